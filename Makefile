@@ -1,0 +1,64 @@
+# Every verb sets up what it needs; a fresh machine has cargo, python3 (3.11 or later) and make.
+
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUST := $(shell find src crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
+# Sets and dictionaries of words keep one order in every run.
+export PYTHONHASHSEED := 0
+
+.PHONY: help demo test test-rust test-python test-long lint bench build clean
+
+help: ## list the verbs
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
+
+demo: $(VENV)/.native ## the whole job on a recording with a known truth; report in demo/report.html
+	$(BIN)/granulcal demo --out demo
+
+test: test-rust test-python ## everything that ends within minutes
+
+test-rust:
+	cargo test --workspace --locked
+
+test-python: $(VENV)/.native
+	$(BIN)/python -m pytest -m "not slow"
+
+test-long: $(VENV)/.native ## every test, the slow ones too
+	cargo test --workspace --locked --release -- --include-ignored
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/.deps ## format, lints, types, spelling, documentation, licences
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --locked -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+	cargo deny --version >/dev/null 2>&1 || cargo install cargo-deny --locked
+	cargo deny --workspace check bans licenses sources
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/pyright
+	$(BIN)/typos
+
+bench: ## criterion benchmarks; see benches/README.md
+	cargo bench --locked
+
+build: $(VENV)/.native ## the command line (target/release/granulcal-cli) and the Python package
+	cargo build --release --locked -p granulcal-cli
+
+clean: ## remove what was built, not what was measured
+	rm -rf target $(VENV) python/granulcal/_native.abi3.so
+
+# The environment: dependencies change with pyproject.toml only.
+$(VENV)/.deps: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --editable ".[dev]"
+	touch $@
+
+# The extension: rebuilt when Rust changes, without asking the network.
+$(VENV)/.native: $(VENV)/.deps $(RUST)
+	VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --locked
+	touch $@

@@ -1,0 +1,288 @@
+//! The arguments: clap types and nothing else.
+
+use std::path::PathBuf;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand};
+use granulcal_dataset::Shard;
+use granulcal_dem::Preset;
+
+use crate::commands::completions::CompletionsArgs;
+
+/// Calibrates a granular simulator from depth images: pours grains, looks at them, describes them.
+#[derive(Debug, Parser)]
+#[command(name = "granulcal-cli", version, propagate_version = true, arg_required_else_help = true)]
+#[command(after_help = "\
+Start here:
+  granulcal-cli simulate funnel                       one pour, its health and its 16 statistics
+  granulcal-cli generate funnel default -n 100 -o d   100 pours with unknown material, as Parquet
+  granulcal-cli features pile.npz                     the same statistics of a measured pile
+
+Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy or without
+grains in view, 130 stopped. Results go to stdout, progress and messages to stderr.")]
+pub struct Cli {
+    #[command(flatten)]
+    pub global: Global,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Options that every command takes.
+#[derive(Clone, Debug, Args)]
+pub struct Global {
+    /// No progress and no messages but errors
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    /// More messages; twice for all
+    #[arg(long, short, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
+    pub verbose: u8,
+}
+
+/// What can be done.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    Simulate(SimulateArgs),
+    Generate(GenerateArgs),
+    Render(RenderArgs),
+    Features(FeaturesArgs),
+    Inspect(InspectArgs),
+    Merge(MergeArgs),
+    Completions(CompletionsArgs),
+}
+
+/// Which scene, with which changes.
+#[derive(Clone, Debug, Args)]
+pub struct SceneArgs {
+    /// Scene as TOML, or one of the words `funnel` and `drop` for the scenes that are built in
+    pub scene: PathBuf,
+    /// Set a number of the scene by its path, for example material.sliding_friction=0.5; repeat as needed
+    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_change)]
+    pub changes: Vec<(String, f64)>,
+    /// Solver preset instead of the scene's
+    #[arg(long, value_parser = PossibleValuesParser::new(Preset::ALL.map(Preset::name))
+        .try_map(|word| word.parse::<Preset>()))]
+    pub preset: Option<Preset>,
+}
+
+fn parse_change(text: &str) -> Result<(String, f64), String> {
+    let (path, value) = text.split_once('=').ok_or("must be PATH=VALUE")?;
+    let value =
+        value.trim().parse().map_err(|_| format!("value must be a number, got {value:?}"))?;
+    Ok((path.trim().to_owned(), value))
+}
+
+/// Simulate one pour: status, health and statistics
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Simulates one pour to its end and prints how it ended, whether it can be trusted and the 16
+statistics of its depth image.
+
+The same scene, numbers and seed give the same result on any machine. The row of a data set
+is made again by setting its parameters and its seed.
+
+Example:
+  granulcal-cli simulate funnel --set material.sliding_friction=0.5 --seed 1 --json
+  granulcal-cli simulate examples/drop.toml --mcap drop.mcap --positions grains.npy")]
+pub struct SimulateArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Seed of the grains' jitter at the start and of the camera's noise
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Cores for the one pour; only very large scenes gain, and none changes by a bit
+    #[arg(long, default_value_t = 1)]
+    pub threads: usize,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+    /// Write the final centres [m] as an array (n, 3)
+    #[arg(long, value_name = "OUT.npy")]
+    pub positions: Option<PathBuf>,
+    /// Write the final depth image (16-bit PNG), or the height map of an orthographic camera (.npz)
+    #[arg(long, value_name = "OUT.png")]
+    pub depth: Option<PathBuf>,
+    /// Metres per count of the PNG
+    #[arg(long, default_value_t = granulcal_dataset::png::DEPTH_UNIT, value_name = "METRES")]
+    pub depth_unit: f64,
+    /// Write grains and depth image over time, for Foxglove
+    #[arg(long, value_name = "OUT.mcap")]
+    pub mcap: Option<PathBuf>,
+    /// Frames per simulated second in the MCAP
+    #[arg(long, default_value_t = 60.0, requires = "mcap")]
+    pub fps: f64,
+}
+
+/// Simulate many pours with parameters drawn from a prior, to Parquet
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Draws parameters from a prior, simulates a pour for each draw and writes one row a pour:
+parameters, seed, status, health and the 16 statistics, as Parquet.
+
+Row i depends on the scene, the prior, the seed and i only. Stop it at any moment, also by
+pulling the plug, and start it again with the same arguments: the rows are the same as
+without the stop. A larger -n continues the same data set. Shards of several machines, each
+in a folder of its own, are joined by `merge`.
+
+Example:
+  granulcal-cli generate examples/funnel.toml examples/prior.toml -n 1000 --seed 1 -o data/
+  granulcal-cli generate funnel default -n 1000 --shard 0/4 -o shard-0/")]
+pub struct GenerateArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Prior as TOML, or the word `default` for the friction, rolling friction and restitution of a dry grain
+    pub prior: PathBuf,
+    /// Rows of the whole data set
+    #[arg(long = "rows", short = 'n', default_value_t = 1000)]
+    pub rows: u64,
+    /// Folder to write into
+    #[arg(long = "out", short = 'o', value_name = "DIR")]
+    pub out: PathBuf,
+    /// Seed of the data set
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Make the i-th of k parts only, counted from 0
+    #[arg(long, value_name = "I/K", default_value = "0/1")]
+    pub shard: Shard,
+    /// Pours at once [default: all cores]
+    #[arg(long)]
+    pub threads: Option<usize>,
+    /// Rows in a part
+    #[arg(long, default_value_t = 16)]
+    pub chunk: u64,
+    /// Refuse a folder that holds rows already
+    #[arg(long)]
+    pub no_resume: bool,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Simulate or take grains and write the depth image that the scene's camera sees
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Writes the image that the scene's camera delivers, down-sampled and with the scene's noise:
+a 16-bit PNG of depth with the camera's TOML beside it, or an .npz height map for an
+orthographic camera. Both can be read back by `features`.
+
+Example:
+  granulcal-cli render funnel --seed 1 -o pile.png && granulcal-cli features pile.png --camera pile.toml
+  granulcal-cli render funnel --positions grains.npy -o pile.png")]
+pub struct RenderArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Image to write: .png for a pinhole camera, .npz for an orthographic one
+    #[arg(long = "out", short = 'o')]
+    pub out: PathBuf,
+    /// Render these centres [m], an array (n, 3), with the scene's grain diameter, instead of a pour
+    #[arg(long, value_name = "IN.npy")]
+    pub positions: Option<PathBuf>,
+    /// Seed of the pour and of the camera's noise
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Metres per count of the PNG
+    #[arg(long, default_value_t = granulcal_dataset::png::DEPTH_UNIT, value_name = "METRES")]
+    pub depth_unit: f64,
+}
+
+/// Segment and describe a measured height map or depth image
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Finds the ground plane of a measured recording, levels it, takes the points above it and
+prints the same 16 statistics that simulated pours have.
+
+RECORDING is an .npz height map (arrays depthmap, xres, yres, zres, scale), a 16-bit depth
+PNG, or a folder of PNGs of one pile, which are averaged. PNGs need --camera: the TOML of
+lens, depth unit and segmentation.
+
+Example:
+  granulcal-cli features pile.npz --threshold 0.002
+  granulcal-cli features frames/ --camera examples/camera.toml --json
+  granulcal-cli features --list")]
+pub struct FeaturesArgs {
+    /// Recording to describe
+    #[arg(required_unless_present = "list")]
+    pub recording: Option<PathBuf>,
+    /// TOML of the camera that took a depth image
+    #[arg(long, value_name = "CAMERA.toml")]
+    pub camera: Option<PathBuf>,
+    /// Height above the ground from which a pixel counts as grain [m]
+    #[arg(long, value_name = "METRES")]
+    pub threshold: Option<f64>,
+    /// Ignore a frame of so many pixels
+    #[arg(long, value_name = "PIXELS")]
+    pub border: Option<usize>,
+    /// Keep the middle pixel of every n x n block
+    #[arg(long, value_name = "N")]
+    pub downsample: Option<usize>,
+    /// Height above which a pixel is a fault and no data [m]
+    #[arg(long, value_name = "METRES")]
+    pub max_height: Option<f64>,
+    /// Grains must form patches of at least so many pixels
+    #[arg(long, value_name = "PIXELS")]
+    pub min_component: Option<usize>,
+    /// Write the points of the formation [m] as an array (n, 3)
+    #[arg(long, value_name = "OUT.npy")]
+    pub points: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+    /// List the statistics with unit and meaning
+    #[arg(long, conflicts_with_all = ["recording", "camera"])]
+    pub list: bool,
+}
+
+/// Say what is in a scene, prior, data set, recording or MCAP file
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Says what is in a file or folder: a scene, prior or camera (.toml), a data set (folder or
+.parquet), an array or height map (.npy, .npz), an image (.png) or a recording over time
+(.mcap). The whole file is read, so a damaged one is found.
+
+Example:
+  granulcal-cli inspect data/
+  granulcal-cli inspect drop.mcap --json")]
+pub struct InspectArgs {
+    /// File or folder
+    pub path: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Join shards of a data set into one Parquet file
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Joins folders and files of one data set (same scene, prior, seed and version) into one
+Parquet file, in order of the rows. A row that stands in two of them is an error.
+
+Example:
+  granulcal-cli merge shard-0/ shard-1/ -o data.parquet")]
+pub struct MergeArgs {
+    /// Folders of `generate`, or Parquet files
+    #[arg(required = true)]
+    pub inputs: Vec<PathBuf>,
+    /// File to write
+    #[arg(long = "out", short = 'o', value_name = "OUT.parquet")]
+    pub out: PathBuf,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn changes_are_read_from_text() {
+        assert_eq!(parse_change("a.b = 0.5"), Ok(("a.b".to_owned(), 0.5)));
+        assert!(parse_change("a.b").is_err() && parse_change("a=b").is_err());
+    }
+}

@@ -1,0 +1,29 @@
+//! One file per command; here only the dispatch.
+
+pub mod completions;
+mod features;
+mod generate;
+mod inspect;
+mod merge;
+mod render;
+mod simulate;
+
+use crate::args::Command;
+use crate::context::Context;
+use crate::outcome::Outcome;
+
+/// Runs a command.
+///
+/// # Errors
+/// Whatever went wrong, to be printed once.
+pub fn dispatch(context: &Context, command: Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::Simulate(args) => simulate::run(context, &args),
+        Command::Generate(args) => generate::run(context, &args),
+        Command::Render(args) => render::run(context, &args),
+        Command::Features(args) => features::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Merge(args) => merge::run(&args),
+        Command::Completions(args) => completions::run(&args),
+    }
+}

@@ -1,0 +1,189 @@
+//! `inspect`: what is in a file.
+
+use std::path::Path;
+
+use anyhow::anyhow;
+use granulcal_dataset::{
+    CameraFile, Dataset, DatasetError, Npz, Prior, load_prior, load_scene, npy, png, summarize_mcap,
+};
+use granulcal_dem::Scene;
+use serde_json::{Value, json};
+
+use crate::args::InspectArgs;
+use crate::context::{print_json, print_line};
+use crate::outcome::{BadArgument, Outcome};
+
+/// How many missing rows are named.
+const NAMED_GAPS: usize = 5;
+
+pub fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
+    let facts = inspect(&args.path)?;
+    if args.json {
+        print_json(&facts)?;
+    } else {
+        for line in lines(&facts, "") {
+            print_line(&line)?;
+        }
+    }
+    Ok(Outcome::Done)
+}
+
+fn inspect(path: &Path) -> anyhow::Result<Value> {
+    if path.is_dir() {
+        return Ok(dataset_facts(&Dataset::open(path)?));
+    }
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    match ending.as_str() {
+        "parquet" => Ok(dataset_facts(&Dataset::open(path)?)),
+        "toml" => toml_facts(path),
+        "npy" => {
+            let array = npy::read(path)?;
+            let mut facts = json!({ "kind": "array", "shape": array.shape });
+            add_range(&mut facts, &array.values);
+            Ok(facts)
+        }
+        "npz" => npz_facts(path),
+        "png" => png_facts(path),
+        "mcap" => mcap_facts(path),
+        other => {
+            let found = if other.is_empty() { "no ending" } else { other };
+            let allowed = "a folder or .parquet, .toml, .npy, .npz, .png, .mcap";
+            let path = path.display();
+            Err(BadArgument(format!("{path}: must be {allowed}, found {found}")).into())
+        }
+    }
+}
+
+fn dataset_facts(dataset: &Dataset) -> Value {
+    json!({
+        "kind": "data set",
+        "rows": dataset.rows.len(),
+        "missing": dataset.gaps(NAMED_GAPS),
+        "status": dataset.status_counts(),
+        "seed": dataset.header.seed,
+        "version": dataset.header.version,
+        "cpu_s": dataset.rows.iter().map(|row| row.cpu_s).sum::<f64>(),
+        "scene": scene_facts(&dataset.header.scene),
+        "prior": prior_facts(&dataset.header.prior),
+    })
+}
+
+fn scene_facts(scene: &Scene) -> Value {
+    json!({
+        "name": scene.name,
+        "preset": scene.preset.name(),
+        "grains": scene.grains.count,
+        "diameter_m": scene.grains.diameter,
+        "material": scene.material,
+        "funnel": scene.funnel.is_some(),
+        "walls": scene.walls.len(),
+    })
+}
+
+fn prior_facts(prior: &Prior) -> Value {
+    let describe = |p: &granulcal_dataset::Parameter| {
+        (p.path.clone(), Value::from(format!("{:?}", p.distribution)))
+    };
+    prior.parameters().iter().map(describe).collect::<serde_json::Map<_, _>>().into()
+}
+
+/// A .toml can be any of three things: the first that reads it wins, else all three say why not.
+fn toml_facts(path: &Path) -> anyhow::Result<Value> {
+    let with_kind = |kind: &str, mut facts: Value| {
+        facts["kind"] = kind.into();
+        facts
+    };
+    let scene = match load_scene(path) {
+        Ok(scene) => return Ok(with_kind("scene", scene_facts(&scene))),
+        Err(error @ DatasetError::Io { .. }) => return Err(error.into()),
+        Err(error) => anyhow!(error),
+    };
+    let prior = match load_prior(path) {
+        Ok(prior) => return Ok(with_kind("prior", prior_facts(&prior))),
+        Err(error) => anyhow!(error),
+    };
+    let camera = match CameraFile::load(path) {
+        Ok(camera) => return Ok(with_kind("camera", serde_json::to_value(camera)?)),
+        Err(error) => anyhow!(error),
+    };
+    let path = path.display();
+    Err(BadArgument(format!(
+        "{path} is no scene, prior or camera\nas a scene: {scene:#}\nas a prior: {prior:#}\nas a camera: {camera:#}"
+    ))
+    .into())
+}
+
+fn npz_facts(path: &Path) -> anyhow::Result<Value> {
+    let mut archive = Npz::open(path)?;
+    let mut facts = json!({ "kind": "arrays", "names": archive.names() });
+    if archive.names().iter().any(|name| name == "depthmap") {
+        let map = archive.height_map()?;
+        facts["kind"] = "height map".into();
+        facts["width"] = map.width.into();
+        facts["height"] = map.height.into();
+        facts["resolution_m"] = json!([map.resolution_x, map.resolution_y]);
+        add_range(&mut facts, &map.z);
+    }
+    Ok(facts)
+}
+
+fn png_facts(path: &Path) -> anyhow::Result<Value> {
+    match png::read_depth(path, 1.0) {
+        Ok(image) => {
+            let mut facts =
+                json!({ "kind": "depth image", "width": image.width, "height": image.height });
+            let valid: Vec<_> =
+                image.depth.iter().filter(|d| **d > 0.0).map(|d| f64::from(*d)).collect();
+            facts["pixels without data"] = (image.depth.len() - valid.len()).into();
+            add_range(&mut facts, &valid);
+            facts["unit"] = "counts; the camera's TOML says how many metres".into();
+            Ok(facts)
+        }
+        Err(DatasetError::Content { .. }) => {
+            let image = png::read_colour(path)?;
+            Ok(json!({ "kind": "colour image", "width": image.width, "height": image.height }))
+        }
+        Err(other) => Err(other.into()),
+    }
+}
+
+fn mcap_facts(path: &Path) -> anyhow::Result<Value> {
+    let summary = summarize_mcap(path)?;
+    let topic = |t: granulcal_dataset::Topic| {
+        (t.topic, json!({ "schema": t.schema, "encoding": t.encoding, "messages": t.messages }))
+    };
+    Ok(json!({
+        "kind": "recording over time",
+        "start_s": summary.start_s,
+        "end_s": summary.end_s,
+        "topics": summary.topics.into_iter().map(topic).collect::<serde_json::Map<_, _>>(),
+    }))
+}
+
+/// Smallest and largest finite value, and how many are not finite.
+fn add_range(facts: &mut Value, values: &[f64]) {
+    let finite = || values.iter().copied().filter(|v| v.is_finite());
+    facts["not finite"] = (values.len() - finite().count()).into();
+    if finite().next().is_some() {
+        let (low, high) =
+            (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
+        facts["range"] = json!([low, high]);
+    }
+}
+
+/// A JSON object as indented lines.
+fn lines(value: &Value, indent: &str) -> Vec<String> {
+    let Value::Object(entries) = value else { return vec![format!("{indent}{value}")] };
+    let mut lines = Vec::new();
+    for (key, value) in entries {
+        match value {
+            Value::Object(_) => {
+                lines.push(format!("{indent}{key}:"));
+                lines.extend(self::lines(value, &format!("{indent}  ")));
+            }
+            Value::String(text) => lines.push(format!("{indent}{key}: {text}")),
+            other => lines.push(format!("{indent}{key}: {other}")),
+        }
+    }
+    lines
+}

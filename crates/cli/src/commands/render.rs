@@ -1,0 +1,75 @@
+//! `render`: the image that the scene's camera delivers.
+
+use std::path::Path;
+
+use granulcal_dataset::{CameraFile, View, look, npy, png, write_height_map};
+use granulcal_dem::{Projection, Scene};
+
+use crate::args::RenderArgs;
+use crate::context::{Context, print_line};
+use crate::outcome::{BadArgument, Outcome};
+use crate::scene;
+
+pub fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
+    let scene = scene::load(&args.scene)?;
+    check_name(&args.out, &scene)?;
+    let (positions, radii) = match &args.positions {
+        Some(path) => {
+            let positions = npy::read_points(path)?;
+            let radii = vec![scene.grains.radius(); positions.len()];
+            (positions, radii)
+        }
+        None => match scene::pour(context, &scene, args.seed, 1, None)? {
+            Some(pour) => (pour.positions, pour.radii),
+            None => return Ok(Outcome::Stopped),
+        },
+    };
+    let view = look(&scene.camera, &positions, &radii, args.seed)?;
+    write_view(&args.out, &view, args.depth_unit)?;
+    print_line(&match &view {
+        View::Depth(_, image) => {
+            let (path, camera) = (args.out.display(), args.out.with_extension("toml"));
+            format!(
+                "{path}: {}x{} depths, camera in {}",
+                image.width,
+                image.height,
+                camera.display()
+            )
+        }
+        View::Heights(map) => {
+            format!("{}: {}x{} heights", args.out.display(), map.width, map.height)
+        }
+    })?;
+    Ok(Outcome::Done)
+}
+
+/// Refuses a file name whose ending does not go with the scene's camera, before anything is simulated.
+///
+/// # Errors
+/// [`BadArgument`].
+pub fn check_name(path: &Path, scene: &Scene) -> Result<(), BadArgument> {
+    let (kind, ending) = match scene.camera.projection {
+        Projection::Pinhole => ("a pinhole camera", "png"),
+        Projection::Orthographic => ("an orthographic camera", "npz"),
+    };
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
+        return Ok(());
+    }
+    let path = path.display();
+    Err(BadArgument(format!("{path}: the image of {kind} must be named .{ending}")))
+}
+
+/// Writes a depth image with its camera beside it, or a height map.
+///
+/// # Errors
+/// What the file system or a depth unit that is too small says.
+pub fn write_view(path: &Path, view: &View, depth_unit: f64) -> anyhow::Result<()> {
+    match view {
+        View::Depth(camera, image) => {
+            png::write_depth(path, image, depth_unit)?;
+            CameraFile::of(camera, depth_unit).save(&path.with_extension("toml"))?;
+        }
+        View::Heights(map) => write_height_map(path, map)?,
+    }
+    Ok(())
+}

@@ -1,0 +1,117 @@
+//! `simulate`: one pour.
+
+use std::time::Instant;
+
+use anyhow::Context as _;
+use cpu_time::ProcessTime;
+use granulcal_dataset::{DatasetError, RowStatus, npy, observe};
+use granulcal_dem::{Health, Pour, Scene};
+use granulcal_features::PAPER16;
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use super::render::{check_name, write_view};
+use crate::args::SimulateArgs;
+use crate::context::{Context, print_json, print_line};
+use crate::outcome::Outcome;
+use crate::scene::{self, Film};
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    scene: String,
+    seed: u64,
+    status: &'static str,
+    health: Health,
+    cpu_s: f64,
+    wall_s: f64,
+    simulated_s: f64,
+    /// Null with too few grains in view.
+    statistics: Option<Map<String, Value>>,
+}
+
+pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
+    let scene = scene::load(&args.scene)?;
+    if let Some(path) = &args.depth {
+        check_name(path, &scene)?;
+    }
+    let (clock, start) = (ProcessTime::now(), Instant::now());
+    let film = args.mcap.as_deref().map(|path| Film { path, fps: args.fps });
+    let Some(pour) = scene::pour(context, &scene, args.seed, args.threads, film.as_ref())? else {
+        tracing::warn!("stopped; nothing was written");
+        return Ok(Outcome::Stopped);
+    };
+    let mut report = Report {
+        scene: scene.name.clone(),
+        seed: args.seed,
+        status: pour.status.name(),
+        health: pour.health,
+        cpu_s: 0.0,
+        wall_s: 0.0,
+        simulated_s: pour.simulated_s,
+        statistics: None,
+    };
+    let status = describe(&scene, &pour, args, &mut report)?;
+    report.cpu_s = clock.elapsed().as_secs_f64();
+    report.wall_s = start.elapsed().as_secs_f64();
+    if let Some(path) = &args.positions {
+        npy::write_points(path, &pour.positions).context("writing --positions")?;
+    }
+    print(&report, args.json)?;
+    Ok(Outcome::healthy_if(status.is_healthy()))
+}
+
+/// Looks at the pour and fills in the statistics; writes the image if asked.
+fn describe(
+    scene: &Scene,
+    pour: &Pour,
+    args: &SimulateArgs,
+    report: &mut Report,
+) -> anyhow::Result<RowStatus> {
+    let status = RowStatus::Pour(pour.status);
+    let seen = match observe(&scene.camera, pour, args.seed) {
+        // The grains of an unhealthy pour can be anywhere: the status says enough.
+        Err(DatasetError::Features(reason)) if !status.is_healthy() => {
+            tracing::warn!("no statistics: {reason}");
+            return Ok(status);
+        }
+        other => other?,
+    };
+    if let Some(path) = &args.depth {
+        write_view(path, &seen.view, args.depth_unit).context("writing --depth")?;
+    }
+    match seen.statistics {
+        Ok(values) => {
+            let named = PAPER16.iter().zip(values);
+            report.statistics =
+                Some(named.map(|(s, value)| (s.name.to_owned(), Value::from(value))).collect());
+            Ok(status)
+        }
+        Err(reason) => {
+            tracing::warn!("{reason}");
+            let status = if status.is_healthy() { RowStatus::NoGrainsInView } else { status };
+            report.status = status.name();
+            Ok(status)
+        }
+    }
+}
+
+fn print(report: &Report, json: bool) -> anyhow::Result<()> {
+    if json {
+        return print_json(report);
+    }
+    let Report { health, .. } = report;
+    print_line(&format!("scene              {} (seed {})", report.scene, report.seed))?;
+    print_line(&format!("status             {}", report.status))?;
+    print_line(&format!("simulated          {:.3} s", report.simulated_s))?;
+    print_line(&format!("wall, cpu          {:.2} s, {:.2} s", report.wall_s, report.cpu_s))?;
+    print_line(&format!("worst penetration  {:.4} radii", health.worst_penetration))?;
+    print_line(&format!("energy created     {:.2e}", health.energy_created))?;
+    print_line(&format!("grains lost        {}", health.grains_lost))?;
+    let Some(statistics) = &report.statistics else { return Ok(()) };
+    for statistic in &PAPER16 {
+        let value = statistics.get(statistic.name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+        print_line(&format!("{:<18} {value:<12.6} {}", statistic.name, statistic.unit))?;
+    }
+    Ok(())
+}

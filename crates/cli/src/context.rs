@@ -1,0 +1,73 @@
+//! What every command gets: how loud to be, and whether the user wants to stop.
+
+use std::io::{self, IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::Serialize;
+use tracing_subscriber::filter::LevelFilter;
+
+use crate::args::Global;
+
+/// Set by Ctrl-C and by termination signals. One for the process, as the signals are.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// Options and state that all commands share.
+#[derive(Debug)]
+pub struct Context {
+    /// No progress, no messages.
+    pub quiet: bool,
+    /// Whether somebody looks at stderr.
+    pub terminal: bool,
+}
+
+impl Context {
+    /// Sets up logging to stderr and the handler of Ctrl-C.
+    pub fn new(global: &Global) -> Self {
+        let level = match (global.quiet, global.verbose) {
+            (true, _) => LevelFilter::ERROR,
+            (false, 0) => LevelFilter::INFO,
+            (false, 1) => LevelFilter::DEBUG,
+            (false, _) => LevelFilter::TRACE,
+        };
+        let terminal = io::stderr().is_terminal();
+        // A second call in one process (the wheel's) keeps what the first set up.
+        let _ = tracing_subscriber::fmt()
+            .with_max_level(level)
+            .with_writer(io::stderr)
+            .with_ansi(terminal)
+            .without_time()
+            .with_target(false)
+            .try_init();
+        STOP.store(false, Ordering::Relaxed);
+        let _ = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));
+        Self { quiet: global.quiet, terminal }
+    }
+}
+
+/// Whether the user has not asked to stop.
+pub fn keeps_going() -> bool {
+    !STOP.load(Ordering::Relaxed)
+}
+
+/// Prints a line to stderr. If even that is closed there is no one left to tell.
+pub fn note(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// Prints a line of results.
+///
+/// # Errors
+/// What stdout says, a broken pipe above all.
+pub fn print_line(line: &str) -> anyhow::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{line}")?;
+    Ok(out.flush()?)
+}
+
+/// Prints one JSON object.
+///
+/// # Errors
+/// As [`print_line`].
+pub fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
+    print_line(&serde_json::to_string_pretty(value)?)
+}

@@ -1,0 +1,54 @@
+//! The command line of granulcal.
+//!
+//! Results go to stdout, progress and messages to stderr. Exit codes are a contract:
+//!
+//! | code | meaning |
+//! |---|---|
+//! | 0 | done; also when whoever read stdout closed it |
+//! | 1 | failed: a disk that is full, a folder in use |
+//! | 2 | bad arguments or bad input |
+//! | 3 | done, but some pours are unhealthy or show no grains |
+//! | 130 | stopped by Ctrl-C or a termination signal; finished rows are kept |
+
+mod args;
+mod commands;
+mod context;
+mod outcome;
+mod progress;
+mod scene;
+
+use std::ffi::OsString;
+
+use clap::Parser;
+
+use args::Cli;
+use context::Context;
+use outcome::Outcome;
+
+/// Runs one command line, the name of the program first, and returns its exit code.
+///
+/// ```
+/// let args = ["granulcal-cli", "features", "--list"].map(Into::into);
+/// assert_eq!(granulcal_cli::run(args), 0);
+/// ```
+pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(refusal) => {
+            // Help and version are no failures; if even stderr is closed there is no one to tell.
+            let _ = refusal.print();
+            return refusal.exit_code() as u8;
+        }
+    };
+    let context = Context::new(&cli.global);
+    match commands::dispatch(&context, cli.command) {
+        Ok(outcome) => outcome.exit_code(),
+        Err(error) => {
+            let code = outcome::exit_code_of(&error);
+            if code != Outcome::Done.exit_code() {
+                context::note(&format!("error: {error:#}"));
+            }
+            code
+        }
+    }
+}

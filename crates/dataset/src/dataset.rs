@@ -1,0 +1,143 @@
+//! A data set as a whole, read from a folder of parts or from one file.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use granulcal_features::PAPER16;
+
+use crate::header::Header;
+use crate::manifest::{self, Manifest};
+use crate::row::Row;
+use crate::{DatasetError, table};
+
+/// All rows of a data set, in order of their index.
+#[derive(Clone, Debug)]
+pub struct Dataset {
+    /// Scene, prior, seed and version.
+    pub header: Header,
+    /// The rows; an unfinished data set has gaps in the indices.
+    pub rows: Vec<Row>,
+}
+
+impl Dataset {
+    /// Reads a folder that [`crate::generate`] made, or one Parquet file.
+    ///
+    /// # Errors
+    /// [`DatasetError::Io`], [`DatasetError::Parquet`] or [`DatasetError::Content`] name the file
+    /// and what is wrong with it; [`DatasetError::Differs`] for parts of different data sets.
+    pub fn open(path: &Path) -> Result<Self, DatasetError> {
+        if !path.is_dir() {
+            let (header, rows) = table::read(path)?;
+            let mut dataset = Self { header, rows };
+            dataset.sort(path)?;
+            return Ok(dataset);
+        }
+        let Some(manifest) = Manifest::read(path)? else {
+            let allowed = "present in the folder of a data set";
+            return Err(DatasetError::content(path, manifest::NAME, "none", allowed));
+        };
+        let mut dataset = Self { header: manifest.header, rows: Vec::new() };
+        for chunk in manifest::parts(path)? {
+            let part = manifest::part_path(path, chunk);
+            let (header, rows) = table::read(&part)?;
+            dataset.header.require_same(&part, &header)?;
+            dataset.rows.extend(rows);
+        }
+        dataset.sort(path)?;
+        Ok(dataset)
+    }
+
+    fn sort(&mut self, path: &Path) -> Result<(), DatasetError> {
+        self.rows.sort_by_key(|row| row.row);
+        match self.rows.windows(2).find(|pair| pair[0].row == pair[1].row) {
+            None => Ok(()),
+            Some(pair) => {
+                let (first, second) = (path.to_owned(), path.to_owned());
+                Err(DatasetError::DuplicateRow { row: pair[0].row, first, second })
+            }
+        }
+    }
+
+    /// Writes the data set as one Parquet file.
+    ///
+    /// # Errors
+    /// [`DatasetError::Io`] or [`DatasetError::Parquet`].
+    pub fn write(&self, path: &Path) -> Result<(), DatasetError> {
+        table::write(path, &self.header, &self.rows)
+    }
+
+    /// Paths of the parameters that vary, the columns of [`Dataset::theta`].
+    pub fn theta_names(&self) -> Vec<&str> {
+        let names = self.header.prior.names();
+        self.header.prior.free().into_iter().map(|i| names[i]).collect()
+    }
+
+    /// Values of the parameters that vary, row by row, shape `[n, p]`.
+    pub fn theta(&self) -> Vec<f64> {
+        let free = self.header.prior.free();
+        self.rows.iter().flat_map(|row| free.iter().map(|&i| row.parameters[i])).collect()
+    }
+
+    /// Names of the statistics, the columns of [`Dataset::x`].
+    pub fn x_names() -> [&'static str; 16] {
+        PAPER16.map(|statistic| statistic.name)
+    }
+
+    /// The statistics, row by row, shape `[n, 16]`; NaN where no grains were in view.
+    pub fn x(&self) -> Vec<f64> {
+        self.rows.iter().flat_map(|row| row.statistics).collect()
+    }
+
+    /// How many rows ended in each status, by its word.
+    pub fn status_counts(&self) -> BTreeMap<&'static str, usize> {
+        let mut counts = BTreeMap::new();
+        for row in &self.rows {
+            *counts.entry(row.status.name()).or_insert(0) += 1;
+        }
+        counts
+    }
+
+    /// The first rows that are missing below the highest index, at most `limit` of them.
+    pub fn gaps(&self, limit: usize) -> Vec<u64> {
+        let mut expected = 0;
+        let mut gaps = Vec::new();
+        for row in &self.rows {
+            gaps.extend((expected..row.row).take(limit - gaps.len().min(limit)));
+            expected = row.row + 1;
+        }
+        gaps
+    }
+}
+
+/// Joins data sets of one scene, prior, seed and version, for example the shards of several machines.
+///
+/// # Errors
+/// [`DatasetError::Differs`] names the first difference, [`DatasetError::DuplicateRow`] a row that
+/// stands in two of them, [`DatasetError::Argument`] for no input; else as [`Dataset::open`].
+pub fn merge(inputs: &[PathBuf]) -> Result<Dataset, DatasetError> {
+    let mut merged: Option<Dataset> = None;
+    let mut origin: BTreeMap<u64, &Path> = BTreeMap::new();
+    for input in inputs {
+        let dataset = Dataset::open(input)?;
+        if let Some(merged) = &merged {
+            dataset.header.require_same(input, &merged.header)?;
+        }
+        for row in &dataset.rows {
+            if let Some(first) = origin.insert(row.row, input) {
+                let (first, second) = (first.to_owned(), input.clone());
+                return Err(DatasetError::DuplicateRow { row: row.row, first, second });
+            }
+        }
+        match &mut merged {
+            None => merged = Some(dataset),
+            Some(merged) => merged.rows.extend(dataset.rows),
+        }
+    }
+    let mut merged = merged.ok_or(DatasetError::Argument {
+        what: "the number of data sets to merge",
+        got: "0".to_owned(),
+        allowed: "at least 1",
+    })?;
+    merged.rows.sort_by_key(|row| row.row);
+    Ok(merged)
+}

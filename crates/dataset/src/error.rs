@@ -1,0 +1,216 @@
+//! The one error type of the crate.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use granulcal_dem::DemError;
+use granulcal_features::FeatureError;
+
+/// Why a file, a prior or a batch was refused, or could not be written.
+///
+/// Every variant names the thing, what was found and what is allowed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DatasetError {
+    /// The file system refused.
+    #[error("cannot {action} {}", path.display())]
+    Io {
+        /// What was tried: read, write, create, rename, lock, list.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// What stands in a file is not what must stand there.
+    #[error("{}: {what} must be {allowed}, found {found}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// The thing in the file.
+        what: String,
+        /// What was found.
+        found: String,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// A file of TOML is not the TOML of this thing.
+    #[error("{} is not the TOML of a {what}", path.display())]
+    Toml {
+        /// The file.
+        path: PathBuf,
+        /// What it should describe.
+        what: &'static str,
+        /// Where and why.
+        #[source]
+        source: Box<toml::de::Error>,
+    },
+    /// Something could not be written as TOML.
+    #[error("{what} cannot be written as TOML")]
+    TomlWrite {
+        /// The thing.
+        what: &'static str,
+        /// Why.
+        #[source]
+        source: Box<toml::ser::Error>,
+    },
+    /// The text of a prior is not the TOML of a prior.
+    #[error("not the TOML of a prior")]
+    PriorToml(#[source] Box<toml::de::Error>),
+    /// A parameter of a prior is wrong.
+    #[error("prior of {parameter:?}: {what} must be {allowed}, got {got}")]
+    Prior {
+        /// Path of the parameter in the scene.
+        parameter: String,
+        /// The key that is wrong.
+        what: &'static str,
+        /// What was got.
+        got: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// A value that the prior can draw has no place in the scene.
+    #[error("prior of {parameter:?} does not fit the scene at the value {value}")]
+    PriorDoesNotFit {
+        /// Path of the parameter in the scene.
+        parameter: String,
+        /// The value tried.
+        value: f64,
+        /// What the scene says.
+        source: DemError,
+    },
+    /// A number given to a function is out of range.
+    #[error("{what} must be {allowed}, got {got}")]
+    Argument {
+        /// The argument.
+        what: &'static str,
+        /// What was got.
+        got: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// A scene is wrong.
+    #[error("{}: not a scene", path.display())]
+    Scene {
+        /// Where the scene stands.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: DemError,
+    },
+    /// A simulation was refused.
+    #[error("the simulation was refused")]
+    Simulation(#[source] DemError),
+    /// One row of a batch cannot be made.
+    #[error("row {row} of the data set cannot be made")]
+    Row {
+        /// Index of the row.
+        row: u64,
+        /// Why.
+        source: Box<DatasetError>,
+    },
+    /// An image could not be rendered, segmented or described.
+    #[error("the image cannot be used")]
+    Features(#[source] FeatureError),
+    /// A recording could not be segmented or described.
+    #[error("{}: the recording cannot be used", path.display())]
+    Recording {
+        /// The recording.
+        path: PathBuf,
+        /// Why.
+        source: FeatureError,
+    },
+    /// A file is no readable Parquet.
+    #[error("{} is truncated, damaged or no Parquet file", path.display())]
+    Parquet {
+        /// The file.
+        path: PathBuf,
+        /// What the reader or writer said.
+        source: parquet::errors::ParquetError,
+    },
+    /// A file is no readable PNG.
+    #[error("{} is truncated, damaged or no PNG", path.display())]
+    Png {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder or encoder said.
+        source: image::ImageError,
+    },
+    /// A file is no readable npz.
+    #[error("{} is truncated, damaged or no npz archive", path.display())]
+    Npz {
+        /// The file.
+        path: PathBuf,
+        /// What the archive reader or writer said.
+        source: zip::result::ZipError,
+    },
+    /// A file is no readable MCAP.
+    #[error("{} is truncated, damaged or no MCAP file", path.display())]
+    Mcap {
+        /// The file.
+        path: PathBuf,
+        /// What the reader or writer said.
+        source: mcap::McapError,
+    },
+    /// Two things that must be the same differ.
+    #[error("{}: {what} is {found}, but {given} is given; use another folder or the same {what}", path.display())]
+    Differs {
+        /// The folder or file.
+        path: PathBuf,
+        /// What differs.
+        what: String,
+        /// What the file says.
+        found: String,
+        /// What was given.
+        given: String,
+    },
+    /// Another process is writing into the folder.
+    #[error("{}: another generate is writing into this folder", path.display())]
+    Locked {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// One row stands in two data sets that were to be merged.
+    #[error("row {row} stands in {} and in {}", first.display(), second.display())]
+    DuplicateRow {
+        /// Index of the row.
+        row: u64,
+        /// The file it stood in first.
+        first: PathBuf,
+        /// The file it stands in again.
+        second: PathBuf,
+    },
+}
+
+impl DatasetError {
+    /// Whether the input is to blame, and not the machine: wrong arguments and wrong or missing files.
+    pub fn is_bad_input(&self) -> bool {
+        match self {
+            Self::Io { action, source, .. } => {
+                matches!(*action, "read" | "list") || source.kind() == io::ErrorKind::NotFound
+            }
+            Self::TomlWrite { .. } | Self::Locked { .. } => false,
+            Self::Row { source, .. } => source.is_bad_input(),
+            _ => true,
+        }
+    }
+
+    /// An [`DatasetError::Io`], to be used in `map_err`.
+    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { action, path: path.to_owned(), source }
+    }
+
+    /// A [`DatasetError::Content`].
+    pub(crate) fn content(
+        path: &Path,
+        what: impl Into<String>,
+        found: impl Into<String>,
+        allowed: impl Into<String>,
+    ) -> Self {
+        Self::Content {
+            path: path.to_owned(),
+            what: what.into(),
+            found: found.into(),
+            allowed: allowed.into(),
+        }
+    }
+}

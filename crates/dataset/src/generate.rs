@@ -1,0 +1,298 @@
+//! Batches: a scene and a prior to a folder of Parquet parts, stopped and resumed at will.
+//!
+//! Row i depends on the scene, the prior, the seed and i, and on nothing else: not on the number of
+//! threads, of shards, of interruptions. Rows are written in chunks; a part is complete on disk or
+//! absent, so a run that was killed loses the rows in flight and nothing else.
+
+mod folder;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use cpu_time::ThreadTime;
+use granulcal_dem::{Simulation, Status};
+
+use crate::header::Header;
+use crate::manifest;
+use crate::observe::observe;
+use crate::random::pour_seed;
+use crate::row::{Row, RowStatus};
+use crate::{DatasetError, Prior, table};
+use folder::Folder;
+
+/// How long the caller goes unasked at most while pours run.
+const PATIENCE: Duration = Duration::from_millis(100);
+/// Largest seed: manifests are TOML, whose whole numbers have a sign.
+const MAX_SEED: u64 = i64::MAX as u64;
+
+/// Which part of the rows one machine of several makes: chunk c belongs to shard c mod count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 0 to count - 1.
+    pub index: u64,
+    /// How many shards there are.
+    pub count: u64,
+}
+
+impl Shard {
+    /// Everything.
+    pub const WHOLE: Self = Self { index: 0, count: 1 };
+}
+
+impl FromStr for Shard {
+    type Err = DatasetError;
+
+    fn from_str(text: &str) -> Result<Self, DatasetError> {
+        let parse = || {
+            let (index, count) = text.split_once('/')?;
+            let shard = Self { index: index.parse().ok()?, count: count.parse().ok()? };
+            (shard.index < shard.count).then_some(shard)
+        };
+        let allowed = "i/k with whole numbers 0 <= i < k";
+        parse().ok_or(DatasetError::Argument { what: "shard", got: format!("{text:?}"), allowed })
+    }
+}
+
+/// What [`generate`] is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GenerateOptions {
+    /// Rows of the whole data set, over all shards.
+    pub rows: u64,
+    /// Seed of the data set, below 2^63.
+    pub seed: u64,
+    /// Which rows are made here.
+    pub shard: Shard,
+    /// Pours at once.
+    pub threads: usize,
+    /// Rows in a part; a folder keeps the number that it began with.
+    pub chunk: u64,
+    /// Whether rows that are in the folder already are kept; else a folder with rows is refused.
+    pub resume: bool,
+}
+
+impl Default for GenerateOptions {
+    /// 1000 rows on all cores, in parts of 16.
+    fn default() -> Self {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        Self { rows: 1000, seed: 0, shard: Shard::WHOLE, threads, chunk: 16, resume: true }
+    }
+}
+
+/// How far a batch is. Rows count for this shard only.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Progress {
+    /// Rows asked for.
+    pub total: u64,
+    /// Rows that were in the folder already.
+    pub resumed: u64,
+    /// Rows made by this call.
+    pub made: u64,
+    /// Rows, resumed or made, whose numbers cannot be used: unhealthy, or no grains in view.
+    pub unhealthy: u64,
+    /// Rows on disk beyond those asked for, left as they are.
+    pub beyond: u64,
+}
+
+/// What a batch has come to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Summary {
+    /// The counts at the end.
+    pub progress: Progress,
+    /// Whether the caller stopped it before its end; what was made is on disk.
+    pub stopped: bool,
+}
+
+/// Makes the rows that the folder `out` lacks.
+///
+/// `watch` is called on this thread at the start, after each row and at least ten times a second;
+/// it returns whether to go on. When it says no, pours in flight are dropped and finished rows kept.
+///
+/// # Errors
+/// Whatever is wrong with scene, prior or folder, before anything is simulated; then
+/// [`DatasetError::Row`] for a row that cannot be made and [`DatasetError::Io`] for a disk that is
+/// full. Finished rows are kept then too.
+pub fn generate(
+    scene: &granulcal_dem::Scene,
+    prior: &Prior,
+    options: &GenerateOptions,
+    out: &Path,
+    watch: &mut dyn FnMut(&Progress) -> bool,
+) -> Result<Summary, DatasetError> {
+    check(options)?;
+    let header = Header::new(scene, prior, options.seed)?;
+    let folder = Folder::open(out, header, options)?;
+    let plan = folder.plan(options)?;
+    Batch { folder: &folder, chunks: plan.chunks, progress: plan.progress }.run(options, watch)
+}
+
+fn check(options: &GenerateOptions) -> Result<(), DatasetError> {
+    let refuse = |what, got: u64, allowed| {
+        Err(DatasetError::Argument { what, got: got.to_string(), allowed })
+    };
+    if options.rows == 0 {
+        return refuse("the number of rows", 0, "at least 1");
+    }
+    if options.threads == 0 {
+        return refuse("the number of threads", 0, "at least 1");
+    }
+    if options.chunk == 0 {
+        return refuse("the rows in a part", 0, "at least 1");
+    }
+    if options.seed > MAX_SEED {
+        return refuse("the seed", options.seed, "below 2^63");
+    }
+    if options.shard.index >= options.shard.count {
+        return refuse("the index of the shard", options.shard.index, "below the number of shards");
+    }
+    Ok(())
+}
+
+/// A chunk that is not complete: the rows it has and how many it lacks.
+#[derive(Debug)]
+struct OpenChunk {
+    rows: Vec<Row>,
+    missing: Vec<u64>,
+    changed: bool,
+}
+
+/// The collecting side of a batch.
+struct Batch<'a> {
+    folder: &'a Folder,
+    chunks: BTreeMap<u64, OpenChunk>,
+    progress: Progress,
+}
+
+impl Batch<'_> {
+    fn run(
+        mut self,
+        options: &GenerateOptions,
+        watch: &mut dyn FnMut(&Progress) -> bool,
+    ) -> Result<Summary, DatasetError> {
+        let queue: Vec<u64> =
+            self.chunks.values().flat_map(|c| c.missing.iter().copied()).collect();
+        let next = AtomicUsize::new(0);
+        let stop = AtomicBool::new(!watch(&self.progress));
+        let (sender, finished) = channel();
+        let header = &self.folder.header;
+
+        let outcome = std::thread::scope(|scope| {
+            for _ in 0..options.threads.min(queue.len()) {
+                let sender = sender.clone();
+                let (queue, next, stop) = (&queue, &next, &stop);
+                scope.spawn(move || {
+                    let keep_going = || !stop.load(Ordering::Relaxed);
+                    while keep_going() {
+                        let Some(&row) = queue.get(next.fetch_add(1, Ordering::Relaxed)) else {
+                            break;
+                        };
+                        let Some(made) = make_row(header, row, &keep_going).transpose() else {
+                            break;
+                        };
+                        let failed = made.is_err();
+                        if sender.send((row, made)).is_err() || failed {
+                            break;
+                        }
+                    }
+                });
+            }
+            drop(sender);
+            let mut outcome = Ok(());
+            loop {
+                let result = match finished.recv_timeout(PATIENCE) {
+                    Ok((row, made)) => {
+                        let named = made
+                            .map_err(|source| DatasetError::Row { row, source: Box::new(source) });
+                        named.and_then(|row| self.accept(row))
+                    }
+                    Err(RecvTimeoutError::Timeout) => Ok(()),
+                    Err(RecvTimeoutError::Disconnected) => break,
+                };
+                if let (true, Err(error)) = (outcome.is_ok(), result) {
+                    outcome = Err(error);
+                }
+                if outcome.is_err() || !watch(&self.progress) {
+                    stop.store(true, Ordering::Relaxed);
+                }
+            }
+            outcome
+        });
+
+        let flushed = self.flush();
+        outcome.and(flushed)?;
+        let Progress { total, resumed, made, .. } = self.progress;
+        Ok(Summary { progress: self.progress, stopped: resumed + made < total })
+    }
+
+    /// Takes a finished row, and writes its chunk if that was the last one missing.
+    fn accept(&mut self, row: Row) -> Result<(), DatasetError> {
+        let index = row.row / self.folder.chunk;
+        self.progress.made += 1;
+        self.progress.unhealthy += u64::from(!row.status.is_healthy());
+        let Some(chunk) = self.chunks.get_mut(&index) else { return Ok(()) };
+        chunk.missing.retain(|&missing| missing != row.row);
+        chunk.rows.push(row);
+        chunk.changed = true;
+        if chunk.missing.is_empty() {
+            self.write(index)?;
+        }
+        Ok(())
+    }
+
+    /// Writes what was finished of chunks that are not complete.
+    fn flush(&mut self) -> Result<(), DatasetError> {
+        let changed: Vec<u64> =
+            self.chunks.iter().filter(|(_, c)| c.changed).map(|(&index, _)| index).collect();
+        changed.into_iter().try_for_each(|index| self.write(index))
+    }
+
+    fn write(&mut self, index: u64) -> Result<(), DatasetError> {
+        let Some(mut chunk) = self.chunks.remove(&index) else { return Ok(()) };
+        chunk.rows.sort_by_key(|row| row.row);
+        table::write(
+            &manifest::part_path(&self.folder.path, index),
+            &self.folder.header,
+            &chunk.rows,
+        )
+    }
+}
+
+/// Simulates one row, or gives up when told to.
+fn make_row(
+    header: &Header,
+    row: u64,
+    keep_going: &dyn Fn() -> bool,
+) -> Result<Option<Row>, DatasetError> {
+    let start = ThreadTime::now();
+    let parameters = header.prior.sample(header.seed, row);
+    let scene = header.prior.apply(&header.scene, &parameters)?;
+    let seed = pour_seed(header.seed, row);
+    let simulation = Simulation::new(&scene, seed).map_err(DatasetError::Simulation)?;
+    let Some(pour) = simulation.run_while(keep_going) else { return Ok(None) };
+
+    let mut status = RowStatus::Pour(pour.status);
+    let mut statistics = [f64::NAN; 16];
+    match observe(&scene.camera, &pour, seed).map(|seen| seen.statistics) {
+        Ok(Ok(seen)) => statistics = seen,
+        // The grains of an unhealthy pour can be anywhere, NaN included: the status says enough.
+        _ if pour.status == Status::Unhealthy => {}
+        Ok(Err(_)) => status = RowStatus::NoGrainsInView,
+        Err(error) => return Err(error),
+    }
+    Ok(Some(Row {
+        row,
+        parameters,
+        seed,
+        status,
+        simulated_s: pour.simulated_s,
+        health: pour.health,
+        cpu_s: start.elapsed().as_secs_f64(),
+        statistics,
+    }))
+}
+
+#[cfg(test)]
+mod tests;

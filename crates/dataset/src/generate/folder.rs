@@ -1,0 +1,128 @@
+//! The folder of a batch: its lock, its manifest, and what it already holds.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, TryLockError};
+use std::path::{Path, PathBuf};
+
+use super::{GenerateOptions, OpenChunk, Progress};
+use crate::header::Header;
+use crate::manifest::{self, Manifest};
+use crate::random::pour_seed;
+use crate::row::Row;
+use crate::{DatasetError, table};
+
+/// An open folder; nobody else writes into it while this lives.
+#[derive(Debug)]
+pub(super) struct Folder {
+    pub(super) path: PathBuf,
+    pub(super) header: Header,
+    pub(super) chunk: u64,
+    /// The system drops the lock with the file, also when the process is killed.
+    _lock: File,
+}
+
+/// What is left to do.
+#[derive(Debug)]
+pub(super) struct Plan {
+    pub(super) chunks: BTreeMap<u64, OpenChunk>,
+    pub(super) progress: Progress,
+}
+
+impl Folder {
+    /// Opens or creates the folder, refuses one that was made from something else.
+    pub(super) fn open(
+        path: &Path,
+        header: Header,
+        options: &GenerateOptions,
+    ) -> Result<Self, DatasetError> {
+        if path.exists() && !path.is_dir() {
+            return Err(DatasetError::content(path, "the output", "a file", "a folder"));
+        }
+        fs::create_dir_all(path).map_err(DatasetError::io("create", path))?;
+        let lock = lock(path)?;
+        manifest::remove_leftovers(path)?;
+        let parts = manifest::parts(path)?;
+        if !options.resume && !parts.is_empty() {
+            let found = format!("{} parts of a data set", parts.len());
+            return Err(DatasetError::content(path, "the output", found, "empty unless resumed"));
+        }
+        let chunk = match Manifest::read(path)? {
+            Some(manifest) => {
+                manifest.header.require_same(path, &header)?;
+                manifest.chunk
+            }
+            None if parts.is_empty() => {
+                let manifest = Manifest { header: header.clone(), chunk: options.chunk };
+                manifest.write(path)?;
+                manifest.chunk
+            }
+            None => {
+                let found = format!("{} parts without one", parts.len());
+                return Err(DatasetError::content(path, manifest::NAME, found, "present"));
+            }
+        };
+        Ok(Self { path: path.to_owned(), header, chunk, _lock: lock })
+    }
+
+    /// Reads and checks every part, and lists the rows that are missing.
+    pub(super) fn plan(&self, options: &GenerateOptions) -> Result<Plan, DatasetError> {
+        let mut plan = Plan { chunks: BTreeMap::new(), progress: Progress::default() };
+        let parts = manifest::parts(&self.path)?;
+        let wanted = (0..options.rows.div_ceil(self.chunk))
+            .filter(|chunk| chunk % options.shard.count == options.shard.index);
+        for chunk in wanted {
+            let (first, end) = (chunk * self.chunk, ((chunk + 1) * self.chunk).min(options.rows));
+            plan.progress.total += end - first;
+            let rows = match parts.binary_search(&chunk) {
+                Ok(_) => self.read_part(chunk)?,
+                Err(_) => Vec::new(),
+            };
+            let (kept, beyond): (Vec<_>, Vec<_>) = rows.iter().partition(|row| row.row < end);
+            plan.progress.resumed += kept.len() as u64;
+            plan.progress.beyond += beyond.len() as u64;
+            plan.progress.unhealthy +=
+                kept.iter().filter(|row| !row.status.is_healthy()).count() as u64;
+            let missing: Vec<_> =
+                (first..end).filter(|&i| kept.iter().all(|row| row.row != i)).collect();
+            if !missing.is_empty() {
+                plan.chunks.insert(chunk, OpenChunk { rows, missing, changed: false });
+            }
+        }
+        Ok(plan)
+    }
+
+    /// The rows of a part, each checked against what it must have been made from.
+    fn read_part(&self, chunk: u64) -> Result<Vec<Row>, DatasetError> {
+        let path = manifest::part_path(&self.path, chunk);
+        let (header, rows) = table::read(&path)?;
+        header.require_same(&path, &self.header)?;
+        let range = chunk * self.chunk..(chunk + 1) * self.chunk;
+        let allowed = format!("rising within {}..{}", range.start, range.end);
+        let mut last = None;
+        for row in &rows {
+            let index = row.row;
+            if !range.contains(&index) || last.is_some_and(|last| last >= index) {
+                let found = format!("row {index} after {last:?}");
+                return Err(DatasetError::content(&path, "column row", found, allowed));
+            }
+            last = Some(index);
+            let expected = self.header.prior.sample(self.header.seed, index);
+            if row.parameters != expected || row.seed != pour_seed(self.header.seed, index) {
+                let found = format!("{:?}", row.parameters);
+                let what = format!("the parameters of row {index}");
+                return Err(DatasetError::content(&path, what, found, format!("{expected:?}")));
+            }
+        }
+        Ok(rows)
+    }
+}
+
+fn lock(folder: &Path) -> Result<File, DatasetError> {
+    let path = folder.join(".lock");
+    let file = File::create(&path).map_err(DatasetError::io("create", &path))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(DatasetError::Locked { path: folder.to_owned() }),
+        Err(TryLockError::Error(source)) => Err(DatasetError::Io { action: "lock", path, source }),
+    }
+}

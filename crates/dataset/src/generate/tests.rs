@@ -1,0 +1,206 @@
+//! Whatever happens to a batch, its rows are the same.
+
+use std::fs;
+use std::path::PathBuf;
+
+use granulcal_dem::Scene;
+
+use super::*;
+use crate::{Dataset, merge};
+
+/// A handful of grains let go just above the ground: milliseconds a pour.
+fn small() -> Scene {
+    let mut scene = Scene::drop(0.01);
+    scene.set(&[("grains.count", 12.0), ("start.solid_fraction", 0.5)]).unwrap();
+    scene.end.horizon = 0.25;
+    scene.camera.downsample = 8;
+    scene
+}
+
+fn options(rows: u64) -> GenerateOptions {
+    GenerateOptions { rows, seed: 3, threads: 2, chunk: 4, ..GenerateOptions::default() }
+}
+
+/// A folder of its own for each batch of a test.
+struct Place(tempfile::TempDir);
+
+impl Place {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn make(&self, name: &str, options: &GenerateOptions) -> Summary {
+        generate(&small(), &Prior::default(), options, &self.at(name), &mut |_| true).unwrap()
+    }
+}
+
+fn assert_same(a: &Dataset, b: &Dataset) {
+    assert_eq!(a.rows.len(), b.rows.len());
+    for (a, b) in a.rows.iter().zip(&b.rows) {
+        assert!(a.same_as(b), "row {}:\n{a:?}\n{b:?}", a.row);
+    }
+}
+
+#[test]
+fn threads_chunks_shards_and_growth_do_not_change_rows() {
+    let place = Place::new();
+    let summary = place.make("whole", &options(10));
+    assert!(!summary.stopped);
+    assert_eq!((summary.progress.total, summary.progress.made), (10, 10));
+    let whole = Dataset::open(&place.at("whole")).unwrap();
+    assert_eq!(whole.rows.len(), 10);
+    assert!(whole.rows.iter().all(|r| r.statistics.iter().all(|s| s.is_finite())), "{whole:?}");
+    assert!(whole.rows.iter().enumerate().all(|(i, row)| row.row == i as u64));
+    assert_eq!(whole.theta().len(), 30);
+    assert_eq!(whole.x().len(), 160);
+
+    place.make("other", &GenerateOptions { threads: 1, chunk: 3, ..options(10) });
+    assert_same(&whole, &Dataset::open(&place.at("other")).unwrap());
+
+    place.make("grown", &options(6));
+    let summary = place.make("grown", &options(10));
+    assert_eq!((summary.progress.resumed, summary.progress.made), (6, 4));
+    assert_same(&whole, &Dataset::open(&place.at("grown")).unwrap());
+    assert_eq!(place.make("grown", &options(5)).progress.beyond, 3);
+
+    for (name, text) in [("left", "0/2"), ("right", "1/2")] {
+        place.make(name, &GenerateOptions { shard: text.parse().unwrap(), ..options(10) });
+    }
+    let merged = merge(&[place.at("right"), place.at("left")]).unwrap();
+    assert_same(&whole, &merged);
+    merged.write(&place.at("merged.parquet")).unwrap();
+    assert_same(&whole, &Dataset::open(&place.at("merged.parquet")).unwrap());
+    let twice = merge(&[place.at("left"), place.at("left")]).unwrap_err();
+    assert!(matches!(twice, DatasetError::DuplicateRow { row: 0, .. }), "{twice}");
+}
+
+#[test]
+fn a_row_can_be_made_again_by_itself() {
+    let place = Place::new();
+    place.make("whole", &options(3));
+    let row = Dataset::open(&place.at("whole")).unwrap().rows[2].clone();
+    let scene = Prior::default().apply(&small(), &row.parameters).unwrap();
+    let pour = Simulation::new(&scene, row.seed).unwrap().run();
+    let seen = observe(&scene.camera, &pour, row.seed).unwrap();
+    assert_eq!(seen.statistics.unwrap(), row.statistics);
+}
+
+#[test]
+fn stopping_keeps_what_was_finished() {
+    let place = Place::new();
+    place.make("whole", &options(9));
+    let path = place.at("stopped");
+    let mut rounds = 0;
+    loop {
+        let mut start = None;
+        let stop_after_two = &mut |p: &Progress| p.made < *start.get_or_insert(p.made) + 2;
+        let summary =
+            generate(&small(), &Prior::default(), &options(9), &path, stop_after_two).unwrap();
+        rounds += 1;
+        if !summary.stopped {
+            break;
+        }
+        assert!(rounds < 9, "{summary:?}");
+    }
+    assert!(rounds > 1);
+    let (whole, stopped) = (place.at("whole"), path);
+    assert_same(&Dataset::open(&whole).unwrap(), &Dataset::open(&stopped).unwrap());
+}
+
+#[test]
+fn folders_of_something_else_are_refused_and_left_alone() {
+    let place = Place::new();
+    place.make("a", &options(5));
+    let path = place.at("a");
+    let run = |scene: &Scene, prior: &Prior, options: &GenerateOptions| {
+        generate(scene, prior, options, &path, &mut |_| true).unwrap_err().to_string()
+    };
+    let before = fs::read(path.join("manifest.toml")).unwrap();
+    let other_scene = small().with("material.restitution", 0.25).unwrap();
+    assert!(
+        run(&other_scene, &Prior::default(), &options(5)).contains("scene.material.restitution")
+    );
+    let other_prior = Prior::new(Prior::default().parameters()[..1].to_vec()).unwrap();
+    assert!(run(&small(), &other_prior, &options(5)).contains("the prior"));
+    let other_seed = GenerateOptions { seed: 4, ..options(5) };
+    assert!(run(&small(), &Prior::default(), &other_seed).contains("the seed is 3, but 4"));
+    let fresh = GenerateOptions { resume: false, ..options(5) };
+    assert!(run(&small(), &Prior::default(), &fresh).contains("empty unless resumed"));
+    assert_eq!(fs::read(path.join("manifest.toml")).unwrap(), before);
+
+    let wide = Prior::from_toml(
+        "[[parameter]]\npath = \"material.restitution\"\ndistribution = \"uniform\"\nlow = 0.5\nhigh = 1.5",
+    );
+    let absent = place.at("absent");
+    let error =
+        generate(&small(), &wide.unwrap(), &options(5), &absent, &mut |_| true).unwrap_err();
+    assert!(
+        error.to_string().contains("material.restitution") && error.to_string().contains("1.5")
+    );
+    assert!(!absent.exists());
+}
+
+#[test]
+fn damaged_parts_are_named_and_leftovers_removed() {
+    let place = Place::new();
+    place.make("a", &options(5));
+    let path = place.at("a");
+    fs::write(path.join(".part-000009.parquet.123.tmp"), b"half").unwrap();
+    let part = path.join("part-000000.parquet");
+    let whole = fs::read(&part).unwrap();
+    let mut messages = Vec::new();
+    for bytes in [&whole[..whole.len() / 2], &whole[..3], b"not a table"] {
+        fs::write(&part, bytes).unwrap();
+        let error = generate(&small(), &Prior::default(), &options(5), &path, &mut |_| true);
+        let error = error.unwrap_err();
+        assert!(error.is_bad_input());
+        messages.push(error.to_string());
+        assert!(Dataset::open(&path).is_err());
+    }
+    assert!(messages.iter().all(|m| m.contains("part-000000.parquet")), "{messages:?}");
+    assert!(!path.join(".part-000009.parquet.123.tmp").exists());
+
+    // A part of another place in the same data set.
+    fs::write(&part, fs::read(path.join("part-000001.parquet")).unwrap()).unwrap();
+    let error = generate(&small(), &Prior::default(), &options(5), &path, &mut |_| true);
+    assert!(error.unwrap_err().to_string().contains("column row"));
+}
+
+#[test]
+fn rows_out_of_view_are_rows() {
+    let place = Place::new();
+    let mut scene = small();
+    scene.camera.height_threshold = 0.2;
+    let summary =
+        generate(&scene, &Prior::default(), &options(2), &place.at("a"), &mut |_| true).unwrap();
+    assert_eq!(summary.progress.unhealthy, 2);
+    let dataset = Dataset::open(&place.at("a")).unwrap();
+    assert_eq!(dataset.status_counts().get("no_grains_in_view"), Some(&2));
+    assert!(dataset.x().iter().all(|value| value.is_nan()));
+}
+
+#[test]
+fn one_writer_at_a_time() {
+    let place = Place::new();
+    let path = place.at("a");
+    let mut inner = None;
+    generate(&small(), &Prior::default(), &options(1), &path, &mut |_| {
+        let again = generate(&small(), &Prior::default(), &options(1), &path, &mut |_| true);
+        inner.get_or_insert(again);
+        true
+    })
+    .unwrap();
+    assert!(matches!(inner, Some(Err(DatasetError::Locked { .. }))), "{inner:?}");
+}
+
+#[test]
+fn shards_are_read_from_text() {
+    assert_eq!("1/4".parse::<Shard>().unwrap(), Shard { index: 1, count: 4 });
+    for text in ["4/4", "1", "a/2", "0/0", "-1/2", "1/2/3"] {
+        assert!(text.parse::<Shard>().unwrap_err().to_string().contains("i/k"), "{text}");
+    }
+}

@@ -1,0 +1,144 @@
+//! What a data set was made from, kept with every file of it.
+
+use std::path::Path;
+
+use granulcal_dem::Scene;
+use toml::{Table, Value};
+
+use crate::{DatasetError, Prior};
+
+/// The version of granulcal that writes.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Scene, prior, version and seed: together they determine every row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// The scene before the prior's parameters are set.
+    pub scene: Scene,
+    /// What is drawn.
+    pub prior: Prior,
+    /// The version of granulcal that wrote the rows.
+    pub version: String,
+    /// The seed of the data set.
+    pub seed: u64,
+    pub(crate) scene_toml: String,
+    pub(crate) prior_toml: String,
+}
+
+impl Header {
+    /// The header of rows that are written now.
+    ///
+    /// # Errors
+    /// [`DatasetError::PriorDoesNotFit`] if the prior names what the scene has not.
+    pub fn new(scene: &Scene, prior: &Prior, seed: u64) -> Result<Self, DatasetError> {
+        scene.check().map_err(DatasetError::Simulation)?;
+        prior.check(scene)?;
+        Ok(Self {
+            scene: scene.clone(),
+            prior: prior.clone(),
+            version: VERSION.to_owned(),
+            seed,
+            scene_toml: scene.to_toml().map_err(DatasetError::Simulation)?,
+            prior_toml: prior.to_toml()?,
+        })
+    }
+
+    /// The header that stands in the file at `path`.
+    pub(crate) fn parse(
+        path: &Path,
+        scene_toml: &str,
+        prior_toml: &str,
+        version: String,
+        seed: u64,
+    ) -> Result<Self, DatasetError> {
+        let scene = Scene::from_toml(scene_toml)
+            .map_err(|source| DatasetError::Scene { path: path.to_owned(), source })?;
+        Ok(Self {
+            scene,
+            prior: Prior::from_toml(prior_toml)?,
+            version,
+            seed,
+            scene_toml: scene_toml.to_owned(),
+            prior_toml: prior_toml.to_owned(),
+        })
+    }
+
+    /// Refuses another header than `self`, which stands at `path`, and names the first difference.
+    ///
+    /// # Errors
+    /// [`DatasetError::Differs`].
+    pub(crate) fn require_same(&self, path: &Path, given: &Self) -> Result<(), DatasetError> {
+        let differs = |what: String, found: String, given: String| {
+            Err(DatasetError::Differs { path: path.to_owned(), what, found, given })
+        };
+        if let Some((key, found, given)) = difference(&self.scene_toml, &given.scene_toml) {
+            return differs(format!("scene.{key}"), found, given);
+        }
+        if self.prior != given.prior {
+            let (found, given) = (describe(&self.prior), describe(&given.prior));
+            return differs("the prior".to_owned(), found, given);
+        }
+        if self.seed != given.seed {
+            return differs("the seed".to_owned(), self.seed.to_string(), given.seed.to_string());
+        }
+        if self.version != given.version {
+            let what = "the version of granulcal".to_owned();
+            return differs(what, self.version.clone(), given.version.clone());
+        }
+        Ok(())
+    }
+}
+
+fn describe(prior: &Prior) -> String {
+    let of = |p: &crate::Parameter| format!("{} {:?}", p.path, p.distribution);
+    prior.parameters().iter().map(of).collect::<Vec<_>>().join("; ")
+}
+
+/// The first key in which two TOML texts differ, and both values.
+fn difference(left: &str, right: &str) -> Option<(String, String, String)> {
+    let parse = |text: &str| text.parse::<Table>().map(Value::Table).ok();
+    let (left, right) = (parse(left)?, parse(right)?);
+    first_difference("", Some(&left), Some(&right))
+}
+
+fn first_difference(
+    path: &str,
+    left: Option<&Value>,
+    right: Option<&Value>,
+) -> Option<(String, String, String)> {
+    if left == right {
+        return None;
+    }
+    if let (Some(Value::Table(a)), Some(Value::Table(b))) = (left, right) {
+        let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+        return keys.into_iter().find_map(|key| {
+            let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+            first_difference(&path, a.get(key), b.get(key))
+        });
+    }
+    let show = |value: Option<&Value>| value.map_or("absent".to_owned(), Value::to_string);
+    Some((path.to_owned(), show(left), show(right)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_difference_is_named() {
+        let prior = Prior::default();
+        let scene = Scene::funnel(0.12);
+        let header = Header::new(&scene, &prior, 1).unwrap();
+        let path = Path::new("data");
+        header.require_same(path, &header.clone()).unwrap();
+        let message = |other: Header| header.require_same(path, &other).unwrap_err().to_string();
+
+        let changed = scene.with("material.restitution", 0.3).unwrap();
+        let text = message(Header::new(&changed, &prior, 1).unwrap());
+        assert!(text.contains("scene.material.restitution is 0.5, but 0.3 is given"), "{text}");
+        let text = message(Header::new(&scene, &prior, 2).unwrap());
+        assert!(text.contains("the seed is 1, but 2 is given"), "{text}");
+        let text = message(Header { version: "9.9.9".to_owned(), ..header.clone() });
+        assert!(text.contains("9.9.9"), "{text}");
+    }
+}

@@ -1,0 +1,54 @@
+//! The files of granulcal: the only crate that touches the disk.
+//!
+//! A [`Prior`] says which numbers of a scene are unknown; [`generate()`] draws, pours and describes
+//! until a folder holds every row; [`Dataset`] reads it back. A [`Recording`] is a measured depth
+//! image or height map, described by the same code. Formats are in `docs/theory/dataset.md`.
+//!
+//! Two promises hold everywhere: a file that is written is complete or absent, and a file that is
+//! read is refused with its name, what was found and what is allowed.
+//!
+//! | module | what it is |
+//! |---|---|
+//! | [`Prior`], [`Distribution`] | parameters by path, drawn by seed and row |
+//! | [`observe()`] | pour to image to statistics |
+//! | [`generate()`] | resumable batches |
+//! | [`Dataset`], [`merge`] | Parquet back into memory |
+//! | [`Recording`] | measured height maps and depth images |
+//! | [`png`], [`npy`] | 16-bit depth PNG, arrays |
+//! | [`record_pour`] | a pour over time as MCAP |
+
+mod camera_file;
+mod dataset;
+mod distribution;
+mod error;
+mod files;
+mod generate;
+mod header;
+mod manifest;
+mod mcap_file;
+mod normal;
+pub mod npy;
+mod npz;
+mod observe;
+pub mod png;
+mod prior;
+mod random;
+mod recording;
+mod row;
+mod scene_file;
+mod table;
+
+pub use camera_file::CameraFile;
+pub use dataset::{Dataset, merge};
+pub use distribution::Distribution;
+pub use error::DatasetError;
+pub use files::write_file;
+pub use generate::{GenerateOptions, Progress, Shard, Summary, generate};
+pub use header::{Header, VERSION};
+pub use mcap_file::{McapSummary, Topic, record_pour, summarize_mcap};
+pub use npz::{Npz, write_height_map};
+pub use observe::{Observation, TooFewGrains, View, look, observe, overhead};
+pub use prior::{Parameter, Prior};
+pub use recording::{Recording, Source, measured_data};
+pub use row::{Row, RowStatus};
+pub use scene_file::{load_prior, load_scene};

@@ -1,0 +1,300 @@
+//! A pour over time as MCAP, in Foxglove's own schemas: Foxglove opens the file as it is.
+//!
+//! | topic | schema | what |
+//! |---|---|---|
+//! | `/grains` | foxglove.PointCloud | centres and radii, f32 `[m]`, frame `world` |
+//! | `/depth` | foxglove.RawImage, 32FC1 | what the scene's camera delivers `[m]`, frame `camera`; 0 is no data |
+//! | `/heights` | foxglove.RawImage, 32FC1 | the same for an orthographic camera, instead of `/depth` |
+//! | `/camera` | foxglove.CameraCalibration | the pinhole camera of `/depth` |
+//! | `/tf` | foxglove.FrameTransform | where the frame `camera` is in `world` |
+//!
+//! Time 0 is the start of the pour. The scene's TOML, the seed and the outcome stand in the metadata
+//! record `granulcal`, the TOML also as the attachment `scene.toml`.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use foxglove::Encode;
+use foxglove::messages::packed_element_field::NumericType;
+use foxglove::messages::{
+    CameraCalibration, FrameTransform, PackedElementField, PointCloud, Pose, Quaternion, RawImage,
+    Timestamp, Vector3,
+};
+use granulcal_dem::{Pour, Scene, Simulation};
+use granulcal_features::{Camera, Intrinsics};
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
+
+use crate::files::PendingFile;
+use crate::{DatasetError, VERSION, View, files, look};
+
+const WORLD: &str = "world";
+const CAMERA: &str = "camera";
+/// Bytes of one grain in `/grains`: x, y, z, radius.
+const STRIDE: u32 = 16;
+
+/// Runs a simulation of `scene` with `seed` to its end and writes `rate` frames a simulated second, and one
+/// at the end.
+///
+/// `watch` is called with the simulated time before each frame and returns whether to go on; when it
+/// says no the result is `None` and no file is left.
+///
+/// # Errors
+/// [`DatasetError::Argument`] for a rate that is not positive, [`DatasetError::Io`] or [`DatasetError::Mcap`] if the file cannot be written.
+pub fn record_pour(
+    mut simulation: Simulation,
+    scene: &Scene,
+    seed: u64,
+    rate: f64,
+    path: &Path,
+    watch: &mut dyn FnMut(f64) -> bool,
+) -> Result<Option<Pour>, DatasetError> {
+    if !(rate > 0.0 && rate.is_finite()) {
+        let (what, got) = ("the frames per second", rate.to_string());
+        return Err(DatasetError::Argument { what, got, allowed: "positive and finite" });
+    }
+    let scene_toml = scene.to_toml().map_err(DatasetError::Simulation)?;
+    let failed = |source| DatasetError::Mcap { path: path.to_owned(), source };
+    let mut recorder = Recorder::create(path)?;
+    recorder.attach_scene(&scene_toml).map_err(failed)?;
+    for frame in 1u64.. {
+        if !watch(simulation.time()) {
+            return Ok(None);
+        }
+        recorder.frame(scene, seed, &simulation)?;
+        if simulation.ended().is_some() {
+            break;
+        }
+        // From the frame's own time: rounding to substeps must not add up.
+        simulation.advance(frame as f64 / rate - simulation.time());
+    }
+    let pour = simulation.into_pour();
+    let outcome = [
+        ("scene", scene_toml),
+        ("seed", seed.to_string()),
+        ("version", VERSION.to_owned()),
+        ("status", pour.status.name().to_owned()),
+        ("simulated_s", pour.simulated_s.to_string()),
+    ];
+    recorder.finish(&outcome)?;
+    Ok(Some(pour))
+}
+
+/// An MCAP file being written, with the sequence number of each topic.
+struct Recorder<'a> {
+    writer: Writer<PendingFile>,
+    path: &'a Path,
+    sequences: BTreeMap<u16, u32>,
+}
+
+impl<'a> Recorder<'a> {
+    fn create(path: &'a Path) -> Result<Self, DatasetError> {
+        let options = WriteOptions::new().library(format!("granulcal {VERSION}")).compression(None);
+        let writer = options
+            .create(PendingFile::create(path)?)
+            .map_err(|source| DatasetError::Mcap { path: path.to_owned(), source })?;
+        Ok(Self { writer, path, sequences: BTreeMap::new() })
+    }
+
+    fn attach_scene(&mut self, scene_toml: &str) -> McapResult<()> {
+        self.writer.attach(&Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: "scene.toml".to_owned(),
+            media_type: "application/toml".to_owned(),
+            data: Cow::Borrowed(scene_toml.as_bytes()),
+        })
+    }
+
+    /// Everything that there is to see at one time.
+    fn frame(
+        &mut self,
+        scene: &Scene,
+        seed: u64,
+        simulation: &Simulation,
+    ) -> Result<(), DatasetError> {
+        let time = simulation.time();
+        let failed = |source| DatasetError::Mcap { path: self.path.to_owned(), source };
+        let view = look(&scene.camera, simulation.positions(), simulation.radii(), seed);
+        let messages = |recorder: &mut Self| -> McapResult<()> {
+            recorder.send("/grains", time, &grains(time, simulation))?;
+            match view {
+                Ok(View::Depth(camera, image)) => {
+                    recorder.send("/tf", time, &pose_of(time, &camera))?;
+                    recorder.send("/camera", time, &calibration(time, &camera.intrinsics))?;
+                    let image = raw_image(time, CAMERA, image.width, image.height, &image.depth);
+                    recorder.send("/depth", time, &image)
+                }
+                Ok(View::Heights(map)) => {
+                    let heights: Vec<_> = map.z.iter().map(|&z| z as f32).collect();
+                    let image = raw_image(time, WORLD, map.width, map.height, &heights);
+                    recorder.send("/heights", time, &image)
+                }
+                // Grains of an unhealthy pour can be anywhere, NaN included; the cloud shows it.
+                Err(_) => Ok(()),
+            }
+        };
+        messages(self).map_err(failed)
+    }
+
+    fn send<T: Encode>(&mut self, topic: &str, time: f64, message: &T) -> McapResult<()> {
+        let mut bytes = Vec::new();
+        message
+            .encode(&mut bytes)
+            .map_err(|e| McapError::Io(std::io::Error::other(e.to_string())))?;
+        // The writer gives a schema or channel that it knows the number it has.
+        let schema = match T::get_schema() {
+            Some(schema) => self.writer.add_schema(&schema.name, &schema.encoding, &schema.data)?,
+            None => 0,
+        };
+        let encoding = T::get_message_encoding();
+        let channel_id = self.writer.add_channel(schema, topic, &encoding, &BTreeMap::new())?;
+        let sequence = self.sequences.entry(channel_id).or_insert(0);
+        let log_time = nanoseconds(time);
+        let header =
+            MessageHeader { channel_id, sequence: *sequence, log_time, publish_time: log_time };
+        *sequence += 1;
+        self.writer.write_to_known_channel(&header, &bytes)
+    }
+
+    fn finish(mut self, metadata: &[(&str, String)]) -> Result<(), DatasetError> {
+        let failed = |source| DatasetError::Mcap { path: self.path.to_owned(), source };
+        let metadata = metadata.iter().map(|(key, value)| ((*key).to_owned(), value.clone()));
+        self.writer
+            .write_metadata(&Metadata {
+                name: "granulcal".to_owned(),
+                metadata: metadata.collect(),
+            })
+            .map_err(failed)?;
+        self.writer.finish().map_err(failed)?;
+        self.writer.into_inner().commit()
+    }
+}
+
+fn nanoseconds(time: f64) -> u64 {
+    (time * 1e9).round() as u64
+}
+
+fn timestamp(time: f64) -> Option<Timestamp> {
+    let total = nanoseconds(time);
+    Timestamp::new_checked((total / 1_000_000_000) as u32, (total % 1_000_000_000) as u32)
+}
+
+fn grains(time: f64, simulation: &Simulation) -> PointCloud {
+    let mut data = Vec::with_capacity(simulation.radii().len() * STRIDE as usize);
+    for (position, radius) in simulation.positions().iter().zip(simulation.radii()) {
+        for value in [position.x, position.y, position.z, *radius] {
+            data.extend((value as f32).to_le_bytes());
+        }
+    }
+    let field = |(index, name): (u32, &str)| PackedElementField {
+        name: name.to_owned(),
+        offset: 4 * index,
+        r#type: NumericType::Float32.into(),
+    };
+    PointCloud {
+        timestamp: timestamp(time),
+        frame_id: WORLD.to_owned(),
+        pose: Some(Pose {
+            position: Some(Vector3::default()),
+            orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
+        }),
+        point_stride: STRIDE,
+        fields: (0..).zip(["x", "y", "z", "radius"]).map(field).collect(),
+        data: data.into(),
+    }
+}
+
+fn raw_image(time: f64, frame: &str, width: usize, height: usize, values: &[f32]) -> RawImage {
+    RawImage {
+        timestamp: timestamp(time),
+        frame_id: frame.to_owned(),
+        width: width as u32,
+        height: height as u32,
+        encoding: "32FC1".to_owned(),
+        step: 4 * width as u32,
+        data: values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>().into(),
+    }
+}
+
+fn calibration(time: f64, lens: &Intrinsics) -> CameraCalibration {
+    // Foxglove follows OpenCV: the centre of the first pixel is (0, 0).
+    let (cx, cy) = (lens.cx - 0.5, lens.cy - 0.5);
+    let (fx, fy) = (lens.fx, lens.fy);
+    CameraCalibration {
+        timestamp: timestamp(time),
+        frame_id: CAMERA.to_owned(),
+        width: lens.width as u32,
+        height: lens.height as u32,
+        distortion_model: String::new(),
+        d: Vec::new(),
+        k: vec![fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+        r: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p: vec![fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+    }
+}
+
+fn pose_of(time: f64, camera: &Camera) -> FrameTransform {
+    let world_from_camera = camera.camera_from_world.inverse();
+    let (at, turn) = (world_from_camera.translation.vector, world_from_camera.rotation);
+    FrameTransform {
+        timestamp: timestamp(time),
+        parent_frame_id: WORLD.to_owned(),
+        child_frame_id: CAMERA.to_owned(),
+        translation: Some(Vector3 { x: at.x, y: at.y, z: at.z }),
+        rotation: Some(Quaternion { x: turn.i, y: turn.j, z: turn.k, w: turn.w }),
+    }
+}
+
+/// One topic of an MCAP file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Topic {
+    /// Its name.
+    pub topic: String,
+    /// Name of the schema, empty if it has none.
+    pub schema: String,
+    /// Encoding of the messages.
+    pub encoding: String,
+    /// How many messages.
+    pub messages: u64,
+}
+
+/// What an MCAP file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct McapSummary {
+    /// The topics, by name.
+    pub topics: Vec<Topic>,
+    /// Time of the first message `[s]`.
+    pub start_s: f64,
+    /// Time of the last message `[s]`.
+    pub end_s: f64,
+}
+
+/// Reads a whole MCAP file, whoever wrote it, and says what is in it.
+///
+/// # Errors
+/// [`DatasetError::Io`], or [`DatasetError::Mcap`] for a file that is truncated, damaged or compressed
+/// in a way that this build does not read.
+pub fn summarize_mcap(path: &Path) -> Result<McapSummary, DatasetError> {
+    let bytes = files::read(path)?;
+    let failed = |source| DatasetError::Mcap { path: path.to_owned(), source };
+    let mut topics: BTreeMap<(String, u16), Topic> = BTreeMap::new();
+    let mut span: Option<(u64, u64)> = None;
+    for message in mcap::MessageStream::new(&bytes).map_err(failed)? {
+        let message = message.map_err(failed)?;
+        let (first, last) = span.unwrap_or((message.log_time, message.log_time));
+        span = Some((first.min(message.log_time), last.max(message.log_time)));
+        let channel = &message.channel;
+        let topic = topics.entry((channel.topic.clone(), channel.id)).or_insert_with(|| Topic {
+            topic: channel.topic.clone(),
+            schema: channel.schema.as_ref().map_or_else(String::new, |schema| schema.name.clone()),
+            encoding: channel.message_encoding.clone(),
+            messages: 0,
+        });
+        topic.messages += 1;
+    }
+    let (first, last) = span.unwrap_or((0, 0));
+    let topics = topics.into_values().collect();
+    Ok(McapSummary { topics, start_s: first as f64 * 1e-9, end_s: last as f64 * 1e-9 })
+}

@@ -1,0 +1,122 @@
+//! Depth as 16-bit grey PNG, colour as 8-bit RGB PNG.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use granulcal_features::{ColourImage, DepthImage};
+use image::{DynamicImage, ImageBuffer, ImageFormat, ImageReader, Luma};
+
+use crate::{DatasetError, files};
+
+/// Metres per count that depth is written with unless told otherwise: 0.1 mm, up to 6.5 m.
+pub const DEPTH_UNIT: f64 = 1e-4;
+
+fn decode(path: &Path) -> Result<DynamicImage, DatasetError> {
+    let bytes = files::read(path)?;
+    ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png)
+        .decode()
+        .map_err(|source| DatasetError::Png { path: path.to_owned(), source })
+}
+
+/// Reads a 16-bit grey PNG as depth, `depth_unit` metres a count; 0 is no data.
+///
+/// # Errors
+/// [`DatasetError::Io`], [`DatasetError::Png`], or [`DatasetError::Content`] for other pixels.
+pub fn read_depth(path: &Path, depth_unit: f64) -> Result<DepthImage, DatasetError> {
+    let image = match decode(path)? {
+        DynamicImage::ImageLuma16(image) => image,
+        other => {
+            let found = format!("{:?}", other.color());
+            return Err(DatasetError::content(path, "the pixels", found, "16-bit grey (L16)"));
+        }
+    };
+    let depth = image.pixels().map(|Luma([count])| (f64::from(*count) * depth_unit) as f32);
+    let depth = depth.collect();
+    DepthImage::new(image.width() as usize, image.height() as usize, depth)
+        .map_err(|source| DatasetError::Recording { path: path.to_owned(), source })
+}
+
+/// Reads an 8-bit RGB PNG; an alpha channel is dropped.
+///
+/// # Errors
+/// As [`read_depth`].
+pub fn read_colour(path: &Path) -> Result<ColourImage, DatasetError> {
+    let image = match decode(path)? {
+        image @ (DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_)) => image.into_rgb8(),
+        other => {
+            let found = format!("{:?}", other.color());
+            return Err(DatasetError::content(path, "the pixels", found, "8-bit colour (Rgb8)"));
+        }
+    };
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    ColourImage::new(width, height, image.into_raw())
+        .map_err(|source| DatasetError::Recording { path: path.to_owned(), source })
+}
+
+/// Writes depth as 16-bit grey PNG, `depth_unit` metres a count.
+///
+/// # Errors
+/// [`DatasetError::Io`], [`DatasetError::Png`], or [`DatasetError::Argument`] for a unit in which a
+/// depth does not fit 16 bits.
+pub fn write_depth(path: &Path, image: &DepthImage, depth_unit: f64) -> Result<(), DatasetError> {
+    let counts = counts(image, depth_unit)?;
+    let (width, height) = (image.width as u32, image.height as u32);
+    let Some(buffer) = ImageBuffer::<Luma<u16>, _>::from_raw(width, height, counts) else {
+        let found = format!("{} values for {width}x{height}", image.depth.len());
+        return Err(DatasetError::content(path, "the depth image", found, "one value a pixel"));
+    };
+    let mut bytes = Cursor::new(Vec::new());
+    buffer
+        .write_to(&mut bytes, ImageFormat::Png)
+        .map_err(|source| DatasetError::Png { path: path.to_owned(), source })?;
+    files::write_file(path, &bytes.into_inner())
+}
+
+/// Depth in counts of `depth_unit`, rounded; no data is 0.
+pub(crate) fn counts(image: &DepthImage, depth_unit: f64) -> Result<Vec<u16>, DatasetError> {
+    let refuse = |got: f64, allowed| {
+        Err(DatasetError::Argument { what: "depth unit [m]", got: got.to_string(), allowed })
+    };
+    if !(depth_unit > 0.0 && depth_unit.is_finite()) {
+        return refuse(depth_unit, "positive and finite");
+    }
+    let deepest = image.depth.iter().copied().filter(|d| d.is_finite()).fold(0.0, f32::max);
+    if (f64::from(deepest) / depth_unit).round() > f64::from(u16::MAX) {
+        return refuse(depth_unit, "large enough that 65535 counts reach the deepest pixel");
+    }
+    // Casts of floats saturate and turn NaN into 0, which is no data.
+    Ok(image.depth.iter().map(|&d| (f64::from(d) / depth_unit).round() as u16).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_survives_to_half_a_count() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("d.png");
+        let depth: Vec<f32> = (0..12).map(|i| 0.29 - 0.003_17 * i as f32).chain([0.0; 4]).collect();
+        let image = DepthImage::new(4, 4, depth).unwrap();
+        write_depth(&path, &image, DEPTH_UNIT).unwrap();
+        let back = read_depth(&path, DEPTH_UNIT).unwrap();
+        for (a, b) in image.depth.iter().zip(&back.depth) {
+            assert!((a - b).abs() <= 0.5001e-4, "{a} {b}");
+        }
+        assert_eq!(back.at(3, 3), 0.0);
+        let error = write_depth(&path, &image, 1e-6).unwrap_err().to_string();
+        assert!(error.contains("depth unit"), "{error}");
+    }
+
+    #[test]
+    fn other_pixels_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("c.png");
+        image::RgbImage::new(2, 2).save(&path).unwrap();
+        let error = read_depth(&path, 1e-3).unwrap_err().to_string();
+        assert!(error.contains("16-bit grey") && error.contains("Rgb8"), "{error}");
+        assert_eq!(read_colour(&path).unwrap().rgb.len(), 12);
+        std::fs::write(&path, b"\x89PNG\r\n\x1a\nrest").unwrap();
+        assert!(matches!(read_colour(&path), Err(DatasetError::Png { .. })));
+    }
+}

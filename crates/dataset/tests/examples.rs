@@ -1,0 +1,27 @@
+//! The examples are what the documentation says they are.
+
+use std::path::{Path, PathBuf};
+
+use granulcal_dataset::{CameraFile, Prior, load_prior, load_scene};
+use granulcal_dem::Scene;
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples").join(name)
+}
+
+#[test]
+fn scenes_and_priors_fit() {
+    let funnel = load_scene(&example("funnel.toml")).unwrap();
+    assert_eq!(funnel, Scene::funnel(0.12));
+    load_scene(&example("drop.toml")).unwrap().check().unwrap();
+    let prior = load_prior(&example("prior.toml")).unwrap();
+    prior.check(&funnel).unwrap();
+    assert_eq!(prior.parameters()[..3], *Prior::default().parameters());
+}
+
+#[test]
+fn the_camera_is_read() {
+    let camera = CameraFile::load(&example("camera.toml")).unwrap();
+    assert_eq!((camera.width, camera.height), (640, 480));
+    assert_eq!(camera.segmentation.downsample, 2);
+}

@@ -1,0 +1,106 @@
+//! An MCAP file as Foxglove would read it.
+
+use std::collections::BTreeMap;
+
+use foxglove::Decode;
+use foxglove::messages::{CameraCalibration, PointCloud, RawImage};
+use granulcal_dataset::{DatasetError, View, look, record_pour, summarize_mcap};
+use granulcal_dem::{Scene, Simulation};
+
+fn scene() -> Scene {
+    let mut scene = Scene::drop(0.02);
+    scene
+        .set(&[
+            ("grains.count", 20.0),
+            ("start.solid_fraction", 0.5),
+            ("end.horizon", 0.3),
+            ("camera.depth_noise", 1e-4),
+        ])
+        .unwrap();
+    scene
+}
+
+fn simulation() -> Simulation {
+    Simulation::new(&scene(), 4).unwrap()
+}
+
+#[test]
+fn schemas_counts_stamps_and_bytes_are_those_of_the_pour() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pour.mcap");
+    let scene = scene();
+    let pour = record_pour(simulation(), &scene, 4, 60.0, &path, &mut |_| true).unwrap().unwrap();
+    assert_eq!(pour, simulation().run());
+
+    let bytes = std::fs::read(&path).unwrap();
+    let mut schemas = BTreeMap::new();
+    let mut last = BTreeMap::new();
+    let mut stamps = Vec::new();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        let channel = &message.channel;
+        assert_eq!(channel.message_encoding, "protobuf");
+        let schema = channel.schema.as_ref().unwrap();
+        assert_eq!(schema.encoding, "protobuf");
+        schemas.insert(channel.topic.clone(), schema.name.clone());
+        if channel.topic == "/grains" {
+            stamps.push(message.log_time);
+        }
+        last.insert(channel.topic.clone(), message.data.to_vec());
+    }
+    let expected = [
+        ("/camera", "foxglove.CameraCalibration"),
+        ("/depth", "foxglove.RawImage"),
+        ("/grains", "foxglove.PointCloud"),
+        ("/tf", "foxglove.FrameTransform"),
+    ];
+    assert_eq!(schemas, expected.map(|(t, s)| (t.to_owned(), s.to_owned())).into());
+
+    // From 0 to the end, a frame every sixtieth of a second and one at the end.
+    assert_eq!(stamps[0], 0);
+    assert_eq!(*stamps.last().unwrap(), (pour.simulated_s * 1e9).round() as u64);
+    let frames = (pour.simulated_s * 60.0).ceil() as usize + 1;
+    assert!(stamps.len().abs_diff(frames) <= 1, "{} {frames}", stamps.len());
+    assert!(stamps.windows(2).all(|pair| pair[0] < pair[1]));
+
+    let cloud = PointCloud::decode(last["/grains"].as_slice()).unwrap();
+    assert_eq!((cloud.point_stride, cloud.data.len()), (16, 20 * 16));
+    let first = f32::from_le_bytes(cloud.data[..4].try_into().unwrap());
+    assert_eq!(first, pour.positions[0].x as f32);
+
+    let View::Depth(camera, image) = look(&scene.camera, &pour.positions, &pour.radii, 4).unwrap()
+    else {
+        panic!("the scene has a pinhole camera");
+    };
+    let depth = RawImage::decode(last["/depth"].as_slice()).unwrap();
+    assert_eq!((depth.encoding.as_str(), depth.step), ("32FC1", 4 * depth.width));
+    let values: Vec<_> =
+        depth.data.as_chunks::<4>().0.iter().map(|&raw| f32::from_le_bytes(raw)).collect();
+    assert_eq!(values, image.depth);
+    let lens = CameraCalibration::decode(last["/camera"].as_slice()).unwrap();
+    assert_eq!((lens.k[0], lens.k[2]), (camera.intrinsics.fx, camera.intrinsics.cx - 0.5));
+
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let attachment = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).unwrap();
+    assert_eq!(Scene::from_toml(std::str::from_utf8(&attachment.data).unwrap()).unwrap(), scene);
+    let metadata = mcap::read::metadata(&bytes, &summary.metadata_indexes[0]).unwrap();
+    assert_eq!(metadata.metadata["seed"], "4");
+    assert_eq!(metadata.metadata["status"], pour.status.name());
+
+    let ours = summarize_mcap(&path).unwrap();
+    assert_eq!(ours.topics.len(), 4);
+    assert!((ours.end_s - pour.simulated_s).abs() < 1e-9);
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    assert!(matches!(summarize_mcap(&path), Err(DatasetError::Mcap { .. })));
+}
+
+#[test]
+fn a_stopped_recording_leaves_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pour.mcap");
+    let pour =
+        record_pour(simulation(), &scene(), 4, 60.0, &path, &mut |time| time < 0.05).unwrap();
+    assert!(pour.is_none());
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    assert!(record_pour(simulation(), &scene(), 4, 0.0, &path, &mut |_| true).is_err());
+}

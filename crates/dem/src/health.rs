@@ -1,0 +1,124 @@
+//! What can go wrong inside a pour, in numbers, and the bounds beyond which it is called unhealthy.
+
+use serde::{Deserialize, Serialize};
+
+/// Numbers that tell whether a pour can be trusted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Health {
+    /// Deepest overlap of any contact so far, in radii of the smaller grain `[-]`.
+    pub worst_penetration: f64,
+    /// Mean natural-map residual over rms normal impulse of the sampled substeps `[-]`.
+    pub mean_residual: f64,
+    /// Worst natural-map residual over rms normal impulse of the sampled substeps `[-]`.
+    pub worst_residual: f64,
+    /// Largest rise of mechanical energy above its lowest value so far, over the energy at the start `[-]`.
+    pub energy_created: f64,
+    /// Grains whose centre passed through a wall; must be 0.
+    pub grains_lost: usize,
+    /// Substeps taken.
+    pub substeps: usize,
+    /// Gauss-Seidel sweeps in all.
+    pub sweeps: usize,
+    /// Mean number of listed contacts in a substep.
+    pub mean_contacts: f64,
+}
+
+/// Energy that a pour may create, over its energy at the start, before it is called unhealthy. Correcting
+/// penetrations lifts grains a little; an unstable solver multiplies energy.
+pub const MAX_ENERGY_CREATED: f64 = 0.01;
+
+/// Collects the health of a running simulation.
+#[derive(Clone, Debug)]
+pub(crate) struct HealthWatch {
+    worst_penetration: f64,
+    residual_sum: f64,
+    worst_residual: f64,
+    residual_samples: usize,
+    contacts_sum: f64,
+    contacts_samples: usize,
+    start_energy: f64,
+    energy: f64,
+    lowest_energy: f64,
+    created: f64,
+    sweeps: usize,
+    lost: Vec<bool>,
+}
+
+impl HealthWatch {
+    pub fn new(grains: usize, energy: f64) -> Self {
+        Self {
+            worst_penetration: 0.0,
+            residual_sum: 0.0,
+            worst_residual: 0.0,
+            residual_samples: 0,
+            contacts_sum: 0.0,
+            contacts_samples: 0,
+            start_energy: energy,
+            energy,
+            lowest_energy: energy,
+            created: 0.0,
+            sweeps: 0,
+            lost: vec![false; grains],
+        }
+    }
+
+    /// One flag for each grain: set when its centre has passed through a wall.
+    pub fn lost_mut(&mut self) -> &mut [bool] {
+        &mut self.lost
+    }
+
+    pub fn see_penetration(&mut self, penetration: f64) {
+        self.worst_penetration = self.worst_penetration.max(penetration);
+    }
+
+    pub fn see_residual(&mut self, residual: f64) {
+        self.residual_samples += 1;
+        self.residual_sum += residual;
+        self.worst_residual = self.worst_residual.max(residual);
+    }
+
+    pub fn see_sweep(&mut self) {
+        self.sweeps += 1;
+    }
+
+    pub fn see_contacts(&mut self, contacts: usize) {
+        self.contacts_samples += 1;
+        self.contacts_sum += contacts as f64;
+    }
+
+    pub fn see_energy(&mut self, energy: f64) {
+        self.energy = energy;
+        self.created = self.created.max(energy - self.lowest_energy);
+        self.lowest_energy = self.lowest_energy.min(energy);
+    }
+
+    /// False once a NaN or an infinity has reached the energy.
+    pub fn is_finite(&self) -> bool {
+        self.energy.is_finite()
+    }
+
+    pub fn health(&self, substeps: usize) -> Health {
+        let mean = |sum: f64, samples: usize| sum / samples.max(1) as f64;
+        Health {
+            worst_penetration: self.worst_penetration,
+            mean_residual: mean(self.residual_sum, self.residual_samples),
+            worst_residual: self.worst_residual,
+            energy_created: self.energy_created(),
+            grains_lost: self.lost.iter().filter(|&&lost| lost).count(),
+            substeps,
+            sweeps: self.sweeps,
+            mean_contacts: mean(self.contacts_sum, self.contacts_samples),
+        }
+    }
+
+    pub fn is_healthy(&self, max_penetration: f64) -> bool {
+        self.is_finite()
+            && self.worst_penetration <= max_penetration
+            && self.energy_created() <= MAX_ENERGY_CREATED
+            && !self.lost.contains(&true)
+    }
+
+    fn energy_created(&self) -> f64 {
+        if self.start_energy > 0.0 { self.created / self.start_energy } else { 0.0 }
+    }
+}

@@ -1,0 +1,177 @@
+//! Eight numbers side by side: the arithmetic of one batch of contacts.
+//!
+//! [`Lanes`] is how they lie in memory, [`Reg`] how they are computed with, on whatever registers a
+//! [`Width`] has. No fused multiply-add and no approximate reciprocal: every width gives the same bits.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod portable;
+mod reg;
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx2::Avx2;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx512::Avx512;
+pub(crate) use portable::Portable;
+pub(crate) use reg::{Reg, Reg3};
+
+/// Contacts in a batch.
+pub(crate) const LANES: usize = 8;
+
+/// One number for each contact of a batch, in memory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub(crate) struct Lanes(pub [f64; LANES]);
+
+/// One 3-vector for each contact of a batch, component by component, in memory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Lanes3 {
+    pub x: Lanes,
+    pub y: Lanes,
+    pub z: Lanes,
+}
+
+impl Lanes {
+    pub const ZERO: Self = Self([0.0; LANES]);
+
+    pub fn splat(value: f64) -> Self {
+        Self([value; LANES])
+    }
+}
+
+impl Lanes3 {
+    pub const ZERO: Self = Self { x: Lanes::ZERO, y: Lanes::ZERO, z: Lanes::ZERO };
+
+    /// Puts `value` into lane `lane`.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, value: [f64; 3]) {
+        self.x.0[lane] = value[0];
+        self.y.0[lane] = value[1];
+        self.z.0[lane] = value[2];
+    }
+
+    /// The vector in lane `lane`.
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> [f64; 3] {
+        [self.x.0[lane], self.y.0[lane], self.z.0[lane]]
+    }
+}
+
+/// The operations that the contact kernels are written in, on one kind of machine.
+///
+/// Implementations for wide registers may only be used behind [`widest`], which tests for them.
+pub(crate) trait Width: Copy {
+    /// Eight numbers in registers.
+    type Value: Copy;
+
+    fn load(from: &Lanes) -> Self::Value;
+    fn store(value: Self::Value, to: &mut Lanes);
+    fn splat(value: f64) -> Self::Value;
+    fn add(a: Self::Value, b: Self::Value) -> Self::Value;
+    fn sub(a: Self::Value, b: Self::Value) -> Self::Value;
+    fn mul(a: Self::Value, b: Self::Value) -> Self::Value;
+    fn div(a: Self::Value, b: Self::Value) -> Self::Value;
+    fn sqrt(a: Self::Value) -> Self::Value;
+    /// `yes` where `a < b`, `no` elsewhere (also where either is NaN).
+    fn select_less(
+        a: Self::Value,
+        b: Self::Value,
+        yes: Self::Value,
+        no: Self::Value,
+    ) -> Self::Value;
+    /// Eight rows of eight numbers as eight columns.
+    fn transpose(rows: [Self::Value; LANES]) -> [Self::Value; LANES];
+}
+
+/// Compiles a function three times, for AVX-512, AVX2 and the target's baseline, and calls the widest
+/// that this machine has. The body must be inlined for the wider registers to reach it; `$width` names
+/// the [`Width`] that it is compiled for.
+macro_rules! widest {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident<$width:ident>($($arg:ident: $kind:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
+        $(#[$doc])*
+        #[allow(unsafe_code)] // calls of functions that need the vector width just tested for
+        $vis fn $name($($arg: $kind),*) $(-> $out)? {
+            #[inline(always)]
+            fn with<$width: $crate::lanes::Width>($($arg: $kind),*) $(-> $out)? $body
+
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+                fn avx512($($arg: $kind),*) $(-> $out)? {
+                    with::<$crate::lanes::Avx512>($($arg),*)
+                }
+                #[target_feature(enable = "avx2")]
+                fn avx2($($arg: $kind),*) $(-> $out)? {
+                    with::<$crate::lanes::Avx2>($($arg),*)
+                }
+                if is_x86_feature_detected!("avx512vl")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512bw")
+                {
+                    // SAFETY: the features were detected on this machine.
+                    return unsafe { avx512($($arg),*) };
+                }
+                if is_x86_feature_detected!("avx2") {
+                    // SAFETY: the feature was detected on this machine.
+                    return unsafe { avx2($($arg),*) };
+                }
+            }
+            with::<$crate::lanes::Portable>($($arg),*)
+        }
+    };
+}
+pub(crate) use widest;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers(seed: f64) -> [Lanes; LANES] {
+        std::array::from_fn(|r| Lanes(std::array::from_fn(|c| (seed * (10 * r + c) as f64).sin())))
+    }
+
+    /// Every operation once, on whatever width.
+    #[inline(always)]
+    fn exercise<W: Width>(a: &[Lanes; LANES], b: &[Lanes; LANES]) -> [Lanes; LANES] {
+        let rows = std::array::from_fn(|r| {
+            let (a, b) = (W::load(&a[r]), W::load(&b[r]));
+            let square = W::add(W::mul(a, a), W::splat(0.5));
+            let root = W::sub(W::sqrt(square), W::div(b, square));
+            W::select_less(a, b, root, W::mul(root, b))
+        });
+        W::transpose(rows).map(|value| {
+            let mut out = Lanes::ZERO;
+            W::store(value, &mut out);
+            out
+        })
+    }
+
+    widest! {
+        fn exercise_widest<W>(a: &[Lanes; LANES], b: &[Lanes; LANES]) -> [Lanes; LANES] {
+            exercise::<W>(a, b)
+        }
+    }
+
+    #[test]
+    fn every_width_gives_the_same_bits() {
+        let (a, b) = (numbers(0.7), numbers(1.3));
+        let expected = exercise::<Portable>(&a, &b);
+        assert_eq!(exercise_widest(&a, &b), expected);
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            assert_eq!(exercise::<Avx2>(&a, &b), expected);
+        }
+    }
+
+    #[test]
+    fn transpose_is_a_transpose() {
+        let rows: [[f64; LANES]; LANES] =
+            std::array::from_fn(|r| std::array::from_fn(|c| (10 * r + c) as f64));
+        let columns = Portable::transpose(rows);
+        for (c, column) in columns.iter().enumerate() {
+            assert_eq!(*column, std::array::from_fn(|r| (10 * r + c) as f64));
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! A batch's numbers and vectors in registers, with the operators of arithmetic.
+
+use std::ops::{Add, Mul, Sub};
+
+use super::{Lanes, Lanes3, Width};
+
+/// One number for each contact of a batch, in registers.
+#[derive(Clone, Copy)]
+pub(crate) struct Reg<W: Width>(pub W::Value);
+
+/// One 3-vector for each contact of a batch, in registers.
+#[derive(Clone, Copy)]
+pub(crate) struct Reg3<W: Width> {
+    pub x: Reg<W>,
+    pub y: Reg<W>,
+    pub z: Reg<W>,
+}
+
+impl<W: Width> Reg<W> {
+    #[inline(always)]
+    pub fn splat(value: f64) -> Self {
+        Self(W::splat(value))
+    }
+
+    #[inline(always)]
+    pub fn load(from: &Lanes) -> Self {
+        Self(W::load(from))
+    }
+
+    #[inline(always)]
+    pub fn store(self, to: &mut Lanes) {
+        W::store(self.0, to);
+    }
+
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        Self(W::sqrt(self.0))
+    }
+
+    /// `self / other`.
+    #[inline(always)]
+    pub fn over(self, other: Self) -> Self {
+        Self(W::div(self.0, other.0))
+    }
+
+    /// `yes` where `self < other`, `no` elsewhere.
+    #[inline(always)]
+    pub fn if_less(self, other: Self, yes: Self, no: Self) -> Self {
+        Self(W::select_less(self.0, other.0, yes.0, no.0))
+    }
+
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        self.if_less(other, other, self)
+    }
+
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        self.if_less(other, self, other)
+    }
+}
+
+impl<W: Width> Reg3<W> {
+    #[inline(always)]
+    pub fn load(from: &Lanes3) -> Self {
+        Self { x: Reg::load(&from.x), y: Reg::load(&from.y), z: Reg::load(&from.z) }
+    }
+
+    #[inline(always)]
+    pub fn store(self, to: &mut Lanes3) {
+        self.x.store(&mut to.x);
+        self.y.store(&mut to.y);
+        self.z.store(&mut to.z);
+    }
+
+    #[inline(always)]
+    pub fn dot(self, other: Self) -> Reg<W> {
+        self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    #[inline(always)]
+    pub fn cross(self, other: Self) -> Self {
+        Self {
+            x: self.y * other.z - self.z * other.y,
+            y: self.z * other.x - self.x * other.z,
+            z: self.x * other.y - self.y * other.x,
+        }
+    }
+
+    #[inline(always)]
+    pub fn scale(self, factor: Reg<W>) -> Self {
+        Self { x: self.x * factor, y: self.y * factor, z: self.z * factor }
+    }
+
+    #[inline(always)]
+    pub fn norm(self) -> Reg<W> {
+        self.dot(self).sqrt()
+    }
+}
+
+impl<W: Width> Add for Reg<W> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(W::add(self.0, other.0))
+    }
+}
+
+impl<W: Width> Sub for Reg<W> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(W::sub(self.0, other.0))
+    }
+}
+
+impl<W: Width> Mul for Reg<W> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(W::mul(self.0, other.0))
+    }
+}
+
+impl<W: Width> Add for Reg3<W> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self { x: self.x + other.x, y: self.y + other.y, z: self.z + other.z }
+    }
+}
+
+impl<W: Width> Sub for Reg3<W> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self { x: self.x - other.x, y: self.y - other.y, z: self.z - other.z }
+    }
+}

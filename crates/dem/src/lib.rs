@@ -1,0 +1,59 @@
+//! Implicit discrete element method for rigid grains.
+#![doc = ""]
+//! A scene goes in, grains at rest come out:
+//!
+//! ```
+//! use granulcal_dem::{Scene, Simulation, Status};
+//!
+//! let mut scene = Scene::drop(0.02);
+//! scene.grains.count = 10;
+//! let pour = Simulation::new(&scene, 7)?.run();
+//! assert_eq!(pour.status, Status::AtRest);
+//! # Ok::<(), granulcal_dem::DemError>(())
+//! ```
+//!
+//! Read [`Scene`], then [`Simulation`]; the law is in `law.rs`, the solver in `solver/nsgs.rs`.
+//!
+//! | symbol | name | unit |
+//! |---|---|---|
+//! | `x`, `v` | position and velocity of a grain | m, m/s |
+//! | `w` | `r omega`, scaled angular velocity | m/s |
+//! | `n` | contact normal, from j to i | - |
+//! | `g` | gap, negative when overlapping | m |
+//! | `w_n`, `u_t` | normal and tangential relative velocity | m/s |
+//! | `rho` | relative rolling velocity | m/s |
+//! | `lambda_n`, `lambda_t`, `lambda_r` | impulses over a typical mass | m/s |
+//! | `b` | bias of the normal constraint | m/s |
+//! | `A_n`, `A_t`, `A_r` | diagonal of the contact's Delassus block | - |
+
+// The kernels are compiled for several register widths, which only reach what is inlined.
+#![allow(clippy::inline_always)]
+
+mod assemble;
+mod bed;
+mod contact;
+mod contacts;
+mod error;
+mod health;
+mod lanes;
+mod law;
+mod material;
+mod neighbor;
+mod pour;
+mod preset;
+mod scene;
+mod simulation;
+mod solver;
+mod wall;
+
+pub use error::DemError;
+pub use health::{Health, MAX_ENERGY_CREATED};
+pub use material::{
+    Material, WallMaterial, rolling_friction_from_length, rolling_friction_to_length,
+};
+pub use pour::{Pour, Status};
+pub use preset::{Preset, SolverSettings};
+pub use scene::{
+    CameraSpec, EndRule, Funnel, GRAVITY, Grains, Ground, Projection, Scene, Shape, Start, Wall,
+};
+pub use simulation::Simulation;

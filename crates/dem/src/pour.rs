@@ -1,0 +1,62 @@
+//! The outcome of one simulation: grains, how it ended and how healthy it was.
+
+use std::fmt;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::health::Health;
+
+/// How a pour ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// The mean kinetic energy fell below the end rule's threshold.
+    AtRest,
+    /// Every grain that still moves is out of the camera's view.
+    OutOfView,
+    /// The end rule's horizon was reached first.
+    Horizon,
+    /// A bound of [`Health`] was broken; the numbers are not to be trusted.
+    Unhealthy,
+}
+
+impl Status {
+    /// Every status.
+    pub const ALL: [Self; 4] = [Self::AtRest, Self::OutOfView, Self::Horizon, Self::Unhealthy];
+
+    /// The word used in Parquet, on the command line and in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::AtRest => "at_rest",
+            Self::OutOfView => "out_of_view",
+            Self::Horizon => "horizon",
+            Self::Unhealthy => "unhealthy",
+        }
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Grains at the end of a pour.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pour {
+    /// Centres `[m]`, ground at z = 0.
+    pub positions: Vec<Vector3<f64>>,
+    /// Velocities `[m/s]`.
+    pub velocities: Vec<Vector3<f64>>,
+    /// Angular velocities `[rad/s]`.
+    pub angular_velocities: Vec<Vector3<f64>>,
+    /// Radii `[m]`.
+    pub radii: Vec<f64>,
+    /// How it ended.
+    pub status: Status,
+    /// Whether it can be trusted, in numbers.
+    pub health: Health,
+    /// Simulated time `[s]`.
+    pub simulated_s: f64,
+}

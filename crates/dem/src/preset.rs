@@ -1,0 +1,124 @@
+//! Solver presets: named choices of step, sweeps and margins. They change cost and error, never the law.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::DemError;
+
+/// The name of a set of solver settings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// For a first look: large steps, penetration below 0.25 radii.
+    Fast,
+    /// For data sets: penetration below 0.1 radii.
+    #[default]
+    Default,
+    /// For checking the others: steps four times smaller than `default`, four times the sweeps.
+    Accurate,
+}
+
+impl Preset {
+    /// Every preset, from cheap to dear.
+    pub const ALL: [Self; 3] = [Self::Fast, Self::Default, Self::Accurate];
+
+    /// The word used in TOML, on the command line and in Python.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Default => "default",
+            Self::Accurate => "accurate",
+        }
+    }
+}
+
+impl fmt::Display for Preset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Preset {
+    type Err = DemError;
+
+    fn from_str(word: &str) -> Result<Self, DemError> {
+        Self::ALL
+            .into_iter()
+            .find(|preset| preset.name() == word)
+            .ok_or_else(|| DemError::UnknownPreset { got: word.to_owned() })
+    }
+}
+
+/// What a preset stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolverSettings {
+    /// Substep `[s]`.
+    pub dt: f64,
+    /// Gauss-Seidel sweeps in a substep, at least.
+    pub sweeps: usize,
+    /// Sweeps in a substep, at most: hard impacts on dense packings need more than quiet flow.
+    pub max_sweeps: usize,
+    /// Way by which a contact may still close against its constraint in a substep, in radii `[-]`;
+    /// as long as one closes further the sweeps go on.
+    pub closing: f64,
+    /// Substeps between two searches for pairs.
+    pub list_period: usize,
+    /// Gap below which a pair is listed although it does not approach, in radii `[-]`.
+    pub margin: f64,
+    /// Penetration beyond which a pour is unhealthy, in radii `[-]`.
+    pub max_penetration: f64,
+}
+
+impl SolverSettings {
+    pub(crate) fn check(&self) -> Result<(), DemError> {
+        let positive = |name, got: f64| {
+            let allowed = "positive and finite";
+            let fits = got > 0.0 && got.is_finite();
+            if fits { Ok(()) } else { Err(DemError::range(name, got, allowed)) }
+        };
+        positive("settings.dt", self.dt)?;
+        positive("settings.sweeps", self.sweeps as f64)?;
+        positive("settings.max_sweeps", self.max_sweeps as f64)?;
+        positive("settings.closing", self.closing)?;
+        positive("settings.list_period", self.list_period as f64)?;
+        positive("settings.margin", self.margin)?;
+        positive("settings.max_penetration", self.max_penetration)
+    }
+}
+
+impl Preset {
+    /// The settings behind the name.
+    pub fn settings(self) -> SolverSettings {
+        match self {
+            Self::Fast => SolverSettings {
+                dt: 1.0 / 1200.0,
+                sweeps: 6,
+                max_sweeps: 30,
+                closing: 0.06,
+                list_period: 2,
+                margin: 0.3,
+                max_penetration: 0.25,
+            },
+            Self::Default => SolverSettings {
+                dt: 1.0 / 2400.0,
+                sweeps: 6,
+                max_sweeps: 60,
+                closing: 0.02,
+                list_period: 2,
+                margin: 0.25,
+                max_penetration: 0.1,
+            },
+            Self::Accurate => SolverSettings {
+                dt: 1.0 / 12_000.0,
+                sweeps: 24,
+                max_sweeps: 240,
+                closing: 0.002,
+                list_period: 8,
+                margin: 0.3,
+                max_penetration: 0.1,
+            },
+        }
+    }
+}

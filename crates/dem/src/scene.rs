@@ -1,0 +1,223 @@
+//! A scene: grains, how they start, walls, ground, gravity, camera, solver preset and end rule.
+//!
+//! The same words stand in Rust, in TOML and in Python. Lengths are metres, angles radians, the
+//! ground is the plane z = 0 and gravity points down unless the scene says otherwise.
+
+mod camera;
+mod path;
+mod start;
+mod walls;
+
+use serde::{Deserialize, Serialize};
+
+pub use camera::{CameraSpec, Projection};
+pub use start::Start;
+pub use walls::{Funnel, Ground, Shape, Wall};
+
+use crate::{DemError, Material, Preset};
+
+/// Standard gravity as the peers' scenes use it `[m/s^2]`.
+pub const GRAVITY: f64 = 9.81;
+
+/// A whole experiment but for its seed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// What the scene is called in data sets and reports.
+    pub name: String,
+    /// Solver settings by name.
+    #[serde(default)]
+    pub preset: Preset,
+    /// Gravity `[m/s^2]`.
+    #[serde(default = "standard_gravity")]
+    pub gravity: [f64; 3],
+    /// The grains' material, and every wall's that states none.
+    #[serde(default)]
+    pub material: Material,
+    /// What is poured.
+    pub grains: Grains,
+    /// Where the grains are when the pour begins.
+    pub start: Start,
+    /// The plane z = 0.
+    #[serde(default, skip_serializing_if = "Ground::is_plain")]
+    pub ground: Ground,
+    /// A conical funnel about the z axis, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub funnel: Option<Funnel>,
+    /// Further walls.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub walls: Vec<Wall>,
+    /// When the pour ends.
+    #[serde(default)]
+    pub end: EndRule,
+    /// The depth camera above the ground.
+    #[serde(default)]
+    pub camera: CameraSpec,
+}
+
+/// What is poured: equal spheres.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grains {
+    /// How many.
+    pub count: usize,
+    /// Diameter `[m]`.
+    pub diameter: f64,
+    /// Density `[kg/m^3]`; it drops out of dry pours of equal grains and only sets the unit of energy.
+    pub density: f64,
+}
+
+impl Grains {
+    /// Radius of a grain `[m]`.
+    pub fn radius(&self) -> f64 {
+        0.5 * self.diameter
+    }
+}
+
+/// When a pour ends: at rest, with every moving grain out of view, or at the horizon.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EndRule {
+    /// Longest simulated time `[s]`.
+    pub horizon: f64,
+    /// Mean kinetic energy of a grain per mass below which the pour is at rest `[m^2/s^2]`.
+    pub kinetic_energy: f64,
+}
+
+impl Default for EndRule {
+    fn default() -> Self {
+        Self { horizon: 4.0, kinetic_energy: 1e-8 }
+    }
+}
+
+fn standard_gravity() -> [f64; 3] {
+    [0.0, 0.0, -GRAVITY]
+}
+
+impl Scene {
+    /// The paper's pour: 2000 grains of 4 mm through a funnel whose tip is `height` `[m]` above the ground.
+    pub fn funnel(height: f64) -> Self {
+        Self {
+            name: "funnel".to_owned(),
+            preset: Preset::Default,
+            gravity: standard_gravity(),
+            material: Material::default(),
+            grains: Grains { count: 2000, diameter: 4e-3, density: 1300.0 },
+            start: Start::Grid { counts: [10, 10, 20], spacing: 8e-3, jitter: 1e-4, base: -4e-3 },
+            ground: Ground::default(),
+            funnel: Some(Funnel { height, ..Funnel::default() }),
+            walls: Vec::new(),
+            end: EndRule::default(),
+            camera: CameraSpec::default(),
+        }
+    }
+
+    /// A ball of 2000 grains of 4 mm let go with its lowest point `height` `[m]` above the ground.
+    pub fn drop(height: f64) -> Self {
+        Self {
+            name: "drop".to_owned(),
+            start: Start::Ball { height, solid_fraction: 0.6, jitter: 5e-5 },
+            funnel: None,
+            ..Self::funnel(0.0)
+        }
+    }
+
+    /// Reads and checks a scene.
+    ///
+    /// # Errors
+    /// [`DemError::Toml`] for what is not TOML of a scene (unknown keys included),
+    /// [`DemError::OutOfRange`] for numbers that no scene can have.
+    pub fn from_toml(text: &str) -> Result<Self, DemError> {
+        let scene: Self = toml::from_str(text).map_err(|e| DemError::Toml(Box::new(e)))?;
+        scene.check()?;
+        Ok(scene)
+    }
+
+    /// The scene as TOML; [`Scene::from_toml`] reads it back unchanged.
+    ///
+    /// # Errors
+    /// [`DemError::TomlWrite`] if a number cannot be written.
+    pub fn to_toml(&self) -> Result<String, DemError> {
+        toml::to_string(self).map_err(|e| DemError::TomlWrite(Box::new(e)))
+    }
+
+    /// Checks every number of the scene.
+    ///
+    /// # Errors
+    /// [`DemError::OutOfRange`] or [`DemError::StartTooSmall`].
+    pub fn check(&self) -> Result<(), DemError> {
+        self.material.check("material")?;
+        positive("grains.diameter", self.grains.diameter)?;
+        positive("grains.density", self.grains.density)?;
+        positive("end.horizon", self.end.horizon)?;
+        positive("end.kinetic_energy", self.end.kinetic_energy)?;
+        for (axis, value) in ["x", "y", "z"].iter().zip(self.gravity) {
+            finite(&format!("gravity.{axis}"), value)?;
+        }
+        self.start.check(&self.grains)?;
+        self.ground.check(&self.material)?;
+        if let Some(funnel) = &self.funnel {
+            funnel.check(&self.material, self.grains.radius())?;
+        }
+        for (index, wall) in self.walls.iter().enumerate() {
+            wall.check(&format!("walls.{index}"), &self.material)?;
+        }
+        self.camera.check()
+    }
+}
+
+pub(crate) fn positive(name: &str, got: f64) -> Result<(), DemError> {
+    if got > 0.0 && got.is_finite() {
+        return Ok(());
+    }
+    Err(DemError::range(name, got, "positive and finite"))
+}
+
+pub(crate) fn non_negative(name: &str, got: f64) -> Result<(), DemError> {
+    if got >= 0.0 && got.is_finite() {
+        return Ok(());
+    }
+    Err(DemError::range(name, got, "zero or positive, and finite"))
+}
+
+pub(crate) fn finite(name: &str, got: f64) -> Result<(), DemError> {
+    if got.is_finite() {
+        return Ok(());
+    }
+    Err(DemError::range(name, got, "finite"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn built_in_scenes_are_valid_and_survive_toml() {
+        for scene in [Scene::funnel(0.12), Scene::drop(0.2)] {
+            scene.check().unwrap();
+            assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+        }
+    }
+
+    #[test]
+    fn unknown_keys_are_named() {
+        let text = Scene::drop(0.1).to_toml().unwrap().replace("diameter", "diametre");
+        let error = Scene::from_toml(&text).unwrap_err();
+        let source = std::error::Error::source(&error).unwrap().to_string();
+        assert!(source.contains("diametre") && source.contains("diameter"), "{source}");
+    }
+
+    #[test]
+    fn bad_numbers_are_named() {
+        for (change, name) in [
+            ((|s: &mut Scene| s.grains.diameter = -1.0) as fn(&mut Scene), "grains.diameter"),
+            (|s| s.gravity[2] = f64::NAN, "gravity.z"),
+            (|s| s.end.horizon = 0.0, "end.horizon"),
+            (|s| s.material.restitution = 2.0, "material.restitution"),
+        ] {
+            let mut scene = Scene::funnel(0.12);
+            change(&mut scene);
+            assert!(scene.check().unwrap_err().to_string().contains(name), "{name}");
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! Numbers of a scene by their path, for example `material.sliding_friction` or `scene.funnel.height`.
+//!
+//! A scene as TOML is a tree of tables; a path walks it. `scene.` in front may be left out.
+
+use toml::{Table, Value};
+
+use super::Scene;
+use crate::DemError;
+
+impl Scene {
+    /// A copy with the number at `path` set to `value`, checked like any scene.
+    ///
+    /// # Errors
+    /// [`DemError::Path`] if the path names no number of a scene, or what the changed scene's check says.
+    pub fn with(&self, path: &str, value: f64) -> Result<Self, DemError> {
+        let mut scene = self.clone();
+        scene.set(&[(path, value)])?;
+        Ok(scene)
+    }
+
+    /// Sets several numbers by path; the scene stays as it was if any of them is refused.
+    ///
+    /// # Errors
+    /// As [`Scene::with`].
+    pub fn set(&mut self, values: &[(&str, f64)]) -> Result<(), DemError> {
+        let mut tree = self.tree()?;
+        for &(path, value) in values {
+            insert(&mut tree, path, value)?;
+        }
+        let paths = || values.iter().map(|(path, _)| *path).collect::<Vec<_>>().join(", ");
+        let changed: Self = Value::Table(tree)
+            .try_into()
+            .map_err(|e: toml::de::Error| path_error(&paths(), e.message()))?;
+        changed.check()?;
+        *self = changed;
+        Ok(())
+    }
+
+    /// The number at `path`.
+    ///
+    /// # Errors
+    /// [`DemError::Path`] if nothing or no number stands there.
+    pub fn get(&self, path: &str) -> Result<f64, DemError> {
+        let tree = self.tree()?;
+        let mut found = None;
+        let mut table = &tree;
+        for key in keys(path) {
+            let value = table.get(key).ok_or_else(|| {
+                let here: Vec<_> = table.keys().map(String::as_str).collect();
+                path_error(path, &format!("no {key:?} here, only {}", here.join(", ")))
+            })?;
+            found = Some(value);
+            if let Value::Table(inner) = value {
+                table = inner;
+            }
+        }
+        match found {
+            Some(Value::Float(number)) => Ok(*number),
+            Some(Value::Integer(number)) => Ok(*number as f64),
+            other => {
+                let kind = other.map_or("nothing", Value::type_str);
+                Err(path_error(path, &format!("a {kind} stands there")))
+            }
+        }
+    }
+
+    fn tree(&self) -> Result<Table, DemError> {
+        Table::try_from(self).map_err(|e| DemError::TomlWrite(Box::new(e)))
+    }
+}
+
+/// Tables that a scene leaves out where they say nothing.
+const MATERIAL: &str = "material";
+const GROUND: &str = "ground";
+
+fn keys(path: &str) -> impl Iterator<Item = &str> {
+    path.strip_prefix("scene.").unwrap_or(path).split('.')
+}
+
+fn path_error(path: &str, reason: &str) -> DemError {
+    DemError::Path { path: path.to_owned(), reason: reason.to_owned() }
+}
+
+/// Puts `value` at `path`. A missing number or table of coefficients is created, and whether it may exist
+/// is the scene's to say; other missing tables are not: a height must not conjure up a funnel.
+fn insert(tree: &mut Table, path: &str, value: f64) -> Result<(), DemError> {
+    let mut table = tree;
+    let mut keys = keys(path).peekable();
+    while let Some(key) = keys.next() {
+        if keys.peek().is_none() {
+            let number = match table.get(key) {
+                Some(Value::Integer(_)) if value.fract() == 0.0 => Value::Integer(value as i64),
+                Some(Value::Integer(_)) => {
+                    return Err(path_error(path, &format!("must be a whole number, got {value}")));
+                }
+                None | Some(Value::Float(_)) => Value::Float(value),
+                Some(other) => {
+                    let reason = format!("a {} stands there, not a number", other.type_str());
+                    return Err(path_error(path, &reason));
+                }
+            };
+            table.insert(key.to_owned(), number);
+            return Ok(());
+        }
+        if !table.contains_key(key) && key != MATERIAL && key != GROUND {
+            return Err(path_error(path, &format!("this scene has no {key:?}")));
+        }
+        let entry = table.entry(key.to_owned()).or_insert_with(|| Value::Table(Table::new()));
+        let kind = entry.type_str();
+        table = entry
+            .as_table_mut()
+            .ok_or_else(|| path_error(path, &format!("{key:?} is a {kind}, not a table")))?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_and_gets_by_path() {
+        let scene = Scene::funnel(0.12);
+        let changed = scene.with("material.sliding_friction", 0.25).unwrap();
+        assert_eq!(changed.material.sliding_friction, 0.25);
+        let changed = changed.with("scene.funnel.height", 0.05).unwrap();
+        assert_eq!(changed.get("funnel.height").unwrap(), 0.05);
+        assert_eq!(changed.with("grains.count", 100.0).unwrap().grains.count, 100);
+        let ground = scene.with("scene.ground.material.restitution", 0.1).unwrap();
+        assert_eq!(ground.ground.material.restitution, Some(0.1));
+    }
+
+    #[test]
+    fn refuses_what_is_no_number_of_a_scene() {
+        let scene = Scene::drop(0.1);
+        for path in [
+            "material.friction",
+            "scene.start.kind",
+            "name",
+            "nothing.at.all",
+            "",
+            "preset.x",
+            "funnel.height",
+        ] {
+            let error = scene.with(path, 0.1).unwrap_err();
+            assert!(matches!(error, DemError::Path { .. }), "{path}: {error}");
+        }
+        assert!(scene.with("grains.count", 1.5).is_err());
+        assert!(scene.with("material.restitution", 1.5).is_err());
+        assert!(scene.get("material.friction").is_err());
+        assert!(scene.get("material").is_err());
+    }
+}

@@ -1,0 +1,201 @@
+//! Where the grains are when a pour begins.
+
+use nalgebra::Vector3;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::{Deserialize, Serialize};
+
+use super::{Grains, Scene, finite, non_negative, positive};
+use crate::DemError;
+
+/// Solid fraction of the closest packing of equal spheres, pi / sqrt(18).
+const CLOSEST_PACKING: f64 = 0.740_480_489_693_061;
+
+/// The arrangement of the grains at time zero, at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+pub enum Start {
+    /// A block about the z axis, filled layer by layer from below.
+    Grid {
+        /// Grains along x, y and z.
+        counts: [usize; 3],
+        /// Distance of neighbours `[m]`.
+        spacing: f64,
+        /// Half width of a uniform seeded displacement along each axis `[m]`.
+        jitter: f64,
+        /// Height of the lowest layer above the funnel's rim, or above the ground without a funnel `[m]`.
+        base: f64,
+    },
+    /// A ball cut out of a face-centred cubic lattice, its lowest point at `height` above the ground.
+    Ball {
+        /// Height of the lowest grain's lowest point `[m]`.
+        height: f64,
+        /// Share of the lattice's volume that is grain `[-]`.
+        solid_fraction: f64,
+        /// Half width of a uniform seeded displacement along each axis `[m]`.
+        jitter: f64,
+    },
+}
+
+impl Start {
+    pub(super) fn check(&self, grains: &Grains) -> Result<(), DemError> {
+        match *self {
+            Self::Grid { counts, spacing, jitter, base } => {
+                finite("start.base", base)?;
+                jitter_fits(jitter, spacing - grains.diameter)?;
+                positive("start.spacing", spacing)?;
+                let capacity = counts.iter().product();
+                if grains.count > capacity {
+                    let count = grains.count;
+                    return Err(DemError::StartTooSmall { kind: "grid", capacity, count });
+                }
+            }
+            Self::Ball { height, solid_fraction, jitter } => {
+                non_negative("start.height", height)?;
+                if !(solid_fraction > 0.0 && solid_fraction <= CLOSEST_PACKING) {
+                    let allowed = "in (0, 0.7404]";
+                    return Err(DemError::range("start.solid_fraction", solid_fraction, allowed));
+                }
+                jitter_fits(
+                    jitter,
+                    lattice_spacing(grains.diameter, solid_fraction) - grains.diameter,
+                )?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Centres of the grains `[m]`, one each.
+    pub(crate) fn positions(&self, scene: &Scene, seed: u64) -> Vec<Vector3<f64>> {
+        let (mut positions, jitter) = match *self {
+            Self::Grid { counts, spacing, jitter, base } => {
+                let floor = scene.funnel.map_or(0.0, |funnel| funnel.rim_height());
+                (grid(scene.grains.count, counts, spacing, floor + base), jitter)
+            }
+            Self::Ball { height, solid_fraction, jitter } => {
+                let spacing = lattice_spacing(scene.grains.diameter, solid_fraction);
+                (ball(&scene.grains, spacing, height + jitter), jitter)
+            }
+        };
+        let mut random = Pcg64::seed_from_u64(seed);
+        for position in &mut positions {
+            for axis in 0..3 {
+                position[axis] += jitter * (2.0 * unit_interval(random.next_u64()) - 1.0);
+            }
+        }
+        positions
+    }
+}
+
+/// Two neighbours may move towards each other by `jitter` along every axis, so twice its length must fit the gap.
+fn jitter_fits(jitter: f64, gap: f64) -> Result<(), DemError> {
+    non_negative("start.jitter", jitter)?;
+    if 2.0 * jitter * 3f64.sqrt() <= gap + 1e-12 {
+        return Ok(());
+    }
+    Err(DemError::range("start.jitter", jitter, "small enough that no two grains overlap"))
+}
+
+fn lattice_spacing(diameter: f64, solid_fraction: f64) -> f64 {
+    diameter * (CLOSEST_PACKING / solid_fraction).cbrt()
+}
+
+/// The top 53 bits of a random word as a number in [0, 1).
+fn unit_interval(word: u64) -> f64 {
+    (word >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+}
+
+fn grid(count: usize, counts: [usize; 3], spacing: f64, bottom: f64) -> Vec<Vector3<f64>> {
+    let centred = |index: usize, n: usize| spacing * (index as f64 - 0.5 * (n as f64 - 1.0));
+    (0..count)
+        .map(|index| {
+            let (x, rest) = (index % counts[0], index / counts[0]);
+            let (y, z) = (rest % counts[1], rest / counts[1]);
+            Vector3::new(centred(x, counts[0]), centred(y, counts[1]), bottom + spacing * z as f64)
+        })
+        .collect()
+}
+
+/// The `count` lattice points nearest to the centre of a face-centred cubic lattice, lowest point at `height`.
+fn ball(grains: &Grains, spacing: f64, height: f64) -> Vec<Vector3<f64>> {
+    let edge = spacing * std::f64::consts::SQRT_2;
+    // Four points a cubic cell: this many cells each way hold twice the ball.
+    let reach = (3.0 * grains.count as f64 / (8.0 * std::f64::consts::PI)).cbrt().ceil() as i64 + 1;
+    let corners = [[0.0, 0.0, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0]];
+    let mut points = Vec::new();
+    for z in -reach..=reach {
+        for y in -reach..=reach {
+            for x in -reach..=reach {
+                for corner in corners {
+                    let cell = Vector3::new(x as f64, y as f64, z as f64);
+                    points.push(edge * (cell + Vector3::from(corner)));
+                }
+            }
+        }
+    }
+    // A stable sort: points at one distance keep the lattice's order on every machine.
+    points.sort_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
+    points.truncate(grains.count);
+    let lowest = points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    if lowest.is_finite() {
+        let lift = height + grains.radius() - lowest;
+        for point in &mut points {
+            point.z += lift;
+        }
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nearest_pair(points: &[Vector3<f64>]) -> f64 {
+        let mut nearest = f64::INFINITY;
+        for (i, a) in points.iter().enumerate() {
+            for b in &points[..i] {
+                nearest = nearest.min((a - b).norm());
+            }
+        }
+        nearest
+    }
+
+    #[test]
+    fn no_grains_overlap_at_the_start() {
+        for mut scene in [Scene::funnel(0.12), Scene::drop(0.1)] {
+            scene.grains.count = 700;
+            let points = scene.start.positions(&scene, 3);
+            assert_eq!(points.len(), 700);
+            assert!(nearest_pair(&points) >= scene.grains.diameter);
+        }
+    }
+
+    #[test]
+    fn ball_hangs_at_its_height_and_is_round() {
+        let scene = Scene::drop(0.1);
+        let points = scene.start.positions(&scene, 1);
+        let lowest = points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+        assert!((lowest - 0.002 - 0.1).abs() < 2.1e-4, "{lowest}");
+        // Radius of a ball of 2000 grains at 60 % solid: (2000 / 0.6)^(1/3) * R.
+        let extent = points.iter().map(|p| p.x.abs()).fold(0.0, f64::max);
+        let expected = (2000.0f64 / 0.6).cbrt() * 0.002;
+        assert!((extent + 0.002 - expected).abs() < 0.1 * expected, "{extent} {expected}");
+    }
+
+    #[test]
+    fn seeds_differ_and_repeat() {
+        let scene = Scene::funnel(0.12);
+        let at = |seed| scene.start.positions(&scene, seed);
+        assert_eq!(at(1), at(1));
+        assert_ne!(at(1), at(2));
+    }
+
+    #[test]
+    fn too_many_grains_or_too_much_jitter_is_refused() {
+        let mut scene = Scene::funnel(0.12);
+        scene.grains.count = 2001;
+        assert!(matches!(scene.check(), Err(DemError::StartTooSmall { capacity: 2000, .. })));
+        let scene = Scene::drop(0.1).with("start.jitter", 1e-3);
+        assert!(scene.unwrap_err().to_string().contains("start.jitter"));
+    }
+}

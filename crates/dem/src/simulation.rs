@@ -1,0 +1,251 @@
+//! A pour in time: the substep, the end rule, the health.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::DemError;
+use crate::bed::{Bed, Body};
+use crate::contacts::{Contacts, Surroundings};
+use crate::health::{Health, HealthWatch};
+use crate::pour::{Pour, Status};
+use crate::preset::SolverSettings;
+use crate::scene::{CameraSpec, EndRule, Scene};
+use crate::solver::nsgs;
+
+/// Examinations between two looks at the residual, which costs about a sweep.
+const RESIDUAL_PERIOD: usize = 4;
+/// Sweeps, at least, after late contacts have been found, and how often what these bring together is
+/// looked for.
+const LATE_SWEEPS: usize = 2;
+const LATE_ROUNDS: usize = 8;
+
+/// A scene in motion.
+///
+/// Each substep (Moreau's time stepping; docs/theory/contact.md, box 2):
+/// list the contacts now and then; assemble gaps, biases and the warm start from the
+/// velocities before gravity; add gravity; sweep; solve what the sweeps have brought together; move.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    bed: Bed,
+    contacts: Contacts,
+    around: Surroundings,
+    gravity: Vector3<f64>,
+    end: EndRule,
+    camera: CameraSpec,
+    /// Velocities before gravity, for restitution.
+    before: Vec<Body>,
+    substep: usize,
+    watch: HealthWatch,
+    /// Threads for large scenes; small ones stay on the calling thread.
+    pool: Option<Arc<ThreadPool>>,
+    ended: Option<Status>,
+}
+
+impl Simulation {
+    /// Puts the grains of `scene` at their start; the seed moves them within the start's jitter.
+    ///
+    /// # Errors
+    /// What [`Scene::check`] says.
+    pub fn new(scene: &Scene, seed: u64) -> Result<Self, DemError> {
+        scene.check()?;
+        let bed = Bed::new(scene, seed);
+        let gravity = Vector3::from(scene.gravity);
+        Ok(Self {
+            watch: HealthWatch::new(bed.count(), bed.energy(&gravity)),
+            before: bed.bodies.clone(),
+            contacts: Contacts::default(),
+            around: Surroundings::new(scene),
+            bed,
+            gravity,
+            end: scene.end,
+            camera: scene.camera,
+            substep: 0,
+            pool: None,
+            ended: None,
+        })
+    }
+
+    /// Settings other than the preset's, for convergence studies.
+    ///
+    /// # Errors
+    /// [`DemError::OutOfRange`] for a step, margin or bound that is not positive, or a count of 0.
+    pub fn with_settings(mut self, settings: SolverSettings) -> Result<Self, DemError> {
+        settings.check()?;
+        self.around.set_settings(settings);
+        Ok(self)
+    }
+
+    /// Lets `threads` threads share this one simulation. The result is the same to the last bit; only
+    /// scenes of some ten thousand grains have enough contacts of a colour to gain from it.
+    ///
+    /// # Errors
+    /// [`DemError::Threads`] if `threads` is 0 or the system gives none.
+    pub fn with_threads(mut self, threads: usize) -> Result<Self, DemError> {
+        if threads == 0 {
+            return Err(DemError::range("threads", 0.0, "at least 1"));
+        }
+        self.pool = if threads == 1 {
+            None
+        } else {
+            let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+            Some(Arc::new(pool.map_err(DemError::Threads)?))
+        };
+        Ok(self)
+    }
+
+    /// Simulated time `[s]`.
+    pub fn time(&self) -> f64 {
+        self.substep as f64 * self.around.settings.dt
+    }
+
+    /// Centres of the grains `[m]`.
+    pub fn positions(&self) -> &[Vector3<f64>] {
+        &self.bed.positions
+    }
+
+    /// Velocities of the grains `[m/s]`.
+    pub fn velocities(&self) -> Vec<Vector3<f64>> {
+        (0..self.bed.count()).map(|grain| self.bed.velocity(grain)).collect()
+    }
+
+    /// Radii of the grains `[m]`.
+    pub fn radii(&self) -> &[f64] {
+        &self.bed.radii
+    }
+
+    /// How the pour ended, once it has.
+    pub fn ended(&self) -> Option<Status> {
+        self.ended
+    }
+
+    /// The health so far.
+    pub fn health(&self) -> Health {
+        self.watch.health(self.substep)
+    }
+
+    /// Simulates `seconds`, or less if the pour ends before.
+    pub fn advance(&mut self, seconds: f64) {
+        let last = self.substep + (seconds / self.around.settings.dt).round() as usize;
+        while self.ended.is_none() && self.substep < last {
+            self.step();
+        }
+    }
+
+    /// Simulates to the end.
+    pub fn run(mut self) -> Pour {
+        while self.ended.is_none() {
+            self.step();
+        }
+        self.into_pour()
+    }
+
+    /// Simulates to the end, or gives up when `keep_going` says so; it is asked at every search for pairs.
+    pub fn run_while(mut self, keep_going: &dyn Fn() -> bool) -> Option<Pour> {
+        while self.ended.is_none() {
+            if self.substep.is_multiple_of(self.around.settings.list_period) && !keep_going() {
+                return None;
+            }
+            self.step();
+        }
+        Some(self.into_pour())
+    }
+
+    /// The state as it is, as a pour; one that has not ended counts as cut at its horizon.
+    pub fn into_pour(self) -> Pour {
+        Pour {
+            velocities: self.velocities(),
+            angular_velocities: (0..self.bed.count())
+                .map(|grain| self.bed.angular_velocity(grain))
+                .collect(),
+            status: self.ended.unwrap_or(Status::Horizon),
+            health: self.health(),
+            simulated_s: self.time(),
+            positions: self.bed.positions,
+            radii: self.bed.radii,
+        }
+    }
+
+    /// One substep.
+    fn step(&mut self) {
+        let SolverSettings { dt, sweeps, list_period, .. } = self.around.settings;
+        let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
+        contacts.refresh_list(bed, around);
+        self.before.clone_from(&bed.bodies);
+        let seen = contacts.assemble(bed, &self.before, around, self.watch.lost_mut());
+        bed.accelerate(&self.gravity, dt);
+        self.solve(sweeps);
+        for _ in 0..LATE_ROUNDS {
+            let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
+            if !contacts.add_late(bed, &mut self.before, around, self.watch.lost_mut()) {
+                break;
+            }
+            self.solve(LATE_SWEEPS);
+        }
+        self.bed.move_on(dt);
+        self.watch.see_penetration(seen.penetration);
+        self.substep += 1;
+        if self.substep.is_multiple_of(list_period) {
+            self.examine();
+        }
+    }
+
+    /// Sweeps until no contact closes too far, within the settings' bounds, late contacts first.
+    fn solve(&mut self, at_least: usize) {
+        let SolverSettings { dt, max_sweeps, closing, .. } = self.around.settings;
+        let too_fast = closing * self.around.radius / dt;
+        for done in 1..=max_sweeps {
+            if self.sweep() <= too_fast && done >= at_least {
+                break;
+            }
+        }
+    }
+
+    /// One sweep over all contacts; returns the fastest closing that it met `[m/s]`.
+    fn sweep(&mut self) -> f64 {
+        let (bodies, pool) = (&mut self.bed.bodies, self.pool.as_deref());
+        let Contacts { pairs, at_walls, late_pairs, late_at_walls, .. } = &mut self.contacts;
+        self.watch.see_sweep();
+        [late_pairs, late_at_walls, pairs, at_walls]
+            .into_iter()
+            .map(|set| nsgs::sweep(set, bodies, pool))
+            .fold(0.0, f64::max)
+    }
+
+    /// Looks at the state between two searches: health and the end rule.
+    fn examine(&mut self) {
+        if self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period) {
+            let mut residual = nsgs::ResidualSums::default();
+            residual.add(&self.contacts.pairs, &self.bed.bodies);
+            residual.add(&self.contacts.at_walls, &self.bed.bodies);
+            self.watch.see_residual(residual.relative());
+        }
+        self.watch.see_contacts(self.contacts.count());
+        self.watch.see_energy(self.bed.energy(&self.gravity));
+        self.ended = self.end_reached().map(|status| {
+            let trusted = self.watch.is_healthy(self.around.settings.max_penetration);
+            if trusted { status } else { Status::Unhealthy }
+        });
+        if self.ended.is_none() && !self.watch.is_finite() {
+            self.ended = Some(Status::Unhealthy);
+        }
+    }
+
+    fn end_reached(&self) -> Option<Status> {
+        let threshold = self.end.kinetic_energy;
+        let energies: Vec<f64> =
+            (0..self.bed.count()).map(|i| self.bed.kinetic_energy(i)).collect();
+        if energies.iter().sum::<f64>() <= threshold * energies.len() as f64 {
+            return Some(Status::AtRest);
+        }
+        let still = |(grain, energy): (usize, &f64)| {
+            let at = &self.bed.positions[grain];
+            *energy <= threshold || !self.camera.sees_ground(at.x, at.y)
+        };
+        if energies.iter().enumerate().all(still) {
+            return Some(Status::OutOfView);
+        }
+        (self.time() >= self.end.horizon).then_some(Status::Horizon)
+    }
+}

@@ -1,0 +1,3 @@
+//! Solvers of one substep's contact problem.
+
+pub(crate) mod nsgs;

@@ -1,0 +1,149 @@
+//! The one error type of the crate.
+
+use thiserror::Error;
+
+/// Why an image could not be rendered, segmented or described.
+///
+/// Every variant carries what was got and what would have been allowed.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum FeatureError {
+    /// Too few points for the quantity to exist.
+    #[error("{what} needs at least {min} points, got {got}")]
+    TooFewPoints {
+        /// The quantity asked for.
+        what: &'static str,
+        /// Points given.
+        got: usize,
+        /// Points needed.
+        min: usize,
+    },
+    /// A NaN or an infinity where a finite number is needed.
+    #[error("{what}[{index}] must be finite, got {got}")]
+    NonFinite {
+        /// The array.
+        what: &'static str,
+        /// Position in the array.
+        index: usize,
+        /// The value found.
+        got: f64,
+    },
+    /// A number outside its range.
+    #[error("{what} must be in [{min}, {max}], got {got}")]
+    OutOfRange {
+        /// The quantity.
+        what: &'static str,
+        /// The value given.
+        got: f64,
+        /// Smallest value allowed.
+        min: f64,
+        /// Largest value allowed.
+        max: f64,
+    },
+    /// Two arrays that must be equally long are not.
+    #[error("{what} must have length {expected}, got {got}")]
+    LengthMismatch {
+        /// The array.
+        what: &'static str,
+        /// Its length.
+        got: usize,
+        /// The length it must have.
+        expected: usize,
+    },
+    /// Two images, or an image and a camera, differ in size.
+    #[error("{what} must be {}x{} pixels, got {}x{}", expected.0, expected.1, got.0, got.1)]
+    SizeMismatch {
+        /// The image.
+        what: &'static str,
+        /// Its (width, height) `[px]`.
+        got: (usize, usize),
+        /// The (width, height) it must have `[px]`.
+        expected: (usize, usize),
+    },
+    /// Down-sampling would leave no pixel.
+    #[error("down-sampling factor must be in [1, {max}] for this image, got {got}")]
+    DownsampleFactor {
+        /// The factor given.
+        got: usize,
+        /// The largest factor that leaves a pixel.
+        max: usize,
+    },
+    /// Too few pixels of the image carry depth.
+    #[error("at least {min} of the {pixels} pixels must carry depth, got {got}")]
+    NoValidDepth {
+        /// Pixels of the image.
+        pixels: usize,
+        /// Valid pixels within the border.
+        got: usize,
+        /// Valid pixels needed.
+        min: usize,
+    },
+    /// No pixel was taken for a grain.
+    #[error(
+        "none of {valid} valid pixels belongs to a grain (highest is {highest} m, threshold {threshold} m)"
+    )]
+    EmptyMask {
+        /// Valid pixels.
+        valid: usize,
+        /// Height of the highest valid pixel above the ground `[m]`.
+        highest: f64,
+        /// Height above which a pixel counts as grain `[m]`.
+        threshold: f64,
+    },
+    /// Segmentation by colour was half asked for.
+    #[error(
+        "colour segmentation needs a colour image and a colour range, got image: {image}, range: {range}"
+    )]
+    IncompleteColour {
+        /// Whether an image was given.
+        image: bool,
+        /// Whether a range was given.
+        range: bool,
+    },
+    /// The points do not span a plane.
+    #[error(
+        "points do not span a plane: their second largest spread is {got} m, it must exceed {min} m"
+    )]
+    DegeneratePlane {
+        /// Root mean square extent along the second principal axis `[m]`.
+        got: f64,
+        /// The extent needed `[m]`.
+        min: f64,
+    },
+}
+
+/// Refuses the first value of `values` that is not finite.
+pub(crate) fn require_finite(
+    what: &'static str,
+    values: impl Iterator<Item = f64>,
+) -> Result<(), FeatureError> {
+    for (index, got) in values.enumerate() {
+        if !got.is_finite() {
+            return Err(FeatureError::NonFinite { what, index, got });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a value outside `[min, max]`; NaN is outside of everything.
+pub(crate) fn require_in(
+    what: &'static str,
+    got: f64,
+    min: f64,
+    max: f64,
+) -> Result<(), FeatureError> {
+    if got >= min && got <= max {
+        Ok(())
+    } else {
+        Err(FeatureError::OutOfRange { what, got, min, max })
+    }
+}
+
+/// Refuses an array of the wrong length.
+pub(crate) fn require_length(
+    what: &'static str,
+    got: usize,
+    expected: usize,
+) -> Result<(), FeatureError> {
+    if got == expected { Ok(()) } else { Err(FeatureError::LengthMismatch { what, got, expected }) }
+}

@@ -1,0 +1,120 @@
+//! Heights on a regular grid, as a time-of-flight rig or a laser scanner delivers them.
+
+use nalgebra::Vector3;
+
+use crate::camera::MAX_SIDE_PX;
+use crate::depth::decimate;
+use crate::error::{FeatureError, require_in, require_length};
+
+/// Height above a datum on a regular grid, seen without perspective.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeightMap {
+    /// Columns `[px]`.
+    pub width: usize,
+    /// Rows `[px]`.
+    pub height: usize,
+    /// Distance between columns `[m/px]`.
+    pub resolution_x: f64,
+    /// Distance between rows `[m/px]`.
+    pub resolution_y: f64,
+    /// Height `[m]`, row by row, shape [height · width]; NaN = no data.
+    pub z: Vec<f64>,
+}
+
+impl HeightMap {
+    /// A map of the given size.
+    ///
+    /// # Errors
+    /// `OutOfRange` for an empty map or a resolution that is not positive, `LengthMismatch` when
+    /// `z` has not width · height values.
+    pub fn new(
+        width: usize,
+        height: usize,
+        resolution_x: f64,
+        resolution_y: f64,
+        z: Vec<f64>,
+    ) -> Result<Self, FeatureError> {
+        let map = Self { width, height, resolution_x, resolution_y, z };
+        map.require_valid()?;
+        Ok(map)
+    }
+
+    /// Height of pixel (u, v) `[m]`; NaN = no data, also outside the map.
+    pub fn at(&self, u: usize, v: usize) -> f64 {
+        if u < self.width && v < self.height {
+            self.z.get(v * self.width + u).copied().unwrap_or(f64::NAN)
+        } else {
+            f64::NAN
+        }
+    }
+
+    /// The point of pixel (u, v): x grows with the column, y with the row, and the middle of the
+    /// map is x = y = 0 `[m]`.
+    pub fn point(&self, u: usize, v: usize) -> Vector3<f64> {
+        Vector3::new(
+            (u as f64 + 0.5 - 0.5 * self.width as f64) * self.resolution_x,
+            (v as f64 + 0.5 - 0.5 * self.height as f64) * self.resolution_y,
+            self.at(u, v),
+        )
+    }
+
+    /// The points of all pixels that carry data `[m]`, row by row.
+    pub fn to_points(&self) -> Vec<Vector3<f64>> {
+        (0..self.height)
+            .flat_map(|v| (0..self.width).map(move |u| self.point(u, v)))
+            .filter(|point| point.z.is_finite())
+            .collect()
+    }
+
+    /// Keeps the middle pixel of every n × n block, as [`crate::DepthImage::downsample`] does.
+    ///
+    /// # Errors
+    /// `DownsampleFactor` when no pixel would be left.
+    pub fn downsample(&self, n: usize) -> Result<Self, FeatureError> {
+        self.require_valid()?;
+        let z = decimate(&self.z, self.width, self.height, n)?;
+        Self::new(
+            self.width / n,
+            self.height / n,
+            self.resolution_x * n as f64,
+            self.resolution_y * n as f64,
+            z,
+        )
+    }
+
+    /// Refuses a map whose public fields contradict each other.
+    pub(crate) fn require_valid(&self) -> Result<(), FeatureError> {
+        Self::require_geometry(self.width, self.height, self.resolution_x, self.resolution_y)?;
+        require_length("z", self.z.len(), self.width * self.height)
+    }
+
+    /// Refuses a size or a resolution that no map can have.
+    pub(crate) fn require_geometry(
+        width: usize,
+        height: usize,
+        resolution_x: f64,
+        resolution_y: f64,
+    ) -> Result<(), FeatureError> {
+        require_in("map width [px]", width as f64, 1.0, MAX_SIDE_PX as f64)?;
+        require_in("map height [px]", height as f64, 1.0, MAX_SIDE_PX as f64)?;
+        require_in("resolution_x [m/px]", resolution_x, 1e-9, 1e3)?;
+        require_in("resolution_y [m/px]", resolution_y, 1e-9, 1e3)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_centred_and_skip_missing_data() {
+        let map = HeightMap::new(2, 1, 0.01, 0.02, vec![0.5, f64::NAN]).unwrap();
+        assert_eq!(map.to_points(), [Vector3::new(-0.005, 0.0, 0.5)]);
+    }
+
+    #[test]
+    fn refuses_a_resolution_of_zero() {
+        let got = HeightMap::new(1, 1, 0.0, 0.01, vec![0.0]);
+        assert!(matches!(got, Err(FeatureError::OutOfRange { got: 0.0, .. })));
+    }
+}

@@ -1,0 +1,63 @@
+//! Connected patches of a mask.
+
+/// Clears the patches of fewer than `min_px` pixels; neighbours share an edge or a corner.
+pub(super) fn remove_small(mask: &mut [bool], width: usize, min_px: usize) {
+    if min_px <= 1 || width == 0 {
+        return;
+    }
+    let height = mask.len() / width;
+    let mut seen = vec![false; mask.len()];
+    let mut patch = Vec::new();
+    for start in 0..mask.len() {
+        if !mask[start] || seen[start] {
+            continue;
+        }
+        patch.clear();
+        patch.push(start);
+        seen[start] = true;
+        let mut next = 0;
+        while let Some(&pixel) = patch.get(next) {
+            next += 1;
+            let (u, v) = (pixel % width, pixel / width);
+            for row in v.saturating_sub(1)..(v + 2).min(height) {
+                for column in u.saturating_sub(1)..(u + 2).min(width) {
+                    let neighbour = row * width + column;
+                    if mask[neighbour] && !seen[neighbour] {
+                        seen[neighbour] = true;
+                        patch.push(neighbour);
+                    }
+                }
+            }
+        }
+        if patch.len() < min_px {
+            for &pixel in &patch {
+                mask[pixel] = false;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Letters are set pixels.
+    fn mask(picture: &str) -> Vec<bool> {
+        picture.chars().filter(|c| !c.is_whitespace()).map(|c| c != '.').collect()
+    }
+
+    #[test]
+    fn keeps_patches_that_are_large_enough() {
+        let before = "a..b. .a..b ....b c....";
+        for (min_px, after) in [
+            (1, before),
+            (2, "a..b. .a..b ....b ....."),
+            (3, "...b. ....b ....b ....."),
+            (4, "....................."),
+        ] {
+            let mut got = mask(before);
+            remove_small(&mut got, 5, min_px);
+            assert_eq!(got, mask(after)[..20], "min {min_px}");
+        }
+    }
+}

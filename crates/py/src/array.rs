@@ -1,0 +1,110 @@
+//! NumPy arrays as slices and back; errors name the argument, what was found and what is allowed.
+
+use bytemuck::cast_slice;
+use nalgebra::Vector3;
+use numpy::{
+    Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray1,
+    PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods, dtype,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+/// A borrowed array of vectors, shape (n, 3), float64.
+pub(crate) struct Vectors<'py>(PyReadonlyArray2<'py, f64>);
+
+impl<'py> Vectors<'py> {
+    /// Borrows `value` without copying it.
+    pub(crate) fn borrow(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let array = untyped::<f64>(name, value)?;
+        if array.ndim() != 2 || array.shape()[1] != 3 {
+            return Err(bad_shape(name, "(n, 3)", array));
+        }
+        Ok(Self(value.cast::<PyArray2<f64>>()?.try_readonly()?))
+    }
+
+    /// The vectors, one a row.
+    pub(crate) fn as_slice(&self) -> PyResult<&[Vector3<f64>]> {
+        Ok(cast_slice(self.0.as_slice()?))
+    }
+}
+
+/// A borrowed array of numbers, shape (n,), float64.
+pub(crate) struct Numbers<'py>(PyReadonlyArray1<'py, f64>);
+
+impl<'py> Numbers<'py> {
+    /// Borrows `value` without copying it.
+    pub(crate) fn borrow(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let array = untyped::<f64>(name, value)?;
+        if array.ndim() != 1 {
+            return Err(bad_shape(name, "(n,)", array));
+        }
+        Ok(Self(value.cast::<PyArray1<f64>>()?.try_readonly()?))
+    }
+
+    /// The numbers.
+    pub(crate) fn as_slice(&self) -> PyResult<&[f64]> {
+        Ok(self.0.as_slice()?)
+    }
+}
+
+/// A borrowed image, shape (h, w), float32.
+pub(crate) struct Image<'py>(PyReadonlyArray2<'py, f32>);
+
+impl<'py> Image<'py> {
+    /// Borrows `value` without copying it.
+    pub(crate) fn borrow(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let array = untyped::<f32>(name, value)?;
+        if array.ndim() != 2 {
+            return Err(bad_shape(name, "(h, w)", array));
+        }
+        Ok(Self(value.cast::<PyArray2<f32>>()?.try_readonly()?))
+    }
+
+    /// Width, height and the pixels row by row.
+    pub(crate) fn parts(&self) -> PyResult<(usize, usize, &[f32])> {
+        Ok((self.0.shape()[1], self.0.shape()[0], self.0.as_slice()?))
+    }
+}
+
+/// A contiguous array of the right dtype, of any shape.
+fn untyped<'a, 'py, T: Element>(
+    name: &str,
+    value: &'a Bound<'py, PyAny>,
+) -> PyResult<&'a Bound<'py, PyUntypedArray>> {
+    let Ok(array) = value.cast::<PyUntypedArray>() else {
+        let found = value.get_type().name()?;
+        return Err(PyTypeError::new_err(format!("{name} must be a NumPy array, got {found}")));
+    };
+    let expected = dtype::<T>(value.py());
+    if !array.dtype().is_equiv_to(&expected) {
+        let message = format!("{name} must have dtype {expected}, got {}", array.dtype());
+        return Err(PyTypeError::new_err(message));
+    }
+    if !array.is_c_contiguous() {
+        return Err(PyValueError::new_err(format!("{name} must be C-contiguous")));
+    }
+    Ok(array)
+}
+
+fn bad_shape(name: &str, allowed: &str, array: &Bound<'_, PyUntypedArray>) -> PyErr {
+    let found = array.shape().iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    PyValueError::new_err(format!("{name} must have shape {allowed}, got ({found})"))
+}
+
+/// A new array, shape (n, 3).
+pub(crate) fn from_vectors<'py>(
+    py: Python<'py>,
+    vectors: &[Vector3<f64>],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    PyArray1::from_slice(py, cast_slice::<_, f64>(vectors)).reshape([vectors.len(), 3])
+}
+
+/// A new array, shape (rows, columns), from its values row by row.
+pub(crate) fn matrix<T: Element>(
+    py: Python<'_>,
+    values: Vec<T>,
+    rows: usize,
+    columns: usize,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    PyArray1::from_vec(py, values).reshape([rows, columns])
+}

@@ -1,0 +1,67 @@
+//! Class `Camera`.
+
+use std::path::PathBuf;
+
+use granulcal_dataset::{CameraFile, png};
+use granulcal_features::{DepthImage, SensorNoise};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use crate::array::{Image, Numbers, Vectors};
+use crate::{array, error};
+
+/// A pinhole camera in the world.
+#[pyclass(frozen, module = "granulcal._native")]
+pub(crate) struct Camera {
+    inner: granulcal_features::Camera,
+}
+
+#[pymethods]
+impl Camera {
+    #[staticmethod]
+    fn overhead(height: f64, field_width: f64, pixels: usize) -> PyResult<Self> {
+        let inner = granulcal_features::Camera::overhead(height, field_width, pixels);
+        Ok(Self { inner: inner.map_err(error::features)? })
+    }
+
+    fn tilted(&self, tilt_x_rad: f64, tilt_y_rad: f64) -> Self {
+        Self { inner: self.inner.tilted(tilt_x_rad, tilt_y_rad) }
+    }
+
+    /// Depth [m] of grains over the ground, with the noise of a sensor.
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        positions: &Bound<'py, PyAny>,
+        radii: &Bound<'py, PyAny>,
+        depth_sigma: f64,
+        blur_px: f64,
+        seed: u64,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let positions = Vectors::borrow("positions", positions)?;
+        let radii = Numbers::borrow("radii", radii)?;
+        let (positions, radii) = (positions.as_slice()?, radii.as_slice()?);
+        let image = py
+            .detach(|| {
+                let image = granulcal_features::render(&self.inner, positions, radii)?;
+                SensorNoise { blur_px, depth_sigma }.apply(&image, seed)
+            })
+            .map_err(error::features)?;
+        array::matrix(py, image.depth, image.height, image.width)
+    }
+
+    /// Writes a depth image as 16-bit PNG and the camera's TOML beside it.
+    fn save_image(
+        &self,
+        image: &Bound<'_, PyAny>,
+        png_path: PathBuf,
+        camera_path: PathBuf,
+        depth_unit: f64,
+    ) -> PyResult<()> {
+        let image = Image::borrow("image", image)?;
+        let (width, height, depth) = image.parts()?;
+        let image = DepthImage::new(width, height, depth.to_vec()).map_err(error::features)?;
+        png::write_depth(&png_path, &image, depth_unit).map_err(error::dataset)?;
+        CameraFile::of(&self.inner, depth_unit).save(&camera_path).map_err(error::dataset)
+    }
+}

@@ -1,0 +1,54 @@
+//! Python bindings: arrays checked, errors translated, the interpreter released; nothing else.
+//!
+//! `python/granulcal/_native.pyi` lists what is registered here; a test compares the two.
+
+// Arguments from Python are converted for the call and belong to it.
+#![allow(clippy::needless_pass_by_value)]
+
+mod array;
+mod camera;
+mod dataset;
+mod error;
+mod formation;
+mod generate;
+mod observation;
+mod pour;
+mod recording;
+mod run_cli;
+mod scene;
+mod signals;
+mod simulate;
+mod statistics;
+
+use pyo3::pymodule;
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::camera::Camera;
+    #[pymodule_export]
+    use crate::dataset::Dataset;
+    #[pymodule_export]
+    use crate::formation::Formation;
+    #[pymodule_export]
+    use crate::generate::generate;
+    #[pymodule_export]
+    use crate::observation::Observation;
+    #[pymodule_export]
+    use crate::pour::Pour;
+    #[pymodule_export]
+    use crate::recording::Recording;
+    #[pymodule_export]
+    use crate::run_cli::run_cli;
+    #[pymodule_export]
+    use crate::scene::Scene;
+    #[pymodule_export]
+    use crate::simulate::simulate;
+    #[pymodule_export]
+    use crate::statistics::{paper16, statistics_table};
+
+    /// Version of the Rust crates.
+    #[pymodule_export]
+    #[allow(non_upper_case_globals)] // The name is Python's.
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

@@ -1,0 +1,85 @@
+//! Class `Pour`.
+
+use granulcal_dem::{CameraSpec, Health};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::observation::Observation;
+use crate::{array, error};
+
+/// Grains at the end of a pour, with the camera that looks at them.
+#[pyclass(frozen, module = "granulcal._native")]
+pub(crate) struct Pour {
+    pub(crate) inner: granulcal_dem::Pour,
+    pub(crate) camera: CameraSpec,
+    pub(crate) seed: u64,
+    pub(crate) cpu_seconds: f64,
+}
+
+#[pymethods]
+impl Pour {
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array::from_vectors(py, &self.inner.positions)
+    }
+
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array::from_vectors(py, &self.inner.velocities)
+    }
+
+    #[getter]
+    fn angular_velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array::from_vectors(py, &self.inner.angular_velocities)
+    }
+
+    #[getter]
+    fn radii<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.radii)
+    }
+
+    #[getter]
+    fn status(&self) -> &'static str {
+        self.inner.status.name()
+    }
+
+    #[getter]
+    fn health<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let Health {
+            worst_penetration,
+            mean_residual,
+            worst_residual,
+            energy_created,
+            grains_lost,
+            substeps,
+            sweeps,
+            mean_contacts,
+        } = self.inner.health;
+        let health = PyDict::new(py);
+        health.set_item("worst_penetration", worst_penetration)?;
+        health.set_item("mean_residual", mean_residual)?;
+        health.set_item("worst_residual", worst_residual)?;
+        health.set_item("energy_created", energy_created)?;
+        health.set_item("grains_lost", grains_lost)?;
+        health.set_item("substeps", substeps)?;
+        health.set_item("sweeps", sweeps)?;
+        health.set_item("mean_contacts", mean_contacts)?;
+        Ok(health)
+    }
+
+    #[getter]
+    fn simulated_s(&self) -> f64 {
+        self.inner.simulated_s
+    }
+
+    #[getter]
+    fn cpu_seconds(&self) -> f64 {
+        self.cpu_seconds
+    }
+
+    fn observe(&self, py: Python<'_>) -> PyResult<Observation> {
+        let seen = py.detach(|| granulcal_dataset::observe(&self.camera, &self.inner, self.seed));
+        Ok(Observation { inner: seen.map_err(error::dataset)? })
+    }
+}

@@ -1,0 +1,30 @@
+//! Function `simulate`.
+
+use cpu_time::{ProcessTime, ThreadTime};
+use granulcal_dem::Simulation;
+use pyo3::prelude::*;
+
+use crate::error;
+use crate::pour::Pour;
+use crate::scene::Scene;
+use crate::signals::Watch;
+
+/// Simulates a scene to its end. CPU time is the calling thread's, or the process's if more threads help.
+#[pyfunction]
+pub(crate) fn simulate(py: Python<'_>, scene: &Scene, seed: u64, threads: usize) -> PyResult<Pour> {
+    let scene = &scene.inner;
+    let (outcome, interrupted, cpu_seconds) = py.detach(|| {
+        let (thread, process) = (ThreadTime::now(), ProcessTime::now());
+        let watch = Watch::new();
+        let outcome = Simulation::new(scene, seed)
+            .and_then(|simulation| simulation.with_threads(threads))
+            .map(|simulation| simulation.run_while(&|| watch.keep_going(|_| Ok(()))));
+        let elapsed = if threads == 1 { thread.elapsed() } else { process.elapsed() };
+        (outcome, watch.finish(), elapsed.as_secs_f64())
+    });
+    interrupted?;
+    let pour = outcome.map_err(error::dem)?.ok_or_else(|| {
+        pyo3::exceptions::PyKeyboardInterrupt::new_err("the simulation was stopped")
+    })?;
+    Ok(Pour { inner: pour, camera: scene.camera, seed, cpu_seconds })
+}

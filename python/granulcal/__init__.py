@@ -1,0 +1,59 @@
+"""granulcal calibrates a granular simulator from depth images.
+
+    >>> import granulcal as gc
+    >>> scene = gc.Scene.drop(0.02, count=50)
+    >>> pour = gc.simulate(scene, seed=1)
+    >>> pour.statistics().paper16.shape
+    (16,)
+
+Torch is loaded when a model is first trained or loaded, matplotlib when something is first drawn.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from granulcal._native import __version__
+from granulcal.dataset import Dataset, generate
+from granulcal.prior import Parameter, Prior
+from granulcal.recording import Camera, Formation, Plane, Recording
+from granulcal.scene import Material, Scene
+from granulcal.simulate import Pour, simulate
+from granulcal.statistics import Statistics, statistics
+
+if TYPE_CHECKING:
+    from granulcal.bayessim import BayesSim
+    from granulcal.posterior import Posterior
+
+__all__ = [
+    "BayesSim",
+    "Camera",
+    "Dataset",
+    "Formation",
+    "Material",
+    "Parameter",
+    "Plane",
+    "Posterior",
+    "Pour",
+    "Prior",
+    "Recording",
+    "Scene",
+    "Statistics",
+    "__version__",
+    "generate",
+    "simulate",
+    "statistics",
+]
+
+_LAZY = {"BayesSim": "granulcal.bayessim", "Posterior": "granulcal.posterior"}
+
+
+def __getattr__(name: str) -> Any:
+    """Loads what needs heavy packages on first use."""
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(_LAZY[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(set(globals()) | set(_LAZY))

@@ -1,0 +1,40 @@
+"""The one place where arrays from outside become float64 matrices of a known shape."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["as_matrix", "as_real"]
+
+
+def as_real(name: str, value: Any) -> NDArray[np.float64]:
+    """Returns `value` as a float64 array; booleans, text, objects and complex are refused.
+
+    Raises:
+        TypeError: `value` is not an array of real numbers.
+    """
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise TypeError(f"{name} must be an array of real numbers: {error}") from None
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name} must be an array of real numbers, got dtype {array.dtype}")
+    return array.astype(np.float64)
+
+
+def as_matrix(name: str, value: Any, *, columns: int | None = None) -> NDArray[np.float64]:
+    """Returns `value` as a matrix, shape (rows, columns); one row may come as a vector.
+
+    Raises:
+        TypeError: `value` is not an array of real numbers.
+        ValueError: `value` has another number of dimensions or columns.
+    """
+    array = as_real(name, value)
+    expected = f"(rows, {'columns' if columns is None else columns})"
+    if array.ndim == 1 and columns is not None:
+        array = array[None, :]
+    if array.ndim != 2 or (columns is not None and array.shape[1] != columns):
+        found = np.shape(value)
+        raise ValueError(f"{name} must have shape {expected}, got {found}")
+    return array

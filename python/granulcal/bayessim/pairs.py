@@ -1,0 +1,187 @@
+"""Pairs of parameters and statistics, checked once and freed of unusable rows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.bayessim.arrays import as_matrix
+from granulcal.errors import TrainingDataError
+from granulcal.prior import Prior
+
+__all__ = ["TrainingPairs"]
+
+Array = NDArray[np.float64]
+
+KEPT_STATUSES = ("at_rest", "out_of_view", "horizon")
+EXCLUDED_STATUSES = ("unhealthy", "no_grains_in_view")
+# Fewer pairs than this cannot be split into training, validation and test.
+FEWEST_PAIRS = 50
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingPairs:
+    """Usable pairs and the count of the others.
+
+    Attributes:
+        prior: the prior that the parameters were drawn from.
+        theta: parameters, own units, columns as `prior.names`, shape (n, p).
+        x: statistics, own units, shape (n, s).
+        x_names: names of the statistics.
+        pair_count: pairs given.
+        excluded: pairs left out by reason.
+        horizon_count: kept pairs whose simulation ended at its time limit.
+        scene_toml: the scene that the pairs come from, or None.
+    """
+
+    prior: Prior
+    theta: Array
+    x: Array
+    x_names: tuple[str, ...]
+    pair_count: int
+    excluded: dict[str, int]
+    horizon_count: int
+    scene_toml: str | None
+
+    @classmethod
+    def gather(
+        cls,
+        data_or_theta: Any,
+        x: Any = None,
+        *,
+        prior: Prior | None = None,
+        status: Sequence[str] | None = None,
+        x_names: Sequence[str] | None = None,
+        scene: Any = None,
+    ) -> "TrainingPairs":
+        """Returns the usable pairs of a data set, or of two arrays.
+
+        Raises:
+            TrainingDataError: shapes that do not fit, a status that does not exist, NaN among the
+                parameters, parameters outside the prior, no prior, or too few usable pairs.
+            TypeError: an array that does not hold real numbers.
+        """
+        theta_names = None
+        if x is None:
+            data = data_or_theta
+            for attribute in ("theta", "x"):
+                if not hasattr(data, attribute):
+                    raise TypeError(
+                        "fit takes a data set with attributes theta and x, or theta and x "
+                        f"as two arrays; got one {type(data).__name__} without {attribute}"
+                    )
+            theta_values, x = data.theta, data.x
+            theta_names = getattr(data, "theta_names", None)
+            prior = prior if prior is not None else getattr(data, "prior", None)
+            status = status if status is not None else getattr(data, "status", None)
+            x_names = x_names if x_names is not None else getattr(data, "x_names", None)
+            scene = scene if scene is not None else getattr(data, "scene_toml", None)
+        else:
+            theta_values = data_or_theta
+        if prior is None:
+            raise TrainingDataError("no prior: neither fit(prior=...) nor the data set has one")
+        if not isinstance(prior, Prior):
+            raise TypeError(f"prior must be a Prior, got {type(prior).__name__}")
+        theta = _matrix("theta", theta_values)
+        theta = theta[:, _columns(theta.shape[1], theta_names, prior)]
+        statistics = _matrix("x", x)
+        if len(theta) != len(statistics):
+            raise TrainingDataError(
+                f"theta and x must have as many rows, got {len(theta)} and {len(statistics)}"
+            )
+        names = _statistic_names(x_names, statistics.shape[1])
+        statuses = _statuses(status, len(theta))
+        excluded = {name: int(np.sum(statuses == name)) for name in EXCLUDED_STATUSES}
+        is_healthy = ~np.isin(statuses, EXCLUDED_STATUSES)
+        is_finite = np.isfinite(statistics).all(axis=1)
+        excluded["non_finite"] = int(np.sum(is_healthy & ~is_finite))
+        keep = is_healthy & is_finite
+        _check_inside(theta[keep], prior)
+        if keep.sum() < FEWEST_PAIRS:
+            dropped = ", ".join(f"{count} {reason}" for reason, count in excluded.items())
+            raise TrainingDataError(
+                f"at least {FEWEST_PAIRS} usable pairs are needed, got {int(keep.sum())} "
+                f"of {len(theta)} (excluded: {dropped})"
+            )
+        return cls(
+            prior=prior,
+            theta=theta[keep],
+            x=statistics[keep],
+            x_names=names,
+            pair_count=len(theta),
+            excluded=excluded,
+            horizon_count=int(np.sum(statuses[keep] == "horizon")),
+            scene_toml=_scene_toml(scene),
+        )
+
+
+def _matrix(name: str, value: Any) -> Array:
+    try:
+        array = as_matrix(name, value)
+    except ValueError as error:
+        raise TrainingDataError(str(error)) from None
+    if array.shape[1] == 0:
+        raise TrainingDataError(f"{name} must have at least one column, got shape {array.shape}")
+    return array
+
+
+def _columns(count: int, theta_names: Sequence[str] | None, prior: Prior) -> list[int]:
+    """Columns of the data set that are the prior's free parameters, in the prior's order."""
+    if theta_names is None:
+        if count != len(prior.names):
+            raise TrainingDataError(
+                f"theta must have one column for each of {prior.names}, got {count} columns"
+            )
+        return list(range(count))
+    names = list(theta_names)
+    if len(names) != count:
+        raise TrainingDataError(f"theta has {count} columns but {len(names)} theta_names")
+    missing = [name for name in prior.names if name not in names]
+    if missing:
+        raise TrainingDataError(f"theta has no column {', '.join(missing)}; it has {names}")
+    return [names.index(name) for name in prior.names]
+
+
+def _statistic_names(x_names: Sequence[str] | None, count: int) -> tuple[str, ...]:
+    if x_names is None:
+        return tuple(f"statistic_{i}" for i in range(count))
+    if len(x_names) != count:
+        raise TrainingDataError(f"x has {count} columns but {len(x_names)} x_names")
+    return tuple(str(name) for name in x_names)
+
+
+def _statuses(status: Sequence[str] | None, count: int) -> NDArray[np.str_]:
+    if status is None:
+        return np.full(count, "at_rest")
+    statuses = np.asarray([str(each) for each in status])
+    if len(statuses) != count:
+        raise TrainingDataError(f"status must have {count} entries, got {len(statuses)}")
+    known = KEPT_STATUSES + EXCLUDED_STATUSES
+    unknown = sorted(set(statuses.tolist()) - set(known))
+    if unknown:
+        raise TrainingDataError(f"unknown status {', '.join(unknown)}; known: {', '.join(known)}")
+    return statuses
+
+
+def _check_inside(theta: Array, prior: Prior) -> None:
+    for i, name in enumerate(prior.names):
+        bad_count = int(np.sum(~np.isfinite(theta[:, i])))
+        if bad_count:
+            raise TrainingDataError(f"theta: {name} is NaN or infinite in {bad_count} rows")
+        low, high = prior.bounds[i]
+        outside = theta[(theta[:, i] < low) | (theta[:, i] > high), i]
+        if len(outside):
+            raise TrainingDataError(
+                f"theta: {name} must lie in the prior's bounds [{low:g}, {high:g}], "
+                f"got {outside[0]:g} ({len(outside)} rows outside)"
+            )
+
+
+def _scene_toml(scene: Any) -> str | None:
+    if scene is None or isinstance(scene, str):
+        return scene
+    if hasattr(scene, "to_toml"):
+        return str(scene.to_toml())
+    raise TypeError(f"scene must be TOML text or have to_toml(), got {type(scene).__name__}")

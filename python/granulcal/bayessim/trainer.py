@@ -1,0 +1,182 @@
+"""Trains the members of an ensemble side by side and keeps each at its best validation loss."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from granulcal.bayessim.config import Config
+from granulcal.bayessim.features import draw_frequencies
+from granulcal.bayessim.network import HeadLayout, Network
+
+__all__ = ["Progress", "TrainingResult", "train"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """State after one pass, given to the progress callback.
+
+    Attributes:
+        epoch: passes done.
+        max_epochs: passes at most.
+        train_loss: mean negative log density of this pass over all members [nat].
+        validation_loss: mean of the members' lowest validation losses [nat].
+    """
+
+    epoch: int
+    max_epochs: int
+    train_loss: float
+    validation_loss: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingResult:
+    """The trained network and the counts of its training; see `TrainingSummary`."""
+
+    network: Network
+    status: str
+    train_count: int
+    validation_count: int
+    epoch_count: int
+    best_epochs: tuple[int, ...]
+    train_losses: tuple[float, ...]
+    validation_losses: tuple[float, ...]
+
+
+def train(
+    u: Array,
+    x: Array,
+    relevance: Array,
+    *,
+    config: Config,
+    seed: int,
+    progress: Callable[[Progress], None] | None = None,
+) -> TrainingResult:
+    """Returns the ensemble trained on standardised pairs.
+
+    Args:
+        u: standardised coordinates of the parameters, shape (n, p).
+        x: standardised statistics, shape (n, s).
+        relevance: factor on each statistic's frequencies, shape (s,).
+        config: settings.
+        seed: seed of the frequencies, the splits, the batches and the jitter.
+        progress: called after each pass.
+
+    The thread count of torch is set to 1 meanwhile: the sums, and so the result, would otherwise
+    depend on the machine.
+    """
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        return _Training(u, x, relevance, config, seed).run(progress)
+    finally:
+        torch.set_num_threads(threads)
+
+
+class _Training:
+    def __init__(self, u: Array, x: Array, relevance: Array, config: Config, seed: int) -> None:
+        self.config = config
+        self.generator = torch.Generator().manual_seed(seed)
+        self.u = torch.from_numpy(u).float()
+        self.x = torch.from_numpy(x).float()
+        members = config.ensemble
+        validation_count = max(1, round(config.validation_share * len(x)))
+        order = torch.stack([self._permutation(len(x)) for _ in range(members)])
+        self.validation = order[:, :validation_count]
+        self.training = order[:, validation_count:]
+        scale = torch.from_numpy(relevance / (config.length_scale * _median_distance(x, relevance)))
+        frequencies = torch.stack(
+            [
+                draw_frequencies(
+                    config.features, x.shape[1], kernel=config.kernel, seed=seed * members + i
+                )
+                * scale
+                for i in range(members)
+            ]
+        )
+        layout = HeadLayout(config.components, u.shape[1])
+        self.network = Network.initial(layout, frequencies, self.generator)
+        if config.linear_start:
+            for i, rows in enumerate(self.training):
+                self.network.start_at_regression(i, self.x[rows], self.u[rows])
+        self.best = [tensor.clone() for tensor in self.network.parameters()]
+
+    def run(self, progress: Callable[[Progress], None] | None) -> TrainingResult:
+        config, members = self.config, self.config.ensemble
+        parameters = self.network.parameters()
+        for tensor in parameters:
+            tensor.requires_grad_(True)
+        linear, fourier, bias = parameters
+        optimizer = torch.optim.AdamW(
+            [
+                {"params": [linear, bias], "weight_decay": 0.0},
+                {"params": [fourier], "weight_decay": config.weight_decay},
+            ],
+            lr=config.learning_rate,
+        )
+        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, config.max_epochs)
+        best_loss = torch.full((members,), torch.inf)
+        best_epoch = torch.zeros(members, dtype=torch.long)
+        train_loss = torch.zeros(members)
+        epoch, status = 0, "epoch_limit"
+        for epoch in range(1, config.max_epochs + 1):
+            train_loss = self._one_pass(optimizer)
+            schedule.step()
+            with torch.no_grad():
+                loss = self._loss(self.validation, jitter=0.0)
+            is_better = loss < best_loss
+            best_loss = torch.where(is_better, loss, best_loss)
+            best_epoch[is_better] = epoch
+            for kept, tensor in zip(self.best, parameters, strict=True):
+                kept[is_better] = tensor.detach()[is_better]
+            if progress is not None:
+                means = (float(train_loss.mean()), float(best_loss.mean()))
+                progress(Progress(epoch, config.max_epochs, *means))
+            if bool((epoch - best_epoch >= config.patience).all()):
+                status = "stopped_early"
+                break
+        if not bool(torch.isfinite(best_loss).all()):
+            status = "diverged"
+        network = Network(self.network.layout, self.network.frequencies, *self.best)
+        return TrainingResult(
+            network=network,
+            status=status,
+            train_count=self.training.shape[1],
+            validation_count=self.validation.shape[1],
+            epoch_count=epoch,
+            best_epochs=tuple(best_epoch.tolist()),
+            train_losses=tuple(train_loss.tolist()),
+            validation_losses=tuple(best_loss.tolist()),
+        )
+
+    def _one_pass(self, optimizer: torch.optim.Optimizer) -> torch.Tensor:
+        count = self.training.shape[1]
+        order = torch.stack([row[self._permutation(count)] for row in self.training])
+        total = torch.zeros(len(order))
+        for batch in order.split(self.config.batch_size, dim=1):
+            loss = self._loss(batch, jitter=self.config.jitter)
+            optimizer.zero_grad(set_to_none=True)
+            loss.sum().backward()
+            optimizer.step()
+            total += loss.detach() * batch.shape[1]
+        return total / count
+
+    def _loss(self, rows: torch.Tensor, *, jitter: float) -> torch.Tensor:
+        x, u = self.x[rows], self.u[rows]
+        if jitter:
+            x = x + jitter * torch.randn(x.shape, generator=self.generator)
+        return -self.network.layout.log_density(self.network.outputs(x), u).mean(dim=1)
+
+    def _permutation(self, count: int) -> torch.Tensor:
+        return torch.randperm(count, generator=self.generator)
+
+
+def _median_distance(x: Array, relevance: Array) -> float:
+    """Median distance between scaled inputs, on at most 500 of them."""
+    some = (x * relevance)[:500]
+    squares = np.sum((some[:, None] - some[None]) ** 2, axis=-1)
+    return float(np.sqrt(np.median(squares[np.triu_indices(len(some), 1)]))) or 1.0

@@ -1,0 +1,139 @@
+"""From recordings and a trained model to a posterior, forward pours and a report."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from granulcal.dataset import Dataset
+from granulcal.forward import pours_at, scene_at
+from granulcal.recording import Recording
+from granulcal.report import write_report
+from granulcal.scene import Scene
+from granulcal.simulate import Pour
+
+if TYPE_CHECKING:
+    from granulcal.bayessim import BayesSim
+    from granulcal.posterior import Posterior
+
+__all__ = ["Calibrated", "calibrate", "require_same_scene"]
+
+# Seeds of forward pours: far from those of data sets, which are hashes, and of demo recordings.
+_FIRST_SEED = 9000
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Calibrated:
+    """What `calibrate` found.
+
+    Attributes:
+        posterior: the inferred parameters.
+        observed: statistics of each recording, SI units, shape (k, 16).
+        pours: pours at the posterior's mode.
+        prior_pours: pours at the prior's mean.
+        report: the HTML page.
+    """
+
+    posterior: "Posterior"
+    observed: NDArray[np.float64]
+    pours: list[Pour]
+    prior_pours: list[Pour]
+    report: Path
+
+
+def require_same_scene(model: "BayesSim", scene: Scene) -> None:
+    """Refuses a model that was trained on another scene.
+
+    Raises:
+        ValueError: the scenes differ, or the model does not know its scene.
+    """
+    if model.scene_toml is None:
+        raise ValueError("the model does not say which scene it was trained on")
+    trained = Scene.from_toml(model.scene_toml)
+    if trained != scene:
+        raise ValueError(
+            f"the model was trained on another scene: {_first_difference(trained, scene)}"
+        )
+
+
+def calibrate(
+    model: "BayesSim",
+    data: Dataset,
+    recordings: Sequence[Recording],
+    *,
+    report: str | PathLike[str],
+    seeds: int = 3,
+    threads: int | None = None,
+    truth: ArrayLike | None = None,
+    title: str = "Calibration report",
+    summary: str = "",
+    notes: Sequence[str] = (),
+    command: str = "",
+    segmentation: Mapping[str, Any] | None = None,
+) -> Calibrated:
+    """Infers the material of recordings, simulates it and writes the report.
+
+    Args:
+        model: trained on `data`.
+        data: the pours that the model was trained on.
+        recordings: formations of one material in the scene of `data`, at least one; the page shows
+            the first and compares the mean of their statistics.
+        report: the HTML file.
+        seeds: number of pours at the posterior's mode and at the prior's mean.
+        threads: pours at once; the default is one for each core.
+        truth: the true parameters, where they are known, shape (p,).
+        title: heading of the page.
+        summary: one paragraph that says what was done.
+        notes: further sentences that a reader must know.
+        command: command line that makes the page again.
+        segmentation: options of `Recording.formation` for every recording.
+
+    Raises:
+        ValueError: no recording, another scene, or a pour without grains in view.
+    """
+    if not recordings:
+        raise ValueError("calibrate needs at least one recording, got none")
+    require_same_scene(model, data.scene)
+    formations = [recording.formation(**(segmentation or {})) for recording in recordings]
+    observed = np.array([np.asarray(formation.statistics()) for formation in formations])
+    posterior = model.posterior(observed)
+    numbers = range(_FIRST_SEED, _FIRST_SEED + seeds)
+    fitted = scene_at(data.scene, model.prior, posterior.mode())
+    unfitted = scene_at(data.scene, model.prior, model.prior.mean())
+    pours = pours_at(fitted, numbers, threads=threads)
+    prior_pours = pours_at(unfitted, numbers, threads=threads)
+    page = write_report(
+        report,
+        observed=observed.mean(axis=0),
+        observed_points=formations[0].points,
+        posterior=posterior,
+        pours=pours,
+        prior_pours=prior_pours,
+        data=data,
+        calibration=model.calibration,
+        truth=truth,
+        title=title,
+        summary=summary,
+        notes=notes,
+        command=command,
+    )
+    return Calibrated(
+        posterior=posterior,
+        observed=observed,
+        pours=pours,
+        prior_pours=prior_pours,
+        report=page,
+    )
+
+
+def _first_difference(trained: Scene, asked: Scene) -> str:
+    """Names the first line of TOML in which two scenes differ."""
+    left, right = trained.to_toml().splitlines(), asked.to_toml().splitlines()
+    for ours, theirs in zip(left, right, strict=False):
+        if ours != theirs:
+            return f"{ours!r} there, {theirs!r} asked for"
+    return f"{len(left)} lines there, {len(right)} asked for"

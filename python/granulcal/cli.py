@@ -1,0 +1,276 @@
+"""Command line `granulcal`: what needs Python here, every other word by granulcal-cli."""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from granulcal import _native
+
+__all__ = ["main"]
+
+_DONE, _FAILED, _BAD_INPUT, _INTERRUPTED = 0, 1, 2, 130
+_UNHEALTHY = 3
+_SAMPLES = 1000
+_TRAINING = "training.parquet"
+
+_DESCRIPTION = """\
+Calibrates a granular simulator from depth images.
+
+  granulcal generate scene.toml prior.toml -n 1000 -o pours   simulate a training set
+  granulcal train pours -o model                              train BayesSim on it
+  granulcal infer model couscous.png --camera camera.toml     posterior of the material
+  granulcal report model couscous.png --camera camera.toml -o report.html
+
+Commands of the simulator (granulcal COMMAND --help tells more):
+  simulate, generate, render, features, inspect, merge, completions
+"""
+_EPILOG = "Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy."
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command line without the program's name; returns the exit code."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    parser = _parser()
+    if words and not words[0].startswith("-") and words[0] not in _commands():
+        return _native.run_cli(["granulcal", *words])
+    if words and words[0] == "demo":
+        return _guarded(lambda: _demo(words[1:]))
+    try:
+        options = parser.parse_args(words)
+    except SystemExit as end:
+        # argparse ends the process; here the exit code is returned like every other.
+        return end.code if isinstance(end.code, int) else _BAD_INPUT
+    if options.run is None:
+        parser.print_help()
+        return _BAD_INPUT
+    return _guarded(lambda: options.run(options))
+
+
+def _guarded(command: Callable[[], int]) -> int:
+    """Runs a command; tells what was wrong in one line instead of a traceback."""
+    try:
+        return command()
+    except KeyboardInterrupt:
+        print("granulcal: stopped", file=sys.stderr)
+        return _INTERRUPTED
+    except BrokenPipeError:
+        return _DONE
+    except ModuleNotFoundError as error:
+        print(f"granulcal: {error}; pip install 'granulcal[all]'", file=sys.stderr)
+        return _FAILED
+    except (ValueError, TypeError, FileNotFoundError, NotADirectoryError) as error:
+        print(f"granulcal: {error}", file=sys.stderr)
+        return _BAD_INPUT
+    except OSError as error:
+        print(f"granulcal: {error}", file=sys.stderr)
+        return _FAILED
+
+
+def _commands() -> tuple[str, ...]:
+    return ("train", "infer", "report", "reproduce", "demo")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="granulcal",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"granulcal {_native.__version__}")
+    parser.set_defaults(run=None)
+    commands = parser.add_subparsers(title="commands of the inference", metavar="COMMAND")
+    _add_train(commands)
+    _add_infer(commands)
+    _add_report(commands)
+    _add_reproduce(commands)
+    commands.add_parser("demo", help="the whole job on a recording with a known truth")
+    return parser
+
+
+def _add_train(commands: Any) -> None:
+    text = "train BayesSim on a data set and check its calibration on pours kept aside"
+    parser = commands.add_parser("train", help=text, description=text)
+    parser.add_argument("data", type=Path, help="folder of `generate`, or one Parquet file")
+    parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the model")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the training (default: 0)")
+    parser.add_argument("--recipe", help="settings by name: snr (default) or plain (the paper's)")
+    parser.set_defaults(run=_train)
+
+
+def _add_recordings(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("model", type=Path, help="folder of `train`")
+    parser.add_argument(
+        "recording",
+        type=Path,
+        nargs="+",
+        help=".npz height map, 16-bit depth PNG or folder of PNGs; several: pours of one material",
+    )
+    parser.add_argument("--camera", type=Path, help="TOML of the camera, for depth images")
+    parser.add_argument("--scene", type=Path, help="refuse a model of another scene than this TOML")
+
+
+def _add_infer(commands: Any) -> None:
+    text = "infer the parameters from recordings"
+    parser = commands.add_parser("infer", help=text, description=text)
+    _add_recordings(parser)
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.add_argument("-o", "--out", type=Path, help="write JSON with samples to this file")
+    parser.add_argument("--plot", type=Path, help="write the pair plot to this file")
+    parser.set_defaults(run=_infer)
+
+
+def _add_report(commands: Any) -> None:
+    text = "infer, simulate the result and write one HTML page"
+    parser = commands.add_parser("report", help=text, description=text)
+    _add_recordings(parser)
+    parser.add_argument("-o", "--out", type=Path, required=True, help="the HTML file")
+    parser.add_argument("--seeds", type=int, default=3, help="pours to compare (default: 3)")
+    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument(
+        "--data", type=Path, help=f"training data (default: {_TRAINING} in the model's folder)"
+    )
+    parser.set_defaults(run=_report)
+
+
+def _add_reproduce(commands: Any) -> None:
+    text = "repeat a study of docs/results; without a name, list them"
+    parser = commands.add_parser("reproduce", help=text, description=text)
+    parser.add_argument("study", nargs="?", help="name of the study")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder (default: out)")
+    parser.add_argument("--data", type=Path, help="measured data (default: $GRANULCAL_DATA)")
+    parser.set_defaults(run=_reproduce)
+
+
+def _train(options: argparse.Namespace) -> int:
+    from granulcal.bayessim import BayesSim
+    from granulcal.dataset import Dataset
+
+    data = Dataset.load(options.data)
+    settings = {} if options.recipe is None else {"recipe": options.recipe}
+    model = BayesSim.fit(data, seed=options.seed, **settings)
+    model.save(options.out)
+    data.save(options.out / _TRAINING)
+    print(f"model written to {options.out}")
+    return _DONE
+
+
+def _infer(options: argparse.Namespace) -> int:
+    import numpy as np
+
+    model = _model(options)
+    recordings = _recordings(options)
+    observed = [recording.statistics() for recording in recordings]
+    posterior = model.posterior(np.array([np.asarray(each) for each in observed]))
+    if options.plot is not None:
+        posterior.pair_plot(options.plot)
+    mode, mean, region = posterior.mode(), posterior.mean(), posterior.credible_region(0.9)
+    document = {
+        "recordings": [str(path) for path in options.recording],
+        "parameters": {
+            name: {
+                "mode": float(mode[i]),
+                "mean": float(mean[i]),
+                "interval90": list(region[name]),
+            }
+            for i, name in enumerate(posterior.names)
+        },
+        "warnings": [str(warning) for warning in posterior.warnings],
+        "statistics": [each.to_dict() for each in observed],
+    }
+    if options.out is not None:
+        samples = posterior.sample(_SAMPLES).tolist()
+        text = json.dumps({**document, "samples": samples}, indent=1)
+        options.out.write_text(text + "\n", encoding="utf-8")
+    if options.json:
+        print(json.dumps(document, indent=1))
+        return _DONE
+    print(f"{'parameter':<30}{'mode':>10}{'mean':>10}   90 % interval")
+    for name, values in document["parameters"].items():
+        low, high = values["interval90"]
+        print(f"{name:<30}{values['mode']:>10.4g}{values['mean']:>10.4g}   {low:.4g} to {high:.4g}")
+    for warning in document["warnings"]:
+        print(f"note: {warning}", file=sys.stderr)
+    return _DONE
+
+
+def _report(options: argparse.Namespace) -> int:
+    from granulcal.calibrate import calibrate
+    from granulcal.dataset import Dataset
+
+    if options.seeds < 1:
+        raise ValueError(f"--seeds must be at least 1, got {options.seeds}")
+    model = _model(options)
+    data = Dataset.load(options.model / _TRAINING if options.data is None else options.data)
+    names = " ".join(str(path) for path in options.recording)
+    camera = "" if options.camera is None else f" --camera {options.camera}"
+    found = calibrate(
+        model,
+        data,
+        _recordings(options),
+        report=options.out,
+        seeds=options.seeds,
+        threads=options.threads,
+        title=f"Calibration from {names}",
+        summary=f"Parameters of the scene {data.scene.name!r}, inferred from {names} "
+        f"with a model trained on {len(data)} pours.",
+        command=f"granulcal report {options.model} {names}{camera} "
+        f"-o {options.out} --seeds {options.seeds}",
+    )
+    print(found.report)
+    is_healthy = all(p.status != "unhealthy" for p in [*found.pours, *found.prior_pours])
+    return _DONE if is_healthy else _UNHEALTHY
+
+
+def _reproduce(options: argparse.Namespace) -> int:
+    import importlib
+    import pkgutil
+
+    from granulcal import experiments
+    from granulcal.demo import measured_data
+
+    studies = sorted(module.name for module in pkgutil.iter_modules(experiments.__path__))
+    if options.study is None:
+        print("\n".join(studies))
+        return _DONE
+    if options.study not in studies:
+        raise ValueError(f"no study {options.study!r}; there are {', '.join(studies)}")
+    module = importlib.import_module(f"granulcal.experiments.{options.study}")
+    data = options.data or measured_data()
+    if data is None:
+        raise FileNotFoundError("no measured data: give --data or set $GRANULCAL_DATA")
+    module.reproduce(options.out, data)
+    return _DONE
+
+
+def _demo(words: list[str]) -> int:
+    from granulcal.demo import main as demo
+
+    try:
+        return demo(words)
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else _BAD_INPUT
+
+
+def _model(options: argparse.Namespace) -> Any:
+    from granulcal.bayessim import BayesSim
+    from granulcal.calibrate import require_same_scene
+    from granulcal.scene import Scene
+
+    model = BayesSim.load(options.model)
+    if options.scene is not None:
+        require_same_scene(model, Scene.load(options.scene))
+    return model
+
+
+def _recordings(options: argparse.Namespace) -> list[Any]:
+    from granulcal.recording import Recording
+
+    return [Recording.open(path, camera=options.camera) for path in options.recording]
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,19 @@
+"""Exceptions of the Python side: each says what was found and what is allowed."""
+
+__all__ = ["ModelFormatError", "ObservationError", "PriorError", "TrainingDataError"]
+
+
+class PriorError(ValueError):
+    """A prior that cannot be: unknown key or distribution, an empty range, a repeated path."""
+
+
+class TrainingDataError(ValueError):
+    """Pairs of parameters and statistics that no model can be trained on."""
+
+
+class ObservationError(ValueError):
+    """An observation whose shape or values do not fit the trained model."""
+
+
+class ModelFormatError(ValueError):
+    """A saved model that is present but cannot be read: truncated, wrong version, wrong shape."""

@@ -1,0 +1,1 @@
+"""Studies on measured data; `granulcal reproduce NAME` repeats them."""

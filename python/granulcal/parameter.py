@@ -1,0 +1,212 @@
+"""One parameter of a prior: a path and a distribution, checked once."""
+
+import re
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.errors import PriorError
+
+__all__ = ["Parameter"]
+
+Array = NDArray[np.float64]
+
+# Keys that a distribution needs, and keys that it may have besides.
+_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "uniform": (("low", "high"), ()),
+    "log_uniform": (("low", "high"), ()),
+    "normal": (("mean", "sd"), ("low", "high")),
+    "fixed": (("value",), ()),
+}
+_PATH = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*(\.[A-Za-z0-9_-]+)*")
+# A normal cut to less mass than this is a mistake, and its inverse would lose all its digits.
+_SMALLEST_NORMAL_MASS = 1e-6
+_STANDARD_NORMAL = NormalDist()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """One number of a scene or a material, and what is believed of it before any pour.
+
+    Attributes:
+        path: where the number lives, for example `material.sliding_friction`.
+        distribution: `uniform`, `log_uniform`, `normal` or `fixed`.
+        low: lower bound, in the parameter's own unit.
+        high: upper bound, in the parameter's own unit.
+        mean: mean of the normal before it is cut to its bounds.
+        sd: standard deviation of the normal before it is cut to its bounds.
+        value: value of a fixed parameter.
+    """
+
+    path: str
+    distribution: str
+    low: float | None = None
+    high: float | None = None
+    mean: float | None = None
+    sd: float | None = None
+    value: float | None = None
+
+    def __post_init__(self) -> None:
+        """Checks that the keys fit the distribution and the numbers fit each other."""
+        if not isinstance(self.path, str) or not _PATH.fullmatch(self.path):
+            raise PriorError(f"path must be words joined by dots, got {self.path!r}")
+        if self.distribution not in _KEYS:
+            raise PriorError(
+                f"{self.path}: distribution must be one of {', '.join(_KEYS)}, "
+                f"got {self.distribution!r}"
+            )
+        needed, optional = _KEYS[self.distribution]
+        for key in ("low", "high", "mean", "sd", "value"):
+            self._check_key(key, needed=key in needed, allowed=key in needed + optional)
+        if self.low is not None and self.high is not None and not self.low < self.high:
+            raise PriorError(
+                f"{self.path}: low must be less than high, got low = {self.low}, high = {self.high}"
+            )
+        if self.distribution == "log_uniform" and self.low is not None and self.low <= 0:
+            raise PriorError(f"{self.path}: low of log_uniform must be positive, got {self.low}")
+        if self.distribution == "normal":
+            self._check_normal()
+
+    def _check_key(self, key: str, *, needed: bool, allowed: bool) -> None:
+        number = getattr(self, key)
+        if number is None:
+            if needed:
+                raise PriorError(f"{self.path}: {self.distribution} needs {key}")
+            return
+        if not allowed:
+            known = ", ".join(sum(_KEYS[self.distribution], ()))
+            raise PriorError(f"{self.path}: {self.distribution} takes {known}; got {key} besides")
+        if isinstance(number, bool) or not isinstance(number, int | float | np.number):
+            raise PriorError(f"{self.path}: {key} must be a number, got {number!r}")
+        if not np.isfinite(number):
+            raise PriorError(f"{self.path}: {key} must be finite, got {number}")
+        object.__setattr__(self, key, float(number))
+
+    def _check_normal(self) -> None:
+        assert self.sd is not None
+        if self.sd <= 0:
+            raise PriorError(f"{self.path}: sd must be positive, got {self.sd}")
+        first, last = self._normal_cdf_range()
+        if last - first < _SMALLEST_NORMAL_MASS:
+            raise PriorError(
+                f"{self.path}: low and high must hold at least {_SMALLEST_NORMAL_MASS:g} of the "
+                f"normal's mass, got {last - first:.3g}"
+            )
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the parameter is inferred: every distribution but `fixed`."""
+        return self.distribution != "fixed"
+
+    @property
+    def is_log(self) -> bool:
+        """Whether the parameter's coordinate is its logarithm."""
+        return self.distribution == "log_uniform"
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest possible value, in the parameter's own unit; may be infinite."""
+        if self.distribution == "fixed":
+            assert self.value is not None
+            return self.value, self.value
+        low = -np.inf if self.low is None else self.low
+        high = np.inf if self.high is None else self.high
+        return low, high
+
+    def to_coordinate(self, value: Array) -> Array:
+        """Returns the prior range mapped to [0, 1] (log first if log-uniform), or z-scores."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            warped = np.log(value) if self.is_log else value
+        origin, scale = self._affine()
+        coordinate = (warped - origin) / scale
+        low, high = self.bounds
+        # Round-off must not carry a value at a bound across it.
+        inside = (value >= low) & (value <= high)
+        return np.where(inside, np.clip(coordinate, *self.coordinate_bounds), coordinate)
+
+    def from_coordinate(self, coordinate: Array) -> Array:
+        """Returns the value of a coordinate; round-off never leaves the bounds."""
+        origin, scale = self._affine()
+        warped = origin + scale * coordinate
+        value = np.exp(warped) if self.is_log else warped
+        low, high = self.bounds
+        # Round-off only: a coordinate that is truly outside stays outside.
+        inside = self._is_inside_coordinate(coordinate)
+        return np.where(inside, np.clip(value, low, high), value)
+
+    def log_slope(self, value: Array) -> Array:
+        """Returns log |d coordinate / d value|, shape of `value`."""
+        scale = self._affine()[1]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            size = np.log(value) if self.is_log else np.zeros_like(value)
+        return -size - np.log(scale)
+
+    def coordinate_log_density(self, coordinate: Array) -> Array:
+        """Returns the log prior density of a coordinate, -inf outside the bounds."""
+        if self.distribution == "normal":
+            first, last = self._normal_cdf_range()
+            density = -0.5 * coordinate**2 - 0.5 * np.log(2 * np.pi) - np.log(last - first)
+        else:
+            density = np.zeros_like(coordinate)
+        return np.where(self._is_inside_coordinate(coordinate), density, -np.inf)
+
+    def quantile(self, probability: Array) -> Array:
+        """Returns the value below which a share `probability` of the prior lies."""
+        if self.distribution != "normal":
+            return self.from_coordinate(probability)
+        first, last = self._normal_cdf_range()
+        share = np.clip(first + (last - first) * probability, 1e-300, 1 - 1e-16)
+        coordinate = np.array([_STANDARD_NORMAL.inv_cdf(p) for p in share.ravel()])
+        low, high = self.bounds
+        return np.clip(self.from_coordinate(coordinate.reshape(share.shape)), low, high)
+
+    @property
+    def coordinate_bounds(self) -> tuple[float, float]:
+        """The bounds as coordinates: (0, 1) unless the distribution is normal."""
+        if self.distribution != "normal":
+            return 0.0, 1.0
+        low, high = self.bounds
+        origin, scale = self._affine()
+        return (low - origin) / scale, (high - origin) / scale
+
+    @property
+    def prior_mean(self) -> float:
+        """Mean of the distribution, in the parameter's own unit."""
+        low, high = self.bounds
+        if self.distribution == "fixed":
+            return low
+        if self.distribution == "uniform":
+            return 0.5 * (low + high)
+        if self.distribution == "log_uniform":
+            return float((high - low) / np.log(high / low))
+        first, last = self.coordinate_bounds
+        mass = _STANDARD_NORMAL.cdf(last) - _STANDARD_NORMAL.cdf(first)
+        shift = (_STANDARD_NORMAL.pdf(first) - _STANDARD_NORMAL.pdf(last)) / mass
+        return float(self.from_coordinate(np.array(shift)))
+
+    def as_dict(self) -> dict[str, str | float]:
+        """Returns the keys of the TOML form that are set."""
+        keys = ("path", "distribution", "low", "high", "mean", "sd", "value")
+        return {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
+
+    def _is_inside_coordinate(self, coordinate: Array) -> NDArray[np.bool_]:
+        low, high = self.coordinate_bounds
+        return (coordinate >= low) & (coordinate <= high)
+
+    def _affine(self) -> tuple[float, float]:
+        if self.distribution == "normal":
+            assert self.mean is not None and self.sd is not None
+            return self.mean, self.sd
+        low, high = self.bounds
+        if self.is_log:
+            low, high = float(np.log(low)), float(np.log(high))
+        return low, high - low
+
+    def _normal_cdf_range(self) -> tuple[float, float]:
+        assert self.mean is not None and self.sd is not None
+        normal = NormalDist(self.mean, self.sd)
+        first = 0.0 if self.low is None else normal.cdf(self.low)
+        last = 1.0 if self.high is None else normal.cdf(self.high)
+        return first, last

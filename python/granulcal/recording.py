@@ -1,0 +1,289 @@
+"""Measured depth images and height maps, and a camera that makes such recordings of grains."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from granulcal import _native
+from granulcal.statistics import Statistics, as_points, statistics
+
+__all__ = ["Camera", "Formation", "Plane", "Recording"]
+
+Array = NDArray[np.float64]
+
+# A tenth of a millimetre: finer than a depth camera at this range, and 16 bits reach 6.5 m.
+_DEPTH_UNIT = 1e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plane:
+    """The ground that was fitted, in the frame of the camera or of the height map.
+
+    Attributes:
+        normal: unit normal towards the grains.
+        offset: normal . point for points of the plane [m].
+        tilt_deg: angle between the normal and the vertical of the frame [deg].
+        rms: root mean square distance of the inliers [m].
+        inlier_count: pixels that decided.
+    """
+
+    normal: tuple[float, float, float]
+    offset: float
+    tilt_deg: float
+    rms: float
+    inlier_count: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Formation:
+    """The points of a formation and how they were found.
+
+    Attributes:
+        points: points of the grains [m], ground at z = 0, centroid at x = y = 0, shape (n, 3).
+        mask: which pixels they are, shape (h, w) after down-sampling.
+        plane: the fitted ground.
+        valid_count: pixels that carry data.
+        threshold: height from which a pixel counts as grain [m].
+        centroid: where the centroid was before it was moved to 0 [m].
+    """
+
+    points: Array
+    mask: NDArray[np.bool_]
+    plane: Plane
+    valid_count: int
+    threshold: float
+    centroid: tuple[float, float]
+
+    def statistics(self) -> Statistics:
+        """Returns the statistics of the points."""
+        return statistics(self.points)
+
+    def height_image(self) -> Array:
+        """Returns heights above the fitted ground [m], NaN where no grain is, shape (h, w)."""
+        image = np.full(self.mask.shape, np.nan)
+        image[self.mask] = self.points[:, 2]
+        return image
+
+
+class Recording:
+    """One measured formation: a height map, or a depth image with its camera.
+
+    Reads .npz height maps, 16-bit depth PNGs, and folders of such PNGs of one formation, which are
+    averaged. PNGs need the TOML of their camera.
+
+    Example:
+        >>> import tempfile
+        >>> import granulcal
+        >>> pour = granulcal.simulate(granulcal.Scene.drop(0.02, count=60), seed=1)
+        >>> camera = Camera.overhead(height=0.3, field_width=0.2, pixels=200)
+        >>> folder = tempfile.mkdtemp()
+        >>> image, toml = camera.record(pour.positions, pour.radii, folder)
+        >>> recording = Recording.open(image, camera=toml)
+        >>> 0 < recording.statistics()["max_z"] < 0.02
+        True
+    """
+
+    def __init__(self, native: _native.Recording, path: Path) -> None:
+        self._native = native
+        self.path = path
+        """The file or folder."""
+
+    @classmethod
+    def open(
+        cls, path: str | PathLike[str], camera: str | PathLike[str] | None = None
+    ) -> "Recording":
+        """Returns the recording at `path`.
+
+        Args:
+            path: .npz, .png or a folder of .png.
+            camera: TOML of the camera, which depth images need and height maps have not.
+
+        Raises:
+            FileNotFoundError: a file does not exist.
+            ValueError: a file is no recording; the message says what is wrong with it.
+        """
+        return cls(_native.Recording.open(path, camera), Path(path))
+
+    @property
+    def frames(self) -> int:
+        """Number of frames that were averaged."""
+        return self._native.frames
+
+    @cached_property
+    def depth(self) -> NDArray[np.float32] | None:
+        """Depth [m], 0 is no data, shape (h, w); None for a height map."""
+        return self._native.depth
+
+    @cached_property
+    def heights(self) -> Array | None:
+        """Heights [m], NaN is no data, shape (h, w); None for a depth image."""
+        return self._native.heights
+
+    def formation(
+        self,
+        *,
+        height_threshold: float | None = None,
+        threshold_floor: float | None = None,
+        border_px: int | None = None,
+        downsample: int | None = None,
+        inlier_distance: float | None = None,
+        max_height: float | None = None,
+        min_component_px: int | None = None,
+        plane_seed: int | None = None,
+    ) -> Formation:
+        """Returns the points of the formation, levelled and centred.
+
+        What is None is as the camera's file says, else the default.
+
+        Args:
+            height_threshold: height from which a pixel counts as grain [m]; the default is
+                automatic, three robust standard deviations of the ground.
+            threshold_floor: least automatic threshold [m]; the default is 1 mm.
+            border_px: frame at the edge of the full image that is ignored [px]; default 0.
+            downsample: keep one pixel of every block of this side; default 1.
+            inlier_distance: distance within which a pixel can be ground [m]; default 3 mm.
+            max_height: height above which a pixel is a fault and not data [m]; default none.
+            min_component_px: least number of connected pixels of grain; default 1.
+            plane_seed: seed of the search for the ground; default 0.
+
+        Raises:
+            ValueError: no pixel belongs to a grain, an image without data, a setting out of range,
+                or both a fixed threshold and a floor.
+        """
+        if height_threshold is not None and threshold_floor is not None:
+            raise ValueError("give height_threshold or threshold_floor, not both")
+        found = self._native.formation(
+            height_threshold=height_threshold,
+            threshold_floor=threshold_floor,
+            border_px=border_px,
+            downsample=downsample,
+            inlier_distance=inlier_distance,
+            max_height=max_height,
+            min_component_px=min_component_px,
+            plane_seed=plane_seed,
+        )
+        plane = Plane(
+            normal=found.normal,
+            offset=found.offset,
+            tilt_deg=float(np.degrees(found.tilt_rad)),
+            rms=found.plane_rms,
+            inlier_count=found.plane_inliers,
+        )
+        return Formation(
+            points=found.points,
+            mask=found.mask,
+            plane=plane,
+            valid_count=found.valid_count,
+            threshold=found.threshold,
+            centroid=found.centroid,
+        )
+
+    @cached_property
+    def _formation(self) -> Formation:
+        return self.formation()
+
+    def statistics(self) -> Statistics:
+        """Returns the statistics under the recording's own segmentation; see `formation`."""
+        return self._formation.statistics()
+
+    def points(self) -> Array:
+        """Returns the points under the recording's own segmentation [m], shape (n, 3)."""
+        return self._formation.points
+
+    @property
+    def plane(self) -> Plane:
+        """The ground under the recording's own segmentation."""
+        return self._formation.plane
+
+    def __repr__(self) -> str:
+        kind = "height map" if self.depth is None else f"depth, {self.frames} frame(s)"
+        return f"Recording({str(self.path)!r}, {kind})"
+
+
+class Camera:
+    """A pinhole camera above the ground that takes depth images of grains; made by `overhead`.
+
+    Image right is world +x, image up is world +y.
+    """
+
+    def __init__(self, native: _native.Camera) -> None:
+        self._native = native
+
+    @classmethod
+    def overhead(cls, *, height: float, field_width: float, pixels: int) -> "Camera":
+        """Returns a camera that looks straight down.
+
+        Args:
+            height: height above the ground [m].
+            field_width: side of the square of ground in view [m].
+            pixels: pixels along a side of the image.
+
+        Raises:
+            ValueError: a number is out of its range.
+        """
+        return cls(_native.Camera.overhead(height, field_width, pixels))
+
+    def tilted(self, *, x_deg: float = 0.0, y_deg: float = 0.0) -> "Camera":
+        """Returns the camera turned about its own x axis, then its own y axis [deg]."""
+        return Camera(self._native.tilted(float(np.radians(x_deg)), float(np.radians(y_deg))))
+
+    def render(
+        self,
+        positions: ArrayLike,
+        radii: ArrayLike,
+        *,
+        depth_noise: float = 0.0,
+        blur_px: float = 0.0,
+        seed: int = 0,
+    ) -> NDArray[np.float32]:
+        """Returns the depth image of grains on the ground z = 0 [m], 0 is no data, shape (h, w).
+
+        Args:
+            positions: centres of the grains [m], shape (n, 3).
+            radii: their radii [m], shape (n,).
+            depth_noise: standard deviation of Gaussian noise of each pixel [m].
+            blur_px: standard deviation of a Gaussian blur [px].
+            seed: seed of the noise.
+
+        Raises:
+            TypeError: an array that does not hold real numbers.
+            ValueError: another shape, or a number out of its range.
+        """
+        centres, sizes = as_points("positions", positions), as_points("radii", radii)
+        return self._native.render(centres, sizes, depth_noise, blur_px, seed)
+
+    def record(
+        self,
+        positions: ArrayLike,
+        radii: ArrayLike,
+        folder: str | PathLike[str],
+        *,
+        depth_noise: float = 0.0,
+        blur_px: float = 0.0,
+        seed: int = 0,
+        depth_unit: float = _DEPTH_UNIT,
+    ) -> tuple[Path, Path]:
+        """Writes `depth.png` (16 bits) and `camera.toml` into `folder`, as a real camera would.
+
+        Args:
+            positions: centres of the grains [m], shape (n, 3).
+            radii: their radii [m], shape (n,).
+            folder: where to write; made if it does not exist.
+            depth_noise: standard deviation of Gaussian noise of each pixel [m].
+            blur_px: standard deviation of a Gaussian blur [px].
+            seed: seed of the noise.
+            depth_unit: metres per count of the image.
+
+        Returns:
+            The paths of the image and of the camera, for `Recording.open`.
+        """
+        image = self.render(positions, radii, depth_noise=depth_noise, blur_px=blur_px, seed=seed)
+        place = Path(folder)
+        place.mkdir(parents=True, exist_ok=True)
+        paths = place / "depth.png", place / "camera.toml"
+        self._native.save_image(image, *paths, depth_unit)
+        return paths

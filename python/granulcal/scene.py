@@ -1,0 +1,205 @@
+"""Scenes and materials: what is poured, onto what, and who looks at it."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from os import PathLike
+
+from granulcal import _native
+
+__all__ = ["Material", "Scene"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """Coefficients of a contact between two grains, and of every wall that states none.
+
+    Attributes:
+        sliding_friction: Coulomb's coefficient mu_s [-], in [0, 10].
+        rolling_friction: rolling and torsional friction mu_r [-], relative to the effective
+            radius, in [0, 1000]; above about 1 rolling is locked.
+        restitution: Newton's coefficient e [-], in [0, 1].
+        tangential_restitution: e_t [-], in [0, 1].
+
+    Example:
+        >>> Material(sliding_friction=0.5, rolling_friction=0.1, restitution=0.5).restitution
+        0.5
+    """
+
+    sliding_friction: float
+    rolling_friction: float
+    restitution: float
+    tangential_restitution: float = 0.0
+
+    def values(self) -> dict[str, float]:
+        """Returns the coefficients by their path in a scene."""
+        return {f"material.{name}": float(value) for name, value in asdict(self).items()}
+
+
+class Scene:
+    """A whole experiment but for its seed; immutable, checked when it is made. SI units.
+
+    Example:
+        >>> scene = Scene.funnel(height=0.12)
+        >>> scene.get("grains.count")
+        2000.0
+        >>> scene.with_({"material.sliding_friction": 0.3}).get("material.sliding_friction")
+        0.3
+    """
+
+    __slots__ = ("native",)
+
+    def __init__(self, native: _native.Scene) -> None:
+        self.native = native
+        """The scene as the Rust side holds it."""
+
+    @classmethod
+    def funnel(
+        cls,
+        height: float = 0.12,
+        *,
+        count: int | None = None,
+        material: Material | None = None,
+        preset: str | None = None,
+    ) -> "Scene":
+        """Returns the paper's pour: grains of 4 mm through a funnel.
+
+        Args:
+            height: height of the funnel's tip above the ground [m].
+            count: number of grains, at most 2000 in this start; the default is 2000.
+            material: the grains' material; the default is a middling dry grain.
+            preset: `fast`, `default` or `accurate`; the default is `default`.
+
+        Raises:
+            ValueError: a number is out of its range; the message says which.
+        """
+        return cls(_native.Scene.funnel(height))._with_options(count, material, preset)
+
+    @classmethod
+    def drop(
+        cls,
+        height: float,
+        *,
+        count: int | None = None,
+        material: Material | None = None,
+        preset: str | None = None,
+    ) -> "Scene":
+        """Returns a ball of grains of 4 mm let go with its lowest point at `height` [m].
+
+        Args:
+            height: height of the lowest point above the ground [m].
+            count: number of grains; the default is 2000.
+            material: the grains' material; the default is a middling dry grain.
+            preset: `fast`, `default` or `accurate`; the default is `default`.
+
+        Raises:
+            ValueError: a number is out of its range; the message says which.
+        """
+        return cls(_native.Scene.drop(height))._with_options(count, material, preset)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> "Scene":
+        """Returns the scene in a TOML file.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: the file is not a scene; the message names the key.
+        """
+        return cls(_native.Scene.load(path))
+
+    @classmethod
+    def from_toml(cls, text: str) -> "Scene":
+        """Returns the scene written in `text`.
+
+        Raises:
+            ValueError: the text is not a scene; the message names the key.
+        """
+        return cls(_native.Scene.from_toml(text))
+
+    def to_toml(self) -> str:
+        """Returns the scene as TOML; `from_toml` reads it back unchanged."""
+        return self.native.to_toml()
+
+    def with_(
+        self, changes: Mapping[str, float | str] | None = None, /, **more: float | str
+    ) -> "Scene":
+        """Returns a copy with other values.
+
+        Args:
+            changes: new values by path, for example `{"funnel.height": 0.06}`; numbers, or words
+                for `preset` and `name`.
+            more: the same, for paths without a dot: `scene.with_(preset="fast")`.
+
+        Raises:
+            ValueError: a path does not exist or a value is out of its range.
+            TypeError: a word where a number belongs.
+        """
+        wanted = {**(changes or {}), **more}
+        native = self.native
+        if "preset" in wanted:
+            native = native.with_preset(_word("preset", wanted.pop("preset")))
+        if "name" in wanted:
+            native = native.with_name(_word("name", wanted.pop("name")))
+        return Scene(native.with_values([(path, _number(path, v)) for path, v in wanted.items()]))
+
+    def with_material(self, material: Material) -> "Scene":
+        """Returns a copy whose grains have this material."""
+        return self.with_(material.values())
+
+    def get(self, path: str) -> float:
+        """Returns the number at `path`, for example `scene.get("funnel.height")`.
+
+        Raises:
+            ValueError: no number stands there.
+        """
+        return self.native.get(path)
+
+    @property
+    def name(self) -> str:
+        """What the scene is called in data sets and reports."""
+        return self.native.name
+
+    @property
+    def preset(self) -> str:
+        """Name of the solver settings."""
+        return self.native.preset
+
+    @property
+    def material(self) -> Material:
+        """The grains' material."""
+        names = ("sliding_friction", "rolling_friction", "restitution", "tangential_restitution")
+        return Material(**{name: self.get(f"material.{name}") for name in names})
+
+    def _with_options(
+        self, count: int | None, material: Material | None, preset: str | None
+    ) -> "Scene":
+        changes: dict[str, float | str] = {} if material is None else {**material.values()}
+        if count is not None:
+            changes["grains.count"] = count
+        if preset is not None:
+            changes["preset"] = preset
+        return self.with_(changes)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scene) and self.to_toml() == other.to_toml()
+
+    def __hash__(self) -> int:
+        return hash(self.to_toml())
+
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return Scene.from_toml, (self.to_toml(),)
+
+    def __repr__(self) -> str:
+        count = int(self.get("grains.count"))
+        return f"Scene({self.name!r}, {count} grains, preset {self.preset!r})"
+
+
+def _word(path: str, value: float | str) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{path} must be a word, got {value!r}")
+    return value
+
+
+def _number(path: str, value: float | str) -> float:
+    if isinstance(value, str | bool):
+        raise TypeError(f"{path} must be a number, got {value!r}")
+    return float(value)

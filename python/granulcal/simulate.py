@@ -1,0 +1,160 @@
+"""One pour: from a scene to grains at rest, and what the camera sees of them."""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal import _native
+from granulcal.scene import Material, Scene
+from granulcal.statistics import Statistics
+
+__all__ = ["Pour", "simulate"]
+
+Array = NDArray[np.float64]
+
+
+class Pour:
+    """Grains at the end of a pour, how it ended and how far it can be trusted.
+
+    Example:
+        >>> pour = simulate(Scene.drop(0.02, count=20), seed=1)
+        >>> pour.positions.shape, pour.status
+        ((20, 3), 'at_rest')
+    """
+
+    def __init__(self, native: _native.Pour, scene: Scene, seed: int) -> None:
+        self._native = native
+        self.scene = scene
+        """The scene, with the material and the preset that were simulated."""
+        self.seed = seed
+        """Seed of the grains' start and of the camera's noise."""
+
+    @cached_property
+    def positions(self) -> Array:
+        """Centres of the grains [m], ground at z = 0, shape (n, 3)."""
+        return self._native.positions
+
+    @cached_property
+    def velocities(self) -> Array:
+        """Velocities of the grains [m/s], shape (n, 3)."""
+        return self._native.velocities
+
+    @cached_property
+    def angular_velocities(self) -> Array:
+        """Angular velocities of the grains [rad/s], shape (n, 3)."""
+        return self._native.angular_velocities
+
+    @cached_property
+    def radii(self) -> Array:
+        """Radii of the grains [m], shape (n,)."""
+        return self._native.radii
+
+    @property
+    def status(self) -> str:
+        """How the pour ended: `at_rest`, `out_of_view`, `horizon` or `unhealthy`."""
+        return self._native.status
+
+    @cached_property
+    def health(self) -> dict[str, float]:
+        """Penetration [radii], residuals [-], energy created [-], grains lost, work done."""
+        return self._native.health
+
+    @property
+    def simulated_s(self) -> float:
+        """Simulated time [s]."""
+        return self._native.simulated_s
+
+    @property
+    def cpu_seconds(self) -> float:
+        """Processor time of the simulation [s]."""
+        return self._native.cpu_seconds
+
+    def depth_image(self) -> NDArray[np.float32]:
+        """Returns what the scene's pinhole camera sees: depth [m], 0 is no data, shape (h, w).
+
+        Raises:
+            ValueError: the scene's camera is orthographic; it delivers `height_map`.
+        """
+        image = self._observation.depth
+        if image is None:
+            raise ValueError("the scene's camera is orthographic: ask for height_map()")
+        return image
+
+    def height_map(self) -> Array:
+        """Returns what the scene's orthographic camera sees: heights [m], shape (h, w).
+
+        Raises:
+            ValueError: the scene's camera is a pinhole; it delivers `depth_image`.
+        """
+        heights = self._observation.heights
+        if heights is None:
+            raise ValueError("the scene's camera is a pinhole: ask for depth_image()")
+        return heights
+
+    def points(self) -> Array:
+        """Returns the points of the image that were taken for grains [m], shape (k, 3).
+
+        Empty if no grain is in view.
+        """
+        return self._observation.points
+
+    def statistics(self) -> Statistics:
+        """Returns the statistics of the image, the simulated half of every comparison.
+
+        Raises:
+            ValueError: too few grains are in view.
+        """
+        return Statistics(self._observation.statistics())
+
+    @cached_property
+    def _observation(self) -> _native.Observation:
+        return self._native.observe()
+
+    def __repr__(self) -> str:
+        return f"Pour({len(self.radii)} grains, {self.status}, {self.simulated_s:.2f} s)"
+
+
+def simulate(
+    scene: Scene,
+    material: Material | None = None,
+    seed: int = 0,
+    preset: str | None = None,
+    threads: int = 1,
+) -> Pour:
+    """Returns the pour of a scene; the same arguments give the same bits.
+
+    Other Python threads run meanwhile, and Ctrl-C stops it.
+
+    Args:
+        scene: what is poured.
+        material: the grains' material instead of the scene's.
+        seed: seed of the start's jitter and of the camera's noise.
+        preset: `fast`, `default` or `accurate` instead of the scene's, which is `default` unless
+            the scene states another.
+        threads: threads that share this one pour. The bits stay the same; only scenes of some ten
+            thousand grains gain from a second thread, and `generate` runs many pours at once.
+
+    Raises:
+        ValueError: a number is out of its range.
+    """
+    check_whole("seed", seed, at_least=0)
+    check_whole("threads", threads, at_least=1)
+    if material is not None:
+        scene = scene.with_material(material)
+    if preset is not None:
+        scene = scene.with_(preset=preset)
+    return Pour(_native.simulate(scene.native, seed, threads), scene, seed)
+
+
+def check_whole(name: str, value: int, *, at_least: int) -> None:
+    """Refuses what is not a whole number of at least `at_least`.
+
+    Raises:
+        TypeError: not a whole number.
+        ValueError: too small.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise TypeError(f"{name} must be a whole number, got {value!r}")
+    if value < at_least:
+        raise ValueError(f"{name} must be at least {at_least}, got {value}")

@@ -1,0 +1,19 @@
+//! granulcal calibrates a granular simulator from depth images.
+//!
+//! This crate is the front door; the rooms are [`dem`] (grains, materials, contact solver,
+//! scenes), [`features`] (camera, depth raster, segmentation, the 16 statistics) and
+//! [`dataset`] (recordings, resumable batches, Parquet, MCAP).
+//!
+//! ```
+//! use granulcal::dem::{Scene, Simulation};
+//!
+//! let mut scene = Scene::drop(0.05);
+//! scene.grains.count = 20;
+//! let pour = Simulation::new(&scene, 1)?.run();
+//! assert_eq!(pour.positions.len(), 20);
+//! # Ok::<(), granulcal::dem::DemError>(())
+//! ```
+
+pub use granulcal_dataset as dataset;
+pub use granulcal_dem as dem;
+pub use granulcal_features as features;

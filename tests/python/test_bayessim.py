@@ -1,0 +1,339 @@
+"""BayesSim: features, training against exact posteriors, reproducibility, files, bad input."""
+
+import json
+import shutil
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from granulcal.bayessim import BayesSim, Config  # noqa: E402
+from granulcal.bayessim.features import draw_frequencies, fourier_features  # noqa: E402
+from granulcal.bayessim.network import HeadLayout  # noqa: E402
+from granulcal.bayessim.standardise import Standardiser  # noqa: E402
+from granulcal.bayessim.trainer import Progress  # noqa: E402
+from granulcal.errors import ModelFormatError, ObservationError, TrainingDataError  # noqa: E402
+from granulcal.posterior import OutOfRange  # noqa: E402
+from granulcal.prior import Prior  # noqa: E402
+from granulcal.toys import LinearGaussian, PileStandIn  # noqa: E402
+
+QUICK = {"quiet": True, "max_epochs": 3, "ensemble": 2, "features": 20}
+KERNELS = {
+    "matern12": lambda r: np.exp(-r),
+    "matern32": lambda r: (1 + np.sqrt(3) * r) * np.exp(-np.sqrt(3) * r),
+    "matern52": lambda r: (1 + np.sqrt(5) * r + 5 * r**2 / 3) * np.exp(-np.sqrt(5) * r),
+    "rbf": lambda r: np.exp(-(r**2) / 2),
+}
+
+
+@pytest.fixture(scope="module")
+def toy():
+    return LinearGaussian.random(seed=1, noise=2.0)
+
+
+@pytest.fixture(scope="module")
+def trained(toy):
+    theta, x = toy.simulate(1000, seed=20)
+    return BayesSim.fit(theta, x, toy.prior, quiet=True)
+
+
+@pytest.fixture(scope="module")
+def quick(toy):
+    theta, x = toy.simulate(120, seed=1)
+    names = [f"s{i}" for i in range(16)]
+    return BayesSim.fit(theta, x, toy.prior, x_names=names, scene="count = 3\n", **QUICK)
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_features_approximate_the_kernel(kernel: str):
+    frequencies = draw_frequencies(16_384, 3, kernel=kernel, seed=0)
+    x = torch.randn(60, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
+    features = fourier_features(x, frequencies)
+    distances = torch.cdist(x, x).numpy()
+    error = (features @ features.T).numpy() - KERNELS[kernel](distances)
+    # Plain Monte Carlo with as many frequencies: root mean square 0.005, at most about 0.02.
+    assert np.abs(error).max() < 0.015
+    assert np.sqrt(np.mean(error**2)) < 0.004
+
+
+def test_training_density_is_the_mixture_density():
+    layout = HeadLayout(components=4, dimension=3)
+    outputs = torch.randn(5, layout.size, generator=torch.Generator().manual_seed(0)).double()
+    u = torch.randn(5, 3, generator=torch.Generator().manual_seed(1)).double()
+    mixtures = layout.mixtures(outputs)
+    expected = [m.log_prob(row[None].numpy())[0] for m, row in zip(mixtures, u, strict=True)]
+    np.testing.assert_allclose(layout.log_density(outputs, u).numpy(), expected, rtol=1e-10)
+
+
+def test_close_to_the_exact_posterior(toy, trained):
+    x = toy.simulate(60, seed=400)[1]
+    divergences = []
+    for row in x:
+        exact, ours = toy.posterior(row), trained.posterior(row)
+        draws = exact.sample(300, seed=1)
+        divergences.append(np.mean(exact.log_prob(draws) - ours.log_prob(draws)))
+    # The prior's own divergence from these posteriors is about 4 nat.
+    assert np.mean(divergences) < 0.2
+
+
+def test_several_pours_are_close_to_the_exact_posterior(toy, trained):
+    theta = toy.prior.from_unconstrained([[0.3, -0.5, 0.8]])
+    x = toy.simulate_at(np.repeat(theta, 4, axis=0), seed=3)
+    exact, ours, single = toy.posterior(x), trained.posterior(x), trained.posterior(x[0])
+    draws = exact.sample(1000, seed=1)
+    assert np.mean(exact.log_prob(draws) - ours.log_prob(draws)) < 0.6
+    assert np.all(ours.sample(2000).std(axis=0) < 0.75 * single.sample(2000).std(axis=0))
+
+
+def test_own_calibration_check_is_stored_and_holds(toy, trained):
+    assert trained.calibration.test_count == 100
+    assert trained.calibration.posterior_loss < trained.calibration.prior_loss - 2
+    theta, x = toy.simulate(200, seed=500)
+    assert trained.check(theta, x, draw_count=300).is_calibrated
+
+
+def test_default_recipe_beats_the_plain_one():
+    pile = PileStandIn(seed=0)
+    theta, x = pile.simulate(500, seed=1)
+    new_theta, new_x = pile.simulate(150, seed=2)
+    losses = {
+        recipe: BayesSim.fit(theta, x, pile.prior, quiet=True, recipe=recipe)
+        .check(new_theta, new_x, draw_count=50)
+        .posterior_loss
+        for recipe in ("snr", "plain")
+    }
+    exact = -np.mean(pile.exact_log_prob(new_theta[:50], new_x[:50]))
+    assert exact < losses["snr"] < losses["plain"] - 0.3
+
+
+def test_same_seed_same_model_on_any_thread_count(toy):
+    theta, x = toy.simulate(120, seed=1)
+    state, threads = torch.random.get_rng_state(), torch.get_num_threads()
+    first = BayesSim.fit(theta, x, toy.prior, **QUICK)
+    try:
+        torch.set_num_threads(2)
+        again = BayesSim.fit(theta, x, toy.prior, **QUICK)
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(threads)
+    other = BayesSim.fit(theta, x, toy.prior, seed=1, **QUICK)
+    draws = [model.posterior(x[0]).sample(20) for model in (first, again, other)]
+    np.testing.assert_array_equal(draws[0], draws[1])
+    assert not np.array_equal(draws[0], draws[2])
+    assert torch.equal(state, torch.random.get_rng_state())
+
+
+def test_save_and_load_are_identical_to_the_bit(quick, toy, tmp_path):
+    quick.save(tmp_path / "model")
+    quick.save(tmp_path / "model")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["model"]
+    loaded = BayesSim.load(tmp_path / "model")
+    x = toy.simulate(3, seed=8)[1]
+    for observed in (x[0], x):
+        ours, theirs = quick.posterior(observed), loaded.posterior(observed)
+        np.testing.assert_array_equal(ours.sample(50), theirs.sample(50))
+        np.testing.assert_array_equal(
+            ours.log_prob(ours.sample(5)), theirs.log_prob(ours.sample(5))
+        )
+    assert loaded.calibration == quick.calibration
+    assert (loaded.x_names, loaded.scene_toml) == (quick.x_names, "count = 3\n")
+    assert loaded.scene_hash == quick.scene_hash
+    loaded.save(tmp_path / "again")
+    for name in ("model.json", "weights.safetensors"):
+        first, second = (tmp_path / folder / name for folder in ("model", "again"))
+        assert first.read_bytes() == second.read_bytes()
+
+
+def _edit_json(folder, **changes):
+    path = folder / "model.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
+
+
+def _cut(folder, name):
+    path = folder / name
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def _drop_entry(folder):
+    document = json.loads((folder / "model.json").read_text())
+    del document["prior_toml"]
+    (folder / "model.json").write_text(json.dumps(document))
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda f: _edit_json(f, version=99), "version must be 1, got 99"),
+        (lambda f: _edit_json(f, kind="flow"), "kind must be 'mdrff', got 'flow'"),
+        (lambda f: _edit_json(f, format="other"), "is not a granulcal-bayessim file"),
+        (lambda f: _edit_json(f, x_names=["one"]), "must have shape"),
+        (lambda f: _edit_json(f, config={"colour": 3}), "colour"),
+        (lambda f: _edit_json(f, prior_toml="[["), "not valid TOML"),
+        (_drop_entry, "no entry 'prior_toml'"),
+        (lambda f: _cut(f, "model.json"), "truncated or not JSON"),
+        (lambda f: _cut(f, "weights.safetensors"), "truncated"),
+    ],
+)
+def test_damaged_files_are_named(quick, tmp_path, damage, message):
+    quick.save(tmp_path / "model")
+    damage(tmp_path / "model")
+    with pytest.raises(ModelFormatError, match=message):
+        BayesSim.load(tmp_path / "model")
+
+
+def test_missing_files_and_foreign_folders(quick, tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"model\.json"):
+        BayesSim.load(tmp_path / "nothing")
+    quick.save(tmp_path / "model")
+    (tmp_path / "model" / "weights.safetensors").unlink()
+    with pytest.raises(FileNotFoundError, match=r"weights\.safetensors"):
+        BayesSim.load(tmp_path / "model")
+    shutil.rmtree(tmp_path / "model")
+    (tmp_path / "model").mkdir()
+    (tmp_path / "model" / "diary.txt").write_text("dear diary")
+    with pytest.raises(FileExistsError, match="not a saved model"):
+        quick.save(tmp_path / "model")
+    assert (tmp_path / "model" / "diary.txt").exists()
+
+
+def test_data_set_rows_are_excluded_counted_and_reordered(toy, capsys):
+    theta, x = toy.simulate(200, seed=5)
+    status = ["at_rest"] * 200
+    status[3], status[4], status[5], status[6] = (
+        "unhealthy",
+        "no_grains_in_view",
+        "horizon",
+        "out_of_view",
+    )
+    theta[4], x[9, 2] = np.nan, np.inf
+    data = SimpleNamespace(
+        theta=np.column_stack([np.full(200, 7.0), theta[:, ::-1]]),
+        theta_names=["scene.other", *toy.prior.names[::-1]],
+        x=x,
+        status=status,
+        prior=toy.prior,
+        scene_toml="a = 1\n",
+    )
+    options = {**QUICK, "quiet": False}
+    model = BayesSim.fit(data, **options)
+    assert model.summary.excluded == {
+        "unhealthy": 1,
+        "no_grains_in_view": 1,
+        "non_finite": 1,
+    }
+    assert model.summary.pair_count == 200
+    assert model.summary.horizon_count == 1
+    assert model.scene_toml == "a = 1\n"
+    printed = capsys.readouterr().out
+    assert (
+        "1 unhealthy, 1 no_grains_in_view, 1 non_finite" in printed
+        and "90% region holds" in printed
+    )
+    keep = np.setdiff1d(np.arange(200), [3, 4, 9])
+    same = BayesSim.fit(theta[keep], x[keep], toy.prior, **QUICK)
+    np.testing.assert_array_equal(model.posterior(x[0]).sample(5), same.posterior(x[0]).sample(5))
+
+
+def test_progress_is_reported(toy):
+    theta, x = toy.simulate(60, seed=5)
+    seen: list[Progress] = []
+    BayesSim.fit(theta, x, toy.prior, progress=seen.append, **QUICK)
+    assert [p.epoch for p in seen] == [1, 2, 3] and seen[0].max_epochs == 3
+
+
+def test_constant_statistics_are_noted_and_harmless(toy):
+    theta, x = toy.simulate(100, seed=5)
+    x[:, 4] = 2.5
+    for recipe in ("snr", "plain"):
+        model = BayesSim.fit(theta, x, toy.prior, **{**QUICK, "recipe": recipe})
+        assert "statistic_4" in model.summary.notes[0]
+        assert np.all(np.isfinite(model.posterior(x[0]).sample(50)))
+
+
+def test_wide_positive_statistics_are_taken_in_logarithms():
+    generator = np.random.default_rng(0)
+    x = np.column_stack([np.exp(3 * generator.standard_normal(500)), generator.random(500)])
+    standardiser = Standardiser.fit(x)
+    assert standardiser.is_log.tolist() == [True, False]
+    z = standardiser.apply(x)
+    np.testing.assert_allclose([z.mean(0), z.std(0)], [[0, 0], [1, 1]], atol=1e-9)
+    assert np.all(np.isfinite(standardiser.apply(np.array([[-1.0, 99.0]]))))
+
+
+def test_observation_outside_the_training_range_is_a_warning(quick, toy):
+    x = toy.simulate(2, seed=3)[1]
+    x[1, 5] = 1e4
+    assert quick.posterior(x[0]).warnings == ()
+    found = [w for w in quick.posterior(x).warnings if isinstance(w, OutOfRange)]
+    assert (found[0].pour, found[0].names, found[0].values) == (1, ("s5",), (1e4,))
+    assert "s5 = 1e+04 (trained on" in str(found[0])
+
+
+@pytest.mark.parametrize(
+    ("x_obs", "error", "message"),
+    [
+        (np.zeros(15), ObservationError, r"shape \(16,\) or \(k, 16\), got \(15,\)"),
+        (np.zeros((0, 16)), ObservationError, r"got \(0, 16\)"),
+        (np.zeros((1, 2, 16)), ObservationError, r"got \(1, 2, 16\)"),
+        (np.r_[np.nan, np.zeros(15)], ObservationError, "not in s0"),
+        (["a"] * 16, TypeError, "real numbers"),
+        (3.0, ObservationError, r"got \(\)"),
+    ],
+)
+def test_bad_observations(quick, x_obs, error, message):
+    with pytest.raises(error, match=message):
+        quick.posterior(x_obs)
+
+
+THETA, X = Prior.default().sample(80, seed=0), np.random.default_rng(0).random((80, 16))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "error", "message"),
+    [
+        ((THETA[:20], X[:20], Prior.default()), {}, TrainingDataError, "at least 50 .* got 20"),
+        ((THETA, X[:70], Prior.default()), {}, TrainingDataError, "as many rows, got 80 and 70"),
+        ((THETA[:, :2], X, Prior.default()), {}, TrainingDataError, "one column for each"),
+        ((THETA, X[:, 0], Prior.default()), {}, TrainingDataError, r"got \(80,\)"),
+        ((THETA, X, None), {}, TrainingDataError, "no prior"),
+        ((THETA, X, "uniform"), {}, TypeError, "prior must be a Prior, got str"),
+        ((THETA + 5, X, Prior.default()), {}, TrainingDataError, "80 rows outside"),
+        ((THETA * np.nan, X, Prior.default()), {}, TrainingDataError, "NaN or infinite in 80"),
+        ((THETA, X * np.nan, Prior.default()), {}, TrainingDataError, "80 non_finite"),
+        ((THETA.astype(str), X, Prior.default()), {}, TypeError, "theta must be .* real"),
+        ((THETA, X > 0.5, Prior.default()), {}, TypeError, "dtype bool"),
+        ((THETA,), {}, TypeError, "without theta"),
+        ((THETA, X, Prior.default()), {"status": ["asleep"] * 80}, TrainingDataError, "asleep"),
+        ((THETA, X, Prior.default()), {"status": ["at_rest"]}, TrainingDataError, "80 entries"),
+        ((THETA, X, Prior.default()), {"x_names": ["a"]}, TrainingDataError, "1 x_names"),
+        ((THETA, X, Prior.default(), -1), {}, ValueError, "seed must be"),
+        ((THETA, X, Prior.default()), {"scene": 3}, TypeError, "scene must be"),
+        ((THETA, X, Prior.default()), {"epochs": 3}, ValueError, "unknown option epochs"),
+    ],
+)
+def test_bad_training_data(arguments, options, error, message):
+    with pytest.raises(error, match=message):
+        BayesSim.fit(*arguments, quiet=True, **options)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"components": 0},
+        {"components": 2.5},
+        {"ensemble": True},
+        {"kernel": "linear"},
+        {"recipe": "best"},
+        {"learning_rate": 0.0},
+        {"jitter": float("nan")},
+        {"validation_share": 0.9},
+        {"test_share": -0.1},
+        {"length_scale": float("inf")},
+        {"snr": 1},
+    ],
+)
+def test_bad_settings_are_named(options):
+    with pytest.raises(ValueError, match=next(iter(options))):
+        Config.from_options(**options)

@@ -1,0 +1,125 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.cli import main
+
+pytest.importorskip("torch")
+
+
+@pytest.fixture(scope="module")
+def model(small_data: gc.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("trained") / "model"
+    assert main(["train", str(small_data.path), "-o", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def recording(small_pour: gc.Pour, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
+    camera = gc.Camera.overhead(height=0.29, field_width=0.58, pixels=580)
+    folder = tmp_path_factory.mktemp("recording")
+    image, toml = camera.record(small_pour.positions, small_pour.radii, folder)
+    return str(image), str(toml)
+
+
+def _run(*words: str) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "granulcal.cli", *words]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_help_teaches(capsys):
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    for word in ("generate", "train", "infer", "report", "reproduce", "demo", "Exit codes"):
+        assert word in text
+    assert main([]) == 2
+    assert main(["--version"]) == 0
+
+
+def test_words_of_the_simulator_are_passed_on():
+    done = _run("features", "--list")
+    assert done.returncode == 0
+    assert "max_z" in done.stdout
+    refused = _run("nonsense")
+    assert refused.returncode == 2
+    assert "nonsense" in refused.stderr
+    assert refused.stdout == ""
+
+
+def test_train_writes_a_model_with_its_data(model, small_data):
+    assert gc.BayesSim.load(model).prior == small_data.prior
+    assert np.array_equal(gc.Dataset.load(model / "training.parquet").x, small_data.x)
+
+
+def test_infer_prints_json_and_writes_files(model, recording, tmp_path, capsys):
+    out, plot = tmp_path / "posterior.json", tmp_path / "pair.png"
+    capsys.readouterr()
+    words = ["infer", str(model), recording[0], "--camera", recording[1], "--json"]
+    assert main([*words, "-o", str(out), "--plot", str(plot)]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert list(printed["parameters"]) == gc.Prior.default().names
+    for values in printed["parameters"].values():
+        low, high = values["interval90"]
+        assert low < values["mean"] < high
+    assert len(printed["statistics"]) == 1
+    written = json.loads(out.read_text())
+    assert written["parameters"] == printed["parameters"]
+    assert np.shape(written["samples"]) == (1000, 3)
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_infer_prints_a_table(model, recording, capsys):
+    assert main(["infer", str(model), recording[0], "--camera", recording[1]]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split()[:3] == ["parameter", "mode", "mean"]
+    assert len(lines) == 4
+
+
+def test_a_model_of_another_scene_is_refused(model, recording, small_scene, tmp_path, capsys):
+    same, other = tmp_path / "same.toml", tmp_path / "other.toml"
+    same.write_text(small_scene.to_toml())
+    other.write_text(small_scene.with_({"grains.count": 61}).to_toml())
+    words = ["infer", str(model), recording[0], "--camera", recording[1], "--json", "--scene"]
+    assert main([*words, str(same)]) == 0
+    capsys.readouterr()
+    assert main([*words, str(other)]) == 2
+    said = capsys.readouterr()
+    assert "another scene: 'count = 60' there, 'count = 61' asked for" in said.err
+    assert said.out == ""
+
+
+def test_report_writes_one_page(model, recording, tmp_path, capsys):
+    pytest.importorskip("jinja2")
+    page = tmp_path / "deep" / "report.html"
+    words = ["report", str(model), recording[0], "--camera", recording[1], "-o", str(page)]
+    assert main([*words, "--seeds", "2"]) == 0
+    assert str(page) in capsys.readouterr().out
+    assert "mean of 2 pours" in page.read_text()
+
+
+def test_bad_input_is_exit_code_2(model, recording, tmp_path, capsys):
+    for words, message in (
+        (["train", str(tmp_path / "none"), "-o", str(tmp_path / "m")], "none"),
+        (["infer", str(tmp_path / "none"), recording[0]], "none"),
+        (["infer", str(model), str(tmp_path / "none.png"), "--camera", recording[1]], "none.png"),
+        (["infer", str(model), recording[0]], "camera"),
+        (["report", str(model), recording[0], "-o", "x.html", "--seeds", "0"], "--seeds"),
+        (["infer", str(model)], "recording"),
+        (["demo", "--pours"], "--pours"),
+    ):
+        assert main(words) == 2, words
+        said = capsys.readouterr()
+        assert message in said.err
+        assert "Traceback" not in said.err
+
+
+def test_a_folder_that_is_no_model_is_left_alone(small_data, tmp_path, capsys):
+    (tmp_path / "precious.txt").write_text("keep")
+    assert main(["train", str(small_data.path), "-o", str(tmp_path)]) == 1
+    assert "not a saved model" in capsys.readouterr().err
+    assert (tmp_path / "precious.txt").read_text() == "keep"

@@ -1,0 +1,110 @@
+import os
+import stat
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+
+
+def test_shapes_and_names(small_data):
+    assert small_data.theta.shape == (80, 3)
+    assert list(small_data.theta_names) == gc.Prior.default().names
+    assert small_data.x.shape == (80, 16)
+    assert len(small_data.status) == len(small_data.seed) == len(small_data) == 80
+    assert small_data.status_counts() == {"at_rest": 80}
+    assert small_data.is_usable.all()
+    assert small_data.health["worst_penetration"].shape == (80,)
+    assert small_data.health["grains_lost"].sum() == 0
+    assert len(small_data.columns()) == 1 + 3 + 2 + 10 + 16
+
+
+def test_rows_come_from_prior_and_scene(small_data, small_scene, small_prior):
+    prior = small_prior
+    assert small_data.prior == prior
+    assert small_data.scene == small_scene
+    assert np.isfinite(prior.log_prob(small_data.theta)).all()
+    row = small_data.theta[4]
+    scene = small_scene.with_(dict(zip(small_data.theta_names, row.tolist(), strict=True)))
+    pour = gc.simulate(scene, seed=int(small_data.seed[4]))
+    assert np.array_equal(pour.statistics().paper16, small_data.x[4])
+
+
+def test_load_returns_what_generate_returned(small_data, tmp_path):
+    again = gc.Dataset.load(small_data.path)
+    assert np.array_equal(again.theta, small_data.theta)
+    assert np.array_equal(again.x, small_data.x)
+    small_data.save(tmp_path / "one.parquet")
+    one = gc.Dataset.load(tmp_path / "one.parquet")
+    assert np.array_equal(one.x, small_data.x)
+    assert one.prior == small_data.prior
+
+
+def test_a_batch_can_be_extended_and_cut(small_scene, tmp_path):
+    prior = gc.Prior.default()
+
+    def batch(n: int, **options) -> gc.Dataset:
+        return gc.generate(small_scene, prior, n, out=tmp_path / "d", progress=False, **options)
+
+    first = batch(5)
+    counts = []
+    more = gc.generate(
+        small_scene, prior, 9, out=tmp_path / "d", progress=lambda *c: counts.append(c)
+    )
+    assert np.array_equal(more.x[:5], first.x)
+    assert counts[-1] == (9, 5, 4, 0)
+    assert len(batch(5)) == 5
+    assert np.array_equal(batch(9, threads=1).x, more.x)
+    with pytest.raises(ValueError, match="unless resumed"):
+        batch(9, resume=False)
+    with pytest.raises(ValueError, match="the seed is 0, but 1 is given"):
+        batch(9, seed=1)
+
+
+def test_an_exception_in_progress_stops_the_batch(small_scene, tmp_path):
+    def refuse(*_: int) -> None:
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        gc.generate(small_scene, gc.Prior.default(), 50, out=tmp_path, progress=refuse)
+
+
+def test_grains_out_of_view_are_counted_and_not_used(small_scene):
+    scene = small_scene.with_({"camera.height_threshold": 0.5})
+    data = gc.generate(scene, gc.Prior.default(), 2, progress=False)
+    assert data.status_counts() == {"no_grains_in_view": 2}
+    assert np.isnan(data.x).all()
+    assert not data.is_usable.any()
+
+
+def test_errors_are_those_of_python(small_scene, tmp_path):
+    prior = gc.Prior.default()
+    with pytest.raises(ValueError, match="n must be at least 1, got 0"):
+        gc.generate(small_scene, prior, 0)
+    with pytest.raises(TypeError, match="n must be a whole number"):
+        gc.generate(small_scene, prior, 2.5)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(FileNotFoundError, match=r"nothing"):
+        gc.Dataset.load(tmp_path / "nothing")
+    broken = tmp_path / "broken.parquet"
+    broken.write_bytes(b"PAR1 and no more")
+    with pytest.raises(ValueError, match=r"broken\.parquet"):
+        gc.Dataset.load(broken)
+    unknown = gc.Parameter(path="material.friction", distribution="uniform", low=0.1, high=0.2)
+    with pytest.raises(ValueError, match=r"material\.friction"):
+        gc.generate(small_scene, gc.Prior([unknown]), 1, progress=False)
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere"
+)
+def test_a_folder_that_cannot_be_written_is_a_permission_error(small_scene, tmp_path):
+    tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
+    with pytest.raises(PermissionError):
+        gc.generate(small_scene, gc.Prior.default(), 1, out=tmp_path / "d", progress=False)
+
+
+def test_pandas_gets_every_column(small_data):
+    pandas = pytest.importorskip("pandas")
+    frame = small_data.to_pandas()
+    assert isinstance(frame, pandas.DataFrame)
+    assert frame.shape == (80, len(small_data.columns()))

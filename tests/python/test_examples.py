@@ -1,0 +1,69 @@
+import doctest
+import importlib
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+_EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def _run(name: str, *words: str) -> None:
+    before = sys.argv
+    sys.argv = [name, *words]
+    try:
+        runpy.run_path(str(_EXAMPLES / name), run_name="__main__")
+    finally:
+        sys.argv = before
+
+
+def test_every_example_is_run_here():
+    text = Path(__file__).read_text()
+    scripts = sorted(path.name for path in _EXAMPLES.glob("*.py"))
+    assert scripts
+    assert [name for name in scripts if f'"{name}"' not in text] == []
+
+
+def test_one_pour(capsys):
+    _run("one_pour.py", "--count", "100")
+    assert "chi_df" in capsys.readouterr().out
+
+
+def test_describe_recording(capsys):
+    _run("describe_recording.py", "--count", "200")
+    assert "ground tilted by 3.0" in capsys.readouterr().out
+
+
+def test_calibrate(tmp_path, capsys):
+    pytest.importorskip("torch")
+    _run("calibrate.py", "--pours", "60", "--count", "60", "--out", str(tmp_path / "pours"))
+    assert "material.restitution" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "granulcal",
+        "granulcal.prior",
+        "granulcal.scene",
+        "granulcal.simulate",
+        "granulcal.statistics",
+    ],
+)
+def test_docstrings(name):
+    found = doctest.testmod(importlib.import_module(name))
+    assert found.attempted > 0
+    assert found.failed == 0
+
+
+def test_docstrings_that_write(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    for name in ("granulcal.dataset", "granulcal.recording"):
+        found = doctest.testmod(importlib.import_module(name))
+        assert (found.attempted > 0, found.failed) == (True, 0), capsys.readouterr().out
+
+
+def test_peers(capsys):
+    _run("peers.py", "--set", "P", "--seeds", "1", "--count", "100")
+    assert "| 1 | at_rest |" in capsys.readouterr().out

@@ -1,0 +1,202 @@
+"""Posterior: densities that integrate to one, draws inside the prior, regions, several pours."""
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from granulcal.bayessim.mixture import Mixture
+from granulcal.parameter import Parameter
+from granulcal.posterior import MassOutsidePrior, Posterior, PoursDisagree
+from granulcal.prior import Prior
+from granulcal.toys import LinearGaussian
+
+BOX = Prior(
+    [
+        Parameter(path="a.flat", distribution="uniform", low=-2.0, high=3.0),
+        Parameter(path="a.log", distribution="log_uniform", low=1e-2, high=10.0),
+    ]
+)
+
+
+def random_mixture(seed: int, *, components: int = 3, dimension: int = 2) -> Mixture:
+    generator = np.random.default_rng(seed)
+    roots = 0.15 * generator.standard_normal((components, dimension, dimension))
+    covariances = roots @ roots.transpose(0, 2, 1) + 0.01 * np.eye(dimension)
+    weights = generator.dirichlet(np.ones(components))
+    means = generator.uniform(-0.1, 1.1, (components, dimension))
+    return Mixture.from_covariances(weights, means, covariances)
+
+
+def test_mixture_matches_scipy():
+    mixture = random_mixture(1, dimension=3)
+    u = np.random.default_rng(0).standard_normal((40, 3))
+    expected = sum(
+        w * stats.multivariate_normal(m, c).pdf(u)
+        for w, m, c in zip(mixture.weights, mixture.means, mixture.covariances, strict=True)
+    )
+    np.testing.assert_allclose(mixture.log_prob(u), np.log(expected), rtol=1e-9)
+
+
+def test_mixture_conditional_is_joint_over_marginal():
+    mixture = random_mixture(2, dimension=3)
+    conditional = mixture.conditional({1: 0.4})
+    u = np.random.default_rng(0).random((10, 3))
+    u[:, 1] = 0.4
+    ratio = mixture.log_prob(u) - conditional.log_prob(u[:, [0, 2]])
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
+    with pytest.raises(ValueError, match="some but not all"):
+        mixture.conditional({0: 0.0, 1: 0.0, 2: 0.0})
+
+
+def test_mixture_draws_have_the_mixture_moments():
+    mixture = random_mixture(3)
+    draws = mixture.sample(40_000, np.random.default_rng(0))
+    np.testing.assert_allclose(draws.mean(axis=0), mixture.weights @ mixture.means, atol=0.01)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_density_in_own_units_integrates_to_one(seed: int):
+    posterior = Posterior.from_mixture(BOX, random_mixture(seed))
+    # Cell centres, even in the value and (for accuracy only) in the logarithm of the second one.
+    flat = np.linspace(-2, 3, 401)
+    edges = np.geomspace(1e-2, 10, 401)
+    flat, flat_width = 0.5 * (flat[1:] + flat[:-1]), np.diff(flat)
+    log, log_width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+    theta = np.stack(np.meshgrid(flat, log, indexing="ij"), axis=-1).reshape(-1, 2)
+    cells = np.outer(flat_width, log_width).ravel()
+    # Tolerance: the quasi-Monte Carlo mass inside the bounds.
+    assert np.exp(posterior.log_prob(theta)) @ cells == pytest.approx(1.0, abs=5e-3)
+
+
+def test_never_outside_the_bounds():
+    mixture = Mixture.from_covariances(
+        np.array([0.5, 0.5]),
+        np.array([[0.0, 1.0], [1.3, -0.2]]),
+        np.tile(0.3 * np.eye(2), (2, 1, 1)),
+    )
+    posterior = Posterior.from_mixture(BOX, mixture)
+    theta = posterior.sample(5000, seed=1)
+    low, high = BOX.bounds.T
+    assert np.all((theta >= low) & (theta <= high))
+    assert np.all(np.isfinite(posterior.log_prob(theta)))
+    outside = [[-2.1, 1.0], [0.0, 20.0], [0.0, -1.0]]
+    assert np.all(posterior.log_prob(outside) == -np.inf)
+    for point in (posterior.mean(), posterior.mode()):
+        assert np.all((point >= low) & (point <= high))
+
+
+def test_mass_far_outside_is_reported_and_still_normalised():
+    far = Mixture.from_covariances(np.ones(1), np.array([[1.5, 0.5]]), 0.02 * np.eye(2)[None])
+    posterior = Posterior.from_mixture(BOX, far)
+    assert isinstance(posterior.warnings[0], MassOutsidePrior)
+    u = np.stack(np.meshgrid(*[(np.arange(300) + 0.5) / 300] * 2), axis=-1).reshape(-1, 2)
+    assert np.exp(posterior.density.log_prob(u)).mean() == pytest.approx(1.0, abs=0.1)
+    assert posterior.sample(100).shape == (100, 2)
+
+
+def test_sampling_is_reproducible_and_fast():
+    posterior = Posterior.from_mixture(BOX, random_mixture(5, components=25))
+    np.testing.assert_array_equal(posterior.sample(50, seed=2), posterior.sample(50, seed=2))
+    assert not np.array_equal(posterior.sample(50, seed=2), posterior.sample(50, seed=3))
+    best = min(_seconds(lambda: posterior.sample(1000)) for _ in range(5))
+    # 10 ms is meant; the slack is for a busy machine.
+    assert best < 0.03
+
+
+def _seconds(call) -> float:
+    started = time.perf_counter()
+    call()
+    return time.perf_counter() - started
+
+
+def test_region_holds_its_level_and_names_its_intervals():
+    posterior = Posterior.from_mixture(BOX, random_mixture(6))
+    region = posterior.credible_region(0.8)
+    assert np.mean(region.contains(posterior.sample(4000, seed=9))) == pytest.approx(0.8, abs=0.03)
+    assert region.contains(posterior.mode())[0]
+    low, high = region["a.log"]
+    share = np.mean(posterior.sample(4000, seed=8)[:, 1] < low) * 10
+    assert share == pytest.approx(1.0, abs=0.3) and low < high
+    assert not region.contains([[99.0, 1.0]])[0]
+    with pytest.raises(ValueError, match="level must lie between 0 and 1, got 90"):
+        posterior.credible_region(90)
+
+
+def test_mode_and_mean_of_one_normal():
+    toy = LinearGaussian.random(seed=3)
+    x = toy.simulate(1, seed=5)[1]
+    posterior = toy.posterior(x[0])
+    exact = toy.prior.from_unconstrained(posterior.density.mixtures[0].means)[0]
+    spread = 2 * np.sqrt(np.diag(posterior.density.mixtures[0].covariances[0]))
+    assert np.all(np.abs(posterior.mode() - exact) < 0.02 * spread)
+    assert np.all(np.abs(posterior.mean() - exact) < 0.05 * spread)
+
+
+def test_marginals_integrate_to_one():
+    for parameter, marginal in zip(
+        BOX.free, Posterior.from_mixture(BOX, random_mixture(7)).marginals().values(), strict=True
+    ):
+        coordinate = parameter.to_coordinate(marginal.grid)
+        assert np.trapezoid(marginal.density, coordinate) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("bounded", [False, True])
+@pytest.mark.parametrize("pours", [2, 10])
+def test_product_of_exact_posteriors_is_the_exact_posterior(bounded: bool, pours: int):
+    toy = LinearGaussian.random(seed=1, noise=0.5 if bounded else 3.0, bounded=bounded)
+    theta = toy.prior.sample(1, seed=4)
+    x = toy.simulate_at(np.repeat(theta, pours, axis=0), seed=6)
+    exact = toy.posterior(x)
+    product = Posterior.from_mixtures(
+        toy.prior, [toy.posterior(row).density.mixtures[0] for row in x]
+    )
+    assert product.warnings == ()
+    draws = exact.sample(2000, seed=1)
+    # Mean of the log ratio is the divergence of the product from the exact posterior [nat].
+    assert abs(np.mean(exact.log_prob(draws) - product.log_prob(draws))) < 0.03
+    ours, theirs = product.sample(4000, seed=2), exact.sample(4000, seed=3)
+    spread = theirs.std(axis=0)
+    assert np.all(np.abs(ours.mean(axis=0) - theirs.mean(axis=0)) < 0.1 * spread)
+    np.testing.assert_allclose(ours.std(axis=0), spread, rtol=0.08)
+
+
+def test_pours_that_contradict_each_other_are_reported():
+    apart = [
+        Mixture.from_covariances(np.ones(1), np.array([[m, m]]), 1e-6 * np.eye(2)[None])
+        for m in (0.01, 0.99)
+    ]
+    found = Posterior.from_mixtures(BOX, apart)
+    assert np.all(np.isfinite(found.sample(100)))
+    assert any(isinstance(w, PoursDisagree) for w in found.warnings)
+
+
+def test_pair_plot_is_written(tmp_path):
+    posterior = Posterior.from_mixture(BOX, random_mixture(8))
+    path = tmp_path / "pairs.png"
+    figure = posterior.pair_plot(path, truth=[0.0, 0.5], extra=posterior)
+    assert path.stat().st_size > 5000
+    assert figure.axes[2].get_yscale() == "log"
+    with pytest.raises(ValueError, match="truth must have shape"):
+        posterior.pair_plot(truth=[0.0])
+
+
+def test_bad_arguments():
+    posterior = Posterior.from_mixture(BOX, random_mixture(9))
+    with pytest.raises(ValueError, match="n must be"):
+        posterior.sample(-1)
+    with pytest.raises(ValueError, match=r"\(rows, 2\)"):
+        posterior.log_prob([[1.0, 2.0, 3.0]])
+    assert posterior.sample(0).shape == (0, 2)
+
+
+def test_no_heavy_imports():
+    code = (
+        "import sys, granulcal.posterior, granulcal.prior, granulcal.diagnostics\n"
+        "import granulcal.bayessim\n"
+        "sys.exit(any(m in sys.modules for m in ('torch', 'matplotlib', 'scipy')))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,114 @@
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.compare import Scale, comparison_table, nearest_row, standardised_distance
+
+
+@pytest.fixture(scope="module")
+def pour() -> gc.Pour:
+    return gc.simulate(gc.Scene.drop(0.03, count=500, preset="fast"), seed=2)
+
+
+@pytest.fixture(scope="module")
+def camera() -> gc.Camera:
+    return gc.Camera.overhead(height=0.4, field_width=0.4, pixels=400)
+
+
+def test_a_photograph_of_a_pour_has_the_pours_statistics(pour, tmp_path):
+    # The scene's own camera, stored as a PNG: only the rounding of depth is between the two.
+    camera = gc.Camera.overhead(height=0.29, field_width=0.58, pixels=1920)
+    image, toml = camera.record(pour.positions, pour.radii, tmp_path, depth_unit=1e-5)
+    recording = gc.Recording.open(image, camera=toml)
+    assert recording.depth is not None
+    assert recording.depth.shape == (1920, 1920)
+    assert recording.heights is None
+    assert recording.frames == 1
+    seen = recording.formation(downsample=20, height_threshold=1e-3).statistics()
+    for name, value in pour.statistics().to_dict().items():
+        assert seen[name] == pytest.approx(value, rel=0.01, abs=1e-4), name
+
+
+@pytest.mark.parametrize("tilt", [(3.0, 0.0), (-2.0, 4.0)])
+def test_tilt_and_noise_are_undone(pour, camera, tmp_path, tilt):
+    straight = camera.record(pour.positions, pour.radii, tmp_path / "straight")
+    tilted = camera.tilted(x_deg=tilt[0], y_deg=tilt[1]).record(
+        pour.positions, pour.radii, tmp_path / "tilted", depth_noise=3e-4, seed=1
+    )
+    expected = gc.Recording.open(straight[0], camera=straight[1]).statistics()
+    recording = gc.Recording.open(tilted[0], camera=tilted[1])
+    angle = np.degrees(np.arccos(np.cos(np.radians(tilt[0])) * np.cos(np.radians(tilt[1]))))
+    assert recording.plane.tilt_deg == pytest.approx(angle, abs=0.05)
+    for name in ("max_z", "mean_r", "sd_r"):
+        assert recording.statistics()[name] == pytest.approx(expected[name], rel=0.06), name
+
+
+def test_segmentation_options_are_honoured(pour, camera, tmp_path):
+    image, toml = camera.record(pour.positions, pour.radii, tmp_path)
+    recording = gc.Recording.open(image, camera=toml)
+    high = recording.formation(height_threshold=0.005)
+    assert high.threshold == 0.005
+    assert high.points[:, 2].min() > 0.005
+    coarse = recording.formation(downsample=4)
+    assert coarse.mask.shape == (100, 100)
+    assert coarse.mask.sum() == len(coarse.points)
+    heights = coarse.height_image()
+    assert np.nanmax(heights) == coarse.points[:, 2].max()
+    assert np.abs(coarse.points[:, :2].mean(axis=0)).max() < 1e-12
+    with pytest.raises(ValueError, match="not both"):
+        recording.formation(height_threshold=0.002, threshold_floor=0.001)
+    with pytest.raises(ValueError, match="none of .* pixels belongs to a grain"):
+        recording.formation(height_threshold=0.5)
+
+
+def test_a_height_map_is_read(tmp_path):
+    y, x = np.mgrid[-40:40, -40:40] * 1.0
+    heights = np.maximum(0.0, 20.0 - np.hypot(x, y))
+    path = tmp_path / "cone.npz"
+    np.savez(path, depthmap=heights, xres=1.0, yres=1.0, zres=1.0, scale="mm")
+    recording = gc.Recording.open(path)
+    assert recording.depth is None
+    assert recording.heights is not None
+    assert recording.heights.shape == (80, 80)
+    assert recording.statistics()["max_z"] == pytest.approx(0.020, abs=2e-4)
+
+
+def test_errors_name_the_file(pour, camera, tmp_path):
+    image, toml = camera.record(pour.positions, pour.radii, tmp_path)
+    with pytest.raises(FileNotFoundError, match=r"missing\.png"):
+        gc.Recording.open(tmp_path / "missing.png", camera=toml)
+    with pytest.raises(ValueError, match="camera"):
+        gc.Recording.open(image)
+    with pytest.raises(ValueError, match="radii"):
+        camera.render(pour.positions, pour.radii[:-1] * 0 + 1)
+    text = tmp_path / "notes.txt"
+    text.write_text("no image")
+    with pytest.raises(ValueError, match=r"notes\.txt"):
+        gc.Recording.open(text)
+
+
+def test_noise_belongs_to_the_seed(pour, camera):
+    def image(seed: int) -> np.ndarray:
+        return camera.render(pour.positions, pour.radii, depth_noise=1e-3, seed=seed)
+
+    assert np.array_equal(image(1), image(1))
+    assert not np.array_equal(image(1), image(2))
+
+
+def test_distances_are_in_training_deviations(small_data):
+    scale = Scale.of(small_data)
+    a = small_data.x[0]
+    assert np.allclose(scale.sd, small_data.x.std(axis=0, ddof=1))
+    assert standardised_distance(a, a, scale) == 0
+    assert standardised_distance(a + scale.sd, a, scale) == pytest.approx(4.0)
+    assert nearest_row(a, small_data) == 0
+    rows = comparison_table(a, [a + 3 * scale.sd, a + scale.sd], scale)
+    assert [row.name for row in rows] == list(small_data.x_names)
+    assert all(row.difference == pytest.approx(2.0) for row in rows)
+    assert comparison_table(a, [a - 3 * scale.sd], scale)[0].is_far
+
+
+def test_a_statistic_that_never_varied_counts_only_where_it_differs():
+    scale = Scale(np.array([0.0, 1.0]))
+    assert scale.difference([1.0, 2.0], [1.0, 1.0]).tolist() == [0.0, 1.0]
+    assert np.isinf(scale.difference([2.0, 2.0], [1.0, 1.0])[0])

@@ -1,0 +1,156 @@
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.formation_image import common_field, height_grid
+from granulcal.report import HealthRow, write_report
+from granulcal.toys import LinearGaussian
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("jinja2")
+
+
+@pytest.fixture(scope="module")
+def posterior() -> gc.Posterior:
+    """A posterior of the default prior's parameters, without training."""
+    toy = LinearGaussian.random(bounded=True)
+    mixture = toy.posterior(toy.simulate(1)[1][0]).density.mixtures[0]
+    return gc.Posterior.from_mixture(gc.Prior.default(), mixture)
+
+
+@pytest.fixture(scope="module")
+def page(
+    small_data: gc.Dataset,
+    small_pour: gc.Pour,
+    posterior: gc.Posterior,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Path:
+    other = gc.simulate(small_pour.scene, seed=4)
+    observed = small_pour.statistics().paper16 + 3 * small_data.x.std(axis=0)
+    return write_report(
+        tmp_path_factory.mktemp("report") / "report.html",
+        observed=observed,
+        observed_points=small_pour.points(),
+        posterior=posterior,
+        pours=[small_pour, other],
+        prior_pours=[other],
+        data=small_data,
+        truth=gc.Prior.default().mean(),
+        title="A <test> & more",
+        summary="What was done.",
+        notes=["Read this."],
+        command="granulcal report a b -o c",
+    )
+
+
+class _Links(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.open: list[str] = []
+        self.balanced = True
+
+    def handle_starttag(self, tag, attrs):
+        self.links += [value for key, value in attrs if key in ("src", "href") and value]
+        if tag not in ("meta", "img", "link", "br"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        self.balanced &= bool(self.open) and self.open.pop() == tag
+
+
+def test_the_page_needs_nothing_else(page):
+    text = page.read_text(encoding="utf-8")
+    parser = _Links()
+    parser.feed(text)
+    assert parser.balanced
+    assert not parser.open
+    assert len(parser.links) == 2
+    assert all(link.startswith("data:image/png;base64,") for link in parser.links)
+    assert not re.search(r"https?://|@import|url\(|<script", text)
+
+
+def test_the_page_shows_every_number(page, small_data):
+    text = page.read_text(encoding="utf-8")
+    assert "A &lt;test&gt; &amp; more" in text
+    for name in (*small_data.x_names, *small_data.theta_names):
+        assert f"<code>{name}</code>" in text
+    assert "What was done." in text
+    assert "Read this." in text
+    assert "granulcal report a b -o c" in text
+    assert "80 at_rest" in text
+    assert "Not checked" in text
+    assert gc.__version__ in text
+
+
+def test_large_differences_are_marked(page):
+    text = page.read_text(encoding="utf-8")
+    assert text.count('<tr class="far">') == text.count("beyond 2</td>") > 8
+
+
+def test_a_report_without_pours_is_refused(posterior, small_data, tmp_path):
+    with pytest.raises(ValueError, match="at least one pour"):
+        write_report(
+            tmp_path / "report.html",
+            observed=np.zeros(16),
+            observed_points=np.zeros((1, 3)),
+            posterior=posterior,
+            pours=[],
+            data=small_data,
+        )
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_health_counts_what_happened(small_data, small_pour):
+    row = HealthRow.of_dataset("data", small_data)
+    assert (row.count, row.grains_lost) == (80, 0)
+    assert row.worst_penetration == small_data.health["worst_penetration"].max()
+    assert HealthRow.of_pours("pours", [small_pour]).statuses == {"at_rest": 1}
+
+
+def test_a_grid_keeps_heights_and_places():
+    y, x = np.mgrid[-0.05:0.05:21j, -0.05:0.05:21j]
+    points = np.column_stack([x.ravel(), y.ravel(), 0.01 + 0.1 * x.ravel()])
+    field = common_field([points])
+    assert field == pytest.approx(0.12, rel=0.05)
+    grid = height_grid(points, field=field, pixels=100)
+    assert np.nanmax(grid) == pytest.approx(0.015)
+    # Full where the points are, empty at the rim; heights rise with x, which is the column.
+    assert np.isfinite(grid[12:88, 12:88]).all()
+    assert np.isnan(grid[0]).all()
+    assert grid[50, 80] > grid[50, 20]
+
+
+def test_a_browser_shows_the_page(page, tmp_path):
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    if browser is None:
+        pytest.skip("chromium is not installed (apt-get install chromium)")
+    picture = tmp_path / "report.png"
+    subprocess.run(
+        [
+            browser,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-background-networking",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            "--window-size=1000,2400",
+            f"--screenshot={picture}",
+            page.as_uri(),
+        ],
+        check=True,
+        capture_output=True,
+        timeout=120,
+    )
+    from matplotlib.image import imread
+
+    pixels = imread(picture)[..., :3]
+    assert pixels.shape[:2] == (2400, 1000)
+    # Text and pictures, not a blank page.
+    assert pixels.std() > 0.05
