@@ -104,8 +104,15 @@ fn a_tilted_noisy_camera_sees_nearly_the_same() {
     let seen = paper16(&formation.points).expect("statistics");
     let mut difference = String::new();
     for ((statistic, got), expected) in PAPER16.iter().zip(seen).zip(direct) {
-        // Measured: see tests/golden/README.md.
-        if (got - expected).abs() > 0.05 * expected.abs() {
+        // Measured over two pours: 3 % at iqr_x, 2 % at iqr_r and max_z, about 1 % elsewhere. The shift
+        // of the chi distribution is a small length that belongs to its scale; an excess kurtosis, which
+        // hangs on single far grains, is compared with the 3 of a normal distribution.
+        let scale = match statistic.name {
+            "chi_shift" => direct[15],
+            "kurtosis_r" => 3.0,
+            _ => expected,
+        };
+        if (got - expected).abs() > 0.05 * scale.abs() {
             writeln!(difference, "{}: {got}, straight down {expected}", statistic.name)
                 .expect("memory");
         }

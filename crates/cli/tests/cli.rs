@@ -184,8 +184,11 @@ fn killed_and_resumed_gives_the_rows_of_an_uninterrupted_run() {
         let more = ["--set", "grains.count=100", "-o", out];
         tiny(&["generate", "drop", "default", "-n", "24", "--seed", "5", "--chunk", "2"], &more)
     };
-    place.expect(0, &args("whole"));
-    place.expect(0, &args("again"));
+    // The prior reaches restitution 1, where a drop may be unhealthy: what counts here are the rows.
+    let finished = |code: Option<i32>| matches!(code, Some(0 | 3));
+    for out in ["whole", "again"] {
+        assert!(finished(place.run(&args(out)).status.code()));
+    }
     assert_same_rows(&place.at("whole"), &place.at("again"));
 
     let mut kills = 0;
@@ -202,8 +205,8 @@ fn killed_and_resumed_gives_the_rows_of_an_uninterrupted_run() {
         let _ = child.kill();
         match child.wait().unwrap().code() {
             None => kills += 1,
-            Some(code) => {
-                assert_eq!(code, 0);
+            code => {
+                assert!(finished(code), "{code:?}");
                 break;
             }
         }

@@ -152,3 +152,68 @@ impl Bed {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::Portable;
+
+    /// Three grains of different size and mass, in motion.
+    fn bed() -> Bed {
+        let mut scene = Scene::drop(0.1);
+        scene.grains.count = 3;
+        let mut bed = Bed::new(&scene, 1);
+        bed.radii = vec![1e-3, 2e-3, 4e-3];
+        bed.inverse_mass = vec![8.0, 1.0, 0.125];
+        for (i, body) in bed.bodies[..3].iter_mut().enumerate() {
+            let i = i as f64;
+            body.velocity = [1.0 + i, -2.0, 0.5 * i, 0.0];
+            body.spin = [0.1, 0.2 * i, -0.3, 0.0];
+        }
+        bed
+    }
+
+    #[test]
+    fn spin_is_radius_times_angular_velocity() {
+        let bed = bed();
+        assert_eq!(bed.angular_velocity(2), Vector3::new(0.1, 0.4, -0.3) / 4e-3);
+        assert_eq!(bed.velocity(2), Vector3::new(3.0, -2.0, 1.0));
+    }
+
+    #[test]
+    fn kinetic_energy_is_that_of_a_solid_sphere() {
+        let bed = bed();
+        for grain in 0..3 {
+            let mass = 1.0 / bed.inverse_mass[grain];
+            let inertia = 0.4 * mass * bed.radii[grain].powi(2);
+            let expected = 0.5 * mass * bed.velocity(grain).norm_squared()
+                + 0.5 * inertia * bed.angular_velocity(grain).norm_squared();
+            assert!((bed.kinetic_energy(grain) / expected - 1.0).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn free_flight_changes_energy_by_half_g_squared_dt_squared() {
+        // v += g dt, then x += v dt: the potential drops by m g dt (v + g dt) while the kinetic
+        // energy rises by m g dt (v + g dt / 2).
+        let (mut bed, gravity, dt) = (bed(), Vector3::new(0.0, 0.0, -9.81), 1e-3);
+        let before = bed.energy(&gravity);
+        bed.accelerate(&gravity, dt);
+        bed.move_on(dt);
+        let mass = bed.inverse_mass.iter().map(|m| 1.0 / m).sum::<f64>();
+        let expected = -0.5 * mass * (9.81 * dt).powi(2);
+        assert!((bed.energy(&gravity) - before - expected).abs() < 1e-12);
+        assert_eq!(bed.bodies[3], Body::default()); // the resting body feels no gravity
+    }
+
+    #[test]
+    fn the_resting_body_is_read_but_never_written() {
+        let mut bodies = bed().bodies;
+        let shared = SharedBodies::new(&mut bodies);
+        shared.store::<Portable>(3, [7.0; 8]);
+        assert_eq!(shared.load::<Portable>(3), [0.0; 8]);
+        shared.store::<Portable>(1, [7.0; 8]);
+        assert_eq!(shared.load::<Portable>(1), [7.0; 8]);
+        assert_eq!(bodies[1], Body { velocity: [7.0; 4], spin: [7.0; 4] });
+    }
+}

@@ -89,6 +89,14 @@ pub(crate) struct ContactLaw {
     pub tangential_restitution: f64,
 }
 
+/// The impulses of a batch.
+#[derive(Clone, Debug)]
+struct Held {
+    n: Lanes,
+    t: Lanes3,
+    r: Lanes3,
+}
+
 /// The batches of one colour.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Colour {
@@ -109,6 +117,8 @@ pub(crate) struct ContactSet {
     /// Tangential bias of each batch, `e_t` times the tangential velocity before an impact `[m/s]`;
     /// empty when no material bounces tangentially.
     pub bias_t: Vec<Lanes3>,
+    /// Impulses of the solves before the present one in this substep, for each batch; empty if there are none.
+    held: Vec<Held>,
     /// The contact law behind each entry of `laws`, if all its lanes share one.
     uniform: Vec<Option<ContactLaw>>,
     carried: Vec<Carried>,
@@ -184,6 +194,26 @@ impl ContactSet {
     pub fn clear(&mut self) {
         self.batches.clear();
         self.colours.clear();
+    }
+
+    /// Lays the impulses aside, so that the next solve begins from nothing.
+    pub fn hold(&mut self) {
+        self.release();
+        self.held.extend(self.batches.iter_mut().map(|batch| Held {
+            n: std::mem::replace(&mut batch.lambda_n, Lanes::ZERO),
+            t: std::mem::replace(&mut batch.lambda_t, Lanes3::ZERO),
+            r: std::mem::replace(&mut batch.lambda_r, Lanes3::ZERO),
+        }));
+    }
+
+    /// Adds the impulses that were laid aside to the present ones.
+    pub fn release(&mut self) {
+        for (batch, held) in self.batches.iter_mut().zip(&self.held) {
+            batch.lambda_n.add(&held.n);
+            batch.lambda_t.add(&held.t);
+            batch.lambda_r.add(&held.r);
+        }
+        self.held.clear();
     }
 
     /// Replaces the list: colours the contacts, fills the batches and hands the impulses on.

@@ -97,9 +97,6 @@ impl Contacts {
         let set = &mut self.at_walls;
         let walls = assemble::refresh_walls(set, &around.walls, bed, before, dt, lost);
         self.age += 1;
-        self.late.clear();
-        self.late_pairs.clear();
-        self.late_at_walls.clear();
         pairs.max(walls)
     }
 
@@ -128,13 +125,29 @@ impl Contacts {
         self.listed.clear();
         self.listed.extend(walls.iter().map(|late| late.contact));
         rebuild_walls(&mut self.late_at_walls, &self.listed, bed, around);
-        // These impacts begin with the velocities that the solve has just given.
+        // A second impact in the same instant: it begins with the velocities that the first has left, for
+        // all contacts. Kept to the first one's bias, a contact that has bounced would bounce again whenever
+        // a late one slows it, and create energy.
+        self.pairs.hold();
+        self.at_walls.hold();
         before.clone_from(&bed.bodies);
         let dt = around.settings.dt;
-        assemble::refresh_pairs(&mut self.late_pairs, bed, before, dt);
-        let set = &mut self.late_at_walls;
-        assemble::refresh_walls(set, &around.walls, bed, before, dt, lost);
+        for set in [&mut self.pairs, &mut self.late_pairs] {
+            assemble::refresh_pairs(set, bed, before, dt);
+        }
+        for set in [&mut self.at_walls, &mut self.late_at_walls] {
+            assemble::refresh_walls(set, &around.walls, bed, before, dt, lost);
+        }
         true
+    }
+
+    /// Ends the substep: the impulses of its solves become one.
+    pub fn conclude(&mut self) {
+        self.pairs.release();
+        self.at_walls.release();
+        self.late.clear();
+        self.late_pairs.clear();
+        self.late_at_walls.clear();
     }
 
     /// Number of listed contacts.

@@ -39,10 +39,24 @@ impl Lanes {
     pub fn splat(value: f64) -> Self {
         Self([value; LANES])
     }
+
+    /// Adds `other` in place.
+    pub fn add(&mut self, other: &Self) {
+        for (value, more) in self.0.iter_mut().zip(other.0) {
+            *value += more;
+        }
+    }
 }
 
 impl Lanes3 {
     pub const ZERO: Self = Self { x: Lanes::ZERO, y: Lanes::ZERO, z: Lanes::ZERO };
+
+    /// Adds `other` in place.
+    pub fn add(&mut self, other: &Self) {
+        self.x.add(&other.x);
+        self.y.add(&other.y);
+        self.z.add(&other.z);
+    }
 
     /// Puts `value` into lane `lane`.
     #[inline(always)]

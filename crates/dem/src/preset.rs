@@ -16,7 +16,7 @@ pub enum Preset {
     /// For data sets: penetration below 0.1 radii.
     #[default]
     Default,
-    /// For checking the others: steps four times smaller than `default`, four times the sweeps.
+    /// For checking the others: a fifth of the step of `default` and four times the sweeps.
     Accurate,
 }
 

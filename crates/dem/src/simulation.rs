@@ -40,6 +40,8 @@ pub struct Simulation {
     watch: HealthWatch,
     /// Threads for large scenes; small ones stay on the calling thread.
     pool: Option<Arc<ThreadPool>>,
+    /// What the last look at the end rule found.
+    seemed_ended: Option<Status>,
     ended: Option<Status>,
 }
 
@@ -63,6 +65,7 @@ impl Simulation {
             camera: scene.camera,
             substep: 0,
             pool: None,
+            seemed_ended: None,
             ended: None,
         })
     }
@@ -183,6 +186,7 @@ impl Simulation {
             }
             self.solve(LATE_SWEEPS);
         }
+        self.contacts.conclude();
         self.bed.move_on(dt);
         self.watch.see_penetration(seen.penetration);
         self.substep += 1;
@@ -232,7 +236,16 @@ impl Simulation {
         }
     }
 
-    fn end_reached(&self) -> Option<Status> {
+    /// How the pour has ended, if it has. Rest must last: a grain at the top of its bounce is slow, too,
+    /// but gravity does not leave it so until the next look.
+    fn end_reached(&mut self) -> Option<Status> {
+        let now = self.looks_ended();
+        let lasting = now.filter(|status| *status == Status::Horizon || now == self.seemed_ended);
+        self.seemed_ended = now;
+        lasting
+    }
+
+    fn looks_ended(&self) -> Option<Status> {
         let threshold = self.end.kinetic_energy;
         let energies: Vec<f64> =
             (0..self.bed.count()).map(|i| self.bed.kinetic_energy(i)).collect();

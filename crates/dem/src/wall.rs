@@ -99,7 +99,7 @@ impl Frustum {
         let distance = gap.norm();
         let cross = self.generator.x * in_plane.y - self.generator.y * in_plane.x;
         let beyond_the_ends = share <= 0.0 || share >= 1.0;
-        let side = if beyond_the_ends { 0 } else { cross.signum() as i8 };
+        let side = if beyond_the_ends || cross == 0.0 { 0 } else { cross.signum() as i8 };
         // A centre on the shell itself is pushed inwards.
         let inwards = Vector2::new(self.generator.y, -self.generator.x);
         let direction = if distance > 0.0 { gap / distance } else { inwards.normalize() };
@@ -139,5 +139,157 @@ fn surface(shape: &Shape) -> Surface {
         Shape::Cylinder { from, to, radius } => {
             Surface::Frustum(Frustum::new(from.into(), to.into(), radius, radius))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use parry3d_f64::math::Vector as ParryVector;
+    use parry3d_f64::query::PointQuery;
+    use parry3d_f64::shape::TriMesh;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const FROM: [f64; 3] = [0.01, -0.02, 0.1];
+    const SIDES: u32 = 720;
+
+    /// A frustum from [`FROM`] to `to`.
+    fn frustum(to: [f64; 3], radius_from: f64, radius_to: f64) -> Surface {
+        surface(&Shape::Cone { from: FROM, to, radius_from, radius_to })
+    }
+
+    /// The same shell as triangles between two rings of [`SIDES`] points.
+    fn mesh(to: [f64; 3], radius_from: f64, radius_to: f64) -> TriMesh {
+        let (from, to) = (Vector3::from(FROM), Vector3::from(to));
+        let axis = (to - from).normalize();
+        let u = any_normal(&axis);
+        let v = axis.cross(&u);
+        let ring = |centre: Vector3<f64>, radius: f64| {
+            (0..SIDES).map(move |side| {
+                let (sin, cos) =
+                    (std::f64::consts::TAU * f64::from(side) / f64::from(SIDES)).sin_cos();
+                let point = centre + radius * (cos * u + sin * v);
+                ParryVector::new(point.x, point.y, point.z)
+            })
+        };
+        let vertices = ring(from, radius_from).chain(ring(to, radius_to)).collect();
+        let triangles = (0..SIDES)
+            .flat_map(|side| {
+                let next = (side + 1) % SIDES;
+                [[side, next, SIDES + side], [next, SIDES + next, SIDES + side]]
+            })
+            .collect();
+        TriMesh::new(vertices, triangles).expect("a mesh")
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn nearest_point_is_the_nearest_of_a_mesh(
+            to in prop::array::uniform3(-0.05f64..0.05),
+            radius_from in 0.005f64..0.06,
+            radius_to in 0.005f64..0.06,
+            points in proptest::collection::vec(prop::array::uniform3(-0.15f64..0.15), 16),
+        ) {
+            let shell = frustum(to, radius_from, radius_to);
+            let mesh = mesh(to, radius_from, radius_to);
+            // The chords of a circle of 720 sides are r (1 - cos(pi / 720)) inside it.
+            let resolution = 0.06 * (1.0 - (std::f64::consts::PI / f64::from(SIDES)).cos()) + 1e-12;
+            for point in points {
+                let centre = Vector3::from(FROM) + Vector3::from(point);
+                let near = shell.nearest(&centre);
+                let referee = mesh
+                    .project_local_point(ParryVector::new(centre.x, centre.y, centre.z), false)
+                    .point;
+                let referee = Vector3::new(referee.x, referee.y, referee.z);
+                let distance = (centre - referee).norm();
+                prop_assert!((near.distance - distance).abs() < resolution, "{near:?} {distance}");
+                prop_assert!((near.normal.norm() - 1.0).abs() < 1e-12);
+                // The point that distance and normal speak of lies on the shell.
+                let on_shell = shell.nearest(&(centre - near.distance * near.normal));
+                prop_assert!(on_shell.distance < 1e-12, "{on_shell:?}");
+            }
+        }
+
+        #[test]
+        fn may_reach_never_misses(
+            to in prop::array::uniform3(-0.05f64..0.05),
+            point in prop::array::uniform3(-0.2f64..0.2),
+            range in 0f64..0.1,
+        ) {
+            let shell = frustum(to, 0.03, 0.01);
+            let near = shell.nearest(&Vector3::from(point)).distance < range;
+            prop_assert_eq!(shell.may_reach(&Vector3::from(point), range), near);
+        }
+    }
+
+    #[test]
+    fn side_changes_when_the_shell_is_crossed() {
+        let cone = surface(&Shape::Cone {
+            from: [0.0; 3],
+            to: [0.0, 0.0, 0.1],
+            radius_from: 0.02,
+            radius_to: 0.06,
+        });
+        let side = |x: f64, z: f64| cone.nearest(&Vector3::new(x, 0.0, z)).side;
+        // At half the height the shell is at 0.04.
+        assert_eq!((side(0.039, 0.05), side(0.041, 0.05)), (-1, 1));
+        assert_eq!((side(-0.039, 0.05), side(-0.041, 0.05)), (-1, 1));
+        // Beyond the ends a grain may go round the rim.
+        assert_eq!((side(0.07, 0.2), side(0.01, -0.1)), (0, 0));
+    }
+
+    #[test]
+    fn normal_points_from_the_shell_to_the_centre() {
+        let cylinder =
+            surface(&Shape::Cylinder { from: [0.0; 3], to: [0.0, 0.0, 0.1], radius: 0.02 });
+        let inside = cylinder.nearest(&Vector3::new(0.0, 0.015, 0.05));
+        assert!((inside.normal + Vector3::y()).norm() < 1e-15);
+        assert!((inside.distance - 0.005).abs() < 1e-15);
+        let outside = cylinder.nearest(&Vector3::new(0.03, 0.0, 0.05));
+        assert!((outside.normal - Vector3::x()).norm() < 1e-15);
+        // Above the rim: straight up from it.
+        let above = cylinder.nearest(&Vector3::new(0.02, 0.0, 0.13));
+        assert!((above.normal - Vector3::z()).norm() < 1e-12);
+        assert!((above.distance - 0.03).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_centre_on_the_axis_or_on_the_shell_has_a_normal() {
+        for axis in [[0.0, 0.0, 0.1], [0.1, 0.0, 0.0], [0.0, -0.1, 0.0]] {
+            let shape =
+                Shape::Cone { from: [0.0; 3], to: axis, radius_from: 0.01, radius_to: 0.02 };
+            let near = surface(&shape).nearest(&(0.5 * Vector3::from(axis)));
+            assert!((near.normal.norm() - 1.0).abs() < 1e-12, "{near:?}");
+            assert!(near.distance > 0.0 && near.distance < 0.015 && near.side == -1);
+        }
+        let shape = Shape::Cylinder { from: [0.0; 3], to: [0.0, 0.0, 0.1], radius: 0.02 };
+        let near = surface(&shape).nearest(&Vector3::new(0.02, 0.0, 0.05));
+        assert_eq!(near.distance, 0.0);
+        assert!((near.normal + Vector3::x()).norm() < 1e-15); // inwards
+    }
+
+    #[test]
+    fn plane_has_a_sign() {
+        let plane = surface(&Shape::Plane { point: [0.0, 0.0, 1.0], normal: [0.0, 3.0, 4.0] });
+        let above = plane.nearest(&Vector3::new(7.0, 3.0, 5.0));
+        assert!((above.distance - 5.0).abs() < 1e-15 && above.side == 1);
+        assert!((above.normal - Vector3::new(0.0, 0.6, 0.8)).norm() < 1e-15);
+        let below = plane.nearest(&Vector3::new(0.0, 0.0, 0.0));
+        assert!((below.distance + 0.8).abs() < 1e-15 && below.side == -1);
+        assert!(plane.may_reach(&Vector3::zeros(), 0.1)); // below the plane, at any depth
+        assert!(!plane.may_reach(&Vector3::new(0.0, 0.0, 2.0), 0.7));
+    }
+
+    #[test]
+    fn ground_comes_first_and_materials_resolve() {
+        let mut scene = Scene::funnel(0.12);
+        scene.ground.material.restitution = Some(0.1);
+        let walls = walls_of(&scene);
+        assert_eq!(walls.len(), 3);
+        assert!(matches!(walls[0].surface, Surface::Plane { .. }));
+        assert_eq!(walls[0].material, Material { restitution: 0.1, ..scene.material });
+        assert_eq!(walls[1].material, scene.material);
     }
 }

@@ -8,8 +8,9 @@
 //! lambda_r <- projection on |.| <= mu_r lambda_n of lambda_r - rho / A_r
 //! ```
 //!
-//! Spheres make the contact's own Delassus block diagonal, so this is its exact solution. Contacts of a
-//! batch share no grain: the order within a batch cannot change a bit.
+//! Equal spheres make the contact's own Delassus block diagonal, so this is its exact solution; at walls and
+//! between unequal spheres sliding and rolling couple, and the three lines are one pass inside the contact.
+//! Contacts of a batch share no grain: the order within a batch cannot change a bit.
 
 use rayon::ThreadPool;
 use rayon::prelude::*;

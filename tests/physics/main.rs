@@ -1,0 +1,14 @@
+//! The solver against closed forms, against itself on other threads, and against scenes that break solvers.
+//!
+//! One topic a module. Every tolerance stands beside its number with what it was measured from; see
+//! docs/theory/contact.md for the equations.
+
+mod collision;
+mod counters;
+mod determinism;
+mod incline;
+mod packing;
+mod restitution;
+mod robustness;
+mod rolling;
+mod scenes;
