@@ -29,7 +29,7 @@ HIDDEN = Material(sliding_friction=0.35, rolling_friction=0.08, restitution=0.4)
 _RECORDING_SEED = 20_231
 _TILT_DEG = (2.5, -1.5)
 _DEPTH_NOISE = 4e-4
-_DEFAULT_POURS = 300
+_DEFAULT_POURS = 200
 
 
 def demo_scene() -> Scene:

@@ -1,3 +1,5 @@
+import csv
+
 import numpy as np
 import pytest
 
@@ -45,10 +47,10 @@ def test_every_measured_mound_is_segmented():
 def test_volumes_agree_with_those_published_beside_the_maps():
     assert _DATA is not None
     folder = _DATA / "granular-impact-kinect"
-    table = np.genfromtxt(
-        folder / "derived_summary.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
-    )
-    published = dict(zip(table["file"], table["volume_above_bed_cm3"], strict=True))
+    with (folder / "derived_summary.csv").open(newline="", encoding="utf-8") as table:
+        published = {
+            row["file"]: float(row["volume_above_bed_cm3"]) for row in csv.DictReader(table)
+        }
     pixel_cm2 = 0.28025**2
     for path in kinect_mounds.measured_maps(_DATA):
         heights = Recording.open(path).formation(**kinect_mounds._SEGMENTATION).points[:, 2]

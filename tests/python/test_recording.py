@@ -39,8 +39,10 @@ def test_tilt_and_noise_are_undone(pour, camera, tmp_path, tilt):
     recording = gc.Recording.open(tilted[0], camera=tilted[1])
     angle = np.degrees(np.arccos(np.cos(np.radians(tilt[0])) * np.cos(np.radians(tilt[1]))))
     assert recording.plane.tilt_deg == pytest.approx(angle, abs=0.05)
-    for name in ("max_z", "mean_r", "sd_r"):
+    for name in ("mean_r", "sd_r"):
         assert recording.statistics()[name] == pytest.approx(expected[name], rel=0.06), name
+    # The highest of many noisy pixels lies up to three sds of the noise too high.
+    assert recording.statistics()["max_z"] == pytest.approx(expected["max_z"], abs=3 * 3e-4)
 
 
 def test_segmentation_options_are_honoured(pour, camera, tmp_path):
