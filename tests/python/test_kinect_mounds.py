@@ -55,6 +55,6 @@ def test_volumes_agree_with_those_published_beside_the_maps():
     for path in kinect_mounds.measured_maps(_DATA):
         heights = Recording.open(path).formation(**kinect_mounds._SEGMENTATION).points[:, 2]
         volume = pixel_cm2 * 100 * heights.sum()
-        # Their ground and ours are different fits: a tenth of a millimetre over the mound's area.
-        tolerance = 0.05 * volume + 0.01 * pixel_cm2 * len(heights)
+        # Their ground and ours are different fits: two tenths of a millimetre over the mound's area.
+        tolerance = 0.05 * volume + 0.02 * pixel_cm2 * len(heights)
         assert volume == pytest.approx(published[path.name], abs=tolerance), path.name
