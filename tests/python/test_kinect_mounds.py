@@ -57,6 +57,6 @@ def test_volumes_agree_with_those_published_beside_the_maps():
             continue  # its bed is not flat: the two fits differ by half a millimetre
         heights = Recording.open(path).formation(**kinect_mounds._SEGMENTATION).points[:, 2]
         volume = pixel_cm2 * 100 * heights.sum()
-        # Their ground and ours are different fits: two tenths of a millimetre over the mound's area.
+        # Two fits of the ground: two tenths of a millimetre over the mound's area.
         tolerance = 0.05 * volume + 0.02 * pixel_cm2 * len(heights)
         assert volume == pytest.approx(published[path.name], abs=tolerance), path.name
