@@ -138,9 +138,12 @@ def test_the_interpreter_is_released_while_a_pour_runs():
     assert ticks > 10
 
 
+# Jobs in the background start with Ctrl-C ignored, and so would their children.
 _INTERRUPTED = """
+import signal
 import sys
 import granulcal as gc
+signal.signal(signal.SIGINT, signal.default_int_handler)
 print("started", flush=True)
 try:
     {call}
@@ -159,7 +162,10 @@ def _interrupt(call: str, *, after: float) -> subprocess.CompletedProcess:
     time.sleep(after)
     sent = time.monotonic()
     process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=30)
+    try:
+        out, _ = process.communicate(timeout=30)
+    finally:
+        process.kill()
     assert time.monotonic() - sent < 10
     return subprocess.CompletedProcess(process.args, process.returncode, out)
 
