@@ -16,6 +16,8 @@ use crate::solver::nsgs;
 
 /// Examinations between two looks at the residual, which costs about a sweep.
 const RESIDUAL_PERIOD: usize = 4;
+/// Looks at the end rule within which a pour must seem ended twice.
+const REST_LOOKS: usize = 16;
 /// Sweeps, at least, after late contacts have been found, and how often what these bring together is
 /// looked for.
 const LATE_SWEEPS: usize = 2;
@@ -40,8 +42,8 @@ pub struct Simulation {
     watch: HealthWatch,
     /// Threads for large scenes; small ones stay on the calling thread.
     pool: Option<Arc<ThreadPool>>,
-    /// What the last look at the end rule found.
-    seemed_ended: Option<Status>,
+    /// The last end that the end rule saw, and at which substep.
+    seemed_ended: Option<(Status, usize)>,
     ended: Option<Status>,
 }
 
@@ -236,13 +238,14 @@ impl Simulation {
         }
     }
 
-    /// How the pour has ended, if it has. Rest must last: a grain at the top of its bounce is slow, too,
-    /// but gravity does not leave it so until the next look.
+    /// How the pour has ended, if it has. It must have looked so twice within [`REST_LOOKS`]: a grain at the
+    /// top of its bounce is slow, too, but once, while a pile whose last grain trembles is slow now and then.
     fn end_reached(&mut self) -> Option<Status> {
-        let now = self.looks_ended();
-        let lasting = now.filter(|status| *status == Status::Horizon || now == self.seemed_ended);
-        self.seemed_ended = now;
-        lasting
+        let now = self.looks_ended()?;
+        let window = REST_LOOKS * self.around.settings.list_period;
+        let seen = self.seemed_ended.replace((now, self.substep));
+        let again = seen.is_some_and(|(then, at)| then == now && self.substep - at <= window);
+        (again || now == Status::Horizon).then_some(now)
     }
 
     fn looks_ended(&self) -> Option<Status> {
