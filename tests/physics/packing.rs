@@ -60,6 +60,7 @@ fn no_material_creates_energy() {
                         rolling_friction,
                         restitution,
                         tangential_restitution,
+                        torsional_friction: 0.1,
                     };
                     // A margin of a radius lists every neighbour in time: the law without late contacts.
                     let settings = SolverSettings { margin: 1.0, ..Preset::Default.settings() };
@@ -127,7 +128,13 @@ fn a_pile_is_higher_the_rougher_its_grains() {
         let heights = (0..2).map(|seed| {
             let scene = drop_of(400, 0.01, material(friction, 0.3, 0.2));
             let pour = Simulation::new(&scene, seed).expect("a valid scene").run();
-            assert!(matches!(pour.status, Status::AtRest | Status::OutOfView), "{:?}", pour.status);
+            assert!(
+                matches!(pour.status, Status::AtRest | Status::OutOfView),
+                "{friction} {:?} {:?} {:?}",
+                pour.status,
+                pour.health,
+                pour.velocities.iter().map(|v| v.norm()).fold(0.0, f64::max)
+            );
             pour.positions.iter().map(|p| p.z).sum::<f64>() / 400.0
         });
         heights.sum::<f64>() / 2.0

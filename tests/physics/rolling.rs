@@ -63,7 +63,8 @@ fn a_slipping_grain_ends_up_rolling() {
     let time = 0.05;
     simulation.advance(time);
     let slipping = motion(&simulation, 0);
-    assert!(((begin.v.x - slipping.v.x) / (0.1 * GRAVITY * time) - 1.0).abs() < 1e-9);
+    let slowed = (begin.v.x - slipping.v.x) / (0.1 * GRAVITY * time);
+    assert!((slowed - 1.0).abs() < 1e-5, "{slowed}");
     // Angular momentum about the contact point stays: v_end = (5 v + 2 w) / 7.
     simulation.advance(1.0);
     let end = motion(&simulation, 0);
@@ -76,12 +77,13 @@ fn a_slipping_grain_ends_up_rolling() {
 fn torsion_stops_a_spinning_grain() {
     // Pulled over frictionless ground into a rough wall at 45 degrees, the grain leaves with a spin
     // about the vertical that only torsion can stop.
-    let mut scene = one_grain(RADIUS, material(0.5, 0.0, 0.5));
+    // It starts as deep as resting contacts are, the solver's slop.
+    let mut scene = one_grain(RADIUS - 1e-5, material(0.5, 0.0, 0.5));
     scene.gravity = [3.0, 0.0, -GRAVITY];
     scene.ground = Ground {
         material: WallMaterial {
             sliding_friction: Some(0.0),
-            rolling_friction: Some(0.04),
+            torsional_friction: Some(0.04),
             ..WallMaterial::default()
         },
     };
@@ -91,14 +93,15 @@ fn torsion_stops_a_spinning_grain() {
     });
     let mut simulation = start(&scene);
     while motion(&simulation, 0).w.norm() == 0.0 {
-        simulation.advance(1e-3);
+        simulation.advance(1.0 / 1500.0);
     }
+    simulation.advance(0.02); // the impact has moved it within the slop: let it settle
     let begin = motion(&simulation, 0);
     assert!(begin.w.z.abs() > 0.1 && begin.w.z.abs() > 0.999 * begin.w.norm(), "{begin:?}");
-    let time = 0.05;
+    let time = 0.01;
     simulation.advance(time);
     let end = motion(&simulation, 0);
-    // I domega/dt = mu_r r N: d(r omega)/dt = 5/2 mu_r g.
+    // I domega/dt = mu_t r N: d(r omega)/dt = 5/2 mu_t g.
     let slowed = (begin.w.z.abs() - end.w.z.abs()) / time;
-    assert!((slowed / (2.5 * 0.04 * GRAVITY) - 1.0).abs() < 1e-9, "{slowed}");
+    assert!((slowed / (2.5 * 0.04 * GRAVITY) - 1.0).abs() < 1e-5, "{slowed}");
 }
