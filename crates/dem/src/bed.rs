@@ -117,6 +117,15 @@ impl Bed {
         Vector3::new(x, y, z) / self.radii[grain]
     }
 
+    /// Sets velocity `[m/s]` and angular velocity `[rad/s]` of a grain.
+    pub fn set_motion(&mut self, grain: usize, velocity: &Vector3<f64>, angular: &Vector3<f64>) {
+        let spin = self.radii[grain] * angular;
+        self.bodies[grain] = Body {
+            velocity: [velocity.x, velocity.y, velocity.z, 0.0],
+            spin: [spin.x, spin.y, spin.z, 0.0],
+        };
+    }
+
     /// Kinetic energy of a grain per typical mass, rotation included `[m^2/s^2]`.
     pub fn kinetic_energy(&self, grain: usize) -> f64 {
         let square = |a: &[f64; 4]| a[0] * a[0] + a[1] * a[1] + a[2] * a[2];

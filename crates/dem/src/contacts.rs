@@ -84,6 +84,11 @@ impl Contacts {
         }
     }
 
+    /// Calls for a new list before the next substep: something other than the solve has set a grain in motion.
+    pub fn forget_list(&mut self) {
+        self.age = usize::MAX;
+    }
+
     /// Gaps, normals, biases and the warm start of every listed contact.
     pub fn assemble(
         &mut self,
