@@ -46,13 +46,16 @@ impl Progress {
     }
 }
 
-/// The material of every law but the heaps'.
+/// Measures one law.
+type Measure = fn(&Progress) -> Vec<Check>;
+
+/// The material of every law; the heaps change one coefficient of it at a time.
 fn material() -> Material {
     Material::default()
 }
 
 fn main() -> ExitCode {
-    let laws: [(&str, fn(&Progress) -> Vec<Check>); 4] = [
+    let laws: [(&str, Measure); 4] = [
         ("silo", measure_silo),
         ("hopper", measure_hopper),
         ("collapse", measure_collapse),

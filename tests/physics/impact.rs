@@ -87,7 +87,6 @@ fn test_3_leaves_with_e_times_its_speed() {
 }
 
 #[test]
-#[ignore = "a grain turns up to a substep's way above the ground until impacts are resolved at their time"]
 fn test_3_turns_where_it_touches() {
     for substeps in SUBSTEPS {
         let dt = 1.0 / (60.0 * f64::from(substeps));

@@ -41,7 +41,6 @@ fn realised(e: f64, speed: f64, substeps: u32, phase: f64) -> Option<f64> {
 }
 
 #[test]
-#[ignore = "a grain turns up to a substep's way above the ground until impacts are resolved at their time"]
 fn a_grain_bounces_to_e_squared_of_its_height() {
     let (mut worst, mut measured) = (0.0_f64, 0);
     for substeps in [5, 10, 20, 40] {

@@ -122,7 +122,7 @@ fn grains_that_miss_the_funnel_fall_past_it() {
 fn nothing_moves_without_gravity() {
     let mut scene = drop_of(100, 0.05, Material::default());
     scene.gravity = [0.0; 3];
-    let from = start(&scene).positions().to_vec();
+    let from = start(&scene).positions();
     let pour = start(&scene).run();
     assert_eq!(pour.status, Status::AtRest);
     assert_eq!(pour.positions, from);

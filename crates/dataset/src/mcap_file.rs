@@ -116,7 +116,7 @@ impl<'a> Recorder<'a> {
     ) -> Result<(), DatasetError> {
         let time = simulation.time();
         let failed = |source| DatasetError::Mcap { path: self.path.to_owned(), source };
-        let view = look(&scene.camera, simulation.positions(), simulation.radii(), seed);
+        let view = look(&scene.camera, &simulation.positions(), &simulation.radii(), seed);
         let messages = |recorder: &mut Self| -> McapResult<()> {
             recorder.send("/grains", time, &grains(time, simulation))?;
             match view {
@@ -184,7 +184,7 @@ fn timestamp(time: f64) -> Option<Timestamp> {
 fn grains(time: f64, simulation: &Simulation) -> PointCloud {
     let mut data = Vec::with_capacity(simulation.radii().len() * STRIDE as usize);
     for (position, radius) in simulation.positions().iter().zip(simulation.radii()) {
-        for value in [position.x, position.y, position.z, *radius] {
+        for value in [position.x, position.y, position.z, radius] {
             data.extend((value as f32).to_le_bytes());
         }
     }

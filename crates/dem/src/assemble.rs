@@ -1,37 +1,23 @@
-//! Assembly of one substep's contact problem: gaps, normals, biases and the warm start.
+//! Assembly of one substep's contact problem: gaps, normals, biases, and which contacts are impacts.
 //!
-//! Reads positions and the velocities before gravity; writes the batches and, by applying the
-//! impulses of the last substep, the bodies.
+//! Reads places and velocities (gravity included), writes the batches.
 
-use nalgebra::Vector3;
-
-use crate::bed::{Bed, Body, INVERSE_INERTIA};
-use crate::contact::{Batch, ContactSet, LawLanes};
-use crate::lanes::{LANES, Lanes, Lanes3, Reg, Reg3, Width, widest};
+use crate::bed::Bed;
+use crate::contact::{Batch, ContactSet};
+use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, widest};
 use crate::law;
 use crate::wall::Wall;
 
 /// Distance below which two centres are one point and the normal is the vertical `[m]`.
 const COINCIDENT: f64 = 1e-12;
 
+const LANE_NUMBERS: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7];
+
 /// What the assembly saw.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Seen {
     /// Deepest overlap over the radius of the smaller grain `[-]`.
     pub penetration: f64,
-}
-
-/// Velocity and spin of one body for each lane, from the bodies' rows.
-#[inline(always)]
-pub(crate) fn gather<W: Width>(
-    index: &[u32; LANES],
-    row: impl Fn(u32) -> W::Value,
-) -> (Reg3<W>, Reg3<W>) {
-    let [a, b, c, d, e, f, g, h] = *index;
-    let rows = [row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h)];
-    let [vx, vy, vz, _, wx, wy, wz, _] = W::transpose(rows);
-    let vector = |x, y, z| Reg3 { x: Reg(x), y: Reg(y), z: Reg(z) };
-    (vector(vx, vy, vz), vector(wx, wy, wz))
 }
 
 impl Seen {
@@ -41,37 +27,173 @@ impl Seen {
     }
 }
 
+/// Two grains, or a grain and a wall, that may be an impact within the substep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Candidate {
+    pub i: u32,
+    /// Second grain, or the number of grains plus the wall's number.
+    pub partner: u32,
+}
+
 widest! {
-    /// Refreshes the contacts between grains for the positions in `bed` and the velocities `before` gravity.
-    pub(crate) fn refresh_pairs<W>(
+    /// Refreshes the contacts between grains at the beginning of a substep and lists the possible impacts.
+    pub(crate) fn assemble_pairs<W>(
         set: &mut ContactSet,
-        bed: &mut Bed,
-        before: &[Body],
+        bed: &Bed,
         dt: f64,
+        candidates: &mut Vec<Candidate>,
     ) -> Seen {
-        let mut overlap = Lanes::ZERO;
-        for number in 0..set.batches.len() {
-            let gap = pair_geometry::<W>(&mut set.batches[number], bed, &mut overlap);
-            finish::<W>(set, number, &gap, bed, before, dt);
+        let mut overlap = Reg::<W>::splat(0.0);
+        for batch in &mut set.batches {
+            let place = |body: u32| W::load_row(&bed.places[body as usize]);
+            let (i, j) = (each(&batch.i, place), each(&batch.j, place));
+            let (gap, distance) = pair_geometry::<W>(batch, i, j, &mut overlap);
+            let gap = empty_lanes_open(batch, gap);
+            let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
+            let v_i = vectors::<W>(each(&batch.i, velocity));
+            let v_j = vectors::<W>(each(&batch.j, velocity));
+            let dv = v_i - v_j;
+            let w_n = Reg3::load(&batch.normal).dot(dv);
+            finish(batch, law::bias_lanes(gap, dt) + passing(distance, dv, w_n, dt));
+            let closes = closing_bits(gap, w_n, dt);
+            for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
+                candidates.push(Candidate { i: batch.i[lane], partner: batch.j[lane] });
+            }
         }
-        Seen { penetration: overlap.0.into_iter().fold(0.0, f64::max) }
+        let mut lanes = Lanes::ZERO;
+        overlap.store(&mut lanes);
+        Seen { penetration: lanes.0.into_iter().fold(0.0, f64::max) }
     }
 }
 
-/// Sets the normals and returns the gaps of a batch of pairs.
-#[inline(always)]
-fn pair_geometry<W: Width>(batch: &mut Batch, bed: &Bed, overlap: &mut Lanes) -> Lanes {
-    let mut apart = Lanes3 { x: Lanes::ZERO, y: Lanes::ZERO, z: Lanes::splat(1.0) };
-    let mut touching = Lanes::ZERO;
-    let mut smaller = Lanes::splat(1.0);
-    for lane in batch.lanes() {
-        let (i, j) = (batch.i[lane] as usize, batch.j[lane] as usize);
-        let (a, b) = (&bed.positions[i], &bed.positions[j]);
-        apart.set(lane, [a.x - b.x, a.y - b.y, a.z - b.z]);
-        touching.0[lane] = bed.radii[i] + bed.radii[j];
-        smaller.0[lane] = bed.radii[i].min(bed.radii[j]);
+widest! {
+    /// Refreshes the contacts at walls, lists the possible impacts and notes in `lost` every grain whose
+    /// centre went through a wall.
+    pub(crate) fn assemble_walls<W>(
+        set: &mut ContactSet,
+        walls: &[Wall],
+        bed: &Bed,
+        dt: f64,
+        lost: &mut [bool],
+        candidates: &mut Vec<Candidate>,
+    ) -> Seen {
+        let mut seen = Seen::default();
+        for number in 0..set.batches.len() {
+            let gap = Reg::<W>::load(&wall_geometry(set, number, walls, bed, &mut seen));
+            let (batch, at) = (&mut set.batches[number], &mut set.at_walls[number]);
+            for lane in batch.lanes() {
+                lost[batch.i[lane] as usize] |= at.went_through[lane];
+            }
+            let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
+            let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
+            finish(batch, law::bias_lanes(gap, dt));
+            let closes = closing_bits(gap, w_n, dt);
+            for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
+                let partner = bed.count() as u32 + u32::from(at.wall[lane]);
+                candidates.push(Candidate { i: batch.i[lane], partner });
+            }
+        }
+        seen
     }
-    let apart = Reg3::<W>::load(&apart);
+}
+
+widest! {
+    /// Refreshes the batches of pairs in which a grain has had an impact, as they are when the later one of
+    /// their last impacts happened.
+    pub(crate) fn refresh_pairs<W>(set: &mut ContactSet, bed: &Bed, dt: f64) {
+        for batch in &mut set.batches {
+            let mut clocks = Lanes::ZERO;
+            for lane in batch.lanes() {
+                let (i, j) = (batch.i[lane] as usize, batch.j[lane] as usize);
+                clocks.0[lane] = bed.clocks[i].max(bed.clocks[j]);
+            }
+            if clocks == Lanes::ZERO {
+                continue;
+            }
+            let at = |grains: &[u32; LANES]| -> [Row; LANES] {
+                std::array::from_fn(|lane| bed.place_at(grains[lane] as usize, clocks.0[lane]))
+            };
+            let (i, j) = (at(&batch.i), at(&batch.j));
+            let place = |rows: &[Row; LANES]| each(&LANE_NUMBERS, |lane| W::load_row(&rows[lane as usize]));
+            let mut unseen = Reg::splat(0.0);
+            let (gap, distance) = pair_geometry::<W>(batch, place(&i), place(&j), &mut unseen);
+            let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
+            let dv = vectors::<W>(each(&batch.i, velocity)) - vectors(each(&batch.j, velocity));
+            let w_n = Reg3::load(&batch.normal).dot(dv);
+            let gap = empty_lanes_open(batch, gap);
+            let bias = law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt);
+            finish(batch, bias + passing(distance, dv, w_n, dt));
+        }
+    }
+}
+
+widest! {
+    /// The same for the contacts at walls.
+    pub(crate) fn refresh_walls<W>(set: &mut ContactSet, walls: &[Wall], bed: &Bed, dt: f64) {
+        for number in 0..set.batches.len() {
+            let mut clocks = Lanes::ZERO;
+            for lane in set.batches[number].lanes() {
+                clocks.0[lane] = bed.clocks[set.batches[number].i[lane] as usize];
+            }
+            if clocks == Lanes::ZERO {
+                continue;
+            }
+            let gap = Reg::<W>::load(&wall_geometry(set, number, walls, bed, &mut Seen::default()));
+            let batch = &mut set.batches[number];
+            let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
+            let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
+            finish(batch, law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt));
+        }
+    }
+}
+
+/// The vectors of eight rows, one for each lane.
+#[inline(always)]
+pub(crate) fn vectors<W: Width>(rows: [W::Quad; LANES]) -> Reg3<W> {
+    let [x, y, z, _] = W::columns(rows);
+    Reg3 { x: Reg(x), y: Reg(y), z: Reg(z) }
+}
+
+/// Which lanes would close within the substep faster than an impact must.
+#[inline(always)]
+fn closing_bits<W: Width>(gap: Reg<W>, w_n: Reg<W>, dt: f64) -> u32 {
+    let zero = Reg::<W>::splat(0.0);
+    let end = gap + Reg::splat(dt) * w_n;
+    W::less_bits(end.0, zero.0) & W::less_bits(w_n.0, Reg::<W>::splat(-law::IMPACT_SPEED).0)
+}
+
+/// An infinite gap, hence an infinite bias and no impulse, where there is no contact.
+#[inline(always)]
+fn empty_lanes_open<W: Width>(batch: &Batch, gap: Reg<W>) -> Reg<W> {
+    if batch.used as usize == LANES {
+        return gap;
+    }
+    let mut gaps = Lanes::ZERO;
+    gap.store(&mut gaps);
+    gaps.0[batch.used as usize..].fill(f64::INFINITY);
+    Reg::load(&gaps)
+}
+
+/// How much slower two centres approach, on the mean of the substep, than along their first normal, for they
+/// pass each other: `w_t^2 dt / (2 d)`.
+#[inline(always)]
+fn passing<W: Width>(distance: Reg<W>, dv: Reg3<W>, w_n: Reg<W>, dt: f64) -> Reg<W> {
+    let across = dv.dot(dv) - w_n * w_n;
+    (Reg::splat(0.5 * dt) * across).over(distance.max(Reg::splat(COINCIDENT)))
+}
+
+/// Sets the normals and returns the gaps and distances of a batch of pairs whose grains are at these places.
+#[inline(always)]
+fn pair_geometry<W: Width>(
+    batch: &mut Batch,
+    i: [W::Quad; LANES],
+    j: [W::Quad; LANES],
+    overlap: &mut Reg<W>,
+) -> (Reg<W>, Reg<W>) {
+    let ([ix, iy, iz, r_i], [jx, jy, jz, r_j]) = (W::columns(i), W::columns(j));
+    let apart = Reg3::<W> { x: Reg(ix), y: Reg(iy), z: Reg(iz) }
+        - Reg3 { x: Reg(jx), y: Reg(jy), z: Reg(jz) };
+    let (r_i, r_j) = (Reg::<W>(r_i), Reg(r_j));
     let (zero, one) = (Reg::splat(0.0), Reg::splat(1.0));
     let distance = apart.norm();
     // Two centres in one point have no normal: push them apart vertically.
@@ -79,117 +201,41 @@ fn pair_geometry<W: Width>(batch: &mut Batch, bed: &Bed, overlap: &mut Lanes) ->
     let mut normal = apart.scale(coincide(zero, one.over(distance)));
     normal.z = normal.z + coincide(one, zero);
     normal.store(&mut batch.normal);
-
-    let gap = distance - Reg::load(&touching);
-    let penetration = (zero - gap).over(Reg::load(&smaller));
-    penetration.max(Reg::load(overlap)).store(overlap);
-    let mut gaps = Lanes::ZERO;
-    gap.store(&mut gaps);
-    for lane in batch.used as usize..LANES {
-        gaps.0[lane] = f64::INFINITY;
-    }
-    gaps
+    let gap = distance - (r_i + r_j);
+    // Empty lanes have no radius, hence no overlap that is a number.
+    let penetration = (zero - gap).over(r_i.min(r_j));
+    *overlap = overlap.if_less(penetration, penetration, *overlap);
+    (gap, distance)
 }
 
-widest! {
-    /// Refreshes the contacts at walls and notes every grain whose centre went through a wall in `lost`.
-    pub(crate) fn refresh_walls<W>(
-        set: &mut ContactSet,
-        walls: &[Wall],
-        bed: &mut Bed,
-        before: &[Body],
-        dt: f64,
-        lost: &mut [bool],
-    ) -> Seen {
-        let mut seen = Seen::default();
-        for number in 0..set.batches.len() {
-            let gap = wall_geometry(set, number, walls, bed, &mut seen, lost);
-            finish::<W>(set, number, &gap, bed, before, dt);
-        }
-        seen
-    }
-}
-
-/// Sets the normals and returns the gaps of a batch at walls.
+/// Sets the normals and returns the gaps of a batch at walls; a grain that has had an impact is seen where it
+/// was then.
 fn wall_geometry(
     set: &mut ContactSet,
     number: usize,
     walls: &[Wall],
     bed: &Bed,
     seen: &mut Seen,
-    lost: &mut [bool],
 ) -> Lanes {
     let (batch, at) = (&mut set.batches[number], &mut set.at_walls[number]);
     let mut gap = Lanes::splat(f64::INFINITY);
     for lane in batch.lanes() {
         let i = batch.i[lane] as usize;
-        let near = walls[at.wall[lane] as usize].surface.nearest(&bed.positions[i]);
+        let near = walls[at.wall[lane] as usize].surface.nearest(&bed.position(i));
         batch.normal.set(lane, near.normal.into());
-        gap.0[lane] = near.distance - bed.radii[i];
-        if near.side * at.side[lane] < 0 {
-            lost[i] = true;
-        }
+        gap.0[lane] = near.distance - bed.radius(i);
+        at.went_through[lane] |= near.side * at.side[lane] < 0;
         at.side[lane] = near.side;
-        seen.penetration = seen.penetration.max(-gap.0[lane] / bed.radii[i]);
+        seen.penetration = seen.penetration.max(-gap.0[lane] / bed.radius(i));
     }
     gap
 }
 
-/// Bias and warm start of a batch whose gaps and normals are fresh. Empty lanes have an infinite gap,
-/// hence an infinite bias, and their impulses stay zero.
+/// Bias and tangent plane of a batch whose normals are fresh.
 #[inline(always)]
-fn finish<W: Width>(
-    set: &mut ContactSet,
-    number: usize,
-    gap: &Lanes,
-    bed: &mut Bed,
-    before: &[Body],
-    dt: f64,
-) {
-    let batch = &mut set.batches[number];
-    let law = &set.laws[batch.law as usize];
-    let gap = Reg::<W>::load(gap);
-    let n = Reg3::load(&batch.normal);
-    let row = |body: u32| W::load(before[body as usize].row());
-    let (v_i, w_i) = gather::<W>(&batch.i, row);
-    let (v_j, w_j) = gather::<W>(&batch.j, row);
-    let dv = v_i - v_j;
-    let approach = n.dot(dv);
-    law::bias_lanes(gap, approach, Reg::load(&law.restitution), dt).store(&mut batch.bias);
-    if let Some(bias_t) = set.bias_t.get_mut(number) {
-        let u_t = dv + n.cross(w_i + w_j) - n.scale(approach);
-        let e_t = Reg::load(&law.tangential_restitution);
-        let e_t = law::if_impact(gap, approach, dt, e_t, Reg::splat(0.0));
-        u_t.scale(e_t).store(bias_t);
-    }
+fn finish<W: Width>(batch: &mut Batch, bias: Reg<W>) {
+    bias.store(&mut batch.bias);
+    let n = Reg3::<W>::load(&batch.normal);
     let lambda_t = Reg3::load(&batch.lambda_t);
     (lambda_t - n.scale(n.dot(lambda_t))).store(&mut batch.lambda_t);
-    warm_start(batch, law, &mut bed.bodies);
-}
-
-/// Applies the impulses that a batch already carries.
-#[inline(always)]
-fn warm_start(batch: &Batch, law: &LawLanes, bodies: &mut [Body]) {
-    for lane in batch.lanes() {
-        if batch.lambda_n.0[lane] == 0.0 {
-            continue; // both friction impulses vanish with the normal one
-        }
-        let normal = Vector3::from(batch.normal.get(lane));
-        let lambda_t = Vector3::from(batch.lambda_t.get(lane));
-        let lambda_r = Vector3::from(batch.lambda_r.get(lane));
-        let force = batch.lambda_n.0[lane] * normal + lambda_t;
-        let twist = normal.cross(&lambda_t);
-        let sides = [
-            (batch.i[lane], law.inverse_mass_i.0[lane], law.lever_i.0[lane], 1.0),
-            (batch.j[lane], law.inverse_mass_j.0[lane], law.lever_j.0[lane], -1.0),
-        ];
-        for (body, inverse_mass, lever, sign) in sides {
-            let body = &mut bodies[body as usize];
-            for axis in 0..3 {
-                body.velocity[axis] += sign * inverse_mass * force[axis];
-                body.spin[axis] +=
-                    INVERSE_INERTIA * inverse_mass * (sign * lever * lambda_r[axis] - twist[axis]);
-            }
-        }
-    }
 }

@@ -4,36 +4,18 @@ use std::marker::PhantomData;
 
 use nalgebra::Vector3;
 
-use crate::lanes::{Lanes, Width};
+use crate::lanes::{Row, Width};
 use crate::scene::Scene;
 
-/// Linear and scaled angular velocity of one body, padded to a cache line.
+/// Linear and scaled angular velocity of one body, a cache line.
 ///
 /// `spin` is `r * omega` `[m/s]`: with it the contact equations of unequal spheres have the
-/// same coefficients as those of equal ones.
+/// same coefficients as those of equal ones. The fourth numbers are zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C, align(64))]
 pub(crate) struct Body {
-    pub velocity: [f64; 4],
-    pub spin: [f64; 4],
-}
-
-impl Body {
-    /// Velocity and spin as one row of a batch.
-    #[inline(always)]
-    #[allow(unsafe_code)] // the same 64 bytes under another name
-    pub fn row(&self) -> &Lanes {
-        // SAFETY: both types are eight f64 in a row, aligned to 64 bytes.
-        unsafe { &*std::ptr::from_ref(self).cast() }
-    }
-
-    /// The same row to write to.
-    #[inline(always)]
-    #[allow(unsafe_code)]
-    pub fn row_mut(&mut self) -> &mut Lanes {
-        // SAFETY: as in `row`.
-        unsafe { &mut *std::ptr::from_mut(self).cast() }
-    }
+    pub velocity: Row,
+    pub spin: Row,
 }
 
 /// Bodies that several threads change at once, each the grains of its own contacts.
@@ -58,33 +40,48 @@ impl<'a> SharedBodies<'a> {
         Self { first: bodies.as_mut_ptr(), count, lifetime: PhantomData }
     }
 
-    /// Velocity and spin of a body as one row.
-    #[inline(always)]
-    #[allow(unsafe_code)]
-    pub fn load<W: Width>(&self, body: u32) -> W::Value {
-        assert!(body <= self.count);
-        // SAFETY: in bounds; nobody writes this body now.
-        unsafe { W::load((*self.first.add(body as usize)).row()) }
+    /// Grains; the index of the resting body.
+    pub fn count(&self) -> usize {
+        self.count as usize
     }
 
-    /// Puts velocity and spin of a grain back; the resting body stays as it is.
+    /// Velocity and spin of a body.
+    ///
+    /// # Safety
+    /// `body` is at most [`Self::count`], and nobody writes it now.
     #[inline(always)]
     #[allow(unsafe_code)]
-    pub fn store<W: Width>(&self, body: u32, row: W::Value) {
-        if body < self.count {
-            // SAFETY: in bounds; nobody else reads or writes this body now.
-            unsafe { W::store(row, (*self.first.add(body as usize)).row_mut()) }
-        }
+    pub unsafe fn load<W: Width>(&self, body: u32) -> (W::Quad, W::Quad) {
+        debug_assert!(body <= self.count);
+        // SAFETY: in bounds and not written, as the caller promises.
+        let body = unsafe { &*self.first.add(body as usize) };
+        (W::load_row(&body.velocity), W::load_row(&body.spin))
+    }
+
+    /// Puts velocity and spin of a grain back.
+    ///
+    /// # Safety
+    /// `grain` is less than [`Self::count`], and nobody else reads or writes it now.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub unsafe fn store<W: Width>(&self, grain: u32, velocity: W::Quad, spin: W::Quad) {
+        debug_assert!(grain < self.count);
+        // SAFETY: in bounds and nobody else's, as the caller promises.
+        let body = unsafe { &mut *self.first.add(grain as usize) };
+        W::store_row(velocity, &mut body.velocity);
+        W::store_row(spin, &mut body.spin);
     }
 }
 
-/// Grains as arrays. `bodies` has one entry more than there are grains: the resting body that
+/// Grains as arrays. `places` and `bodies` have one entry more than there are grains: the resting body that
 /// walls and empty lanes refer to.
 #[derive(Clone, Debug)]
 pub(crate) struct Bed {
-    pub positions: Vec<Vector3<f64>>,
+    /// Centre and radius of each grain `[m]`.
+    pub places: Vec<Row>,
     pub bodies: Vec<Body>,
-    pub radii: Vec<f64>,
+    /// How far into the substep each grain's place is `[s]`: the time of its last impact, else 0.
+    pub clocks: Vec<f64>,
     /// Mass of a typical grain over the grain's mass `[-]`; impulses are in units of that mass.
     pub inverse_mass: Vec<f64>,
 }
@@ -95,69 +92,110 @@ pub(crate) const INVERSE_INERTIA: f64 = 2.5;
 impl Bed {
     pub fn new(scene: &Scene, seed: u64) -> Self {
         let count = scene.grains.count;
+        let radius = scene.grains.radius();
+        let mut places: Vec<Row> =
+            scene.start.positions(scene, seed).iter().map(|at| Row::new(at, radius)).collect();
+        places.push(Row::default());
         Self {
-            positions: scene.start.positions(scene, seed),
+            places,
             bodies: vec![Body::default(); count + 1],
-            radii: vec![scene.grains.radius(); count],
+            clocks: vec![0.0; count],
             inverse_mass: vec![1.0; count],
         }
     }
 
     pub fn count(&self) -> usize {
-        self.positions.len()
+        self.inverse_mass.len()
     }
 
+    /// Centre of a grain `[m]`.
+    #[inline]
+    pub fn position(&self, grain: usize) -> Vector3<f64> {
+        self.places[grain].vector()
+    }
+
+    /// Radius of a grain `[m]`.
+    #[inline]
+    pub fn radius(&self, grain: usize) -> f64 {
+        self.places[grain].0[3]
+    }
+
+    #[inline]
     pub fn velocity(&self, grain: usize) -> Vector3<f64> {
-        let [x, y, z, _] = self.bodies[grain].velocity;
-        Vector3::new(x, y, z)
+        self.bodies[grain].velocity.vector()
     }
 
     pub fn angular_velocity(&self, grain: usize) -> Vector3<f64> {
-        let [x, y, z, _] = self.bodies[grain].spin;
-        Vector3::new(x, y, z) / self.radii[grain]
+        self.bodies[grain].spin.vector() / self.radius(grain)
     }
 
     /// Sets velocity `[m/s]` and angular velocity `[rad/s]` of a grain.
     pub fn set_motion(&mut self, grain: usize, velocity: &Vector3<f64>, angular: &Vector3<f64>) {
-        let spin = self.radii[grain] * angular;
-        self.bodies[grain] = Body {
-            velocity: [velocity.x, velocity.y, velocity.z, 0.0],
-            spin: [spin.x, spin.y, spin.z, 0.0],
-        };
+        let spin = self.radius(grain) * angular;
+        self.bodies[grain] = Body { velocity: Row::new(velocity, 0.0), spin: Row::new(&spin, 0.0) };
     }
 
     /// Kinetic energy of a grain per typical mass, rotation included `[m^2/s^2]`.
+    #[inline]
     pub fn kinetic_energy(&self, grain: usize) -> f64 {
-        let square = |a: &[f64; 4]| a[0] * a[0] + a[1] * a[1] + a[2] * a[2];
         let Body { velocity, spin } = &self.bodies[grain];
+        let square = |row: &Row| row.vector().norm_squared();
         0.5 * (square(velocity) + square(spin) / INVERSE_INERTIA) / self.inverse_mass[grain]
+    }
+
+    /// Kinetic energy of a grain's centre per typical mass `[m^2/s^2]`.
+    #[inline]
+    pub fn translation(&self, grain: usize) -> f64 {
+        0.5 * self.velocity(grain).norm_squared() / self.inverse_mass[grain]
     }
 
     /// Kinetic and potential energy of all grains per typical mass `[m^2/s^2]`.
     pub fn energy(&self, gravity: &Vector3<f64>) -> f64 {
         (0..self.count())
-            .map(|i| {
-                self.kinetic_energy(i) - gravity.dot(&self.positions[i]) / self.inverse_mass[i]
-            })
+            .map(|i| self.kinetic_energy(i) - gravity.dot(&self.position(i)) / self.inverse_mass[i])
             .sum()
     }
 
     /// v += g dt.
     pub fn accelerate(&mut self, gravity: &Vector3<f64>, dt: f64) {
-        let count = self.count();
+        let (count, step) = (self.count(), gravity * dt);
         for body in &mut self.bodies[..count] {
-            for axis in 0..3 {
-                body.velocity[axis] += gravity[axis] * dt;
+            body.velocity.add(&step);
+        }
+    }
+
+    /// Where a grain is at `time` `[s]` into the substep, and its radius.
+    #[inline(always)]
+    pub fn place_at(&self, grain: usize, time: f64) -> Row {
+        let mut place = self.places[grain];
+        if grain < self.count() {
+            place.add(&((time - self.clocks[grain]) * self.velocity(grain)));
+        }
+        place
+    }
+
+    /// Takes one grain to `time` `[s]` into the substep.
+    pub fn advance(&mut self, grain: usize, time: f64) {
+        self.places[grain] = self.place_at(grain, time);
+        self.clocks[grain] = time;
+    }
+
+    /// Takes every grain back to the begin of the substep, to where its present motion would have begun.
+    pub fn rewind(&mut self) {
+        for ((place, body), clock) in self.places.iter_mut().zip(&self.bodies).zip(&mut self.clocks)
+        {
+            if *clock != 0.0 {
+                place.add(&(-*clock * body.velocity.vector()));
+                *clock = 0.0;
             }
         }
     }
 
     /// x += v dt. Spheres need no orientation.
     pub fn move_on(&mut self, dt: f64) {
-        for (position, body) in self.positions.iter_mut().zip(&self.bodies) {
-            for axis in 0..3 {
-                position[axis] += body.velocity[axis] * dt;
-            }
+        let count = self.count();
+        for (place, body) in self.places[..count].iter_mut().zip(&self.bodies) {
+            place.add(&(dt * body.velocity.vector()));
         }
     }
 }
@@ -165,19 +203,20 @@ impl Bed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::Portable;
 
     /// Three grains of different size and mass, in motion.
     fn bed() -> Bed {
         let mut scene = Scene::drop(0.1);
         scene.grains.count = 3;
         let mut bed = Bed::new(&scene, 1);
-        bed.radii = vec![1e-3, 2e-3, 4e-3];
+        for (place, radius) in bed.places.iter_mut().zip([1e-3, 2e-3, 4e-3]) {
+            place.0[3] = radius;
+        }
         bed.inverse_mass = vec![8.0, 1.0, 0.125];
         for (i, body) in bed.bodies[..3].iter_mut().enumerate() {
             let i = i as f64;
-            body.velocity = [1.0 + i, -2.0, 0.5 * i, 0.0];
-            body.spin = [0.1, 0.2 * i, -0.3, 0.0];
+            body.velocity = Row([1.0 + i, -2.0, 0.5 * i, 0.0]);
+            body.spin = Row([0.1, 0.2 * i, -0.3, 0.0]);
         }
         bed
     }
@@ -194,7 +233,7 @@ mod tests {
         let bed = bed();
         for grain in 0..3 {
             let mass = 1.0 / bed.inverse_mass[grain];
-            let inertia = 0.4 * mass * bed.radii[grain].powi(2);
+            let inertia = 0.4 * mass * bed.radius(grain).powi(2);
             let expected = 0.5 * mass * bed.velocity(grain).norm_squared()
                 + 0.5 * inertia * bed.angular_velocity(grain).norm_squared();
             assert!((bed.kinetic_energy(grain) / expected - 1.0).abs() < 1e-14);
@@ -213,16 +252,5 @@ mod tests {
         let expected = -0.5 * mass * (9.81 * dt).powi(2);
         assert!((bed.energy(&gravity) - before - expected).abs() < 1e-12);
         assert_eq!(bed.bodies[3], Body::default()); // the resting body feels no gravity
-    }
-
-    #[test]
-    fn the_resting_body_is_read_but_never_written() {
-        let mut bodies = bed().bodies;
-        let shared = SharedBodies::new(&mut bodies);
-        shared.store::<Portable>(3, [7.0; 8]);
-        assert_eq!(shared.load::<Portable>(3), [0.0; 8]);
-        shared.store::<Portable>(1, [7.0; 8]);
-        assert_eq!(shared.load::<Portable>(1), [7.0; 8]);
-        assert_eq!(bodies[1], Body { velocity: [7.0; 4], spin: [7.0; 4] });
     }
 }

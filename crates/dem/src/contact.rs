@@ -9,6 +9,8 @@ use crate::lanes::{LANES, Lanes, Lanes3};
 
 /// Colours that a grain's mask can tell apart; contacts beyond them get a batch of their own.
 const COLOURS: usize = 63;
+/// Appended batches that are looked through for a free lane.
+const APPEND_LOOK_BACK: usize = 8;
 
 /// [`LANES`] contacts: geometry, law and impulses. Empty lanes refer to the resting body and have no compliance.
 #[derive(Clone, Debug)]
@@ -47,8 +49,7 @@ pub(crate) struct LawLanes {
     pub compliance_r: Lanes,
     pub sliding_friction: Lanes,
     pub rolling_friction: Lanes,
-    pub restitution: Lanes,
-    pub tangential_restitution: Lanes,
+    pub torsional_friction: Lanes,
 }
 
 /// What only grains at walls need.
@@ -58,6 +59,8 @@ pub(crate) struct WallLanes {
     pub wall: [u16; LANES],
     /// Side of the wall's shell at the last look (see `wall::Nearest::side`).
     pub side: [i8; LANES],
+    /// Whether the grain's centre has changed sides.
+    pub went_through: [bool; LANES],
 }
 
 /// A contact before it is put into a batch.
@@ -85,16 +88,7 @@ pub(crate) struct ContactLaw {
     pub lever: [f64; 2],
     pub sliding_friction: f64,
     pub rolling_friction: f64,
-    pub restitution: f64,
-    pub tangential_restitution: f64,
-}
-
-/// The impulses of a batch.
-#[derive(Clone, Debug)]
-struct Held {
-    n: Lanes,
-    t: Lanes3,
-    r: Lanes3,
+    pub torsional_friction: f64,
 }
 
 /// The batches of one colour.
@@ -114,11 +108,10 @@ pub(crate) struct ContactSet {
     pub colours: Vec<Colour>,
     /// One for each batch at walls, none for pairs.
     pub at_walls: Vec<WallLanes>,
-    /// Tangential bias of each batch, `e_t` times the tangential velocity before an impact `[m/s]`;
-    /// empty when no material bounces tangentially.
-    pub bias_t: Vec<Lanes3>,
-    /// Impulses of the solves before the present one in this substep, for each batch; empty if there are none.
-    held: Vec<Held>,
+    /// Grains; every index in a batch is at most this, the resting body's.
+    grains: usize,
+    /// Batches that were coloured; those after them hold contacts that were appended.
+    coloured: usize,
     /// The contact law behind each entry of `laws`, if all its lanes share one.
     uniform: Vec<Option<ContactLaw>>,
     carried: Vec<Carried>,
@@ -160,8 +153,7 @@ impl LawLanes {
             compliance_r: Lanes::ZERO,
             sliding_friction: Lanes::ZERO,
             rolling_friction: Lanes::ZERO,
-            restitution: Lanes::ZERO,
-            tangential_restitution: Lanes::ZERO,
+            torsional_friction: Lanes::ZERO,
         };
         (0..LANES).for_each(|lane| lanes.set(lane, law));
         lanes
@@ -179,8 +171,7 @@ impl LawLanes {
         self.compliance_r.0[lane] = 1.0 / (crate::bed::INVERSE_INERTIA * roll);
         self.sliding_friction.0[lane] = law.sliding_friction;
         self.rolling_friction.0[lane] = law.rolling_friction;
-        self.restitution.0[lane] = law.restitution;
-        self.tangential_restitution.0[lane] = law.tangential_restitution;
+        self.torsional_friction.0[lane] = law.torsional_friction;
     }
 }
 
@@ -190,30 +181,9 @@ impl ContactSet {
         self.batches.iter().map(|batch| batch.used as usize).sum()
     }
 
-    /// Forgets every contact and its impulses.
-    pub fn clear(&mut self) {
-        self.batches.clear();
-        self.colours.clear();
-    }
-
-    /// Lays the impulses aside, so that the next solve begins from nothing.
-    pub fn hold(&mut self) {
-        self.release();
-        self.held.extend(self.batches.iter_mut().map(|batch| Held {
-            n: std::mem::replace(&mut batch.lambda_n, Lanes::ZERO),
-            t: std::mem::replace(&mut batch.lambda_t, Lanes3::ZERO),
-            r: std::mem::replace(&mut batch.lambda_r, Lanes3::ZERO),
-        }));
-    }
-
-    /// Adds the impulses that were laid aside to the present ones.
-    pub fn release(&mut self) {
-        for (batch, held) in self.batches.iter_mut().zip(&self.held) {
-            batch.lambda_n.add(&held.n);
-            batch.lambda_t.add(&held.t);
-            batch.lambda_r.add(&held.r);
-        }
-        self.held.clear();
+    /// Grains that the contacts are between.
+    pub fn grains(&self) -> usize {
+        self.grains
     }
 
     /// Replaces the list: colours the contacts, fills the batches and hands the impulses on.
@@ -224,12 +194,11 @@ impl ContactSet {
         listed: &[Listed],
         grains: usize,
         at_walls: bool,
-        tangential: bool,
         law: impl Fn(&Listed) -> ContactLaw,
     ) {
         self.collect_carried(grains);
         self.colour(listed, grains, at_walls);
-        let mut next = self.lay_out(grains as u32, at_walls, tangential);
+        let mut next = self.lay_out(grains as u32, at_walls);
         for (index, contact) in listed.iter().enumerate() {
             let colour = self.colour_of[index] as usize;
             let slot = next[colour];
@@ -254,6 +223,46 @@ impl ContactSet {
                     self.at_walls[number].side[lane] = old.side;
                 }
             }
+        }
+    }
+
+    /// Adds one contact, without impulses, between two lists: into one of the last batches if it shares no
+    /// grain with that, else into a new one. Appended contacts are solved after all others.
+    pub fn append(&mut self, contact: Listed, at_wall: bool, law: ContactLaw) {
+        let (i, j) = (contact.i, if at_wall { self.grains as u32 } else { contact.partner });
+        let fits = |batch: &Batch| {
+            let mut lanes = batch.lanes();
+            let shared = |lane: usize| {
+                let grains = [batch.i[lane], batch.j[lane]];
+                grains.contains(&i) || (!at_wall && grains.contains(&j))
+            };
+            (batch.used as usize) < LANES && !lanes.any(shared)
+        };
+        let first = self.coloured.max(self.batches.len().saturating_sub(APPEND_LOOK_BACK));
+        let number = (first..self.batches.len()).find(|&n| fits(&self.batches[n]));
+        let number = number.unwrap_or_else(|| {
+            self.batches.push(Batch::empty(self.grains as u32));
+            if at_wall {
+                self.at_walls.push(WallLanes::default());
+            }
+            match self.colours.last_mut() {
+                Some(last) if last.batches.start == self.coloured => last.batches.end += 1,
+                _ => {
+                    let batches = self.coloured..self.coloured + 1;
+                    self.colours.push(Colour { batches, is_disjoint: false });
+                }
+            }
+            self.batches.len() - 1
+        });
+        let lane = self.batches[number].used as usize;
+        self.set_law(number, lane, law);
+        let batch = &mut self.batches[number];
+        batch.used += 1;
+        batch.i[lane] = i;
+        if at_wall {
+            self.at_walls[number].wall[lane] = contact.partner as u16;
+        } else {
+            batch.j[lane] = j;
         }
     }
 
@@ -344,7 +353,7 @@ impl ContactSet {
     }
 
     /// Sizes the batches and returns the first slot of each colour.
-    fn lay_out(&mut self, resting: u32, at_walls: bool, tangential: bool) -> [usize; COLOURS + 1] {
+    fn lay_out(&mut self, resting: u32, at_walls: bool) -> [usize; COLOURS + 1] {
         let mut counts = [0; COLOURS + 1];
         for &colour in &self.colour_of {
             counts[colour as usize] += 1;
@@ -364,8 +373,8 @@ impl ContactSet {
         self.batches.resize(batches, Batch::empty(resting));
         self.at_walls.clear();
         self.at_walls.resize(if at_walls { batches } else { 0 }, WallLanes::default());
-        self.bias_t.clear();
-        self.bias_t.resize(if tangential { batches } else { 0 }, Lanes3::ZERO);
+        self.grains = resting as usize;
+        self.coloured = batches;
         self.laws.clear();
         self.uniform.clear();
         next
@@ -382,8 +391,7 @@ mod tests {
             lever: [0.5, 0.5],
             sliding_friction: number,
             rolling_friction: 0.1,
-            restitution: 0.5,
-            tangential_restitution: 0.0,
+            torsional_friction: 0.05,
         }
     }
 
@@ -399,7 +407,7 @@ mod tests {
         // 80 grains that all touch need more colours than a mask holds.
         let listed = all_pairs(80);
         let mut set = ContactSet::default();
-        set.rebuild(&listed, 80, false, false, |_| law(0.5));
+        set.rebuild(&listed, 80, false, |_| law(0.5));
         assert_eq!(set.len(), listed.len());
         let mut found = Vec::new();
         for batch in &set.batches {
@@ -418,7 +426,7 @@ mod tests {
     fn impulses_and_laws_follow_their_contact() {
         let mut set = ContactSet::default();
         let friction = |contact: &Listed| f64::from(contact.i) + 0.01 * f64::from(contact.partner);
-        set.rebuild(&all_pairs(9), 9, false, true, |contact| law(friction(contact)));
+        set.rebuild(&all_pairs(9), 9, false, |contact| law(friction(contact)));
         for batch in &mut set.batches {
             for lane in batch.lanes() {
                 batch.lambda_n.0[lane] = f64::from(batch.i[lane] * 100 + batch.j[lane]);
@@ -427,9 +435,8 @@ mod tests {
         // The next list has fewer contacts in another order.
         let mut fewer: Vec<Listed> = all_pairs(9).into_iter().filter(|c| c.partner != 4).collect();
         fewer.reverse();
-        set.rebuild(&fewer, 9, false, true, |contact| law(friction(contact)));
+        set.rebuild(&fewer, 9, false, |contact| law(friction(contact)));
         assert_eq!(set.len(), fewer.len());
-        assert_eq!(set.bias_t.len(), set.batches.len());
         for batch in &set.batches {
             for lane in batch.lanes() {
                 let (i, partner) = (batch.i[lane], batch.j[lane]);

@@ -1,48 +1,45 @@
-//! All contacts of a simulation: which are listed, when the list is stale, and those that a solve creates.
+//! All contacts of a simulation: which are listed, and when the list is stale.
 //!
 //! A list made at time t covers every pair that comes nearer than a margin on straight paths. It stays
-//! complete until a grain has left its path by half the margin. A grain that the solve itself throws off
-//! its path may meet a neighbour that is not listed: such *late* contacts are found after the sweeps and
-//! solved with a few more, or an impact of 2 m/s would end a third of a radius inside the neighbour.
-
-use nalgebra::Vector3;
+//! complete as long as every grain is within half the margin of its path. A grain that leaves it gets a new path
+//! and the contacts that lie on it; when many do, the list is made afresh.
 
 use crate::Material;
 use crate::assemble::{self, Seen};
-use crate::bed::{Bed, Body};
+use crate::bed::Bed;
 use crate::contact::{ContactLaw, ContactSet, Listed};
-use crate::neighbor::PairSearch;
+use crate::impact::Impacts;
+use crate::neighbor::{PairSearch, Path};
 use crate::preset::SolverSettings;
 use crate::scene::Scene;
 use crate::wall::{Wall, walls_of};
+use nalgebra::Vector3;
 
-/// Overlap at the end of a substep from which a contact counts as missed, over the margin. It lies above
-/// what an unfinished solve leaves of listed contacts.
-const MISSED: f64 = 0.05;
+/// Share of the grains from which on a new list is cheaper than single new paths.
+const MANY: usize = 16;
+/// Gap below which a contact is listed among those that will act, in radii of a typical grain `[-]`.
+const NEAR: f64 = 0.02;
 
 /// What the contacts are made of: walls, material and settings of one simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Surroundings {
     pub walls: Vec<Wall>,
     pub material: Material,
+    pub gravity: Vector3<f64>,
     pub settings: SolverSettings,
     /// Radius of a typical grain `[m]`, the length that the settings are relative to.
     pub radius: f64,
     /// Gap below which a pair is listed in any case `[m]`.
     pub margin: f64,
-    /// Whether any material bounces tangentially.
-    pub tangential: bool,
 }
 
 impl Surroundings {
     pub fn new(scene: &Scene) -> Self {
-        let walls = walls_of(scene);
-        let bounces = |material: &Material| material.tangential_restitution > 0.0;
         let settings = scene.preset.settings();
         Self {
-            tangential: bounces(&scene.material) || walls.iter().any(|w| bounces(&w.material)),
-            walls,
+            walls: walls_of(scene),
             material: scene.material,
+            gravity: scene.gravity.into(),
             settings,
             radius: scene.grains.radius(),
             margin: settings.margin * scene.grains.radius(),
@@ -54,215 +51,18 @@ impl Surroundings {
         self.margin = settings.margin * self.radius;
         self.settings = settings;
     }
-}
 
-/// Pairs and grains at walls, with their search.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Contacts {
-    pub pairs: ContactSet,
-    pub at_walls: ContactSet,
-    pub late_pairs: ContactSet,
-    pub late_at_walls: ContactSet,
-    search: PairSearch,
-    found: Vec<(u32, u32)>,
-    listed: Vec<Listed>,
-    /// Position and velocity of each grain when the list was made.
-    paths: Vec<(Vector3<f64>, Vector3<f64>)>,
-    /// Substeps since then.
-    age: usize,
-    strayed: Vec<usize>,
-    /// What the solves of this substep have created.
-    late: Vec<Late>,
-}
-
-impl Contacts {
-    /// Makes a new list if the present one may miss a pair in the coming substep.
-    pub fn refresh_list(&mut self, bed: &Bed, around: &Surroundings) {
-        let is_due = self.paths.is_empty() || self.age >= around.settings.list_period;
-        if is_due || self.has_strayed(bed, around) {
-            self.list(bed, around);
-        }
-    }
-
-    /// Calls for a new list before the next substep: something other than the solve has set a grain in motion.
-    pub fn forget_list(&mut self) {
-        self.age = usize::MAX;
-    }
-
-    /// Gaps, normals, biases and the warm start of every listed contact.
-    pub fn assemble(
-        &mut self,
-        bed: &mut Bed,
-        before: &[Body],
-        around: &Surroundings,
-        lost: &mut [bool],
-    ) -> Seen {
-        let dt = around.settings.dt;
-        let pairs = assemble::refresh_pairs(&mut self.pairs, bed, before, dt);
-        let set = &mut self.at_walls;
-        let walls = assemble::refresh_walls(set, &around.walls, bed, before, dt, lost);
-        self.age += 1;
-        pairs.max(walls)
-    }
-
-    /// Finds and assembles the contacts that the solve has created, in addition to those of earlier
-    /// calls in this substep; false if there are no new ones.
-    pub fn add_late(
-        &mut self,
-        bed: &mut Bed,
-        before: &mut Vec<Body>,
-        around: &Surroundings,
-        lost: &mut [bool],
-    ) -> bool {
-        let known = self.late.len();
-        self.find_late(bed, around);
-        if self.late.len() == known {
-            return false;
-        }
-        let at_wall = self.late.partition_point(|late| !late.at_wall);
-        let (pairs, walls) = self.late.split_at(at_wall);
-        // Impulses found before are in the velocities already: late contacts begin without any.
-        self.late_pairs.clear();
-        self.late_at_walls.clear();
-        self.listed.clear();
-        self.listed.extend(pairs.iter().map(|late| late.contact));
-        rebuild_pairs(&mut self.late_pairs, &self.listed, bed, around);
-        self.listed.clear();
-        self.listed.extend(walls.iter().map(|late| late.contact));
-        rebuild_walls(&mut self.late_at_walls, &self.listed, bed, around);
-        // A second impact in the same instant: it begins with the velocities that the first has left, for
-        // all contacts. Kept to the first one's bias, a contact that has bounced would bounce again whenever
-        // a late one slows it, and create energy.
-        self.pairs.hold();
-        self.at_walls.hold();
-        before.clone_from(&bed.bodies);
-        let dt = around.settings.dt;
-        for set in [&mut self.pairs, &mut self.late_pairs] {
-            assemble::refresh_pairs(set, bed, before, dt);
-        }
-        for set in [&mut self.at_walls, &mut self.late_at_walls] {
-            assemble::refresh_walls(set, &around.walls, bed, before, dt, lost);
-        }
-        true
-    }
-
-    /// Ends the substep: the impulses of its solves become one.
-    pub fn conclude(&mut self) {
-        self.pairs.release();
-        self.at_walls.release();
-        self.late.clear();
-        self.late_pairs.clear();
-        self.late_at_walls.clear();
-    }
-
-    /// Number of listed contacts.
-    pub fn count(&self) -> usize {
-        self.pairs.len() + self.at_walls.len()
-    }
-
-    fn list(&mut self, bed: &Bed, around: &Surroundings) {
-        self.age = 0;
-        self.paths.clear();
-        self.paths.extend((0..bed.count()).map(|i| (bed.positions[i], bed.velocity(i))));
-        let interval = around.settings.dt * around.settings.list_period as f64;
-
-        self.search.pairs(bed, interval, around.margin, &mut self.found);
-        self.listed.clear();
-        self.listed.extend(self.found.iter().map(|&(i, partner)| Listed { i, partner }));
-        rebuild_pairs(&mut self.pairs, &self.listed, bed, around);
-
-        self.listed.clear();
-        for (grain, (position, velocity)) in self.paths.iter().enumerate() {
-            let range = bed.radii[grain] + around.margin + interval * velocity.norm();
-            for (number, wall) in around.walls.iter().enumerate() {
-                if wall.surface.may_reach(position, range) {
-                    self.listed.push(Listed { i: grain as u32, partner: number as u32 });
-                }
-            }
-        }
-        rebuild_walls(&mut self.at_walls, &self.listed, bed, around);
-    }
-
-    /// Whether any grain has left its listed path by half the margin.
-    fn has_strayed(&self, bed: &Bed, around: &Surroundings) -> bool {
-        let time = self.age as f64 * around.settings.dt;
-        let slack = 0.5 * around.margin;
-        self.paths.iter().zip(&bed.positions).any(|((from, velocity), at)| {
-            (at - from - time * velocity).norm_squared() > slack * slack
-        })
-    }
-
-    /// The grains that will have left their listed path by half the margin at the end of this substep.
-    fn collect_strayed(&mut self, bed: &Bed, around: &Surroundings) {
-        let dt = around.settings.dt;
-        let time = self.age as f64 * dt;
-        let slack = 0.5 * around.margin;
-        self.strayed.clear();
-        for (grain, (from, velocity)) in self.paths.iter().enumerate() {
-            let at_end = bed.positions[grain] + dt * bed.velocity(grain);
-            if (at_end - from - time * velocity).norm_squared() > slack * slack {
-                self.strayed.push(grain);
-            }
-        }
-    }
-
-    /// Adds what the strayed grains will overlap at the end of this substep to `late`.
-    fn find_late(&mut self, bed: &Bed, around: &Surroundings) {
-        self.collect_strayed(bed, around);
-        let dt = around.settings.dt;
-        let missed = MISSED * around.margin;
-        let at_end = |grain: usize| bed.positions[grain] + dt * bed.velocity(grain);
-        for &i in &self.strayed {
-            let end_i = at_end(i);
-            self.search.around(&end_i, |j| {
-                let touching = bed.radii[i] + bed.radii[j] - missed;
-                if j != i && (end_i - at_end(j)).norm_squared() < touching * touching {
-                    self.late.push(Late::pair(i.min(j), i.max(j)));
-                }
-            });
-            for (number, wall) in around.walls.iter().enumerate() {
-                if wall.surface.may_reach(&end_i, bed.radii[i] - missed) {
-                    self.late.push(Late::at_wall(i, number));
-                }
-            }
-        }
-        self.late.sort_unstable();
-        self.late.dedup();
-    }
-}
-
-/// A contact that a solve has created. Pairs come before walls, each in the order of their grains.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Late {
-    at_wall: bool,
-    contact: Listed,
-}
-
-impl Late {
-    fn pair(i: usize, j: usize) -> Self {
-        Self { at_wall: false, contact: Listed { i: i as u32, partner: j as u32 } }
-    }
-
-    fn at_wall(grain: usize, wall: usize) -> Self {
-        Self { at_wall: true, contact: Listed { i: grain as u32, partner: wall as u32 } }
-    }
-}
-
-fn rebuild_pairs(set: &mut ContactSet, listed: &[Listed], bed: &Bed, around: &Surroundings) {
-    let material = &around.material;
-    set.rebuild(listed, bed.count(), false, around.tangential, |contact| {
-        let (i, j) = (contact.i as usize, contact.partner as usize);
-        let (r_i, r_j) = (bed.radii[i], bed.radii[j]);
+    /// The coefficients of a contact between two grains.
+    pub fn pair_law(&self, bed: &Bed, i: usize, j: usize) -> ContactLaw {
+        let (r_i, r_j) = (bed.radius(i), bed.radius(j));
         let lever = [r_j / (r_i + r_j), r_i / (r_i + r_j)];
-        contact_law(material, [bed.inverse_mass[i], bed.inverse_mass[j]], lever)
-    });
-}
+        contact_law(&self.material, [bed.inverse_mass[i], bed.inverse_mass[j]], lever)
+    }
 
-fn rebuild_walls(set: &mut ContactSet, listed: &[Listed], bed: &Bed, around: &Surroundings) {
-    set.rebuild(listed, bed.count(), true, around.tangential, |contact| {
-        let material = &around.walls[contact.partner as usize].material;
-        contact_law(material, [bed.inverse_mass[contact.i as usize], 0.0], [1.0, 0.0])
-    });
+    /// The coefficients of a contact between a grain and a wall.
+    pub fn wall_law(&self, bed: &Bed, i: usize, wall: usize) -> ContactLaw {
+        contact_law(&self.walls[wall].material, [bed.inverse_mass[i], 0.0], [1.0, 0.0])
+    }
 }
 
 fn contact_law(material: &Material, inverse_mass: [f64; 2], lever: [f64; 2]) -> ContactLaw {
@@ -271,7 +71,205 @@ fn contact_law(material: &Material, inverse_mass: [f64; 2], lever: [f64; 2]) -> 
         lever,
         sliding_friction: material.sliding_friction,
         rolling_friction: material.rolling_friction,
-        restitution: material.restitution,
-        tangential_restitution: material.tangential_restitution,
+        torsional_friction: material.torsional_friction,
     }
+}
+
+/// Pairs and grains at walls, with their search.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Contacts {
+    pub pairs: ContactSet,
+    pub at_walls: ContactSet,
+    search: PairSearch,
+    found: Vec<(u32, u32)>,
+    listed: Vec<Listed>,
+    /// For each grain those that it is listed with: grains, and walls with the number of grains added.
+    partners: Vec<Vec<u32>>,
+    /// The way of each grain, from the time of the list on.
+    paths: Vec<Path>,
+    /// Grains whose path is newer than the list.
+    renewed: Vec<u32>,
+    /// Substeps since the list was made.
+    age: usize,
+    strayed: Vec<u32>,
+}
+
+impl Contacts {
+    /// Calls for a new list before the next substep: something other than the solve has set a grain in motion.
+    pub fn forget_list(&mut self) {
+        self.age = usize::MAX;
+    }
+
+    /// Lists what may touch in the coming substep.
+    pub fn follow(&mut self, bed: &Bed, around: &Surroundings) {
+        if self.paths.is_empty() || self.age >= around.settings.list_period {
+            self.list(bed, around);
+            return;
+        }
+        let now = self.age as f64 * around.settings.dt;
+        self.strayed.clear();
+        let dt = around.settings.dt;
+        for (grain, path) in self.paths.iter().enumerate() {
+            let at_end = bed.position(grain) + dt * bed.velocity(grain);
+            if is_off(&(at_end - path.at(now + dt)), around) {
+                self.strayed.push(grain as u32);
+            }
+        }
+        if (self.strayed.len() + self.renewed.len()) * MANY > bed.count() {
+            self.list(bed, around);
+            return;
+        }
+        for number in 0..self.strayed.len() {
+            self.renew(self.strayed[number] as usize, now, bed, around);
+        }
+    }
+
+    /// Lists what a grain may touch after an impact at `time` `[s]` into the substep, if it will leave its path.
+    pub fn follow_after_impact(
+        &mut self,
+        grain: usize,
+        time: f64,
+        bed: &Bed,
+        around: &Surroundings,
+    ) {
+        let dt = around.settings.dt;
+        // `assemble` has counted the present substep already.
+        let begin = (self.age - 1) as f64 * dt;
+        let end = bed.place_at(grain, dt).vector();
+        if is_off(&(end - self.paths[grain].at(begin + dt)), around) {
+            self.renew(grain, begin + time, bed, around);
+        }
+    }
+
+    /// Those that a grain is listed with: grains, and walls with the number of grains added.
+    pub fn partners(&self, grain: usize) -> &[u32] {
+        &self.partners[grain]
+    }
+
+    /// Gaps, normals and biases of every listed contact, and what may be an impact.
+    pub fn assemble(
+        &mut self,
+        bed: &Bed,
+        around: &Surroundings,
+        lost: &mut [bool],
+        impacts: &mut Impacts,
+    ) -> Seen {
+        let (dt, found) = (around.settings.dt, &mut impacts.candidates);
+        self.age += 1;
+        let pairs = assemble::assemble_pairs(&mut self.pairs, bed, dt, found);
+        let walls =
+            assemble::assemble_walls(&mut self.at_walls, &around.walls, bed, dt, lost, found);
+        pairs.max(walls)
+    }
+
+    /// The same for the contacts of grains that have had an impact.
+    pub fn assemble_again(&mut self, bed: &Bed, around: &Surroundings) {
+        assemble::refresh_pairs(&mut self.pairs, bed, around.settings.dt);
+        assemble::refresh_walls(&mut self.at_walls, &around.walls, bed, around.settings.dt);
+    }
+
+    /// Number of listed contacts.
+    pub fn count(&self) -> usize {
+        self.pairs.len() + self.at_walls.len()
+    }
+
+    /// A new list for all grains.
+    fn list(&mut self, bed: &Bed, around: &Surroundings) {
+        self.age = 0;
+        self.renewed.clear();
+        self.paths.clear();
+        self.paths.extend(
+            (0..bed.count()).map(|i| Path { from: bed.position(i), velocity: bed.velocity(i) }),
+        );
+        self.partners.resize(bed.count(), Vec::new());
+        self.partners.iter_mut().for_each(Vec::clear);
+        let interval = around.settings.dt * around.settings.list_period as f64;
+
+        self.search.pairs(bed, interval, around.margin, &mut self.found);
+        self.listed.clear();
+        // Contacts that will act first: their batches are full of them, the others can be passed over whole.
+        let near = |&&(i, j): &&(u32, u32)| acts(bed, i as usize, j as usize, interval, around);
+        let far = |pair: &&(u32, u32)| !near(pair);
+        let listed = |&(i, partner): &(u32, u32)| Listed { i, partner };
+        self.listed.extend(self.found.iter().filter(near).map(listed));
+        self.listed.extend(self.found.iter().filter(far).map(listed));
+        for &(i, j) in &self.found {
+            self.partners[i as usize].push(j);
+            self.partners[j as usize].push(i);
+        }
+        self.pairs.rebuild(&self.listed, bed.count(), false, |contact| {
+            around.pair_law(bed, contact.i as usize, contact.partner as usize)
+        });
+
+        self.listed.clear();
+        for (grain, path) in self.paths.iter().enumerate() {
+            let range = bed.radius(grain) + around.margin + interval * path.velocity.norm();
+            for (number, wall) in around.walls.iter().enumerate() {
+                if wall.surface.may_reach(&path.from, range) {
+                    self.listed.push(Listed { i: grain as u32, partner: number as u32 });
+                    self.partners[grain].push((bed.count() + number) as u32);
+                }
+            }
+        }
+        self.at_walls.rebuild(&self.listed, bed.count(), true, |contact| {
+            around.wall_law(bed, contact.i as usize, contact.partner as usize)
+        });
+    }
+
+    /// Gives a grain a new path from `now` `[s]` after the list on and lists what lies on it.
+    fn renew(&mut self, grain: usize, now: f64, bed: &Bed, around: &Surroundings) {
+        let settings = &around.settings;
+        let left = settings.dt * settings.list_period as f64 - now;
+        let (at, velocity) = (bed.position(grain), bed.velocity(grain));
+        let path = Path { from: at, velocity };
+        self.paths[grain] = Path { from: at - now * velocity, velocity };
+        self.renewed.push(grain as u32);
+
+        let half_way = 0.5 * left * velocity;
+        let reach = bed.radius(grain) + half_way.norm() + around.margin;
+        self.found.clear();
+        let mut visit = |other: usize| self.found.push((grain as u32, other as u32));
+        self.search.around(&(at + half_way), reach, &mut visit);
+        // Those with a new path may have left the cell in which the search knows them.
+        self.renewed.iter().for_each(|&other| visit(other as usize));
+        for number in 0..self.found.len() {
+            let other = self.found[number].1 as usize;
+            if other == grain || self.partners[grain].contains(&(other as u32)) {
+                continue;
+            }
+            let theirs = &self.paths[other];
+            let theirs = Path { from: theirs.at(now), velocity: theirs.velocity };
+            let limit = bed.radius(grain) + bed.radius(other) + around.margin;
+            if path.comes_within(&theirs, limit, left) {
+                let (i, j) = (grain.min(other), grain.max(other));
+                self.partners[i].push(j as u32);
+                self.partners[j].push(i as u32);
+                let contact = Listed { i: i as u32, partner: j as u32 };
+                self.pairs.append(contact, false, around.pair_law(bed, i, j));
+            }
+        }
+        let range = bed.radius(grain) + around.margin + left * velocity.norm();
+        for (number, wall) in around.walls.iter().enumerate() {
+            let partner = (bed.count() + number) as u32;
+            if !self.partners[grain].contains(&partner) && wall.surface.may_reach(&at, range) {
+                self.partners[grain].push(partner);
+                let contact = Listed { i: grain as u32, partner: number as u32 };
+                self.at_walls.append(contact, true, around.wall_law(bed, grain, number));
+            }
+        }
+    }
+}
+
+/// Whether a grain this far from its path has left it.
+fn is_off(deviation: &Vector3<f64>, around: &Surroundings) -> bool {
+    deviation.norm_squared() > 0.25 * around.margin * around.margin
+}
+
+/// Whether a pair touches, or will on its straight paths.
+fn acts(bed: &Bed, i: usize, j: usize, interval: f64, around: &Surroundings) -> bool {
+    let apart = bed.position(i) - bed.position(j);
+    let closing = -apart.dot(&(bed.velocity(i) - bed.velocity(j))).min(0.0);
+    let distance = apart.norm();
+    let gap = distance - bed.radius(i) - bed.radius(j);
+    (gap - NEAR * around.radius) * distance < closing * interval
 }

@@ -14,6 +14,7 @@ mod reg;
 pub(crate) use avx2::Avx2;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx512::Avx512;
+use nalgebra::Vector3;
 pub(crate) use portable::Portable;
 pub(crate) use reg::{Reg, Reg3};
 
@@ -24,6 +25,33 @@ pub(crate) const LANES: usize = 8;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(crate) struct Lanes(pub [f64; LANES]);
+
+/// Four numbers of one grain, in memory: a vector and a fourth number.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C, align(32))]
+pub(crate) struct Row(pub [f64; 4]);
+
+impl Row {
+    /// The vector.
+    #[inline(always)]
+    pub fn vector(&self) -> Vector3<f64> {
+        Vector3::new(self.0[0], self.0[1], self.0[2])
+    }
+
+    /// A vector and a fourth number.
+    #[inline(always)]
+    pub fn new(vector: &Vector3<f64>, fourth: f64) -> Self {
+        Self([vector.x, vector.y, vector.z, fourth])
+    }
+
+    /// Adds `step` to the vector.
+    #[inline(always)]
+    pub fn add(&mut self, step: &Vector3<f64>) {
+        self.0[0] += step.x;
+        self.0[1] += step.y;
+        self.0[2] += step.z;
+    }
+}
 
 /// One 3-vector for each contact of a batch, component by component, in memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,24 +67,10 @@ impl Lanes {
     pub fn splat(value: f64) -> Self {
         Self([value; LANES])
     }
-
-    /// Adds `other` in place.
-    pub fn add(&mut self, other: &Self) {
-        for (value, more) in self.0.iter_mut().zip(other.0) {
-            *value += more;
-        }
-    }
 }
 
 impl Lanes3 {
     pub const ZERO: Self = Self { x: Lanes::ZERO, y: Lanes::ZERO, z: Lanes::ZERO };
-
-    /// Adds `other` in place.
-    pub fn add(&mut self, other: &Self) {
-        self.x.add(&other.x);
-        self.y.add(&other.y);
-        self.z.add(&other.z);
-    }
 
     /// Puts `value` into lane `lane`.
     #[inline(always)]
@@ -73,12 +87,21 @@ impl Lanes3 {
     }
 }
 
+/// `f` of every lane's index; written out, for an array's own `map` is not inlined into the wide kernels.
+#[inline(always)]
+pub(crate) fn each<T>(index: &[u32; LANES], f: impl Fn(u32) -> T) -> [T; LANES] {
+    let [a, b, c, d, e, g, h, i] = *index;
+    [f(a), f(b), f(c), f(d), f(e), f(g), f(h), f(i)]
+}
+
 /// The operations that the contact kernels are written in, on one kind of machine.
 ///
 /// Implementations for wide registers may only be used behind [`widest`], which tests for them.
 pub(crate) trait Width: Copy {
     /// Eight numbers in registers.
     type Value: Copy;
+    /// One [`Row`] in registers.
+    type Quad: Copy;
 
     fn load(from: &Lanes) -> Self::Value;
     fn store(value: Self::Value, to: &mut Lanes);
@@ -95,8 +118,14 @@ pub(crate) trait Width: Copy {
         yes: Self::Value,
         no: Self::Value,
     ) -> Self::Value;
-    /// Eight rows of eight numbers as eight columns.
-    fn transpose(rows: [Self::Value; LANES]) -> [Self::Value; LANES];
+    /// One bit for each lane in which `a < b`.
+    fn less_bits(a: Self::Value, b: Self::Value) -> u32;
+    fn load_row(from: &Row) -> Self::Quad;
+    fn store_row(value: Self::Quad, to: &mut Row);
+    /// Eight rows as their four columns.
+    fn columns(rows: [Self::Quad; LANES]) -> [Self::Value; 4];
+    /// Four columns as their eight rows.
+    fn rows(columns: [Self::Value; 4]) -> [Self::Quad; LANES];
 }
 
 /// Compiles a function three times, for AVX-512, AVX2 and the target's baseline, and calls the widest
@@ -148,22 +177,38 @@ mod tests {
 
     /// Every operation once, on whatever width.
     #[inline(always)]
-    fn exercise<W: Width>(a: &[Lanes; LANES], b: &[Lanes; LANES]) -> [Lanes; LANES] {
-        let rows = std::array::from_fn(|r| {
+    fn exercise<W: Width>(a: &[Lanes; LANES], b: &[Lanes; LANES]) -> ([Lanes; LANES], u32) {
+        let mut bits = 0;
+        let values: [W::Value; LANES] = std::array::from_fn(|r| {
             let (a, b) = (W::load(&a[r]), W::load(&b[r]));
             let square = W::add(W::mul(a, a), W::splat(0.5));
             let root = W::sub(W::sqrt(square), W::div(b, square));
+            bits = bits << 4 ^ W::less_bits(a, b);
             W::select_less(a, b, root, W::mul(root, b))
         });
-        W::transpose(rows).map(|value| {
-            let mut out = Lanes::ZERO;
-            W::store(value, &mut out);
-            out
-        })
+        let [p, q, r, s, t, u, v, w] = values;
+        let rows = [W::rows([p, q, r, s]), W::rows([t, u, v, w])];
+        let mut out = [Lanes::ZERO; LANES];
+        for (half, rows) in rows.into_iter().enumerate() {
+            let mut memory = [Row::default(); LANES];
+            for (row, memory) in rows.into_iter().zip(&mut memory) {
+                W::store_row(row, memory);
+            }
+            let back = W::columns(memory.each_ref().map(W::load_row));
+            for (column, value) in back.into_iter().enumerate() {
+                W::store(value, &mut out[4 * half + column]);
+            }
+            for (lane, row) in memory.iter().enumerate() {
+                for column in 0..4 {
+                    assert_eq!(row.0[column], out[4 * half + column].0[lane]);
+                }
+            }
+        }
+        (out, bits)
     }
 
     widest! {
-        fn exercise_widest<W>(a: &[Lanes; LANES], b: &[Lanes; LANES]) -> [Lanes; LANES] {
+        fn exercise_widest<W>(a: &[Lanes; LANES], b: &[Lanes; LANES]) -> ([Lanes; LANES], u32) {
             exercise::<W>(a, b)
         }
     }
@@ -176,16 +221,6 @@ mod tests {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") {
             assert_eq!(exercise::<Avx2>(&a, &b), expected);
-        }
-    }
-
-    #[test]
-    fn transpose_is_a_transpose() {
-        let rows: [[f64; LANES]; LANES] =
-            std::array::from_fn(|r| std::array::from_fn(|c| (10 * r + c) as f64));
-        let columns = Portable::transpose(rows);
-        for (c, column) in columns.iter().enumerate() {
-            assert_eq!(*column, std::array::from_fn(|r| (10 * r + c) as f64));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The contact law on lanes: Signorini, Coulomb, rolling resistance and Newton's restitution.
+//! The contact law: Signorini, Coulomb, rolling resistance.
 //!
 //! Pure functions without loops over contacts; docs/theory/contact.md derives them.
 
@@ -10,45 +10,37 @@ pub(crate) const CORRECTION: f64 = 0.2;
 pub(crate) const SLOP: f64 = 1e-5;
 /// Fastest correction of a penetration `[m/s]`.
 pub(crate) const CORRECTION_SPEED: f64 = 0.5;
-/// Approach below which an impact is inelastic `[m/s]`: it must exceed what gravity adds in two
-/// substeps, or resting contacts bounce.
+/// Fastest way out `[m/s]` that is asked of a contact whose grains have parted in an impact and are pressed together
+/// again in the same substep.
+pub(crate) const PINNED_SPEED: f64 = 0.1;
+/// Approach below which an impact is inelastic `[m/s]`: a matter of the contact solve, not of `impact`.
 pub(crate) const IMPACT_SPEED: f64 = 0.05;
 
 /// Inverse of the tangential over the normal Delassus element of two spheres: 1 + 5/2.
 pub(crate) const TANGENTIAL_INERTIA: f64 = 3.5;
 
-/// Bias b of `0 <= w_n + b _|_ lambda_n >= 0` from the gap, the approach speed before gravity and e.
+/// Bias b of `0 <= w_n + b _|_ lambda_n >= 0` from the gap.
 ///
-/// Open contacts may close their gap but not cross it; closed ones are pushed apart slowly; an
-/// approach that would close the gap within the substep bounces.
+/// Open contacts may close their gap but not cross it; closed ones are pushed apart slowly.
 #[inline(always)]
-pub(crate) fn bias_lanes<W: Width>(
-    gap: Reg<W>,
-    approach: Reg<W>,
-    restitution: Reg<W>,
-    dt: f64,
-) -> Reg<W> {
-    let zero = Reg::splat(0.0);
-    let step = Reg::splat(dt);
-    let open = gap.over(step);
+pub(crate) fn bias_lanes<W: Width>(gap: Reg<W>, dt: f64) -> Reg<W> {
+    let (zero, step) = (Reg::splat(0.0), Reg::splat(dt));
     let push = Reg::splat(CORRECTION) * (gap + Reg::splat(SLOP)).over(step);
-    let keep_apart = gap.if_less(zero, push.max(Reg::splat(-CORRECTION_SPEED)), open);
-    let bounce = restitution * approach;
-    let bounce = gap.if_less(zero, bounce.min(keep_apart), bounce);
-    if_impact(gap, approach, dt, bounce, keep_apart)
+    gap.if_less(zero, push.max(Reg::splat(-CORRECTION_SPEED)), gap.over(step))
 }
 
-/// `yes` where a contact would close within this substep faster than [`IMPACT_SPEED`], `no` elsewhere.
+/// The bias of a contact of which a grain has had an impact: at the time `clock` of that impact there is this
+/// gap, which opens at `w_n`. What the solve changes acts for the whole substep, so the gap counts that
+/// would have been at its begin.
 #[inline(always)]
-pub(crate) fn if_impact<W: Width>(
+pub(crate) fn bias_after_impact<W: Width>(
     gap: Reg<W>,
-    approach: Reg<W>,
+    w_n: Reg<W>,
+    clock: Reg<W>,
     dt: f64,
-    yes: Reg<W>,
-    no: Reg<W>,
 ) -> Reg<W> {
-    let closes = (gap + Reg::splat(dt) * approach).if_less(Reg::splat(0.0), yes, no);
-    approach.if_less(Reg::splat(-IMPACT_SPEED), closes, no)
+    let begin = (gap - clock * w_n).over(Reg::splat(dt)).max(Reg::splat(-PINNED_SPEED));
+    gap.if_less(Reg::splat(0.0), bias_lanes(gap, dt), begin)
 }
 
 /// The nearest point of the ball of radius `limit` to `impulse`: stick inside, slip on the rim.
@@ -75,40 +67,17 @@ mod tests {
 
     const DT: f64 = 1.0 / 2400.0;
 
-    /// The law in scalars, as the theory writes it.
-    fn bias(gap: f64, approach: f64, restitution: f64, dt: f64) -> f64 {
-        let keep_apart = if gap >= 0.0 {
-            gap / dt
-        } else {
-            (CORRECTION * ((gap + SLOP) / dt)).max(-CORRECTION_SPEED)
-        };
-        if gap + dt * approach >= 0.0 || approach >= -IMPACT_SPEED {
-            return keep_apart;
-        }
-        let bounce = restitution * approach;
-        if gap < 0.0 { bounce.min(keep_apart) } else { bounce }
-    }
-
-    fn bias_of(gap: f64, approach: f64, restitution: f64, dt: f64) -> f64 {
-        first(bias_lanes(R::splat(gap), R::splat(approach), R::splat(restitution), dt))
-    }
-
     #[test]
-    fn bias_has_its_three_modes() {
-        assert_eq!(bias_of(1e-3, -0.1, 0.5, DT), 1e-3 / DT); // open: the gap may close
-        assert_eq!(bias_of(1e-4, -2.0, 0.5, DT), -1.0); // bounces with e times the approach
-        assert_eq!(bias_of(0.0, -0.04, 0.5, DT), 0.0); // too slow to bounce
-        assert_eq!(bias_of(-1e-2, 0.0, 0.5, DT), -CORRECTION_SPEED); // deep: capped correction
-        assert!((bias_of(-2e-5, 0.0, 0.5, DT) + CORRECTION * 1e-5 / DT).abs() < 1e-12);
-        assert_eq!(bias_of(-SLOP, 0.0, 0.5, DT), 0.0); // at the slop nothing moves
+    fn bias_has_its_modes() {
+        let bias = |gap| first(bias_lanes(R::splat(gap), DT));
+        assert_eq!(bias(1e-3), 1e-3 / DT); // open: the gap may close
+        assert_eq!(bias(0.0), 0.0);
+        assert_eq!(bias(-1e-2), -CORRECTION_SPEED); // deep: capped correction
+        assert!((bias(-2e-5) + CORRECTION * 1e-5 / DT).abs() < 1e-12);
+        assert_eq!(bias(-SLOP), 0.0); // at the slop nothing moves
     }
 
     proptest! {
-        #[test]
-        fn lanes_follow_the_scalar_law(gap in -1e-3f64..1e-3, approach in -3f64..3.0, e in 0f64..1.0) {
-            prop_assert_eq!(bias_of(gap, approach, e, DT), bias(gap, approach, e, DT));
-        }
-
         #[test]
         fn projection_is_inside_and_idempotent(
             x in -9f64..9.0, y in -9f64..9.0, z in -9f64..9.0, limit in 0f64..5.0,

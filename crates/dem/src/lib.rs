@@ -35,6 +35,7 @@ mod contact;
 mod contacts;
 mod error;
 mod health;
+mod impact;
 mod lanes;
 mod law;
 mod material;

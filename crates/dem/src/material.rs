@@ -12,10 +12,11 @@ use crate::DemError;
 /// | `rolling_friction` | mu_r | - | `[0, 10^3]` |
 /// | `restitution` | e | - | `[0, 1]` |
 /// | `tangential_restitution` | e_t | - | `[0, 1]` |
+/// | `torsional_friction` | mu_t | - | `[0, 10^3]` |
 ///
-/// `rolling_friction` limits the rolling and torsional moment by `mu_r R_eff F_n`,
-/// `R_eff = r_i r_j / (r_i + r_j)` for a pair and `r` at a wall (Ai et al. 2011); its upper bound
-/// only keeps out typing errors: above about 1 rolling is locked.
+/// `rolling_friction` limits the rolling moment by `mu_r R_eff F_n`, `torsional_friction` the moment about the
+/// normal by `mu_t R_eff F_n`, `R_eff = r_i r_j / (r_i + r_j)` for a pair and `r` at a wall (Ai et al. 2011);
+/// their upper bound only keeps out typing errors: above about 1 rolling is locked.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
@@ -28,22 +29,26 @@ pub struct Material {
     /// Tangential restitution e_t `[-]`: a sticking impact leaves with `-e_t` times its tangential speed.
     #[serde(default)]
     pub tangential_restitution: f64,
+    /// Torsional friction mu_t `[-]`: resists spinning about the normal, as `rolling_friction` resists rolling.
+    #[serde(default)]
+    pub torsional_friction: f64,
 }
 
 impl Default for Material {
-    /// A middling dry grain: mu_s 0.5, mu_r 0.1, e 0.5, no tangential restitution.
+    /// A middling dry grain: mu_s 0.5, mu_r 0.1, e 0.5, no tangential restitution, no torsional friction.
     fn default() -> Self {
         Self {
             sliding_friction: 0.5,
             rolling_friction: 0.1,
             restitution: 0.5,
             tangential_restitution: 0.0,
+            torsional_friction: 0.0,
         }
     }
 }
 
 impl Material {
-    /// A checked material without tangential restitution.
+    /// A checked material without tangential restitution and torsional friction.
     ///
     /// # Errors
     /// [`DemError::OutOfRange`] names the coefficient that is out of range or not finite.
@@ -52,8 +57,7 @@ impl Material {
         rolling_friction: f64,
         restitution: f64,
     ) -> Result<Self, DemError> {
-        let material =
-            Self { sliding_friction, rolling_friction, restitution, tangential_restitution: 0.0 };
+        let material = Self { sliding_friction, rolling_friction, restitution, ..Self::default() };
         material.check("material")?;
         Ok(material)
     }
@@ -65,6 +69,7 @@ impl Material {
     pub fn check(&self, name: &str) -> Result<(), DemError> {
         in_range(name, "sliding_friction", self.sliding_friction, 10.0, "in [0, 10]")?;
         in_range(name, "rolling_friction", self.rolling_friction, 1e3, "in [0, 1000]")?;
+        in_range(name, "torsional_friction", self.torsional_friction, 1e3, "in [0, 1000]")?;
         in_range(name, "restitution", self.restitution, 1.0, "in [0, 1]")?;
         in_range(name, "tangential_restitution", self.tangential_restitution, 1.0, "in [0, 1]")
     }
@@ -86,6 +91,9 @@ pub struct WallMaterial {
     /// Tangential restitution of grain on wall `[-]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tangential_restitution: Option<f64>,
+    /// Torsional friction of grain on wall `[-]`, relative to the grain's radius.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torsional_friction: Option<f64>,
 }
 
 impl WallMaterial {
@@ -103,6 +111,7 @@ impl WallMaterial {
             tangential_restitution: self
                 .tangential_restitution
                 .unwrap_or(grains.tangential_restitution),
+            torsional_friction: self.torsional_friction.unwrap_or(grains.torsional_friction),
         }
     }
 }

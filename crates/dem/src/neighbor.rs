@@ -43,27 +43,40 @@ impl PairSearch {
     /// `interval` `[s]` at their present velocities. Each pair once; the order depends on the state alone.
     pub fn pairs(&mut self, bed: &Bed, interval: f64, margin: f64, found: &mut Vec<(u32, u32)>) {
         found.clear();
+        self.starts.clear();
         if bed.count() < 2 {
             return;
         }
         self.sweep_balls(bed, interval, margin);
         self.sort_into_cells();
         overlapping(self, found);
-        found.retain(|&(i, j)| approach(bed, i as usize, j as usize, interval, margin));
+        found.retain(|&(i, j)| {
+            let (i, j) = (i as usize, j as usize);
+            let path = |grain| Path { from: bed.position(grain), velocity: bed.velocity(grain) };
+            let limit = bed.radius(i) + bed.radius(j) + margin;
+            path(i).comes_within(&path(j), limit, interval)
+        });
     }
 
-    /// Calls `visit` for every grain whose swept ball may overlap a ball about `point` that is no wider
-    /// than the widest swept one.
-    pub fn around(&self, point: &Vector3<f64>, mut visit: impl FnMut(usize)) {
+    /// Calls `visit` for every grain whose swept ball may overlap the ball of radius `reach` `[m]` about `point`.
+    pub fn around(&self, point: &Vector3<f64>, reach: f64, mut visit: impl FnMut(usize)) {
+        if self.starts.is_empty() {
+            return;
+        }
+        let reach = reach + 0.5 * self.edge;
         let [(x0, x1), (y0, y1), (z0, z1)] = [0, 1, 2].map(|axis| {
-            let cell = ((point[axis] - self.corner[axis]) / self.edge).floor();
-            let clamp = |c: f64| c.clamp(0.0, self.cells[axis] as f64) as usize;
-            (clamp(cell - 1.0), clamp(cell + 2.0))
+            let cell = |at: f64| {
+                let cell = ((at - self.corner[axis]) / self.edge).floor();
+                cell.clamp(-1.0, self.cells[axis] as f64)
+            };
+            let (first, last) = (cell(point[axis] - reach), cell(point[axis] + reach));
+            (first.max(0.0) as usize, ((last + 1.0) as usize).min(self.cells[axis]))
         });
         for z in z0..z1 {
             for y in y0..y1 {
                 let row = (z * self.cells[1] + y) * self.cells[0];
-                let slots = self.starts[row + x0] as usize..self.starts[row + x1] as usize;
+                let (first, last) = (row + x0, row + x1.max(x0));
+                let slots = self.starts[first] as usize..self.starts[last] as usize;
                 for &grain in &self.order[slots] {
                     visit(grain as usize);
                 }
@@ -74,10 +87,11 @@ impl PairSearch {
     fn sweep_balls(&mut self, bed: &Bed, interval: f64, margin: f64) {
         self.middles.clear();
         self.reaches.clear();
-        for (grain, position) in bed.positions.iter().enumerate() {
+        for grain in 0..bed.count() {
+            let position = bed.position(grain);
             let half_way = 0.5 * interval * bed.velocity(grain);
             self.middles.push(position + half_way);
-            self.reaches.push(bed.radii[grain] + half_way.norm() + 0.5 * margin + ROUNDING);
+            self.reaches.push(bed.radius(grain) + half_way.norm() + 0.5 * margin + ROUNDING);
         }
     }
 
@@ -214,20 +228,34 @@ widest! {
     }
 }
 
-/// Whether two grains come nearer than `margin` within `interval` on their present straight paths.
-fn approach(bed: &Bed, i: usize, j: usize, interval: f64, margin: f64) -> bool {
-    let limit = bed.radii[i] + bed.radii[j] + margin;
-    let apart = bed.positions[i] - bed.positions[j];
-    if apart.norm_squared() < limit * limit {
-        return true;
+/// A grain's straight way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Path {
+    pub from: Vector3<f64>,
+    pub velocity: Vector3<f64>,
+}
+
+impl Path {
+    #[inline]
+    pub fn at(&self, time: f64) -> Vector3<f64> {
+        self.from + time * self.velocity
     }
-    let relative = bed.velocity(i) - bed.velocity(j);
-    let closing = -apart.dot(&relative);
-    if closing <= 0.0 {
-        return false;
+
+    /// Whether the way comes within `limit` `[m]` of another in the next `interval` `[s]`.
+    #[inline]
+    pub fn comes_within(&self, other: &Self, limit: f64, interval: f64) -> bool {
+        let apart = self.from - other.from;
+        if apart.norm_squared() < limit * limit {
+            return true;
+        }
+        let relative = self.velocity - other.velocity;
+        let closing = -apart.dot(&relative);
+        if closing <= 0.0 {
+            return false;
+        }
+        let nearest = (closing / relative.norm_squared()).min(interval);
+        (apart + nearest * relative).norm_squared() < limit * limit
     }
-    let nearest = (closing / relative.norm_squared()).min(interval);
-    (apart + nearest * relative).norm_squared() < limit * limit
 }
 
 #[cfg(test)]
@@ -235,7 +263,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::bed::Body;
+    use crate::lanes::Row;
     use crate::scene::Scene;
 
     fn bed(points: &[([f64; 3], [f64; 3], f64)]) -> Bed {
@@ -243,10 +271,8 @@ mod tests {
         scene.grains.count = points.len();
         let mut bed = Bed::new(&scene, 0);
         for (i, (position, velocity, radius)) in points.iter().enumerate() {
-            bed.positions[i] = (*position).into();
-            let [x, y, z] = *velocity;
-            bed.bodies[i] = Body { velocity: [x, y, z, 0.0], spin: [0.0; 4] };
-            bed.radii[i] = *radius;
+            bed.places[i] = Row::new(&(*position).into(), *radius);
+            bed.bodies[i].velocity = Row::new(&(*velocity).into(), 0.0);
         }
         bed
     }
@@ -254,7 +280,12 @@ mod tests {
     fn brute_force(bed: &Bed, interval: f64, margin: f64) -> Vec<(u32, u32)> {
         let pairs = (0..bed.count()).flat_map(|i| (i + 1..bed.count()).map(move |j| (i, j)));
         pairs
-            .filter(|&(i, j)| approach(bed, i, j, interval, margin))
+            .filter(|&(i, j)| {
+                let path =
+                    |grain| Path { from: bed.position(grain), velocity: bed.velocity(grain) };
+                let limit = bed.radius(i) + bed.radius(j) + margin;
+                path(i).comes_within(&path(j), limit, interval)
+            })
             .map(|(i, j)| (i as u32, j as u32))
             .collect()
     }
@@ -265,9 +296,7 @@ mod tests {
             (prop::array::uniform3(-0.03f64..0.03), prop::array::uniform3(-3f64..3.0), 0.0005f64..0.004), 0..120),
             interval in 0f64..0.004, far in 0f64..3.0) {
             let mut bed = bed(&points);
-            if let Some(position) = bed.positions.first_mut() {
-                position.x += far; // one grain far out stretches the grid
-            }
+            bed.places[0].0[0] += far; // one grain far out stretches the grid
             let mut pairs = Vec::new();
             PairSearch::default().pairs(&bed, interval, 0.0005, &mut pairs);
             pairs.sort_unstable();

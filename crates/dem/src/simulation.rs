@@ -6,9 +6,10 @@ use nalgebra::Vector3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::DemError;
-use crate::bed::{Bed, Body};
+use crate::bed::Bed;
 use crate::contacts::{Contacts, Surroundings};
 use crate::health::{Health, HealthWatch};
+use crate::impact::Impacts;
 use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
 use crate::scene::{CameraSpec, EndRule, Scene};
@@ -19,26 +20,19 @@ use crate::wall_load::{self, WallLoad};
 const RESIDUAL_PERIOD: usize = 4;
 /// Looks at the end rule within which a pour must seem ended twice.
 const REST_LOOKS: usize = 16;
-/// Sweeps, at least, after late contacts have been found, and how often what these bring together is
-/// looked for.
-const LATE_SWEEPS: usize = 2;
-const LATE_ROUNDS: usize = 8;
-
 /// A scene in motion.
 ///
 /// Each substep (Moreau's time stepping; docs/theory/contact.md, box 2):
-/// list the contacts now and then; assemble gaps, biases and the warm start from the
-/// velocities before gravity; add gravity; sweep; solve what the sweeps have brought together; move.
+/// list the contacts now and then; add gravity; assemble gaps, normals and biases; resolve the impacts, each at
+/// its time; solve the lasting contacts; move.
 #[derive(Clone, Debug)]
 pub struct Simulation {
     bed: Bed,
     contacts: Contacts,
     around: Surroundings,
-    gravity: Vector3<f64>,
+    impacts: Impacts,
     end: EndRule,
     camera: CameraSpec,
-    /// Velocities before gravity, for restitution.
-    before: Vec<Body>,
     substep: usize,
     watch: HealthWatch,
     /// Threads for large scenes; small ones stay on the calling thread.
@@ -59,11 +53,10 @@ impl Simulation {
         let gravity = Vector3::from(scene.gravity);
         Ok(Self {
             watch: HealthWatch::new(bed.count(), bed.energy(&gravity)),
-            before: bed.bodies.clone(),
             contacts: Contacts::default(),
             around: Surroundings::new(scene),
             bed,
-            gravity,
+            impacts: Impacts::default(),
             end: scene.end,
             camera: scene.camera,
             substep: 0,
@@ -107,8 +100,8 @@ impl Simulation {
     }
 
     /// Centres of the grains `[m]`.
-    pub fn positions(&self) -> &[Vector3<f64>] {
-        &self.bed.positions
+    pub fn positions(&self) -> Vec<Vector3<f64>> {
+        (0..self.bed.count()).map(|grain| self.bed.position(grain)).collect()
     }
 
     /// Velocities of the grains `[m/s]`.
@@ -122,8 +115,8 @@ impl Simulation {
     }
 
     /// Radii of the grains `[m]`.
-    pub fn radii(&self) -> &[f64] {
-        &self.bed.radii
+    pub fn radii(&self) -> Vec<f64> {
+        (0..self.bed.count()).map(|grain| self.bed.radius(grain)).collect()
     }
 
     /// Sets a grain in motion: velocity `[m/s]` and angular velocity `[rad/s]` at its centre. A pour that had
@@ -209,28 +202,23 @@ impl Simulation {
             status: self.ended.unwrap_or(Status::Horizon),
             health: self.health(),
             simulated_s: self.time(),
-            positions: self.bed.positions,
-            radii: self.bed.radii,
+            positions: self.positions(),
+            radii: self.radii(),
         }
     }
 
     /// One substep.
     fn step(&mut self) {
-        let SolverSettings { dt, sweeps, list_period, .. } = self.around.settings;
+        let SolverSettings { dt, list_period, .. } = self.around.settings;
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
-        contacts.refresh_list(bed, around);
-        self.before.clone_from(&bed.bodies);
-        let seen = contacts.assemble(bed, &self.before, around, self.watch.lost_mut());
-        bed.accelerate(&self.gravity, dt);
-        self.solve(sweeps);
-        for _ in 0..LATE_ROUNDS {
-            let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
-            if !contacts.add_late(bed, &mut self.before, around, self.watch.lost_mut()) {
-                break;
-            }
-            self.solve(LATE_SWEEPS);
+        contacts.follow(bed, around);
+        bed.accelerate(&around.gravity, dt);
+        let seen = contacts.assemble(bed, around, self.watch.lost_mut(), &mut self.impacts);
+        if self.impacts.resolve(bed, contacts, around) > 0 {
+            contacts.assemble_again(bed, around);
+            bed.rewind();
         }
-        self.contacts.conclude();
+        self.solve();
         self.bed.move_on(dt);
         self.watch.see_penetration(seen.penetration);
         self.substep += 1;
@@ -239,38 +227,34 @@ impl Simulation {
         }
     }
 
-    /// Sweeps until no contact closes too far, within the settings' bounds, late contacts first.
-    fn solve(&mut self, at_least: usize) {
-        let SolverSettings { dt, max_sweeps, closing, .. } = self.around.settings;
+    /// Sweeps until no contact closes too far, within the settings' bounds.
+    fn solve(&mut self) {
+        let SolverSettings { dt, sweeps, max_sweeps, closing, .. } = self.around.settings;
+        let (bodies, pool) = (&mut self.bed.bodies, self.pool.as_deref());
         let too_fast = closing * self.around.radius / dt;
+        let Contacts { pairs, at_walls, .. } = &mut self.contacts;
+        nsgs::warm_start(pairs, bodies, pool);
+        nsgs::warm_start(at_walls, bodies, pool);
         for done in 1..=max_sweeps {
-            if self.sweep() <= too_fast && done >= at_least {
+            let fastest = nsgs::sweep(pairs, bodies, pool);
+            let fastest = fastest.max(nsgs::sweep(at_walls, bodies, pool));
+            self.watch.see_sweep();
+            if fastest <= too_fast && done >= sweeps {
                 break;
             }
         }
-    }
-
-    /// One sweep over all contacts; returns the fastest closing that it met `[m/s]`.
-    fn sweep(&mut self) -> f64 {
-        let (bodies, pool) = (&mut self.bed.bodies, self.pool.as_deref());
-        let Contacts { pairs, at_walls, late_pairs, late_at_walls, .. } = &mut self.contacts;
-        self.watch.see_sweep();
-        [late_pairs, late_at_walls, pairs, at_walls]
-            .into_iter()
-            .map(|set| nsgs::sweep(set, bodies, pool))
-            .fold(0.0, f64::max)
     }
 
     /// Looks at the state between two searches: health and the end rule.
     fn examine(&mut self) {
         if self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period) {
             let mut residual = nsgs::ResidualSums::default();
-            residual.add(&self.contacts.pairs, &self.bed.bodies);
-            residual.add(&self.contacts.at_walls, &self.bed.bodies);
+            residual.add(&self.contacts.pairs, &mut self.bed.bodies);
+            residual.add(&self.contacts.at_walls, &mut self.bed.bodies);
             self.watch.see_residual(residual.relative());
         }
         self.watch.see_contacts(self.contacts.count());
-        self.watch.see_energy(self.bed.energy(&self.gravity));
+        self.watch.see_energy(self.bed.energy(&self.around.gravity));
         self.ended = self.end_reached().map(|status| {
             let trusted = self.watch.is_healthy(self.around.settings.max_penetration);
             if trusted { status } else { Status::Unhealthy }
@@ -292,13 +276,12 @@ impl Simulation {
 
     fn looks_ended(&self) -> Option<Status> {
         let threshold = self.end.kinetic_energy;
-        let energies: Vec<f64> =
-            (0..self.bed.count()).map(|i| self.bed.kinetic_energy(i)).collect();
+        let energies: Vec<f64> = (0..self.bed.count()).map(|i| self.bed.translation(i)).collect();
         if energies.iter().sum::<f64>() <= threshold * energies.len() as f64 {
             return Some(Status::AtRest);
         }
         let still = |(grain, energy): (usize, &f64)| {
-            let at = &self.bed.positions[grain];
+            let at = self.bed.position(grain);
             *energy <= threshold || !self.camera.sees_ground(at.x, at.y)
         };
         if energies.iter().enumerate().all(still) {

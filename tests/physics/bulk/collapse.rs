@@ -51,7 +51,7 @@ pub fn measure(radius: f64, aspect: f64, material: Material, seed: u64) -> Colla
 
     let mut simulation = start(&scene(&column, material, Vec::new()));
     wait_for_rest(&mut simulation);
-    let deposit = simulation.positions();
+    let deposit = &simulation.positions();
     Collapse {
         aspect: h_0 / r_0,
         run_out: edge(deposit) / r_0 - 1.0,

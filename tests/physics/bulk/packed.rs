@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 pub const DIAMETER: f64 = 4e-3;
 
 /// Kinetic energy of a grain per mass, in the mean, at which a packing counts as settled `[m^2/s^2]`.
-const SETTLED: f64 = 1e-7;
+const SETTLED: f64 = 1e-6;
 /// Sweeps in a substep while a packing is prepared.
 const PREPARING: usize = 40;
 /// Longest time that a packing may take to settle `[s]`.
@@ -89,7 +89,7 @@ pub fn settle(scene: &Scene) -> Vec<Vector3<f64>> {
     let settings = SolverSettings { sweeps: PREPARING, max_sweeps: 2 * PREPARING, ..preset };
     let mut simulation = start(scene).with_settings(settings).expect("valid settings");
     wait_for_rest(&mut simulation);
-    simulation.positions().to_vec()
+    simulation.positions()
 }
 
 /// Advances until the grains are at rest in the mean.

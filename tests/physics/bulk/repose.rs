@@ -18,8 +18,8 @@ const PINHOLE: f64 = 1e-3;
 /// Tip of the funnel above the plate over the plate's radius: well above the steepest heap.
 const TIP: f64 = 1.0;
 /// Hole and width of the funnel, in diameters; its cone falls at 60 deg.
-const OUTLET: f64 = 7.0;
-const FUNNEL: f64 = 16.0;
+const OUTLET: f64 = 9.0;
+const FUNNEL: f64 = 18.0;
 /// Part of the surface that the slope is fitted to, as shares of the plate's radius: neither tip nor foot.
 const FITTED: (f64, f64) = (0.2, 0.8);
 
@@ -62,6 +62,8 @@ pub fn measure(radius: f64, material: Material, seed: u64) -> f64 {
     // What has run over goes on rolling; only the heap must come to rest.
     simulation.advance(0.1);
     wait_for_rest_above(&mut simulation, plate_height);
+    let run_over = simulation.positions().iter().filter(|p| p.z < plate_height).count();
+    assert!(run_over > 0, "{material:?}: the plate of {radius} d is not full");
     let heap: Vec<Vector3<f64>> = simulation
         .positions()
         .iter()

@@ -3,11 +3,11 @@
 
 use std::arch::x86_64::{
     __m256d, _CMP_LT_OQ, _mm256_add_pd, _mm256_blendv_pd, _mm256_cmp_pd, _mm256_div_pd,
-    _mm256_load_pd, _mm256_mul_pd, _mm256_permute2f128_pd, _mm256_set1_pd, _mm256_sqrt_pd,
-    _mm256_store_pd, _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd,
+    _mm256_load_pd, _mm256_movemask_pd, _mm256_mul_pd, _mm256_permute2f128_pd, _mm256_set1_pd,
+    _mm256_sqrt_pd, _mm256_store_pd, _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd,
 };
 
-use super::{LANES, Lanes, Width};
+use super::{LANES, Lanes, Row, Width};
 
 /// 256-bit registers.
 #[derive(Clone, Copy, Debug)]
@@ -18,6 +18,7 @@ type Pair = [__m256d; 2];
 // SAFETY of every block below: the registers are there, and `Lanes` is aligned to 64 bytes and 64 bytes long.
 impl Width for Avx2 {
     type Value = Pair;
+    type Quad = __m256d;
 
     #[inline(always)]
     fn load(from: &Lanes) -> Pair {
@@ -66,15 +67,35 @@ impl Width for Avx2 {
         }
     }
 
-    /// Four transposes of four rows by four columns.
     #[inline(always)]
-    fn transpose(rows: [Pair; LANES]) -> [Pair; LANES] {
+    fn less_bits(a: Pair, b: Pair) -> u32 {
+        unsafe {
+            let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a[0], b[0]));
+            let high = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a[1], b[1]));
+            (low | high << 4) as u32
+        }
+    }
+    #[inline(always)]
+    fn load_row(from: &Row) -> __m256d {
+        unsafe { _mm256_load_pd(from.0.as_ptr()) }
+    }
+    #[inline(always)]
+    fn store_row(value: __m256d, to: &mut Row) {
+        unsafe { _mm256_store_pd(to.0.as_mut_ptr(), value) }
+    }
+    #[inline(always)]
+    fn columns(rows: [__m256d; LANES]) -> [Pair; 4] {
         let [r0, r1, r2, r3, r4, r5, r6, r7] = rows;
-        let [a0, a1, a2, a3] = square(r0[0], r1[0], r2[0], r3[0]);
-        let [b0, b1, b2, b3] = square(r4[0], r5[0], r6[0], r7[0]);
-        let [c0, c1, c2, c3] = square(r0[1], r1[1], r2[1], r3[1]);
-        let [d0, d1, d2, d3] = square(r4[1], r5[1], r6[1], r7[1]);
-        [[a0, b0], [a1, b1], [a2, b2], [a3, b3], [c0, d0], [c1, d1], [c2, d2], [c3, d3]]
+        let [a0, a1, a2, a3] = square(r0, r1, r2, r3);
+        let [b0, b1, b2, b3] = square(r4, r5, r6, r7);
+        [[a0, b0], [a1, b1], [a2, b2], [a3, b3]]
+    }
+    #[inline(always)]
+    fn rows(columns: [Pair; 4]) -> [__m256d; LANES] {
+        let [c0, c1, c2, c3] = columns;
+        let [r0, r1, r2, r3] = square(c0[0], c1[0], c2[0], c3[0]);
+        let [r4, r5, r6, r7] = square(c0[1], c1[1], c2[1], c3[1]);
+        [r0, r1, r2, r3, r4, r5, r6, r7]
     }
 }
 

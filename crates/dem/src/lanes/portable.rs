@@ -1,6 +1,6 @@
 //! Any machine: plain arrays and loops.
 
-use super::{LANES, Lanes, Width};
+use super::{LANES, Lanes, Row, Width};
 
 /// Plain arrays.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +17,7 @@ fn zip(a: [f64; LANES], b: [f64; LANES], f: impl Fn(f64, f64) -> f64) -> [f64; L
 
 impl Width for Portable {
     type Value = [f64; LANES];
+    type Quad = [f64; 4];
 
     #[inline(always)]
     fn load(from: &Lanes) -> [f64; LANES] {
@@ -66,13 +67,35 @@ impl Width for Portable {
         out
     }
     #[inline(always)]
-    fn transpose(rows: [[f64; LANES]; LANES]) -> [[f64; LANES]; LANES] {
-        let mut columns = [[0.0; LANES]; LANES];
-        for (r, row) in rows.iter().enumerate() {
+    fn less_bits(a: [f64; LANES], b: [f64; LANES]) -> u32 {
+        (0..LANES).fold(0, |bits, lane| bits | u32::from(a[lane] < b[lane]) << lane)
+    }
+    #[inline(always)]
+    fn load_row(from: &Row) -> [f64; 4] {
+        from.0
+    }
+    #[inline(always)]
+    fn store_row(value: [f64; 4], to: &mut Row) {
+        to.0 = value;
+    }
+    #[inline(always)]
+    fn columns(rows: [[f64; 4]; LANES]) -> [[f64; LANES]; 4] {
+        let mut columns = [[0.0; LANES]; 4];
+        for (lane, row) in rows.iter().enumerate() {
             for (column, value) in columns.iter_mut().zip(row) {
-                column[r] = *value;
+                column[lane] = *value;
             }
         }
         columns
+    }
+    #[inline(always)]
+    fn rows(columns: [[f64; LANES]; 4]) -> [[f64; 4]; LANES] {
+        let mut rows = [[0.0; 4]; LANES];
+        for (number, column) in columns.iter().enumerate() {
+            for (row, value) in rows.iter_mut().zip(column) {
+                row[number] = *value;
+            }
+        }
+        rows
     }
 }

@@ -4,8 +4,9 @@
 //!
 //! ```text
 //! lambda_n <- max(0, lambda_n - (w_n + b) / A_n)
-//! lambda_t <- projection on |.| <= mu_s lambda_n of lambda_t - (u_t + b_t) / A_t
-//! lambda_r <- projection on |.| <= mu_r lambda_n of lambda_r - rho / A_r
+//! lambda_t <- projection on |.| <= mu_s lambda_n of lambda_t - u_t / A_t
+//! lambda_r <- lambda_r - rho / A_r: its part across n projected on |.| <= mu_r lambda_n,
+//!             its part along n on |.| <= mu_t lambda_n
 //! ```
 //!
 //! Equal spheres make the contact's own Delassus block diagonal, so this is its exact solution; at walls and
@@ -15,10 +16,10 @@
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::assemble::gather;
+use crate::assemble::vectors;
 use crate::bed::{Body, INVERSE_INERTIA, SharedBodies};
 use crate::contact::{Batch, ContactSet, LawLanes};
-use crate::lanes::{LANES, Lanes, Lanes3, Reg, Reg3, Width, widest};
+use crate::lanes::{LANES, Lanes, Reg, Reg3, Width, each, widest};
 use crate::law::{TANGENTIAL_INERTIA, project_ball};
 
 /// Batches of a colour below which a second thread costs more than it brings.
@@ -31,49 +32,69 @@ const SHARE: usize = 64;
 ///
 /// Returns the fastest closing `-(w_n + b)` that a contact still had when its turn came `[m/s]`.
 pub(crate) fn sweep(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) -> f64 {
-    let ContactSet { batches, laws, bias_t, colours, .. } = set;
+    for_each_colour(set, bodies, pool, sweep_batches)
+}
+
+/// Adds what the impulses that the contacts carry do to the velocities: the warm start.
+pub(crate) fn warm_start(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) {
+    for_each_colour(set, bodies, pool, apply_batches);
+}
+
+/// Calls `kernel` for the batches of every colour, in parts; returns the largest of its values.
+fn for_each_colour(
+    set: &mut ContactSet,
+    bodies: &mut [Body],
+    pool: Option<&ThreadPool>,
+    kernel: fn(&mut [Batch], &[LawLanes], &SharedBodies<'_>) -> f64,
+) -> f64 {
+    // The kernels index the bodies without looking: the indices were made for as many.
+    assert_eq!(set.grains() + 1, bodies.len());
+    let ContactSet { batches, laws, colours, .. } = set;
     let bodies = SharedBodies::new(bodies);
     let Some(pool) = pool else {
-        return sweep_batches(batches, laws, bias_t, &bodies);
+        return kernel(batches, laws, &bodies);
     };
-    let mut closing = 0.0_f64;
+    let mut largest = 0.0_f64;
     for colour in colours.iter() {
-        let bias_t = bias_t.get(colour.batches.clone()).unwrap_or_default();
         let batches = &mut batches[colour.batches.clone()];
         if batches.len() < PARALLEL_BATCHES || !colour.is_disjoint {
-            closing = closing.max(sweep_batches(batches, laws, bias_t, &bodies));
+            largest = largest.max(kernel(batches, laws, &bodies));
             continue;
         }
-        let shares = batches.par_chunks_mut(SHARE).enumerate();
-        let fastest = shares.map(|(share, batches)| {
-            let bias_t = bias_t.get(share * SHARE..).unwrap_or_default();
-            sweep_batches(batches, laws, bias_t, &bodies)
-        });
-        closing = closing.max(pool.install(|| fastest.reduce(|| 0.0, f64::max)));
+        let shares = batches.par_chunks_mut(SHARE);
+        let values = shares.map(|batches| kernel(batches, laws, &bodies));
+        largest = largest.max(pool.install(|| values.reduce(|| 0.0, f64::max)));
     }
-    closing
+    largest
 }
 
 widest! {
-    fn sweep_batches<W>(
-        batches: &mut [Batch],
-        laws: &[LawLanes],
-        bias_t: &[Lanes3],
-        bodies: &SharedBodies<'_>,
-    ) -> f64 {
+    fn sweep_batches<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> f64 {
         let mut closing = Reg::<W>::splat(0.0);
-        if bias_t.is_empty() {
-            for batch in batches {
-                solve(batch, &laws[batch.law as usize], None, bodies, &mut closing);
-            }
-        } else {
-            for (batch, bias_t) in batches.iter_mut().zip(bias_t) {
-                solve(batch, &laws[batch.law as usize], Some(bias_t), bodies, &mut closing);
-            }
+        for batch in batches {
+            solve(batch, &laws[batch.law as usize], bodies, &mut closing);
         }
         let mut lanes = Lanes::ZERO;
         closing.store(&mut lanes);
         lanes.0.into_iter().fold(0.0, f64::max)
+    }
+}
+
+widest! {
+    fn apply_batches<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> f64 {
+        let zero = Reg::<W>::splat(0.0);
+        for batch in batches {
+            // Both friction impulses vanish with the normal one.
+            if W::less_bits(zero.0, W::load(&batch.lambda_n)) != 0 {
+                let mut velocities = Velocities::<W>::gather(batch, bodies);
+                let impulses = Impulses::load(batch);
+                let law = &laws[batch.law as usize];
+                velocities.push(law, &Reg3::load(&batch.normal), impulses.n, impulses.t);
+                velocities.roll(law, impulses.r);
+                velocities.scatter(batch, bodies);
+            }
+        }
+        0.0
     }
 }
 
@@ -86,10 +107,9 @@ struct Velocities<W: Width> {
     w_j: Reg3<W>,
 }
 
-/// The impulses of each contact, and how fast it closed against its constraint before they were found.
+/// The impulses of each contact.
 #[derive(Clone, Copy)]
 struct Impulses<W: Width> {
-    closing: Reg<W>,
     n: Reg<W>,
     t: Reg3<W>,
     r: Reg3<W>,
@@ -97,10 +117,40 @@ struct Impulses<W: Width> {
 
 impl<W: Width> Velocities<W> {
     #[inline(always)]
-    fn gather(batch: &Batch, row: impl Fn(u32) -> W::Value) -> Self {
-        let (v_i, w_i) = gather(&batch.i, &row);
-        let (v_j, w_j) = gather(&batch.j, &row);
+    #[allow(unsafe_code)]
+    fn gather(batch: &Batch, bodies: &SharedBodies<'_>) -> Self {
+        // SAFETY: the indices are in bounds (`for_each_colour`), and a body is another batch's only if it rests.
+        let body = |body| unsafe { bodies.load::<W>(body) };
+        let [v_i, w_i] = pairs(each(&batch.i, body));
+        let [v_j, w_j] = pairs(each(&batch.j, body));
         Self { v_i, w_i, v_j, w_j }
+    }
+
+    #[inline(always)]
+    fn scatter(&self, batch: &Batch, bodies: &SharedBodies<'_>) {
+        scatter(batch.used, &batch.i, bodies, self.v_i, self.w_i);
+        scatter(batch.used, &batch.j, bodies, self.v_j, self.w_j);
+    }
+
+    /// Applies normal and tangential impulses.
+    #[inline(always)]
+    fn push(&mut self, law: &LawLanes, n: &Reg3<W>, normal: Reg<W>, tangential: Reg3<W>) {
+        let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
+        let force = n.scale(normal) + tangential;
+        let twist = n.cross(tangential).scale(Reg::splat(INVERSE_INERTIA));
+        self.v_i = self.v_i + force.scale(mass_i);
+        self.v_j = self.v_j - force.scale(mass_j);
+        self.w_i = self.w_i - twist.scale(mass_i);
+        self.w_j = self.w_j - twist.scale(mass_j);
+    }
+
+    /// Applies rolling impulses.
+    #[inline(always)]
+    fn roll(&mut self, law: &LawLanes, rolling: Reg3<W>) {
+        let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
+        let step = rolling.scale(Reg::splat(INVERSE_INERTIA));
+        self.w_i = self.w_i + step.scale(mass_i * Reg::load(&law.lever_i));
+        self.w_j = self.w_j - step.scale(mass_j * Reg::load(&law.lever_j));
     }
 }
 
@@ -108,11 +158,17 @@ impl<W: Width> Impulses<W> {
     #[inline(always)]
     fn load(batch: &Batch) -> Self {
         Self {
-            closing: Reg::splat(0.0),
             n: Reg::load(&batch.lambda_n),
             t: Reg3::load(&batch.lambda_t),
             r: Reg3::load(&batch.lambda_r),
         }
+    }
+
+    #[inline(always)]
+    fn store(&self, batch: &mut Batch) {
+        self.n.store(&mut batch.lambda_n);
+        self.t.store(&mut batch.lambda_t);
+        self.r.store(&mut batch.lambda_r);
     }
 }
 
@@ -121,18 +177,27 @@ impl<W: Width> Impulses<W> {
 fn solve<W: Width>(
     batch: &mut Batch,
     law: &LawLanes,
-    bias_t: Option<&Lanes3>,
     bodies: &SharedBodies<'_>,
-    closing: &mut Reg<W>,
+    fastest: &mut Reg<W>,
 ) {
-    let mut velocities = Velocities::<W>::gather(batch, |body| bodies.load::<W>(body));
-    let solved = local_solution(batch, law, bias_t, Impulses::load(batch), &mut velocities);
-    *closing = closing.max(solved.closing);
-    solved.n.store(&mut batch.lambda_n);
-    solved.t.store(&mut batch.lambda_t);
-    solved.r.store(&mut batch.lambda_r);
-    scatter(&batch.i, bodies, velocities.v_i, velocities.w_i);
-    scatter(&batch.j, bodies, velocities.v_j, velocities.w_j);
+    let mut velocities = Velocities::<W>::gather(batch, bodies);
+    let old = Impulses::load(batch);
+    let closing = closing(batch, &velocities);
+    // A batch without impulses that stays open is left as it is.
+    let zero = Reg::<W>::splat(0.0);
+    if W::less_bits(zero.0, old.n.0) | W::less_bits(zero.0, closing.0) == 0 {
+        return;
+    }
+    *fastest = fastest.max(closing);
+    local_solution(batch, law, closing, old, &mut velocities).store(batch);
+    velocities.scatter(batch, bodies);
+}
+
+/// How fast each contact closes against its constraint, `-(w_n + b)`.
+#[inline(always)]
+fn closing<W: Width>(batch: &Batch, velocities: &Velocities<W>) -> Reg<W> {
+    let w_n = Reg3::load(&batch.normal).dot(velocities.v_i - velocities.v_j);
+    Reg::splat(0.0) - (w_n + Reg::load(&batch.bias))
 }
 
 /// The exact solution of each contact of a batch by itself; updates the velocities to match.
@@ -140,57 +205,61 @@ fn solve<W: Width>(
 fn local_solution<W: Width>(
     batch: &Batch,
     law: &LawLanes,
-    bias_t: Option<&Lanes3>,
+    closing: Reg<W>,
     old: Impulses<W>,
     velocities: &mut Velocities<W>,
 ) -> Impulses<W> {
     let n = Reg3::load(&batch.normal);
-    let Velocities { mut v_i, mut w_i, mut v_j, mut w_j } = *velocities;
-    let inertia = Reg::splat(INVERSE_INERTIA);
-    let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
-    let (lever_i, lever_j) = (Reg::load(&law.lever_i), Reg::load(&law.lever_j));
     let compliance_n = Reg::load(&law.compliance_n);
     let compliance_t = compliance_n * Reg::splat(1.0 / TANGENTIAL_INERTIA);
+    let lambda_n = (old.n + closing * compliance_n).max(Reg::splat(0.0));
 
+    let Velocities { v_i, w_i, v_j, w_j } = *velocities;
     let dv = v_i - v_j;
-    let w_n = n.dot(dv);
-    let zero = Reg::splat(0.0);
-    let closing = zero - (w_n + Reg::load(&batch.bias));
-    let lambda_n = (old.n + closing * compliance_n).max(zero);
-
-    let mut u_t = dv + n.cross(w_i + w_j) - n.scale(w_n);
-    if let Some(bias_t) = bias_t {
-        u_t = u_t + Reg3::load(bias_t);
-    }
+    let u_t = dv + n.cross(w_i + w_j) - n.scale(n.dot(dv));
     let limit = Reg::load(&law.sliding_friction) * lambda_n;
     let lambda_t = project_ball(old.t - u_t.scale(compliance_t), limit);
-
-    let step_t = lambda_t - old.t;
-    let force = n.scale(lambda_n - old.n) + step_t;
-    let twist = n.cross(step_t).scale(inertia);
-    v_i = v_i + force.scale(mass_i);
-    v_j = v_j - force.scale(mass_j);
-    w_i = w_i - twist.scale(mass_i);
-    w_j = w_j - twist.scale(mass_j);
+    velocities.push(law, &n, lambda_n - old.n, lambda_t - old.t);
 
     // At a wall the tangential impulse has just changed the rolling velocity: take it afresh.
-    let rho = w_i.scale(lever_i) - w_j.scale(lever_j);
+    let Velocities { w_i, w_j, .. } = *velocities;
+    let rho = w_i.scale(Reg::load(&law.lever_i)) - w_j.scale(Reg::load(&law.lever_j));
+    let wanted = old.r - rho.scale(Reg::load(&law.compliance_r));
+    let about = n.dot(wanted);
     let limit = Reg::load(&law.rolling_friction) * lambda_n;
-    let lambda_r = project_ball(old.r - rho.scale(Reg::load(&law.compliance_r)), limit);
-    let step_r = (lambda_r - old.r).scale(inertia);
-    w_i = w_i + step_r.scale(mass_i * lever_i);
-    w_j = w_j - step_r.scale(mass_j * lever_j);
-
-    *velocities = Velocities { v_i, w_i, v_j, w_j };
-    Impulses { closing, n: lambda_n, t: lambda_t, r: lambda_r }
+    let rolling = project_ball(wanted - n.scale(about), limit);
+    let limit = Reg::load(&law.torsional_friction) * lambda_n;
+    let lambda_r = rolling + n.scale(about.min(limit).max(Reg::splat(0.0) - limit));
+    velocities.roll(law, lambda_r - old.r);
+    Impulses { n: lambda_n, t: lambda_t, r: lambda_r }
 }
 
 #[inline(always)]
-fn scatter<W: Width>(index: &[u32; LANES], bodies: &SharedBodies<'_>, v: Reg3<W>, w: Reg3<W>) {
+fn pairs<W: Width>(rows: [(W::Quad, W::Quad); LANES]) -> [Reg3<W>; 2] {
+    let [a, b, c, d, e, f, g, h] = rows;
+    let first = [a.0, b.0, c.0, d.0, e.0, f.0, g.0, h.0];
+    let second = [a.1, b.1, c.1, d.1, e.1, f.1, g.1, h.1];
+    [vectors(first), vectors(second)]
+}
+
+#[inline(always)]
+#[allow(unsafe_code)]
+fn scatter<W: Width>(
+    used: u32,
+    index: &[u32; LANES],
+    bodies: &SharedBodies<'_>,
+    v: Reg3<W>,
+    w: Reg3<W>,
+) {
     let zero = W::splat(0.0);
-    let rows = W::transpose([v.x.0, v.y.0, v.z.0, zero, w.x.0, w.y.0, w.z.0, zero]);
-    for lane in 0..LANES {
-        bodies.store::<W>(index[lane], rows[lane]);
+    let velocities = W::rows([v.x.0, v.y.0, v.z.0, zero]);
+    let spins = W::rows([w.x.0, w.y.0, w.z.0, zero]);
+    let count = bodies.count() as u32;
+    for lane in 0..used as usize {
+        if index[lane] < count {
+            // SAFETY: in bounds, and no other contact of this colour has this grain.
+            unsafe { bodies.store::<W>(index[lane], velocities[lane], spins[lane]) };
+        }
     }
 }
 
@@ -203,7 +272,7 @@ pub(crate) struct ResidualSums {
 
 impl ResidualSums {
     /// Adds the contacts of `set`: how far its own exact solution would still move each impulse.
-    pub fn add(&mut self, set: &ContactSet, bodies: &[Body]) {
+    pub fn add(&mut self, set: &ContactSet, bodies: &mut [Body]) {
         residual_lanes(set, bodies, &mut self.squares, &mut self.impulses);
     }
 
@@ -216,16 +285,18 @@ impl ResidualSums {
 widest! {
     fn residual_lanes<W>(
         set: &ContactSet,
-        bodies: &[Body],
+        bodies: &mut [Body],
         squares: &mut f64,
         impulses: &mut f64,
     ) {
-        for (number, batch) in set.batches.iter().enumerate() {
+        assert_eq!(set.grains() + 1, bodies.len());
+        let bodies = SharedBodies::new(bodies);
+        for batch in &set.batches {
             let law = &set.laws[batch.law as usize];
             let old = Impulses::<W>::load(batch);
-            let row = |body: u32| W::load(bodies[body as usize].row());
-            let mut velocities = Velocities::gather(batch, row);
-            let new = local_solution(batch, law, set.bias_t.get(number), old, &mut velocities);
+            let mut velocities = Velocities::gather(batch, &bodies);
+            let closing = closing(batch, &velocities);
+            let new = local_solution(batch, law, closing, old, &mut velocities);
             let (n, t, r) = (new.n - old.n, new.t - old.t, new.r - old.r);
             let (mut square, mut impulse) = (Lanes::ZERO, Lanes::ZERO);
             (n * n + t.dot(t) + r.dot(r)).store(&mut square);
