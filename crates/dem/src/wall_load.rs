@@ -39,6 +39,7 @@ mod tests {
     /// The loads of one grain at `position` after 0.5 s.
     fn loads(scene: &mut Scene, position: [f64; 3]) -> Vec<WallLoad> {
         scene.grains.count = 1;
+        scene.end.kinetic_energy = f64::MIN_POSITIVE;
         scene.start = Start::Positions { positions: vec![position] };
         let mut simulation = Simulation::new(scene, 1).unwrap();
         simulation.advance(0.5);
