@@ -137,7 +137,7 @@ fn grains_that_lose_nothing_reach_the_horizon() {
     let pour = start(&scene).with_settings(settings).expect("valid settings").run();
     assert_finite(&pour);
     assert_eq!(pour.status, Status::Horizon, "{:?}", pour.health);
-    assert!((pour.simulated_s - 0.3).abs() < 2.0 / 2400.0);
+    assert!((pour.simulated_s - 0.3).abs() <= settings.list_period as f64 * settings.dt);
     assert!(pour.angular_velocities.iter().all(|w| w.norm() == 0.0));
 }
 

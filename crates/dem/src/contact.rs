@@ -181,6 +181,11 @@ impl ContactSet {
         self.batches.iter().map(|batch| batch.used as usize).sum()
     }
 
+    /// Whether the second body of every contact is a wall.
+    pub fn is_at_walls(&self) -> bool {
+        !self.at_walls.is_empty()
+    }
+
     /// Grains that the contacts are between.
     pub fn grains(&self) -> usize {
         self.grains

@@ -83,6 +83,7 @@ pub(crate) struct Contacts {
     search: PairSearch,
     found: Vec<(u32, u32)>,
     listed: Vec<Listed>,
+    far: Vec<Listed>,
     /// For each grain those that it is listed with: grains, and walls with the number of grains added.
     partners: Vec<Vec<u32>>,
     /// The way of each grain, from the time of the list on.
@@ -185,18 +186,24 @@ impl Contacts {
         self.partners.iter_mut().for_each(Vec::clear);
         let interval = around.settings.dt * around.settings.list_period as f64;
 
-        self.search.pairs(bed, interval, around.margin, &mut self.found);
+        self.search.pairs(bed, &self.paths, interval, around.margin, &mut self.found);
+        // Contacts that will act come first: their batches are full of them, the others are passed over whole.
         self.listed.clear();
-        // Contacts that will act first: their batches are full of them, the others can be passed over whole.
-        let near = |&&(i, j): &&(u32, u32)| acts(bed, i as usize, j as usize, interval, around);
-        let far = |pair: &&(u32, u32)| !near(pair);
-        let listed = |&(i, partner): &(u32, u32)| Listed { i, partner };
-        self.listed.extend(self.found.iter().filter(near).map(listed));
-        self.listed.extend(self.found.iter().filter(far).map(listed));
-        for &(i, j) in &self.found {
-            self.partners[i as usize].push(j);
-            self.partners[j as usize].push(i);
+        self.far.clear();
+        for &(i, partner) in &self.found {
+            let contact = Listed { i, partner };
+            let near = [i, partner].map(|n| bed.radius(n as usize)).iter().sum::<f64>()
+                + NEAR * around.radius;
+            let [a, b] = [i, partner].map(|n| &self.paths[n as usize]);
+            if a.comes_within(b, near, interval) {
+                self.listed.push(contact);
+            } else {
+                self.far.push(contact);
+            }
+            self.partners[i as usize].push(partner);
+            self.partners[partner as usize].push(i);
         }
+        self.listed.append(&mut self.far);
         self.pairs.rebuild(&self.listed, bed.count(), false, |contact| {
             around.pair_law(bed, contact.i as usize, contact.partner as usize)
         });
@@ -263,13 +270,4 @@ impl Contacts {
 /// Whether a grain this far from its path has left it.
 fn is_off(deviation: &Vector3<f64>, around: &Surroundings) -> bool {
     deviation.norm_squared() > 0.25 * around.margin * around.margin
-}
-
-/// Whether a pair touches, or will on its straight paths.
-fn acts(bed: &Bed, i: usize, j: usize, interval: f64, around: &Surroundings) -> bool {
-    let apart = bed.position(i) - bed.position(j);
-    let closing = -apart.dot(&(bed.velocity(i) - bed.velocity(j))).min(0.0);
-    let distance = apart.norm();
-    let gap = distance - bed.radius(i) - bed.radius(j);
-    (gap - NEAR * around.radius) * distance < closing * interval
 }

@@ -77,8 +77,8 @@ impl HealthWatch {
         self.worst_residual = self.worst_residual.max(residual);
     }
 
-    pub fn see_sweep(&mut self) {
-        self.sweeps += 1;
+    pub fn see_sweeps(&mut self, sweeps: usize) {
+        self.sweeps += sweeps;
     }
 
     pub fn see_contacts(&mut self, contacts: usize) {

@@ -40,8 +40,15 @@ pub(crate) struct PairSearch {
 
 impl PairSearch {
     /// Fills `found` with every pair `(i, j)`, `i < j`, of grains whose gap falls below `margin` `[m]` within
-    /// `interval` `[s]` at their present velocities. Each pair once; the order depends on the state alone.
-    pub fn pairs(&mut self, bed: &Bed, interval: f64, margin: f64, found: &mut Vec<(u32, u32)>) {
+    /// `interval` `[s]` on their paths. Each pair once; the order depends on the state alone.
+    pub fn pairs(
+        &mut self,
+        bed: &Bed,
+        paths: &[Path],
+        interval: f64,
+        margin: f64,
+        found: &mut Vec<(u32, u32)>,
+    ) {
         found.clear();
         self.starts.clear();
         if bed.count() < 2 {
@@ -52,9 +59,8 @@ impl PairSearch {
         overlapping(self, found);
         found.retain(|&(i, j)| {
             let (i, j) = (i as usize, j as usize);
-            let path = |grain| Path { from: bed.position(grain), velocity: bed.velocity(grain) };
             let limit = bed.radius(i) + bed.radius(j) + margin;
-            path(i).comes_within(&path(j), limit, interval)
+            paths[i].comes_within(&paths[j], limit, interval)
         });
     }
 
@@ -298,7 +304,10 @@ mod tests {
             let mut bed = bed(&points);
             bed.places[0].0[0] += far; // one grain far out stretches the grid
             let mut pairs = Vec::new();
-            PairSearch::default().pairs(&bed, interval, 0.0005, &mut pairs);
+            let paths: Vec<Path> = (0..bed.count())
+                .map(|i| Path { from: bed.position(i), velocity: bed.velocity(i) })
+                .collect();
+            PairSearch::default().pairs(&bed, &paths, interval, 0.0005, &mut pairs);
             pairs.sort_unstable();
             prop_assert_eq!(pairs, brute_force(&bed, interval, 0.0005));
         }

@@ -56,8 +56,10 @@ impl FromStr for Preset {
 pub struct SolverSettings {
     /// Substep `[s]`.
     pub dt: f64,
-    /// Gauss-Seidel sweeps in a substep, at least.
+    /// Gauss-Seidel sweeps in a substep, at least, unless the impulses settle before.
     pub sweeps: usize,
+    /// Change of a contact's impulses in a sweep below which they have settled, in radii a substep `[-]`.
+    pub settled: f64,
     /// Sweeps in a substep, at most: hard impacts on dense packings need more than quiet flow.
     pub max_sweeps: usize,
     /// Way by which a contact may still close against its constraint in a substep, in radii `[-]`;
@@ -80,6 +82,7 @@ impl SolverSettings {
         };
         positive("settings.dt", self.dt)?;
         positive("settings.sweeps", self.sweeps as f64)?;
+        positive("settings.settled", self.settled)?;
         positive("settings.max_sweeps", self.max_sweeps as f64)?;
         positive("settings.closing", self.closing)?;
         positive("settings.list_period", self.list_period as f64)?;
@@ -93,10 +96,11 @@ impl Preset {
     pub fn settings(self) -> SolverSettings {
         match self {
             Self::Fast => SolverSettings {
-                dt: 1.0 / 1200.0,
+                dt: 1.0 / 900.0,
                 sweeps: 6,
+                settled: 1e-6,
                 max_sweeps: 30,
-                closing: 0.06,
+                closing: 0.04,
                 list_period: 2,
                 margin: 0.3,
                 max_penetration: 0.25,
@@ -104,15 +108,17 @@ impl Preset {
             Self::Default => SolverSettings {
                 dt: 1.0 / 1500.0,
                 sweeps: 6,
+                settled: 1e-6,
                 max_sweeps: 60,
                 closing: 0.02,
-                list_period: 2,
+                list_period: 4,
                 margin: 0.25,
                 max_penetration: 0.1,
             },
             Self::Accurate => SolverSettings {
                 dt: 1.0 / 6000.0,
                 sweeps: 12,
+                settled: 1e-6,
                 max_sweeps: 120,
                 closing: 0.002,
                 list_period: 8,

@@ -227,22 +227,13 @@ impl Simulation {
         }
     }
 
-    /// Sweeps until no contact closes too far, within the settings' bounds.
+    /// Solves the lasting contacts.
     fn solve(&mut self) {
-        let SolverSettings { dt, sweeps, max_sweeps, closing, .. } = self.around.settings;
-        let (bodies, pool) = (&mut self.bed.bodies, self.pool.as_deref());
-        let too_fast = closing * self.around.radius / dt;
         let Contacts { pairs, at_walls, .. } = &mut self.contacts;
-        nsgs::warm_start(pairs, bodies, pool);
-        nsgs::warm_start(at_walls, bodies, pool);
-        for done in 1..=max_sweeps {
-            let fastest = nsgs::sweep(pairs, bodies, pool);
-            let fastest = fastest.max(nsgs::sweep(at_walls, bodies, pool));
-            self.watch.see_sweep();
-            if fastest <= too_fast && done >= sweeps {
-                break;
-            }
-        }
+        let (bodies, pool) = (&mut self.bed.bodies, self.pool.as_deref());
+        let (settings, radius) = (&self.around.settings, self.around.radius);
+        let sweeps = nsgs::solve(&mut [pairs, at_walls], bodies, settings, radius, pool);
+        self.watch.see_sweeps(sweeps);
     }
 
     /// Looks at the state between two searches: health and the end rule.

@@ -21,32 +21,75 @@ use crate::bed::{Body, INVERSE_INERTIA, SharedBodies};
 use crate::contact::{Batch, ContactSet, LawLanes};
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Width, each, widest};
 use crate::law::{TANGENTIAL_INERTIA, project_ball};
+use crate::preset::SolverSettings;
 
 /// Batches of a colour below which a second thread costs more than it brings.
 const PARALLEL_BATCHES: usize = 512;
 /// Batches that a thread takes at once.
 const SHARE: usize = 64;
 
+/// How far a sweep still was from the end.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Progress {
+    /// Fastest closing `-(w_n + b)` that a contact had when its turn came `[m/s]`.
+    pub closing: f64,
+    /// Largest change of the impulses of a contact `[m/s]`.
+    pub change: f64,
+}
+
+impl Progress {
+    fn max(self, other: Self) -> Self {
+        Self { closing: self.closing.max(other.closing), change: self.change.max(other.change) }
+    }
+}
+
+/// Sweeps over all contacts, from the impulses that they carry: at least `settings.sweeps` times unless the
+/// impulses have settled, and until none closes too fast, but no more than `settings.max_sweeps` times.
+/// Returns the number of sweeps.
+pub(crate) fn solve(
+    sets: &mut [&mut ContactSet],
+    bodies: &mut [Body],
+    settings: &SolverSettings,
+    radius: f64,
+    pool: Option<&ThreadPool>,
+) -> usize {
+    let too_fast = settings.closing * radius / settings.dt;
+    let settled = settings.settled * radius / settings.dt;
+    for set in sets.iter_mut() {
+        warm_start(set, bodies, pool);
+    }
+    for sweeps in 1..settings.max_sweeps {
+        let Progress { closing, change } = sets
+            .iter_mut()
+            .map(|set| sweep(set, bodies, pool))
+            .fold(Progress::default(), Progress::max);
+        if closing <= too_fast && (sweeps >= settings.sweeps || change <= settled) {
+            return sweeps;
+        }
+    }
+    settings.max_sweeps
+}
+
 /// One sweep over the batches in their order; the batches of a colour share no grain and may go to the
 /// threads of `pool` in any order without changing a bit.
-///
-/// Returns the fastest closing `-(w_n + b)` that a contact still had when its turn came `[m/s]`.
-pub(crate) fn sweep(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) -> f64 {
-    for_each_colour(set, bodies, pool, sweep_batches)
+fn sweep(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) -> Progress {
+    let kernel = if set.is_at_walls() { sweep_walls } else { sweep_pairs };
+    for_each_colour(set, bodies, pool, kernel)
 }
 
 /// Adds what the impulses that the contacts carry do to the velocities: the warm start.
-pub(crate) fn warm_start(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) {
-    for_each_colour(set, bodies, pool, apply_batches);
+fn warm_start(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) {
+    let kernel = if set.is_at_walls() { apply_walls } else { apply_pairs };
+    for_each_colour(set, bodies, pool, kernel);
 }
 
-/// Calls `kernel` for the batches of every colour, in parts; returns the largest of its values.
+/// Calls `kernel` for the batches of every colour, in parts; returns the worst of its values.
 fn for_each_colour(
     set: &mut ContactSet,
     bodies: &mut [Body],
     pool: Option<&ThreadPool>,
-    kernel: fn(&mut [Batch], &[LawLanes], &SharedBodies<'_>) -> f64,
-) -> f64 {
+    kernel: fn(&mut [Batch], &[LawLanes], &SharedBodies<'_>) -> Progress,
+) -> Progress {
     // The kernels index the bodies without looking: the indices were made for as many.
     assert_eq!(set.grains() + 1, bodies.len());
     let ContactSet { batches, laws, colours, .. } = set;
@@ -54,7 +97,7 @@ fn for_each_colour(
     let Some(pool) = pool else {
         return kernel(batches, laws, &bodies);
     };
-    let mut largest = 0.0_f64;
+    let mut largest = Progress::default();
     for colour in colours.iter() {
         let batches = &mut batches[colour.batches.clone()];
         if batches.len() < PARALLEL_BATCHES || !colour.is_disjoint {
@@ -63,39 +106,78 @@ fn for_each_colour(
         }
         let shares = batches.par_chunks_mut(SHARE);
         let values = shares.map(|batches| kernel(batches, laws, &bodies));
-        largest = largest.max(pool.install(|| values.reduce(|| 0.0, f64::max)));
+        largest = largest.max(pool.install(|| values.reduce(Progress::default, Progress::max)));
     }
     largest
 }
 
 widest! {
-    fn sweep_batches<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> f64 {
-        let mut closing = Reg::<W>::splat(0.0);
-        for batch in batches {
-            solve(batch, &laws[batch.law as usize], bodies, &mut closing);
-        }
-        let mut lanes = Lanes::ZERO;
-        closing.store(&mut lanes);
-        lanes.0.into_iter().fold(0.0, f64::max)
+    fn sweep_pairs<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> Progress {
+        sweep_batches::<W, false>(batches, laws, bodies)
     }
 }
 
 widest! {
-    fn apply_batches<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> f64 {
-        let zero = Reg::<W>::splat(0.0);
-        for batch in batches {
-            // Both friction impulses vanish with the normal one.
-            if W::less_bits(zero.0, W::load(&batch.lambda_n)) != 0 {
-                let mut velocities = Velocities::<W>::gather(batch, bodies);
-                let impulses = Impulses::load(batch);
-                let law = &laws[batch.law as usize];
-                velocities.push(law, &Reg3::load(&batch.normal), impulses.n, impulses.t);
-                velocities.roll(law, impulses.r);
-                velocities.scatter(batch, bodies);
-            }
-        }
-        0.0
+    fn sweep_walls<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> Progress {
+        sweep_batches::<W, true>(batches, laws, bodies)
     }
+}
+
+/// Solves batch after batch. `AT_WALLS`: the second body is the resting one, and stays so.
+#[inline(always)]
+fn sweep_batches<W: Width, const AT_WALLS: bool>(
+    batches: &mut [Batch],
+    laws: &[LawLanes],
+    bodies: &SharedBodies<'_>,
+) -> Progress {
+    let (mut closing, mut square) = (Reg::<W>::splat(0.0), Reg::<W>::splat(0.0));
+    for batch in batches {
+        let law = &laws[batch.law as usize];
+        solve_batch::<W, AT_WALLS>(batch, law, bodies, &mut closing, &mut square);
+    }
+    Progress { closing: largest(closing), change: largest(square).sqrt() }
+}
+
+widest! {
+    fn apply_pairs<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> Progress {
+        apply_batches::<W, false>(batches, laws, bodies)
+    }
+}
+
+widest! {
+    fn apply_walls<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> Progress {
+        apply_batches::<W, true>(batches, laws, bodies)
+    }
+}
+
+/// The largest lane, if it is positive.
+#[inline(always)]
+fn largest<W: Width>(value: Reg<W>) -> f64 {
+    let mut lanes = Lanes::ZERO;
+    value.store(&mut lanes);
+    lanes.0.into_iter().fold(0.0, f64::max)
+}
+
+/// Adds what the impulses of each batch do to the velocities.
+#[inline(always)]
+fn apply_batches<W: Width, const AT_WALLS: bool>(
+    batches: &mut [Batch],
+    laws: &[LawLanes],
+    bodies: &SharedBodies<'_>,
+) -> Progress {
+    let zero = Reg::<W>::splat(0.0);
+    for batch in batches {
+        let Impulses { n, t, r } = Impulses::load(batch);
+        // Both friction impulses vanish with the normal one.
+        if W::less_bits(zero.0, n.0) != 0 {
+            let law = &laws[batch.law as usize];
+            let mut velocities = Velocities::<W>::gather::<AT_WALLS>(batch, bodies);
+            velocities.push(law, &Reg3::load(&batch.normal), n, t);
+            velocities.roll(law, r);
+            velocities.scatter::<AT_WALLS>(batch, bodies);
+        }
+    }
+    Progress::default()
 }
 
 /// Velocities of both grains of each contact.
@@ -118,18 +200,21 @@ struct Impulses<W: Width> {
 impl<W: Width> Velocities<W> {
     #[inline(always)]
     #[allow(unsafe_code)]
-    fn gather(batch: &Batch, bodies: &SharedBodies<'_>) -> Self {
+    fn gather<const AT_WALLS: bool>(batch: &Batch, bodies: &SharedBodies<'_>) -> Self {
         // SAFETY: the indices are in bounds (`for_each_colour`), and a body is another batch's only if it rests.
         let body = |body| unsafe { bodies.load::<W>(body) };
         let [v_i, w_i] = pairs(each(&batch.i, body));
-        let [v_j, w_j] = pairs(each(&batch.j, body));
+        let rest = Reg3 { x: Reg::splat(0.0), y: Reg::splat(0.0), z: Reg::splat(0.0) };
+        let [v_j, w_j] = if AT_WALLS { [rest; 2] } else { pairs(each(&batch.j, body)) };
         Self { v_i, w_i, v_j, w_j }
     }
 
     #[inline(always)]
-    fn scatter(&self, batch: &Batch, bodies: &SharedBodies<'_>) {
+    fn scatter<const AT_WALLS: bool>(&self, batch: &Batch, bodies: &SharedBodies<'_>) {
         scatter(batch.used, &batch.i, bodies, self.v_i, self.w_i);
-        scatter(batch.used, &batch.j, bodies, self.v_j, self.w_j);
+        if !AT_WALLS {
+            scatter(batch.used, &batch.j, bodies, self.v_j, self.w_j);
+        }
     }
 
     /// Applies normal and tangential impulses.
@@ -164,6 +249,13 @@ impl<W: Width> Impulses<W> {
         }
     }
 
+    /// `|lambda - old|^2` of all three impulses.
+    #[inline(always)]
+    fn square_of_change(&self, old: &Self) -> Reg<W> {
+        let (n, t, r) = (self.n - old.n, self.t - old.t, self.r - old.r);
+        n * n + t.dot(t) + r.dot(r)
+    }
+
     #[inline(always)]
     fn store(&self, batch: &mut Batch) {
         self.n.store(&mut batch.lambda_n);
@@ -174,13 +266,14 @@ impl<W: Width> Impulses<W> {
 
 /// Solves each contact of a batch against the present velocities and puts the new ones back.
 #[inline(always)]
-fn solve<W: Width>(
+fn solve_batch<W: Width, const AT_WALLS: bool>(
     batch: &mut Batch,
     law: &LawLanes,
     bodies: &SharedBodies<'_>,
     fastest: &mut Reg<W>,
+    largest_square: &mut Reg<W>,
 ) {
-    let mut velocities = Velocities::<W>::gather(batch, bodies);
+    let mut velocities = Velocities::<W>::gather::<AT_WALLS>(batch, bodies);
     let old = Impulses::load(batch);
     let closing = closing(batch, &velocities);
     // A batch without impulses that stays open is left as it is.
@@ -188,9 +281,11 @@ fn solve<W: Width>(
     if W::less_bits(zero.0, old.n.0) | W::less_bits(zero.0, closing.0) == 0 {
         return;
     }
+    let new = local_solution(batch, law, closing, old, &mut velocities);
     *fastest = fastest.max(closing);
-    local_solution(batch, law, closing, old, &mut velocities).store(batch);
-    velocities.scatter(batch, bodies);
+    *largest_square = largest_square.max(new.square_of_change(&old));
+    new.store(batch);
+    velocities.scatter::<AT_WALLS>(batch, bodies);
 }
 
 /// How fast each contact closes against its constraint, `-(w_n + b)`.
@@ -254,12 +349,21 @@ fn scatter<W: Width>(
     let zero = W::splat(0.0);
     let velocities = W::rows([v.x.0, v.y.0, v.z.0, zero]);
     let spins = W::rows([w.x.0, w.y.0, w.z.0, zero]);
-    let count = bodies.count() as u32;
-    for lane in 0..used as usize {
-        if index[lane] < count {
-            // SAFETY: in bounds, and no other contact of this colour has this grain.
-            unsafe { bodies.store::<W>(index[lane], velocities[lane], spins[lane]) };
-        }
+    // SAFETY: the lanes in use have grains of their own, in bounds, that no other contact of this colour has.
+    let store = |lane: usize| unsafe {
+        bodies.store::<W>(index[lane], velocities[lane], spins[lane]);
+    };
+    if used as usize == LANES {
+        store(0);
+        store(1);
+        store(2);
+        store(3);
+        store(4);
+        store(5);
+        store(6);
+        store(7);
+    } else {
+        (0..used as usize).for_each(store);
     }
 }
 
@@ -294,12 +398,11 @@ widest! {
         for batch in &set.batches {
             let law = &set.laws[batch.law as usize];
             let old = Impulses::<W>::load(batch);
-            let mut velocities = Velocities::gather(batch, &bodies);
+            let mut velocities = Velocities::gather::<false>(batch, &bodies);
             let closing = closing(batch, &velocities);
             let new = local_solution(batch, law, closing, old, &mut velocities);
-            let (n, t, r) = (new.n - old.n, new.t - old.t, new.r - old.r);
             let (mut square, mut impulse) = (Lanes::ZERO, Lanes::ZERO);
-            (n * n + t.dot(t) + r.dot(r)).store(&mut square);
+            new.square_of_change(&old).store(&mut square);
             (old.n * old.n).store(&mut impulse);
             // Lane after lane, so that every width sums in the same order; empty lanes hold zeros.
             for lane in batch.lanes() {
