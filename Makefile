@@ -11,7 +11,7 @@ RUST := $(shell find src crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Car
 # Sets and dictionaries of words keep one order in every run.
 export PYTHONHASHSEED := 0
 
-.PHONY: help demo test test-rust test-python test-long lint bench build clean
+.PHONY: help demo test test-rust test-python test-long lint bench bench-physics build clean
 
 help: ## list the verbs
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -44,6 +44,9 @@ lint: $(VENV)/.deps ## format, lints, types, spelling, documentation, licences
 
 bench: ## criterion benchmarks; see benches/README.md
 	cargo bench --locked
+
+bench-physics: ## bulk laws against their closed forms, the table of docs/results/physics.md; LAWS="silo repose" chooses
+	cargo run --release --locked --example bench_physics -- $(LAWS)
 
 build: $(VENV)/.native ## the command line (target/release/granulcal-cli) and the Python package
 	cargo build --release --locked -p granulcal-cli

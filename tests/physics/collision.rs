@@ -3,7 +3,7 @@
 use granulcal::dem::{GRAVITY, Ground, Material, Preset, Scene, Simulation, Start, WallMaterial};
 use nalgebra::Vector3;
 
-use crate::scenes::{Motion, RADIUS, block, motion};
+use crate::scenes::{Motion, RADIUS, block, motion, one_grain, start};
 
 /// Two grains one above the other over ground that gives all energy back.
 fn pair(grains: Material, jitter: f64) -> Scene {
@@ -118,5 +118,81 @@ fn tangential_restitution_reverses_the_sliding_of_a_sticking_impact() {
         };
         let left = sliding(&after) + 0.4 * sliding(&before);
         assert!(left.norm() < 1e-12, "seed {seed}: {left:?}");
+    }
+}
+
+/// Two grains that meet with the relative motion of a number, without gravity: before and after.
+fn meet(grains: Material, number: u32) -> ([Motion; 2], [Motion; 2]) {
+    // Directions and speeds that fill their ranges evenly: fractional parts of multiples of the golden ratios.
+    let fraction = |factor: f64| (f64::from(number + 1) * factor).fract();
+    let wave = |factor: f64| 2.0 * fraction(factor) - 1.0;
+    let normal = Vector3::new(wave(0.8191), wave(0.6711), wave(0.5497)).normalize();
+    let sideways = normal.cross(&Vector3::new(wave(0.4503), wave(0.3689), 1.1)).normalize();
+    let (approach, slide) = (0.1 + 2.0 * fraction(0.7549), 2.0 * fraction(0.5698));
+    let spins = [0.3021, 0.2475].map(|f| Vector3::new(wave(f), wave(0.5 * f), wave(2.0 * f)));
+
+    let dt = Preset::Default.settings().dt;
+    let mut scene = one_grain(1.0, grains);
+    scene.gravity = [0.0; 3];
+    scene.grains.count = 2;
+    let relative = approach * normal + slide * sideways;
+    // They touch 2.4 substeps after the start with `normal` between them.
+    let apart = -(2.0 * RADIUS) * normal - 2.4 * dt * relative;
+    let middle = Vector3::new(0.0, 0.0, 1.0);
+    let positions = [middle, middle + -apart].map(Into::into).to_vec();
+    scene.start = Start::Positions { positions };
+    let mut simulation = start(&scene);
+    for (grain, sign) in [(0, 0.5), (1, -0.5)] {
+        let drift = Vector3::new(0.3, -0.2, 0.1);
+        let velocity = drift + sign * relative;
+        simulation.set_motion(grain, velocity, spins[grain] / RADIUS).expect("a valid motion");
+    }
+    let both = |simulation: &_| [motion(simulation, 0), motion(simulation, 1)];
+    let before = both(&simulation);
+    simulation.advance(6.0 * dt);
+    (before, both(&simulation))
+}
+
+/// Angular momentum about the origin over mass and radius `[m/s]`.
+fn angular_momentum(grains: &[Motion; 2]) -> Vector3<f64> {
+    grains.iter().map(|g| g.x.cross(&g.v) / RADIUS + 0.4 * g.w).sum()
+}
+
+#[test]
+fn a_pair_loses_what_the_law_takes() {
+    for number in 0..200 {
+        let grains = Material {
+            sliding_friction: [0.0, 0.1, 0.5][number as usize % 3],
+            rolling_friction: 0.0,
+            restitution: [0.0, 0.5, 0.9, 1.0][number as usize % 4],
+            ..Material::default()
+        };
+        let (before, after) = meet(grains, number);
+        assert!((momentum(&after) - momentum(&before)).norm() < 1e-12, "{number}");
+        // Relative motion at the contact. The loss is -lambda (u + u') / 2, with u' = -e w_n in the normal and
+        // u' = u - 7 lambda_t in the tangential direction, lambda_t = min(u / 7, mu lambda_n).
+        let change = after[0].v - before[0].v;
+        assert!(change.norm() > 0.05, "{number}: no impact");
+        let spins = before[0].w + before[1].w;
+        let dv = before[0].v - before[1].v;
+        let normal = touch(&before);
+        let w_n = normal.dot(&dv);
+        let slide = dv - w_n * normal + normal.cross(&spins);
+        let lambda_n = -0.5 * (1.0 + grains.restitution) * w_n;
+        let lambda_t = (slide.norm() / 7.0).min(grains.sliding_friction * lambda_n);
+        let loss = -0.5 * lambda_n * (w_n - grains.restitution * w_n)
+            + 0.5 * lambda_t * (2.0 * slide.norm() - 7.0 * lambda_t);
+        let lost = energy(&before) - energy(&after);
+        assert!((lost - loss).abs() < 1e-9 * energy(&before), "{number}: {lost}, expected {loss}");
+    }
+}
+
+#[test]
+fn a_pair_keeps_its_angular_momentum() {
+    for number in 0..200 {
+        let grains = Material { rolling_friction: 0.0, ..Material::default() };
+        let (before, after) = meet(grains, number);
+        let (then, now) = (angular_momentum(&before), angular_momentum(&after));
+        assert!((now - then).norm() < 1e-9 * then.norm(), "{number}: {then:?} {now:?}");
     }
 }

@@ -3,12 +3,17 @@
 //! One topic a module. Every tolerance stands beside its number with what it was measured from; see
 //! docs/theory/contact.md for the equations.
 
+mod bulk;
+mod bulk_laws;
 mod collision;
 mod counters;
 mod determinism;
+mod impact;
 mod incline;
 mod packing;
+mod rebound;
 mod restitution;
 mod robustness;
 mod rolling;
 mod scenes;
+mod stack;

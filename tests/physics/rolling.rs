@@ -1,9 +1,12 @@
 //! A grain left to itself on level ground: rolling resistance, slip to roll, torsion.
 //!
-//! Scenes start at rest, so a ramp or a pull sets the grain in motion; each test begins with the motion
-//! that it finds.
+//! Some tests let a ramp or a pull set the grain in motion and begin with the motion that they find; the others
+//! throw it.
 
-use granulcal::dem::{GRAVITY, Ground, Scene, Shape, Simulation, Wall, WallMaterial};
+use granulcal::dem::{
+    GRAVITY, Ground, Material, Preset, Scene, Shape, Simulation, Start, Wall, WallMaterial,
+};
+use nalgebra::Vector3;
 
 use crate::scenes::{RADIUS, material, motion, one_grain, start};
 
@@ -104,4 +107,88 @@ fn torsion_stops_a_spinning_grain() {
     // I domega/dt = mu_t r N: d(r omega)/dt = 5/2 mu_t g.
     let slowed = (begin.w.z.abs() - end.w.z.abs()) / time;
     assert!((slowed / (2.5 * 0.04 * GRAVITY) - 1.0).abs() < 1e-5, "{slowed}");
+}
+
+/// A grain on the ground that moves along x with `velocity` and turns with r omega = `spin` `[m/s]`.
+fn thrown(material: Material, velocity: f64, spin: Vector3<f64>) -> Simulation {
+    let mut simulation = start(&one_grain(RADIUS, material));
+    let velocity = Vector3::new(velocity, 0.0, 0.0);
+    simulation.set_motion(0, velocity, spin / RADIUS).expect("a valid motion");
+    simulation
+}
+
+fn assert_within(got: f64, expected: f64, relative: f64) {
+    assert!((got / expected - 1.0).abs() < relative, "{got}, expected {expected}");
+}
+
+#[test]
+fn slip_turns_to_roll_at_two_sevenths_of_the_stopping_time() {
+    // t = 2 v / (7 mu_s g), then v_end = 5/7 v for good: the bar is 0.5 % for both.
+    let dt = Preset::Default.settings().dt;
+    for (sliding_friction, speed) in [(0.1, 0.5), (0.2, 1.0), (0.5, 3.0)] {
+        let mut simulation = thrown(material(sliding_friction, 0.0, 0.5), speed, Vector3::zeros());
+        let slip = |simulation: &Simulation| {
+            let grain = motion(simulation, 0);
+            grain.v.x - grain.w.y
+        };
+        let (mut before, mut now) = (speed, slip(&simulation));
+        let mut lost = 0.0;
+        while now > 1e-9 {
+            simulation.advance(dt);
+            (before, now) = (now, slip(&simulation));
+            lost = if now > 1e-9 { before - now } else { lost };
+        }
+        // Slip falls linearly: it ends part of the way through the last substep.
+        let time = simulation.time() - dt + dt * before / lost;
+        assert_within(time, 2.0 * speed / (7.0 * sliding_friction * GRAVITY), 1e-9);
+        simulation.advance(1.0);
+        let end = motion(&simulation, 0);
+        assert_within(end.v.x, 5.0 / 7.0 * speed, 1e-9);
+        assert_within(end.w.y, 5.0 / 7.0 * speed, 1e-9);
+    }
+}
+
+#[test]
+fn a_rolling_grain_stops_after_its_way() {
+    // Rolls 7 v^2 / (10 mu_r g) in 7 v / (5 mu_r g); the bar is 0.5 %.
+    let dt = Preset::Default.settings().dt;
+    for rolling_friction in [0.02, 0.1, 0.3] {
+        let speed = 0.5;
+        let spin = Vector3::new(0.0, speed, 0.0);
+        let mut simulation = thrown(material(1.0, rolling_friction, 0.5), speed, spin);
+        let time = 1.4 * speed / (rolling_friction * GRAVITY);
+        simulation.advance(0.5 * time);
+        assert_within(motion(&simulation, 0).v.x, 0.5 * speed, 2.0 * dt / time);
+        simulation.advance(0.45 * time);
+        assert!(motion(&simulation, 0).v.x > 0.0);
+        simulation.advance(0.06 * time + 0.1);
+        let stopped = motion(&simulation, 0);
+        assert!(stopped.v.norm() < 1e-9 && stopped.w.norm() < 1e-9, "{stopped:?}");
+        // The last substep's velocity counts for the whole of it: half a substep of the speed at the start.
+        let way = 0.7 * speed * speed / (rolling_friction * GRAVITY);
+        assert!((stopped.x.x - way).abs() < 0.51 * dt * speed, "{stopped:?}, expected {way}");
+        assert!((stopped.x.x / way - 1.0).abs() < 5e-3, "{stopped:?}, expected {way}");
+    }
+}
+
+#[test]
+fn a_top_spins_down() {
+    // d(r omega)/dt = 5/2 mu_t g about the vertical, and it neither moves nor turns afterwards.
+    for torsional_friction in [0.01, 0.1] {
+        let spin = Vector3::new(0.0, 0.0, 0.5);
+        let grains = Material { torsional_friction, ..Material::default() };
+        let mut scene = one_grain(RADIUS, grains);
+        // A top alone would be at rest to the end rule, which looks at centres: another grain falls meanwhile.
+        scene.grains.count = 2;
+        scene.start = Start::Positions { positions: vec![[0.0, 0.0, RADIUS], [1.0, 0.0, 1e3]] };
+        let mut simulation = start(&scene);
+        simulation.set_motion(0, Vector3::zeros(), spin / RADIUS).expect("a valid motion");
+        let time = 0.5 / (2.5 * torsional_friction * GRAVITY);
+        simulation.advance(0.25 * time);
+        let turning = motion(&simulation, 0).w.z;
+        assert_within(0.5 - turning, 2.5 * torsional_friction * GRAVITY * simulation.time(), 1e-9);
+        simulation.advance(0.76 * time);
+        let stopped = motion(&simulation, 0);
+        assert!(stopped.w.norm() < 1e-12 && stopped.v.norm() < 1e-12, "{stopped:?}");
+    }
 }

@@ -124,6 +124,12 @@ impl Bed {
         self.bodies[grain].spin.vector() / self.radius(grain)
     }
 
+    /// Sets velocity `[m/s]` and angular velocity `[rad/s]` of a grain.
+    pub fn set_motion(&mut self, grain: usize, velocity: &Vector3<f64>, angular: &Vector3<f64>) {
+        let spin = self.radius(grain) * angular;
+        self.bodies[grain] = Body { velocity: Row::new(velocity, 0.0), spin: Row::new(&spin, 0.0) };
+    }
+
     /// Kinetic energy of a grain per typical mass, rotation included `[m^2/s^2]`.
     #[inline]
     pub fn kinetic_energy(&self, grain: usize) -> f64 {

@@ -96,6 +96,11 @@ pub(crate) struct Contacts {
 }
 
 impl Contacts {
+    /// Calls for a new list before the next substep: something other than the solve has set a grain in motion.
+    pub fn forget_list(&mut self) {
+        self.age = usize::MAX;
+    }
+
     /// Lists what may touch in the coming substep.
     pub fn follow(&mut self, bed: &Bed, around: &Surroundings) {
         if self.paths.is_empty() || self.age >= around.settings.list_period {

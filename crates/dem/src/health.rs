@@ -92,6 +92,13 @@ impl HealthWatch {
         self.lowest_energy = self.lowest_energy.min(energy);
     }
 
+    /// Counts energy that came from outside, which is not created.
+    pub fn see_work(&mut self, work: f64) {
+        self.start_energy += work;
+        self.lowest_energy += work;
+        self.energy += work;
+    }
+
     /// False once a NaN or an infinity has reached the energy.
     pub fn is_finite(&self) -> bool {
         self.energy.is_finite()

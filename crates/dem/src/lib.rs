@@ -46,6 +46,7 @@ mod scene;
 mod simulation;
 mod solver;
 mod wall;
+mod wall_load;
 
 pub use error::DemError;
 pub use health::{Health, MAX_ENERGY_CREATED};
@@ -58,3 +59,4 @@ pub use scene::{
     CameraSpec, EndRule, Funnel, GRAVITY, Grains, Ground, Projection, Scene, Shape, Start, Wall,
 };
 pub use simulation::Simulation;
+pub use wall_load::WallLoad;

@@ -14,6 +14,7 @@ use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
 use crate::scene::{CameraSpec, EndRule, Scene};
 use crate::solver::nsgs;
+use crate::wall_load::{self, WallLoad};
 
 /// Examinations between two looks at the residual, which costs about a sweep.
 const RESIDUAL_PERIOD: usize = 4;
@@ -108,9 +109,52 @@ impl Simulation {
         (0..self.bed.count()).map(|grain| self.bed.velocity(grain)).collect()
     }
 
+    /// Angular velocities of the grains `[rad/s]`.
+    pub fn angular_velocities(&self) -> Vec<Vector3<f64>> {
+        (0..self.bed.count()).map(|grain| self.bed.angular_velocity(grain)).collect()
+    }
+
     /// Radii of the grains `[m]`.
     pub fn radii(&self) -> Vec<f64> {
         (0..self.bed.count()).map(|grain| self.bed.radius(grain)).collect()
+    }
+
+    /// Sets a grain in motion: velocity `[m/s]` and angular velocity `[rad/s]` at its centre. A pour that had
+    /// ended goes on, and the energy put in does not count as created.
+    ///
+    /// Velocities live at the middle of substeps (x += dt v after v += dt g): for a motion v at the present
+    /// time set v - dt g / 2.
+    ///
+    /// # Errors
+    /// [`DemError::OutOfRange`] for a grain that is not there or a number that is not finite.
+    pub fn set_motion(
+        &mut self,
+        grain: usize,
+        velocity: Vector3<f64>,
+        angular_velocity: Vector3<f64>,
+    ) -> Result<(), DemError> {
+        if grain >= self.bed.count() {
+            let allowed = "less than the number of grains";
+            return Err(DemError::range("grain", grain as f64, allowed));
+        }
+        for (name, vector) in [("velocity", velocity), ("angular_velocity", angular_velocity)] {
+            if let Some(&got) = vector.iter().find(|c| !c.is_finite()) {
+                return Err(DemError::range(name, got, "finite"));
+            }
+        }
+        let before = self.bed.kinetic_energy(grain);
+        self.bed.set_motion(grain, &velocity, &angular_velocity);
+        self.watch.see_work(self.bed.kinetic_energy(grain) - before);
+        self.contacts.forget_list();
+        (self.seemed_ended, self.ended) = (None, None);
+        Ok(())
+    }
+
+    /// What the grains press on every wall with in the last substep: the ground first, then the funnel's cone
+    /// and stem if there is one, then the scene's walls in their order. See [`WallLoad`].
+    pub fn wall_loads(&self) -> Vec<WallLoad> {
+        let dt = self.around.settings.dt;
+        wall_load::of(&self.contacts.at_walls, self.around.walls.len(), dt)
     }
 
     /// How the pour ended, once it has.
@@ -154,9 +198,7 @@ impl Simulation {
     pub fn into_pour(self) -> Pour {
         Pour {
             velocities: self.velocities(),
-            angular_velocities: (0..self.bed.count())
-                .map(|grain| self.bed.angular_velocity(grain))
-                .collect(),
+            angular_velocities: self.angular_velocities(),
             status: self.ended.unwrap_or(Status::Horizon),
             health: self.health(),
             simulated_s: self.time(),

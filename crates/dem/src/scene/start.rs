@@ -12,7 +12,7 @@ use crate::DemError;
 const CLOSEST_PACKING: f64 = 0.740_480_489_693_061;
 
 /// The arrangement of the grains at time zero, at rest.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub enum Start {
     /// A block about the z axis, filled layer by layer from below.
@@ -35,12 +35,17 @@ pub enum Start {
         /// Half width of a uniform seeded displacement along each axis `[m]`.
         jitter: f64,
     },
+    /// Listed centres, for example those of another pour that has come to rest. The seed changes nothing.
+    Positions {
+        /// Centre of each grain `[m]`, shape `[grains.count, 3]`. Overlaps are pushed apart like any other.
+        positions: Vec<[f64; 3]>,
+    },
 }
 
 impl Start {
     pub(super) fn check(&self, grains: &Grains) -> Result<(), DemError> {
-        match *self {
-            Self::Grid { counts, spacing, jitter, base } => {
+        match self {
+            &Self::Grid { counts, spacing, jitter, base } => {
                 finite("start.base", base)?;
                 jitter_fits(jitter, spacing - grains.diameter)?;
                 positive("start.spacing", spacing)?;
@@ -50,7 +55,7 @@ impl Start {
                     return Err(DemError::StartTooSmall { kind: "grid", capacity, count });
                 }
             }
-            Self::Ball { height, solid_fraction, jitter } => {
+            &Self::Ball { height, solid_fraction, jitter } => {
                 non_negative("start.height", height)?;
                 if !(solid_fraction > 0.0 && solid_fraction <= CLOSEST_PACKING) {
                     let allowed = "in (0, 0.7404]";
@@ -61,20 +66,34 @@ impl Start {
                     lattice_spacing(grains.diameter, solid_fraction) - grains.diameter,
                 )?;
             }
+            Self::Positions { positions } => {
+                let (got, expected) = (positions.len(), grains.count);
+                if got != expected {
+                    return Err(DemError::Length { name: "start.positions", got, expected });
+                }
+                for (grain, position) in positions.iter().enumerate() {
+                    for (axis, &value) in ["x", "y", "z"].iter().zip(position) {
+                        finite(&format!("start.positions.{grain}.{axis}"), value)?;
+                    }
+                }
+            }
         }
         Ok(())
     }
 
     /// Centres of the grains `[m]`, one each.
     pub(crate) fn positions(&self, scene: &Scene, seed: u64) -> Vec<Vector3<f64>> {
-        let (mut positions, jitter) = match *self {
-            Self::Grid { counts, spacing, jitter, base } => {
+        let (mut positions, jitter) = match self {
+            &Self::Grid { counts, spacing, jitter, base } => {
                 let floor = scene.funnel.map_or(0.0, |funnel| funnel.rim_height());
                 (grid(scene.grains.count, counts, spacing, floor + base), jitter)
             }
-            Self::Ball { height, solid_fraction, jitter } => {
+            &Self::Ball { height, solid_fraction, jitter } => {
                 let spacing = lattice_spacing(scene.grains.diameter, solid_fraction);
                 (ball(&scene.grains, spacing, height + jitter), jitter)
+            }
+            Self::Positions { positions } => {
+                return positions.iter().map(|&position| Vector3::from(position)).collect();
             }
         };
         let mut random = Pcg64::seed_from_u64(seed);
@@ -188,6 +207,30 @@ mod tests {
         let at = |seed| scene.start.positions(&scene, seed);
         assert_eq!(at(1), at(1));
         assert_ne!(at(1), at(2));
+    }
+
+    #[test]
+    fn listed_positions_are_the_start_whatever_the_seed() {
+        let positions = vec![[0.0, 0.0, 0.002], [0.01, -0.02, 0.003]];
+        let mut scene = Scene::drop(0.1);
+        scene.grains.count = 2;
+        scene.start = Start::Positions { positions: positions.clone() };
+        scene.check().unwrap();
+        assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+        let started = scene.start.positions(&scene, 5);
+        assert_eq!(started, positions.iter().map(|p| Vector3::from(*p)).collect::<Vec<_>>());
+        assert_eq!(started, scene.start.positions(&scene, 6));
+    }
+
+    #[test]
+    fn listed_positions_must_be_finite_and_one_for_each_grain() {
+        let mut scene = Scene::drop(0.1);
+        scene.grains.count = 2;
+        scene.start = Start::Positions { positions: vec![[0.0; 3]] };
+        let error = scene.check().unwrap_err();
+        assert!(matches!(error, DemError::Length { got: 1, expected: 2, .. }), "{error}");
+        scene.start = Start::Positions { positions: vec![[0.0; 3], [0.0, f64::NAN, 0.0]] };
+        assert!(scene.check().unwrap_err().to_string().contains("start.positions.1.y"));
     }
 
     #[test]
