@@ -113,7 +113,7 @@ def line(engine: str, piles: Piles, row: str, law: Law, against: Piles | None) -
 
 
 def comparable(piles: Piles) -> bool:
-    """Returns whether there is a pile to measure: some pours did not jam, and grains came to lie."""
+    """Returns whether there is a pile to measure: not all jammed, and grains lie on others."""
     tops = column(piles, "max_z")
     return len(tops) > 0 and tops.mean() > FLAT
 

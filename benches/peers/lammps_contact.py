@@ -6,7 +6,7 @@ here are the formulas.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 RADIUS = 2e-3
 """Radius of a grain [m]."""
@@ -96,6 +96,16 @@ USUAL = Elastic(
     torsion=False,
 )
 """Settings as they are met in inputs: Tsuji's dashpot, a soft rolling spring that rebounds."""
+RIGID = Elastic()
+SETTINGS = {
+    "rigid": RIGID,
+    "usual": USUAL,
+    "no_torsion": replace(RIGID, torsion=False),
+    "tension": replace(RIGID, tension=True),
+    "tangential": replace(RIGID, tangential="mindlin", tangential_damping=1.0),
+    "soft_rolling": replace(RIGID, rolling_rate=0.035, rolling_damping=0.2),
+}
+"""Settings by name: `rigid` stands for our law, the last four take one thing back from it."""
 
 
 def damping_ratio(restitution: float, *, tension: bool) -> float:

@@ -12,14 +12,14 @@ from lammps_contact import (
     DENSITY,
     RADIUS,
     ROLLING_INERTIA,
+    SETTINGS,
     TANGENTIAL_INERTIA,
-    USUAL,
     Elastic,
     Law,
     contact,
 )
 
-SETTINGS = {"usual": USUAL, "rigid": Elastic()}
+SHOWN = {name: SETTINGS[name] for name in ("usual", "rigid")}
 RESTITUTIONS = (0.1, 0.14, 0.3, 0.5, 0.8)
 SLIDING = (0.1, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0)
 """Sliding over normal velocity before the impact [-]; mu_s is 0.5."""
@@ -132,7 +132,7 @@ def main() -> None:
             *(f"{impact(law_of(e), elastic, at)[0] / SPEED:.3f}" for at in ("wall", "pair")),
         ]
         for e in RESTITUTIONS
-        for name, elastic in SETTINGS.items()
+        for name, elastic in SHOWN.items()
     ]
     table("Realised restitution", ["e", "settings", "wall", "pair"], lines)
 
@@ -140,7 +140,7 @@ def main() -> None:
     for e in RESTITUTIONS:
         law = [kept(TANGENTIAL_INERTIA, friction, e, u) for u in SLIDING]
         lines.append([f"{e:g}", "our law", *(f"{share:.2f}" for share in law)])
-        for name, elastic in SETTINGS.items():
+        for name, elastic in SHOWN.items():
             shares = [
                 impact(law_of(e, sliding=friction), elastic, "wall", sliding=u)[1] / u
                 for u in SLIDING
@@ -154,7 +154,7 @@ def main() -> None:
         for e in RESTITUTIONS:
             law = [kept(inertia, friction, e, rho) for rho in ROLLING]
             lines.append([at, f"{e:g}", "our law", *(f"{share:.2f}" for share in law)])
-            for name, elastic in SETTINGS.items():
+            for name, elastic in SHOWN.items():
                 shares = [
                     impact(law_of(e, rolling=friction), elastic, at, rolling=rho)[2] / rho
                     for rho in ROLLING

