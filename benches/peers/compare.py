@@ -87,10 +87,12 @@ def mean_and_sd(piles: Piles, name: str) -> str:
 
 
 def difference(ours: Piles, theirs: Piles, name: str) -> tuple[float, float]:
-    """Returns by how much ours is above theirs and the standard error of that [%]."""
+    """Returns by how much ours is above theirs [%] and its standard error, NaN for one pour [%]."""
     a, b = column(ours, name), column(theirs, name)
-    errors = [values.var(ddof=1) / len(values) for values in (a, b) if len(values) > 1]
-    return 100.0 * (a.mean() / b.mean() - 1.0), 100.0 * float(np.sqrt(sum(errors))) / b.mean()
+    variance = sum(
+        values.var(ddof=1) / len(values) if len(values) > 1 else np.nan for values in (a, b)
+    )
+    return 100.0 * (a.mean() / b.mean() - 1.0), 100.0 * float(np.sqrt(variance)) / b.mean()
 
 
 def line(engine: str, piles: Piles, row: str, law: Law, against: Piles | None) -> str:
@@ -105,7 +107,8 @@ def line(engine: str, piles: Piles, row: str, law: Law, against: Piles | None) -
         cell = mean_and_sd(piles, name)
         if against and name in COMPARED and comparable(piles) and comparable(against):
             percent, error = difference(piles, against, name)
-            cell += f" ({percent:+.1f} ± {error:.1f} %)"
+            plus_minus = "" if np.isnan(error) else f" ± {error:.1f}"
+            cell += f" ({percent:+.1f}{plus_minus} %)"
         cells.append(cell)
     cells.append(f"{100.0 * max(pile['worst_overlap'] for pile in piles):.1f}")
     cells.append(f"{np.mean([pile['cpu_s'] for pile in piles]):.2f}")

@@ -21,12 +21,25 @@ def rows() -> dict[str, Law]:
     is 0.8, 0.1 and 0.1 R F_n, with R the grain's radius, at pairs and at walls. R_eff is R / 2 at
     pairs: hence twice the number between grains. The ten points have one number for both, as
     scenes have by default. B14 is B with about the least restitution at which LAMMPS' contacts can
-    do without tension.
+    do without tension. P44 and B23 are what P and B become with LAMMPS' `tsuji` and the grain's
+    radius mistaken for the effective one.
     """
     laws = {
         "P": _with_grain_radius(0.5, 0.3, 0.3),
         "B": _with_grain_radius(0.8, 0.1, 0.1),
         "B14": _with_grain_radius(0.8, 0.1, 0.14),
+        "P44": Law(
+            sliding_friction=0.5,
+            rolling_friction=0.3,
+            restitution=0.44,
+            wall_rolling_friction=0.3,
+        ),
+        "B23": Law(
+            sliding_friction=0.8,
+            rolling_friction=0.1,
+            restitution=0.23,
+            wall_rolling_friction=0.1,
+        ),
     }
     for index, (rolling_rank, restitution_rank) in enumerate(RANKS):
         mu_s, mu_r, e = (
