@@ -40,15 +40,10 @@ impl<'a> SharedBodies<'a> {
         Self { first: bodies.as_mut_ptr(), count, lifetime: PhantomData }
     }
 
-    /// Grains; the index of the resting body.
-    pub fn count(&self) -> usize {
-        self.count as usize
-    }
-
     /// Velocity and spin of a body.
     ///
     /// # Safety
-    /// `body` is at most [`Self::count`], and nobody writes it now.
+    /// `body` is at most the number of grains, and nobody writes it now.
     #[inline(always)]
     #[allow(unsafe_code)]
     pub unsafe fn load<W: Width>(&self, body: u32) -> (W::Quad, W::Quad) {
@@ -61,7 +56,7 @@ impl<'a> SharedBodies<'a> {
     /// Puts velocity and spin of a grain back.
     ///
     /// # Safety
-    /// `grain` is less than [`Self::count`], and nobody else reads or writes it now.
+    /// `grain` is less than the number of grains, and nobody else reads or writes it now.
     #[inline(always)]
     #[allow(unsafe_code)]
     pub unsafe fn store<W: Width>(&self, grain: u32, velocity: W::Quad, spin: W::Quad) {
