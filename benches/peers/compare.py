@@ -35,10 +35,12 @@ def scene_of(law: Law) -> gc.Scene:
         sliding_friction=law.sliding_friction,
         rolling_friction=law.rolling_friction,
         restitution=law.restitution,
+        torsional_friction=law.rolling_friction,  # as in the LAMMPS rows
     )
     at_walls = {
-        f"{wall}.material.rolling_friction": law.wall_rolling_friction
+        f"{wall}.material.{kind}_friction": law.wall_rolling_friction
         for wall in ("ground", "funnel")
+        for kind in ("rolling", "torsional")
     }
     return gc.Scene.funnel(height=0.12).with_material(material).with_(at_walls)
 
