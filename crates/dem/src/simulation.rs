@@ -11,6 +11,7 @@ use crate::contacts::{Contacts, Surroundings};
 use crate::health::{Health, HealthWatch};
 use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
+use crate::problem::{ContactProblem, SWEEPS_A_LOOK};
 use crate::scene::{CameraSpec, EndRule, Scene};
 use crate::solver::nsgs;
 
@@ -128,6 +129,28 @@ impl Simulation {
     /// The health so far.
     pub fn health(&self) -> Health {
         self.watch.health(self.substep)
+    }
+
+    /// The contact problem of the next substep, frozen as it is assembled, with its solution after
+    /// as many sweeps as its residual needs to be rounding. The simulation itself stays as it is.
+    pub fn contact_problem(&self) -> ContactProblem {
+        let mut twin = self.clone();
+        let dt = twin.around.settings.dt;
+        let (bed, contacts, around) = (&mut twin.bed, &mut twin.contacts, &twin.around);
+        contacts.refresh_list(bed, around);
+        twin.before.clone_from(&bed.bodies);
+        contacts.assemble(bed, &twin.before, around, twin.watch.lost_mut());
+        bed.bodies.clone_from(&twin.before);
+        bed.accelerate(&twin.gravity, dt);
+        let mut problem = ContactProblem::new(bed, contacts, self.time(), dt);
+        while !problem.is_solved() {
+            problem.put_velocities(&mut twin.bed.bodies);
+            for _ in 0..SWEEPS_A_LOOK {
+                twin.sweep();
+            }
+            problem.take_impulses(&twin.contacts, SWEEPS_A_LOOK);
+        }
+        problem
     }
 
     /// Simulates `seconds`, or less if the pour ends before.
