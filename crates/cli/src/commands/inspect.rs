@@ -19,12 +19,11 @@ use crate::outcome::{BadArgument, Outcome};
 const NAMED_GAPS: usize = 5;
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
-    let facts = match &args.contact_problem {
-        Some(out) => contact_problem::write(&args.path, out, &args.substep)?,
-        None => {
-            args.substep.refuse_any()?;
-            inspect(&args.path)?
-        }
+    let facts = if let Some(out) = &args.contact_problem {
+        contact_problem::write(&args.path, out, &args.substep)?
+    } else {
+        args.substep.refuse_any()?;
+        inspect(&args.path)?
     };
     if args.json {
         print_json(&facts)?;
