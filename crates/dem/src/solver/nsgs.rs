@@ -75,6 +75,15 @@ pub(crate) fn solve(
     settings.max_sweeps
 }
 
+/// Sweeps `count` times, from velocities that contain the impulses.
+pub(crate) fn sweep_plainly(sets: &mut [&mut ContactSet], bodies: &mut [Body], count: usize) {
+    for _ in 0..count {
+        for set in sets.iter_mut() {
+            sweep(set, bodies, 1.0, None);
+        }
+    }
+}
+
 /// One sweep over the batches in their order; the batches of a colour share no grain and may go to the
 /// threads of `pool` in any order without changing a bit.
 fn sweep(
