@@ -24,7 +24,7 @@ const RESIDUAL_PERIOD: usize = 4;
 const REST_LOOKS: usize = 16;
 /// A scene in motion.
 ///
-/// Each substep (Moreau's time stepping; docs/theory/contact.md, box 2):
+/// Each substep (Moreau's time stepping; docs/theory/contact.md, box 3):
 /// list the contacts now and then; add gravity; assemble gaps, normals and biases; resolve the impacts, each at
 /// its time; solve the lasting contacts; move.
 #[derive(Clone, Debug)]

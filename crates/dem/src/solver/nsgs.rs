@@ -1,6 +1,6 @@
 //! Non-smooth Gauss-Seidel: sweeps over the contacts, each solved exactly against the present velocities.
 //!
-//! For each contact in turn (docs/theory/contact.md, box 1):
+//! For each contact in turn (docs/theory/contact.md, box 2):
 //!
 //! ```text
 //! lambda_n <- max(0, lambda_n - (w_n + b) / A_n)
