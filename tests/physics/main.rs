@@ -12,3 +12,4 @@ mod restitution;
 mod robustness;
 mod rolling;
 mod scenes;
+mod solvers;

@@ -190,6 +190,11 @@ impl ContactSet {
         self.batches.iter().map(|batch| batch.used as usize).sum()
     }
 
+    /// The tangential bias of one contact `[m/s]`.
+    pub fn tangential_bias(&self, batch: usize, lane: usize) -> [f64; 3] {
+        self.bias_t.get(batch).map_or([0.0; 3], |bias| bias.get(lane))
+    }
+
     /// Forgets every contact and its impulses.
     pub fn clear(&mut self) {
         self.batches.clear();

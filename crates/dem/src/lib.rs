@@ -12,7 +12,7 @@
 //! # Ok::<(), granulcal_dem::DemError>(())
 //! ```
 //!
-//! Read [`Scene`], then [`Simulation`]; the law is in `law.rs`, the solver in `solver/nsgs.rs`.
+//! Read [`Scene`], then [`Simulation`]; the law is in `law.rs`, the solvers in `solver/`.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -41,6 +41,7 @@ mod material;
 mod neighbor;
 mod pour;
 mod preset;
+mod problem;
 mod scene;
 mod simulation;
 mod solver;
@@ -53,7 +54,11 @@ pub use material::{
 };
 pub use pour::{Pour, Status};
 pub use preset::{Preset, SolverSettings};
+pub use problem::{ContactProblem, ContactSolution};
 pub use scene::{
     CameraSpec, EndRule, Funnel, GRAVITY, Grains, Ground, Projection, Scene, Shape, Start, Wall,
 };
 pub use simulation::Simulation;
+pub use solver::Method;
+pub use solver::newton_pcr::{Complementarity, NewtonSettings};
+pub use solver::reference::ReferenceSettings;

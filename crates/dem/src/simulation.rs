@@ -6,13 +6,15 @@ use nalgebra::Vector3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::DemError;
+use crate::assemble::Seen;
 use crate::bed::{Bed, Body};
 use crate::contacts::{Contacts, Surroundings};
 use crate::health::{Health, HealthWatch};
 use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
+use crate::problem::ContactProblem;
 use crate::scene::{CameraSpec, EndRule, Scene};
-use crate::solver::nsgs;
+use crate::solver::{self, nsgs};
 
 /// Examinations between two looks at the residual, which costs about a sweep.
 const RESIDUAL_PERIOD: usize = 4;
@@ -172,14 +174,28 @@ impl Simulation {
         }
     }
 
-    /// One substep.
-    fn step(&mut self) {
-        let SolverSettings { dt, sweeps, list_period, .. } = self.around.settings;
+    /// The contact problem of the coming substep, for studies of solvers; the simulation stays as it is.
+    pub fn contact_problem(&self) -> ContactProblem {
+        let mut copy = self.clone();
+        copy.assemble();
+        let Contacts { pairs, at_walls, .. } = copy.contacts;
+        ContactProblem::new([pairs, at_walls], copy.bed, self.around.radius)
+    }
+
+    /// Lists and assembles the contacts of a substep and lets gravity act.
+    fn assemble(&mut self) -> Seen {
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
         contacts.refresh_list(bed, around);
         self.before.clone_from(&bed.bodies);
         let seen = contacts.assemble(bed, &self.before, around, self.watch.lost_mut());
-        bed.accelerate(&self.gravity, dt);
+        bed.accelerate(&self.gravity, around.settings.dt);
+        seen
+    }
+
+    /// One substep.
+    fn step(&mut self) {
+        let SolverSettings { dt, sweeps, list_period, .. } = self.around.settings;
+        let seen = self.assemble();
         self.solve(sweeps);
         for _ in 0..LATE_ROUNDS {
             let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
@@ -197,34 +213,22 @@ impl Simulation {
         }
     }
 
-    /// Sweeps until no contact closes too far, within the settings' bounds, late contacts first.
+    /// Solves the contacts, late ones first; Gauss-Seidel sweeps `at_least` so many times.
     fn solve(&mut self, at_least: usize) {
-        let SolverSettings { dt, max_sweeps, closing, .. } = self.around.settings;
-        let too_fast = closing * self.around.radius / dt;
-        for done in 1..=max_sweeps {
-            if self.sweep() <= too_fast && done >= at_least {
-                break;
-            }
-        }
-    }
-
-    /// One sweep over all contacts; returns the fastest closing that it met `[m/s]`.
-    fn sweep(&mut self) -> f64 {
-        let (bodies, pool) = (&mut self.bed.bodies, self.pool.as_deref());
         let Contacts { pairs, at_walls, late_pairs, late_at_walls, .. } = &mut self.contacts;
-        self.watch.see_sweep();
-        [late_pairs, late_at_walls, pairs, at_walls]
-            .into_iter()
-            .map(|set| nsgs::sweep(set, bodies, pool))
-            .fold(0.0, f64::max)
+        let mut sets = [late_pairs, late_at_walls, pairs, at_walls];
+        let settings = SolverSettings { sweeps: at_least, ..self.around.settings };
+        let (bodies, pool) = (&mut self.bed.bodies, self.pool.as_deref());
+        let work = solver::solve(&mut sets, bodies, &settings, self.around.radius, pool);
+        self.watch.see_work(&work);
     }
 
     /// Looks at the state between two searches: health and the end rule.
     fn examine(&mut self) {
         if self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period) {
             let mut residual = nsgs::ResidualSums::default();
-            residual.add(&self.contacts.pairs, &self.bed.bodies);
-            residual.add(&self.contacts.at_walls, &self.bed.bodies);
+            residual.add(&self.contacts.pairs, &mut self.bed.bodies);
+            residual.add(&self.contacts.at_walls, &mut self.bed.bodies);
             self.watch.see_residual(residual.relative());
         }
         self.watch.see_contacts(self.contacts.count());

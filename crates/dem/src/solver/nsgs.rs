@@ -20,17 +20,49 @@ use crate::bed::{Body, INVERSE_INERTIA, SharedBodies};
 use crate::contact::{Batch, ContactSet, LawLanes};
 use crate::lanes::{LANES, Lanes, Lanes3, Reg, Reg3, Width, widest};
 use crate::law::{TANGENTIAL_INERTIA, project_ball};
+use crate::preset::SolverSettings;
+use crate::solver::Work;
 
 /// Batches of a colour below which a second thread costs more than it brings.
 const PARALLEL_BATCHES: usize = 512;
 /// Batches that a thread takes at once.
 const SHARE: usize = 64;
 
+/// Sweeps over all contacts, at least `settings.sweeps` times, until none closes faster than `too_fast`
+/// `[m/s]` against its constraint, or `settings.max_sweeps` are used up.
+pub(super) fn solve(
+    sets: &mut [&mut ContactSet],
+    bodies: &mut [Body],
+    settings: &SolverSettings,
+    too_fast: f64,
+    pool: Option<&ThreadPool>,
+) -> Work {
+    let mut work = Work::default();
+    while work.sweeps < settings.max_sweeps {
+        work.closing = sweep_all(sets, bodies, pool);
+        work.sweeps += 1;
+        work.unconverged = work.closing > too_fast;
+        if !work.unconverged && work.sweeps >= settings.sweeps {
+            break;
+        }
+    }
+    work
+}
+
+/// One sweep over the sets in their order; returns the fastest closing that it met `[m/s]`.
+pub(super) fn sweep_all(
+    sets: &mut [&mut ContactSet],
+    bodies: &mut [Body],
+    pool: Option<&ThreadPool>,
+) -> f64 {
+    sets.iter_mut().map(|set| sweep(set, bodies, pool)).fold(0.0, f64::max)
+}
+
 /// One sweep over the batches in their order; the batches of a colour share no grain and may go to the
 /// threads of `pool` in any order without changing a bit.
 ///
 /// Returns the fastest closing `-(w_n + b)` that a contact still had when its turn came `[m/s]`.
-pub(crate) fn sweep(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) -> f64 {
+fn sweep(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) -> f64 {
     let ContactSet { batches, laws, bias_t, colours, .. } = set;
     let bodies = SharedBodies::new(bodies);
     let Some(pool) = pool else {
@@ -64,11 +96,11 @@ widest! {
         let mut closing = Reg::<W>::splat(0.0);
         if bias_t.is_empty() {
             for batch in batches {
-                solve(batch, &laws[batch.law as usize], None, bodies, &mut closing);
+                solve_batch(batch, &laws[batch.law as usize], None, bodies, &mut closing);
             }
         } else {
             for (batch, bias_t) in batches.iter_mut().zip(bias_t) {
-                solve(batch, &laws[batch.law as usize], Some(bias_t), bodies, &mut closing);
+                solve_batch(batch, &laws[batch.law as usize], Some(bias_t), bodies, &mut closing);
             }
         }
         let mut lanes = Lanes::ZERO;
@@ -79,11 +111,11 @@ widest! {
 
 /// Velocities of both grains of each contact.
 #[derive(Clone, Copy)]
-struct Velocities<W: Width> {
-    v_i: Reg3<W>,
-    w_i: Reg3<W>,
-    v_j: Reg3<W>,
-    w_j: Reg3<W>,
+pub(super) struct Velocities<W: Width> {
+    pub v_i: Reg3<W>,
+    pub w_i: Reg3<W>,
+    pub v_j: Reg3<W>,
+    pub w_j: Reg3<W>,
 }
 
 /// The impulses of each contact, and how fast it closed against its constraint before they were found.
@@ -97,10 +129,37 @@ struct Impulses<W: Width> {
 
 impl<W: Width> Velocities<W> {
     #[inline(always)]
-    fn gather(batch: &Batch, row: impl Fn(u32) -> W::Value) -> Self {
-        let (v_i, w_i) = gather(&batch.i, &row);
-        let (v_j, w_j) = gather(&batch.j, &row);
+    pub fn gather(batch: &Batch, bodies: &SharedBodies<'_>) -> Self {
+        let (v_i, w_i) = gather(&batch.i, |body| bodies.load::<W>(body));
+        let (v_j, w_j) = gather(&batch.j, |body| bodies.load::<W>(body));
         Self { v_i, w_i, v_j, w_j }
+    }
+
+    #[inline(always)]
+    pub fn scatter(&self, batch: &Batch, bodies: &SharedBodies<'_>) {
+        scatter(&batch.i, bodies, self.v_i, self.w_i);
+        scatter(&batch.j, bodies, self.v_j, self.w_j);
+    }
+
+    /// Applies normal and tangential impulses.
+    #[inline(always)]
+    pub fn push(&mut self, law: &LawLanes, n: &Reg3<W>, normal: Reg<W>, tangential: Reg3<W>) {
+        let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
+        let force = n.scale(normal) + tangential;
+        let twist = n.cross(tangential).scale(Reg::splat(INVERSE_INERTIA));
+        self.v_i = self.v_i + force.scale(mass_i);
+        self.v_j = self.v_j - force.scale(mass_j);
+        self.w_i = self.w_i - twist.scale(mass_i);
+        self.w_j = self.w_j - twist.scale(mass_j);
+    }
+
+    /// Applies rolling impulses.
+    #[inline(always)]
+    pub fn roll(&mut self, law: &LawLanes, rolling: Reg3<W>) {
+        let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
+        let step = rolling.scale(Reg::splat(INVERSE_INERTIA));
+        self.w_i = self.w_i + step.scale(mass_i * Reg::load(&law.lever_i));
+        self.w_j = self.w_j - step.scale(mass_j * Reg::load(&law.lever_j));
     }
 }
 
@@ -118,21 +177,20 @@ impl<W: Width> Impulses<W> {
 
 /// Solves each contact of a batch against the present velocities and puts the new ones back.
 #[inline(always)]
-fn solve<W: Width>(
+fn solve_batch<W: Width>(
     batch: &mut Batch,
     law: &LawLanes,
     bias_t: Option<&Lanes3>,
     bodies: &SharedBodies<'_>,
     closing: &mut Reg<W>,
 ) {
-    let mut velocities = Velocities::<W>::gather(batch, |body| bodies.load::<W>(body));
+    let mut velocities = Velocities::<W>::gather(batch, bodies);
     let solved = local_solution(batch, law, bias_t, Impulses::load(batch), &mut velocities);
     *closing = closing.max(solved.closing);
     solved.n.store(&mut batch.lambda_n);
     solved.t.store(&mut batch.lambda_t);
     solved.r.store(&mut batch.lambda_r);
-    scatter(&batch.i, bodies, velocities.v_i, velocities.w_i);
-    scatter(&batch.j, bodies, velocities.v_j, velocities.w_j);
+    velocities.scatter(batch, bodies);
 }
 
 /// The exact solution of each contact of a batch by itself; updates the velocities to match.
@@ -145,10 +203,7 @@ fn local_solution<W: Width>(
     velocities: &mut Velocities<W>,
 ) -> Impulses<W> {
     let n = Reg3::load(&batch.normal);
-    let Velocities { mut v_i, mut w_i, mut v_j, mut w_j } = *velocities;
-    let inertia = Reg::splat(INVERSE_INERTIA);
-    let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
-    let (lever_i, lever_j) = (Reg::load(&law.lever_i), Reg::load(&law.lever_j));
+    let Velocities { v_i, w_i, v_j, w_j } = *velocities;
     let compliance_n = Reg::load(&law.compliance_n);
     let compliance_t = compliance_n * Reg::splat(1.0 / TANGENTIAL_INERTIA);
 
@@ -165,28 +220,24 @@ fn local_solution<W: Width>(
     let limit = Reg::load(&law.sliding_friction) * lambda_n;
     let lambda_t = project_ball(old.t - u_t.scale(compliance_t), limit);
 
-    let step_t = lambda_t - old.t;
-    let force = n.scale(lambda_n - old.n) + step_t;
-    let twist = n.cross(step_t).scale(inertia);
-    v_i = v_i + force.scale(mass_i);
-    v_j = v_j - force.scale(mass_j);
-    w_i = w_i - twist.scale(mass_i);
-    w_j = w_j - twist.scale(mass_j);
+    velocities.push(law, &n, lambda_n - old.n, lambda_t - old.t);
 
     // At a wall the tangential impulse has just changed the rolling velocity: take it afresh.
-    let rho = w_i.scale(lever_i) - w_j.scale(lever_j);
+    let Velocities { w_i, w_j, .. } = *velocities;
+    let rho = w_i.scale(Reg::load(&law.lever_i)) - w_j.scale(Reg::load(&law.lever_j));
     let limit = Reg::load(&law.rolling_friction) * lambda_n;
     let lambda_r = project_ball(old.r - rho.scale(Reg::load(&law.compliance_r)), limit);
-    let step_r = (lambda_r - old.r).scale(inertia);
-    w_i = w_i + step_r.scale(mass_i * lever_i);
-    w_j = w_j - step_r.scale(mass_j * lever_j);
-
-    *velocities = Velocities { v_i, w_i, v_j, w_j };
+    velocities.roll(law, lambda_r - old.r);
     Impulses { closing, n: lambda_n, t: lambda_t, r: lambda_r }
 }
 
 #[inline(always)]
-fn scatter<W: Width>(index: &[u32; LANES], bodies: &SharedBodies<'_>, v: Reg3<W>, w: Reg3<W>) {
+pub(super) fn scatter<W: Width>(
+    index: &[u32; LANES],
+    bodies: &SharedBodies<'_>,
+    v: Reg3<W>,
+    w: Reg3<W>,
+) {
     let zero = W::splat(0.0);
     let rows = W::transpose([v.x.0, v.y.0, v.z.0, zero, w.x.0, w.y.0, w.z.0, zero]);
     for lane in 0..LANES {
@@ -202,9 +253,28 @@ pub(crate) struct ResidualSums {
 }
 
 impl ResidualSums {
+    /// The sums over the contacts of all sets.
+    pub fn of(sets: &[&mut ContactSet], bodies: &mut [Body]) -> Self {
+        let mut sums = Self::default();
+        for set in sets {
+            sums.add(set, bodies);
+        }
+        sums
+    }
+
     /// Adds the contacts of `set`: how far its own exact solution would still move each impulse.
-    pub fn add(&mut self, set: &ContactSet, bodies: &[Body]) {
+    pub fn add(&mut self, set: &ContactSet, bodies: &mut [Body]) {
         residual_lanes(set, bodies, &mut self.squares, &mut self.impulses);
+    }
+
+    /// Sum of the squares of the residual `[m^2/s^2]`.
+    pub fn squares(&self) -> f64 {
+        self.squares
+    }
+
+    /// Whether the relative residual is at most `bound`; true without any impulse.
+    pub fn is_below(&self, bound: f64) -> bool {
+        self.squares <= bound * bound * self.impulses
     }
 
     /// Root mean square of the residual over that of the normal impulses; 0 without any impulse.
@@ -216,15 +286,15 @@ impl ResidualSums {
 widest! {
     fn residual_lanes<W>(
         set: &ContactSet,
-        bodies: &[Body],
+        bodies: &mut [Body],
         squares: &mut f64,
         impulses: &mut f64,
     ) {
+        let bodies = SharedBodies::new(bodies);
         for (number, batch) in set.batches.iter().enumerate() {
             let law = &set.laws[batch.law as usize];
             let old = Impulses::<W>::load(batch);
-            let row = |body: u32| W::load(bodies[body as usize].row());
-            let mut velocities = Velocities::gather(batch, row);
+            let mut velocities = Velocities::gather(batch, &bodies);
             let new = local_solution(batch, law, set.bias_t.get(number), old, &mut velocities);
             let (n, t, r) = (new.n - old.n, new.t - old.t, new.r - old.r);
             let (mut square, mut impulse) = (Lanes::ZERO, Lanes::ZERO);
