@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::DemError;
+use crate::assemble::Seen;
 use crate::bed::Bed;
 use crate::contacts::{Contacts, Surroundings};
 use crate::health::{Health, HealthWatch};
@@ -13,7 +14,8 @@ use crate::impact::Impacts;
 use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
 use crate::scene::{CameraSpec, EndRule, Scene};
-use crate::solver::nsgs;
+use crate::solver::frozen::FrozenSolve;
+use crate::solver::{self, nsgs};
 use crate::wall_load::{self, WallLoad};
 
 /// Examinations between two looks at the residual, which costs about a sweep.
@@ -207,17 +209,19 @@ impl Simulation {
         }
     }
 
+    /// The contact problem that the coming substep has to solve, for studies of solvers; the simulation stays as
+    /// it is.
+    pub fn frozen_solve(&self) -> FrozenSolve {
+        let mut copy = self.clone();
+        copy.assemble();
+        let Contacts { pairs, at_walls, .. } = copy.contacts;
+        FrozenSolve::new([pairs, at_walls], copy.bed, self.around.radius)
+    }
+
     /// One substep.
     fn step(&mut self) {
         let SolverSettings { dt, list_period, .. } = self.around.settings;
-        let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
-        contacts.follow(bed, around);
-        bed.accelerate(&around.gravity, dt);
-        let seen = contacts.assemble(bed, around, self.watch.lost_mut(), &mut self.impacts);
-        if self.impacts.resolve(bed, contacts, around) > 0 {
-            contacts.assemble_again(bed, around);
-            bed.rewind();
-        }
+        let seen = self.assemble();
         self.solve();
         self.bed.move_on(dt);
         self.watch.see_penetration(seen.penetration);
@@ -227,21 +231,33 @@ impl Simulation {
         }
     }
 
+    /// Lists and assembles the contacts, lets gravity act and resolves the impacts.
+    fn assemble(&mut self) -> Seen {
+        let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
+        contacts.follow(bed, around);
+        bed.accelerate(&around.gravity, around.settings.dt);
+        let seen = contacts.assemble(bed, around, self.watch.lost_mut(), &mut self.impacts);
+        if self.impacts.resolve(bed, contacts, around) > 0 {
+            contacts.assemble_again(bed, around);
+            bed.rewind();
+        }
+        seen
+    }
+
     /// Solves the lasting contacts.
     fn solve(&mut self) {
         let Contacts { pairs, at_walls, .. } = &mut self.contacts;
         let (bodies, pool) = (&mut self.bed.bodies, self.pool.as_deref());
         let (settings, radius) = (&self.around.settings, self.around.radius);
-        let sweeps = nsgs::solve(&mut [pairs, at_walls], bodies, settings, radius, pool);
-        self.watch.see_sweeps(sweeps);
+        let work = solver::solve(&mut [pairs, at_walls], bodies, settings, radius, pool);
+        self.watch.see_solve(&work);
     }
 
     /// Looks at the state between two searches: health and the end rule.
     fn examine(&mut self) {
         if self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period) {
-            let mut residual = nsgs::ResidualSums::default();
-            residual.add(&self.contacts.pairs, &mut self.bed.bodies);
-            residual.add(&self.contacts.at_walls, &mut self.bed.bodies);
+            let Contacts { pairs, at_walls, .. } = &mut self.contacts;
+            let residual = nsgs::ResidualSums::of(&[pairs, at_walls], &mut self.bed.bodies);
             self.watch.see_residual(residual.relative());
         }
         self.watch.see_contacts(self.contacts.count());

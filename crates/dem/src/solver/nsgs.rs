@@ -22,6 +22,7 @@ use crate::contact::{Batch, ContactSet, LawLanes};
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Width, each, widest};
 use crate::law::{TANGENTIAL_INERTIA, project_ball};
 use crate::preset::SolverSettings;
+use crate::solver::Work;
 
 /// Batches of a colour below which a second thread costs more than it brings.
 const PARALLEL_BATCHES: usize = 512;
@@ -43,52 +44,68 @@ impl Progress {
     }
 }
 
-/// Sweeps over all contacts, from the impulses that they carry: at least `settings.sweeps` times unless the
-/// impulses have settled, and until none closes too fast, but no more than `settings.max_sweeps` times.
-/// Returns the number of sweeps.
-pub(crate) fn solve(
+/// Sweeps over all contacts: at least `settings.sweeps` times unless the impulses have settled, and until none
+/// closes too fast, but no more than `settings.max_sweeps` times.
+pub(super) fn solve(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
     settings: &SolverSettings,
     radius: f64,
     pool: Option<&ThreadPool>,
-) -> usize {
+) -> Work {
     let too_fast = settings.closing * radius / settings.dt;
     let settled = settings.settled * radius / settings.dt;
-    for set in sets.iter_mut() {
-        warm_start(set, bodies, pool);
-    }
+    let mut work = Work::default();
     for sweeps in 1..settings.max_sweeps {
-        let Progress { closing, change } = sets
-            .iter_mut()
-            .map(|set| sweep(set, bodies, pool))
-            .fold(Progress::default(), Progress::max);
+        let Progress { closing, change } = sweep(sets, bodies, State::OnCones, pool);
+        work = Work { sweeps, closing, ..work };
         if closing <= too_fast && (sweeps >= settings.sweeps || change <= settled) {
-            return sweeps;
+            return work;
         }
     }
-    settings.max_sweeps
+    Work { sweeps: settings.max_sweeps, unconverged: work.closing > too_fast, ..work }
 }
 
-/// One sweep over the batches in their order; the batches of a colour share no grain and may go to the
-/// threads of `pool` in any order without changing a bit.
-fn sweep(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) -> Progress {
-    let kernel = if set.is_at_walls() { sweep_walls } else { sweep_pairs };
-    for_each_colour(set, bodies, pool, kernel)
+/// What a sweep may take for granted of the impulses that it finds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// Each lies on its cones: without a normal impulse there is none.
+    OnCones,
+    /// Nothing: steps of other methods leave the cones, and the sweep puts everything back on them.
+    Anywhere,
 }
 
-/// Adds what the impulses that the contacts carry do to the velocities: the warm start.
-fn warm_start(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) {
+/// One sweep over the sets in their order.
+pub(super) fn sweep(
+    sets: &mut [&mut ContactSet],
+    bodies: &mut [Body],
+    state: State,
+    pool: Option<&ThreadPool>,
+) -> Progress {
+    let mut worst = Progress::default();
+    for set in sets {
+        let kernel = if set.is_at_walls() { sweep_walls } else { sweep_pairs };
+        let sweep = |batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>| {
+            kernel(batches, laws, bodies, state)
+        };
+        worst = worst.max(for_each_colour(set, bodies, pool, sweep));
+    }
+    worst
+}
+
+/// Adds what the impulses that the contacts of a set carry do to the velocities: the warm start.
+pub(super) fn warm_start(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) {
     let kernel = if set.is_at_walls() { apply_walls } else { apply_pairs };
     for_each_colour(set, bodies, pool, kernel);
 }
 
-/// Calls `kernel` for the batches of every colour, in parts; returns the worst of its values.
+/// Calls `kernel` for the batches of every colour, in parts; returns the worst of its values. The batches of a
+/// colour share no grain and may go to the threads of `pool` in any order without changing a bit.
 fn for_each_colour(
     set: &mut ContactSet,
     bodies: &mut [Body],
     pool: Option<&ThreadPool>,
-    kernel: fn(&mut [Batch], &[LawLanes], &SharedBodies<'_>) -> Progress,
+    kernel: impl Fn(&mut [Batch], &[LawLanes], &SharedBodies<'_>) -> Progress + Sync,
 ) -> Progress {
     // The kernels index the bodies without looking: the indices were made for as many.
     assert_eq!(set.grains() + 1, bodies.len());
@@ -112,14 +129,24 @@ fn for_each_colour(
 }
 
 widest! {
-    fn sweep_pairs<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> Progress {
-        sweep_batches::<W, false>(batches, laws, bodies)
+    fn sweep_pairs<W>(
+        batches: &mut [Batch],
+        laws: &[LawLanes],
+        bodies: &SharedBodies<'_>,
+        state: State,
+    ) -> Progress {
+        sweep_batches::<W, false>(batches, laws, bodies, state)
     }
 }
 
 widest! {
-    fn sweep_walls<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> Progress {
-        sweep_batches::<W, true>(batches, laws, bodies)
+    fn sweep_walls<W>(
+        batches: &mut [Batch],
+        laws: &[LawLanes],
+        bodies: &SharedBodies<'_>,
+        state: State,
+    ) -> Progress {
+        sweep_batches::<W, true>(batches, laws, bodies, state)
     }
 }
 
@@ -129,11 +156,12 @@ fn sweep_batches<W: Width, const AT_WALLS: bool>(
     batches: &mut [Batch],
     laws: &[LawLanes],
     bodies: &SharedBodies<'_>,
+    state: State,
 ) -> Progress {
     let (mut closing, mut square) = (Reg::<W>::splat(0.0), Reg::<W>::splat(0.0));
     for batch in batches {
         let law = &laws[batch.law as usize];
-        solve_batch::<W, AT_WALLS>(batch, law, bodies, &mut closing, &mut square);
+        solve_batch::<W, AT_WALLS>(batch, law, bodies, state, &mut closing, &mut square);
     }
     Progress { closing: largest(closing), change: largest(square).sqrt() }
 }
@@ -182,11 +210,11 @@ fn apply_batches<W: Width, const AT_WALLS: bool>(
 
 /// Velocities of both grains of each contact.
 #[derive(Clone, Copy)]
-struct Velocities<W: Width> {
-    v_i: Reg3<W>,
-    w_i: Reg3<W>,
-    v_j: Reg3<W>,
-    w_j: Reg3<W>,
+pub(super) struct Velocities<W: Width> {
+    pub v_i: Reg3<W>,
+    pub w_i: Reg3<W>,
+    pub v_j: Reg3<W>,
+    pub w_j: Reg3<W>,
 }
 
 /// The impulses of each contact.
@@ -200,7 +228,7 @@ struct Impulses<W: Width> {
 impl<W: Width> Velocities<W> {
     #[inline(always)]
     #[allow(unsafe_code)]
-    fn gather<const AT_WALLS: bool>(batch: &Batch, bodies: &SharedBodies<'_>) -> Self {
+    pub fn gather<const AT_WALLS: bool>(batch: &Batch, bodies: &SharedBodies<'_>) -> Self {
         // SAFETY: the indices are in bounds (`for_each_colour`), and a body is another batch's only if it rests.
         let body = |body| unsafe { bodies.load::<W>(body) };
         let [v_i, w_i] = pairs(each(&batch.i, body));
@@ -210,7 +238,7 @@ impl<W: Width> Velocities<W> {
     }
 
     #[inline(always)]
-    fn scatter<const AT_WALLS: bool>(&self, batch: &Batch, bodies: &SharedBodies<'_>) {
+    pub fn scatter<const AT_WALLS: bool>(&self, batch: &Batch, bodies: &SharedBodies<'_>) {
         scatter(batch.used, &batch.i, bodies, self.v_i, self.w_i);
         if !AT_WALLS {
             scatter(batch.used, &batch.j, bodies, self.v_j, self.w_j);
@@ -219,7 +247,7 @@ impl<W: Width> Velocities<W> {
 
     /// Applies normal and tangential impulses.
     #[inline(always)]
-    fn push(&mut self, law: &LawLanes, n: &Reg3<W>, normal: Reg<W>, tangential: Reg3<W>) {
+    pub fn push(&mut self, law: &LawLanes, n: &Reg3<W>, normal: Reg<W>, tangential: Reg3<W>) {
         let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
         let force = n.scale(normal) + tangential;
         let twist = n.cross(tangential).scale(Reg::splat(INVERSE_INERTIA));
@@ -231,7 +259,7 @@ impl<W: Width> Velocities<W> {
 
     /// Applies rolling impulses.
     #[inline(always)]
-    fn roll(&mut self, law: &LawLanes, rolling: Reg3<W>) {
+    pub fn roll(&mut self, law: &LawLanes, rolling: Reg3<W>) {
         let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
         let step = rolling.scale(Reg::splat(INVERSE_INERTIA));
         self.w_i = self.w_i + step.scale(mass_i * Reg::load(&law.lever_i));
@@ -270,6 +298,7 @@ fn solve_batch<W: Width, const AT_WALLS: bool>(
     batch: &mut Batch,
     law: &LawLanes,
     bodies: &SharedBodies<'_>,
+    state: State,
     fastest: &mut Reg<W>,
     largest_square: &mut Reg<W>,
 ) {
@@ -278,7 +307,8 @@ fn solve_batch<W: Width, const AT_WALLS: bool>(
     let closing = closing(batch, &velocities);
     // A batch without impulses that stays open is left as it is.
     let zero = Reg::<W>::splat(0.0);
-    if W::less_bits(zero.0, old.n.0) | W::less_bits(zero.0, closing.0) == 0 {
+    let acting = W::less_bits(zero.0, old.n.0) | W::less_bits(zero.0, closing.0);
+    if acting == 0 && state == State::OnCones {
         return;
     }
     let new = local_solution(batch, law, closing, old, &mut velocities);
@@ -375,9 +405,24 @@ pub(crate) struct ResidualSums {
 }
 
 impl ResidualSums {
-    /// Adds the contacts of `set`: how far its own exact solution would still move each impulse.
-    pub fn add(&mut self, set: &ContactSet, bodies: &mut [Body]) {
-        residual_lanes(set, bodies, &mut self.squares, &mut self.impulses);
+    /// The sums over the contacts of all sets.
+    pub fn of(sets: &[&mut ContactSet], bodies: &mut [Body]) -> Self {
+        let mut sums = Self::default();
+        for set in sets {
+            residual_lanes(set, bodies, &mut sums.squares, &mut sums.impulses);
+        }
+        sums
+    }
+
+    /// Sum of the squares of the residual, how far its own exact solution would still move each impulse
+    /// `[m^2/s^2]`.
+    pub fn squares(&self) -> f64 {
+        self.squares
+    }
+
+    /// Whether the relative residual is at most `bound`; true without any impulse.
+    pub fn is_below(&self, bound: f64) -> bool {
+        self.squares <= bound * bound * self.impulses
     }
 
     /// Root mean square of the residual over that of the normal impulses; 0 without any impulse.
