@@ -62,11 +62,13 @@ fn a_stack_of_twenty_stands_still() {
 fn enough_sweeps_hold_a_stack_of_twenty() {
     for preset in [Preset::Fast, Preset::Default] {
         for e in [0.0, 0.5] {
-            let settings = SolverSettings { sweeps: 60, max_sweeps: 60, ..preset.settings() };
+            let preset_settings = preset.settings();
+            let settings =
+                SolverSettings { sweeps: 60, max_sweeps: 60, settled: 1e-14, ..preset_settings };
             let upright = stack(preset, e, 0.0).with_settings(settings).expect("valid settings");
             let (fastest, farthest) = jitter(upright);
             println!("{preset}, e {e}, 60 sweeps: {fastest:.1e} m/s, {farthest:.1e} m in 3 s");
-            assert!(fastest < 1e-9 && farthest < 1e-9 * RADIUS, "{preset}: {fastest} {farthest}");
+            assert!(fastest < 1e-6 && farthest < 1e-6 * RADIUS, "{preset}: {fastest} {farthest}");
             // Askew by a micrometre it leans on, by what the sweeps leave of the rolling resistance: slowly.
             let mut askew = stack(preset, e, 1e-6).with_settings(settings).expect("valid settings");
             askew.advance(1.0);

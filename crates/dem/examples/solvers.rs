@@ -1,6 +1,7 @@
 //! Residual against cost of the three solver methods, on frozen substeps of the paper's funnel.
 //!
 //!     cargo run --release -p granulcal-dem --example solvers
+//!     cargo run --release -p granulcal-dem --example solvers -- pours    # whole pours
 //!
 //! Prints the tables of docs/theory/solvers.md. A pour of 2000 grains is simulated with Gauss-Seidel sweeps to 0.3 s
 //! (the funnel is full) and to 0.6 s (the pile grows); the contact problem of the next substep is then solved by each
@@ -10,9 +11,10 @@ use std::time::Duration;
 
 use cpu_time::ThreadTime;
 use granulcal_dem::{
-    Complementarity, DemError, FrozenSolution, FrozenSolve, Material, Method, NewtonSettings,
-    Preset, ReferenceSettings, Scene, Simulation, SolverSettings,
+    Complementarity, DemError, FrozenSolution, FrozenSolve, Health, Material, Method,
+    NewtonSettings, Preset, ReferenceSettings, Scene, Simulation, SolverSettings,
 };
+use nalgebra::Vector3;
 
 /// Times at which a substep is frozen `[s]`.
 const TIMES: [f64; 2] = [0.3, 0.6];
@@ -20,8 +22,53 @@ const TIMES: [f64; 2] = [0.3, 0.6];
 const REPETITIONS: usize = 5;
 
 fn main() -> Result<(), DemError> {
+    if std::env::args().any(|argument| argument == "pours") {
+        return pours();
+    }
     for dt in [1.0 / 600.0, 1.0 / 2400.0] {
         table(dt)?;
+    }
+    Ok(())
+}
+
+/// Prints the table of whole pours through the funnel, to rest.
+fn pours() -> Result<(), DemError> {
+    println!(
+        "| mu_s, mu_r, e | settings | mean z mm | mean r mm | CPU s | worst penetration / R | mean residual | guarded | energy created | lost |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    for [mu_s, mu_r, e] in [[0.5, 0.2, 0.5], [0.8, 0.2, 0.77], [0.3, 0.2, 0.1]] {
+        let paper = Preset::Paper.settings();
+        let settings = [
+            ("`default`", Preset::Default.settings()),
+            ("`paper`", paper),
+            ("`paper` by nsgs, 40 sweeps", gauss_seidel(40, paper)),
+        ];
+        for (name, settings) in settings {
+            let material = Material::new(mu_s, mu_r, e)?;
+            let scene = Scene { material, ..Scene::funnel(0.12) };
+            let start = ThreadTime::now();
+            let pour = Simulation::new(&scene, 1)?.with_settings(settings)?.run();
+            let seconds = start.elapsed().as_secs_f64();
+            let count = pour.positions.len() as f64;
+            let mean = |of: &dyn Fn(&Vector3<f64>) -> f64| {
+                1e3 * pour.positions.iter().map(of).sum::<f64>() / count
+            };
+            let (z, r) = (mean(&|at| at.z), mean(&|at| at.x.hypot(at.y)));
+            let Health {
+                worst_penetration,
+                mean_residual,
+                guarded,
+                substeps,
+                energy_created,
+                grains_lost,
+                ..
+            } = pour.health;
+            println!(
+                "| {mu_s}, {mu_r}, {e} | {name}: {} | {z:.2} | {r:.1} | {seconds:.1} | {worst_penetration:.2} | {mean_residual:.3} | {guarded} in {substeps} substeps | {energy_created:.1e} | {grains_lost} |",
+                pour.status
+            );
+        }
     }
     Ok(())
 }
@@ -59,8 +106,11 @@ fn table(dt: f64) -> Result<(), DemError> {
 /// The methods that are compared, by name.
 fn methods(base: SolverSettings) -> Vec<(String, SolverSettings)> {
     let mut methods = Vec::new();
-    for count in [5, 20, 80, 400, 2000] {
-        methods.push((format!("nsgs, {count} sweeps"), gauss_seidel(count, base)));
+    for relaxation in [1.0, 1.4] {
+        for count in [4, 20, 80, 400, 2000] {
+            let settings = SolverSettings { relaxation, ..gauss_seidel(count, base) };
+            methods.push((format!("nsgs, {relaxation}, {count} sweeps"), settings));
+        }
     }
     let equations = [
         ("Fischer-Burmeister", Complementarity::FischerBurmeister),

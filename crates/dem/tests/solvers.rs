@@ -12,12 +12,20 @@ use proptest::prelude::*;
 const EQUATIONS: [Complementarity; 2] =
     [Complementarity::FischerBurmeister, Complementarity::MinMap];
 
-/// Exactly so many Gauss-Seidel sweeps.
+/// Exactly so many Gauss-Seidel sweeps, plain ones: those over-relaxed by 1.4 end in a cycle (docs/theory/solvers.md).
 fn gauss_seidel(sweeps: usize) -> SolverSettings {
     let (settled, closing) = (f64::MIN_POSITIVE, f64::MAX);
     let base = Preset::Paper.settings();
     let max_sweeps = sweeps + 1;
-    SolverSettings { method: Method::Nsgs, sweeps, settled, max_sweeps, closing, ..base }
+    SolverSettings {
+        method: Method::Nsgs,
+        sweeps,
+        relaxation: 1.0,
+        settled,
+        max_sweeps,
+        closing,
+        ..base
+    }
 }
 
 fn newton(outer: usize, inner: usize, complementarity: Complementarity) -> SolverSettings {
@@ -102,15 +110,15 @@ fn the_methods_agree_on_a_heap() {
     let problem = heap();
     assert!(problem.contact_count() > 100, "{}", problem.contact_count());
     let exact = solve(&problem, &reference(1e-10));
-    // Measured 4.7e-3, 1.3e-10, 7.9e-7, 4.1e-2, 3.0e-2, 6.0e-5 and 4.6e-5.
+    // Measured 4.0e-4, 7.3e-11, 8.4e-7, 6.5e-3, 8.1e-3, 7.1e-6 and 6.9e-6.
     let cases = [
-        (gauss_seidel(20), 1e-2),
+        (gauss_seidel(20), 2e-3),
         (gauss_seidel(20_000), 1e-8),
         (reference(1e-6), 2e-5),
-        (newton(4, 20, Complementarity::FischerBurmeister), 0.1),
-        (newton(4, 20, Complementarity::MinMap), 0.1),
-        (newton(200, 20, Complementarity::FischerBurmeister), 1e-3),
-        (newton(200, 20, Complementarity::MinMap), 1e-3),
+        (newton(4, 20, Complementarity::FischerBurmeister), 0.04),
+        (newton(4, 20, Complementarity::MinMap), 0.04),
+        (newton(200, 20, Complementarity::FischerBurmeister), 1e-4),
+        (newton(200, 20, Complementarity::MinMap), 1e-4),
     ];
     for (settings, tolerance) in cases {
         let solution = solve(&problem, &settings);
@@ -142,7 +150,7 @@ fn conjugate_directions_save_sweeps() {
         "{} sweeps: {:.1e} against {:.1e}",
         solution.sweeps, solution.residual, sweeps.residual
     );
-    // Measured: 256 sweeps leave 9e-9 with and 1.5e-5 without.
+    // Measured: 9336 sweeps leave 9e-9 with and 3.6e-6 without.
     assert!(sweeps.residual > 100.0 * solution.residual, "{}", sweeps.residual);
 }
 
@@ -185,11 +193,11 @@ proptest! {
             let drop = small_drop(grains, newton(4, 20, complementarity), seed);
             let finite = |vectors: &[Vector3<f64>]| vectors.iter().all(|v| v.iter().all(|c| c.is_finite()));
             prop_assert!(finite(&drop.positions()) && finite(&drop.velocities()));
-            // Falling 5 cm gives 1 m/s.
+            // Falling 5 cm gives 1 m/s. Of 800 pours the fastest had 1.5 m/s, the worst had created 6e-7.
             let fastest = drop.velocities().iter().map(Vector3::norm).fold(0.0, f64::max);
             let health = drop.health();
-            prop_assert!(fastest < 3.0, "{fastest} {health:?}");
-            prop_assert!(health.energy_created < 0.05, "{complementarity:?} {health:?}");
+            prop_assert!(fastest < 2.0, "{fastest} {health:?}");
+            prop_assert!(health.energy_created < 1e-4, "{complementarity:?} {health:?}");
             prop_assert!(health.grains_lost == 0);
         }
     }

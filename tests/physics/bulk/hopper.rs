@@ -19,7 +19,7 @@ pub const C: f64 = 0.58;
 pub const K: f64 = 1.4;
 
 /// Share of the grains that has left when the rate is taken from, and up to.
-const WINDOW: (f64, f64) = (0.05, 0.35);
+const WINDOW: (f64, f64) = (0.05, 0.25);
 /// Time between two counts `[s]`.
 const SAMPLE: f64 = 2e-3;
 /// Time without a grain after which the hole is jammed `[s]`.

@@ -56,37 +56,52 @@ pub(super) fn solve(
     let too_fast = settings.closing * radius / settings.dt;
     let settled = settings.settled * radius / settings.dt;
     let mut work = Work::default();
+    let mut has_settled = false;
     for sweeps in 1..settings.max_sweeps {
-        let Progress { closing, change } = sweep(sets, bodies, State::OnCones, pool);
+        // The last sweeps are plain ones: they leave a contact by itself exactly solved.
+        let is_enough = has_settled || sweeps >= settings.sweeps;
+        let relaxation = if is_enough { 1.0 } else { settings.relaxation };
+        let Progress { closing, change } = sweep(sets, bodies, Manner::relaxed(relaxation), pool);
         work = Work { sweeps, closing, ..work };
-        if closing <= too_fast && (sweeps >= settings.sweeps || change <= settled) {
+        if is_enough && closing <= too_fast {
             return work;
         }
+        has_settled = change <= settled;
     }
     Work { sweeps: settings.max_sweeps, unconverged: work.closing > too_fast, ..work }
 }
 
-/// What a sweep may take for granted of the impulses that it finds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum State {
-    /// Each lies on its cones: without a normal impulse there is none.
-    OnCones,
-    /// Nothing: steps of other methods leave the cones, and the sweep puts everything back on them.
-    Anywhere,
+/// How a sweep treats the contacts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Manner {
+    /// Over-relaxation `[-]`.
+    relaxation: f64,
+    /// Whether a batch that stays open is passed over.
+    passes_over: bool,
+}
+
+impl Manner {
+    /// Exact local solutions, from impulses that the steps of another method may have taken off their cones.
+    pub const EXACT: Self = Self { relaxation: 1.0, passes_over: false };
+
+    /// From impulses on their cones: where there is no normal impulse there is none.
+    fn relaxed(relaxation: f64) -> Self {
+        Self { relaxation, passes_over: true }
+    }
 }
 
 /// One sweep over the sets in their order.
 pub(super) fn sweep(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
-    state: State,
+    manner: Manner,
     pool: Option<&ThreadPool>,
 ) -> Progress {
     let mut worst = Progress::default();
     for set in sets {
         let kernel = if set.is_at_walls() { sweep_walls } else { sweep_pairs };
         let sweep = |batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>| {
-            kernel(batches, laws, bodies, state)
+            kernel(batches, laws, bodies, manner)
         };
         worst = worst.max(for_each_colour(set, bodies, pool, sweep));
     }
@@ -133,9 +148,9 @@ widest! {
         batches: &mut [Batch],
         laws: &[LawLanes],
         bodies: &SharedBodies<'_>,
-        state: State,
+        manner: Manner,
     ) -> Progress {
-        sweep_batches::<W, false>(batches, laws, bodies, state)
+        sweep_batches::<W, false>(batches, laws, bodies, manner)
     }
 }
 
@@ -144,9 +159,9 @@ widest! {
         batches: &mut [Batch],
         laws: &[LawLanes],
         bodies: &SharedBodies<'_>,
-        state: State,
+        manner: Manner,
     ) -> Progress {
-        sweep_batches::<W, true>(batches, laws, bodies, state)
+        sweep_batches::<W, true>(batches, laws, bodies, manner)
     }
 }
 
@@ -156,12 +171,12 @@ fn sweep_batches<W: Width, const AT_WALLS: bool>(
     batches: &mut [Batch],
     laws: &[LawLanes],
     bodies: &SharedBodies<'_>,
-    state: State,
+    manner: Manner,
 ) -> Progress {
     let (mut closing, mut square) = (Reg::<W>::splat(0.0), Reg::<W>::splat(0.0));
     for batch in batches {
         let law = &laws[batch.law as usize];
-        solve_batch::<W, AT_WALLS>(batch, law, bodies, state, &mut closing, &mut square);
+        solve_batch::<W, AT_WALLS>(batch, law, bodies, manner, &mut closing, &mut square);
     }
     Progress { closing: largest(closing), change: largest(square).sqrt() }
 }
@@ -298,7 +313,7 @@ fn solve_batch<W: Width, const AT_WALLS: bool>(
     batch: &mut Batch,
     law: &LawLanes,
     bodies: &SharedBodies<'_>,
-    state: State,
+    manner: Manner,
     fastest: &mut Reg<W>,
     largest_square: &mut Reg<W>,
 ) {
@@ -308,10 +323,11 @@ fn solve_batch<W: Width, const AT_WALLS: bool>(
     // A batch without impulses that stays open is left as it is.
     let zero = Reg::<W>::splat(0.0);
     let acting = W::less_bits(zero.0, old.n.0) | W::less_bits(zero.0, closing.0);
-    if acting == 0 && state == State::OnCones {
+    if acting == 0 && manner.passes_over {
         return;
     }
-    let new = local_solution(batch, law, closing, old, &mut velocities);
+    let relaxation = Reg::splat(manner.relaxation);
+    let new = local_solution(batch, law, closing, relaxation, old, &mut velocities);
     *fastest = fastest.max(closing);
     *largest_square = largest_square.max(new.square_of_change(&old));
     new.store(batch);
@@ -325,17 +341,19 @@ fn closing<W: Width>(batch: &Batch, velocities: &Velocities<W>) -> Reg<W> {
     Reg::splat(0.0) - (w_n + Reg::load(&batch.bias))
 }
 
-/// The exact solution of each contact of a batch by itself; updates the velocities to match.
+/// The exact solution of each contact of a batch by itself, or as much beyond it as `relaxation` exceeds 1,
+/// on the cones; updates the velocities to match.
 #[inline(always)]
 fn local_solution<W: Width>(
     batch: &Batch,
     law: &LawLanes,
     closing: Reg<W>,
+    relaxation: Reg<W>,
     old: Impulses<W>,
     velocities: &mut Velocities<W>,
 ) -> Impulses<W> {
     let n = Reg3::load(&batch.normal);
-    let compliance_n = Reg::load(&law.compliance_n);
+    let compliance_n = relaxation * Reg::load(&law.compliance_n);
     let compliance_t = compliance_n * Reg::splat(1.0 / TANGENTIAL_INERTIA);
     let lambda_n = (old.n + closing * compliance_n).max(Reg::splat(0.0));
 
@@ -349,7 +367,7 @@ fn local_solution<W: Width>(
     // At a wall the tangential impulse has just changed the rolling velocity: take it afresh.
     let Velocities { w_i, w_j, .. } = *velocities;
     let rho = w_i.scale(Reg::load(&law.lever_i)) - w_j.scale(Reg::load(&law.lever_j));
-    let wanted = old.r - rho.scale(Reg::load(&law.compliance_r));
+    let wanted = old.r - rho.scale(relaxation * Reg::load(&law.compliance_r));
     let about = n.dot(wanted);
     let limit = Reg::load(&law.rolling_friction) * lambda_n;
     let rolling = project_ball(wanted - n.scale(about), limit);
@@ -445,7 +463,8 @@ widest! {
             let old = Impulses::<W>::load(batch);
             let mut velocities = Velocities::gather::<false>(batch, &bodies);
             let closing = closing(batch, &velocities);
-            let new = local_solution(batch, law, closing, old, &mut velocities);
+            let one = Reg::splat(1.0);
+            let new = local_solution(batch, law, closing, one, old, &mut velocities);
             let (mut square, mut impulse) = (Lanes::ZERO, Lanes::ZERO);
             new.square_of_change(&old).store(&mut square);
             (old.n * old.n).store(&mut impulse);

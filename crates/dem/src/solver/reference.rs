@@ -19,7 +19,7 @@ use crate::solver::Work;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, dot, impulses, put_impulses, scale_and_add, spread,
 };
-use crate::solver::nsgs::{self, ResidualSums, State};
+use crate::solver::nsgs::{self, Manner, ResidualSums};
 
 /// Sweeps between two looks at the residual, which costs a sweep.
 const LOOK: usize = 8;
@@ -53,7 +53,7 @@ pub(super) fn solve(
     let mut work = Work { unconverged: true, ..Work::default() };
     let mut before = impulses(sets);
     loop {
-        work.closing = nsgs::sweep(sets, bodies, State::Anywhere, pool).closing;
+        work.closing = nsgs::sweep(sets, bodies, Manner::EXACT, pool).closing;
         work.sweeps += 1;
         let is_last = work.sweeps >= settings.max_sweeps;
         if (work.sweeps.is_multiple_of(LOOK) || is_last)

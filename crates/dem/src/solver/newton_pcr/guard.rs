@@ -12,7 +12,7 @@ use crate::contact::ContactSet;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, batches, collect, impulses, put_impulses, spread,
 };
-use crate::solver::nsgs::{self, ResidualSums, State};
+use crate::solver::nsgs::{self, Manner, ResidualSums};
 
 /// Shares of a step that are tried in turn.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
@@ -92,7 +92,7 @@ impl<'a> Guard<'a> {
     }
 
     fn sweep(&mut self, sets: &mut [&mut ContactSet], bodies: &mut [Body]) {
-        nsgs::sweep(sets, bodies, State::Anywhere, self.pool);
+        nsgs::sweep(sets, bodies, Manner::EXACT, self.pool);
         self.merit = merit(sets, bodies);
         self.acted += 1;
         self.sweeps += 1;
