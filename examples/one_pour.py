@@ -9,7 +9,7 @@ def main() -> None:
     """Prints the statistics of a pour through the paper's funnel."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=2000, help="grains (default: %(default)s)")
-    parser.add_argument("--preset", default="fast", help="fast, default or accurate")
+    parser.add_argument("--preset", default="fast", help="fast, default, accurate or paper")
     options = parser.parse_args()
 
     material = gc.Material(sliding_friction=0.4, rolling_friction=0.1, restitution=0.5)

@@ -70,7 +70,7 @@ class Scene:
             height: height of the funnel's tip above the ground [m].
             count: number of grains, at most 2000 in this start; the default is 2000.
             material: the grains' material; the default is a middling dry grain.
-            preset: `fast`, `default` or `accurate`; the default is `default`.
+            preset: `fast`, `default`, `accurate` or `paper`; the default is `default`.
 
         Raises:
             ValueError: a number is out of its range; the message says which.
@@ -92,7 +92,7 @@ class Scene:
             height: height of the lowest point above the ground [m].
             count: number of grains; the default is 2000.
             material: the grains' material; the default is a middling dry grain.
-            preset: `fast`, `default` or `accurate`; the default is `default`.
+            preset: `fast`, `default`, `accurate` or `paper`; the default is `default`.
 
         Raises:
             ValueError: a number is out of its range; the message says which.

@@ -130,8 +130,8 @@ def simulate(
         scene: what is poured.
         material: the grains' material instead of the scene's.
         seed: seed of the start's jitter and of the camera's noise.
-        preset: `fast`, `default` or `accurate` instead of the scene's, which is `default` unless
-            the scene states another.
+        preset: `fast`, `default`, `accurate` or `paper` instead of the scene's, which is `default`
+            unless the scene states another.
         threads: threads that share this one pour. The bits stay the same; only scenes of some ten
             thousand grains gain from a second thread, and `generate` runs many pours at once.
 

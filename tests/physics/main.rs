@@ -16,4 +16,5 @@ mod restitution;
 mod robustness;
 mod rolling;
 mod scenes;
+mod solvers;
 mod stack;

@@ -105,7 +105,7 @@ def test_a_pour_outside_the_image_has_no_statistics(small_scene):
         ({"seed": -1}, ValueError, "seed must be at least 0, got -1"),
         ({"seed": 1.5}, TypeError, "seed must be a whole number, got 1.5"),
         ({"threads": 0}, ValueError, "threads must be at least 1, got 0"),
-        ({"preset": "slow"}, ValueError, "preset must be one of fast, default, accurate"),
+        ({"preset": "slow"}, ValueError, "preset must be one of fast, default, accurate, paper"),
     ],
 )
 def test_simulate_refuses_by_name(small_scene, options, error, message):

@@ -51,8 +51,14 @@ pub enum DemError {
     /// The operating system gave no threads.
     #[error("cannot start the threads for a simulation")]
     Threads(#[source] rayon::ThreadPoolBuildError),
+    /// A solver method that does not exist.
+    #[error("method must be one of nsgs, newton_pcr, reference, got {got:?}")]
+    UnknownMethod {
+        /// The name found.
+        got: String,
+    },
     /// A preset that does not exist.
-    #[error("preset must be one of fast, default, accurate, got {got:?}")]
+    #[error("preset must be one of fast, default, accurate, paper, got {got:?}")]
     UnknownPreset {
         /// The name found.
         got: String,

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::solver::Work;
+
 /// Numbers that tell whether a pour can be trusted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Health {
@@ -17,8 +19,12 @@ pub struct Health {
     pub grains_lost: usize,
     /// Substeps taken.
     pub substeps: usize,
-    /// Gauss-Seidel sweeps in all.
+    /// Passes over all contacts: Gauss-Seidel sweeps, or iterations of the linear solver.
     pub sweeps: usize,
+    /// Solves that used up their iterations before their contacts were as still as asked for.
+    pub unconverged: usize,
+    /// Newton steps that the guard has damped or replaced.
+    pub guarded: usize,
     /// Mean number of listed contacts in a substep.
     pub mean_contacts: f64,
 }
@@ -41,6 +47,8 @@ pub(crate) struct HealthWatch {
     lowest_energy: f64,
     created: f64,
     sweeps: usize,
+    unconverged: usize,
+    guarded: usize,
     lost: Vec<bool>,
 }
 
@@ -58,6 +66,8 @@ impl HealthWatch {
             lowest_energy: energy,
             created: 0.0,
             sweeps: 0,
+            unconverged: 0,
+            guarded: 0,
             lost: vec![false; grains],
         }
     }
@@ -77,8 +87,10 @@ impl HealthWatch {
         self.worst_residual = self.worst_residual.max(residual);
     }
 
-    pub fn see_sweeps(&mut self, sweeps: usize) {
-        self.sweeps += sweeps;
+    pub fn see_solve(&mut self, work: &Work) {
+        self.sweeps += work.sweeps;
+        self.unconverged += usize::from(work.unconverged);
+        self.guarded += work.guarded;
     }
 
     pub fn see_contacts(&mut self, contacts: usize) {
@@ -114,6 +126,8 @@ impl HealthWatch {
             grains_lost: self.lost.iter().filter(|&&lost| lost).count(),
             substeps,
             sweeps: self.sweeps,
+            unconverged: self.unconverged,
+            guarded: self.guarded,
             mean_contacts: mean(self.contacts_sum, self.contacts_samples),
         }
     }

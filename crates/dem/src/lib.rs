@@ -12,7 +12,7 @@
 //! # Ok::<(), granulcal_dem::DemError>(())
 //! ```
 //!
-//! Read [`Scene`], then [`Simulation`]; the law is in `law.rs`, the solver in `solver/nsgs.rs`.
+//! Read [`Scene`], then [`Simulation`]; the law is in `law.rs`, the solvers in `solver/`.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -61,4 +61,8 @@ pub use scene::{
     CameraSpec, EndRule, Funnel, GRAVITY, Grains, Ground, Projection, Scene, Shape, Start, Wall,
 };
 pub use simulation::Simulation;
+pub use solver::Method;
+pub use solver::frozen::{FrozenSolution, FrozenSolve};
+pub use solver::newton_pcr::{Complementarity, NewtonSettings};
+pub use solver::reference::ReferenceSettings;
 pub use wall_load::WallLoad;

@@ -15,7 +15,8 @@ use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
 use crate::problem::{ContactProblem, SWEEPS_A_LOOK};
 use crate::scene::{CameraSpec, EndRule, Scene};
-use crate::solver::nsgs;
+use crate::solver::frozen::FrozenSolve;
+use crate::solver::{self, nsgs};
 use crate::wall_load::{self, WallLoad};
 
 /// Examinations between two looks at the residual, which costs about a sweep.
@@ -239,6 +240,15 @@ impl Simulation {
         seen
     }
 
+    /// The contact problem that the coming substep has to solve, for studies of solvers; the simulation stays as
+    /// it is.
+    pub fn frozen_solve(&self) -> FrozenSolve {
+        let mut copy = self.clone();
+        copy.assemble();
+        let Contacts { pairs, at_walls, .. } = copy.contacts;
+        FrozenSolve::new([pairs, at_walls], copy.bed, self.around.radius)
+    }
+
     /// One substep.
     fn step(&mut self) {
         let seen = self.assemble();
@@ -256,16 +266,15 @@ impl Simulation {
         let Contacts { pairs, at_walls, .. } = &mut self.contacts;
         let (bodies, pool) = (&mut self.bed.bodies, self.pool.as_deref());
         let (settings, radius) = (&self.around.settings, self.around.radius);
-        let sweeps = nsgs::solve(&mut [pairs, at_walls], bodies, settings, radius, pool);
-        self.watch.see_sweeps(sweeps);
+        let work = solver::solve(&mut [pairs, at_walls], bodies, settings, radius, pool);
+        self.watch.see_solve(&work);
     }
 
     /// Looks at the state between two searches: health and the end rule.
     fn examine(&mut self) {
         if self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period) {
-            let mut residual = nsgs::ResidualSums::default();
-            residual.add(&self.contacts.pairs, &mut self.bed.bodies);
-            residual.add(&self.contacts.at_walls, &mut self.bed.bodies);
+            let Contacts { pairs, at_walls, .. } = &mut self.contacts;
+            let residual = nsgs::ResidualSums::of(&[pairs, at_walls], &mut self.bed.bodies);
             self.watch.see_residual(residual.relative());
         }
         self.watch.see_contacts(self.contacts.count());

@@ -91,6 +91,8 @@ impl Dataset {
         count("grains_lost", |row| row.health.grains_lost as u64)?;
         count("substeps", |row| row.health.substeps as u64)?;
         count("sweeps", |row| row.health.sweeps as u64)?;
+        count("unconverged", |row| row.health.unconverged as u64)?;
+        count("guarded", |row| row.health.guarded as u64)?;
         Ok(columns)
     }
 

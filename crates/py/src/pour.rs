@@ -54,6 +54,8 @@ impl Pour {
             grains_lost,
             substeps,
             sweeps,
+            unconverged,
+            guarded,
             mean_contacts,
         } = self.inner.health;
         let health = PyDict::new(py);
@@ -64,6 +66,8 @@ impl Pour {
         health.set_item("grains_lost", grains_lost)?;
         health.set_item("substeps", substeps)?;
         health.set_item("sweeps", sweeps)?;
+        health.set_item("unconverged", unconverged)?;
+        health.set_item("guarded", guarded)?;
         health.set_item("mean_contacts", mean_contacts)?;
         Ok(health)
     }

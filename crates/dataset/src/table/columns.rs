@@ -108,6 +108,12 @@ pub(super) fn columns(parameters: &[&str]) -> Vec<Column> {
             |r, v| r.health.grains_lost = v as usize,
         ),
         Column::count("sweeps", |r| r.health.sweeps as u64, |r, v| r.health.sweeps = v as usize),
+        Column::count(
+            "unconverged",
+            |r| r.health.unconverged as u64,
+            |r, v| r.health.unconverged = v as usize,
+        ),
+        Column::count("guarded", |r| r.health.guarded as u64, |r, v| r.health.guarded = v as usize),
         Column::number(
             "mean_contacts",
             |r| r.health.mean_contacts,

@@ -22,6 +22,7 @@ use crate::contact::{Batch, ContactSet, LawLanes};
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Width, each, widest};
 use crate::law::{TANGENTIAL_INERTIA, project_ball};
 use crate::preset::SolverSettings;
+use crate::solver::Work;
 
 /// Batches of a colour below which a second thread costs more than it brings.
 const PARALLEL_BATCHES: usize = 512;
@@ -43,68 +44,85 @@ impl Progress {
     }
 }
 
-/// Sweeps over all contacts, from the impulses that they carry: at least `settings.sweeps` times unless the
-/// impulses have settled, and until none closes too fast, but no more than `settings.max_sweeps` times.
-/// Returns the number of sweeps.
-pub(crate) fn solve(
+/// Sweeps over all contacts: at least `settings.sweeps` times unless the impulses have settled, and until none
+/// closes too fast, but no more than `settings.max_sweeps` times.
+pub(super) fn solve(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
     settings: &SolverSettings,
     radius: f64,
     pool: Option<&ThreadPool>,
-) -> usize {
+) -> Work {
     let too_fast = settings.closing * radius / settings.dt;
     let settled = settings.settled * radius / settings.dt;
-    for set in sets.iter_mut() {
-        warm_start(set, bodies, pool);
-    }
+    let mut work = Work::default();
     let mut has_settled = false;
     for sweeps in 1..settings.max_sweeps {
         // The last sweeps are plain ones: they leave a contact by itself exactly solved.
         let is_enough = has_settled || sweeps >= settings.sweeps;
         let relaxation = if is_enough { 1.0 } else { settings.relaxation };
-        let Progress { closing, change } = sets
-            .iter_mut()
-            .map(|set| sweep(set, bodies, relaxation, pool))
-            .fold(Progress::default(), Progress::max);
+        let Progress { closing, change } = sweep(sets, bodies, Manner::relaxed(relaxation), pool);
+        work = Work { sweeps, closing, ..work };
         if is_enough && closing <= too_fast {
-            return sweeps;
+            return work;
         }
         has_settled = change <= settled;
     }
-    settings.max_sweeps
+    Work { sweeps: settings.max_sweeps, unconverged: work.closing > too_fast, ..work }
 }
 
 /// Sweeps `count` times, from velocities that contain the impulses.
 pub(crate) fn sweep_plainly(sets: &mut [&mut ContactSet], bodies: &mut [Body], count: usize) {
     for _ in 0..count {
-        for set in sets.iter_mut() {
-            sweep(set, bodies, 1.0, None);
-        }
+        sweep(sets, bodies, Manner::relaxed(1.0), None);
     }
 }
 
-/// One sweep over the batches in their order; the batches of a colour share no grain and may go to the
-/// threads of `pool` in any order without changing a bit.
-fn sweep(
-    set: &mut ContactSet,
-    bodies: &mut [Body],
+/// How a sweep treats the contacts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Manner {
+    /// Over-relaxation `[-]`.
     relaxation: f64,
-    pool: Option<&ThreadPool>,
-) -> Progress {
-    let kernel = if set.is_at_walls() { sweep_walls } else { sweep_pairs };
-    for_each_colour(set, bodies, pool, |batches, laws, bodies| {
-        kernel(batches, laws, bodies, relaxation)
-    })
+    /// Whether a batch that stays open is passed over.
+    passes_over: bool,
 }
 
-/// Adds what the impulses that the contacts carry do to the velocities: the warm start.
-fn warm_start(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) {
+impl Manner {
+    /// Exact local solutions, from impulses that the steps of another method may have taken off their cones.
+    pub const EXACT: Self = Self { relaxation: 1.0, passes_over: false };
+
+    /// From impulses on their cones: where there is no normal impulse there is none.
+    fn relaxed(relaxation: f64) -> Self {
+        Self { relaxation, passes_over: true }
+    }
+}
+
+/// One sweep over the sets in their order.
+pub(super) fn sweep(
+    sets: &mut [&mut ContactSet],
+    bodies: &mut [Body],
+    manner: Manner,
+    pool: Option<&ThreadPool>,
+) -> Progress {
+    let mut worst = Progress::default();
+    for set in sets {
+        let kernel = if set.is_at_walls() { sweep_walls } else { sweep_pairs };
+        let sweep = |batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>| {
+            kernel(batches, laws, bodies, manner)
+        };
+        worst = worst.max(for_each_colour(set, bodies, pool, sweep));
+    }
+    worst
+}
+
+/// Adds what the impulses that the contacts of a set carry do to the velocities: the warm start.
+pub(super) fn warm_start(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) {
     let kernel = if set.is_at_walls() { apply_walls } else { apply_pairs };
     for_each_colour(set, bodies, pool, kernel);
 }
 
-/// Calls `kernel` for the batches of every colour, in parts; returns the worst of its values.
+/// Calls `kernel` for the batches of every colour, in parts; returns the worst of its values. The batches of a
+/// colour share no grain and may go to the threads of `pool` in any order without changing a bit.
 fn for_each_colour(
     set: &mut ContactSet,
     bodies: &mut [Body],
@@ -137,9 +155,9 @@ widest! {
         batches: &mut [Batch],
         laws: &[LawLanes],
         bodies: &SharedBodies<'_>,
-        relaxation: f64,
+        manner: Manner,
     ) -> Progress {
-        sweep_batches::<W, false>(batches, laws, bodies, relaxation)
+        sweep_batches::<W, false>(batches, laws, bodies, manner)
     }
 }
 
@@ -148,9 +166,9 @@ widest! {
         batches: &mut [Batch],
         laws: &[LawLanes],
         bodies: &SharedBodies<'_>,
-        relaxation: f64,
+        manner: Manner,
     ) -> Progress {
-        sweep_batches::<W, true>(batches, laws, bodies, relaxation)
+        sweep_batches::<W, true>(batches, laws, bodies, manner)
     }
 }
 
@@ -160,13 +178,12 @@ fn sweep_batches<W: Width, const AT_WALLS: bool>(
     batches: &mut [Batch],
     laws: &[LawLanes],
     bodies: &SharedBodies<'_>,
-    relaxation: f64,
+    manner: Manner,
 ) -> Progress {
-    let relaxation = Reg::splat(relaxation);
     let (mut closing, mut square) = (Reg::<W>::splat(0.0), Reg::<W>::splat(0.0));
     for batch in batches {
         let law = &laws[batch.law as usize];
-        solve_batch::<W, AT_WALLS>(batch, law, bodies, relaxation, &mut closing, &mut square);
+        solve_batch::<W, AT_WALLS>(batch, law, bodies, manner, &mut closing, &mut square);
     }
     Progress { closing: largest(closing), change: largest(square).sqrt() }
 }
@@ -215,11 +232,11 @@ fn apply_batches<W: Width, const AT_WALLS: bool>(
 
 /// Velocities of both grains of each contact.
 #[derive(Clone, Copy)]
-struct Velocities<W: Width> {
-    v_i: Reg3<W>,
-    w_i: Reg3<W>,
-    v_j: Reg3<W>,
-    w_j: Reg3<W>,
+pub(super) struct Velocities<W: Width> {
+    pub v_i: Reg3<W>,
+    pub w_i: Reg3<W>,
+    pub v_j: Reg3<W>,
+    pub w_j: Reg3<W>,
 }
 
 /// The impulses of each contact.
@@ -233,7 +250,7 @@ struct Impulses<W: Width> {
 impl<W: Width> Velocities<W> {
     #[inline(always)]
     #[allow(unsafe_code)]
-    fn gather<const AT_WALLS: bool>(batch: &Batch, bodies: &SharedBodies<'_>) -> Self {
+    pub fn gather<const AT_WALLS: bool>(batch: &Batch, bodies: &SharedBodies<'_>) -> Self {
         // SAFETY: the indices are in bounds (`for_each_colour`), and a body is another batch's only if it rests.
         let body = |body| unsafe { bodies.load::<W>(body) };
         let [v_i, w_i] = pairs(each(&batch.i, body));
@@ -243,7 +260,7 @@ impl<W: Width> Velocities<W> {
     }
 
     #[inline(always)]
-    fn scatter<const AT_WALLS: bool>(&self, batch: &Batch, bodies: &SharedBodies<'_>) {
+    pub fn scatter<const AT_WALLS: bool>(&self, batch: &Batch, bodies: &SharedBodies<'_>) {
         scatter(batch.used, &batch.i, bodies, self.v_i, self.w_i);
         if !AT_WALLS {
             scatter(batch.used, &batch.j, bodies, self.v_j, self.w_j);
@@ -252,7 +269,7 @@ impl<W: Width> Velocities<W> {
 
     /// Applies normal and tangential impulses.
     #[inline(always)]
-    fn push(&mut self, law: &LawLanes, n: &Reg3<W>, normal: Reg<W>, tangential: Reg3<W>) {
+    pub fn push(&mut self, law: &LawLanes, n: &Reg3<W>, normal: Reg<W>, tangential: Reg3<W>) {
         let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
         let force = n.scale(normal) + tangential;
         let twist = n.cross(tangential).scale(Reg::splat(INVERSE_INERTIA));
@@ -264,7 +281,7 @@ impl<W: Width> Velocities<W> {
 
     /// Applies rolling impulses.
     #[inline(always)]
-    fn roll(&mut self, law: &LawLanes, rolling: Reg3<W>) {
+    pub fn roll(&mut self, law: &LawLanes, rolling: Reg3<W>) {
         let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
         let step = rolling.scale(Reg::splat(INVERSE_INERTIA));
         self.w_i = self.w_i + step.scale(mass_i * Reg::load(&law.lever_i));
@@ -303,7 +320,7 @@ fn solve_batch<W: Width, const AT_WALLS: bool>(
     batch: &mut Batch,
     law: &LawLanes,
     bodies: &SharedBodies<'_>,
-    relaxation: Reg<W>,
+    manner: Manner,
     fastest: &mut Reg<W>,
     largest_square: &mut Reg<W>,
 ) {
@@ -312,9 +329,11 @@ fn solve_batch<W: Width, const AT_WALLS: bool>(
     let closing = closing(batch, &velocities);
     // A batch without impulses that stays open is left as it is.
     let zero = Reg::<W>::splat(0.0);
-    if W::less_bits(zero.0, old.n.0) | W::less_bits(zero.0, closing.0) == 0 {
+    let acting = W::less_bits(zero.0, old.n.0) | W::less_bits(zero.0, closing.0);
+    if acting == 0 && manner.passes_over {
         return;
     }
+    let relaxation = Reg::splat(manner.relaxation);
     let new = local_solution(batch, law, closing, relaxation, old, &mut velocities);
     *fastest = fastest.max(closing);
     *largest_square = largest_square.max(new.square_of_change(&old));
@@ -411,9 +430,24 @@ pub(crate) struct ResidualSums {
 }
 
 impl ResidualSums {
-    /// Adds the contacts of `set`: how far its own exact solution would still move each impulse.
-    pub fn add(&mut self, set: &ContactSet, bodies: &mut [Body]) {
-        residual_lanes(set, bodies, &mut self.squares, &mut self.impulses);
+    /// The sums over the contacts of all sets.
+    pub fn of(sets: &[&mut ContactSet], bodies: &mut [Body]) -> Self {
+        let mut sums = Self::default();
+        for set in sets {
+            residual_lanes(set, bodies, &mut sums.squares, &mut sums.impulses);
+        }
+        sums
+    }
+
+    /// Sum of the squares of the residual, how far its own exact solution would still move each impulse
+    /// `[m^2/s^2]`.
+    pub fn squares(&self) -> f64 {
+        self.squares
+    }
+
+    /// Whether the relative residual is at most `bound`; true without any impulse.
+    pub fn is_below(&self, bound: f64) -> bool {
+        self.squares <= bound * bound * self.impulses
     }
 
     /// Root mean square of the residual over that of the normal impulses; 0 without any impulse.

@@ -1,0 +1,90 @@
+//! The contact problem of one substep by itself, to compare solvers on.
+
+use nalgebra::Vector3;
+
+use crate::DemError;
+use crate::bed::Bed;
+use crate::contact::ContactSet;
+use crate::preset::SolverSettings;
+use crate::solver::{self, nsgs::ResidualSums};
+
+/// Contacts with normals, biases and warm impulses, and the velocities before they are solved, as
+/// [`Simulation::frozen_solve`](crate::Simulation::frozen_solve) has frozen them.
+#[derive(Clone, Debug)]
+pub struct FrozenSolve {
+    sets: [ContactSet; 2],
+    bed: Bed,
+    radius: f64,
+}
+
+/// What a solver made of a [`FrozenSolve`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrozenSolution {
+    /// Velocities of the grains `[m/s]`, shape `[grains]`.
+    pub velocities: Vec<Vector3<f64>>,
+    /// Spins `r omega` of the grains `[m/s]`, shape `[grains]`.
+    pub spins: Vec<Vector3<f64>>,
+    /// Natural-map residual over the rms normal impulse `[-]`.
+    pub residual: f64,
+    /// Sum of the normal impulses over a typical mass `[m/s]`.
+    pub normal_impulse: f64,
+    /// Fastest closing of a contact against its constraint `[m/s]`.
+    pub closing: f64,
+    /// Passes over all contacts.
+    pub sweeps: usize,
+    /// Newton steps that the guard has damped or replaced.
+    pub guarded: usize,
+    /// Whether the iterations were used up before the method's own measure of success was met.
+    pub unconverged: bool,
+}
+
+impl FrozenSolve {
+    pub(crate) fn new(sets: [ContactSet; 2], bed: Bed, radius: f64) -> Self {
+        Self { sets, bed, radius }
+    }
+
+    /// Number of contacts.
+    pub fn contact_count(&self) -> usize {
+        self.sets.iter().map(ContactSet::len).sum()
+    }
+
+    /// Solves a copy with the method and the iterations of `settings`.
+    ///
+    /// # Errors
+    /// [`DemError::OutOfRange`] for settings that no simulation would take.
+    pub fn solve(&self, settings: &SolverSettings) -> Result<FrozenSolution, DemError> {
+        settings.check()?;
+        let Self { mut sets, mut bed, radius } = self.clone();
+        let mut both = sets.each_mut();
+        let work = solver::solve(&mut both, &mut bed.bodies, settings, radius, None);
+        let residual = ResidualSums::of(&both, &mut bed.bodies).relative();
+        let batches = sets.iter().flat_map(|set| &set.batches);
+        let grains = &bed.bodies[..bed.count()];
+        Ok(FrozenSolution {
+            velocities: (0..bed.count()).map(|grain| bed.velocity(grain)).collect(),
+            spins: grains.iter().map(|body| body.spin.vector()).collect(),
+            residual,
+            normal_impulse: batches.flat_map(|batch| batch.lambda_n.0).sum(),
+            closing: work.closing,
+            sweeps: work.sweeps,
+            guarded: work.guarded,
+            unconverged: work.unconverged,
+        })
+    }
+
+    /// Sums of the squares of the natural-map residual after the warm start and after a solve
+    /// `[m^2/s^2]`.
+    #[cfg(test)]
+    pub(crate) fn merits(&self, settings: &SolverSettings) -> [f64; 2] {
+        let mut warm = self.clone();
+        let mut warm_sets = warm.sets.each_mut();
+        for set in &mut warm_sets {
+            solver::nsgs::warm_start(set, &mut warm.bed.bodies, None);
+        }
+        let before = ResidualSums::of(&warm_sets, &mut warm.bed.bodies).squares();
+        let Self { mut sets, mut bed, radius } = self.clone();
+        let mut both = sets.each_mut();
+        solver::solve(&mut both, &mut bed.bodies, settings, radius, None);
+        [before, ResidualSums::of(&both, &mut bed.bodies).squares()]
+    }
+}

@@ -1,0 +1,89 @@
+//! A solution to compare others with: Gauss-Seidel with conjugate directions, to a stated residual.
+//!
+//! Silcowitz-Hansen, Niebe and Erleben 2010; docs/theory/solvers.md, box 3. With `g = lambda - GS(lambda)`, what a
+//! sweep still takes away, the minus gradient of a function whose rest is the solution:
+//!
+//! ```text
+//! lambda <- GS(lambda),  p <- -g
+//! repeat
+//!     lambda <- GS(lambda),  beta <- |g|^2 / |g before|^2
+//!     beta > 1:  p <- 0                                      a restart
+//!     else:      lambda <- lambda + beta p,  p <- beta p - g
+//! ```
+
+use rayon::ThreadPool;
+
+use crate::bed::Body;
+use crate::contact::ContactSet;
+use crate::solver::Work;
+use crate::solver::components::{
+    Components, add_scaled, add_velocities, dot, impulses, put_impulses, scale_and_add, spread,
+};
+use crate::solver::nsgs::{self, Manner, ResidualSums};
+
+/// Sweeps between two looks at the residual, which costs a sweep.
+const LOOK: usize = 8;
+
+/// How far the reference is iterated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReferenceSettings {
+    /// Natural-map residual over the rms normal impulse at which to stop `[-]`.
+    pub residual: f64,
+    /// Sweeps in a solve, at most.
+    pub max_sweeps: usize,
+}
+
+impl Default for ReferenceSettings {
+    fn default() -> Self {
+        Self { residual: 1e-6, max_sweeps: 20_000 }
+    }
+}
+
+/// Iterates to `settings.residual`; the work is unconverged if that takes more than `settings.max_sweeps`.
+pub(super) fn solve(
+    sets: &mut [&mut ContactSet],
+    bodies: &mut [Body],
+    settings: &ReferenceSettings,
+    pool: Option<&ThreadPool>,
+) -> Work {
+    let count = sets.iter().map(|set| set.batches.len()).sum();
+    let mut direction = vec![Components::ZERO; count]; // p
+    let mut direction_velocities = vec![Body::default(); bodies.len()]; // M^-1 J^T p
+    let mut taken_before = f64::INFINITY; // |g before|^2
+    let mut work = Work { unconverged: true, ..Work::default() };
+    let mut before = impulses(sets);
+    loop {
+        work.closing = nsgs::sweep(sets, bodies, Manner::EXACT, pool).closing;
+        work.sweeps += 1;
+        let is_last = work.sweeps >= settings.max_sweeps;
+        if (work.sweeps.is_multiple_of(LOOK) || is_last)
+            && ResidualSums::of(sets, bodies).is_below(settings.residual)
+        {
+            work.unconverged = false;
+            return work;
+        }
+        if is_last {
+            return work;
+        }
+        let swept = impulses(sets);
+        scale_and_add(&mut before, -1.0, &swept); // -g
+        let taken = dot(&before, &before);
+        let beta = taken / taken_before;
+        taken_before = taken;
+        // Also a restart after a NaN, and in the first sweep, where beta is 0.
+        if beta <= 1.0 {
+            // The sum lies off the cones; the next sweep puts it back.
+            let mut next = swept;
+            add_scaled(&mut next, beta, &direction);
+            put_impulses(sets, &next);
+            add_velocities(bodies, beta, &direction_velocities);
+            scale_and_add(&mut direction, beta, &before);
+            before = next;
+        } else {
+            direction.fill(Components::ZERO);
+            before = swept;
+        }
+        direction_velocities.fill(Body::default());
+        spread(sets, &direction, &mut direction_velocities);
+    }
+}
