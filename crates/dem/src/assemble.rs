@@ -190,9 +190,9 @@ fn pair_geometry<W: Width>(
     j: [W::Quad; LANES],
     overlap: &mut Reg<W>,
 ) -> (Reg<W>, Reg<W>) {
-    let ([ix, iy, iz, r_i], [jx, jy, jz, r_j]) = (W::columns(i), W::columns(j));
-    let apart = Reg3::<W> { x: Reg(ix), y: Reg(iy), z: Reg(iz) }
-        - Reg3 { x: Reg(jx), y: Reg(jy), z: Reg(jz) };
+    let ([x_i, y_i, z_i, r_i], [x_j, y_j, z_j, r_j]) = (W::columns(i), W::columns(j));
+    let apart = Reg3::<W> { x: Reg(x_i), y: Reg(y_i), z: Reg(z_i) }
+        - Reg3 { x: Reg(x_j), y: Reg(y_j), z: Reg(z_j) };
     let (r_i, r_j) = (Reg::<W>(r_i), Reg(r_j));
     let (zero, one) = (Reg::splat(0.0), Reg::splat(1.0));
     let distance = apart.norm();
