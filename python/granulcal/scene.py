@@ -1,7 +1,7 @@
 """Scenes and materials: what is poured, onto what, and who looks at it."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from os import PathLike
 
 from granulcal import _native
@@ -15,10 +15,12 @@ class Material:
 
     Attributes:
         sliding_friction: Coulomb's coefficient mu_s [-], in [0, 10].
-        rolling_friction: rolling and torsional friction mu_r [-], relative to the effective
-            radius, in [0, 1000]; above about 1 rolling is locked.
+        rolling_friction: rolling friction mu_r [-], relative to the effective radius, in
+            [0, 1000]; above about 1 rolling is locked.
         restitution: Newton's coefficient e [-], in [0, 1].
         tangential_restitution: e_t [-], in [0, 1].
+        torsional_friction: resistance to spinning about the normal mu_t [-], relative to the
+            effective radius, in [0, 1000].
 
     Example:
         >>> Material(sliding_friction=0.5, rolling_friction=0.1, restitution=0.5).restitution
@@ -29,6 +31,7 @@ class Material:
     rolling_friction: float
     restitution: float
     tangential_restitution: float = 0.0
+    torsional_friction: float = 0.02
 
     def values(self) -> dict[str, float]:
         """Returns the coefficients by their path in a scene."""
@@ -166,7 +169,7 @@ class Scene:
     @property
     def material(self) -> Material:
         """The grains' material."""
-        names = ("sliding_friction", "rolling_friction", "restitution", "tangential_restitution")
+        names = [field.name for field in fields(Material)]
         return Material(**{name: self.get(f"material.{name}") for name in names})
 
     def _with_options(

@@ -164,6 +164,7 @@ fn a_pair_loses_what_the_law_takes() {
         let grains = Material {
             sliding_friction: [0.0, 0.1, 0.5][number as usize % 3],
             rolling_friction: 0.0,
+            torsional_friction: 0.0,
             restitution: [0.0, 0.5, 0.9, 1.0][number as usize % 4],
             ..Material::default()
         };

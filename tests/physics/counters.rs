@@ -17,6 +17,6 @@ fn a_small_drop_takes_its_substeps_and_sweeps() {
     let health = pour.health;
     println!("{health:?}, {:?}", pour.status);
     assert_eq!(pour.status, Status::AtRest);
-    assert_eq!((health.substeps, health.sweeps), (544, 2202));
-    assert_eq!(health.mean_contacts, 215.36029411764707);
+    assert_eq!((health.substeps, health.sweeps), (700, 2320));
+    assert_eq!(health.mean_contacts, 214.92142857142858);
 }

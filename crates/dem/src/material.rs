@@ -30,25 +30,33 @@ pub struct Material {
     #[serde(default)]
     pub tangential_restitution: f64,
     /// Torsional friction mu_t `[-]`: resists spinning about the normal, as `rolling_friction` resists rolling.
-    #[serde(default)]
+    #[serde(default = "default_torsional_friction")]
     pub torsional_friction: f64,
 }
 
+/// Torsional friction where none is stated: 2/3 mu_s a / R_eff for mu_s 0.5 and a contact of radius a = 0.06 R_eff.
+/// With none at all, a grain may spin for ever on the top of another.
+const TORSIONAL_FRICTION: f64 = 0.02;
+
+fn default_torsional_friction() -> f64 {
+    TORSIONAL_FRICTION
+}
+
 impl Default for Material {
-    /// A middling dry grain: mu_s 0.5, mu_r 0.1, e 0.5, no tangential restitution, no torsional friction.
+    /// A middling dry grain: mu_s 0.5, mu_r 0.1, e 0.5, no tangential restitution, mu_t 0.02.
     fn default() -> Self {
         Self {
             sliding_friction: 0.5,
             rolling_friction: 0.1,
             restitution: 0.5,
             tangential_restitution: 0.0,
-            torsional_friction: 0.0,
+            torsional_friction: TORSIONAL_FRICTION,
         }
     }
 }
 
 impl Material {
-    /// A checked material without tangential restitution and torsional friction.
+    /// A checked material without tangential restitution, with the torsional friction of most grains, 0.02.
     ///
     /// # Errors
     /// [`DemError::OutOfRange`] names the coefficient that is out of range or not finite.

@@ -58,6 +58,8 @@ pub struct SolverSettings {
     pub dt: f64,
     /// Gauss-Seidel sweeps in a substep, at least, unless the impulses settle before.
     pub sweeps: usize,
+    /// Over-relaxation of all sweeps but the last of these `[-]`, in [1, 2).
+    pub relaxation: f64,
     /// Change of a contact's impulses in a sweep below which they have settled, in radii a substep `[-]`.
     pub settled: f64,
     /// Sweeps in a substep, at most: hard impacts on dense packings need more than quiet flow.
@@ -82,6 +84,9 @@ impl SolverSettings {
         };
         positive("settings.dt", self.dt)?;
         positive("settings.sweeps", self.sweeps as f64)?;
+        if !(1.0..2.0).contains(&self.relaxation) {
+            return Err(DemError::range("settings.relaxation", self.relaxation, "in [1, 2)"));
+        }
         positive("settings.settled", self.settled)?;
         positive("settings.max_sweeps", self.max_sweeps as f64)?;
         positive("settings.closing", self.closing)?;
@@ -97,8 +102,9 @@ impl Preset {
         match self {
             Self::Fast => SolverSettings {
                 dt: 1.0 / 900.0,
-                sweeps: 6,
-                settled: 1e-6,
+                sweeps: 4,
+                relaxation: 1.4,
+                settled: 1e-11,
                 max_sweeps: 30,
                 closing: 0.04,
                 list_period: 2,
@@ -106,19 +112,21 @@ impl Preset {
                 max_penetration: 0.25,
             },
             Self::Default => SolverSettings {
-                dt: 1.0 / 1500.0,
-                sweeps: 6,
-                settled: 1e-6,
-                max_sweeps: 60,
+                dt: 1.0 / 2000.0,
+                sweeps: 4,
+                relaxation: 1.4,
+                settled: 1e-11,
+                max_sweeps: 40,
                 closing: 0.02,
-                list_period: 4,
+                list_period: 5,
                 margin: 0.25,
                 max_penetration: 0.1,
             },
             Self::Accurate => SolverSettings {
                 dt: 1.0 / 6000.0,
                 sweeps: 12,
-                settled: 1e-6,
+                relaxation: 1.4,
+                settled: 1e-11,
                 max_sweeps: 120,
                 closing: 0.002,
                 list_period: 8,

@@ -6,12 +6,14 @@ use nalgebra::Vector3;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::DemError;
+use crate::assemble::Seen;
 use crate::bed::Bed;
 use crate::contacts::{Contacts, Surroundings};
 use crate::health::{Health, HealthWatch};
 use crate::impact::Impacts;
 use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
+use crate::problem::{ContactProblem, SWEEPS_A_LOOK};
 use crate::scene::{CameraSpec, EndRule, Scene};
 use crate::solver::nsgs;
 use crate::wall_load::{self, WallLoad};
@@ -167,6 +169,23 @@ impl Simulation {
         self.watch.health(self.substep)
     }
 
+    /// The contact problem of the next substep, frozen as it is assembled, with its solution after
+    /// as many sweeps as its residual needs to be rounding. The simulation itself stays as it is.
+    pub fn contact_problem(&self) -> ContactProblem {
+        let mut twin = self.clone();
+        let dt = twin.around.settings.dt;
+        twin.assemble();
+        let (bed, contacts) = (&mut twin.bed, &mut twin.contacts);
+        let mut problem = ContactProblem::new(bed, contacts, self.time(), dt);
+        while !problem.is_solved() {
+            problem.put_velocities(&mut bed.bodies);
+            let Contacts { pairs, at_walls, .. } = &mut *contacts;
+            nsgs::sweep_plainly(&mut [pairs, at_walls], &mut bed.bodies, SWEEPS_A_LOOK);
+            problem.take_impulses(contacts, SWEEPS_A_LOOK);
+        }
+        problem
+    }
+
     /// Simulates `seconds`, or less if the pour ends before.
     pub fn advance(&mut self, seconds: f64) {
         let last = self.substep + (seconds / self.around.settings.dt).round() as usize;
@@ -207,22 +226,27 @@ impl Simulation {
         }
     }
 
-    /// One substep.
-    fn step(&mut self) {
-        let SolverSettings { dt, list_period, .. } = self.around.settings;
+    /// Lists and assembles the contacts of a substep, lets gravity act and resolves the impacts.
+    fn assemble(&mut self) -> Seen {
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
         contacts.follow(bed, around);
-        bed.accelerate(&around.gravity, dt);
+        bed.accelerate(&around.gravity, around.settings.dt);
         let seen = contacts.assemble(bed, around, self.watch.lost_mut(), &mut self.impacts);
         if self.impacts.resolve(bed, contacts, around) > 0 {
             contacts.assemble_again(bed, around);
             bed.rewind();
         }
+        seen
+    }
+
+    /// One substep.
+    fn step(&mut self) {
+        let seen = self.assemble();
         self.solve();
-        self.bed.move_on(dt);
+        self.bed.move_on(self.around.settings.dt);
         self.watch.see_penetration(seen.penetration);
         self.substep += 1;
-        if self.substep.is_multiple_of(list_period) {
+        if self.substep.is_multiple_of(self.around.settings.list_period) {
             self.examine();
         }
     }

@@ -58,23 +58,44 @@ pub(crate) fn solve(
     for set in sets.iter_mut() {
         warm_start(set, bodies, pool);
     }
+    let mut has_settled = false;
     for sweeps in 1..settings.max_sweeps {
+        // The last sweeps are plain ones: they leave a contact by itself exactly solved.
+        let is_enough = has_settled || sweeps >= settings.sweeps;
+        let relaxation = if is_enough { 1.0 } else { settings.relaxation };
         let Progress { closing, change } = sets
             .iter_mut()
-            .map(|set| sweep(set, bodies, pool))
+            .map(|set| sweep(set, bodies, relaxation, pool))
             .fold(Progress::default(), Progress::max);
-        if closing <= too_fast && (sweeps >= settings.sweeps || change <= settled) {
+        if is_enough && closing <= too_fast {
             return sweeps;
         }
+        has_settled = change <= settled;
     }
     settings.max_sweeps
 }
 
+/// Sweeps `count` times, from velocities that contain the impulses.
+pub(crate) fn sweep_plainly(sets: &mut [&mut ContactSet], bodies: &mut [Body], count: usize) {
+    for _ in 0..count {
+        for set in sets.iter_mut() {
+            sweep(set, bodies, 1.0, None);
+        }
+    }
+}
+
 /// One sweep over the batches in their order; the batches of a colour share no grain and may go to the
 /// threads of `pool` in any order without changing a bit.
-fn sweep(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) -> Progress {
+fn sweep(
+    set: &mut ContactSet,
+    bodies: &mut [Body],
+    relaxation: f64,
+    pool: Option<&ThreadPool>,
+) -> Progress {
     let kernel = if set.is_at_walls() { sweep_walls } else { sweep_pairs };
-    for_each_colour(set, bodies, pool, kernel)
+    for_each_colour(set, bodies, pool, |batches, laws, bodies| {
+        kernel(batches, laws, bodies, relaxation)
+    })
 }
 
 /// Adds what the impulses that the contacts carry do to the velocities: the warm start.
@@ -88,7 +109,7 @@ fn for_each_colour(
     set: &mut ContactSet,
     bodies: &mut [Body],
     pool: Option<&ThreadPool>,
-    kernel: fn(&mut [Batch], &[LawLanes], &SharedBodies<'_>) -> Progress,
+    kernel: impl Fn(&mut [Batch], &[LawLanes], &SharedBodies<'_>) -> Progress + Sync,
 ) -> Progress {
     // The kernels index the bodies without looking: the indices were made for as many.
     assert_eq!(set.grains() + 1, bodies.len());
@@ -112,14 +133,24 @@ fn for_each_colour(
 }
 
 widest! {
-    fn sweep_pairs<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> Progress {
-        sweep_batches::<W, false>(batches, laws, bodies)
+    fn sweep_pairs<W>(
+        batches: &mut [Batch],
+        laws: &[LawLanes],
+        bodies: &SharedBodies<'_>,
+        relaxation: f64,
+    ) -> Progress {
+        sweep_batches::<W, false>(batches, laws, bodies, relaxation)
     }
 }
 
 widest! {
-    fn sweep_walls<W>(batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>) -> Progress {
-        sweep_batches::<W, true>(batches, laws, bodies)
+    fn sweep_walls<W>(
+        batches: &mut [Batch],
+        laws: &[LawLanes],
+        bodies: &SharedBodies<'_>,
+        relaxation: f64,
+    ) -> Progress {
+        sweep_batches::<W, true>(batches, laws, bodies, relaxation)
     }
 }
 
@@ -129,11 +160,13 @@ fn sweep_batches<W: Width, const AT_WALLS: bool>(
     batches: &mut [Batch],
     laws: &[LawLanes],
     bodies: &SharedBodies<'_>,
+    relaxation: f64,
 ) -> Progress {
+    let relaxation = Reg::splat(relaxation);
     let (mut closing, mut square) = (Reg::<W>::splat(0.0), Reg::<W>::splat(0.0));
     for batch in batches {
         let law = &laws[batch.law as usize];
-        solve_batch::<W, AT_WALLS>(batch, law, bodies, &mut closing, &mut square);
+        solve_batch::<W, AT_WALLS>(batch, law, bodies, relaxation, &mut closing, &mut square);
     }
     Progress { closing: largest(closing), change: largest(square).sqrt() }
 }
@@ -270,6 +303,7 @@ fn solve_batch<W: Width, const AT_WALLS: bool>(
     batch: &mut Batch,
     law: &LawLanes,
     bodies: &SharedBodies<'_>,
+    relaxation: Reg<W>,
     fastest: &mut Reg<W>,
     largest_square: &mut Reg<W>,
 ) {
@@ -281,7 +315,7 @@ fn solve_batch<W: Width, const AT_WALLS: bool>(
     if W::less_bits(zero.0, old.n.0) | W::less_bits(zero.0, closing.0) == 0 {
         return;
     }
-    let new = local_solution(batch, law, closing, old, &mut velocities);
+    let new = local_solution(batch, law, closing, relaxation, old, &mut velocities);
     *fastest = fastest.max(closing);
     *largest_square = largest_square.max(new.square_of_change(&old));
     new.store(batch);
@@ -295,17 +329,19 @@ fn closing<W: Width>(batch: &Batch, velocities: &Velocities<W>) -> Reg<W> {
     Reg::splat(0.0) - (w_n + Reg::load(&batch.bias))
 }
 
-/// The exact solution of each contact of a batch by itself; updates the velocities to match.
+/// The exact solution of each contact of a batch by itself, or as much beyond it as `relaxation` exceeds 1,
+/// on the cones; updates the velocities to match.
 #[inline(always)]
 fn local_solution<W: Width>(
     batch: &Batch,
     law: &LawLanes,
     closing: Reg<W>,
+    relaxation: Reg<W>,
     old: Impulses<W>,
     velocities: &mut Velocities<W>,
 ) -> Impulses<W> {
     let n = Reg3::load(&batch.normal);
-    let compliance_n = Reg::load(&law.compliance_n);
+    let compliance_n = relaxation * Reg::load(&law.compliance_n);
     let compliance_t = compliance_n * Reg::splat(1.0 / TANGENTIAL_INERTIA);
     let lambda_n = (old.n + closing * compliance_n).max(Reg::splat(0.0));
 
@@ -319,7 +355,7 @@ fn local_solution<W: Width>(
     // At a wall the tangential impulse has just changed the rolling velocity: take it afresh.
     let Velocities { w_i, w_j, .. } = *velocities;
     let rho = w_i.scale(Reg::load(&law.lever_i)) - w_j.scale(Reg::load(&law.lever_j));
-    let wanted = old.r - rho.scale(Reg::load(&law.compliance_r));
+    let wanted = old.r - rho.scale(relaxation * Reg::load(&law.compliance_r));
     let about = n.dot(wanted);
     let limit = Reg::load(&law.rolling_friction) * lambda_n;
     let rolling = project_ball(wanted - n.scale(about), limit);
@@ -400,7 +436,8 @@ widest! {
             let old = Impulses::<W>::load(batch);
             let mut velocities = Velocities::gather::<false>(batch, &bodies);
             let closing = closing(batch, &velocities);
-            let new = local_solution(batch, law, closing, old, &mut velocities);
+            let one = Reg::splat(1.0);
+            let new = local_solution(batch, law, closing, one, old, &mut velocities);
             let (mut square, mut impulse) = (Lanes::ZERO, Lanes::ZERO);
             new.square_of_change(&old).store(&mut square);
             (old.n * old.n).store(&mut impulse);
