@@ -183,7 +183,7 @@ fn measure_collapse(progress: &Progress) -> Vec<Check> {
         (exponent, format!("{exponent:.3} (factor {factor:.2}; {})", shown.join(", ")))
     };
     let (low, low_text) = branch(12.0, [0.5, 0.75, 1.05, 1.45]);
-    let (high, high_text) = branch(8.0, [2.0, 3.0, 4.5, 7.0]);
+    let (high, high_text) = branch(14.0, [2.0, 3.0, 4.5, 7.0]);
     vec![
         Check {
             quantity: "Column collapse: run-out exponent, a < 1.7",
@@ -201,7 +201,7 @@ fn measure_collapse(progress: &Progress) -> Vec<Check> {
 }
 
 fn measure_repose(progress: &Progress) -> Vec<Check> {
-    const RADIUS: f64 = 18.0;
+    const RADIUS: f64 = 16.0;
     const SEEDS: u64 = 4;
     let mut worst_sd = 0.0_f64;
     let mut series = |name: &str, values: [f64; 4], of: fn(f64) -> Material| {

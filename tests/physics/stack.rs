@@ -6,14 +6,18 @@ use crate::scenes::{RADIUS, block, material, start};
 
 const COUNT: usize = 20;
 
-/// A stack whose grains touch, each off the axis by up to `aside` `[m]`.
+/// Overlap of a resting contact, the solver's slop `[m]`: a shallower one sinks to it at some time.
+const SLOP: f64 = 1e-5;
+
+/// A stack as deep in itself as it comes to rest, each grain off the axis by `aside` `[m]`.
 fn stack(preset: Preset, restitution: f64, aside: f64) -> Simulation {
     let mut scene = block([1, 1, COUNT], 2.0 * RADIUS, RADIUS, material(0.5, 0.1, restitution));
     scene.preset = preset;
     let positions = (0..COUNT)
         .map(|k| {
             let (sin, cos) = (2.4 * k as f64).sin_cos(); // the golden angle: no two alike
-            [aside * cos, aside * sin, RADIUS * (2 * k + 1) as f64]
+            let height = RADIUS * (2 * k + 1) as f64 - SLOP * (k + 1) as f64;
+            [aside * cos, aside * sin, height]
         })
         .collect();
     scene.start = Start::Positions { positions };
@@ -44,7 +48,7 @@ fn jitter(mut simulation: Simulation) -> (f64, f64) {
 }
 
 #[test]
-#[ignore = "missed: default and fast tremble with 0.1 m/s and fall when 1 um askew (docs/results/physics.md)"]
+#[ignore = "missed: default and fast tremble with 0.05 m/s and fall when 1 um askew (docs/results/physics.md)"]
 fn a_stack_of_twenty_stands_still() {
     for preset in [Preset::Default, Preset::Fast] {
         for e in [0.0, 0.5] {
@@ -58,13 +62,16 @@ fn a_stack_of_twenty_stands_still() {
     }
 }
 
+/// `preset` with `sweeps` in every substep.
+fn swept(preset: Preset, sweeps: usize) -> SolverSettings {
+    SolverSettings { sweeps, max_sweeps: sweeps, settled: 1e-15, ..preset.settings() }
+}
+
 #[test]
 fn enough_sweeps_hold_a_stack_of_twenty() {
     for preset in [Preset::Fast, Preset::Default] {
         for e in [0.0, 0.5] {
-            let preset_settings = preset.settings();
-            let settings =
-                SolverSettings { sweeps: 60, max_sweeps: 60, settled: 1e-14, ..preset_settings };
+            let settings = swept(preset, 60);
             let upright = stack(preset, e, 0.0).with_settings(settings).expect("valid settings");
             let (fastest, farthest) = jitter(upright);
             println!("{preset}, e {e}, 60 sweeps: {fastest:.1e} m/s, {farthest:.1e} m in 3 s");
@@ -75,6 +82,31 @@ fn enough_sweeps_hold_a_stack_of_twenty() {
             let aside = askew.positions().iter().map(|p| p.x.hypot(p.y)).fold(0.0, f64::max);
             println!("{preset}, e {e}, 60 sweeps: from 1e-6 to {aside:.1e} m aside in 1 s");
             assert!(aside < 1e-5, "{preset}, e {e}: {aside} m aside");
+        }
+    }
+}
+
+#[test]
+#[ignore = "prints the table of docs/results/physics.md"]
+fn how_many_sweeps_a_stack_of_twenty_needs() {
+    for preset in Preset::ALL {
+        let own = preset.settings();
+        let cases = [4, 12, 24, 48, 96].map(|sweeps| swept(preset, sweeps));
+        for settings in std::iter::once(own).chain(cases) {
+            let run = |aside: f64| {
+                let stack = stack(preset, 0.5, aside).with_settings(settings);
+                let mut stack = stack.expect("valid settings");
+                stack.advance(2.0);
+                let fastest = stack.velocities().iter().map(|v| v.norm()).fold(0.0, f64::max);
+                let off = stack.positions().iter().map(|p| p.x.hypot(p.y)).fold(0.0, f64::max);
+                (fastest, off, stack.health().worst_penetration)
+            };
+            let ((fastest, _, overlap), (_, off, _)) = (run(0.0), run(1e-6));
+            let SolverSettings { sweeps, settled, .. } = settings;
+            println!(
+                "{preset}, {sweeps} sweeps, settled {settled:.0e}: {fastest:.1e} m/s, overlap {overlap:.4} R, askew: {off:.1e} m off"
+            );
+            assert!(sweeps < 96 || (fastest < 1e-9 && off < 1e-4), "{preset}: {fastest} {off}");
         }
     }
 }

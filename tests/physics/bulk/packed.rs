@@ -14,7 +14,7 @@ const SETTLED: f64 = 1e-6;
 /// Sweeps in a substep while a packing is prepared.
 const PREPARING: usize = 40;
 /// Longest time that a packing may take to settle `[s]`.
-const PATIENCE: f64 = 6.0;
+const PATIENCE: f64 = 20.0;
 
 /// Listed grains above the ground among `walls`, never ended by a rule.
 pub fn scene(positions: &[Vector3<f64>], material: Material, walls: Vec<Wall>) -> Scene {

@@ -58,8 +58,12 @@ pub fn measure(radius: f64, material: Material, seed: u64) -> f64 {
     let mut walls = funnel;
     walls.push(ring(PINHOLE * DIAMETER, plate_radius, plate_height));
     walls.push(tube(plate_radius, plate_height, plate_height + RIM * DIAMETER, plain));
-    let mut simulation = start(&scene(&filled, material, walls));
-    // What has run over goes on rolling; only the heap must come to rest.
+    let mut poured = scene(&filled, material, walls);
+    // What runs over must not roll away over half the room.
+    poured.ground.material =
+        WallMaterial { rolling_friction: Some(1.0), restitution: Some(0.0), ..plain };
+    let mut simulation = start(&poured);
+    // Only the heap must come to rest.
     simulation.advance(0.1);
     wait_for_rest_above(&mut simulation, plate_height);
     let run_over = simulation.positions().iter().filter(|p| p.z < plate_height).count();
