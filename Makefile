@@ -11,7 +11,7 @@ RUST := $(shell find src crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Car
 # Sets and dictionaries of words keep one order in every run.
 export PYTHONHASHSEED := 0
 
-.PHONY: help demo test test-rust test-python test-long lint bench bench-physics build clean
+.PHONY: help demo test test-rust test-python test-long bench-physics referee lint bench build clean
 
 help: ## list the verbs
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -30,6 +30,13 @@ test-python: $(VENV)/.native
 test-long: $(VENV)/.native ## every test, the slow ones too
 	cargo test --workspace --locked --release -- --include-ignored
 	$(BIN)/python -m pytest
+
+# Python of the system, for which Debian packages siconos.
+SICONOS_PYTHON ?= /usr/bin/python3
+
+referee: build ## compare the contact solver with siconos on frozen substeps; installs siconos (apt), some minutes
+	$(SICONOS_PYTHON) -c 'import siconos.numerics' 2>/dev/null || scripts/referee/install.sh
+	$(SICONOS_PYTHON) scripts/referee/referee.py --cli target/release/granulcal-cli
 
 lint: $(VENV)/.deps ## format, lints, types, spelling, documentation, licences
 	cargo fmt --all --check

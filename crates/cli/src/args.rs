@@ -55,6 +55,13 @@ pub enum Command {
 pub struct SceneArgs {
     /// Scene as TOML, or one of the words `funnel` and `drop` for the scenes that are built in
     pub scene: PathBuf,
+    #[command(flatten)]
+    pub with: SceneChanges,
+}
+
+/// Changes of a scene.
+#[derive(Clone, Debug, Args)]
+pub struct SceneChanges {
     /// Set a number of the scene by its path, for example material.sliding_friction=0.5; repeat as needed
     #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_change)]
     pub changes: Vec<(String, f64)>,
@@ -231,22 +238,45 @@ pub struct FeaturesArgs {
     pub list: bool,
 }
 
-/// Say what is in a scene, prior, data set, recording or MCAP file
+/// Say what is in a scene, prior, data set, recording or MCAP file, or in one substep of a scene
 #[derive(Debug, Args)]
 #[command(long_about = "\
 Says what is in a file or folder: a scene, prior or camera (.toml), a data set (folder or
 .parquet), an array or height map (.npy, .npz), an image (.png) or a recording over time
 (.mcap). The whole file is read, so a damaged one is found.
 
+With --contact-problem PATH is a scene, or one of the words `funnel` and `drop`: it is simulated
+until --time, and the contact problem of the next substep is written with its solution, as arrays
+that docs/theory/contact-problem.md describes.
+
 Example:
   granulcal-cli inspect data/
-  granulcal-cli inspect drop.mcap --json")]
+  granulcal-cli inspect drop.mcap --json
+  granulcal-cli inspect drop --set grains.count=60 --contact-problem frozen.npz --time 0.2")]
 pub struct InspectArgs {
     /// File or folder
     pub path: PathBuf,
+    /// Write the contact problem of a scene's next substep after --time
+    #[arg(long, value_name = "OUT.npz", requires = "time")]
+    pub contact_problem: Option<PathBuf>,
+    #[command(flatten)]
+    pub substep: SubstepArgs,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+/// Which substep of which pour.
+#[derive(Clone, Debug, Args)]
+pub struct SubstepArgs {
+    /// Simulated time at which the substep begins [s]
+    #[arg(long, value_name = "SECONDS")]
+    pub time: Option<f64>,
+    /// Seed of the grains' jitter at the start [default: 0]
+    #[arg(long)]
+    pub seed: Option<u64>,
+    #[command(flatten)]
+    pub with: SceneChanges,
 }
 
 /// Join shards of a data set into one Parquet file

@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use granulcal_dataset::{DatasetError, Prior, load_prior, load_scene, record_pour};
 use granulcal_dem::{Pour, Scene, Simulation};
 
-use crate::args::SceneArgs;
+use crate::args::{SceneArgs, SceneChanges};
 use crate::context::{Context, keeps_going};
 use crate::progress::PourProgress;
 
@@ -22,17 +22,25 @@ const GLANCE: f64 = 0.01;
 /// # Errors
 /// What is wrong with the file, a path or a value.
 pub fn load(args: &SceneArgs) -> anyhow::Result<Scene> {
-    let mut scene = match args.scene.to_str() {
+    changed(&args.scene, &args.with)
+}
+
+/// The scene of that name, with changes.
+///
+/// # Errors
+/// What is wrong with the file, a path or a value.
+pub fn changed(name: &Path, with: &SceneChanges) -> anyhow::Result<Scene> {
+    let mut scene = match name.to_str() {
         Some("funnel") => Scene::funnel(FUNNEL_HEIGHT),
         Some("drop") => Scene::drop(DROP_HEIGHT),
-        _ => load_scene(&args.scene)?,
+        _ => load_scene(name)?,
     };
-    if let Some(preset) = args.preset {
+    if let Some(preset) = with.preset {
         scene.preset = preset;
     }
     let changes: Vec<_> =
-        args.changes.iter().map(|(path, value)| (path.as_str(), *value)).collect();
-    scene.set(&changes).with_context(|| format!("scene {}", args.scene.display()))?;
+        with.changes.iter().map(|(path, value)| (path.as_str(), *value)).collect();
+    scene.set(&changes).with_context(|| format!("scene {}", name.display()))?;
     Ok(scene)
 }
 

@@ -147,6 +147,28 @@ fn simulate_prints_one_json_object_and_writes_what_is_asked() {
 }
 
 #[test]
+fn a_substep_is_frozen_and_what_cannot_be_is_named() {
+    let place = Place::new();
+    let frozen = |out, time, more: &[&'static str]| {
+        let scene = ["inspect", "drop", "--set", "grains.count=20", "--set", "start.height=0.005"];
+        [&scene[..], &["--contact-problem", out, "--time", time, "--json"], more].concat()
+    };
+    let facts = json(&place.expect(0, &frozen("frozen.npz", "0.04", &["--seed", "1"])));
+    assert_eq!((&facts["kind"], &facts["grains"]), (&"contact problem".into(), &20.into()));
+    assert!(facts["residual_m_per_s"].as_f64().unwrap() < 1e-13, "{facts}");
+    let arrays = json(&place.expect(0, &["inspect", "frozen.npz", "--json"]));
+    let names = arrays["names"].as_array().unwrap();
+    assert!(names.contains(&"delassus".into()) && names.contains(&"impulse".into()));
+
+    place.refused(&frozen("frozen.npy", "0.04", &[]), &["--contact-problem", ".npz", "frozen.npy"]);
+    place.refused(&frozen("frozen.npz", "30", &[]), &["--time", "30", "before the pour's end"]);
+    place.refused(&frozen("frozen.npz", "nan", &[]), &["--time", "NaN"]);
+    place.refused(&["inspect", "drop", "--time", "1"], &["--time", "--contact-problem"]);
+    place.refused(&["inspect", "frozen.npz", "--set", "x=1"], &["--set", "--contact-problem"]);
+    place.refused(&["inspect", "drop", "--contact-problem", "frozen.npz"], &["--time"]);
+}
+
+#[test]
 fn an_unusable_pour_exits_with_3() {
     let place = Place::new();
     let args = tiny(&["simulate", "drop", "--json"], &["--set", "camera.height_threshold=0.5"]);

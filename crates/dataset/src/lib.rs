@@ -18,6 +18,7 @@
 //! | [`record_pour`] | a pour over time as MCAP |
 
 mod camera_file;
+mod contact_problem_file;
 mod dataset;
 mod distribution;
 mod error;
@@ -39,6 +40,7 @@ mod scene_file;
 mod table;
 
 pub use camera_file::CameraFile;
+pub use contact_problem_file::write_contact_problem;
 pub use dataset::{Dataset, merge};
 pub use distribution::Distribution;
 pub use error::DatasetError;

@@ -241,6 +241,13 @@ pub(crate) fn encode(shape: &[usize], values: impl IntoIterator<Item = f64>) -> 
     bytes
 }
 
+/// The bytes of a .npy file of whole numbers.
+pub(crate) fn encode_integers(shape: &[usize], values: impl IntoIterator<Item = i64>) -> Vec<u8> {
+    let mut bytes = encode_header("<i8", shape);
+    values.into_iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+    bytes
+}
+
 /// The bytes of a .npy file of one word.
 pub(crate) fn encode_text(word: &str) -> Vec<u8> {
     let mut bytes = encode_header(&format!("<U{}", word.chars().count().max(1)), &[]);

@@ -125,9 +125,14 @@ pub fn write_height_map(path: &Path, map: &HeightMap) -> Result<(), DatasetError
         ("zres", number(1.0)),
         ("scale", npy::encode_text("m")),
     ];
+    write_arrays(path, &arrays)
+}
+
+/// Writes arrays, each with its name and the bytes of its .npy file.
+pub(crate) fn write_arrays(path: &Path, arrays: &[(&str, Vec<u8>)]) -> Result<(), DatasetError> {
     let pack = || {
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-        for (name, bytes) in &arrays {
+        for (name, bytes) in arrays {
             archive.start_file(format!("{name}.npy"), SimpleFileOptions::default())?;
             archive.write_all(bytes)?;
         }

@@ -1,4 +1,4 @@
-//! Impacts within a substep: one pair after the other, each at its own time (docs/theory/contact.md, box 2).
+//! Impacts within a substep: one pair after the other, each at its own time (docs/theory/contact.md, box 1).
 //!
 //! Between impacts grains move straight on, as in event-driven simulation. What approaches faster than
 //! [`IMPACT_SPEED`] and meets before the substep ends is an impact with Newton's restitution; what is slower or

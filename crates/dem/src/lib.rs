@@ -42,6 +42,7 @@ mod material;
 mod neighbor;
 mod pour;
 mod preset;
+mod problem;
 mod scene;
 mod simulation;
 mod solver;
@@ -55,6 +56,7 @@ pub use material::{
 };
 pub use pour::{Pour, Status};
 pub use preset::{Preset, SolverSettings};
+pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
     CameraSpec, EndRule, Funnel, GRAVITY, Grains, Ground, Projection, Scene, Shape, Start, Wall,
 };

@@ -13,6 +13,7 @@ use crate::health::{Health, HealthWatch};
 use crate::impact::Impacts;
 use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
+use crate::problem::{ContactProblem, SWEEPS_A_LOOK};
 use crate::scene::{CameraSpec, EndRule, Scene};
 use crate::solver::frozen::FrozenSolve;
 use crate::solver::{self, nsgs};
@@ -24,7 +25,7 @@ const RESIDUAL_PERIOD: usize = 4;
 const REST_LOOKS: usize = 16;
 /// A scene in motion.
 ///
-/// Each substep (Moreau's time stepping; docs/theory/contact.md, box 2):
+/// Each substep (Moreau's time stepping; docs/theory/contact.md, box 3):
 /// list the contacts now and then; add gravity; assemble gaps, normals and biases; resolve the impacts, each at
 /// its time; solve the lasting contacts; move.
 #[derive(Clone, Debug)]
@@ -169,6 +170,23 @@ impl Simulation {
         self.watch.health(self.substep)
     }
 
+    /// The contact problem of the next substep, frozen as it is assembled, with its solution after
+    /// as many sweeps as its residual needs to be rounding. The simulation itself stays as it is.
+    pub fn contact_problem(&self) -> ContactProblem {
+        let mut twin = self.clone();
+        let dt = twin.around.settings.dt;
+        twin.assemble();
+        let (bed, contacts) = (&mut twin.bed, &mut twin.contacts);
+        let mut problem = ContactProblem::new(bed, contacts, self.time(), dt);
+        while !problem.is_solved() {
+            problem.put_velocities(&mut bed.bodies);
+            let Contacts { pairs, at_walls, .. } = &mut *contacts;
+            nsgs::sweep_plainly(&mut [pairs, at_walls], &mut bed.bodies, SWEEPS_A_LOOK);
+            problem.take_impulses(contacts, SWEEPS_A_LOOK);
+        }
+        problem
+    }
+
     /// Simulates `seconds`, or less if the pour ends before.
     pub fn advance(&mut self, seconds: f64) {
         let last = self.substep + (seconds / self.around.settings.dt).round() as usize;
@@ -218,20 +236,7 @@ impl Simulation {
         FrozenSolve::new([pairs, at_walls], copy.bed, self.around.radius)
     }
 
-    /// One substep.
-    fn step(&mut self) {
-        let SolverSettings { dt, list_period, .. } = self.around.settings;
-        let seen = self.assemble();
-        self.solve();
-        self.bed.move_on(dt);
-        self.watch.see_penetration(seen.penetration);
-        self.substep += 1;
-        if self.substep.is_multiple_of(list_period) {
-            self.examine();
-        }
-    }
-
-    /// Lists and assembles the contacts, lets gravity act and resolves the impacts.
+    /// Lists and assembles the contacts of a substep, lets gravity act and resolves the impacts.
     fn assemble(&mut self) -> Seen {
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
         contacts.follow(bed, around);
@@ -242,6 +247,18 @@ impl Simulation {
             bed.rewind();
         }
         seen
+    }
+
+    /// One substep.
+    fn step(&mut self) {
+        let seen = self.assemble();
+        self.solve();
+        self.bed.move_on(self.around.settings.dt);
+        self.watch.see_penetration(seen.penetration);
+        self.substep += 1;
+        if self.substep.is_multiple_of(self.around.settings.list_period) {
+            self.examine();
+        }
     }
 
     /// Solves the lasting contacts.

@@ -1,4 +1,6 @@
-//! `inspect`: what is in a file.
+//! `inspect`: what is in a file, or in one substep of a scene.
+
+mod contact_problem;
 
 use std::path::Path;
 
@@ -17,7 +19,12 @@ use crate::outcome::{BadArgument, Outcome};
 const NAMED_GAPS: usize = 5;
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
-    let facts = inspect(&args.path)?;
+    let facts = if let Some(out) = &args.contact_problem {
+        contact_problem::write(&args.path, out, &args.substep)?
+    } else {
+        args.substep.refuse_any()?;
+        inspect(&args.path)?
+    };
     if args.json {
         print_json(&facts)?;
     } else {

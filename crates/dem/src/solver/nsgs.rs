@@ -1,6 +1,6 @@
 //! Non-smooth Gauss-Seidel: sweeps over the contacts, each solved exactly against the present velocities.
 //!
-//! For each contact in turn (docs/theory/contact.md, box 1):
+//! For each contact in turn (docs/theory/contact.md, box 2):
 //!
 //! ```text
 //! lambda_n <- max(0, lambda_n - (w_n + b) / A_n)
@@ -69,6 +69,13 @@ pub(super) fn solve(
         has_settled = change <= settled;
     }
     Work { sweeps: settings.max_sweeps, unconverged: work.closing > too_fast, ..work }
+}
+
+/// Sweeps `count` times, from velocities that contain the impulses.
+pub(crate) fn sweep_plainly(sets: &mut [&mut ContactSet], bodies: &mut [Body], count: usize) {
+    for _ in 0..count {
+        sweep(sets, bodies, Manner::relaxed(1.0), None);
+    }
 }
 
 /// How a sweep treats the contacts.
