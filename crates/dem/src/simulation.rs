@@ -227,15 +227,6 @@ impl Simulation {
         }
     }
 
-    /// The contact problem that the coming substep has to solve, for studies of solvers; the simulation stays as
-    /// it is.
-    pub fn frozen_solve(&self) -> FrozenSolve {
-        let mut copy = self.clone();
-        copy.assemble();
-        let Contacts { pairs, at_walls, .. } = copy.contacts;
-        FrozenSolve::new([pairs, at_walls], copy.bed, self.around.radius)
-    }
-
     /// Lists and assembles the contacts of a substep, lets gravity act and resolves the impacts.
     fn assemble(&mut self) -> Seen {
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
@@ -247,6 +238,15 @@ impl Simulation {
             bed.rewind();
         }
         seen
+    }
+
+    /// The contact problem that the coming substep has to solve, for studies of solvers; the simulation stays as
+    /// it is.
+    pub fn frozen_solve(&self) -> FrozenSolve {
+        let mut copy = self.clone();
+        copy.assemble();
+        let Contacts { pairs, at_walls, .. } = copy.contacts;
+        FrozenSolve::new([pairs, at_walls], copy.bed, self.around.radius)
     }
 
     /// One substep.
