@@ -61,7 +61,7 @@ fn energy(grains: &[Motion; 2]) -> f64 {
 
 #[test]
 fn a_head_on_elastic_pair_exchanges_velocities() {
-    for preset in [Preset::Fast, Preset::Default, Preset::Accurate] {
+    for preset in Preset::ALL {
         let mut scene = pair(Material { restitution: 1.0, ..Material::default() }, 0.0);
         scene.preset = preset;
         let (before, after) = collide(&scene, 1);

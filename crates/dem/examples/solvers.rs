@@ -25,7 +25,7 @@ fn main() -> Result<(), DemError> {
     if std::env::args().any(|argument| argument == "pours") {
         return pours();
     }
-    for dt in [1.0 / 600.0, 1.0 / 2400.0] {
+    for dt in [1.0 / 600.0, 1.0 / 2000.0] {
         table(dt)?;
     }
     Ok(())
