@@ -97,7 +97,8 @@ fn how_many_sweeps_a_stack_of_twenty_needs() {
                 let stack = stack(preset, 0.5, aside).with_settings(settings);
                 let mut stack = stack.expect("valid settings");
                 stack.advance(2.0);
-                let fastest = stack.velocities().iter().map(|v| v.norm()).fold(0.0, f64::max);
+                let fastest =
+                    stack.velocities().iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
                 let off = stack.positions().iter().map(|p| p.x.hypot(p.y)).fold(0.0, f64::max);
                 (fastest, off, stack.health().worst_penetration)
             };
