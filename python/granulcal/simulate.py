@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from granulcal import _native
 from granulcal.scene import Material, Scene
-from granulcal.statistics import Statistics
+from granulcal.statistics import DiagnosticStatistics, Statistics
 
 __all__ = ["Pour", "simulate"]
 
@@ -106,6 +106,16 @@ class Pour:
             ValueError: too few grains are in view.
         """
         return Statistics(self._observation.statistics())
+
+    def diagnostic_statistics(self) -> DiagnosticStatistics:
+        """Returns the diagnostic statistics of the image, about the scene's vertical axis.
+
+        Isolated grains are seen only by pixels finer than a grain: `camera.downsample` decides.
+
+        Raises:
+            ValueError: too few grains are in view.
+        """
+        return DiagnosticStatistics(self._observation.diagnostics())
 
     @cached_property
     def _observation(self) -> _native.Observation:

@@ -102,6 +102,9 @@ pub struct SimulateArgs {
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+    /// Print the diagnostic statistics too: profile, azimuthal modes, tail, bodies
+    #[arg(long)]
+    pub diagnostics: bool,
     /// Write the final centres [m] as an array (n, 3)
     #[arg(long, value_name = "OUT.npy")]
     pub positions: Option<PathBuf>,
@@ -204,6 +207,7 @@ lens, depth unit and segmentation.
 Example:
   granulcal-cli features pile.npz --threshold 0.002
   granulcal-cli features frames/ --camera examples/camera.toml --json
+  granulcal-cli features pile.npz --diagnostics --grain-diameter 0.002
   granulcal-cli features --list")]
 pub struct FeaturesArgs {
     /// Recording to describe
@@ -233,6 +237,17 @@ pub struct FeaturesArgs {
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+    /// Print (or list) the diagnostic statistics too: profile, azimuthal modes, tail, bodies
+    #[arg(long)]
+    pub diagnostics: bool,
+    /// Diameter of a grain [m], which the diagnostic statistics need
+    #[arg(long, value_name = "METRES", requires = "diagnostics")]
+    pub grain_diameter: Option<f64>,
+    /// Where the axis of the pour meets the levelled ground [m], in the frame of the centroid that is
+    /// printed [default: the centroid]
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], requires = "diagnostics",
+        allow_negative_numbers = true)]
+    pub pour_axis: Option<Vec<f64>>,
     /// List the statistics with unit and meaning
     #[arg(long, conflicts_with_all = ["recording", "camera"])]
     pub list: bool,

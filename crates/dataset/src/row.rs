@@ -3,6 +3,7 @@
 use std::fmt;
 
 use granulcal_dem::{Health, Status};
+use granulcal_features::stats::DIAGNOSTIC_COUNT;
 
 /// How a row ended: as its pour, or with too few grains in view to describe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +67,8 @@ pub struct Row {
     pub cpu_s: f64,
     /// The paper's 16 statistics, NaN where [`RowStatus::NoGrainsInView`].
     pub statistics: [f64; 16],
+    /// The diagnostic statistics, NaN where the statistics are and in files that were written without.
+    pub diagnostics: [f64; DIAGNOSTIC_COUNT],
 }
 
 impl Row {
@@ -79,5 +82,6 @@ impl Row {
             && self.simulated_s == other.simulated_s
             && bits(&self.parameters) == bits(&other.parameters)
             && bits(&self.statistics) == bits(&other.statistics)
+            && bits(&self.diagnostics) == bits(&other.diagnostics)
     }
 }

@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use cpu_time::ProcessTime;
 use granulcal_dataset::{DatasetError, RowStatus, npy, observe};
 use granulcal_dem::{Health, Pour, Scene};
-use granulcal_features::PAPER16;
+use granulcal_features::{DIAGNOSTICS, PAPER16, Statistic};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -28,6 +28,9 @@ struct Report {
     simulated_s: f64,
     /// Null with too few grains in view.
     statistics: Option<Map<String, Value>>,
+    /// Absent unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    diagnostics: Option<Map<String, Value>>,
 }
 
 pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
@@ -50,6 +53,7 @@ pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
         wall_s: 0.0,
         simulated_s: pour.simulated_s,
         statistics: None,
+        diagnostics: None,
     };
     let status = describe(&scene, &pour, args, &mut report)?;
     report.cpu_s = clock.elapsed().as_secs_f64();
@@ -80,11 +84,12 @@ fn describe(
     if let Some(path) = &args.depth {
         write_view(path, &seen.view, args.depth_unit).context("writing --depth")?;
     }
-    match seen.statistics {
+    match &seen.statistics {
         Ok(values) => {
-            let named = PAPER16.iter().zip(values);
-            report.statistics =
-                Some(named.map(|(s, value)| (s.name.to_owned(), Value::from(value))).collect());
+            report.statistics = Some(by_name(&PAPER16, values));
+            if args.diagnostics {
+                report.diagnostics = Some(by_name(&DIAGNOSTICS, &seen.diagnostics()?));
+            }
             Ok(status)
         }
         Err(reason) => {
@@ -94,6 +99,10 @@ fn describe(
             Ok(status)
         }
     }
+}
+
+fn by_name<P>(registry: &[Statistic<P>], values: &[f64]) -> Map<String, Value> {
+    registry.iter().zip(values).map(|(s, &value)| (s.name.to_owned(), value.into())).collect()
 }
 
 fn print(report: &Report, json: bool) -> anyhow::Result<()> {
@@ -108,9 +117,17 @@ fn print(report: &Report, json: bool) -> anyhow::Result<()> {
     print_line(&format!("worst penetration  {:.4} radii", health.worst_penetration))?;
     print_line(&format!("energy created     {:.2e}", health.energy_created))?;
     print_line(&format!("grains lost        {}", health.grains_lost))?;
-    let Some(statistics) = &report.statistics else { return Ok(()) };
-    for statistic in &PAPER16 {
-        let value = statistics.get(statistic.name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    print_family(&PAPER16, report.statistics.as_ref())?;
+    print_family(&DIAGNOSTICS, report.diagnostics.as_ref())
+}
+
+fn print_family<P>(
+    registry: &[Statistic<P>],
+    values: Option<&Map<String, Value>>,
+) -> anyhow::Result<()> {
+    let Some(values) = values else { return Ok(()) };
+    for statistic in registry {
+        let value = values.get(statistic.name).and_then(Value::as_f64).unwrap_or(f64::NAN);
         print_line(&format!("{:<18} {value:<12.6} {}", statistic.name, statistic.unit))?;
     }
     Ok(())

@@ -1,7 +1,9 @@
 //! Maximum likelihood of the shifted, scaled chi distribution by its profile over the shift.
 
 use super::gamma::{gamma_shape, ln_gamma};
-use crate::stats::prepared::{extremes, is_constant, mean};
+use super::log_sum::{ln_and_inverse_sums, ln_sum};
+use crate::stats::prepared::is_constant;
+use crate::stats::sum::{extremes, mean, sum};
 
 /// Fewest degrees of freedom: below, the likelihood is unbounded.
 pub const MIN_DF: f64 = 1.0;
@@ -43,7 +45,7 @@ impl ChiFit {
         let (min, max) = extremes(radii);
         let range = max - min;
         if is_constant(radii) {
-            let square = radii.iter().map(|r| (r - min) * (r - min)).sum::<f64>();
+            let square = sum(radii, |r| (r - min) * (r - min));
             let scale = (square / radii.len() as f64).sqrt();
             return Self { df: MIN_DF, shift: min, scale };
         }
@@ -74,7 +76,7 @@ struct UnitData {
 impl UnitData {
     fn new(values: Vec<f64>) -> Self {
         let middle = mean(&values);
-        let squares: f64 = values.iter().map(|v| (v - middle) * (v - middle)).sum();
+        let squares = sum(&values, |v| (v - middle) * (v - middle));
         let variance = squares / values.len() as f64;
         Self { values, mean: middle, variance }
     }
@@ -110,7 +112,12 @@ impl UnitData {
     /// For a fixed shift, (v - b)² follows a gamma distribution of shape k/2: one equation for k,
     /// then A² = mean (v - b)² / k.
     fn profile(&self, gap: f64) -> Profile {
-        let (mean_square, mean_ln) = (self.mean_square(gap), self.mean_ln(gap));
+        self.profile_with(gap, ln_sum(&self.values, gap) / self.count())
+    }
+
+    /// The same where the mean of ln(v + gap) is known.
+    fn profile_with(&self, gap: f64, mean_ln: f64) -> Profile {
+        let mean_square = self.mean_square(gap);
         let log_ratio = mean_square.ln() - 2.0 * mean_ln;
         let df = 2.0 * gamma_shape(log_ratio, 0.5 * MIN_DF, 0.5 * MAX_DF);
         let likelihood = log_likelihood(df, mean_square, mean_ln);
@@ -152,35 +159,19 @@ impl UnitData {
     /// Derivative of the profile likelihood with respect to the gap. k and A are best for the gap,
     /// so only the explicit dependence counts (or k is at a bound and does not move).
     fn slope(&self, gap: f64) -> f64 {
-        let df = self.profile(gap).df;
-        let inverse = self.values.iter().map(|v| 1.0 / (v + gap)).sum::<f64>();
-        let mean_inverse = inverse / self.values.len() as f64;
-        (df - 1.0) * mean_inverse - df * (self.mean + gap) / self.mean_square(gap)
+        let (ln, inverse) = ln_and_inverse_sums(&self.values, gap);
+        let df = self.profile_with(gap, ln / self.count()).df;
+        let square = self.mean_square(gap);
+        (df - 1.0) * inverse / self.count() - df * (self.mean + gap) / square
+    }
+
+    fn count(&self) -> f64 {
+        self.values.len() as f64
     }
 
     /// Mean of (v + gap)².
     fn mean_square(&self, gap: f64) -> f64 {
         self.variance + (self.mean + gap) * (self.mean + gap)
-    }
-
-    /// Mean of ln(v + gap), as logarithms of products of 16: v + gap is within [1e-15, 100], so
-    /// none overflows, and 16 times fewer logarithms are taken.
-    fn mean_ln(&self, gap: f64) -> f64 {
-        const LANES: usize = 4;
-        const FACTORS: usize = 16;
-        let mut sum = 0.0;
-        for chunk in self.values.chunks(LANES * FACTORS) {
-            let (rows, rest) = chunk.as_chunks::<LANES>();
-            let mut products = [1.0; LANES];
-            for row in rows {
-                for (product, v) in products.iter_mut().zip(row) {
-                    *product *= v + gap;
-                }
-            }
-            sum += products.map(f64::ln).iter().sum::<f64>();
-            sum += rest.iter().map(|v| (v + gap).ln()).sum::<f64>();
-        }
-        sum / self.values.len() as f64
     }
 }
 
