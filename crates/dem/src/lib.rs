@@ -31,15 +31,20 @@
 
 mod assemble;
 mod bed;
+mod blocks;
 mod contact;
+mod contact_set;
 mod contacts;
 mod error;
+mod frozen_search;
 mod health;
 mod impact;
 mod lanes;
 mod law;
 mod material;
 mod neighbor;
+mod parallel;
+mod path;
 mod pour;
 mod preset;
 mod problem;
@@ -50,6 +55,7 @@ mod wall;
 mod wall_load;
 
 pub use error::DemError;
+pub use frozen_search::FrozenSearch;
 pub use health::{Health, MAX_ENERGY_CREATED};
 pub use material::{
     Material, WallMaterial, rolling_friction_from_length, rolling_friction_to_length,

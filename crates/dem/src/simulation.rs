@@ -1,16 +1,15 @@
 //! A pour in time: the substep, the end rule, the health.
 
-use std::sync::Arc;
-
 use nalgebra::Vector3;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::DemError;
 use crate::assemble::Seen;
 use crate::bed::Bed;
 use crate::contacts::{Contacts, Surroundings};
+use crate::frozen_search::FrozenSearch;
 use crate::health::{Health, HealthWatch};
 use crate::impact::Impacts;
+use crate::parallel::Threads;
 use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
 use crate::problem::{ContactProblem, SWEEPS_A_LOOK};
@@ -38,8 +37,6 @@ pub struct Simulation {
     camera: CameraSpec,
     substep: usize,
     watch: HealthWatch,
-    /// Threads for large scenes; small ones stay on the calling thread.
-    pool: Option<Arc<ThreadPool>>,
     /// The last end that the end rule saw, and at which substep.
     seemed_ended: Option<(Status, usize)>,
     ended: Option<Status>,
@@ -63,7 +60,6 @@ impl Simulation {
             end: scene.end,
             camera: scene.camera,
             substep: 0,
-            pool: None,
             seemed_ended: None,
             ended: None,
         })
@@ -85,15 +81,7 @@ impl Simulation {
     /// # Errors
     /// [`DemError::Threads`] if `threads` is 0 or the system gives none.
     pub fn with_threads(mut self, threads: usize) -> Result<Self, DemError> {
-        if threads == 0 {
-            return Err(DemError::range("threads", 0.0, "at least 1"));
-        }
-        self.pool = if threads == 1 {
-            None
-        } else {
-            let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-            Some(Arc::new(pool.map_err(DemError::Threads)?))
-        };
+        self.around.threads = Threads::new(threads)?;
         Ok(self)
     }
 
@@ -249,6 +237,11 @@ impl Simulation {
         FrozenSolve::new([pairs, at_walls], copy.bed, self.around.radius)
     }
 
+    /// The search for pairs of the present state, for studies of its cost; the simulation stays as it is.
+    pub fn frozen_search(&self) -> FrozenSearch {
+        FrozenSearch::new(self.bed.clone(), &self.around)
+    }
+
     /// One substep.
     fn step(&mut self) {
         let seen = self.assemble();
@@ -264,9 +257,9 @@ impl Simulation {
     /// Solves the lasting contacts.
     fn solve(&mut self) {
         let Contacts { pairs, at_walls, .. } = &mut self.contacts;
-        let (bodies, pool) = (&mut self.bed.bodies, self.pool.as_deref());
-        let (settings, radius) = (&self.around.settings, self.around.radius);
-        let work = solver::solve(&mut [pairs, at_walls], bodies, settings, radius, pool);
+        let (bodies, around) = (&mut self.bed.bodies, &self.around);
+        let sets = &mut [pairs, at_walls];
+        let work = solver::solve(sets, bodies, &around.settings, around.radius, &around.threads);
         self.watch.see_solve(&work);
     }
 

@@ -10,10 +10,10 @@
 //! lambda <- projection on the cones,  v to match
 //! ```
 
-use rayon::ThreadPool;
+use crate::parallel::Threads;
 
 use crate::bed::Body;
-use crate::contact::ContactSet;
+use crate::contact_set::ContactSet;
 use crate::law::TANGENTIAL_INERTIA;
 use crate::solver::Work;
 use crate::solver::components::{
@@ -59,10 +59,10 @@ pub(super) fn solve(
     bodies: &mut [Body],
     settings: &NewtonSettings,
     too_fast: f64,
-    pool: Option<&ThreadPool>,
+    threads: &Threads,
 ) -> Work {
     let mut work = Work::default();
-    let mut guard = Guard::new(sets, bodies, pool);
+    let mut guard = Guard::new(sets, bodies, threads);
     let mut velocities = vec![Components::ZERO; batches(sets).count()];
     for _ in 0..settings.outer {
         collect(sets, bodies, &mut velocities);
