@@ -5,7 +5,11 @@ use std::marker::PhantomData;
 use nalgebra::Vector3;
 
 use crate::lanes::{Row, Width};
+use crate::parallel::Threads;
 use crate::scene::Scene;
+
+/// Grains that a thread takes at once.
+const SHARE: usize = 4096;
 
 /// Linear and scaled angular velocity of one body, a cache line.
 ///
@@ -152,11 +156,12 @@ impl Bed {
     }
 
     /// v += g dt.
-    pub fn accelerate(&mut self, gravity: &Vector3<f64>, dt: f64) {
+    pub fn accelerate(&mut self, gravity: &Vector3<f64>, dt: f64, threads: &Threads) {
         let (count, step) = (self.count(), gravity * dt);
-        for body in &mut self.bodies[..count] {
-            body.velocity.add(&step);
-        }
+        let accelerate = |bodies: &mut [Body]| {
+            bodies.iter_mut().for_each(|body| body.velocity.add(&step));
+        };
+        threads.shares(&mut self.bodies[..count], SHARE, accelerate, |(), ()| ());
     }
 
     /// Where a grain is at `time` `[s]` into the substep, and its radius.
@@ -241,7 +246,7 @@ mod tests {
         // energy rises by m g dt (v + g dt / 2).
         let (mut bed, gravity, dt) = (bed(), Vector3::new(0.0, 0.0, -9.81), 1e-3);
         let before = bed.energy(&gravity);
-        bed.accelerate(&gravity, dt);
+        bed.accelerate(&gravity, dt, &Threads::default());
         bed.move_on(dt);
         let mass = bed.inverse_mass.iter().map(|m| 1.0 / m).sum::<f64>();
         let expected = -0.5 * mass * (9.81 * dt).powi(2);

@@ -4,6 +4,8 @@
 //! complete as long as every grain is within half the margin of its path. A grain that leaves it gets a new path
 //! and the contacts that lie on it; when many do, the list is made afresh.
 
+use std::ops::Range;
+
 use crate::Material;
 use crate::assemble::{self, Candidate, Seen};
 use crate::bed::Bed;
@@ -13,6 +15,7 @@ use crate::contact_set::ContactSet;
 use crate::impact::Impacts;
 use crate::neighbor::{Neighbours, PairSearch};
 use crate::parallel::Threads;
+use crate::partners::Partners;
 use crate::path::{Ball, Path, Reach};
 use crate::preset::SolverSettings;
 use crate::scene::Scene;
@@ -101,8 +104,9 @@ pub(crate) struct Contacts {
     around_path: Vec<u32>,
     listed: Vec<Listed>,
     far: Vec<Listed>,
-    /// For each grain those that it is listed with: grains, and walls with the number of grains added.
-    partners: Vec<Vec<u32>>,
+    /// Grains, and walls with the number of grains added.
+    partners: Partners,
+    near_walls: Vec<(Listed, bool)>,
     /// The way of each grain, from the time of the list on.
     paths: Vec<Path>,
     /// Paths that are newer than the list.
@@ -162,8 +166,8 @@ impl Contacts {
     }
 
     /// Those that a grain is listed with: grains, and walls with the number of grains added.
-    pub fn partners(&self, grain: usize) -> &[u32] {
-        &self.partners[grain]
+    pub fn partners(&self, grain: usize) -> impl Iterator<Item = u32> + '_ {
+        self.partners.of(grain)
     }
 
     /// Gaps, normals and biases of every listed contact, and what may be an impact.
@@ -205,8 +209,6 @@ impl Contacts {
         self.age = 0;
         self.renewed = 0;
         self.paths = Path::all_of(bed);
-        self.partners.resize(bed.count(), Vec::new());
-        self.partners.iter_mut().for_each(Vec::clear);
         let reach = around.reach();
         let interval = reach.interval;
 
@@ -217,30 +219,50 @@ impl Contacts {
         self.far.clear();
         for &Neighbours { i, j: partner, come_near } in &self.found {
             if come_near { &mut self.listed } else { &mut self.far }.push(Listed { i, partner });
-            self.partners[i as usize].push(partner);
-            self.partners[partner as usize].push(i);
         }
         self.listed.append(&mut self.far);
         self.pairs.rebuild(&self.listed, &self.blocks, bed.count(), false, |contact| {
             around.pair_law(bed, contact.i as usize, contact.partner as usize)
         });
 
+        self.list_walls(bed, around, interval);
         self.listed.clear();
-        for (grain, path) in self.paths.iter().enumerate() {
-            let near = bed.radius(grain) + NEAR * around.radius + interval * path.velocity.norm();
-            let range = near + around.margin - NEAR * around.radius;
-            for (number, wall) in around.walls.iter().enumerate() {
-                if wall.surface.may_reach(&path.from, range) {
-                    let contact = Listed { i: grain as u32, partner: number as u32 };
-                    let is_near = wall.surface.may_reach(&path.from, near);
-                    if is_near { &mut self.listed } else { &mut self.far }.push(contact);
-                    self.partners[grain].push((bed.count() + number) as u32);
-                }
-            }
+        for &(contact, is_near) in &self.near_walls {
+            if is_near { &mut self.listed } else { &mut self.far }.push(contact);
         }
         self.listed.append(&mut self.far);
         self.at_walls.rebuild(&self.listed, &self.blocks, bed.count(), true, |contact| {
             around.wall_law(bed, contact.i as usize, contact.partner as usize)
+        });
+    }
+
+    /// Lists the walls within reach of each grain, and whether they may be touched.
+    fn list_walls(&mut self, bed: &Bed, around: &Surroundings, interval: f64) {
+        self.near_walls.clear();
+        let (paths, walls) = (&self.paths, &around.walls);
+        let list = |grains: Range<usize>, found: &mut Vec<(Listed, bool)>| {
+            for grain in grains {
+                let Path { from, velocity } = &paths[grain];
+                let near = bed.radius(grain) + NEAR * around.radius + interval * velocity.norm();
+                let range = near + around.margin - NEAR * around.radius;
+                for (number, wall) in walls.iter().enumerate() {
+                    if wall.surface.may_reach(from, range) {
+                        let contact = Listed { i: grain as u32, partner: number as u32 };
+                        found.push((contact, wall.surface.may_reach(from, near)));
+                    }
+                }
+            }
+        };
+        around.threads.gather_ranges(bed.count(), SHARE, &mut self.near_walls, list);
+        let (found, near_walls, count) = (&self.found, &self.near_walls, bed.count() as u32);
+        self.partners.rebuild(bed.count(), |add| {
+            for pair in found {
+                add(pair.i, pair.j);
+                add(pair.j, pair.i);
+            }
+            for (contact, _) in near_walls {
+                add(contact.i, count + contact.partner);
+            }
         });
     }
 
@@ -259,7 +281,7 @@ impl Contacts {
         self.search.add(grain as u32, &ball);
         for number in 0..self.around_path.len() {
             let other = self.around_path[number] as usize;
-            if other == grain || self.partners[grain].contains(&(other as u32)) {
+            if other == grain || self.partners.has(grain, other as u32) {
                 continue;
             }
             let theirs = &self.paths[other];
@@ -267,8 +289,8 @@ impl Contacts {
             let limit = bed.radius(grain) + bed.radius(other) + around.margin;
             if path.comes_within(&theirs, limit, left) {
                 let (i, j) = (grain.min(other), grain.max(other));
-                self.partners[i].push(j as u32);
-                self.partners[j].push(i as u32);
+                self.partners.add(i, j as u32);
+                self.partners.add(j, i as u32);
                 let contact = Listed { i: i as u32, partner: j as u32 };
                 self.pairs.append(contact, false, around.pair_law(bed, i, j));
             }
@@ -276,8 +298,8 @@ impl Contacts {
         let range = bed.radius(grain) + around.margin + left * velocity.norm();
         for (number, wall) in around.walls.iter().enumerate() {
             let partner = (bed.count() + number) as u32;
-            if !self.partners[grain].contains(&partner) && wall.surface.may_reach(&at, range) {
-                self.partners[grain].push(partner);
+            if !self.partners.has(grain, partner) && wall.surface.may_reach(&at, range) {
+                self.partners.add(grain, partner);
                 let contact = Listed { i: grain as u32, partner: number as u32 };
                 self.at_walls.append(contact, true, around.wall_law(bed, grain, number));
             }

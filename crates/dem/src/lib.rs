@@ -44,6 +44,7 @@ mod law;
 mod material;
 mod neighbor;
 mod parallel;
+mod partners;
 mod path;
 mod pour;
 mod preset;

@@ -28,6 +28,14 @@ impl Threads {
         Ok(Self(Some(Arc::new(pool.map_err(DemError::Threads)?))))
     }
 
+    /// Runs `work` as one of the threads: loops inside it start without waking another first.
+    pub fn run<V: Send>(&self, work: impl FnOnce() -> V + Send) -> V {
+        match self.0.as_deref() {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
+    }
+
     /// The pool, if `items` are enough for two shares.
     fn pool_for(&self, items: usize, share: usize) -> Option<&ThreadPool> {
         self.0.as_deref().filter(|_| items / 2 >= share)

@@ -219,7 +219,7 @@ impl Simulation {
     fn assemble(&mut self) -> Seen {
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
         contacts.follow(bed, around);
-        bed.accelerate(&around.gravity, around.settings.dt);
+        bed.accelerate(&around.gravity, around.settings.dt, &around.threads);
         let seen = contacts.assemble(bed, around, self.watch.lost_mut(), &mut self.impacts);
         if self.impacts.resolve(bed, contacts, around) > 0 {
             contacts.assemble_again(bed, around);
@@ -244,6 +244,11 @@ impl Simulation {
 
     /// One substep.
     fn step(&mut self) {
+        let threads = self.around.threads.clone();
+        threads.run(|| self.step_here());
+    }
+
+    fn step_here(&mut self) {
         let seen = self.assemble();
         self.solve();
         self.bed.move_on(self.around.settings.dt);
