@@ -3,7 +3,11 @@
 //! Between two searches the list of contacts is fixed; every substep refreshes gap, normal and bias of
 //! each. Impulses live in the batches and are carried from list to list by the pair's indices.
 
+mod check;
+
 use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
 
 use crate::lanes::{LANES, Lanes, Lanes3};
 
@@ -13,7 +17,7 @@ const COLOURS: usize = 63;
 const APPEND_LOOK_BACK: usize = 8;
 
 /// [`LANES`] contacts: geometry, law and impulses. Empty lanes refer to the resting body and have no compliance.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Batch {
     /// First grain of each contact.
     pub i: [u32; LANES],
@@ -36,7 +40,7 @@ pub(crate) struct Batch {
 }
 
 /// Masses, levers, compliances and friction of the contacts of a batch; shared by all batches that agree.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LawLanes {
     /// Inverse masses.
     pub inverse_mass_i: Lanes,
@@ -53,7 +57,7 @@ pub(crate) struct LawLanes {
 }
 
 /// What only grains at walls need.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct WallLanes {
     /// Wall of each contact.
     pub wall: [u16; LANES],
@@ -82,7 +86,7 @@ struct Carried {
 }
 
 /// Coefficients of one contact, put into a lane when the list is made.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ContactLaw {
     pub inverse_mass: [f64; 2],
     pub lever: [f64; 2],
@@ -92,7 +96,7 @@ pub(crate) struct ContactLaw {
 }
 
 /// The batches of one colour.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Colour {
     pub batches: Range<usize>,
     /// Whether no two contacts of the colour share a grain; false only for what was left without a colour.
@@ -100,7 +104,7 @@ pub(crate) struct Colour {
 }
 
 /// All contacts of a kind (pairs of grains, or grains at walls), colour after colour.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct ContactSet {
     pub batches: Vec<Batch>,
     pub laws: Vec<LawLanes>,
@@ -114,9 +118,13 @@ pub(crate) struct ContactSet {
     coloured: usize,
     /// The contact law behind each entry of `laws`, if all its lanes share one.
     uniform: Vec<Option<ContactLaw>>,
+    #[serde(skip)]
     carried: Vec<Carried>,
+    #[serde(skip)]
     carried_starts: Vec<u32>,
+    #[serde(skip)]
     masks: Vec<u64>,
+    #[serde(skip)]
     colour_of: Vec<u8>,
 }
 

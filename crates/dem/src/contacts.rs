@@ -4,6 +4,8 @@
 //! complete as long as every grain is within half the margin of its path. A grain that leaves it gets a new path
 //! and the contacts that lie on it; when many do, the list is made afresh.
 
+mod check;
+
 use crate::Material;
 use crate::assemble::{self, Seen};
 use crate::bed::Bed;
@@ -14,6 +16,7 @@ use crate::preset::SolverSettings;
 use crate::scene::Scene;
 use crate::wall::{Wall, walls_of};
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 /// Share of the grains from which on a new list is cheaper than single new paths.
 const MANY: usize = 16;
@@ -76,13 +79,16 @@ fn contact_law(material: &Material, inverse_mass: [f64; 2], lever: [f64; 2]) -> 
 }
 
 /// Pairs and grains at walls, with their search.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Contacts {
     pub pairs: ContactSet,
     pub at_walls: ContactSet,
     search: PairSearch,
+    #[serde(skip)]
     found: Vec<(u32, u32)>,
+    #[serde(skip)]
     listed: Vec<Listed>,
+    #[serde(skip)]
     far: Vec<Listed>,
     /// For each grain those that it is listed with: grains, and walls with the number of grains added.
     partners: Vec<Vec<u32>>,
@@ -92,6 +98,7 @@ pub(crate) struct Contacts {
     renewed: Vec<u32>,
     /// Substeps since the list was made.
     age: usize,
+    #[serde(skip)]
     strayed: Vec<u32>,
 }
 

@@ -31,6 +31,7 @@
 
 mod assemble;
 mod bed;
+mod checkpoint;
 mod contact;
 mod contacts;
 mod error;
@@ -49,6 +50,7 @@ mod solver;
 mod wall;
 mod wall_load;
 
+pub use checkpoint::CheckpointHeader;
 pub use error::DemError;
 pub use health::{Health, MAX_ENERGY_CREATED};
 pub use material::{

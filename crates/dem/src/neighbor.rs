@@ -5,7 +5,10 @@
 //! that come near on their straight paths are the answer. A dense grid of cells holds the centres, x
 //! fastest, so that neighbouring cells of a row are one range of slots.
 
+mod check;
+
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::bed::Bed;
 use crate::lanes::widest;
@@ -18,23 +21,30 @@ const CHUNK: usize = 16;
 const ROUNDING: f64 = 1e-6;
 
 /// The search and its buffers.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct PairSearch {
+    #[serde(skip)]
     middles: Vec<Vector3<f64>>,
+    #[serde(skip)]
     reaches: Vec<f64>,
     /// Lower corner of the grid `[m]` and the width of a cell `[m]`.
-    corner: Vector3<f64>,
+    corner: [f64; 3],
     edge: f64,
     cells: [usize; 3],
     /// First slot of each cell, and the end.
     starts: Vec<u32>,
+    #[serde(skip)]
     cell_of: Vec<u32>,
     /// Grains in the order of their cells.
     order: Vec<u32>,
     /// Centre from the grid's corner and grown radius, in the order of the cells; single precision for speed.
+    #[serde(skip)]
     x: Vec<f32>,
+    #[serde(skip)]
     y: Vec<f32>,
+    #[serde(skip)]
     z: Vec<f32>,
+    #[serde(skip)]
     reach: Vec<f32>,
 }
 
@@ -117,7 +127,7 @@ impl PairSearch {
             edge *= 1.25;
         }
         self.cells = [0, 1, 2].map(|axis| (extent[axis] / edge) as usize + 1);
-        self.corner = low;
+        self.corner = low.into();
         self.edge = edge;
 
         let total = self.cells.iter().product::<usize>();
@@ -235,10 +245,23 @@ widest! {
 }
 
 /// A grain's straight way.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(from = "[[f64; 3]; 2]", into = "[[f64; 3]; 2]")]
 pub(crate) struct Path {
     pub from: Vector3<f64>,
     pub velocity: Vector3<f64>,
+}
+
+impl From<[[f64; 3]; 2]> for Path {
+    fn from([from, velocity]: [[f64; 3]; 2]) -> Self {
+        Self { from: from.into(), velocity: velocity.into() }
+    }
+}
+
+impl From<Path> for [[f64; 3]; 2] {
+    fn from(path: Path) -> Self {
+        [path.from.into(), path.velocity.into()]
+    }
 }
 
 impl Path {

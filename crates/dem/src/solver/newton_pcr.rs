@@ -11,6 +11,7 @@
 //! ```
 
 use rayon::ThreadPool;
+use serde::{Deserialize, Serialize};
 
 use crate::bed::Body;
 use crate::contact::ContactSet;
@@ -28,7 +29,7 @@ mod guard;
 pub use complementarity::Complementarity;
 
 /// How Newton's method is run.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NewtonSettings {
     /// Newton steps in a substep.
     pub outer: usize,

@@ -25,9 +25,9 @@ use crate::preset::SolverSettings;
 use crate::solver::Work;
 
 /// Batches of a colour below which a second thread costs more than it brings.
-const PARALLEL_BATCHES: usize = 512;
+const PARALLEL_BATCHES: usize = if cfg!(test) { 4 } else { 512 };
 /// Batches that a thread takes at once.
-const SHARE: usize = 64;
+const SHARE: usize = if cfg!(test) { 2 } else { 64 };
 
 /// How far a sweep still was from the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

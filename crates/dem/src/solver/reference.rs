@@ -12,6 +12,7 @@
 //! ```
 
 use rayon::ThreadPool;
+use serde::{Deserialize, Serialize};
 
 use crate::bed::Body;
 use crate::contact::ContactSet;
@@ -25,7 +26,7 @@ use crate::solver::nsgs::{self, Manner, ResidualSums};
 const LOOK: usize = 8;
 
 /// How far the reference is iterated.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceSettings {
     /// Natural-map residual over the rms normal impulse at which to stop `[-]`.
     pub residual: f64,
