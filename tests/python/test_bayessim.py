@@ -201,11 +201,12 @@ def test_missing_files_and_foreign_folders(quick, tmp_path):
 def test_data_set_rows_are_excluded_counted_and_reordered(toy, capsys):
     theta, x = toy.simulate(200, seed=5)
     status = ["at_rest"] * 200
-    status[3], status[4], status[5], status[6] = (
+    status[3], status[4], status[5], status[6], status[7] = (
         "unhealthy",
         "no_grains_in_view",
         "horizon",
         "out_of_view",
+        "jammed",
     )
     theta[4], x[9, 2] = np.nan, np.inf
     data = SimpleNamespace(
@@ -220,6 +221,7 @@ def test_data_set_rows_are_excluded_counted_and_reordered(toy, capsys):
     model = BayesSim.fit(data, **options)
     assert model.summary.excluded == {
         "unhealthy": 1,
+        "jammed": 1,
         "no_grains_in_view": 1,
         "non_finite": 1,
     }
@@ -228,10 +230,10 @@ def test_data_set_rows_are_excluded_counted_and_reordered(toy, capsys):
     assert model.scene_toml == "a = 1\n"
     printed = capsys.readouterr().out
     assert (
-        "1 unhealthy, 1 no_grains_in_view, 1 non_finite" in printed
+        "1 unhealthy, 1 jammed, 1 no_grains_in_view, 1 non_finite" in printed
         and "90% region holds" in printed
     )
-    keep = np.setdiff1d(np.arange(200), [3, 4, 9])
+    keep = np.setdiff1d(np.arange(200), [3, 4, 7, 9])
     same = BayesSim.fit(theta[keep], x[keep], toy.prior, **QUICK)
     np.testing.assert_array_equal(model.posterior(x[0]).sample(5), same.posterior(x[0]).sample(5))
 

@@ -3,6 +3,7 @@
 use std::marker::PhantomData;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::lanes::{Row, Width};
 use crate::parallel::Threads;
@@ -15,7 +16,7 @@ const SHARE: usize = 4096;
 ///
 /// `spin` is `r * omega` `[m/s]`: with it the contact equations of unequal spheres have the
 /// same coefficients as those of equal ones. The fourth numbers are zero.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[repr(C, align(64))]
 pub(crate) struct Body {
     pub velocity: Row,
@@ -74,7 +75,7 @@ impl<'a> SharedBodies<'a> {
 
 /// Grains as arrays. `places` and `bodies` have one entry more than there are grains: the resting body that
 /// walls and empty lanes refer to.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Bed {
     /// Centre and radius of each grain `[m]`.
     pub places: Vec<Row>,
@@ -101,6 +102,22 @@ impl Bed {
             clocks: vec![0.0; count],
             inverse_mass: vec![1.0; count],
         }
+    }
+
+    /// Whether this can have become of `start`: as many grains, as large and as heavy, at the begin of a substep.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check_like(&self, start: &Self) -> Result<(), &'static str> {
+        let count = start.count();
+        let is_like = self.places.len() == count + 1
+            && self.bodies.len() == count + 1
+            && self.clocks == start.clocks
+            && self.inverse_mass == start.inverse_mass
+            && self.places.iter().zip(&start.places).all(|(a, b)| a.0[3] == b.0[3])
+            && self.places[count] == start.places[count]
+            && self.bodies[count] == start.bodies[count];
+        if is_like { Ok(()) } else { Err("grains that are not the scene's") }
     }
 
     pub fn count(&self) -> usize {

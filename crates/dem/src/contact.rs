@@ -5,10 +5,12 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use crate::lanes::{LANES, Lanes, Lanes3};
 
 /// [`LANES`] contacts: geometry, law and impulses. Empty lanes refer to the resting body and have no compliance.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Batch {
     /// First grain of each contact.
     pub i: [u32; LANES],
@@ -31,7 +33,7 @@ pub(crate) struct Batch {
 }
 
 /// Masses, levers, compliances and friction of the contacts of a batch; shared by all batches that agree.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LawLanes {
     /// Inverse masses.
     pub inverse_mass_i: Lanes,
@@ -50,7 +52,7 @@ pub(crate) struct LawLanes {
 }
 
 /// What only grains at walls need.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct WallLanes {
     /// Wall of each contact.
     pub wall: [u16; LANES],
@@ -69,7 +71,7 @@ pub(crate) struct Listed {
 }
 
 /// Coefficients of one contact, put into a lane when the list is made.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ContactLaw {
     pub inverse_mass: [f64; 2],
     pub lever: [f64; 2],

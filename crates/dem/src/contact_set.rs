@@ -3,7 +3,11 @@
 //! The contacts of a block are coloured so that those of a batch share no grain. Impulses are carried from list to
 //! list by the pair's indices.
 
+mod check;
+
 use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
 
 use crate::blocks::Blocks;
 use crate::contact::{Batch, ContactLaw, LawLanes, Listed, WallLanes};
@@ -15,7 +19,7 @@ const COLOURS: usize = 63;
 const APPEND_LOOK_BACK: usize = 8;
 
 /// All contacts of a kind (pairs of grains, or grains at walls), block after block and in it colour after colour.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct ContactSet {
     pub batches: Vec<Batch>,
     pub laws: Vec<LawLanes>,
@@ -31,10 +35,15 @@ pub(crate) struct ContactSet {
     coloured: usize,
     /// The contact law behind each entry of `laws`, if all its lanes share one.
     uniform: Vec<Option<ContactLaw>>,
+    #[serde(skip)]
     carried: Vec<Carried>,
+    #[serde(skip)]
     carried_starts: Vec<u32>,
+    #[serde(skip)]
     ordered: Vec<Listed>,
+    #[serde(skip)]
     masks: Vec<u64>,
+    #[serde(skip)]
     colour_of: Vec<u8>,
 }
 

@@ -4,6 +4,8 @@
 //! complete as long as every grain is within half the margin of its path. A grain that leaves it gets a new path
 //! and the contacts that lie on it; when many do, the list is made afresh.
 
+mod check;
+
 use std::ops::Range;
 
 use crate::Material;
@@ -21,6 +23,7 @@ use crate::preset::SolverSettings;
 use crate::scene::Scene;
 use crate::wall::{Wall, walls_of};
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 /// Share of the grains from which on a new list is cheaper than single new paths.
 const MANY: usize = 16;
@@ -94,18 +97,24 @@ fn contact_law(material: &Material, inverse_mass: [f64; 2], lever: [f64; 2]) -> 
 }
 
 /// Pairs and grains at walls, with their search.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Contacts {
     pub pairs: ContactSet,
     pub at_walls: ContactSet,
     search: PairSearch,
+    #[serde(skip)]
     blocks: Blocks,
+    #[serde(skip)]
     found: Vec<Neighbours>,
+    #[serde(skip)]
     around_path: Vec<u32>,
+    #[serde(skip)]
     listed: Vec<Listed>,
+    #[serde(skip)]
     far: Vec<Listed>,
     /// Grains, and walls with the number of grains added.
     partners: Partners,
+    #[serde(skip)]
     near_walls: Vec<(Listed, bool)>,
     /// The way of each grain, from the time of the list on.
     paths: Vec<Path>,
@@ -113,6 +122,7 @@ pub(crate) struct Contacts {
     renewed: usize,
     /// Substeps since the list was made.
     age: usize,
+    #[serde(skip)]
     strayed: Vec<u32>,
 }
 

@@ -221,8 +221,8 @@ struct Meeting {
 }
 
 impl Meeting {
-    fn with_grain(i: usize, j: usize, bed: &Bed, around: &Surroundings) -> Self {
-        let apart = bed.position(i) - bed.position(j);
+    fn with_grain(i: usize, j: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
+        let apart = bed.place_at(i, time).vector() - bed.place_at(j, time).vector();
         let distance = apart.norm();
         Self {
             law: around.pair_law(bed, i, j),
@@ -235,7 +235,8 @@ impl Meeting {
     }
 
     fn with_wall(i: usize, wall: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
-        let normal = around.walls[wall].surface.nearest(&bed.position(i)).normal;
+        let place = bed.place_at(i, time).vector();
+        let normal = around.walls[wall].surface.nearest(&place).normal;
         Self {
             law: around.wall_law(bed, i, wall),
             material: around.walls[wall].material,
@@ -248,13 +249,11 @@ impl Meeting {
 }
 
 /// Lets two collide at `time` if they still approach fast enough: Newton's restitution, Coulomb's friction
-/// and rolling friction, each solved exactly in this order. False if they do not.
+/// and rolling friction, each solved exactly in this order. If they do not, both stay as they are.
 fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> bool {
     let (i, other) = (pair.i as usize, other_grain(pair, bed));
-    bed.advance(i, time);
     let meeting = if let Some(j) = other {
-        bed.advance(j, time);
-        Meeting::with_grain(i, j, bed, around)
+        Meeting::with_grain(i, j, time, bed, around)
     } else {
         Meeting::with_wall(i, pair.partner as usize - bed.count(), time, bed, around)
     };
@@ -264,6 +263,10 @@ fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> 
     let w_n = normal.dot(&dv);
     if w_n + falling >= -IMPACT_SPEED {
         return false;
+    }
+    bed.advance(i, time);
+    if let Some(j) = other {
+        bed.advance(j, time);
     }
     let a_n = c_i + c_j;
     let lambda_n = -(1.0 + material.restitution) * (w_n + falling) / a_n;

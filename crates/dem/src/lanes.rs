@@ -18,17 +18,18 @@ pub(crate) use avx512::Avx512;
 use nalgebra::Vector3;
 pub(crate) use portable::Portable;
 pub(crate) use reg::{Reg, Reg3};
+use serde::{Deserialize, Serialize};
 
 /// Contacts in a batch.
 pub(crate) const LANES: usize = 8;
 
 /// One number for each contact of a batch, in memory.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[repr(C, align(64))]
 pub(crate) struct Lanes(pub [f64; LANES]);
 
 /// Four numbers of one grain, in memory: a vector and a fourth number.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[repr(C, align(32))]
 pub(crate) struct Row(pub [f64; 4]);
 
@@ -55,7 +56,7 @@ impl Row {
 }
 
 /// One 3-vector for each contact of a batch, component by component, in memory.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Lanes3 {
     pub x: Lanes,
     pub y: Lanes,
@@ -137,6 +138,19 @@ pub(crate) trait Width: Copy {
     fn rows(columns: [Self::Value; 4]) -> [Self::Quad; LANES];
 }
 
+/// The widest registers that kernels may use `[bits]`. Only tests ask for less, to compare.
+#[cfg(test)]
+pub(crate) static WIDEST: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(512);
+
+/// Whether kernels may use registers of so many bits.
+#[inline(always)]
+pub(crate) fn may_use(bits: u32) -> bool {
+    #[cfg(test)]
+    return bits <= WIDEST.load(std::sync::atomic::Ordering::Relaxed);
+    #[cfg(not(test))]
+    return bits <= 512;
+}
+
 /// Compiles a function three times, for AVX-512, AVX2 and the target's baseline, and calls the widest
 /// that this machine has. The body must be inlined for the wider registers to reach it; `$width` names
 /// the [`Width`] that it is compiled for.
@@ -158,14 +172,18 @@ macro_rules! widest {
                 fn avx2($($arg: $kind),*) $(-> $out)? {
                     with::<$crate::lanes::Avx2>($($arg),*)
                 }
-                if is_x86_feature_detected!("avx512vl")
+                if $crate::lanes::may_use(512)
+                    && is_x86_feature_detected!("avx512vl")
                     && is_x86_feature_detected!("avx512dq")
                     && is_x86_feature_detected!("avx512bw")
                 {
                     // SAFETY: the features were detected on this machine.
                     return unsafe { avx512($($arg),*) };
                 }
-                if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                if $crate::lanes::may_use(256)
+                    && is_x86_feature_detected!("avx2")
+                    && is_x86_feature_detected!("fma")
+                {
                     // SAFETY: the feature was detected on this machine.
                     return unsafe { avx2($($arg),*) };
                 }

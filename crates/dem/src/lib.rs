@@ -32,6 +32,7 @@
 mod assemble;
 mod bed;
 mod blocks;
+mod checkpoint;
 mod contact;
 mod contact_set;
 mod contacts;
@@ -55,6 +56,7 @@ mod solver;
 mod wall;
 mod wall_load;
 
+pub use checkpoint::CheckpointHeader;
 pub use error::DemError;
 pub use frozen_search::FrozenSearch;
 pub use health::{Health, MAX_ENERGY_CREATED};

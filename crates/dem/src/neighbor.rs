@@ -5,9 +5,12 @@
 //! that come near on their straight paths are the answer. A dense grid of cells holds the centres, x
 //! fastest, so that neighbouring cells of a row are one range of slots.
 
+mod check;
+
 use std::ops::Range;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::bed::Bed;
 use crate::lanes::widest;
@@ -22,9 +25,11 @@ const CHUNK: usize = 16;
 const ROWS: usize = 64;
 
 /// The search and its buffers.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct PairSearch {
+    #[serde(skip)]
     middles: Vec<Vector3<f64>>,
+    #[serde(skip)]
     reaches: Vec<f64>,
     /// Grains that were added since, each with the next one of its cell; the last of each cell.
     added: Vec<Added>,
@@ -32,18 +37,23 @@ pub(crate) struct PairSearch {
     /// Added grains that fit into no cell.
     outside: Vec<u32>,
     /// Lower corner of the grid `[m]` and the width of a cell `[m]`.
-    corner: Vector3<f64>,
+    corner: [f64; 3],
     edge: f64,
     cells: [usize; 3],
     /// First slot of each cell, and the end.
     starts: Vec<u32>,
+    #[serde(skip)]
     cell_of: Vec<u32>,
     /// Grains in the order of their cells.
     order: Vec<u32>,
     /// Centre from the grid's corner and grown radius, in the order of the cells; single precision for speed.
+    #[serde(skip)]
     x: Vec<f32>,
+    #[serde(skip)]
     y: Vec<f32>,
+    #[serde(skip)]
     z: Vec<f32>,
+    #[serde(skip)]
     reach: Vec<f32>,
 }
 
@@ -87,7 +97,7 @@ impl PairSearch {
 
     /// Adds a grain's new swept ball to those that [`Self::around`] finds.
     pub fn add(&mut self, grain: u32, ball: &Ball) {
-        let from_corner = (ball.middle - self.corner) / self.edge;
+        let from_corner = (ball.middle - Vector3::from(self.corner)) / self.edge;
         let is_inside = |axis: usize| (0.0..self.cells[axis] as f64).contains(&from_corner[axis]);
         if self.starts.is_empty() || ball.reach > 0.5 * self.edge || !(0..3).all(is_inside) {
             self.outside.push(grain);
@@ -160,7 +170,7 @@ impl PairSearch {
             edge *= 1.25;
         }
         self.cells = [0, 1, 2].map(|axis| (extent[axis] / edge) as usize + 1);
-        self.corner = low;
+        self.corner = low.into();
         self.edge = edge;
 
         let total = self.cells.iter().product::<usize>();
@@ -291,7 +301,7 @@ fn keep_from<T: Copy>(items: &mut Vec<T>, first: usize, mut is_kept: impl FnMut(
 }
 
 /// A grain that was added to a cell, and the number, from 1 on, of the one that was added to it before.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Added {
     grain: u32,
     before: u32,

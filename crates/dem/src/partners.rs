@@ -1,10 +1,12 @@
 //! With whom each grain is listed.
 
+use serde::{Deserialize, Serialize};
+
 /// Ends a chain.
 const NONE: u32 = u32::MAX;
 
 /// For each grain those that it is listed with, in one array; those that are added later hang on chains.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Partners {
     starts: Vec<u32>,
     listed: Vec<u32>,
@@ -14,7 +16,7 @@ pub(crate) struct Partners {
 }
 
 /// A partner that was added, and the link before it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Link {
     partner: u32,
     before: u32,
@@ -38,6 +40,25 @@ impl Partners {
             self.listed[*slot as usize] = partner;
             *slot += 1;
         });
+    }
+
+    /// Whether partners that were read from bytes are those of so many grains, each less than `bodies`.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self, grains: usize, bodies: usize) -> Result<(), &'static str> {
+        let known = |&partner: &u32| (partner as usize) < bodies;
+        let links = self.added.len();
+        let fits = self.latest.len() == grains
+            && self.starts.len() == if grains == 0 { self.starts.len() } else { grains + 2 }
+            && self.starts.is_sorted()
+            && self.starts.last().is_none_or(|&end| end as usize == self.listed.len())
+            && self.listed.iter().all(known)
+            && self.added.iter().all(|link| known(&link.partner))
+            // Chains lead back, so that none is a ring.
+            && self.latest.iter().all(|&link| link == NONE || (link as usize) < links)
+            && self.added.iter().enumerate().all(|(number, link)| link.before == NONE || (link.before as usize) < number);
+        if fits { Ok(()) } else { Err("partners that the scene has not") }
     }
 
     /// Adds a partner to a grain.

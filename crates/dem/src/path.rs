@@ -1,6 +1,7 @@
 //! Straight ways of grains, and what they sweep.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::bed::Bed;
 
@@ -8,10 +9,23 @@ use crate::bed::Bed;
 const ROUNDING: f64 = 1e-6;
 
 /// A grain's straight way.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(from = "[[f64; 3]; 2]", into = "[[f64; 3]; 2]")]
 pub(crate) struct Path {
     pub from: Vector3<f64>,
     pub velocity: Vector3<f64>,
+}
+
+impl From<[[f64; 3]; 2]> for Path {
+    fn from([from, velocity]: [[f64; 3]; 2]) -> Self {
+        Self { from: from.into(), velocity: velocity.into() }
+    }
+}
+
+impl From<Path> for [[f64; 3]; 2] {
+    fn from(path: Path) -> Self {
+        [path.from.into(), path.velocity.into()]
+    }
 }
 
 impl Path {

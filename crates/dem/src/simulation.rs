@@ -1,4 +1,10 @@
-//! A pour in time: the substep, the end rule, the health.
+//! A pour in time: the substep and the health; when it ends is in `simulation/end.rs`, its state as bytes in
+//! `simulation/state.rs`.
+
+mod end;
+mod state;
+
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
@@ -13,15 +19,13 @@ use crate::parallel::Threads;
 use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
 use crate::problem::{ContactProblem, SWEEPS_A_LOOK};
-use crate::scene::{CameraSpec, EndRule, Scene};
+use crate::scene::Scene;
 use crate::solver::frozen::FrozenSolve;
 use crate::solver::{self, nsgs};
 use crate::wall_load::{self, WallLoad};
 
 /// Examinations between two looks at the residual, which costs about a sweep.
 const RESIDUAL_PERIOD: usize = 4;
-/// Looks at the end rule within which a pour must seem ended twice.
-const REST_LOOKS: usize = 16;
 /// A scene in motion.
 ///
 /// Each substep (Moreau's time stepping; docs/theory/contact.md, box 3):
@@ -33,13 +37,19 @@ pub struct Simulation {
     contacts: Contacts,
     around: Surroundings,
     impacts: Impacts,
-    end: EndRule,
-    camera: CameraSpec,
+    origin: Arc<Origin>,
     substep: usize,
     watch: HealthWatch,
     /// The last end that the end rule saw, and at which substep.
     seemed_ended: Option<(Status, usize)>,
     ended: Option<Status>,
+}
+
+/// What a simulation is of.
+#[derive(Debug)]
+struct Origin {
+    scene: Scene,
+    seed: u64,
 }
 
 impl Simulation {
@@ -51,14 +61,15 @@ impl Simulation {
         scene.check()?;
         let bed = Bed::new(scene, seed);
         let gravity = Vector3::from(scene.gravity);
+        let lift = gravity.norm() * scene.grains.radius();
+        let least_scale = (lift + scene.end.kinetic_energy) * bed.count() as f64;
         Ok(Self {
-            watch: HealthWatch::new(bed.count(), bed.energy(&gravity)),
+            watch: HealthWatch::new(bed.count(), bed.energy(&gravity), least_scale),
             contacts: Contacts::default(),
             around: Surroundings::new(scene),
             bed,
             impacts: Impacts::default(),
-            end: scene.end,
-            camera: scene.camera,
+            origin: Arc::new(Origin { scene: scene.clone(), seed }),
             substep: 0,
             seemed_ended: None,
             ended: None,
@@ -83,6 +94,11 @@ impl Simulation {
     pub fn with_threads(mut self, threads: usize) -> Result<Self, DemError> {
         self.around.threads = Threads::new(threads)?;
         Ok(self)
+    }
+
+    /// The solver's settings: the preset's, unless they were replaced.
+    pub fn settings(&self) -> &SolverSettings {
+        &self.around.settings
     }
 
     /// Simulated time `[s]`.
@@ -209,7 +225,9 @@ impl Simulation {
             angular_velocities: self.angular_velocities(),
             status: self.ended.unwrap_or(Status::Horizon),
             health: self.health(),
+            grains_in_funnel: self.in_funnel().count(),
             simulated_s: self.time(),
+            state_hash: self.state_hash(),
             positions: self.positions(),
             radii: self.radii(),
         }
@@ -285,30 +303,7 @@ impl Simulation {
             self.ended = Some(Status::Unhealthy);
         }
     }
-
-    /// How the pour has ended, if it has. It must have looked so twice within [`REST_LOOKS`]: a grain at the
-    /// top of its bounce is slow, too, but once, while a pile whose last grain trembles is slow now and then.
-    fn end_reached(&mut self) -> Option<Status> {
-        let now = self.looks_ended()?;
-        let window = REST_LOOKS * self.around.settings.list_period;
-        let seen = self.seemed_ended.replace((now, self.substep));
-        let again = seen.is_some_and(|(then, at)| then == now && self.substep - at <= window);
-        (again || now == Status::Horizon).then_some(now)
-    }
-
-    fn looks_ended(&self) -> Option<Status> {
-        let threshold = self.end.kinetic_energy;
-        let energies: Vec<f64> = (0..self.bed.count()).map(|i| self.bed.translation(i)).collect();
-        if energies.iter().sum::<f64>() <= threshold * energies.len() as f64 {
-            return Some(Status::AtRest);
-        }
-        let still = |(grain, energy): (usize, &f64)| {
-            let at = self.bed.position(grain);
-            *energy <= threshold || !self.camera.sees_ground(at.x, at.y)
-        };
-        if energies.iter().enumerate().all(still) {
-            return Some(Status::OutOfView);
-        }
-        (self.time() >= self.end.horizon).then_some(Status::Horizon)
-    }
 }
+
+#[cfg(test)]
+mod tests;

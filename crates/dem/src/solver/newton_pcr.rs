@@ -10,11 +10,12 @@
 //! lambda <- projection on the cones,  v to match
 //! ```
 
-use crate::parallel::Threads;
+use serde::{Deserialize, Serialize};
 
 use crate::bed::Body;
 use crate::contact_set::ContactSet;
 use crate::law::TANGENTIAL_INERTIA;
+use crate::parallel::Threads;
 use crate::solver::Work;
 use crate::solver::components::{
     Components, Parts, add_scaled, batches, collect, impulses, scale_and_add, spread,
@@ -28,7 +29,7 @@ mod guard;
 pub use complementarity::Complementarity;
 
 /// How Newton's method is run.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NewtonSettings {
     /// Newton steps in a substep.
     pub outer: usize,

@@ -11,10 +11,11 @@
 //!     else:      lambda <- lambda + beta p,  p <- beta p - g
 //! ```
 
-use crate::parallel::Threads;
+use serde::{Deserialize, Serialize};
 
 use crate::bed::Body;
 use crate::contact_set::ContactSet;
+use crate::parallel::Threads;
 use crate::solver::Work;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, dot, impulses, put_impulses, scale_and_add, spread,
@@ -25,7 +26,7 @@ use crate::solver::nsgs::{self, Manner, ResidualSums};
 const LOOK: usize = 8;
 
 /// How far the reference is iterated.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceSettings {
     /// Natural-map residual over the rms normal impulse at which to stop `[-]`.
     pub residual: f64,
