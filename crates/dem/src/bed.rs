@@ -10,7 +10,7 @@ use crate::parallel::Threads;
 use crate::scene::Scene;
 
 /// Grains that a thread takes at once.
-const SHARE: usize = 4096;
+const SHARE: usize = if cfg!(test) { 16 } else { 4096 };
 
 /// Linear and scaled angular velocity of one body, a cache line.
 ///

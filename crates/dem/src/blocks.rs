@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use crate::contact::Listed;
 
 /// Grains below which one block holds all: they fit the cache.
-const ONE_BLOCK: usize = 4096;
+const ONE_BLOCK: usize = if cfg!(test) { 200 } else { 4096 };
 /// Width of a block in radii of a typical grain, if pairs are not too long for it.
 const WIDTH: f64 = 20.0;
 /// Upper bound of the number of blocks.

@@ -31,7 +31,7 @@ const MANY: usize = 16;
 const NEAR: f64 = 0.02;
 
 /// Batches or grains that a thread takes at once.
-const SHARE: usize = 512;
+const SHARE: usize = if cfg!(test) { 4 } else { 512 };
 
 /// What the contacts are made of: walls, material and settings of one simulation.
 #[derive(Clone, Debug)]

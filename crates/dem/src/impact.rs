@@ -20,7 +20,7 @@ use crate::law::{IMPACT_SPEED, TANGENTIAL_INERTIA};
 const MAX_IMPACTS: u32 = 1024;
 
 /// Candidates that a thread takes at once.
-const SHARE: usize = 512;
+const SHARE: usize = if cfg!(test) { 4 } else { 512 };
 
 /// An impact to come.
 #[derive(Clone, Copy, Debug, PartialEq)]

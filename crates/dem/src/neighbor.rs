@@ -22,7 +22,7 @@ const MAX_CELLS: f64 = 65_536.0;
 /// Balls tested at once.
 const CHUNK: usize = 16;
 /// Rows of cells that a thread takes at once.
-const ROWS: usize = 64;
+const ROWS: usize = if cfg!(test) { 4 } else { 64 };
 
 /// The search and its buffers.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
