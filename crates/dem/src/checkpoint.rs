@@ -74,7 +74,11 @@ impl CheckpointHeader {
     /// Refuses the checkpoint of another pour than `given` and names the first difference.
     pub(crate) fn require_same(&self, given: &Self) -> Result<(), DemError> {
         let differs = |what: String, found: String, given: String| {
-            Err(DemError::CheckpointDiffers { what, found, given })
+            Err(DemError::CheckpointDiffers {
+                what: what.into(),
+                found: found.into(),
+                given: given.into(),
+            })
         };
         if let Some((path, found, given)) = self.scene.first_difference(&given.scene)? {
             return differs(format!("scene.{path}"), found, given);

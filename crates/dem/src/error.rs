@@ -95,11 +95,11 @@ pub enum DemError {
     #[error("the checkpoint is of another pour: {what} is {found} there, but {given} is given")]
     CheckpointDiffers {
         /// What differs.
-        what: String,
+        what: Box<str>,
         /// What the checkpoint says.
-        found: String,
+        found: Box<str>,
         /// What was given.
-        given: String,
+        given: Box<str>,
     },
     /// A checkpoint with a state that no simulation of its scene can have; granulcal has not written it.
     #[error("the checkpoint's state must be one of its scene, got {what}")]

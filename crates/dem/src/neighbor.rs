@@ -147,8 +147,8 @@ impl PairSearch {
     fn sweep_balls(&mut self, bed: &Bed, paths: &[Path], reach: Reach) {
         self.middles.clear();
         self.reaches.clear();
-        for grain in 0..bed.count() {
-            let ball = Ball::swept(&paths[grain], bed.radius(grain), reach.interval, reach.far);
+        for (grain, path) in paths.iter().enumerate() {
+            let ball = Ball::swept(path, bed.radius(grain), reach.interval, reach.far);
             self.middles.push(ball.middle);
             self.reaches.push(ball.reach);
         }

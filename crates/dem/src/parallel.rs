@@ -147,7 +147,9 @@ mod tests {
                 64,
                 &mut found,
                 |items, found| {
-                    items.iter_mut().for_each(|item| *item += 1);
+                    for item in items.iter_mut() {
+                        *item += 1;
+                    }
                     found.extend(items.iter().copied().filter(|item| item % 3 == 0));
                     items.iter().copied().max().unwrap_or(0)
                 },
