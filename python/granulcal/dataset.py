@@ -22,7 +22,7 @@ __all__ = ["Dataset", "generate"]
 
 Array = NDArray[np.float64]
 
-_UNUSABLE = ("unhealthy", "no_grains_in_view")
+_UNUSABLE = ("unhealthy", "jammed", "no_grains_in_view")
 
 
 class Dataset:
@@ -92,7 +92,7 @@ class Dataset:
 
     @property
     def is_usable(self) -> NDArray[np.bool_]:
-        """Which pours are healthy and have grains in view, shape (n,)."""
+        """Which pours are healthy, left the funnel and have grains in view, shape (n,)."""
         return ~np.isin(self.status, _UNUSABLE) & np.isfinite(self.x).all(axis=1)
 
     def status_counts(self) -> dict[str, int]:

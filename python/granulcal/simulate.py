@@ -52,8 +52,18 @@ class Pour:
 
     @property
     def status(self) -> str:
-        """How the pour ended: `at_rest`, `out_of_view`, `horizon` or `unhealthy`."""
+        """How the pour ended: `at_rest`, `out_of_view`, `jammed`, `horizon` or `unhealthy`."""
         return self._native.status
+
+    @property
+    def grains_in_funnel(self) -> int:
+        """Grains whose centre is in the funnel at the end; 0 where the scene has none."""
+        return self._native.grains_in_funnel
+
+    @property
+    def state_hash(self) -> str:
+        """Hash of every bit of the final state, 32 hexadecimal digits: equal for equal pours."""
+        return self._native.state_hash
 
     @cached_property
     def health(self) -> dict[str, float]:

@@ -94,6 +94,8 @@ pub struct Progress {
     pub made: u64,
     /// Rows, resumed or made, whose numbers cannot be used: unhealthy, or no grains in view.
     pub unhealthy: u64,
+    /// Rows, resumed or made, in which grains remain in the funnel.
+    pub jammed: u64,
     /// Rows on disk beyond those asked for, left as they are.
     pub beyond: u64,
 }
@@ -233,6 +235,7 @@ impl Batch<'_> {
         let index = row.row / self.folder.chunk;
         self.progress.made += 1;
         self.progress.unhealthy += u64::from(!row.status.is_healthy());
+        self.progress.jammed += u64::from(row.status.is_jammed());
         let Some(chunk) = self.chunks.get_mut(&index) else { return Ok(()) };
         chunk.missing.retain(|&missing| missing != row.row);
         chunk.rows.push(row);
@@ -284,6 +287,7 @@ fn make_row(
         Ok(Some(values)) => (statistics, diagnostics) = values,
         // The grains of an unhealthy pour can be anywhere, NaN included: the status says enough.
         _ if pour.status == Status::Unhealthy => {}
+        Ok(None) if pour.status == Status::Jammed => {}
         Ok(None) => status = RowStatus::NoGrainsInView,
         Err(error) => return Err(error),
     }

@@ -175,7 +175,9 @@ mod tests {
             positions,
             status: Status::AtRest,
             health: Health::default(),
+            grains_in_funnel: 0,
             simulated_s: 1.0,
+            state_hash: 0,
         }
     }
 

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use anyhow::anyhow;
 use granulcal_dataset::{
-    CameraFile, Dataset, DatasetError, Npz, Prior, load_prior, load_scene, npy, png, summarize_mcap,
+    CameraFile, Dataset, DatasetError, Npz, Prior, load_prior, load_scene, npy, png,
+    read_checkpoint_header, summarize_mcap,
 };
 use granulcal_dem::Scene;
 use serde_json::{Value, json};
@@ -52,9 +53,10 @@ fn inspect(path: &Path) -> anyhow::Result<Value> {
         "npz" => npz_facts(path),
         "png" => png_facts(path),
         "mcap" => mcap_facts(path),
+        "ckpt" => checkpoint_facts(path),
         other => {
             let found = if other.is_empty() { "no ending" } else { other };
-            let allowed = "a folder or .parquet, .toml, .npy, .npz, .png, .mcap";
+            let allowed = "a folder or .parquet, .toml, .npy, .npz, .png, .mcap, .ckpt";
             let path = path.display();
             Err(BadArgument(format!("{path}: must be {allowed}, found {found}")).into())
         }
@@ -164,6 +166,18 @@ fn mcap_facts(path: &Path) -> anyhow::Result<Value> {
         "start_s": summary.start_s,
         "end_s": summary.end_s,
         "topics": summary.topics.into_iter().map(topic).collect::<serde_json::Map<_, _>>(),
+    }))
+}
+
+fn checkpoint_facts(path: &Path) -> anyhow::Result<Value> {
+    let header = read_checkpoint_header(path)?;
+    Ok(json!({
+        "kind": "checkpoint",
+        "version": header.version,
+        "seed": header.seed,
+        "substeps": header.substep,
+        "simulated_s": header.time(),
+        "scene": scene_facts(&header.scene),
     }))
 }
 

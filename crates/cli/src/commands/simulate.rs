@@ -14,7 +14,7 @@ use super::render::{check_name, write_view};
 use crate::args::SimulateArgs;
 use crate::context::{Context, print_json, print_line};
 use crate::outcome::Outcome;
-use crate::scene::{self, Film};
+use crate::scene::{self, Keep};
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -26,6 +26,9 @@ struct Report {
     cpu_s: f64,
     wall_s: f64,
     simulated_s: f64,
+    grains_in_funnel: usize,
+    /// Hash of every bit of the final state, in hexadecimal digits.
+    state_hash: String,
     /// Null with too few grains in view.
     statistics: Option<Map<String, Value>>,
     /// Absent unless asked for.
@@ -39,9 +42,19 @@ pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
         check_name(path, &scene)?;
     }
     let (clock, start) = (ProcessTime::now(), Instant::now());
-    let film = args.mcap.as_deref().map(|path| Film { path, fps: args.fps });
-    let Some(pour) = scene::pour(context, &scene, args.seed, args.threads, film.as_ref())? else {
-        tracing::warn!("stopped; nothing was written");
+    let keep = match (&args.mcap, &args.checkpoint) {
+        (Some(path), _) => Keep::Film { path, fps: args.fps },
+        (None, Some(path)) => Keep::Checkpoint { path, every: args.checkpoint_every },
+        (None, None) => Keep::Nothing,
+    };
+    let simulation = scene::start(&scene, args.seed, args.threads, args.resume.as_deref())?;
+    let Some(pour) = scene::pour(context, &scene, args.seed, simulation, &keep)? else {
+        if let Keep::Checkpoint { path, .. } = keep {
+            let path = path.display();
+            tracing::warn!("stopped; the same command with --resume {path} goes on");
+        } else {
+            tracing::warn!("stopped; nothing was written");
+        }
         return Ok(Outcome::Stopped);
     };
     let mut report = Report {
@@ -52,6 +65,8 @@ pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
         cpu_s: 0.0,
         wall_s: 0.0,
         simulated_s: pour.simulated_s,
+        grains_in_funnel: pour.grains_in_funnel,
+        state_hash: format!("{:032x}", pour.state_hash),
         statistics: None,
         diagnostics: None,
     };
@@ -94,7 +109,8 @@ fn describe(
         }
         Err(reason) => {
             tracing::warn!("{reason}");
-            let status = if status.is_healthy() { RowStatus::NoGrainsInView } else { status };
+            let says_enough = !status.is_healthy() || status.is_jammed();
+            let status = if says_enough { status } else { RowStatus::NoGrainsInView };
             report.status = status.name();
             Ok(status)
         }
@@ -117,6 +133,10 @@ fn print(report: &Report, json: bool) -> anyhow::Result<()> {
     print_line(&format!("worst penetration  {:.4} radii", health.worst_penetration))?;
     print_line(&format!("energy created     {:.2e}", health.energy_created))?;
     print_line(&format!("grains lost        {}", health.grains_lost))?;
+    if report.grains_in_funnel > 0 {
+        print_line(&format!("grains in funnel   {}", report.grains_in_funnel))?;
+    }
+    print_line(&format!("state              {}", report.state_hash))?;
     print_family(&PAPER16, report.statistics.as_ref())?;
     print_family(&DIAGNOSTICS, report.diagnostics.as_ref())
 }
