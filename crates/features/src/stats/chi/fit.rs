@@ -13,10 +13,13 @@ pub const MAX_DF: f64 = 100.0;
 /// Largest distance of the shift below the smallest radius, in ranges of the data: for k ≤ 100 the
 /// likelihood rises towards smaller distances from (k - 1) = 99 ranges on.
 const MAX_GAP: f64 = 99.0;
-/// Smallest distance that is searched; closer, k is 1 to all digits, which is tried by itself.
-const MIN_GAP: f64 = 1e-15;
-/// Points of the search grid in ln(gap), 0.6 apart.
-const GRID: usize = 65;
+/// Smallest distance of the shift below the smallest radius, in ranges of the data. Rounding of r must
+/// not put a radius below the shift, where the density is 0; the likelihood cannot tell it from none.
+const MIN_GAP: f64 = 1e-12;
+/// The same in roundings of the largest radius, which decide where the range is much smaller.
+const MIN_GAP_ROUNDINGS: f64 = 8.0;
+/// Points of the search grid in ln(gap), at most 0.6 apart.
+const GRID: usize = 55;
 /// Steps of the root search at most; it converges faster than linearly.
 const ROOT_STEPS: usize = 100;
 /// Relative width of the bracket at which the root search ends.
@@ -27,7 +30,7 @@ const ROOT_TOLERANCE: f64 = 1e-14;
 pub struct ChiFit {
     /// Degrees of freedom k `[-]`, within [[`MIN_DF`], [`MAX_DF`]].
     pub df: f64,
-    /// Shift b `[m]`, at most the smallest radius.
+    /// Shift b `[m]`, below the smallest radius, if by 1e-12 of the range (equal radii: that radius).
     pub shift: f64,
     /// Scale A `[m]`.
     pub scale: f64,
@@ -50,7 +53,8 @@ impl ChiFit {
             return Self { df: MIN_DF, shift: min, scale };
         }
         let data = UnitData::new(radii.iter().map(|r| (r - min) / range).collect());
-        let best = data.best();
+        let rounding = f64::EPSILON * max.abs().max(min.abs()) / range;
+        let best = data.best(MIN_GAP.max(MIN_GAP_ROUNDINGS * rounding));
         Self { df: best.df, shift: min - best.gap * range, scale: best.scale * range }
     }
 }
@@ -82,11 +86,11 @@ impl UnitData {
     }
 
     /// The global maximum: the half-normal end of the range against every local maximum inside.
-    fn best(&self) -> Profile {
-        let step = (MAX_GAP / MIN_GAP).ln() / (GRID - 1) as f64;
-        let gap_of = |i: usize| MIN_GAP * (step * i as f64).exp();
+    fn best(&self, min_gap: f64) -> Profile {
+        let step = (MAX_GAP / min_gap).ln() / (GRID - 1) as f64;
+        let gap_of = |i: usize| min_gap * (step * i as f64).exp();
         let grid: Vec<Profile> = (0..GRID).map(|i| self.profile(gap_of(i))).collect();
-        let mut best = self.half_normal();
+        let mut best = self.half_normal(min_gap);
         for (i, point) in grid.iter().enumerate() {
             let left = grid[i.saturating_sub(1)];
             let right = grid[(i + 1).min(GRID - 1)];
@@ -103,10 +107,10 @@ impl UnitData {
     }
 
     /// k = 1 with the shift at the smallest value, where that k is best placed.
-    fn half_normal(&self) -> Profile {
-        let mean_square = self.mean_square(0.0);
+    fn half_normal(&self, gap: f64) -> Profile {
+        let mean_square = self.mean_square(gap);
         let likelihood = log_likelihood(MIN_DF, mean_square, 0.0);
-        Profile { gap: 0.0, df: MIN_DF, scale: mean_square.sqrt(), likelihood }
+        Profile { gap, df: MIN_DF, scale: mean_square.sqrt(), likelihood }
     }
 
     /// For a fixed shift, (v - b)² follows a gamma distribution of shape k/2: one equation for k,
