@@ -5,7 +5,7 @@ use granulcal_features::{Formation, PAPER16, Segmentation, Threshold};
 use serde_json::{Map, Value, json};
 
 use crate::args::FeaturesArgs;
-use crate::context::{print_json, print_line};
+use crate::context::{note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
 
 pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
@@ -15,7 +15,10 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     let Some(path) = &args.recording else {
         return Err(BadArgument("a recording, or --list, must be given".to_owned()).into());
     };
-    let recording = Recording::open(path, args.camera.as_deref())?;
+    let recording = Recording::open(path, &args.read.options())?;
+    for line in &recording.damage {
+        note(&format!("warning: {line}"));
+    }
     let formation = recording.formation_with(&segmentation(args, &recording.segmentation))?;
     let statistics = recording.statistics_of(&formation)?;
     if let Some(path) = &args.points {
@@ -26,7 +29,7 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     } else {
         print(&recording, &formation, &statistics)?;
     }
-    Ok(Outcome::Done)
+    Ok(Outcome::whole_if(recording.lost.is_none()))
 }
 
 /// The recording's own segmentation with what the command line changes.
@@ -49,6 +52,7 @@ fn as_json(recording: &Recording, formation: &Formation, statistics: &[f64; 16])
     let plane = &formation.plane;
     json!({
         "recording": recording.path.display().to_string(),
+        "topic": recording.topic,
         "statistics": statistics,
         "plane": {
             "normal": plane.plane.normal.as_slice(),
@@ -59,9 +63,15 @@ fn as_json(recording: &Recording, formation: &Formation, statistics: &[f64; 16])
         },
         "counts": {
             "frames": recording.frames,
+            "whole_frames": recording.whole_frames,
             "valid": formation.valid_count,
             "grains": formation.masked_count,
         },
+        "lost": recording.lost.map(|lost| json!({
+            "frames": lost.frames(),
+            "how": lost.how(),
+            "damage": recording.damage,
+        })),
         "threshold_m": formation.threshold,
         "centroid_m": formation.centroid.as_slice(),
     })
@@ -74,6 +84,9 @@ fn print(
 ) -> anyhow::Result<()> {
     let plane = &formation.plane;
     print_line(&format!("recording          {}", recording.path.display()))?;
+    if let Some(topic) = &recording.topic {
+        print_line(&format!("topic              {topic}"))?;
+    }
     print_line(&format!(
         "ground             tilt {:.2} deg, rms {:.2} mm, {} inliers",
         plane.tilt_rad.to_degrees(),
@@ -81,11 +94,16 @@ fn print(
         plane.inliers
     ))?;
     print_line(&format!(
-        "pixels             {} of {} valid are grain (above {:.2} mm), {} frames",
+        "pixels             {} of {} valid are grain (above {:.2} mm)",
         formation.masked_count,
         formation.valid_count,
         formation.threshold * 1e3,
-        recording.frames
+    ))?;
+    print_line(&format!(
+        "frames             {} of {} averaged{}",
+        recording.frames,
+        recording.whole_frames,
+        recording.lost.map_or_else(String::new, |lost| format!(", {lost}"))
     ))?;
     for (statistic, value) in PAPER16.iter().zip(statistics) {
         print_line(&format!("{:<18} {value:<12.6} {}", statistic.name, statistic.unit))?;
