@@ -98,7 +98,24 @@ class Dataset:
 @final
 class Recording:
     @staticmethod
-    def open(path: str | PathLike[str], camera: str | PathLike[str] | None = None) -> Recording: ...
+    def open(
+        path: str | PathLike[str],
+        camera: str | PathLike[str] | None = None,
+        *,
+        topic: str | None = None,
+        camera_topic: str | None = None,
+        colour_topic: str | None = None,
+        frames: int | None = None,
+        first_frame: int | None = None,
+    ) -> Recording: ...
+    @property
+    def topic(self) -> str | None: ...
+    @property
+    def whole_frames(self) -> int: ...
+    @property
+    def lost(self) -> tuple[int, str] | None: ...
+    @property
+    def damage(self) -> list[str]: ...
     @property
     def frames(self) -> int: ...
     @property

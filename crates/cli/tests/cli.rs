@@ -1,12 +1,15 @@
 //! The process boundary: exit codes, streams, files. What the numbers mean is tested elsewhere.
 
+mod place;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use granulcal_dataset::{Dataset, png};
 use granulcal_features::{DIAGNOSTICS, DepthImage, PAPER16};
+use place::{Place, json, text};
 use serde_json::Value;
 
 /// A pour that takes milliseconds.
@@ -22,70 +25,6 @@ const TINY: [&str; 10] = [
     "--set",
     "camera.downsample=8",
 ];
-
-/// A folder of its own, and the binary run inside it.
-struct Place(tempfile::TempDir);
-
-impl Place {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn at(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        fs::write(self.at(name), bytes).unwrap();
-        self.at(name)
-    }
-
-    fn command(&self, args: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_granulcal-cli"));
-        command.args(args).current_dir(self.0.path()).stdin(Stdio::null());
-        command
-    }
-
-    fn run(&self, args: &[&str]) -> Output {
-        self.command(args).output().unwrap()
-    }
-
-    /// Runs, expects the exit code, returns stdout.
-    fn expect(&self, code: i32, args: &[&str]) -> String {
-        let output = self.run(args);
-        let (out, err) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(code), "{args:?}\nstdout: {out}\nstderr: {err}");
-        out
-    }
-
-    /// Runs what must be refused as bad input; every word must stand in the message.
-    fn refused(&self, args: &[&str], words: &[&str]) {
-        let before = self.listing();
-        let output = self.run(args);
-        let (out, err) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(2), "{args:?}\nstdout: {out}\nstderr: {err}");
-        assert_eq!(out, "", "{args:?}");
-        for word in words {
-            assert!(err.contains(word), "{args:?}: {word:?} is missing in\n{err}");
-        }
-        assert_eq!(self.listing(), before, "{args:?} left something on the disk");
-    }
-
-    fn listing(&self) -> Vec<PathBuf> {
-        let mut found: Vec<_> =
-            fs::read_dir(self.0.path()).unwrap().map(|e| e.unwrap().path()).collect();
-        found.sort();
-        found
-    }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-fn json(out: &str) -> Value {
-    serde_json::from_str(out).unwrap_or_else(|e| panic!("{e}: {out}"))
-}
 
 fn tiny<'a>(head: &[&'a str], tail: &[&'a str]) -> Vec<&'a str> {
     [head, &TINY, tail].concat()
@@ -421,7 +360,7 @@ fn bad_recordings_are_named() {
     place.refused(&features("nothing", "camera.toml"), &["nothing", "no .png"]);
     place.write("map.npz", "PK\u{3}\u{4} but not really");
     place.refused(&["features", "map.npz"], &["map.npz"]);
-    place.refused(&["features", "camera.toml"], &["camera.toml", ".npz"]);
+    place.refused(&["features", "camera.toml"], &["camera.toml", ".npz", "ROS 1 bag", "width ="]);
     place.write("bad.npy", b"\x93NUMPY\x01\x00");
     let render = tiny(&["render", "drop", "-o", "o.png", "--positions", "bad.npy"], &[]);
     place.refused(&render, &["bad.npy", "truncated"]);

@@ -245,7 +245,11 @@ mod tests {
         listed.truncate(listed.len() - DIAGNOSTIC_COUNT);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("old.parquet");
-        files::write_file(&path, &encode(&header, &[written.clone()], &listed).unwrap()).unwrap();
+        files::write_file(
+            &path,
+            &encode(&header, std::slice::from_ref(&written), &listed).unwrap(),
+        )
+        .unwrap();
         let (_, rows) = read(&path).unwrap();
         assert_eq!(rows[0].statistics, written.statistics);
         assert!(rows[0].diagnostics.iter().all(|value| value.is_nan()));

@@ -11,6 +11,7 @@
 //! | [`raster`] | spheres over a plane to a depth image or a height map, exact to the ray |
 //! | [`mod@height_map`] | heights on a regular grid, as a time-of-flight rig delivers them |
 //! | [`colour`] | colour image and the hue range that marks grains |
+//! | [`register`] | the colours of a depth image from a camera beside it |
 //! | [`sensor`] | the two noise models of a depth camera |
 //! | [`plane`] | robust plane fit |
 //! | [`segment`] | image to the centred, re-oriented points of the formation |
@@ -44,6 +45,7 @@ pub mod error;
 pub mod height_map;
 pub mod plane;
 pub mod raster;
+pub mod register;
 mod rng;
 pub mod segment;
 pub mod sensor;
@@ -56,6 +58,7 @@ pub use error::FeatureError;
 pub use height_map::HeightMap;
 pub use plane::{Plane, PlaneFit, fit_plane};
 pub use raster::{height_map, render, render_grid};
+pub use register::register_colour;
 pub use segment::{
     Formation, Segmentation, Threshold, grain_points, segment_depth, segment_height_map,
 };

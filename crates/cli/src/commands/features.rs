@@ -9,7 +9,7 @@ use granulcal_features::{
 use serde_json::{Map, Value, json};
 
 use crate::args::FeaturesArgs;
-use crate::context::{print_json, print_line};
+use crate::context::{note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
 
 pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
@@ -23,7 +23,10 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     let Some(path) = &args.recording else {
         return Err(BadArgument("a recording, or --list, must be given".to_owned()).into());
     };
-    let recording = Recording::open(path, args.camera.as_deref())?;
+    let recording = Recording::open(path, &args.read.options())?;
+    for line in &recording.damage {
+        note(&format!("warning: {line}"));
+    }
     let formation = recording.formation_with(&segmentation(args, &recording.segmentation))?;
     let mut statistics = vec![named(&PAPER16, &recording.statistics_of(&formation)?)];
     if args.diagnostics {
@@ -39,7 +42,7 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     } else {
         print(&recording, &formation, &statistics)?;
     }
-    Ok(Outcome::Done)
+    Ok(Outcome::whole_if(recording.lost.is_none()))
 }
 
 /// The recording's own segmentation with what the command line changes.
@@ -89,6 +92,7 @@ fn as_json(recording: &Recording, formation: &Formation, statistics: &[Named]) -
     let plane = &formation.plane;
     let mut report = json!({
         "recording": recording.path.display().to_string(),
+        "topic": recording.topic,
         "statistics": statistics.first().map(object),
         "plane": {
             "normal": plane.plane.normal.as_slice(),
@@ -99,9 +103,15 @@ fn as_json(recording: &Recording, formation: &Formation, statistics: &[Named]) -
         },
         "counts": {
             "frames": recording.frames,
+            "whole_frames": recording.whole_frames,
             "valid": formation.valid_count,
             "grains": formation.masked_count,
         },
+        "lost": recording.lost.map(|lost| json!({
+            "frames": lost.frames(),
+            "how": lost.how(),
+            "damage": recording.damage,
+        })),
         "threshold_m": formation.threshold,
         "centroid_m": formation.centroid.as_slice(),
     });
@@ -114,6 +124,9 @@ fn as_json(recording: &Recording, formation: &Formation, statistics: &[Named]) -
 fn print(recording: &Recording, formation: &Formation, statistics: &[Named]) -> anyhow::Result<()> {
     let plane = &formation.plane;
     print_line(&format!("recording          {}", recording.path.display()))?;
+    if let Some(topic) = &recording.topic {
+        print_line(&format!("topic              {topic}"))?;
+    }
     print_line(&format!(
         "ground             tilt {:.2} deg, rms {:.2} mm, {} inliers",
         plane.tilt_rad.to_degrees(),
@@ -121,11 +134,16 @@ fn print(recording: &Recording, formation: &Formation, statistics: &[Named]) -> 
         plane.inliers
     ))?;
     print_line(&format!(
-        "pixels             {} of {} valid are grain (above {:.2} mm), {} frames",
+        "pixels             {} of {} valid are grain (above {:.2} mm)",
         formation.masked_count,
         formation.valid_count,
         formation.threshold * 1e3,
-        recording.frames
+    ))?;
+    print_line(&format!(
+        "frames             {} of {} averaged{}",
+        recording.frames,
+        recording.whole_frames,
+        recording.lost.map_or_else(String::new, |lost| format!(", {lost}"))
     ))?;
     for (name, unit, value) in statistics.iter().flatten() {
         print_line(&format!("{name:<18} {value:<12.6} {unit}"))?;

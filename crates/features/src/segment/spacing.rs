@@ -1,5 +1,7 @@
 //! How far apart the points of a formation lie.
 
+use nalgebra::Vector3;
+
 use super::Formation;
 
 impl Formation {
@@ -13,7 +15,7 @@ impl Formation {
             let (u, v) = (pixel % self.width.max(1), pixel / self.width.max(1));
             nalgebra::Vector2::new(u as f64, v as f64)
         });
-        let located: Vec<_> = self.points.iter().map(|point| point.xy()).zip(places).collect();
+        let located: Vec<_> = self.points.iter().map(Vector3::xy).zip(places).collect();
         let mut steps: Vec<f64> = located
             .windows(2)
             .map(|pair| (pair[1].0 - pair[0].0).norm() / (pair[1].1 - pair[0].1).norm())

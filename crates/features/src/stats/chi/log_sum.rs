@@ -22,8 +22,8 @@ impl Products {
     fn multiply(&mut self, factors: &[f64; LANES]) {
         const MANTISSA: u64 = (1 << 52) - 1;
         const BIAS: i64 = 1023;
-        for lane in 0..LANES {
-            let bits = (self.mantissas[lane] * factors[lane]).to_bits();
+        for (lane, factor) in factors.iter().enumerate() {
+            let bits = (self.mantissas[lane] * factor).to_bits();
             self.exponents[lane] += (bits >> 52) as i64 - BIAS;
             self.mantissas[lane] = f64::from_bits(bits & MANTISSA | 1.0_f64.to_bits());
         }
