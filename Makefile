@@ -8,10 +8,13 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 RUST := $(shell find src crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
+CRITERION := $(or $(CARGO_TARGET_DIR),target)/criterion
+# Open3D brings packages that disturb pytest: it has an environment of its own.
+BENCH_VENV := build/bench-venv
 # Sets and dictionaries of words keep one order in every run.
 export PYTHONHASHSEED := 0
 
-.PHONY: help demo test test-rust test-python test-long bench-physics referee lint bench build fuzz clean
+.PHONY: help demo test test-rust test-python test-long bench-physics bench-features referee lint bench build fuzz clean
 
 help: ## list the verbs
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -49,8 +52,15 @@ lint: $(VENV)/.deps ## format, lints, types, spelling, documentation, licences
 	$(BIN)/pyright
 	$(BIN)/typos
 
-bench: ## criterion benchmarks; see benches/README.md
+bench: ## criterion benchmarks and one table of them with the bars; see benches/README.md
+	mkdir -p $(CRITERION) && touch $(CRITERION)/.started
 	cargo bench --locked
+	$(PYTHON) scripts/bench_table.py --newer-than $(CRITERION)/.started
+
+bench-features: $(VENV)/.native ## statistics and depth image beside scipy, dcor and Open3D in one run
+	test -x $(BENCH_VENV)/bin/python || $(PYTHON) -m venv $(BENCH_VENV)
+	$(BENCH_VENV)/bin/python -m pip install --quiet -r benches/peers/features-requirements.txt
+	PYTHONPATH=python $(BENCH_VENV)/bin/python benches/peers/features.py
 
 bench-physics: ## bulk laws against their closed forms, the table of docs/results/physics.md; LAWS="silo repose" chooses
 	cargo run --release --locked --example bench_physics -- $(LAWS)

@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
-from granulcal.statistics import Statistics, as_points, statistics
+from granulcal.statistics import (
+    DiagnosticStatistics,
+    Statistics,
+    as_points,
+    diagnostic_statistics,
+    statistics,
+)
 
 __all__ = ["Camera", "DamagedRecordingWarning", "Formation", "Lost", "Plane", "Recording"]
 
@@ -77,6 +83,7 @@ class Formation:
         valid_count: pixels that carry data.
         threshold: height from which a pixel counts as grain [m].
         centroid: where the centroid was before it was moved to 0 [m].
+        spacing: distance on the ground of points from neighbouring pixels [m]; NaN of one point.
     """
 
     points: Array
@@ -85,10 +92,31 @@ class Formation:
     valid_count: int
     threshold: float
     centroid: tuple[float, float]
+    spacing: float
 
     def statistics(self) -> Statistics:
         """Returns the statistics of the points."""
         return statistics(self.points)
+
+    def diagnostic_statistics(
+        self, *, grain_diameter: float, pour_axis: tuple[float, float] | None = None
+    ) -> DiagnosticStatistics:
+        """Returns the diagnostic statistics of the points.
+
+        Args:
+            grain_diameter: diameter of a grain [m].
+            pour_axis: where the axis of the pour meets the levelled ground [m], in the frame in
+                which `centroid` is told; the centroid if None, which hides modes of order 1.
+
+        Raises:
+            ValueError: fewer than 3 points, or a length out of range.
+        """
+        axis = None
+        if pour_axis is not None:
+            axis = (pour_axis[0] - self.centroid[0], pour_axis[1] - self.centroid[1])
+        return diagnostic_statistics(
+            self.points, grain_diameter=grain_diameter, spacing=self.spacing, pour_axis=axis
+        )
 
     def height_image(self) -> Array:
         """Returns heights above the fitted ground [m], NaN where no grain is, shape (h, w)."""
@@ -266,6 +294,7 @@ class Recording:
             valid_count=found.valid_count,
             threshold=found.threshold,
             centroid=found.centroid,
+            spacing=float("nan") if found.spacing is None else found.spacing,
         )
 
     @cached_property

@@ -1,6 +1,7 @@
 //! The arguments: clap types and nothing else.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
@@ -87,9 +88,16 @@ statistics of its depth image.
 The same scene, numbers and seed give the same result on any machine. The row of a data set
 is made again by setting its parameters and its seed.
 
+A long pour survives whatever stops it: with --checkpoint its whole state is kept in a file,
+at the start, every minute, when you stop it (Ctrl-C or SIGTERM) and at the end. The same
+command with --resume goes on from there, and every bit of the result is that of a pour that
+was never stopped. A checkpoint of another scene, seed, preset or version is refused.
+
 Example:
   granulcal-cli simulate funnel --set material.sliding_friction=0.5 --seed 1 --json
-  granulcal-cli simulate examples/drop.toml --mcap drop.mcap --positions grains.npy")]
+  granulcal-cli simulate examples/drop.toml --mcap drop.mcap --positions grains.npy
+  granulcal-cli simulate large.toml --checkpoint large.ckpt
+  granulcal-cli simulate large.toml --checkpoint large.ckpt --resume large.ckpt")]
 pub struct SimulateArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -102,6 +110,9 @@ pub struct SimulateArgs {
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+    /// Print the diagnostic statistics too: profile, azimuthal modes, tail, bodies
+    #[arg(long)]
+    pub diagnostics: bool,
     /// Write the final centres [m] as an array (n, 3)
     #[arg(long, value_name = "OUT.npy")]
     pub positions: Option<PathBuf>,
@@ -117,6 +128,21 @@ pub struct SimulateArgs {
     /// Frames per simulated second in the MCAP
     #[arg(long, default_value_t = 60.0, requires = "mcap")]
     pub fps: f64,
+    /// Keep the whole state in this file, for --resume
+    #[arg(long, value_name = "FILE", conflicts_with = "mcap")]
+    pub checkpoint: Option<PathBuf>,
+    /// Time between two checkpoints on the clock [s]; 0 for as often as possible
+    #[arg(long, value_name = "SECONDS", default_value = "60", requires = "checkpoint",
+        value_parser = parse_period)]
+    pub checkpoint_every: Duration,
+    /// Go on from a checkpoint of the same scene, seed and preset, on any number of threads
+    #[arg(long, value_name = "FILE", conflicts_with = "mcap")]
+    pub resume: Option<PathBuf>,
+}
+
+fn parse_period(text: &str) -> Result<Duration, String> {
+    let period = text.parse().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    period.ok_or_else(|| format!("must be a number of seconds, 0 or more, got {text:?}"))
 }
 
 /// Simulate many pours with parameters drawn from a prior, to Parquet
@@ -213,6 +239,7 @@ Example:
   granulcal-cli features pile.bag
   granulcal-cli features pile.mcap --topic /camera/depth/image_rect_raw --frames 30 --json
   granulcal-cli features frames/ --camera examples/camera.toml --threshold 0.002
+  granulcal-cli features pile.npz --diagnostics --grain-diameter 0.002
   granulcal-cli features --list")]
 pub struct FeaturesArgs {
     /// Recording to describe
@@ -241,6 +268,17 @@ pub struct FeaturesArgs {
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+    /// Print (or list) the diagnostic statistics too: profile, azimuthal modes, tail, bodies
+    #[arg(long)]
+    pub diagnostics: bool,
+    /// Diameter of a grain [m], which the diagnostic statistics need
+    #[arg(long, value_name = "METRES", requires = "diagnostics")]
+    pub grain_diameter: Option<f64>,
+    /// Where the axis of the pour meets the levelled ground [m], in the frame of the centroid that is
+    /// printed [default: the centroid]
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], requires = "diagnostics",
+        allow_negative_numbers = true)]
+    pub pour_axis: Option<Vec<f64>>,
     /// List the statistics with unit and meaning
     #[arg(long, conflicts_with_all = ["recording", "camera"])]
     pub list: bool,
@@ -298,8 +336,8 @@ fn parse_frames(text: &str) -> Result<usize, String> {
 Says what is in a file or folder: a scene, prior or camera (.toml), a data set (folder or
 .parquet), an array or height map (.npy, .npz), an image (.png), a folder of frames, or a recording
 over time (.bag, .mcap): its topics with types, counts and sizes, which of them `features` reads, with
-which lens and depth unit. The whole file is read, so a damaged one is found: it is said where, and how
-many frames are lost (exit code 3).
+which lens and depth unit; or a checkpoint. The whole file is read, so a damaged one is found: it is
+said where, and how many frames are lost (exit code 3).
 
 With --contact-problem PATH is a scene, or one of the words `funnel` and `drop`: it is simulated
 until --time, and the contact problem of the next substep is written with its solution, as arrays

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use granulcal_dataset::{Dataset, png};
-use granulcal_features::{DepthImage, PAPER16};
+use granulcal_features::{DIAGNOSTICS, DepthImage, PAPER16};
 use place::{Place, json, text};
 use serde_json::Value;
 
@@ -131,11 +131,34 @@ fn a_rendered_image_is_described_like_its_pour() {
     };
     close("max_z", 3e-4);
     close("mean_r", 3e-3);
+    assert!(measured.get("diagnostics").is_none());
     place.expect(0, &tiny(&["simulate", "drop"], &["--positions", "g.npy"]));
     place.expect(0, &tiny(&["render", "drop", "-o", "b.png"], &["--positions", "g.npy"]));
     assert_eq!(fs::read(place.at("pile.png")).unwrap(), fs::read(place.at("b.png")).unwrap());
     let map = tiny(&["render", "drop", "-o", "m.npz"], &[]);
     place.refused(&map, &["m.npz", "pinhole", ".png"]);
+}
+
+#[test]
+fn diagnostic_statistics_are_printed_when_asked_for() {
+    let place = Place::new();
+    let more = ["--diagnostics", "--depth", "pile.png", "--set", "camera.downsample=4"];
+    let simulated = json(&place.expect(0, &tiny(&["simulate", "drop", "--json"], &more)));
+    let names: Vec<_> = simulated["diagnostics"].as_object().unwrap().keys().cloned().collect();
+    assert_eq!(names, DIAGNOSTICS.map(|s| s.name));
+    let recording =
+        ["features", "pile.png", "--camera", "pile.toml", "--threshold", "0.001", "--json"];
+    let with = |more: &[&'static str]| [&recording[..], &["--diagnostics"], more].concat();
+    let at = ["--grain-diameter", "0.004", "--pour-axis", "0", "-0.001"];
+    let measured = json(&place.expect(0, &with(&at)));
+    let of = |report: &Value, name: &str| report["diagnostics"][name].as_f64().unwrap();
+    let (seen, pour) = (of(&measured, "r_95"), of(&simulated, "r_95"));
+    assert!((seen - pour).abs() < 0.1 * pour, "{seen} {pour}");
+    assert!(of(&measured, "mass_cos_1") != of(&simulated, "mass_cos_1"));
+    place.refused(&with(&[]), &["--diagnostics", "--grain-diameter"]);
+    place.refused(&with(&["--grain-diameter", "-1"]), &["grain diameter", "-1"]);
+    let alone = [&recording[..], &["--grain-diameter", "0.004"]].concat();
+    place.refused(&alone, &["--diagnostics"]);
 }
 
 #[test]
@@ -355,6 +378,8 @@ fn streams_are_kept_apart_and_a_closed_stdout_is_no_failure() {
     let quiet = place.run(&tiny(&["generate", "drop", "default", "-n", "3", "-o", "d", "-q"], &[]));
     assert_eq!(text(&quiet.stderr), "");
     assert!(place.expect(0, &["features", "--list"]).lines().count() == 16);
+    let diagnostics = place.expect(0, &["features", "--list", "--diagnostics"]);
+    assert_eq!(diagnostics.lines().count(), DIAGNOSTICS.len());
     assert!(place.expect(0, &["simulate", "--help"]).contains("Example:"));
     assert!(place.expect(0, &["completions", "bash"]).contains("granulcal-cli"));
     let usage = place.run(&[]);

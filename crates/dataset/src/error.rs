@@ -100,6 +100,14 @@ pub enum DatasetError {
     /// A simulation was refused.
     #[error("the simulation was refused")]
     Simulation(#[source] DemError),
+    /// A checkpoint is damaged, or of something else.
+    #[error("{} cannot be used", path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: DemError,
+    },
     /// One row of a batch cannot be made.
     #[error("row {row} of the data set cannot be made")]
     Row {

@@ -17,8 +17,10 @@
 //! | [`Survey`] | what is in a .bag or .mcap |
 //! | [`png`], [`npy`] | 16-bit depth PNG, arrays |
 //! | [`record_pour`] | a pour over time as MCAP |
+//! | [`write_checkpoint`], [`resume_checkpoint`] | a pour that is stopped and goes on |
 
 mod camera_file;
+mod checkpoint_file;
 mod contact_problem_file;
 mod dataset;
 mod distribution;
@@ -48,6 +50,7 @@ mod survey;
 mod table;
 
 pub use camera_file::CameraFile;
+pub use checkpoint_file::{read_checkpoint_header, resume_checkpoint, write_checkpoint};
 pub use contact_problem_file::write_contact_problem;
 pub use dataset::{Dataset, merge};
 pub use distribution::Distribution;

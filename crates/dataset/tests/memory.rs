@@ -5,6 +5,7 @@ use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
+use foxglove::Encode;
 use granulcal_dataset::{CameraFile, DatasetError, ReadOptions, Recording, Survey, measured_data};
 use peak_alloc::PeakAlloc;
 
@@ -168,7 +169,6 @@ fn stream_a_long_recording() {
             message(&mut bytes);
             bytes
         };
-        use foxglove::Encode;
         let schema = foxglove::messages::CameraCalibration::get_schema().unwrap();
         send("/lens", schema, &encoded(&|bytes| lens.encode(bytes).unwrap()));
         for frame in 0..frames {

@@ -18,7 +18,7 @@
 //! | [`stats`] | the registry of statistics |
 //!
 //! Lengths are metres. In the world frame the ground is z = 0 and z points up.
-//! The equations are derived in `docs/theory/features.md`.
+//! The equations are derived in `docs/theory/features.md` and `docs/theory/statistics.md`.
 //!
 //! ```
 //! use granulcal_features::{Camera, grain_points, paper16, render_grid};
@@ -35,6 +35,8 @@
 //! assert!((statistics[0] - 2.0 * radius).abs() < 1e-4); // max_z is the top of a grain
 //! # Ok::<(), granulcal_features::FeatureError>(())
 //! ```
+
+#![allow(clippy::inline_always)] // what is compiled for wider registers must be inlined to reach them
 
 pub mod camera;
 pub mod colour;
@@ -61,4 +63,6 @@ pub use segment::{
     Formation, Segmentation, Threshold, grain_points, segment_depth, segment_height_map,
 };
 pub use sensor::SensorNoise;
-pub use stats::{PAPER16, Prepared, Statistic, paper16};
+pub use stats::{
+    DIAGNOSTICS, DiagnosticSettings, PAPER16, Prepared, Statistic, Survey, diagnostics, paper16,
+};

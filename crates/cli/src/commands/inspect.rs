@@ -8,6 +8,7 @@ use std::path::Path;
 use anyhow::anyhow;
 use granulcal_dataset::{
     CameraFile, Dataset, DatasetError, Folder, Npz, Prior, load_prior, load_scene, npy, png,
+    read_checkpoint_header,
 };
 use granulcal_dem::Scene;
 use serde_json::{Map, Value, json};
@@ -60,9 +61,10 @@ fn inspect(path: &Path, is_whole: &mut bool) -> anyhow::Result<Value> {
         "npz" => npz_facts(path),
         "png" => png_facts(path),
         "bag" | "mcap" => recording::facts(path, is_whole),
+        "ckpt" => checkpoint_facts(path),
         other => {
             let found = if other.is_empty() { "no ending" } else { other };
-            let allowed = "a folder or .parquet, .toml, .npy, .npz, .png, .bag, .mcap";
+            let allowed = "a folder or .parquet, .toml, .npy, .npz, .png, .bag, .mcap, .ckpt";
             let path = path.display();
             Err(BadArgument(format!("{path}: must be {allowed}, found {found}")).into())
         }
@@ -160,6 +162,18 @@ fn png_facts(path: &Path) -> anyhow::Result<Value> {
         }
         Err(other) => Err(other.into()),
     }
+}
+
+fn checkpoint_facts(path: &Path) -> anyhow::Result<Value> {
+    let header = read_checkpoint_header(path)?;
+    Ok(json!({
+        "kind": "checkpoint",
+        "version": header.version,
+        "seed": header.seed,
+        "substeps": header.substep,
+        "simulated_s": header.time(),
+        "scene": scene_facts(&header.scene),
+    }))
 }
 
 /// Smallest and largest finite value, and how many are not finite.
