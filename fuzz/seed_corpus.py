@@ -36,6 +36,7 @@ floor = 0.001
 
 
 def write(target: str, name: str, data: bytes) -> None:
+    """Writes a seed of a target."""
     folder = CORPUS / target
     folder.mkdir(parents=True, exist_ok=True)
     (folder / name).write_bytes(data)
@@ -68,18 +69,21 @@ def without_checksums(source: Path, *, chunking: bool, compression: CompressionT
 
 
 def png(pixels: np.ndarray) -> bytes:
+    """Returns the pixels as a PNG."""
     out = io.BytesIO()
     Image.fromarray(pixels).save(out, "png")
     return out.getvalue()
 
 
 def npz(save, **arrays: np.ndarray) -> bytes:
+    """Returns the arrays as NumPy's `save` stores them."""
     out = io.BytesIO()
     save(out, **arrays)
     return out.getvalue()
 
 
 def main() -> None:
+    """Replaces the corpus."""
     shutil.rmtree(CORPUS, ignore_errors=True)
     sys.path.insert(0, str(RECORDINGS.parent))
     from generate_recordings import small_bag

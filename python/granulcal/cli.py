@@ -111,15 +111,18 @@ def _add_recordings(parser: argparse.ArgumentParser) -> None:
         "recording",
         type=Path,
         nargs="+",
-        help=".bag, .mcap, .npz height map, 16-bit depth PNG or folder of PNGs; several: pours of one "
-        "material",
+        help=".bag, .mcap, .npz height map, 16-bit depth PNG or folder of PNGs; "
+        "several: pours of one material",
     )
     parser.add_argument("--camera", type=Path, help="TOML of the camera; PNGs need it")
     parser.add_argument("--topic", help="topic of the depth images, where several fit")
     parser.add_argument("--camera-topic", help="topic of the lens, where several fit")
     parser.add_argument("--colour-topic", help="topic of the colour images, where several fit")
     parser.add_argument(
-        "--frames", type=_frames, default=10, help="frames to average, or all (default: the last 10)"
+        "--frames",
+        type=_frames,
+        default=10,
+        help="frames to average, or all (default: the last 10)",
     )
     parser.add_argument("--first-frame", type=int, help="index of the first of them, from 0")
     parser.add_argument("--scene", type=Path, help="refuse a model of another scene than this TOML")

@@ -129,8 +129,8 @@ class Recording:
     """One measured formation: a height map, or a depth image with its camera.
 
     Reads ROS 1 .bag files as the RealSense viewer saves them, .mcap files of ROS 2 and of Foxglove,
-    16-bit depth PNGs, folders of such frames, and .npz height maps. Of several frames the mean of each
-    pixel is taken over those that have data there. PNGs need the TOML of their camera.
+    16-bit depth PNGs, folders of such frames, and .npz height maps. Of several frames the mean of
+    each pixel is taken over those that have data there. PNGs need the TOML of their camera.
 
     Example:
         >>> import tempfile
@@ -168,8 +168,8 @@ class Recording:
 
         Args:
             path: .bag, .mcap, .npz, .png, or a folder of .png.
-            camera: TOML of the camera, which PNGs need and height maps have not; of a .bag or .mcap it
-                replaces lens, depth unit and segmentation, key by key.
+            camera: TOML of the camera, which PNGs need and height maps have not; of a .bag or .mcap
+                it replaces lens, depth unit and segmentation, key by key.
             topic: topic of the depth images, where several fit.
             camera_topic: topic of the lens, where several fit.
             colour_topic: topic of the colour images, where several fit; they are read when the
@@ -179,8 +179,8 @@ class Recording:
 
         Raises:
             FileNotFoundError: a file does not exist.
-            ValueError: a file is no recording, or none or several topics fit; the message says what is
-                wrong and lists the topics.
+            ValueError: a file is no recording, or none or several topics fit; the message says what
+                is wrong and lists the topics.
         """
         if frames is not None and frames < 1:
             raise ValueError(f"frames must be at least 1, got {frames}")

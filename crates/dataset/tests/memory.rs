@@ -5,7 +5,8 @@ use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
-use granulcal_dataset::{CameraFile, DatasetError, ReadOptions, Recording, Survey};
+use foxglove::Encode;
+use granulcal_dataset::{CameraFile, DatasetError, ReadOptions, Recording, Survey, measured_data};
 use peak_alloc::PeakAlloc;
 
 #[global_allocator]
@@ -168,7 +169,6 @@ fn stream_a_long_recording() {
             message(&mut bytes);
             bytes
         };
-        use foxglove::Encode;
         let schema = foxglove::messages::CameraCalibration::get_schema().unwrap();
         send("/lens", schema, &encoded(&|bytes| lens.encode(bytes).unwrap()));
         for frame in 0..frames {
@@ -200,8 +200,19 @@ fn stream_a_long_recording() {
     assert!(long < length / 8, "{long} of {length}");
 }
 
+/// What the recording of a D435 takes, where it is; `--nocapture` shows the number.
+fn measure_a_real_recording() {
+    let Some(data) = measured_data(&repository()) else { return };
+    let path = data.join("realsense-d435-frames/single_depth_color_640x480.bag");
+    let bytes = fs::read(&path).unwrap();
+    let (result, used) = read("d435.bag", &bytes);
+    assert_eq!(result.unwrap().frames, 2);
+    println!("{used} bytes for {} of {}", bytes.len(), path.display());
+}
+
 #[test]
 fn readers_keep_within_their_memory() {
+    measure_a_real_recording();
     replay_the_corpus();
     defuse_bombs();
     stream_a_long_recording();
