@@ -26,7 +26,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Statistic:
     """One entry of the registry: what a number is and how it answers to a change of frame.
 
@@ -53,10 +53,7 @@ class Statistic:
     lift: str
 
 
-_FIELDS = ("family", "name", "unit", "doc", "length_power", "rotation", "lift")
-REGISTRY: tuple[Statistic, ...] = tuple(
-    Statistic(**dict(zip(_FIELDS, entry, strict=True))) for entry in _native.statistics_table()
-)
+REGISTRY: tuple[Statistic, ...] = tuple(Statistic(*row) for row in _native.statistics_table())
 """Every statistic of both families, in order."""
 NAMES: tuple[str, ...] = tuple(s.name for s in REGISTRY if s.family == "paper16")
 """Names of the 16 statistics, in the paper's order."""

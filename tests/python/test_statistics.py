@@ -292,21 +292,23 @@ def test_every_statistic_behaves_as_its_registry_entry_says(seed):
     lifted = _all_values(points + np.array([0, 0, lift]))
     for entry in REGISTRY:
         name = entry.name
-        tolerance = {"rel": 1e-6 if name.startswith("chi") else 1e-10, "abs": 1e-12}
+        rel = 1e-6 if name.startswith("chi") else 1e-10
         value = before[name]
-        assert moved[name] == pytest.approx(value, **tolerance), name
-        assert shuffled[name] == pytest.approx(value, **tolerance), name
-        assert scaled[name] == pytest.approx(value * scale**entry.length_power, **tolerance), name
+        assert moved[name] == pytest.approx(value, rel=rel, abs=1e-12), name
+        assert shuffled[name] == pytest.approx(value, rel=rel, abs=1e-12), name
+        assert scaled[name] == pytest.approx(
+            value * scale**entry.length_power, rel=rel, abs=1e-12
+        ), name
         if entry.lift != "changes":
             rise = lift if entry.lift == "rises" else 0.0
-            assert lifted[name] == pytest.approx(value + rise, **tolerance), name
+            assert lifted[name] == pytest.approx(value + rise, rel=rel, abs=1e-12), name
         if entry.rotation == "invariant":
-            assert turned[name] == pytest.approx(value, **tolerance), name
+            assert turned[name] == pytest.approx(value, rel=rel, abs=1e-12), name
         elif entry.rotation.startswith("mode"):
             pair = [name.replace("_sin_", "_cos_"), name.replace("_cos_", "_sin_")]
             was, now = (complex(*(values[n] for n in pair)) for values in (before, turned))
             order = int(entry.rotation.removeprefix("mode "))
-            assert now == pytest.approx(was * np.exp(1j * order * angle), **tolerance), name
+            assert now == pytest.approx(was * np.exp(1j * order * angle), rel=rel, abs=1e-12), name
 
 
 def test_diagnostic_statistics_of_a_pour_and_of_its_recording_agree(small_scene, tmp_path):
