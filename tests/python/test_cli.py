@@ -88,7 +88,7 @@ def test_infer_reads_a_recording_that_is_cut_off_and_says_so(model, tmp_path, ca
     assert main(["infer", str(model), str(cut), "--frames", "all", "--json"]) == 3
     printed = capsys.readouterr()
     assert json.loads(printed.out)["statistics"]
-    assert "cut.mcap: at least 1 frame lost" in printed.err
+    assert "cut.mcap: an unknown number of frames lost" in printed.err
     assert main(["infer", str(model), str(cut), "--topic", "/nowhere"]) == 2
     assert "/camera/depth/image_rect_raw" in capsys.readouterr().err
 

@@ -98,7 +98,7 @@ def test_recordings_of_messages_are_read():
     assert one.depth[3, 5] == pytest.approx(0.479)
     every = gc.Recording.open(_RECORDINGS / "foxglove_raw.mcap", frames=None)
     assert every.frames == 3
-    with pytest.raises(ValueError, match=r"no topic /nowhere.*there are: /depth"):
+    with pytest.raises(ValueError, match=r"there are: /depth.*no topic /nowhere"):
         gc.Recording.open(_RECORDINGS / "foxglove_raw.mcap", topic="/nowhere")
     with pytest.raises(ValueError, match="at least 1"):
         gc.Recording.open(_RECORDINGS / "foxglove_raw.mcap", frames=0)
@@ -120,7 +120,7 @@ def test_a_damaged_recording_warns_and_counts(tmp_path):
     whole = (_RECORDINGS / "ros2_16uc1_none.mcap").read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: len(whole) * 3 // 4])
-    with pytest.warns(DamagedRecordingWarning, match=r"cut\.mcap: at least 1 frame lost; .*byte"):
+    with pytest.warns(DamagedRecordingWarning, match=r"cut\.mcap: .* lost; .*byte"):
         recording = gc.Recording.open(cut)
     assert recording.frames in (1, 2)
     assert recording.lost is not None
