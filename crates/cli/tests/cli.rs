@@ -156,7 +156,7 @@ fn diagnostic_statistics_are_printed_when_asked_for() {
     assert!((seen - pour).abs() < 0.1 * pour, "{seen} {pour}");
     assert!(of(&measured, "mass_cos_1") != of(&simulated, "mass_cos_1"));
     place.refused(&with(&[]), &["--diagnostics", "--grain-diameter"]);
-    place.refused(&with(&["--grain-diameter", "-1"]), &["grain diameter", "-1"]);
+    place.refused(&with(&["--grain-diameter=-1"]), &["grain diameter", "-1"]);
     let alone = [&recording[..], &["--grain-diameter", "0.004"]].concat();
     place.refused(&alone, &["--diagnostics"]);
 }
