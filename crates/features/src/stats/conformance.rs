@@ -19,10 +19,13 @@ impl<P> From<&Statistic<P>> for Entry {
     }
 }
 
-/// A family of statistics: its entries and its values for points whose lengths are `unit` of a metre.
+/// Values of a family for points whose lengths are the second argument times a metre.
+type Values = fn(&[Vector3<f64>], f64) -> Result<Vec<f64>, FeatureError>;
+
+/// A family of statistics: its entries and its values.
 struct Family {
     entries: Vec<Entry>,
-    values: fn(&[Vector3<f64>], f64) -> Result<Vec<f64>, FeatureError>,
+    values: Values,
 }
 
 fn families() -> [Family; 2] {

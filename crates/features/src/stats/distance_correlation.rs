@@ -8,7 +8,7 @@
 //!
 //! In [0, 1], the biased form (a V-statistic), as `dcor.distance_correlation`. 0 when r or z is
 //! constant, as in `dcor`. Computed in O(n log n): the row sums from sorted values, the double sum by
-//! [`rising`]. `docs/theory/statistics.md` derives it and counts what it costs.
+//! `rising`. `docs/theory/statistics.md` derives it and counts what it costs.
 //!
 //! Source: the paper, Summary Statistic Extraction; Székely, Rizzo & Bakirov 2007,
 //! doi:10.1214/009053607000000505; fast form after Chaudhuri & Hu 2019, doi:10.1016/j.csda.2019.01.016.
