@@ -80,13 +80,15 @@ widest! {
     ) -> Seen {
         let mut seen = Seen::default();
         for number in 0..set.batches.len() {
-            let gap = Reg::<W>::load(&wall_geometry(set, number, walls, bed, &mut seen));
+            let (gap, follows) = wall_geometry(set, number, walls, bed, &mut seen);
+            let gap = Reg::<W>::load(&gap);
             let (batch, at) = (&mut set.batches[number], &mut set.at_walls[number]);
             for lane in batch.lanes() {
                 lost[batch.i[lane] as usize] |= at.went_through[lane];
             }
             let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
             let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
+            let w_n = w_n - Reg::load(&follows);
             finish(batch, law::bias_lanes(gap, dt));
             let closes = closing_bits(gap, w_n, dt);
             for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
@@ -139,10 +141,12 @@ widest! {
             if clocks == Lanes::ZERO {
                 continue;
             }
-            let gap = Reg::<W>::load(&wall_geometry(set, number, walls, bed, &mut Seen::default()));
+            let (gap, follows) = wall_geometry(set, number, walls, bed, &mut Seen::default());
+            let gap = Reg::<W>::load(&gap);
             let batch = &mut set.batches[number];
             let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
             let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
+            let w_n = w_n - Reg::load(&follows);
             finish(batch, law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt));
         }
     }
@@ -209,27 +213,32 @@ fn pair_geometry<W: Width>(
     (gap, distance)
 }
 
-/// Sets the normals and returns the gaps of a batch at walls; a grain that has had an impact is seen where it
-/// was then.
+/// Sets the normals of a batch at walls and returns the gaps, and how fast the walls move along them; a grain that has had
+/// an impact is seen where it was then.
 fn wall_geometry(
     set: &mut ContactSet,
     number: usize,
     walls: &[Wall],
     bed: &Bed,
     seen: &mut Seen,
-) -> Lanes {
+) -> (Lanes, Lanes) {
     let (batch, at) = (&mut set.batches[number], &mut set.at_walls[number]);
-    let mut gap = Lanes::splat(f64::INFINITY);
+    let (mut gap, mut follows) = (Lanes::splat(f64::INFINITY), Lanes::ZERO);
     for lane in batch.lanes() {
         let i = batch.i[lane] as usize;
-        let near = walls[at.wall[lane] as usize].surface.nearest(&bed.position(i));
+        let (wall, place) = (&walls[at.wall[lane] as usize], bed.position(i));
+        let near = wall.nearest(&place, bed.clocks[i]);
+        if wall.is_moving() {
+            let touching = place - near.distance * near.normal;
+            follows.0[lane] = near.normal.dot(&wall.motion_at(&touching).0);
+        }
         batch.normal.set(lane, near.normal.into());
         gap.0[lane] = near.distance - bed.radius(i);
         at.went_through[lane] |= near.side * at.side[lane] < 0;
         at.side[lane] = near.side;
         seen.penetration = seen.penetration.max(-gap.0[lane] / bed.radius(i));
     }
-    gap
+    (gap, follows)
 }
 
 /// Bias and tangent plane of a batch whose normals are fresh.

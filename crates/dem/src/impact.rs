@@ -73,6 +73,8 @@ pub(crate) struct Impacts {
     pub candidates: Vec<Candidate>,
     queue: BinaryHeap<Event>,
     foreseen: Vec<Event>,
+    /// Work that walls have done in impacts since it was last asked for, per typical mass `[m^2/s^2]`.
+    pub work_of_walls: f64,
     /// Impacts of each grain in this substep.
     counts: Vec<u32>,
     /// The grains with impacts.
@@ -99,9 +101,11 @@ impl Impacts {
         self.queue.extend(self.foreseen.drain(..));
         let mut resolved = 0;
         while let Some(Event { time, pair, counts }) = self.queue.pop() {
-            if counts != self.counts_of(pair) || !collide(pair, time, bed, around) {
+            if counts != self.counts_of(pair) {
                 continue;
             }
+            let Some(work) = collide(pair, time, bed, around) else { continue };
+            self.work_of_walls += work;
             resolved += 1;
             for grain in [pair.i, pair.partner] {
                 let grain = grain as usize;
@@ -190,9 +194,10 @@ fn time_at_wall(pair: Candidate, now: f64, bed: &Bed, around: &Surroundings) -> 
     let (grain, dt) = (pair.i as usize, around.settings.dt);
     let wall = &around.walls[pair.partner as usize - bed.count()];
     let place = bed.place_at(grain, now);
-    let near = wall.surface.nearest(&place.vector());
+    let near = wall.nearest(&place.vector(), now);
     let gap = near.distance - place.0[3];
-    let w_n = near.normal.dot(&bed.velocity(grain));
+    let touching = place.vector() - near.distance * near.normal;
+    let w_n = near.normal.dot(&(bed.velocity(grain) - wall.motion_at(&touching).0));
     let fall = near.normal.dot(&around.gravity);
     if gap <= 0.0 {
         return (w_n + fall * (now - 0.5 * dt) < -IMPACT_SPEED).then_some(now);
@@ -236,13 +241,18 @@ impl Meeting {
 
     fn with_wall(i: usize, wall: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
         let place = bed.place_at(i, time).vector();
-        let normal = around.walls[wall].surface.nearest(&place).normal;
+        let (law, wall) = (around.wall_law(bed, i, wall), &around.walls[wall]);
+        let near = wall.nearest(&place, time);
+        let normal = near.normal;
+        let (velocity, omega) = wall.motion_at(&(place - near.distance * normal));
+        let spin = bed.radius(i) * omega;
         Self {
-            law: around.wall_law(bed, i, wall),
-            material: around.walls[wall].material,
+            law,
+            material: wall.material,
             normal,
-            velocity: Vector3::zeros(),
-            spin: Vector3::zeros(),
+            // The contact sees the surface of its second body at v - n x w.
+            velocity: velocity + normal.cross(&spin),
+            spin,
             falling: normal.dot(&around.gravity) * (time - 0.5 * around.settings.dt),
         }
     }
@@ -250,7 +260,8 @@ impl Meeting {
 
 /// Lets two collide at `time` if they still approach fast enough: Newton's restitution, Coulomb's friction
 /// and rolling friction, each solved exactly in this order. If they do not, both stay as they are.
-fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> bool {
+/// Returns the work of a moving wall per typical mass `[m^2/s^2]`.
+fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> Option<f64> {
     let (i, other) = (pair.i as usize, other_grain(pair, bed));
     let meeting = if let Some(j) = other {
         Meeting::with_grain(i, j, time, bed, around)
@@ -262,7 +273,7 @@ fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> 
     let dv = bed.velocity(i) - velocity;
     let w_n = normal.dot(&dv);
     if w_n + falling >= -IMPACT_SPEED {
-        return false;
+        return None;
     }
     bed.advance(i, time);
     if let Some(j) = other {
@@ -293,8 +304,9 @@ fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> 
         let body = &mut bed.bodies[j];
         body.velocity.add(&(-c_j * force));
         body.spin.add(&(-c_j * (l_j * roll + twist)));
+        return Some(0.0);
     }
-    true
+    Some(force.dot(&(velocity - normal.cross(&spin_j))) + lambda_r.dot(&spin_j))
 }
 
 /// The vector, or the part of it that is as long as `limit`.

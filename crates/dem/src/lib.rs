@@ -47,6 +47,7 @@ mod neighbor;
 mod parallel;
 mod partners;
 mod path;
+mod placement;
 mod pour;
 mod preset;
 mod problem;
@@ -67,7 +68,8 @@ pub use pour::{Pour, Status};
 pub use preset::{Preset, SolverSettings};
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
-    CameraSpec, EndRule, Funnel, GRAVITY, Grains, Ground, Projection, Scene, Shape, Start, Wall,
+    CameraSpec, EndRule, Funnel, GRAVITY, Grains, Ground, Motion, Projection, Scene, Shape, Start,
+    Wall,
 };
 pub use simulation::Simulation;
 pub use solver::Method;

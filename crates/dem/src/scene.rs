@@ -4,6 +4,7 @@
 //! ground is the plane z = 0 and gravity points down unless the scene says otherwise.
 
 mod camera;
+mod motion;
 pub(crate) mod path;
 mod start;
 mod walls;
@@ -11,6 +12,7 @@ mod walls;
 use serde::{Deserialize, Serialize};
 
 pub use camera::{CameraSpec, Projection};
+pub use motion::Motion;
 pub use start::Start;
 pub use walls::{Funnel, Ground, Shape, Wall};
 
@@ -139,6 +141,13 @@ impl Scene {
     /// [`DemError::TomlWrite`] if a number cannot be written.
     pub fn to_toml(&self) -> Result<String, DemError> {
         toml::to_string(self).map_err(|e| DemError::TomlWrite(Box::new(e)))
+    }
+
+    /// When the last wall has come to rest, or the horizon if one never does `[s]`.
+    pub fn moves_until(&self) -> f64 {
+        let walls = self.walls.iter().map(|wall| &wall.motion);
+        let motions = walls.chain(self.funnel.iter().map(|funnel| &funnel.motion));
+        motions.map(Motion::end).fold(0.0, f64::max).min(self.end.horizon)
     }
 
     /// Checks every number of the scene.

@@ -5,14 +5,46 @@
 
 use nalgebra::Vector3;
 
-use crate::scene::{Scene, Shape};
+use crate::placement::Placement;
+use crate::scene::{self, Motion, Scene, Shape};
 use crate::{Material, WallMaterial};
 
-/// A wall with its resolved material.
+/// A wall with its resolved material, and where it is if it moves.
 #[derive(Clone, Debug)]
 pub(crate) struct Wall {
-    pub surface: Surface,
+    surface: Surface,
     pub material: Material,
+    pub placement: Option<Placement>,
+}
+
+impl Wall {
+    /// The nearest point to a centre at `now` `[s]` into the substep.
+    pub fn nearest(&self, centre: &Vector3<f64>, now: f64) -> Nearest {
+        let Some(placement) = &self.placement else { return self.surface.nearest(centre) };
+        let near = self.surface.nearest(&placement.seen(centre, now));
+        Nearest { normal: placement.turned(&near.normal), ..near }
+    }
+
+    /// Whether the wall may come nearer than `range` `[m]` until the next list; false only when it surely does not.
+    pub fn may_reach(&self, centre: &Vector3<f64>, range: f64) -> bool {
+        let Some(placement) = &self.placement else {
+            return self.surface.may_reach(centre, range);
+        };
+        let range = range + placement.reach_at(centre);
+        self.surface.may_reach(&placement.seen(centre, 0.0), range)
+    }
+
+    /// Whether it may move.
+    pub fn is_moving(&self) -> bool {
+        self.placement.is_some()
+    }
+
+    /// Velocity and angular velocity in this substep of the wall's point at `x` `[m/s]`, `[rad/s]`.
+    pub fn motion_at(&self, x: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        let still = (Vector3::zeros(), Vector3::zeros());
+        let moving = self.placement.as_ref().filter(|placement| placement.moves());
+        moving.map_or(still, |p| (p.velocity_at(x), p.angular_velocity()))
+    }
 }
 
 /// The surfaces that the solver knows.
@@ -116,15 +148,15 @@ fn any_normal(axis: &Vector3<f64>) -> Vector3<f64> {
 /// Every wall of a scene, the ground first.
 pub(crate) fn walls_of(scene: &Scene) -> Vec<Wall> {
     let ground = Shape::Plane { point: [0.0; 3], normal: [0.0, 0.0, 1.0] };
-    let resolve = |shape: &Shape, material: &WallMaterial| Wall {
+    let resolve = |shape: &Shape, material: &WallMaterial, motion: &Motion| Wall {
         surface: surface(shape),
         material: material.over(&scene.material),
+        placement: Placement::new(motion),
     };
-    let mut walls = vec![resolve(&ground, &scene.ground.material)];
-    if let Some(funnel) = &scene.funnel {
-        walls.extend(funnel.walls().iter().map(|wall| resolve(&wall.shape, &wall.material)));
-    }
-    walls.extend(scene.walls.iter().map(|wall| resolve(&wall.shape, &wall.material)));
+    let of = |wall: &scene::Wall| resolve(&wall.shape, &wall.material, &wall.motion);
+    let mut walls = vec![resolve(&ground, &scene.ground.material, &Motion::Still)];
+    walls.extend(scene.funnel.iter().flat_map(|funnel| funnel.walls()).map(|wall| of(&wall)));
+    walls.extend(scene.walls.iter().map(of));
     walls
 }
 

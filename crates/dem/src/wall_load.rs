@@ -63,7 +63,7 @@ mod tests {
         scene.material = Material::new(0.0, 0.0, 0.0).unwrap();
         for x in [-1.0, 1.0] {
             let shape = Shape::Plane { point: [0.0, 0.0, 0.1], normal: [x, 0.0, 1.0] };
-            scene.walls.push(Wall { shape, material: WallMaterial::default() });
+            scene.walls.push(Wall::fixed(shape, WallMaterial::default()));
         }
         let height = 0.1 + 0.002 * 2f64.sqrt();
         let loads = loads(&mut scene, [0.0, 0.0, height]);

@@ -49,10 +49,10 @@ pub fn measure(radius: f64, material: Material, seed: u64) -> f64 {
     };
     let plain = WallMaterial::default();
     let funnel =
-        vec![Wall { shape: cone, material: plain }, tube(neck, rim, top_of(&rained), plain)];
+        vec![Wall::fixed(cone, plain), tube(neck, rim, top_of(&rained), plain)];
     let mut closed = funnel.clone();
     let lid = Shape::Plane { point: [0.0, 0.0, tip], normal: [0.0, 0.0, 1.0] };
-    closed.push(Wall { shape: lid, material: plain });
+    closed.push(Wall::fixed(lid, plain));
     let filled = settle(&scene(&rained, material, closed));
 
     let mut walls = funnel;

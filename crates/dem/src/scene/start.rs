@@ -5,7 +5,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use super::{Grains, Scene, finite, non_negative, positive};
+use super::{Funnel, Grains, Scene, finite, non_negative, positive};
 use crate::DemError;
 
 /// Solid fraction of the closest packing of equal spheres, pi / sqrt(18).
@@ -85,7 +85,7 @@ impl Start {
     pub(crate) fn positions(&self, scene: &Scene, seed: u64) -> Vec<Vector3<f64>> {
         let (mut positions, jitter) = match self {
             &Self::Grid { counts, spacing, jitter, base } => {
-                let floor = scene.funnel.map_or(0.0, |funnel| funnel.rim_height());
+                let floor = scene.funnel.as_ref().map_or(0.0, Funnel::rim_height);
                 (grid(scene.grains.count, counts, spacing, floor + base), jitter)
             }
             &Self::Ball { height, solid_fraction, jitter } => {

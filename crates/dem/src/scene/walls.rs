@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{finite, positive};
+use super::{Motion, finite, positive};
 use crate::{DemError, Material, WallMaterial};
 
 /// The plane z = 0.
@@ -30,7 +30,7 @@ impl Ground {
 ///
 /// The defaults are those of the pours in other engines: radius 60 mm at the rim, 16 mm in the stem,
 /// a cone 70 mm high above a stem of 10 mm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Funnel {
     /// Height of the tip (the lower end of the stem) above the ground `[m]`.
@@ -46,6 +46,9 @@ pub struct Funnel {
     /// Where the funnel's coefficients differ from the grains'.
     #[serde(skip_serializing_if = "WallMaterial::is_empty")]
     pub material: WallMaterial,
+    /// How the funnel moves.
+    #[serde(skip_serializing_if = "Motion::is_still")]
+    pub motion: Motion,
 }
 
 impl Default for Funnel {
@@ -57,6 +60,7 @@ impl Default for Funnel {
             cone_length: 0.07,
             stem_length: 0.01,
             material: WallMaterial::default(),
+            motion: Motion::Still,
         }
     }
 }
@@ -79,6 +83,7 @@ impl Funnel {
                     radius_to: self.rim_radius,
                 },
                 material: self.material,
+                motion: self.motion.clone(),
             },
             Wall {
                 shape: Shape::Cylinder {
@@ -87,17 +92,19 @@ impl Funnel {
                     radius: self.stem_radius,
                 },
                 material: self.material,
+                motion: self.motion.clone(),
             },
         ]
     }
 
-    /// Whether a grain's centre `[m]` is in the funnel: above its tip and within the stem, the cone or, above the rim,
-    /// the rim's circle.
-    pub fn holds(&self, centre: &Vector3<f64>) -> bool {
+    /// Whether a grain's centre `[m]` is at `time` `[s]` in the funnel: above its tip and within the stem, the cone or,
+    /// above the rim, the rim's circle.
+    pub fn holds(&self, centre: &Vector3<f64>, time: f64) -> bool {
+        let centre = self.motion.pose(time).inverse_transform_point(&(*centre).into());
         let rise = centre.z - self.height;
         let share = ((rise - self.stem_length) / self.cone_length).clamp(0.0, 1.0);
         let radius = self.stem_radius + share * (self.rim_radius - self.stem_radius);
-        rise > 0.0 && centre.xy().norm() < radius
+        rise > 0.0 && centre.x.hypot(centre.y) < radius
     }
 
     pub(super) fn check(&self, grains: &Material, radius: f64) -> Result<(), DemError> {
@@ -112,12 +119,13 @@ impl Funnel {
             let allowed = "at least funnel.stem_radius";
             return Err(DemError::range("funnel.rim_radius", self.rim_radius, allowed));
         }
+        self.motion.check("funnel")?;
         self.material.over(grains).check("funnel.material")
     }
 }
 
 /// A wall of any shape.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
     /// Where it is.
@@ -125,6 +133,9 @@ pub struct Wall {
     /// Where its coefficients differ from the grains'.
     #[serde(default, skip_serializing_if = "WallMaterial::is_empty")]
     pub material: WallMaterial,
+    /// How it moves.
+    #[serde(default, skip_serializing_if = "Motion::is_still")]
+    pub motion: Motion,
 }
 
 /// Shapes of walls. Cones and cylinders are open, thin and touch grains on both sides.
@@ -161,6 +172,11 @@ pub enum Shape {
 }
 
 impl Wall {
+    /// A wall that stays where it is.
+    pub fn fixed(shape: Shape, material: WallMaterial) -> Self {
+        Self { shape, material, motion: Motion::Still }
+    }
+
     fn check_numbers(name: &str, field: &str, values: [f64; 3]) -> Result<(), DemError> {
         values.iter().try_for_each(|&value| finite(&format!("{name}.shape.{field}"), value))
     }
@@ -183,6 +199,7 @@ impl Wall {
                 positive(&format!("{name}.shape.radius"), radius)?;
             }
         }
+        self.motion.check(name)?;
         self.material.over(grains).check(&format!("{name}.material"))
     }
 

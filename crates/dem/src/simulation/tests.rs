@@ -64,7 +64,7 @@ fn an_impact_that_does_not_happen_moves_no_grain() {
     scene.start = Start::Positions { positions: vec![from] };
     let (from, to) = ([0.0, -0.1, 0.05], [0.0, 0.1, 0.05]);
     let shape = Shape::Cylinder { from, to, radius: 5e-3 };
-    scene.walls.push(Wall { shape, material: WallMaterial::default() });
+    scene.walls.push(Wall::fixed(shape, WallMaterial::default()));
     let mut simulation = start(&scene);
     let velocity = Vector3::new(5.0, 0.0, 0.2);
     simulation.set_motion(0, velocity, Vector3::zeros()).expect("a grain");
