@@ -1,7 +1,7 @@
 //! Grains at walls that move, against closed forms (docs/theory/contact.md, "Walls that move").
 
 use granulcal::dem::{
-    GRAVITY, Motion as WallMotion, Preset, Scene, Shape, Simulation, Start, Status, Wall,
+    Ends, GRAVITY, Motion as WallMotion, Preset, Scene, Shape, Simulation, Start, Status, Wall,
     WallMaterial,
 };
 use nalgebra::Vector3;
@@ -105,12 +105,11 @@ fn a_racket_throws_a_grain_at_its_speed_and_its_restitution() {
 /// Grains in a drum that turns, ended by `seconds`.
 fn drum(seconds: f64) -> Scene {
     let mut scene = drop_of(120, 0.0, material(0.5, 0.05, 0.4));
-    scene.name = "drum".to_owned();
     let (from, to, radius) = ([0.0, -0.01, 0.06], [0.0, 0.01, 0.06], 0.04);
     let (point, axis) = (from, [0.0, 1.0, 0.0]);
     let turning = WallMotion::Spin { point, axis, rate: 3.0, begin: 0.0, end: None };
     for shape in [
-        Shape::Cylinder { from, to, radius },
+        Shape::Cylinder { from, to, radius, closed: Ends::None },
         Shape::Plane { point: from, normal: [0.0, 1.0, 0.0] },
         Shape::Plane { point: to, normal: [0.0, -1.0, 0.0] },
     ] {

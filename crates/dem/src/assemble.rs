@@ -7,7 +7,7 @@ use crate::contact::Batch;
 use crate::contact_set::ContactSet;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, widest};
 use crate::law;
-use crate::wall::Wall;
+use crate::wall::Walls;
 
 /// Distance below which two centres are one point and the normal is the vertical `[m]`.
 const COINCIDENT: f64 = 1e-12;
@@ -72,7 +72,7 @@ widest! {
     /// centre went through a wall.
     pub(crate) fn assemble_walls<W>(
         set: &mut ContactSet,
-        walls: &[Wall],
+        walls: &Walls,
         bed: &Bed,
         dt: f64,
         lost: &mut [bool],
@@ -92,7 +92,7 @@ widest! {
             finish(batch, law::bias_lanes(gap, dt));
             let closes = closing_bits(gap, w_n, dt);
             for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
-                let partner = bed.count() as u32 + u32::from(at.wall[lane]);
+                let partner = bed.count() as u32 + at.wall[lane];
                 candidates.push(Candidate { i: batch.i[lane], partner });
             }
         }
@@ -132,7 +132,7 @@ widest! {
 
 widest! {
     /// The same for the contacts at walls.
-    pub(crate) fn refresh_walls<W>(set: &mut ContactSet, walls: &[Wall], bed: &Bed, dt: f64) {
+    pub(crate) fn refresh_walls<W>(set: &mut ContactSet, walls: &Walls, bed: &Bed, dt: f64) {
         for number in 0..set.batches.len() {
             let mut clocks = Lanes::ZERO;
             for lane in set.batches[number].lanes() {
@@ -218,7 +218,7 @@ fn pair_geometry<W: Width>(
 fn wall_geometry(
     set: &mut ContactSet,
     number: usize,
-    walls: &[Wall],
+    walls: &Walls,
     bed: &Bed,
     seen: &mut Seen,
 ) -> (Lanes, Lanes) {
@@ -226,9 +226,9 @@ fn wall_geometry(
     let (mut gap, mut follows) = (Lanes::splat(f64::INFINITY), Lanes::ZERO);
     for lane in batch.lanes() {
         let i = batch.i[lane] as usize;
-        let (wall, place) = (&walls[at.wall[lane] as usize], bed.position(i));
-        let near = wall.nearest(&place, bed.clocks[i]);
-        if wall.is_moving() {
+        let (surface, place) = (at.wall[lane] as usize, bed.position(i));
+        let (wall, near) = (walls.wall(surface), walls.nearest(surface, &place, bed.clocks[i]));
+        if wall.is_moving() && near.distance.is_finite() {
             let touching = place - near.distance * near.normal;
             follows.0[lane] = near.normal.dot(&wall.motion_at(&touching).0);
         }

@@ -380,7 +380,9 @@ mod tests {
     fn impulses_and_laws_follow_their_contact() {
         let mut set = ContactSet::default();
         let friction = |contact: &Listed| f64::from(contact.i) + 0.01 * f64::from(contact.partner);
-        set.rebuild(&all_pairs(9), &Blocks::default(), 9, Second::Grain, |contact| law(friction(contact)));
+        set.rebuild(&all_pairs(9), &Blocks::default(), 9, Second::Grain, |contact| {
+            law(friction(contact))
+        });
         for batch in &mut set.batches {
             for lane in batch.lanes() {
                 batch.lambda_n.0[lane] = f64::from(batch.i[lane] * 100 + batch.j[lane]);

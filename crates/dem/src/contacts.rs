@@ -22,7 +22,7 @@ use crate::partners::Partners;
 use crate::path::{Ball, Path, Reach};
 use crate::preset::SolverSettings;
 use crate::scene::Scene;
-use crate::wall::{Wall, walls_of};
+use crate::wall::Walls;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -37,7 +37,7 @@ const SHARE: usize = if cfg!(test) { 4 } else { 512 };
 /// What the contacts are made of: walls, material and settings of one simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Surroundings {
-    pub walls: Vec<Wall>,
+    pub walls: Walls,
     /// Whether any wall may move.
     pub has_moving_walls: bool,
     pub material: Material,
@@ -53,9 +53,9 @@ pub(crate) struct Surroundings {
 impl Surroundings {
     pub fn new(scene: &Scene) -> Self {
         let settings = scene.preset.settings();
-        let walls = walls_of(scene);
+        let walls = Walls::of(scene);
         Self {
-            has_moving_walls: walls.iter().any(Wall::is_moving),
+            has_moving_walls: walls.any_moving(),
             walls,
             material: scene.material,
             gravity: scene.gravity.into(),
@@ -75,7 +75,7 @@ impl Surroundings {
     /// Takes the walls that move to the substep that begins at `time` `[s]`.
     pub fn move_walls(&mut self, time: f64) {
         let (dt, interval) = (self.settings.dt, self.reach().interval);
-        for placement in self.walls.iter_mut().filter_map(|wall| wall.placement.as_mut()) {
+        for placement in self.walls.placements() {
             placement.move_to(time, dt);
             placement.look_ahead(time, interval);
         }
@@ -98,7 +98,7 @@ impl Surroundings {
     pub fn wall_law(&self, bed: &Bed, i: usize, wall: usize) -> ContactLaw {
         // The spin of a moving wall is in units of the grain's radius, so that its lever is the grain's.
         let lever = if self.has_moving_walls { [1.0, 1.0] } else { [1.0, 0.0] };
-        contact_law(&self.walls[wall].material, [bed.inverse_mass[i], 0.0], lever)
+        contact_law(&self.walls.wall(wall).material, [bed.inverse_mass[i], 0.0], lever)
     }
 }
 
@@ -238,7 +238,7 @@ impl Contacts {
             let (grain, normal) = (batch.i[lane] as usize, Vector3::from(batch.normal.get(lane)));
             let radius = bed.radius(grain);
             let touching = bed.position(grain) - radius * normal;
-            let (velocity, omega) = around.walls[at.wall[lane] as usize].motion_at(&touching);
+            let (velocity, omega) = around.walls.wall(at.wall[lane] as usize).motion_at(&touching);
             let spin = radius * omega;
             bed.bodies[batch.j[lane] as usize] = Body {
                 velocity: Row::new(&(velocity + normal.cross(&spin)), 0.0),
@@ -252,8 +252,8 @@ impl Contacts {
     pub fn work_of_walls(&self, bed: &Bed) -> f64 {
         let work = |(number, lane): (usize, usize)| {
             let batch = &self.at_walls.batches[number];
-            let [normal, lambda_t, lambda_r] =
-                [&batch.normal, &batch.lambda_t, &batch.lambda_r].map(|l| Vector3::from(l.get(lane)));
+            let [normal, lambda_t, lambda_r] = [&batch.normal, &batch.lambda_t, &batch.lambda_r]
+                .map(|l| Vector3::from(l.get(lane)));
             let body = &bed.bodies[batch.j[lane] as usize];
             let spin = body.spin.vector();
             let velocity = body.velocity.vector() - normal.cross(&spin);
@@ -310,12 +310,10 @@ impl Contacts {
                 let Path { from, velocity } = &paths[grain];
                 let near = bed.radius(grain) + NEAR * around.radius + interval * velocity.norm();
                 let range = near + around.margin - NEAR * around.radius;
-                for (number, wall) in walls.iter().enumerate() {
-                    if wall.may_reach(from, range) {
-                        let contact = Listed { i: grain as u32, partner: number as u32 };
-                        found.push((contact, wall.may_reach(from, near)));
-                    }
-                }
+                walls.reached(from, range, |surface| {
+                    let contact = Listed { i: grain as u32, partner: surface as u32 };
+                    found.push((contact, walls.may_reach(surface, from, near)));
+                });
             }
         };
         around.threads.gather_ranges(bed.count(), SHARE, &mut self.near_walls, list);
@@ -361,14 +359,15 @@ impl Contacts {
             }
         }
         let range = bed.radius(grain) + around.margin + left * velocity.norm();
-        for (number, wall) in around.walls.iter().enumerate() {
-            let partner = (bed.count() + number) as u32;
-            if !self.partners.has(grain, partner) && wall.may_reach(&at, range) {
-                self.partners.add(grain, partner);
-                let contact = Listed { i: grain as u32, partner: number as u32 };
-                self.at_walls.append(contact, true, around.wall_law(bed, grain, number));
+        let (partners, at_walls) = (&mut self.partners, &mut self.at_walls);
+        around.walls.reached(&at, range, |surface| {
+            let partner = (bed.count() + surface) as u32;
+            if !partners.has(grain, partner) {
+                partners.add(grain, partner);
+                let contact = Listed { i: grain as u32, partner: surface as u32 };
+                at_walls.append(contact, true, around.wall_law(bed, grain, surface));
             }
-        }
+        });
     }
 }
 

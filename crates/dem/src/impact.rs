@@ -192,12 +192,16 @@ fn time_of_pair(i: usize, j: usize, now: f64, bed: &Bed) -> Option<f64> {
 /// When a grain touches a wall, on the parabola of which the substep is the chord.
 fn time_at_wall(pair: Candidate, now: f64, bed: &Bed, around: &Surroundings) -> Option<f64> {
     let (grain, dt) = (pair.i as usize, around.settings.dt);
-    let wall = &around.walls[pair.partner as usize - bed.count()];
+    let surface = pair.partner as usize - bed.count();
     let place = bed.place_at(grain, now);
-    let near = wall.nearest(&place.vector(), now);
+    let near = around.walls.nearest(surface, &place.vector(), now);
+    if near.distance.is_infinite() {
+        return None;
+    }
     let gap = near.distance - place.0[3];
     let touching = place.vector() - near.distance * near.normal;
-    let w_n = near.normal.dot(&(bed.velocity(grain) - wall.motion_at(&touching).0));
+    let w_n =
+        near.normal.dot(&(bed.velocity(grain) - around.walls.wall(surface).motion_at(&touching).0));
     let fall = near.normal.dot(&around.gravity);
     if gap <= 0.0 {
         return (w_n + fall * (now - 0.5 * dt) < -IMPACT_SPEED).then_some(now);
@@ -239,10 +243,11 @@ impl Meeting {
         }
     }
 
-    fn with_wall(i: usize, wall: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
+    fn with_wall(i: usize, surface: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
         let place = bed.place_at(i, time).vector();
-        let (law, wall) = (around.wall_law(bed, i, wall), &around.walls[wall]);
-        let near = wall.nearest(&place, time);
+        let law = around.wall_law(bed, i, surface);
+        let (wall, near) =
+            (around.walls.wall(surface), around.walls.nearest(surface, &place, time));
         let normal = near.normal;
         let (velocity, omega) = wall.motion_at(&(place - near.distance * normal));
         let spin = bed.radius(i) * omega;

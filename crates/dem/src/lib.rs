@@ -68,8 +68,8 @@ pub use pour::{Pour, Status};
 pub use preset::{Preset, SolverSettings};
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
-    CameraSpec, EndRule, Funnel, GRAVITY, Grains, Ground, Motion, Projection, Scene, Shape, Start,
-    Wall,
+    BoxSide, CameraSpec, EndRule, Ends, Funnel, GRAVITY, Grains, Ground, Mesh, MeshFile, Motion,
+    Projection, Scene, Shape, Start, Wall,
 };
 pub use simulation::Simulation;
 pub use solver::Method;

@@ -97,7 +97,7 @@ mod tests {
         let (time, dt) = (0.7, 1e-6);
         placement.move_to(time, dt);
         let x = Vector3::new(0.2, 0.1, -0.1);
-        let omega = 3.0 * Vector3::y();
+        let omega: Vector3<f64> = 3.0 * Vector3::y();
         let expected = omega.cross(&(x - Vector3::from(point)));
         assert!((placement.velocity_at(&x) - expected).norm() < 1e-5);
         assert!((placement.angular_velocity() - omega).norm() < 1e-6);

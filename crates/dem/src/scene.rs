@@ -4,6 +4,7 @@
 //! ground is the plane z = 0 and gravity points down unless the scene says otherwise.
 
 mod camera;
+mod mesh;
 mod motion;
 pub(crate) mod path;
 mod start;
@@ -12,9 +13,10 @@ mod walls;
 use serde::{Deserialize, Serialize};
 
 pub use camera::{CameraSpec, Projection};
+pub use mesh::{Mesh, MeshFile};
 pub use motion::Motion;
 pub use start::Start;
-pub use walls::{Funnel, Ground, Shape, Wall};
+pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
 
 use crate::{DemError, Material, Preset};
 
@@ -130,9 +132,17 @@ impl Scene {
     /// [`DemError::Toml`] for what is not TOML of a scene (unknown keys included),
     /// [`DemError::OutOfRange`] for numbers that no scene can have.
     pub fn from_toml(text: &str) -> Result<Self, DemError> {
-        let scene: Self = toml::from_str(text).map_err(|e| DemError::Toml(Box::new(e)))?;
+        let scene = Self::parse(text)?;
         scene.check()?;
         Ok(scene)
+    }
+
+    /// Reads a scene whose files are still to be read, and checks nothing else.
+    ///
+    /// # Errors
+    /// [`DemError::Toml`] for what is not TOML of a scene.
+    pub fn parse(text: &str) -> Result<Self, DemError> {
+        toml::from_str(text).map_err(|e| DemError::Toml(Box::new(e)))
     }
 
     /// The scene as TOML; [`Scene::from_toml`] reads it back unchanged.
@@ -141,6 +151,25 @@ impl Scene {
     /// [`DemError::TomlWrite`] if a number cannot be written.
     pub fn to_toml(&self) -> Result<String, DemError> {
         toml::to_string(self).map_err(|e| DemError::TomlWrite(Box::new(e)))
+    }
+
+    /// The mesh files that walls name.
+    pub fn mesh_files(&mut self) -> impl Iterator<Item = &mut MeshFile> {
+        self.walls.iter_mut().filter_map(|wall| match &mut wall.shape {
+            Shape::Mesh(file) => Some(file),
+            _ => None,
+        })
+    }
+
+    /// Takes over the meshes that another scene has read from the same files.
+    pub(crate) fn take_meshes(&mut self, other: &Self) {
+        for (mine, theirs) in self.walls.iter_mut().zip(&other.walls) {
+            if let (Shape::Mesh(mine), Shape::Mesh(theirs)) = (&mut mine.shape, &theirs.shape)
+                && mine.file == theirs.file
+            {
+                mine.mesh.clone_from(&theirs.mesh);
+            }
+        }
     }
 
     /// When the last wall has come to rest, or the horizon if one never does `[s]`.
@@ -169,7 +198,7 @@ impl Scene {
             funnel.check(&self.material, self.grains.radius())?;
         }
         for (index, wall) in self.walls.iter().enumerate() {
-            wall.check(&format!("walls.{index}"), &self.material)?;
+            wall.check(&format!("walls.{index}"), &self.material, &self.grains)?;
         }
         self.camera.check()
     }

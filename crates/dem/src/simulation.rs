@@ -161,7 +161,7 @@ impl Simulation {
     /// and stem if there is one, then the scene's walls in their order. See [`WallLoad`].
     pub fn wall_loads(&self) -> Vec<WallLoad> {
         let dt = self.around.settings.dt;
-        wall_load::of(&self.contacts.at_walls, self.around.walls.len(), dt)
+        wall_load::of(&self.contacts.at_walls, &self.around.walls, dt)
     }
 
     /// How the pour ended, once it has.

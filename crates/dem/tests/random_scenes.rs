@@ -2,8 +2,8 @@
 //! happened. A scene that was ever found to break something has a test of its own in `tests/physics/robustness.rs`.
 
 use granulcal_dem::{
-    EndRule, Funnel, Grains, Ground, MAX_ENERGY_CREATED, Material, Motion, Preset, Scene, Shape,
-    Simulation, Start, Status, Wall, WallMaterial,
+    BoxSide, EndRule, Ends, Funnel, Grains, Ground, MAX_ENERGY_CREATED, Material, Motion, Preset,
+    Scene, Shape, Simulation, Start, Status, Wall, WallMaterial,
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -84,20 +84,40 @@ fn wall() -> impl Strategy<Value = Wall> {
     let shape = prop_oneof![
         (end(), vector(-1.0..1.0)).prop_map(|(point, normal)| Shape::Plane { point, normal }),
         (end(), end(), log(0.1, 30.0), log(0.1, 30.0)).prop_map(
-            |(from, to, radius_from, radius_to)| Shape::Cone { from, to, radius_from, radius_to }
+            |(from, to, radius_from, radius_to)| Shape::Cone {
+                from,
+                to,
+                radius_from,
+                radius_to,
+                closed: Ends::None,
+            }
         ),
-        (end(), end(), log(0.1, 30.0)).prop_map(|(from, to, radius)| Shape::Cylinder {
-            from,
-            to,
-            radius
+        (end(), end(), log(0.1, 30.0), ends()).prop_map(|(from, to, radius, closed)| {
+            Shape::Cylinder { from, to, radius, closed }
         }),
+        (end(), vector(-1.0..1.0), log(0.1, 30.0))
+            .prop_map(|(centre, normal, radius)| { Shape::Disc { centre, normal, radius } }),
+        (end(), vector(0.1..30.0), prop::sample::subsequence(&BoxSide::ALL[..], 0..6)).prop_map(
+            |(min, size, open)| {
+                let max = std::array::from_fn(|axis| min[axis] + size[axis]);
+                Shape::Box { min, max, open }
+            }
+        ),
     ];
     let material = prop::option::of(material()).prop_map(|material| WallMaterial {
         sliding_friction: material.map(|m| m.sliding_friction),
         restitution: material.map(|m| m.restitution),
         ..WallMaterial::default()
     });
-    (shape, material, motion()).prop_map(|(shape, material, motion)| Wall { shape, material, motion })
+    (shape, material, motion()).prop_map(|(shape, material, motion)| Wall {
+        shape,
+        material,
+        motion,
+    })
+}
+
+fn ends() -> impl Strategy<Value = Ends> {
+    prop::sample::select(vec![Ends::None, Ends::From, Ends::To, Ends::Both])
 }
 
 /// How a wall among grains of radius 1 moves: half of them do not.
@@ -110,8 +130,11 @@ fn motion() -> impl Strategy<Value = Motion> {
         |(point, axis, rate, (begin, _))| Motion::Spin { point, axis, rate, begin, end: None },
     );
     let shake = (vector(-2.0..2.0), 0.0..100.0, times()).prop_map(
-        |(amplitude, frequency, (begin, length))| {
-            Motion::Shake { amplitude, frequency, begin, end: Some(begin + length) }
+        |(amplitude, frequency, (begin, length))| Motion::Shake {
+            amplitude,
+            frequency,
+            begin,
+            end: Some(begin + length),
         },
     );
     let still = || Just(Motion::Still);
@@ -192,15 +215,21 @@ fn scaled_wall(wall: Wall, r: f64) -> Wall {
     let times = |v: [f64; 3]| v.map(|c| r * c);
     let shape = match wall.shape {
         Shape::Plane { point, normal } => Shape::Plane { point: times(point), normal },
-        Shape::Cone { from, to, radius_from, radius_to } => Shape::Cone {
+        Shape::Cone { from, to, radius_from, radius_to, closed } => Shape::Cone {
             from: times(from),
             to: times(to),
             radius_from: r * radius_from,
             radius_to: r * radius_to,
+            closed,
         },
-        Shape::Cylinder { from, to, radius } => {
-            Shape::Cylinder { from: times(from), to: times(to), radius: r * radius }
+        Shape::Cylinder { from, to, radius, closed } => {
+            Shape::Cylinder { from: times(from), to: times(to), radius: r * radius, closed }
         }
+        Shape::Disc { centre, normal, radius } => {
+            Shape::Disc { centre: times(centre), normal, radius: r * radius }
+        }
+        Shape::Box { min, max, open } => Shape::Box { min: times(min), max: times(max), open },
+        mesh @ Shape::Mesh(_) => mesh,
     };
     let motion = match wall.motion {
         Motion::Lift { velocity, begin, end } => {

@@ -28,9 +28,10 @@ impl Scene {
             insert(&mut tree, path, value)?;
         }
         let paths = || values.iter().map(|(path, _)| *path).collect::<Vec<_>>().join(", ");
-        let changed: Self = Value::Table(tree)
+        let mut changed: Self = Value::Table(tree)
             .try_into()
             .map_err(|e: toml::de::Error| path_error(&paths(), e.message()))?;
+        changed.take_meshes(self);
         changed.check()?;
         *self = changed;
         Ok(())

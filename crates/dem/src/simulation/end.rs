@@ -57,8 +57,7 @@ impl Simulation {
     pub(super) fn in_funnel(&self) -> impl Iterator<Item = usize> {
         let funnel = self.origin.scene.funnel.as_ref();
         let time = self.time();
-        let is_held =
-            move |grain| funnel.is_some_and(|f| f.holds(&self.bed.position(grain), time));
+        let is_held = move |grain| funnel.is_some_and(|f| f.holds(&self.bed.position(grain), time));
         (0..self.bed.count()).filter(move |&grain| is_held(grain))
     }
 }
