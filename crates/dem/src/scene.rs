@@ -161,6 +161,12 @@ impl Scene {
         })
     }
 
+    /// How the funnel and the walls move.
+    pub fn motions(&mut self) -> impl Iterator<Item = &mut Motion> {
+        let walls = self.walls.iter_mut().map(|wall| &mut wall.motion);
+        walls.chain(self.funnel.iter_mut().map(|funnel| &mut funnel.motion))
+    }
+
     /// Takes over the meshes that another scene has read from the same files.
     pub(crate) fn take_meshes(&mut self, other: &Self) {
         for (mine, theirs) in self.walls.iter_mut().zip(&other.walls) {

@@ -54,8 +54,12 @@ pub enum Motion {
     /// It goes through listed poses, straight and at constant speed between them, and rests before the first and after
     /// the last.
     Trajectory {
+        /// A CSV file of the knots that is still to be read; a relative path is from the scene's file.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        file: Option<String>,
         /// Each knot: time `[s]`, displacement from the stated place (3) `[m]`, rotation about the scene's
         /// origin as a unit quaternion (x, y, z, w).
+        #[serde(default)]
         knots: Vec<[f64; 8]>,
     },
 }
@@ -72,7 +76,7 @@ impl Motion {
             Self::Still => 0.0,
             &Self::Lift { end, .. } => end,
             &Self::Spin { end, .. } | &Self::Shake { end, .. } => end.unwrap_or(f64::INFINITY),
-            Self::Trajectory { knots } => knots.last().map_or(0.0, |knot| knot[0]),
+            Self::Trajectory { knots, .. } => knots.last().map_or(0.0, |knot| knot[0]),
         }
     }
 
@@ -96,7 +100,7 @@ impl Motion {
                 let swing = (std::f64::consts::TAU * phase).sin();
                 Translation3::from(swing * Vector3::from(amplitude)).into()
             }
-            Self::Trajectory { knots } => pose_between(knots, time),
+            Self::Trajectory { knots, .. } => pose_between(knots, time),
         }
     }
 
@@ -131,7 +135,7 @@ impl Motion {
                 non_negative(&format!("{name}.motion.frequency"), frequency)?;
                 is_after(begin, end)
             }
-            Self::Trajectory { knots } => check_knots(name, knots),
+            Self::Trajectory { knots, .. } => check_knots(name, knots),
         }
     }
 }
@@ -220,7 +224,7 @@ mod tests {
             [1.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
             [2.0, 0.3, 0.0, 0.0, 0.0, 0.0, half, half],
         ];
-        let motion = Motion::Trajectory { knots };
+        let motion = Motion::Trajectory { file: None, knots };
         motion.check("walls.0").unwrap();
         assert!((at(&motion, 0.0, [0.0; 3]).x - 0.1).abs() < 1e-15);
         assert!((at(&motion, 1.5, [0.0; 3]).x - 0.2).abs() < 1e-15);
@@ -236,7 +240,7 @@ mod tests {
         (turned[0], turned[6], turned[7]) = (1.0, 1.0, 0.0);
         let mut long = still;
         long[7] = 1.1;
-        let knots = |knots: &[[f64; 8]]| Motion::Trajectory { knots: knots.to_vec() };
+        let knots = |knots: &[[f64; 8]]| Motion::Trajectory { file: None, knots: knots.to_vec() };
         let axis = [0.0; 3];
         for (motion, named) in [
             (knots(&[]), "knots (number)"),
