@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use granulcal_features::{
-    Camera, ColourImage, DepthImage, Formation, HeightMap, Segmentation, paper16, segment_depth,
-    segment_height_map,
+    Camera, ColourImage, DepthImage, Formation, HeightMap, Levelled, Segmentation, level_depth,
+    level_height_map, paper16,
 };
 
 use crate::{CameraFile, DatasetError, Npz, png};
@@ -123,10 +123,28 @@ impl Recording {
     /// # Errors
     /// As [`Recording::formation`].
     pub fn formation_with(&self, segmentation: &Segmentation) -> Result<Formation, DatasetError> {
+        self.formation_of(self.level_with(segmentation)?)
+    }
+
+    /// The points of the formation of this recording that was levelled before.
+    ///
+    /// # Errors
+    /// [`DatasetError::Recording`] for an empty mask.
+    pub fn formation_of(&self, levelled: Levelled) -> Result<Formation, DatasetError> {
+        levelled
+            .into_formation()
+            .map_err(|source| DatasetError::Recording { path: self.path.clone(), source })
+    }
+
+    /// The ground, the heights above it and the mask, whether or not there is a grain.
+    ///
+    /// # Errors
+    /// As [`Recording::formation`] but for an empty mask.
+    pub fn level_with(&self, segmentation: &Segmentation) -> Result<Levelled, DatasetError> {
         match &self.source {
-            Source::Heights(map) => segment_height_map(map, segmentation),
+            Source::Heights(map) => level_height_map(map, segmentation),
             Source::Depth { camera, image, colour } => {
-                segment_depth(camera, image, colour.as_ref(), segmentation)
+                level_depth(camera, image, colour.as_ref(), segmentation)
             }
         }
         .map_err(|source| DatasetError::Recording { path: self.path.clone(), source })

@@ -58,7 +58,8 @@ pub use pour::{Pour, Status};
 pub use preset::{Preset, SolverSettings};
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
-    CameraSpec, EndRule, Funnel, GRAVITY, Grains, Ground, Projection, Scene, Shape, Start, Wall,
+    CameraSpec, EndRule, Funnel, GRAVITY, Grains, Ground, Mask, NoiseSpec, Projection, Scene,
+    SensorSpec, Shape, Start, StereoSpec, TimeOfFlightSpec, Wall,
 };
 pub use simulation::Simulation;
 pub use solver::Method;

@@ -5,12 +5,14 @@
 
 mod camera;
 mod path;
+mod sensor;
 mod start;
 mod walls;
 
 use serde::{Deserialize, Serialize};
 
-pub use camera::{CameraSpec, Projection};
+pub use camera::{CameraSpec, Mask, Projection};
+pub use sensor::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 pub use start::Start;
 pub use walls::{Funnel, Ground, Shape, Wall};
 

@@ -10,9 +10,10 @@
 //! | [`depth`] | depth image, down-sampling |
 //! | [`raster`] | spheres over a plane to a depth image or a height map, exact to the ray |
 //! | [`mod@height_map`] | heights on a regular grid, as a time-of-flight rig delivers them |
-//! | [`colour`] | colour image and the hue range that marks grains |
-//! | [`sensor`] | the two noise models of a depth camera |
+//! | [`colour`] | colour image, the range of colours that marks grains, and how it is picked |
+//! | [`sensor`] | what a depth camera adds: the paper's noise, a fitted sensor, the fit |
 //! | [`plane`] | robust plane fit |
+//! | [`region`] | rectangles of pixels |
 //! | [`segment`] | image to the centred, re-oriented points of the formation |
 //! | [`stats`] | the registry of statistics |
 //!
@@ -42,20 +43,23 @@ pub mod error;
 pub mod height_map;
 pub mod plane;
 pub mod raster;
+pub mod region;
 mod rng;
 pub mod segment;
 pub mod sensor;
 pub mod stats;
 
 pub use camera::{Camera, Intrinsics};
-pub use colour::{ColourImage, HsvRange};
+pub use colour::{ColourImage, HsvRange, Picked, pick_range};
 pub use depth::DepthImage;
 pub use error::FeatureError;
 pub use height_map::HeightMap;
 pub use plane::{Plane, PlaneFit, fit_plane};
 pub use raster::{height_map, render, render_grid};
+pub use region::Region;
 pub use segment::{
-    Formation, Segmentation, Threshold, grain_points, segment_depth, segment_height_map,
+    Formation, Kind, Levelled, Segmentation, Shape, Threshold, grain_points, level_depth,
+    level_height_map, segment_depth, segment_height_map,
 };
-pub use sensor::SensorNoise;
+pub use sensor::{DepthSensor, NoiseField, SensorNoise, StereoSensor, TimeOfFlightSensor};
 pub use stats::{PAPER16, Prepared, Statistic, paper16};

@@ -1,12 +1,13 @@
 //! `features`: a recording to its statistics.
 
-use granulcal_dataset::{Recording, npy};
+use granulcal_dataset::{Recording, npy, write_pictures};
 use granulcal_features::{Formation, PAPER16, Segmentation, Threshold};
 use serde_json::{Map, Value, json};
 
 use crate::args::FeaturesArgs;
-use crate::context::{print_json, print_line};
+use crate::context::{note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
+use crate::scene;
 
 pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     if args.list {
@@ -16,7 +17,18 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
         return Err(BadArgument("a recording, or --list, must be given".to_owned()).into());
     };
     let recording = Recording::open(path, args.camera.as_deref())?;
-    let formation = recording.formation_with(&segmentation(args, &recording.segmentation))?;
+    let levelled = recording.level_with(&segmentation(args, &recording.segmentation)?)?;
+    if let Some(folder) = &args.debug_images {
+        // Before the formation: where none is found, the pictures say why.
+        let pictures = write_pictures(folder, &levelled)?;
+        note(&format!(
+            "pictures in {}: residual.png from -{residual:.2} mm (blue) to {residual:.2} mm (red), height.png from 0 (dark) to {:.2} mm (yellow), mask.png",
+            folder.display(),
+            1e3 * pictures.height,
+            residual = 1e3 * pictures.residual,
+        ));
+    }
+    let formation = recording.formation_of(levelled)?;
     let statistics = recording.statistics_of(&formation)?;
     if let Some(path) = &args.points {
         npy::write_points(path, &formation.points)?;
@@ -30,16 +42,20 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
 }
 
 /// The recording's own segmentation with what the command line changes.
-fn segmentation(args: &FeaturesArgs, own: &Segmentation) -> Segmentation {
+fn segmentation(args: &FeaturesArgs, own: &Segmentation) -> anyhow::Result<Segmentation> {
     let mut changed = own.clone();
+    if let Some(name) = &args.scene {
+        changed.downsample = None;
+        changed.ground_resolution = Some(scene::named(name)?.camera.ground_resolution());
+    }
     if let Some(height) = args.threshold {
         changed.height_threshold = Threshold::Absolute(height);
     }
     changed.border_px = args.border.unwrap_or(changed.border_px);
-    changed.downsample = args.downsample.unwrap_or(changed.downsample);
+    changed.downsample = args.downsample.or(changed.downsample);
     changed.max_height = args.max_height.or(changed.max_height);
     changed.min_component_px = args.min_component.unwrap_or(changed.min_component_px);
-    changed
+    Ok(changed)
 }
 
 fn as_json(recording: &Recording, formation: &Formation, statistics: &[f64; 16]) -> Value {
@@ -56,6 +72,16 @@ fn as_json(recording: &Recording, formation: &Formation, statistics: &[f64; 16])
             "tilt_deg": plane.tilt_rad.to_degrees(),
             "rms_m": plane.rms,
             "inliers": plane.inliers,
+            "noise_m": formation.ground_sd,
+        },
+        "formation": {
+            "kind": formation.shape.kind.name(),
+            "volume_m3": formation.volume,
+            "half_volume_radius_m": formation.shape.half_volume_radius,
+        },
+        "pixel": {
+            "downsample": formation.downsample,
+            "width_m": [formation.resolution.0, formation.resolution.1],
         },
         "counts": {
             "frames": recording.frames,
@@ -75,10 +101,17 @@ fn print(
     let plane = &formation.plane;
     print_line(&format!("recording          {}", recording.path.display()))?;
     print_line(&format!(
-        "ground             tilt {:.2} deg, rms {:.2} mm, {} inliers",
+        "ground             tilt {:.2} deg, rms {:.2} mm, {} inliers, noise {:.2} mm",
         plane.tilt_rad.to_degrees(),
         plane.rms * 1e3,
-        plane.inliers
+        plane.inliers,
+        formation.ground_sd * 1e3
+    ))?;
+    print_line(&format!(
+        "formation          {}, {:.1} cm3, half of it within {:.1} mm",
+        formation.shape.kind.name(),
+        formation.volume * 1e6,
+        formation.shape.half_volume_radius * 1e3
     ))?;
     print_line(&format!(
         "pixels             {} of {} valid are grain (above {:.2} mm), {} frames",
