@@ -174,6 +174,7 @@ class Recording:
         downsample: int | None = None,
         ground_resolution: float | None = None,
         inlier_distance: float | None = None,
+        max_tilt_deg: float | None = None,
         flying_deg: float | None = None,
         max_height: float | None = None,
         min_component_px: int | None = None,
@@ -195,6 +196,7 @@ class Recording:
                 simulated images to compare with; see `Scene.ground_resolution`.
             inlier_distance: distance within which a pixel can be ground [m]; the default is
                 automatic, from 3 mm on.
+            max_tilt_deg: tilt beyond which a plane is a wall and not the ground [deg]; default 45.
             flying_deg: incidence beyond which two steps in a row are a pixel between two surfaces
                 and no surface [deg]; default 80, 90 keeps all.
             max_height: height above which a pixel is a fault and not data [m]; default none.
@@ -213,6 +215,7 @@ class Recording:
             downsample=downsample,
             ground_resolution=ground_resolution,
             inlier_distance=inlier_distance,
+            max_tilt_deg=max_tilt_deg,
             flying_deg=flying_deg,
             max_height=max_height,
             min_component_px=min_component_px,
@@ -244,6 +247,7 @@ class Recording:
         downsample: int | None = None,
         ground_resolution: float | None = None,
         inlier_distance: float | None = None,
+        max_tilt_deg: float | None = None,
         flying_deg: float | None = None,
         max_height: float | None = None,
         min_component_px: int | None = None,
@@ -263,6 +267,7 @@ class Recording:
             downsample=downsample,
             ground_resolution=ground_resolution,
             inlier_distance=inlier_distance,
+            max_tilt_deg=max_tilt_deg,
             flying_deg=flying_deg,
             max_height=max_height,
             min_component_px=min_component_px,

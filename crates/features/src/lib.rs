@@ -54,7 +54,7 @@ pub use colour::{ColourImage, HsvRange, Picked, pick_range};
 pub use depth::DepthImage;
 pub use error::FeatureError;
 pub use height_map::HeightMap;
-pub use plane::{Plane, PlaneFit, fit_plane};
+pub use plane::{Plane, PlaneFit, fit_plane, fit_plane_within};
 pub use raster::{height_map, render, render_grid};
 pub use region::Region;
 pub use segment::{

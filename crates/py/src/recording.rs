@@ -62,6 +62,7 @@ impl Recording {
         downsample = None,
         ground_resolution = None,
         inlier_distance = None,
+        max_tilt_deg = None,
         flying_deg = None,
         max_height = None,
         min_component_px = None,
@@ -77,6 +78,7 @@ impl Recording {
         downsample: Option<usize>,
         ground_resolution: Option<f64>,
         inlier_distance: Option<f64>,
+        max_tilt_deg: Option<f64>,
         flying_deg: Option<f64>,
         max_height: Option<f64>,
         min_component_px: Option<usize>,
@@ -89,6 +91,7 @@ impl Recording {
             downsample,
             ground_resolution,
             inlier_distance,
+            max_tilt_deg,
             flying_deg,
             max_height,
             min_component_px,
@@ -107,6 +110,7 @@ impl Recording {
         downsample = None,
         ground_resolution = None,
         inlier_distance = None,
+        max_tilt_deg = None,
         flying_deg = None,
         max_height = None,
         min_component_px = None,
@@ -122,6 +126,7 @@ impl Recording {
         downsample: Option<usize>,
         ground_resolution: Option<f64>,
         inlier_distance: Option<f64>,
+        max_tilt_deg: Option<f64>,
         flying_deg: Option<f64>,
         max_height: Option<f64>,
         min_component_px: Option<usize>,
@@ -134,6 +139,7 @@ impl Recording {
             downsample,
             ground_resolution,
             inlier_distance,
+            max_tilt_deg,
             flying_deg,
             max_height,
             min_component_px,
@@ -155,6 +161,7 @@ impl Recording {
         downsample: Option<usize>,
         ground_resolution: Option<f64>,
         inlier_distance: Option<f64>,
+        max_tilt_deg: Option<f64>,
         flying_deg: Option<f64>,
         max_height: Option<f64>,
         min_component_px: Option<usize>,
@@ -171,6 +178,7 @@ impl Recording {
             .or(threshold_floor.map(|floor| Threshold::Automatic { floor }))
             .unwrap_or(settings.height_threshold);
         settings.inlier_distance = inlier_distance.or(settings.inlier_distance);
+        settings.max_tilt_deg = max_tilt_deg.unwrap_or(settings.max_tilt_deg);
         settings.flying_deg = flying_deg.unwrap_or(settings.flying_deg);
         settings.max_height = max_height.or(settings.max_height);
         settings.plane_seed = plane_seed.unwrap_or(settings.plane_seed);

@@ -1,12 +1,13 @@
-"""Every measured image through the same segmentation: ground, noise, mask, kind, volume, statistics.
+"""Every measured image through one segmentation: ground, noise, mask, kind, volume, statistics.
 
 57 height maps of a Kinect v2 rig (`granular-impact-kinect`), five frames of a sand-box
-(`ar-sandbox-kinect`), two frames of a RealSense D435 (`realsense-d435-frames`). What is set belongs
-to a rig, never to a file: lens, unit and scale, and a border for the dead edge of the Kinect's maps.
+(`ar-sandbox-kinect`), two frames of a RealSense D435 (`realsense-d435-frames`). What is set
+belongs to a rig, never to a file: lens, unit and scale, and a border for the dead edge of the
+Kinect's maps.
 """
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,6 +47,7 @@ class Rig:
 _RIGS = {
     "kinect": Rig(title="Kinect v2 maps", options={"border_px": 6}),
     "sandbox": Rig(title="sand-box, Kinect v2", options={}),
+    "sandbox crop": Rig(title="sand-box, Kinect v2, cropped", options={"border_px": 12}),
     "d435": Rig(title="D435", options={}),
 }
 
@@ -84,8 +86,8 @@ def images(out_dir: Path, data_dir: Path) -> Iterator[tuple[str, str, str | None
     maps = sorted((data_dir / _KINECT / "data").glob("*.npz"), key=_by_number)
     for path in maps:
         yield "kinect", path.stem, _KINDS[path.stem.partition("_")[0]], Recording.open(path)
-    for name, image, camera in _sandbox(out_dir, data_dir / _SANDBOX):
-        yield "sandbox", name, None, Recording.open(image, camera=camera)
+    for rig, name, image, camera in _sandbox(out_dir, data_dir / _SANDBOX):
+        yield rig, name, None, Recording.open(image, camera=camera)
     camera, _ = write_d435_camera(out_dir, data_dir)
     for name in ("depth0", "depth1"):
         path = data_dir / _D435 / f"{name}.png"
@@ -108,7 +110,7 @@ def see(rig: str, name: str, label: str | None, recording: Recording, volume: fl
 
 
 def reproduce(out_dir: Path, data_dir: Path) -> list[Seen]:
-    """Segments every image; writes `results.md`, `statistics.csv` and `sheet.png` to `out_dir`."""
+    """Segments every image; writes table, statistics and contact sheets to `out_dir`."""
     out_dir.mkdir(parents=True, exist_ok=True)
     volumes = reference_volumes(data_dir)
     seen = []
@@ -117,8 +119,11 @@ def reproduce(out_dir: Path, data_dir: Path) -> list[Seen]:
         print(_row(seen[-1]), flush=True)
     (out_dir / "results.md").write_text(_table(seen), encoding="utf-8")
     _write_statistics(out_dir / "statistics.csv", seen)
-    _sheet(out_dir / "sheet.png", seen)
-    print(f"table, statistics and contact sheet in {out_dir}")
+    formations = [each for each in seen if each.label in ("pile", "ring")]
+    others = [each for each in seen if each not in formations]
+    _sheet(out_dir / "formations.png", formations, columns=9)
+    _sheet(out_dir / "others.png", others, columns=8)
+    print(f"table, statistics and contact sheets in {out_dir}")
     return seen
 
 
@@ -135,28 +140,28 @@ def _by_number(path: Path) -> tuple[str, int]:
     return word, int(number)
 
 
-def _sandbox(out_dir: Path, folder: Path) -> Iterator[tuple[str, Path, Path | None]]:
-    """Yields name, file and camera of the sand-box's frames, as 16-bit PNG or height map."""
+def _sandbox(out_dir: Path, folder: Path) -> Iterator[tuple[str, str, Path, Path | None]]:
+    """Yields rig, name, file and camera of the sand-box's frames, as 16-bit PNG or height map."""
     from PIL import Image
 
     for camera, lens in [("kinect_v2", _KINECT_V2), ("kinect_v2_crop", _CROP)]:
         text = "".join(f"{key} = {value}\n" for key, value in lens.items())
         (out_dir / f"{camera}.toml").write_text(text + "depth_unit = 0.0001\n", encoding="utf-8")
-    for name, camera in [
-        ("depth_raw_a", "kinect_v2"),
-        ("depth_raw_b", "kinect_v2"),
-        ("frame_cropped", "kinect_v2_crop"),
+    for rig, name, camera in [
+        ("sandbox", "depth_raw_a", "kinect_v2"),
+        ("sandbox", "depth_raw_b", "kinect_v2"),
+        ("sandbox crop", "frame_cropped", "kinect_v2_crop"),
     ]:
         millimetres = np.load(folder / f"{name}.npy").astype(np.float64)
         tenths = np.where(millimetres < 6500, 10 * millimetres, 0).round().astype(np.uint16)
         path = out_dir / f"{name}.png"
         Image.fromarray(tenths).save(path)
-        yield name, path, out_dir / f"{camera}.toml"
+        yield rig, name, path, out_dir / f"{camera}.toml"
     for name in ("topo_cone", "topo_ring"):
         path = out_dir / f"{name}.npz"
         scale = {"xres": _CROP_RESOLUTION_MM, "yres": _CROP_RESOLUTION_MM, "zres": 1.0}
         np.savez(path, depthmap=np.load(folder / f"{name}.npy"), scale="mm", **scale)
-        yield name, path, None
+        yield "sandbox crop", name, path, None
 
 
 def _row(seen: Seen) -> str:
@@ -223,7 +228,7 @@ def _write_statistics(path: Path, seen: list[Seen]) -> None:
             writer.writerow([each.name, *(f"{value:.6g}" for value in statistics.paper16)])
 
 
-def _sheet(path: Path, seen: list[Seen]) -> None:
+def _sheet(path: Path, seen: Sequence[Seen], columns: int) -> None:
     """Draws every image's heights with the mask outlined, each on a scale of its own."""
     import matplotlib
 
@@ -231,7 +236,6 @@ def _sheet(path: Path, seen: list[Seen]) -> None:
     import matplotlib.pyplot as plt
     from PIL import Image
 
-    columns = 11
     rows = -(-len(seen) // columns)
     figure, axes = plt.subplots(
         rows, columns, figsize=(1.25 * columns, 1.42 * rows), squeeze=False, layout="constrained"
@@ -244,8 +248,8 @@ def _sheet(path: Path, seen: list[Seen]) -> None:
         axis.imshow(heights, vmin=-top, vmax=top, cmap="RdBu_r", interpolation="nearest")
         if mask.any():
             axis.contour(mask, levels=[0.5], colors="k", linewidths=0.5)
-            axis.set_title(f"{each.name}: {each.kind}, {1e3 * top:.0f} mm", fontsize=5.5, pad=2)
+        axis.set_title(f"{each.name}: {each.kind}, {1e3 * top:.0f} mm", fontsize=5.5, pad=2)
     figure.savefig(path, dpi=100)
     plt.close(figure)
     with Image.open(path) as picture:
-        picture.convert("RGB").quantize(48).save(path, optimize=True)
+        picture.convert("RGB").quantize(32).save(path, optimize=True)

@@ -52,7 +52,8 @@ _PLANES = [f"plane_{i}.npz" for i in range(1, 17)]
 _MAP_REGION = ("12,12,133,133",)
 
 SURFACES = {
-    # Tiles like a chessboard's: the wall's noise changes by 15 % from its left to its right.
+    # Tiles like a chessboard's: the noise of the wall changes by a fifth from one part of it to
+    # another, that of the boards by a third.
     "wall": Surface(
         title="D435, wall at 1.7 m",
         fit=_FRAMES,
@@ -62,8 +63,8 @@ SURFACES = {
     "board": Surface(
         title="D435, boards at 0.4 to 0.7 m",
         fit=_FRAMES,
-        fit_regions=("530,245,76,115", "525,10,65,100"),
-        check_regions=("530,360,76,115", "460,10,65,100"),
+        fit_regions=("530,245,76,57", "530,359,76,57", "460,10,65,50", "525,60,65,50"),
+        check_regions=("530,302,76,57", "530,416,76,57", "525,10,65,50", "460,60,65,50"),
     ),
     "kinect": Surface(
         title="Kinect v2, flat beds",
@@ -86,7 +87,8 @@ class Judged:
         ratio: standard deviation of the model over the measured one.
         near: largest difference of the correlations up to 10 px.
         far: the same up to 20 px.
-        half: lags at which the correlations fall to a half [px]: measured and model along x, then y.
+        half: lags at which the correlations fall to a half [px]: measured and model along x, then
+            along y.
         chance: standard deviation that chance alone gives the ratio.
     """
 
@@ -173,7 +175,7 @@ def reproduce(out_dir: Path, data_dir: Path) -> dict[str, Judged]:
 
 
 def _total(split: dict[str, Any], *, squares: bool = False) -> Array:
-    """Covariances of a single frame along x and y, shape (2, lags); of spreads the root of squares."""
+    """Covariances of a single frame along x and y, shape (2, lags); spreads add in squares."""
     parts = [
         np.array([split[part][axis] for axis in ("x", "y")]) for part in ("noise", "fixed_pattern")
     ]
@@ -194,8 +196,8 @@ def _half_lag(covariances: Array) -> float:
 def _table(judged: dict[str, Judged]) -> str:
     lines = [
         "| surface | sd measured | sd model | model/measured | chance | largest difference of the "
-        "correlation to 10 px | to 20 px | half-lag x: measured, model | half-lag y: measured, model "
-        "| within 15 % |",
+        "correlation to 10 px | to 20 px | half-lag x: measured, model | half-lag y: measured, "
+        "model | within 15 % |",
         "|---" * 10 + "|",
     ]
     for name, found in judged.items():
@@ -242,7 +244,8 @@ def _plot(path: Path, judged: dict[str, Judged]) -> None:
                 label="model, ± what chance does",
             )  # fmt: skip
             axis.plot(lags, middle, color="#d95f02", label="model")
-            axis.plot(lags, measured[row] / measured[0, 0], "k.", ms=5, label="measured, not fitted")
+            seen = measured[row] / measured[0, 0]
+            axis.plot(lags, seen, "k.", ms=5, label="measured, not fitted")
             axis.axhline(0, color="0.7", lw=0.6)
             axis.set_xlabel(f"lag {label} [px]")
             if row == 0:

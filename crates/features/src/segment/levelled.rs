@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector2, Vector3};
 use super::component::{remove_low, remove_small};
 use super::{Formation, Segmentation};
 use crate::error::FeatureError;
-use crate::plane::{PlaneFit, fit_plane, refine_plane};
+use crate::plane::{PlaneFit, fit_plane_within, refine_plane};
 
 /// Standard deviation of a Gaussian over its median absolute deviation.
 const SD_PER_MAD: f64 = 1.482_602_218_505_602;
@@ -172,11 +172,13 @@ impl Cloud {
             None => LARGEST_REACH * extent(&ground),
         };
         let mut reach = first;
-        let mut plane = up(fit_plane(&ground, reach, settings.plane_seed)?);
+        let steepest = settings.max_tilt_deg.to_radians();
+        let search = |reach| fit_plane_within(&ground, reach, steepest, settings.plane_seed);
+        let mut plane = up(search(reach)?);
         // A ground rougher than the inlier distance goes on below it: search again with twice that.
         while 2.0 * reach <= largest && shoulder(&ground, &plane, reach) > SHOULDER {
             reach *= 2.0;
-            plane = up(fit_plane(&ground, reach, settings.plane_seed)?);
+            plane = up(search(reach)?);
         }
         let mut sd = sd_from_below(&ground, &plane, reach);
         // The foot of a pile is within the inlier distance and lifts the plane: fit again to what

@@ -72,6 +72,8 @@ pub struct Segmentation {
     /// Distance from the plane within which a pixel can be ground `[m]`. Default automatic: from 3 mm
     /// on it is doubled until the ground does not go on below it, then brought to the noise found.
     pub inlier_distance: Option<f64>,
+    /// Tilt beyond which a plane is a wall and not the ground `[deg]`; default 45.
+    pub max_tilt_deg: f64,
     /// Incidence beyond which two steps in a row from pixel to pixel are no surface but a pixel that
     /// flies between two `[deg]`; default 80, 90 keeps all.
     pub flying_deg: f64,
@@ -94,6 +96,7 @@ impl Default for Segmentation {
             downsample: None,
             ground_resolution: None,
             inlier_distance: None,
+            max_tilt_deg: 45.0,
             flying_deg: 80.0,
             max_height: None,
             min_component_px: 1,
@@ -116,6 +119,7 @@ impl Segmentation {
         optional("inlier_distance [m]", self.inlier_distance, 1e-9)?;
         optional("ground_resolution [m/px]", self.ground_resolution, 1e-9)?;
         optional("max_height [m]", self.max_height, 0.0)?;
+        require_in("max_tilt_deg [deg]", self.max_tilt_deg, 0.0, 90.0)?;
         require_in("flying_deg [deg]", self.flying_deg, 0.0, 90.0)
     }
 

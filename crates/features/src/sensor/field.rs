@@ -149,7 +149,7 @@ impl NoiseField {
             .iter()
             .filter(|c| c.sd > 0.0)
             .map(|c| c.sd * c.sd * c.x.correlation(x) * c.y.correlation(y))
-            .sum()
+            .fold(0.0, |sum, part| sum + part)
     }
 
     /// Whether the field is 0 everywhere.
