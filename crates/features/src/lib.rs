@@ -11,6 +11,7 @@
 //! | [`raster`] | spheres over a plane to a depth image or a height map, exact to the ray |
 //! | [`mod@height_map`] | heights on a regular grid, as a time-of-flight rig delivers them |
 //! | [`colour`] | colour image, the range of colours that marks grains, and how it is picked |
+//! | [`register`] | the colours of a depth image from a camera beside it |
 //! | [`sensor`] | what a depth camera adds: the paper's noise, a fitted sensor, the fit |
 //! | [`plane`] | robust plane fit |
 //! | [`region`] | rectangles of pixels |
@@ -18,7 +19,7 @@
 //! | [`stats`] | the registry of statistics |
 //!
 //! Lengths are metres. In the world frame the ground is z = 0 and z points up.
-//! The equations are derived in `docs/theory/features.md`.
+//! The equations are derived in `docs/theory/features.md` and `docs/theory/statistics.md`.
 //!
 //! ```
 //! use granulcal_features::{Camera, grain_points, paper16, render_grid};
@@ -36,6 +37,8 @@
 //! # Ok::<(), granulcal_features::FeatureError>(())
 //! ```
 
+#![allow(clippy::inline_always)] // what is compiled for wider registers must be inlined to reach them
+
 pub mod camera;
 pub mod colour;
 pub mod depth;
@@ -44,6 +47,7 @@ pub mod height_map;
 pub mod plane;
 pub mod raster;
 pub mod region;
+pub mod register;
 mod rng;
 pub mod segment;
 pub mod sensor;
@@ -57,9 +61,12 @@ pub use height_map::HeightMap;
 pub use plane::{Plane, PlaneFit, fit_plane, fit_plane_within};
 pub use raster::{height_map, render, render_grid};
 pub use region::Region;
+pub use register::register_colour;
 pub use segment::{
     Formation, Kind, Levelled, Segmentation, Shape, Threshold, grain_points, level_depth,
     level_height_map, segment_depth, segment_height_map,
 };
 pub use sensor::{DepthSensor, NoiseField, SensorNoise, StereoSensor, TimeOfFlightSensor};
-pub use stats::{PAPER16, Prepared, Statistic, paper16};
+pub use stats::{
+    DIAGNOSTICS, DiagnosticSettings, PAPER16, Prepared, Statistic, Survey, diagnostics, paper16,
+};

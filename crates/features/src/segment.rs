@@ -9,6 +9,7 @@ mod flying;
 mod levelled;
 mod settings;
 mod shape;
+mod spacing;
 
 use nalgebra::{Vector2, Vector3};
 

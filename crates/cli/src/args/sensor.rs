@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use granulcal_features::Region;
 
+use super::ReadArgs;
+
 /// Fit a depth camera's noise, fixed pattern, rounding and holes to frames of a flat surface
 #[derive(Debug, Args)]
 #[command(long_about = "\
@@ -13,12 +15,13 @@ Fits the sensor of a scene's camera to frames of something flat: a wall, a board
 Record some ten frames of it without moving anything, from the distance at which you pour. One
 camera stands still: what the frames share is its fixed pattern, what differs is its noise.
 
-FRAMES are files or folders of 16-bit depth PNGs, with --camera, or .npz height maps. With
+RECORDING is what `features` reads: a .bag or .mcap of one or more frames, 16-bit depth PNGs or a
+folder of them, with --camera, or .npz height maps. Each frame is looked at by itself. With
 --baseline the camera is stereo: errors are px of disparity, and depth errors grow with the
 square of the depth. Without, errors are metres, whatever the depth.
 
 Where the frames show more than the flat surface, --region says where it is; repeat it for
-several. --check are frames that the fit does not see, to compare it with; --check-region is
+several. --check are recordings that the fit does not see, to compare it with; --check-region is
 another part of the surface.
 
 What is printed: the parameters; then standard deviation and autocorrelation of the measured
@@ -26,19 +29,19 @@ frames beside those of frames simulated with the fit, after the same trend remov
 the TOML that stands in a scene, [camera.sensor], or goes to `render --sensor`.
 
 Example:
+  granulcal-cli fit-sensor wall.bag --baseline 0.05 -o sensor.toml
   granulcal-cli fit-sensor wall/ --camera d435.toml --baseline 0.05 -o sensor.toml
   granulcal-cli fit-sensor d0.png d1.png --camera d435.toml --baseline 0.05 \\
       --region 30,10,100,290 --check-region 130,10,100,290
   granulcal-cli fit-sensor bed_1.npz bed_2.npz bed_3.npz --check bed_4.npz bed_5.npz")]
 pub struct FitSensorArgs {
-    /// Frames of a flat surface, or folders of them
-    #[arg(required = true)]
-    pub frames: Vec<PathBuf>,
-    /// TOML of the camera that took depth images
-    #[arg(long, value_name = "CAMERA.toml")]
-    pub camera: Option<PathBuf>,
+    /// Recordings of a flat surface
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// Distance of the two imagers of a stereo camera [m]
-    #[arg(long, value_name = "METRES", requires = "camera")]
+    #[arg(long, value_name = "METRES")]
     pub baseline: Option<f64>,
     /// Part of the frames that is flat; repeat as needed [default: the whole frame]
     #[arg(long = "region", value_name = "X,Y,WIDTH,HEIGHT")]
@@ -58,8 +61,8 @@ pub struct FitSensorArgs {
     /// Seed of the simulated sessions
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// Frames to compare with that the fit does not see [default: those of the fit]
-    #[arg(long, value_name = "FRAMES", num_args = 1..)]
+    /// Recordings to compare with that the fit does not see [default: those of the fit]
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
     pub check: Vec<PathBuf>,
     /// Part of the frames to compare with; repeat as needed [default: as --region]
     #[arg(long = "check-region", value_name = "X,Y,WIDTH,HEIGHT")]

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use granulcal_dataset::{CameraFile, DatasetError, Recording, Source, save_sensor, write_file};
+use granulcal_dataset::{DatasetError, Recording, Source, save_sensor, write_file};
 use granulcal_features::sensor::fit::{
     Comparison, FitSettings, FlatFrames, SensorFit, compare, fit,
 };
@@ -14,11 +14,8 @@ use crate::args::FitSensorArgs;
 use crate::context::{note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
 
-/// Endings of the files of a folder that are frames.
-const ENDINGS: [&str; 2] = ["png", "npz"];
-
 pub fn run(args: &FitSensorArgs) -> anyhow::Result<Outcome> {
-    let frames = frames(&args.frames, args)?;
+    let (frames, mut is_whole) = frames(&args.recordings, args)?;
     let mut settings = FitSettings {
         regions: args.regions.clone(),
         trend_degree: args.trend,
@@ -34,7 +31,13 @@ pub fn run(args: &FitSensorArgs) -> anyhow::Result<Outcome> {
         if !args.check_regions.is_empty() {
             settings.regions.clone_from(&args.check_regions);
         }
-        let others = if args.check.is_empty() { frames } else { self::frames(&args.check, args)? };
+        let others = if args.check.is_empty() {
+            frames
+        } else {
+            let (others, whole) = self::frames(&args.check, args)?;
+            is_whole &= whole;
+            others
+        };
         Some(compare(&found.sensor, &others, &settings).context("comparing the sensor")?)
     };
     if let Some(path) = &args.out {
@@ -52,59 +55,77 @@ pub fn run(args: &FitSensorArgs) -> anyhow::Result<Outcome> {
     if found.comparison.frames == 1 {
         note("note: one frame does not tell fixed pattern from noise; all is counted as noise");
     }
-    Ok(Outcome::Done)
+    Ok(Outcome::whole_if(is_whole))
 }
 
-/// All frames of files and folders: depth images of one camera, or height maps of one rig.
-fn frames(paths: &[PathBuf], args: &FitSensorArgs) -> anyhow::Result<FlatFrames> {
-    let camera_file = args.camera.as_deref().map(CameraFile::load).transpose()?;
-    let mut images: Vec<DepthImage> = Vec::new();
-    let mut maps: Vec<HeightMap> = Vec::new();
-    let mut lens: Option<Camera> = None;
+/// All frames of the recordings: depth images of one camera, or height maps of one rig; and whether
+/// none is lost.
+fn frames(paths: &[PathBuf], args: &FitSensorArgs) -> anyhow::Result<(FlatFrames, bool)> {
+    let mut is_whole = true;
+    let (mut images, mut maps) = (Vec::<DepthImage>::new(), Vec::<HeightMap>::new());
+    let mut taken: Option<(Camera, f64)> = None;
     for path in expanded(paths)? {
-        match Recording::open(&path, args.camera.as_deref())?.source {
-            Source::Heights(map) => maps.push(map),
-            Source::Depth { camera, image, .. } => {
-                lens = Some(camera);
-                images.push(image);
+        for recording in Recording::open_each(&path, &args.read.options())? {
+            is_whole &= recording.lost.is_none();
+            for line in &recording.damage {
+                note(&format!("warning: {line}"));
+            }
+            match (recording.source, recording.depth_unit) {
+                (Source::Heights(map), _) => maps.push(map),
+                (Source::Depth { camera, image, .. }, unit) => {
+                    let unit = unit.context("a depth image without a unit")?;
+                    let (first, first_unit) = *taken.get_or_insert((camera, unit));
+                    if (first.intrinsics, first_unit) != (camera.intrinsics, unit) {
+                        let other = format!("{} was taken by another camera", path.display());
+                        return Err(BadArgument(other).into());
+                    }
+                    images.push(image);
+                }
             }
         }
     }
-    let flat = match (lens, camera_file, maps.is_empty()) {
-        (Some(camera), Some(file), true) => match args.baseline {
-            Some(baseline) => FlatFrames::from_stereo(&images, &camera, baseline, file.depth_unit),
-            None => FlatFrames::from_time_of_flight(&images, &camera, file.depth_unit),
-        },
-        (None, _, false) => FlatFrames::from_height_maps(&maps),
+    let flat = match (taken, maps.is_empty(), args.baseline) {
+        (Some((camera, unit)), true, Some(baseline)) => {
+            FlatFrames::from_stereo(&images, &camera, baseline, unit)
+        }
+        (Some((camera, unit)), true, None) => {
+            FlatFrames::from_time_of_flight(&images, &camera, unit)
+        }
+        (None, false, None) => FlatFrames::from_height_maps(&maps),
+        (None, _, Some(_)) => {
+            let refusal = "--baseline is of depth images; height maps have none".to_owned();
+            return Err(BadArgument(refusal).into());
+        }
         _ => {
-            let refusal = "frames must be all depth images or all height maps".to_owned();
+            let refusal = "recordings must be all depth images or all height maps".to_owned();
             return Err(BadArgument(refusal).into());
         }
     };
-    Ok(flat?)
+    Ok((flat?, is_whole))
 }
 
-/// The files, and the frames of the folders in the order of their names.
+/// The recordings: of a folder of height maps each by itself, in the order of their names.
 fn expanded(paths: &[PathBuf]) -> Result<Vec<PathBuf>, DatasetError> {
-    let mut files = Vec::new();
+    let mut recordings = Vec::new();
     for path in paths {
-        if !path.is_dir() {
-            files.push(path.clone());
-            continue;
+        let maps = if path.is_dir() { height_maps(path)? } else { Vec::new() };
+        if maps.is_empty() {
+            recordings.push(path.clone());
+        } else {
+            recordings.extend(maps);
         }
-        let failed = |source| DatasetError::Io { action: "list", path: path.clone(), source };
-        let entries = std::fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>);
-        let is_frame = |path: &Path| {
-            let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-            ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
-        };
-        let mut inside: Vec<_> =
-            entries.map_err(failed)?.iter().map(std::fs::DirEntry::path).collect();
-        inside.retain(|path| is_frame(path));
-        inside.sort();
-        files.append(&mut inside);
     }
-    Ok(files)
+    Ok(recordings)
+}
+
+/// The height maps of a folder.
+fn height_maps(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
+    let failed = |source| DatasetError::Io { action: "list", path: folder.to_owned(), source };
+    let entries = std::fs::read_dir(folder).and_then(Iterator::collect::<Result<Vec<_>, _>>);
+    let mut maps: Vec<_> = entries.map_err(failed)?.iter().map(std::fs::DirEntry::path).collect();
+    maps.retain(|path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npz")));
+    maps.sort();
+    Ok(maps)
 }
 
 fn as_json(found: &SensorFit, checked: Option<&Comparison>) -> Value {

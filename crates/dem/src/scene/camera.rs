@@ -30,6 +30,7 @@ pub enum Mask {
 }
 
 impl Mask {
+    #[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference.
     fn is_height(&self) -> bool {
         *self == Self::Height
     }

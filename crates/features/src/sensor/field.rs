@@ -205,7 +205,9 @@ impl Component {
             let parity = usize::from(stream.uniform() < 0.5);
             for (row, &v) in field.chunks_exact_mut(width).zip(&grid.rows) {
                 let sign = if (v + parity).is_multiple_of(2) { self.sd } else { -self.sd };
-                row.iter_mut().for_each(|value| *value += sign);
+                for value in row {
+                    *value += sign;
+                }
             }
             return;
         }
@@ -215,7 +217,9 @@ impl Component {
         let mut drawn = vec![0.0; x.length];
         let mut smooth = vec![0.0; y.length * x.at.len()];
         for out in smooth.chunks_exact_mut(x.at.len()) {
-            drawn.iter_mut().for_each(|value| *value = stream.normal());
+            for value in &mut drawn {
+                *value = stream.normal();
+            }
             for (value, &start) in out.iter_mut().zip(&x.at) {
                 *value = x.taps.iter().zip(&drawn[start..]).map(|(w, n)| w * n).sum();
             }

@@ -125,7 +125,7 @@ pub fn fit(frames: &FlatFrames, settings: &FitSettings) -> Result<SensorFit, Fea
     // Rounding errs by a white error of its own, which the sensor's rounding will add again.
     let rounding = session.rounding_variance(&template);
     measured.noise.reduce_variance(rounding);
-    let sensor = with_fields(template, &measured, &session.estimator());
+    let sensor = with_fields(&template, &measured, &session.estimator());
     let comparison = session.compare(&sensor, settings)?;
     Ok(SensorFit { sensor, comparison, edge_holes })
 }
@@ -199,14 +199,14 @@ fn template(frames: &FlatFrames, session: &Session) -> (DepthSensor, usize) {
 }
 
 /// The sensor with the fields whose estimates are these covariances.
-fn with_fields(template: DepthSensor, target: &Split, estimator: &Estimator) -> DepthSensor {
+fn with_fields(template: &DepthSensor, target: &Split, estimator: &Estimator) -> DepthSensor {
     let variance = target.total().variance().max(0.0);
     let found = |covariances: &Covariances, pattern: bool, least: f64| -> NoiseField {
         components::decompose(covariances, estimator, pattern, least * variance)
     };
     let noise = found(&target.noise, false, LEAST_NOISE);
     let fixed_pattern = found(&target.fixed_pattern, true, LEAST_PATTERN);
-    match template {
+    match *template {
         DepthSensor::Stereo(sensor) => {
             DepthSensor::Stereo(StereoSensor { noise, fixed_pattern, ..sensor })
         }
