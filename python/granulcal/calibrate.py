@@ -99,7 +99,8 @@ def calibrate(
     if not recordings:
         raise ValueError("calibrate needs at least one recording, got none")
     require_same_scene(model, data.scene)
-    options = {"ground_resolution": data.scene.ground_resolution} | dict(segmentation or {})
+    options: dict[str, Any] = {"ground_resolution": data.scene.ground_resolution}
+    options |= segmentation or {}
     formations = [recording.formation(**options) for recording in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
     posterior = model.posterior(observed)

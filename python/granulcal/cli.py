@@ -178,8 +178,8 @@ def _infer(options: argparse.Namespace) -> int:
 
     model = _model(options)
     recordings = _recordings(options)
-    options = {} if model.scene_toml is None else _matched(model.scene_toml)
-    observed = [recording.formation(**options).statistics() for recording in recordings]
+    matched = {} if model.scene_toml is None else _matched(model.scene_toml)
+    observed = [recording.formation(**matched).statistics() for recording in recordings]
     posterior = model.posterior(np.array([np.asarray(each) for each in observed]))
     if options.plot is not None:
         posterior.pair_plot(options.plot)

@@ -159,8 +159,8 @@ def _sandbox(out_dir: Path, folder: Path) -> Iterator[tuple[str, str, Path, Path
         yield rig, name, path, out_dir / f"{camera}.toml"
     for name in ("topo_cone", "topo_ring"):
         path = out_dir / f"{name}.npz"
-        scale = {"xres": _CROP_RESOLUTION_MM, "yres": _CROP_RESOLUTION_MM, "zres": 1.0}
-        np.savez(path, depthmap=np.load(folder / f"{name}.npy"), scale="mm", **scale)
+        heights, side = np.load(folder / f"{name}.npy"), _CROP_RESOLUTION_MM
+        np.savez(path, depthmap=heights, scale="mm", xres=side, yres=side, zres=1.0)
         yield "sandbox crop", name, path, None
 
 
