@@ -1,43 +1,22 @@
 //! The process boundary of the commands about the camera: `fit-sensor`, `pick-colour`, and what
 //! `features` shows of its steps.
 
-use std::path::PathBuf;
-use std::process::{Command, Output, Stdio};
+mod place;
 
-use granulcal_dataset::{png, write_height_map};
+use std::path::Path;
+
+use granulcal_dataset::{measured_data, png, write_height_map};
 use granulcal_features::{
     Camera, DepthSensor, HeightMap, NoiseField, StereoSensor, TimeOfFlightSensor, render,
 };
-use serde_json::Value;
+use place::{Place, json, text};
 
-struct Place(tempfile::TempDir);
-
-impl Place {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn at(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn run(&self, args: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_granulcal-cli"));
-        command.args(args).current_dir(self.0.path()).stdin(Stdio::null()).output().unwrap()
-    }
-
-    /// Runs, expects the exit code, returns stdout and stderr.
-    fn expect(&self, code: i32, args: &[&str]) -> (String, String) {
-        let output = self.run(args);
-        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-        let (out, err) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(code), "{args:?}\nstdout: {out}\nstderr: {err}");
-        (out, err)
-    }
-}
-
-fn json(text: &str) -> Value {
-    serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"))
+/// Runs, expects the exit code, returns stdout and stderr.
+fn expect(place: &Place, code: i32, args: &[&str]) -> (String, String) {
+    let output = place.run(args);
+    let (out, err) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(output.status.code(), Some(code), "{args:?}\nstdout: {out}\nstderr: {err}");
+    (out, err)
 }
 
 /// Writes `count` maps of a flat bed as `bed_0.npz` and so on.
@@ -76,7 +55,7 @@ fn a_sensor_is_fitted_written_and_used() {
         "-o",
         "sensor.toml",
     ];
-    let (out, _) = place.expect(0, &[&fit[..], &["--report", "r.json", "--json"]].concat());
+    let (out, _) = expect(&place, 0, &[&fit[..], &["--report", "r.json", "--json"]].concat());
     let report = json(&out);
     assert_eq!(json(&std::fs::read_to_string(place.at("r.json")).unwrap()), report);
     assert_eq!(report["sensor"]["kind"], "time_of_flight");
@@ -87,7 +66,7 @@ fn a_sensor_is_fitted_written_and_used() {
         assert!(report[part]["worst_correlation"].as_f64().unwrap() < 0.2, "{part}");
     }
     assert_eq!(report["check"]["covariances"]["frames"], 2);
-    let (table, _) = place.expect(0, &fit);
+    let (table, _) = expect(&place, 0, &fit);
     assert!(
         table.contains("checked on 2 frame(s)") && table.contains("largest difference"),
         "{table}"
@@ -109,15 +88,15 @@ fn a_sensor_is_fitted_written_and_used() {
         "--set",
         "camera.downsample=8",
     ];
-    place.expect(0, &[&["render"], &pour[..], &["-o", "clean.png"]].concat());
+    expect(&place, 0, &[&["render"], &pour[..], &["-o", "clean.png"]].concat());
     let noisy = [&["render"], &pour[..], &["--sensor", "sensor.toml", "-o", "noisy.png"]].concat();
-    place.expect(0, &noisy);
+    expect(&place, 0, &noisy);
     let read = |name: &str| png::read_depth(&place.at(name), 1e-4).unwrap();
     assert_ne!(read("clean.png"), read("noisy.png"));
     let text = std::fs::read_to_string(place.at("sensor.toml")).unwrap();
     std::fs::write(place.at("wrong.toml"), text.replace("dropout", "drop_out")).unwrap();
     let wrong = [&["render"], &pour[..], &["--sensor", "wrong.toml", "-o", "x.png"]].concat();
-    let (_, err) = place.expect(2, &wrong);
+    let (_, err) = expect(&place, 2, &wrong);
     assert!(err.contains("wrong.toml") && err.contains("drop_out"), "{err}");
 }
 
@@ -149,13 +128,14 @@ fn a_stereo_camera_is_fitted_to_a_folder_of_frames() {
         "4",
         "--json",
     ];
-    let (out, _) = place.expect(0, &words);
+    let (out, _) = expect(&place, 0, &words);
     let sensor = &json(&out)["sensor"];
     assert_eq!(sensor["kind"], "stereo");
     let white = sensor["noise"]["white"].as_f64().unwrap();
     assert!((white / 0.1 - 1.0).abs() < 0.05, "{white}");
     // Without a baseline the same frames are a time-of-flight camera's, in metres.
-    let (out, _) = place.expect(
+    let (out, _) = expect(
+        &place,
         0,
         &[
             "fit-sensor",
@@ -181,13 +161,13 @@ fn what_cannot_be_fitted_is_refused() {
         (vec!["fit-sensor", "bed_0.npz", "--region", "50,0,20,20"], "right edge of a region"),
         (vec!["fit-sensor", "bed_0.npz", "--region", "5,5"], "X,Y,WIDTH,HEIGHT"),
         (vec!["fit-sensor", "bed_0.npz", "--trend", "9"], "trend_degree"),
-        (vec!["fit-sensor", "bed_0.npz", "--baseline", "0.05"], "--camera"),
+        (vec!["fit-sensor", "bed_0.npz", "--baseline", "0.05"], "--baseline is of depth images"),
     ] {
-        let (_, err) = place.expect(2, &words);
+        let (_, err) = expect(&place, 2, &words);
         assert!(err.contains(said), "{words:?}: {err}");
     }
     let (_, err) =
-        place.expect(0, &["fit-sensor", "bed_0.npz", "--max-lag", "5", "--sessions", "3"]);
+        expect(&place, 0, &["fit-sensor", "bed_0.npz", "--max-lag", "5", "--sessions", "3"]);
     assert!(err.contains("one frame"), "{err}");
 }
 
@@ -202,7 +182,7 @@ fn a_colour_is_picked_from_an_image() {
     }
     image::RgbImage::from_raw(60, 40, rgb).unwrap().save(place.at("c.png")).unwrap();
     let words = ["pick-colour", "c.png", "--grains", "22,15,10,10", "--ground", "0,0,15,15"];
-    let (out, _) = place.expect(0, &[&words[..], &["--mask", "m.png"]].concat());
+    let (out, _) = expect(&place, 0, &[&words[..], &["--mask", "m.png"]].concat());
     assert!(out.starts_with("[segmentation.colour]\n") && out.contains("value_min = "), "{out}");
     assert!(place.at("m.png").exists());
     // What is printed is TOML that a camera's file can hold.
@@ -210,16 +190,16 @@ fn a_colour_is_picked_from_an_image() {
         "width = 60\nheight = 40\nfx = 60.0\nfy = 60.0\ncx = 29.5\ncy = 19.5\ndepth_unit = 0.001\n{out}"
     );
     std::fs::write(place.at("camera.toml"), camera).unwrap();
-    place.expect(0, &["inspect", "camera.toml"]);
-    let (out, _) = place.expect(0, &[&words[..], &["--json"]].concat());
+    expect(&place, 0, &["inspect", "camera.toml"]);
+    let (out, _) = expect(&place, 0, &[&words[..], &["--json"]].concat());
     let picked = json(&out);
     assert_eq!(picked["ground_inside"], 0.0);
     let share = picked["image_inside"].as_f64().unwrap();
     assert!((share - 29.0 * 20.0 / 2400.0).abs() < 0.02, "{share}");
-    let (_, err) = place.expect(2, &["pick-colour", "c.png", "--grains", "55,0,10,10"]);
+    let (_, err) = expect(&place, 2, &["pick-colour", "c.png", "--grains", "55,0,10,10"]);
     assert!(err.contains("region"), "{err}");
     let same = ["pick-colour", "c.png", "--grains", "0,0,9,9", "--ground", "0,0,9,9"];
-    let (_, err) = place.expect(0, &same);
+    let (_, err) = expect(&place, 0, &same);
     assert!(err.contains("does not tell the two apart"), "{err}");
 }
 
@@ -234,7 +214,7 @@ fn the_steps_of_a_segmentation_can_be_looked_at() {
     let map = HeightMap::new(100, 100, 2e-3, 2e-3, z.collect()).unwrap();
     write_height_map(&place.at("pile.npz"), &map).unwrap();
     let words = ["features", "pile.npz", "--debug-images", "steps", "--json"];
-    let (out, err) = place.expect(0, &words);
+    let (out, err) = expect(&place, 0, &words);
     assert!(err.contains("residual.png") && err.contains("mm"), "{err}");
     for name in ["residual.png", "height.png", "mask.png"] {
         assert!(place.at("steps").join(name).exists(), "{name}");
@@ -246,10 +226,42 @@ fn the_steps_of_a_segmentation_can_be_looked_at() {
     assert!((volume / cone - 1.0).abs() < 0.02, "{volume} {cone}");
     assert_eq!(report["pixel"]["downsample"], 1);
     // As wide on the ground as the paper's simulated images: 6 mm.
-    let (out, _) = place.expect(0, &["features", "pile.npz", "--scene", "funnel", "--json"]);
+    let (out, _) = expect(&place, 0, &["features", "pile.npz", "--scene", "funnel", "--json"]);
     assert_eq!(json(&out)["pixel"]["downsample"], 3);
     // Where there is no grain, the pictures say why.
-    let (_, err) = place.expect(2, &["features", "bed_0.npz", "--debug-images", "bare"]);
+    let (_, err) = expect(&place, 2, &["features", "bed_0.npz", "--debug-images", "bare"]);
     assert!(err.contains("none of 3600 valid pixels belongs to a grain"), "{err}");
     assert!(place.at("bare/residual.png").exists());
+}
+
+/// The recording of a D435 by the RealSense viewer, a wall and a board; the test is empty where the
+/// data are not.
+#[test]
+fn a_sensor_is_fitted_to_a_recording_of_the_realsense_viewer() {
+    let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let Some(data) = measured_data(&repository) else { return };
+    let bag = data.join("realsense-d435-frames/single_depth_color_640x480.bag");
+    let place = Place::new();
+    let words = [
+        "fit-sensor",
+        bag.to_str().unwrap(),
+        "--baseline",
+        "0.05017",
+        "--region",
+        "530,245,76,57",
+        "--max-lag",
+        "6",
+        "--sessions",
+        "3",
+        "--json",
+    ];
+    let fitted = json(&expect(&place, 0, &words).0);
+    assert_eq!(fitted["sensor"]["kind"], "stereo");
+    assert_eq!(fitted["fit"]["covariances"]["frames"], 2);
+    // The lens, the unit and the steps of the disparity are those of the D400's own processor.
+    let number = |name: &str| fitted["sensor"][name].as_f64().unwrap();
+    assert!((number("focal_length") - 390.43).abs() < 0.01, "{fitted}");
+    assert_eq!((number("depth_unit"), number("quantisation")), (0.001, 1.0 / 32.0));
+    let (_, err) = expect(&place, 2, &["fit-sensor", bag.to_str().unwrap(), "--topic", "/none"]);
+    assert!(err.contains("no topic /none"), "{err}");
 }
