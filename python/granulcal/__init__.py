@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from granulcal._native import __version__
 from granulcal.dataset import Dataset, generate
 from granulcal.prior import Parameter, Prior
-from granulcal.recording import Camera, Formation, Plane, Recording
+from granulcal.recording import Camera, Formation, Levelled, Plane, Recording
 from granulcal.scene import Material, Scene
 from granulcal.simulate import Pour, simulate
 from granulcal.statistics import (
@@ -34,6 +34,7 @@ __all__ = [
     "Dataset",
     "DiagnosticStatistics",
     "Formation",
+    "Levelled",
     "Material",
     "Parameter",
     "Plane",

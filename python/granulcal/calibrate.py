@@ -90,7 +90,8 @@ def calibrate(
         summary: one paragraph that says what was done.
         notes: further sentences that a reader must know.
         command: command line that makes the page again.
-        segmentation: options of `Recording.formation` for every recording.
+        segmentation: options of `Recording.formation` for every recording; the down-sampling is
+            matched to the scene's images unless they, or the camera's file, say otherwise.
 
     Raises:
         ValueError: no recording, another scene, or a pour without grains in view.
@@ -98,7 +99,9 @@ def calibrate(
     if not recordings:
         raise ValueError("calibrate needs at least one recording, got none")
     require_same_scene(model, data.scene)
-    formations = [recording.formation(**(segmentation or {})) for recording in recordings]
+    options: dict[str, Any] = {"ground_resolution": data.scene.ground_resolution}
+    options |= segmentation or {}
+    formations = [recording.formation(**options) for recording in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
     posterior = model.posterior(observed)
     numbers = range(_FIRST_SEED, _FIRST_SEED + seeds)

@@ -26,7 +26,7 @@ Calibrates a granular simulator from depth images.
   granulcal report model couscous.png --camera camera.toml -o report.html
 
 Commands of the simulator (granulcal COMMAND --help tells more):
-  simulate, generate, render, features, inspect, merge, completions
+  simulate, generate, render, features, fit-sensor, pick-colour, inspect, merge, completions
 """
 _EPILOG = (
     "Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy "
@@ -178,7 +178,8 @@ def _infer(options: argparse.Namespace) -> int:
 
     model = _model(options)
     recordings = _recordings(options)
-    observed = [recording.statistics() for recording in recordings]
+    matched = {} if model.scene_toml is None else _matched(model.scene_toml)
+    observed = [recording.formation(**matched).statistics() for recording in recordings]
     posterior = model.posterior(np.array([np.asarray(each) for each in observed]))
     if options.plot is not None:
         posterior.pair_plot(options.plot)
@@ -287,6 +288,13 @@ def _model(options: argparse.Namespace) -> Any:
     if options.scene is not None:
         require_same_scene(model, Scene.load(options.scene))
     return model
+
+
+def _matched(scene_toml: str) -> dict[str, float]:
+    """Options with which a pixel is as wide on the ground as in the scene's images."""
+    from granulcal.scene import Scene
+
+    return {"ground_resolution": Scene.from_toml(scene_toml).ground_resolution}
 
 
 def _recordings(options: argparse.Namespace) -> list[Any]:

@@ -18,7 +18,15 @@ from granulcal.statistics import (
     statistics,
 )
 
-__all__ = ["Camera", "DamagedRecordingWarning", "Formation", "Lost", "Plane", "Recording"]
+__all__ = [
+    "Camera",
+    "DamagedRecordingWarning",
+    "Formation",
+    "Levelled",
+    "Lost",
+    "Plane",
+    "Recording",
+]
 
 Array = NDArray[np.float64]
 
@@ -73,25 +81,67 @@ class Plane:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Levelled:
+    """An image whose ground was found, whether or not there is a grain on it.
+
+    Attributes:
+        heights: heights of all pixels above the fitted ground [m], NaN is no data, shape (h, w)
+            after down-sampling.
+        mask: which pixels are grain, shape (h, w); none on a flat bed.
+        plane: the fitted ground.
+        ground_sd: robust standard deviation of the ground about its plane [m].
+        threshold: height from which a pixel counts as grain [m].
+        valid_count: pixels that carry data.
+        downsample: factor by which the image was down-sampled.
+        resolution: width of a pixel on the ground along x and y [m].
+    """
+
+    heights: Array
+    mask: NDArray[np.bool_]
+    plane: Plane
+    ground_sd: float
+    threshold: float
+    valid_count: int
+    downsample: int
+    resolution: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Formation:
     """The points of a formation and how they were found.
 
     Attributes:
         points: points of the grains [m], ground at z = 0, centroid at x = y = 0, shape (n, 3).
         mask: which pixels they are, shape (h, w) after down-sampling.
+        heights: heights of all pixels above the fitted ground [m], NaN is no data, shape (h, w).
         plane: the fitted ground.
+        ground_sd: robust standard deviation of the ground about its plane [m].
         valid_count: pixels that carry data.
         threshold: height from which a pixel counts as grain [m].
         centroid: where the centroid was before it was moved to 0 [m].
+        volume: volume between the ground and the surface of the grains' pixels [m^3].
+        kind: "pile", or "ring" when the middle is lower than the rim around it.
+        half_volume_radius: radius about the volume's centroid that holds half of it [m].
+        profile: mean heights within half of that radius and around it [m], which decide the kind.
+        downsample: factor by which the image was down-sampled.
+        resolution: width of a pixel on the ground along x and y [m].
         spacing: distance on the ground of points from neighbouring pixels [m]; NaN of one point.
     """
 
     points: Array
     mask: NDArray[np.bool_]
+    heights: Array
     plane: Plane
+    ground_sd: float
     valid_count: int
     threshold: float
     centroid: tuple[float, float]
+    volume: float
+    kind: str
+    half_volume_radius: float
+    profile: tuple[float, float]
+    downsample: int
+    resolution: tuple[float, float]
     spacing: float
 
     def statistics(self) -> Statistics:
@@ -244,7 +294,10 @@ class Recording:
         threshold_floor: float | None = None,
         border_px: int | None = None,
         downsample: int | None = None,
+        ground_resolution: float | None = None,
         inlier_distance: float | None = None,
+        max_tilt_deg: float | None = None,
+        flying_deg: float | None = None,
         max_height: float | None = None,
         min_component_px: int | None = None,
         plane_seed: int | None = None,
@@ -255,11 +308,19 @@ class Recording:
 
         Args:
             height_threshold: height from which a pixel counts as grain [m]; the default is
-                automatic, three robust standard deviations of the ground.
+                automatic, three robust standard deviations of the ground; a patch of
+                grains must reach six of them somewhere.
             threshold_floor: least automatic threshold [m]; the default is 1 mm.
             border_px: frame at the edge of the full image that is ignored [px]; default 0.
-            downsample: keep one pixel of every block of this side; default 1.
-            inlier_distance: distance within which a pixel can be ground [m]; default 3 mm.
+            downsample: keep one pixel of every block of this side; the default matches
+                `ground_resolution`, or is 1 without.
+            ground_resolution: width on the ground that a pixel should have [m], as in the
+                simulated images to compare with; see `Scene.ground_resolution`.
+            inlier_distance: distance within which a pixel can be ground [m]; the default is
+                automatic, from 3 mm on.
+            max_tilt_deg: tilt beyond which a plane is a wall and not the ground [deg]; default 45.
+            flying_deg: incidence beyond which two steps in a row are a pixel between two surfaces
+                and no surface [deg]; default 80, 90 keeps all.
             max_height: height above which a pixel is a fault and not data [m]; default none.
             min_component_px: least number of connected pixels of grain; default 1.
             plane_seed: seed of the search for the ground; default 0.
@@ -268,33 +329,82 @@ class Recording:
             ValueError: no pixel belongs to a grain, an image without data, a setting out of range,
                 or both a fixed threshold and a floor.
         """
-        if height_threshold is not None and threshold_floor is not None:
-            raise ValueError("give height_threshold or threshold_floor, not both")
+        _refuse_two_thresholds(height_threshold, threshold_floor)
         found = self._native.formation(
             height_threshold=height_threshold,
             threshold_floor=threshold_floor,
             border_px=border_px,
             downsample=downsample,
+            ground_resolution=ground_resolution,
             inlier_distance=inlier_distance,
+            max_tilt_deg=max_tilt_deg,
+            flying_deg=flying_deg,
             max_height=max_height,
             min_component_px=min_component_px,
             plane_seed=plane_seed,
         )
-        plane = Plane(
-            normal=found.normal,
-            offset=found.offset,
-            tilt_deg=float(np.degrees(found.tilt_rad)),
-            rms=found.plane_rms,
-            inlier_count=found.plane_inliers,
-        )
         return Formation(
             points=found.points,
             mask=found.mask,
-            plane=plane,
+            heights=found.heights,
+            plane=_plane(found.plane),
+            ground_sd=found.ground_sd,
             valid_count=found.valid_count,
             threshold=found.threshold,
             centroid=found.centroid,
+            volume=found.volume,
+            kind=found.kind,
+            half_volume_radius=found.half_volume_radius,
+            profile=found.profile,
+            downsample=found.downsample,
+            resolution=found.resolution,
             spacing=float("nan") if found.spacing is None else found.spacing,
+        )
+
+    def level(
+        self,
+        *,
+        height_threshold: float | None = None,
+        threshold_floor: float | None = None,
+        border_px: int | None = None,
+        downsample: int | None = None,
+        ground_resolution: float | None = None,
+        inlier_distance: float | None = None,
+        max_tilt_deg: float | None = None,
+        flying_deg: float | None = None,
+        max_height: float | None = None,
+        min_component_px: int | None = None,
+        plane_seed: int | None = None,
+    ) -> Levelled:
+        """Returns ground, heights and mask, also of a flat bed; arguments as `formation`.
+
+        Raises:
+            ValueError: an image without data, a setting out of range, or both a fixed threshold
+                and a floor.
+        """
+        _refuse_two_thresholds(height_threshold, threshold_floor)
+        found = self._native.level(
+            height_threshold=height_threshold,
+            threshold_floor=threshold_floor,
+            border_px=border_px,
+            downsample=downsample,
+            ground_resolution=ground_resolution,
+            inlier_distance=inlier_distance,
+            max_tilt_deg=max_tilt_deg,
+            flying_deg=flying_deg,
+            max_height=max_height,
+            min_component_px=min_component_px,
+            plane_seed=plane_seed,
+        )
+        return Levelled(
+            heights=found.heights,
+            mask=found.mask,
+            plane=_plane(found.plane),
+            ground_sd=found.ground_sd,
+            threshold=found.threshold,
+            valid_count=found.valid_count,
+            downsample=found.downsample,
+            resolution=found.resolution,
         )
 
     @cached_property
@@ -317,6 +427,22 @@ class Recording:
     def __repr__(self) -> str:
         kind = "height map" if self.depth is None else f"depth, {self.frames} frame(s)"
         return f"Recording({str(self.path)!r}, {kind})"
+
+
+def _plane(parts: tuple[tuple[float, float, float], float, float, float, int]) -> Plane:
+    normal, offset, tilt_rad, rms, inliers = parts
+    return Plane(
+        normal=normal,
+        offset=offset,
+        tilt_deg=float(np.degrees(tilt_rad)),
+        rms=rms,
+        inlier_count=inliers,
+    )
+
+
+def _refuse_two_thresholds(height_threshold: float | None, floor: float | None) -> None:
+    if height_threshold is not None and floor is not None:
+        raise ValueError("give height_threshold or threshold_floor, not both")
 
 
 class Camera:
@@ -353,6 +479,7 @@ class Camera:
         *,
         depth_noise: float = 0.0,
         blur_px: float = 0.0,
+        sensor: str | PathLike[str] | None = None,
         seed: int = 0,
     ) -> NDArray[np.float32]:
         """Returns the depth image of grains on the ground z = 0 [m], 0 is no data, shape (h, w).
@@ -362,6 +489,7 @@ class Camera:
             radii: their radii [m], shape (n,).
             depth_noise: standard deviation of Gaussian noise of each pixel [m].
             blur_px: standard deviation of a Gaussian blur [px].
+            sensor: TOML that `granulcal fit-sensor` wrote: noise, pattern, rounding and holes.
             seed: seed of the noise.
 
         Raises:
@@ -369,7 +497,7 @@ class Camera:
             ValueError: another shape, or a number out of its range.
         """
         centres, sizes = as_points("positions", positions), as_points("radii", radii)
-        return self._native.render(centres, sizes, depth_noise, blur_px, seed)
+        return self._native.render(centres, sizes, depth_noise, blur_px, seed, sensor)
 
     def record(
         self,
@@ -379,6 +507,7 @@ class Camera:
         *,
         depth_noise: float = 0.0,
         blur_px: float = 0.0,
+        sensor: str | PathLike[str] | None = None,
         seed: int = 0,
         depth_unit: float = _DEPTH_UNIT,
     ) -> tuple[Path, Path]:
@@ -390,13 +519,16 @@ class Camera:
             folder: where to write; made if it does not exist.
             depth_noise: standard deviation of Gaussian noise of each pixel [m].
             blur_px: standard deviation of a Gaussian blur [px].
+            sensor: TOML that `granulcal fit-sensor` wrote: noise, pattern, rounding and holes.
             seed: seed of the noise.
             depth_unit: metres per count of the image.
 
         Returns:
             The paths of the image and of the camera, for `Recording.open`.
         """
-        image = self.render(positions, radii, depth_noise=depth_noise, blur_px=blur_px, seed=seed)
+        image = self.render(
+            positions, radii, depth_noise=depth_noise, blur_px=blur_px, sensor=sensor, seed=seed
+        )
         place = Path(folder)
         place.mkdir(parents=True, exist_ok=True)
         paths = place / "depth.png", place / "camera.toml"

@@ -157,6 +157,12 @@ class Scene:
         return self.native.get(path)
 
     @property
+    def ground_resolution(self) -> float:
+        """Width of a pixel of the camera's down-sampled image on the ground [m]."""
+        width = self.get("camera.field_width") / self.get("camera.pixels")
+        return width * self.get("camera.downsample")
+
+    @property
     def name(self) -> str:
         """What the scene is called in data sets and reports."""
         return self.native.name

@@ -1,5 +1,7 @@
 //! The arguments: clap types and nothing else.
 
+mod sensor;
+
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -9,6 +11,7 @@ use granulcal_dataset::{ReadOptions, Shard};
 use granulcal_dem::Preset;
 
 use crate::commands::completions::CompletionsArgs;
+pub use sensor::{FitSensorArgs, PickColourArgs};
 
 /// Calibrates a granular simulator from depth images: pours grains, looks at them, describes them.
 #[derive(Debug, Parser)]
@@ -46,6 +49,8 @@ pub enum Command {
     Generate(GenerateArgs),
     Render(RenderArgs),
     Features(FeaturesArgs),
+    FitSensor(FitSensorArgs),
+    PickColour(PickColourArgs),
     Inspect(InspectArgs),
     Merge(MergeArgs),
     Completions(CompletionsArgs),
@@ -66,6 +71,9 @@ pub struct SceneChanges {
     /// Set a number of the scene by its path, for example material.sliding_friction=0.5; repeat as needed
     #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_change)]
     pub changes: Vec<(String, f64)>,
+    /// Sensor of the camera as `fit-sensor` wrote it, instead of the scene's
+    #[arg(long, value_name = "SENSOR.toml")]
+    pub sensor: Option<PathBuf>,
     /// Solver preset instead of the scene's
     #[arg(long, value_parser = PossibleValuesParser::new(Preset::ALL.map(Preset::name))
         .try_map(|word| word.parse::<Preset>()))]
@@ -237,6 +245,7 @@ cut off or damaged gives the frames that are whole; the others are counted, exit
 
 Example:
   granulcal-cli features pile.bag
+  granulcal-cli features pile.bag --debug-images steps/
   granulcal-cli features pile.mcap --topic /camera/depth/image_rect_raw --frames 30 --json
   granulcal-cli features frames/ --camera examples/camera.toml --threshold 0.002
   granulcal-cli features pile.npz --diagnostics --grain-diameter 0.002
@@ -256,6 +265,10 @@ pub struct FeaturesArgs {
     /// Keep the middle pixel of every n x n block
     #[arg(long, value_name = "N")]
     pub downsample: Option<usize>,
+    /// Down-sample so that a pixel is as wide on the ground as in this scene's images: a TOML, or `funnel`
+    /// or `drop`
+    #[arg(long, value_name = "SCENE", conflicts_with = "downsample")]
+    pub scene: Option<PathBuf>,
     /// Height above which a pixel is a fault and no data [m]
     #[arg(long, value_name = "METRES")]
     pub max_height: Option<f64>,
@@ -265,6 +278,10 @@ pub struct FeaturesArgs {
     /// Write the points of the formation [m] as an array (n, 3)
     #[arg(long, value_name = "OUT.npy")]
     pub points: Option<PathBuf>,
+    /// Write pictures of the steps into this folder: residual.png (distance from the fitted plane),
+    /// height.png, mask.png
+    #[arg(long, value_name = "DIR")]
+    pub debug_images: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,

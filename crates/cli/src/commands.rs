@@ -2,9 +2,11 @@
 
 pub mod completions;
 mod features;
+mod fit_sensor;
 mod generate;
 mod inspect;
 mod merge;
+mod pick_colour;
 mod render;
 mod simulate;
 
@@ -22,6 +24,8 @@ pub fn dispatch(context: &Context, command: Command) -> anyhow::Result<Outcome> 
         Command::Generate(args) => generate::run(context, &args),
         Command::Render(args) => render::run(context, &args),
         Command::Features(args) => features::run(&args),
+        Command::FitSensor(args) => fit_sensor::run(&args),
+        Command::PickColour(args) => pick_colour::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Completions(args) => completions::run(&args),

@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use granulcal_dataset::{
-    DatasetError, Prior, load_prior, load_scene, record_pour, resume_checkpoint, write_checkpoint,
+    DatasetError, Prior, load_prior, load_scene, load_sensor, record_pour, resume_checkpoint,
+    write_checkpoint,
 };
 use granulcal_dem::{Pour, Scene, Simulation};
 
@@ -33,18 +34,29 @@ pub fn load(args: &SceneArgs) -> anyhow::Result<Scene> {
 /// # Errors
 /// What is wrong with the file, a path or a value.
 pub fn changed(name: &Path, with: &SceneChanges) -> anyhow::Result<Scene> {
-    let mut scene = match name.to_str() {
-        Some("funnel") => Scene::funnel(FUNNEL_HEIGHT),
-        Some("drop") => Scene::drop(DROP_HEIGHT),
-        _ => load_scene(name)?,
-    };
+    let mut scene = named(name)?;
     if let Some(preset) = with.preset {
         scene.preset = preset;
+    }
+    if let Some(path) = &with.sensor {
+        scene.camera.sensor = Some(load_sensor(path)?);
     }
     let changes: Vec<_> =
         with.changes.iter().map(|(path, value)| (path.as_str(), *value)).collect();
     scene.set(&changes).with_context(|| format!("scene {}", name.display()))?;
     Ok(scene)
+}
+
+/// The scene of that name.
+///
+/// # Errors
+/// What is wrong with the file.
+pub fn named(name: &Path) -> anyhow::Result<Scene> {
+    Ok(match name.to_str() {
+        Some("funnel") => Scene::funnel(FUNNEL_HEIGHT),
+        Some("drop") => Scene::drop(DROP_HEIGHT),
+        _ => load_scene(name)?,
+    })
 }
 
 /// The prior that an argument names.

@@ -2,16 +2,21 @@
 
 use std::fmt;
 
-use granulcal_dem::{CameraSpec, Pour, Projection};
+use granulcal_dem::{CameraSpec, Mask, Pour, Projection};
 use granulcal_features::stats::DIAGNOSTIC_COUNT;
 use granulcal_features::{
     Camera, DepthImage, DiagnosticSettings, FeatureError, HeightMap, SensorNoise, diagnostics,
-    grain_points, height_map, paper16, render_grid,
+    height_map, paper16, render_grid,
 };
 use nalgebra::{Vector2, Vector3};
 
 use crate::DatasetError;
-use crate::random::camera_seed;
+use crate::random::{camera_seed, sensor_seed};
+use crate::sensor_file::sensor_of;
+
+/// Height above the ground `[m]` from which a pixel of a noise-free image shows a grain: the rounding
+/// of an f32 depth.
+const BARE: f64 = 1e-6;
 
 /// What the scene's camera delivers.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,21 +28,43 @@ pub enum View {
 }
 
 impl View {
-    /// The points of the pixels that lie above `threshold` `[m]`, in the world.
-    fn grain_points(&self, threshold: f64) -> Result<Vec<Vector3<f64>>, FeatureError> {
+    /// What each pixel saw, row by row, in the world `[m]`; `None` = nothing.
+    fn points(&self) -> Vec<Option<Vector3<f64>>> {
         match self {
-            Self::Depth(camera, image) => grain_points(camera, image, threshold),
-            Self::Heights(map) => {
-                let all = map.to_points();
-                let highest = all.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
-                let valid = all.len();
-                let points: Vec<_> = all.into_iter().filter(|p| p.z > threshold).collect();
-                if points.is_empty() {
-                    return Err(FeatureError::EmptyMask { valid, highest, threshold });
-                }
-                Ok(points)
+            Self::Depth(camera, image) => {
+                let pixels = image.depth.iter().enumerate();
+                let point = |(i, &depth): (usize, &f32)| {
+                    let (u, v) = ((i % image.width) as f64, (i / image.width) as f64);
+                    (depth > 0.0 && depth.is_finite())
+                        .then(|| camera.unproject(u + 0.5, v + 0.5, f64::from(depth)))
+                };
+                pixels.map(point).collect()
             }
+            Self::Heights(map) => (0..map.z.len())
+                .map(|i| Some(map.point(i % map.width, i / map.width)).filter(|p| p.z.is_finite()))
+                .collect(),
         }
+    }
+
+    /// The points of the pixels that `is_grain` takes for grains, given their index and point.
+    fn grain_points(
+        &self,
+        is_grain: impl Fn(usize, &Vector3<f64>) -> bool,
+        threshold: f64,
+    ) -> Result<Vec<Vector3<f64>>, FeatureError> {
+        let all = self.points();
+        let seen = || all.iter().enumerate().filter_map(|(i, point)| Some((i, (*point)?)));
+        let points: Vec<_> =
+            seen().filter(|(i, point)| is_grain(*i, point)).map(|(_, point)| point).collect();
+        if !points.is_empty() {
+            return Ok(points);
+        }
+        let valid = seen().count();
+        if valid == 0 {
+            return Err(FeatureError::NoValidDepth { pixels: all.len(), got: 0, min: 1 });
+        }
+        let highest = seen().map(|(_, p)| p.z).fold(f64::NEG_INFINITY, f64::max);
+        Err(FeatureError::EmptyMask { valid, highest, threshold })
     }
 }
 
@@ -88,13 +115,22 @@ pub fn observe(
     pour: &Pour,
     pour_seed: u64,
 ) -> Result<Observation, DatasetError> {
-    let view = look(camera, &pour.positions, &pour.radii, pour_seed)?;
+    let (clean, view) = views(camera, &pour.positions, &pour.radii, pour_seed)?;
     let diagnostic_settings = DiagnosticSettings {
         pour_axis: Some(Vector2::zeros()),
         grain_diameter: 2.0 * pour.radii.iter().sum::<f64>() / pour.radii.len().max(1) as f64,
         spacing: camera.field_width / camera.pixels as f64 * camera.downsample as f64,
     };
-    let points = match view.grain_points(camera.height_threshold) {
+    let threshold = camera.height_threshold;
+    let found = match camera.mask {
+        Mask::Height => view.grain_points(|_, point| point.z > threshold, threshold),
+        Mask::Colour => {
+            let shows_grain: Vec<bool> =
+                clean.points().iter().map(|point| point.is_some_and(|p| p.z > BARE)).collect();
+            view.grain_points(|i, _| shows_grain[i], BARE)
+        }
+    };
+    let points = match found {
         Err(error) if is_too_few(&error) => {
             let statistics = Err(TooFewGrains(error));
             return Ok(Observation { view, points: Vec::new(), statistics, diagnostic_settings });
@@ -118,24 +154,45 @@ pub fn look(
     radii: &[f64],
     pour_seed: u64,
 ) -> Result<View, DatasetError> {
+    views(camera, positions, radii, pour_seed).map(|(_, view)| view)
+}
+
+/// The noise-free image and the one that the camera delivers.
+fn views(
+    camera: &CameraSpec,
+    positions: &[Vector3<f64>],
+    radii: &[f64],
+    pour_seed: u64,
+) -> Result<(View, View), DatasetError> {
     let noise = SensorNoise { blur_px: camera.blur, depth_sigma: camera.depth_noise };
+    let sensor = camera.sensor.as_ref().map(sensor_of);
     let seed = camera_seed(pour_seed);
-    let view = match camera.projection {
+    let views = match camera.projection {
         Projection::Pinhole => {
             let full = overhead(camera)?;
-            render_grid(&full, positions, radii, camera.downsample)
-                .and_then(|image| noise.apply(&image, seed))
-                .and_then(|image| Ok(View::Depth(full.downsampled(camera.downsample)?, image)))
+            let small = full.downsampled(camera.downsample).map_err(DatasetError::Features)?;
+            render_grid(&full, positions, radii, camera.downsample).and_then(|clean| {
+                let mut image = noise.apply(&clean, seed)?;
+                if let Some(sensor) = sensor {
+                    image = sensor.observe(&small, &image, sensor_seed(pour_seed))?;
+                }
+                Ok((View::Depth(small, clean), View::Depth(small, image)))
+            })
         }
         Projection::Orthographic => {
             let resolution = camera.field_width / camera.pixels as f64;
             height_map(positions, radii, camera.pixels, resolution, (0.0, 0.0))
                 .and_then(|map| map.downsample(camera.downsample))
-                .and_then(|map| noise.apply_to_height_map(&map, seed))
-                .map(View::Heights)
+                .and_then(|clean| {
+                    let mut map = noise.apply_to_height_map(&clean, seed)?;
+                    if let Some(sensor) = sensor {
+                        map = sensor.observe_height_map(&map, sensor_seed(pour_seed))?;
+                    }
+                    Ok((View::Heights(clean), View::Heights(map)))
+                })
         }
     };
-    view.map_err(DatasetError::Features)
+    views.map_err(DatasetError::Features)
 }
 
 /// The scene's pinhole camera before down-sampling.
@@ -158,7 +215,7 @@ fn is_too_few(error: &FeatureError) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use granulcal_dem::{Health, Scene, Status};
+    use granulcal_dem::{Health, NoiseSpec, Scene, SensorSpec, Status, StereoSpec};
 
     use super::*;
 
@@ -222,5 +279,79 @@ mod tests {
         let seen = observe(&CameraSpec::default(), &carpet(2.0), 1).unwrap();
         assert!(seen.points.is_empty());
         assert!(seen.statistics.unwrap_err().to_string().starts_with("too few grains in view"));
+    }
+
+    /// A D435 as `fit-sensor` finds it on a board, with a pattern.
+    fn d435() -> SensorSpec {
+        let noise = NoiseSpec {
+            correlated: 0.1,
+            correlation_x: 6.0,
+            correlation_y: 5.0,
+            ..NoiseSpec::default()
+        };
+        SensorSpec::Stereo(StereoSpec {
+            focal_length: 390.43,
+            baseline: 0.05017,
+            quantisation: 1.0 / 32.0,
+            depth_unit: 1e-3,
+            edge_margin: 2.0,
+            left_margin: 11.0,
+            grazing_deg: 80.0,
+            dropout: 0.003,
+            pattern_seed: 7,
+            noise,
+            fixed_pattern: NoiseSpec::default(),
+        })
+    }
+
+    #[test]
+    fn a_sensor_disturbs_the_image_and_only_when_it_is_given() {
+        let plain = CameraSpec { downsample: 4, ..CameraSpec::default() };
+        let noisy = CameraSpec { sensor: Some(d435()), ..plain };
+        let depth = |camera: &CameraSpec, seed| match observe(camera, &carpet(0.0), seed) {
+            Ok(Observation { view: View::Depth(_, image), .. }) => image,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(depth(&noisy, 1), depth(&noisy, 1));
+        assert_ne!(depth(&noisy, 1), depth(&noisy, 2));
+        let (clean, noisy) = (depth(&plain, 1), depth(&noisy, 1));
+        let errors: Vec<f64> = clean
+            .depth
+            .iter()
+            .zip(&noisy.depth)
+            .filter(|(_, d)| **d > 0.0)
+            .map(|(a, b)| f64::from(b - a))
+            .collect();
+        // 0.1 px at 0.29 m are 0.43 mm, and the depth unit adds 0.29 mm; the right imager misses a
+        // band of 67 + 11 of the 390 columns.
+        let sd = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+        assert!((sd / 5.2e-4 - 1.0).abs() < 0.1, "{sd}");
+        let share = errors.len() as f64 / clean.depth.len() as f64;
+        assert!((share - 0.8).abs() < 0.05, "{share}");
+    }
+
+    #[test]
+    fn colour_finds_the_grains_through_the_noise() {
+        let sensor = Some(d435());
+        let by_height = CameraSpec { sensor, ..CameraSpec::default() };
+        let by_colour = CameraSpec { mask: Mask::Colour, ..by_height };
+        let clean = observe(&CameraSpec::default(), &carpet(0.0), 3).unwrap().points.len();
+        let found = |camera| observe(camera, &carpet(0.0), 3).unwrap().points;
+        // Ground that noise lifts by a millimetre passes for grain where height decides.
+        assert!(found(&by_height).len() > 2 * clean);
+        let points = found(&by_colour);
+        assert!(points.len() > clean / 2 && points.len() < 2 * clean, "{} {clean}", points.len());
+        assert!(points.iter().all(|p| p.x.abs().max(p.y.abs()) < 0.045), "all within the carpet");
+    }
+
+    #[test]
+    fn a_stereo_sensor_needs_a_pinhole_camera() {
+        let camera = CameraSpec {
+            sensor: Some(d435()),
+            projection: Projection::Orthographic,
+            ..CameraSpec::default()
+        };
+        let error = observe(&camera, &carpet(0.0), 1).unwrap_err();
+        assert!(matches!(error, DatasetError::Features(FeatureError::NeedsPinhole)), "{error}");
     }
 }

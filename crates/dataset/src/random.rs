@@ -18,6 +18,8 @@ pub(crate) enum Use {
     Pour = 2,
     /// The seed of the camera's noise.
     Camera = 3,
+    /// The seed of the sensor's noise.
+    Sensor = 4,
 }
 
 /// The output function of SplitMix64: a bijection that scatters neighbouring numbers.
@@ -41,6 +43,11 @@ pub(crate) fn pour_seed(seed: u64, row: u64) -> u64 {
 /// The seed of the camera's noise of a pour.
 pub(crate) fn camera_seed(pour_seed: u64) -> u64 {
     mix(pour_seed, 0, Use::Camera)
+}
+
+/// The seed of the sensor's noise of a pour.
+pub(crate) fn sensor_seed(pour_seed: u64) -> u64 {
+    mix(pour_seed, 0, Use::Sensor)
 }
 
 /// Uniform numbers for the prior of one row.

@@ -4,11 +4,12 @@ mod folder;
 mod messages;
 mod options;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use granulcal_features::{
-    Camera, ColourImage, DepthImage, Formation, HeightMap, Segmentation, paper16, segment_depth,
-    segment_height_map,
+    Camera, ColourImage, DepthImage, Formation, HeightMap, Levelled, Segmentation, level_depth,
+    level_height_map, paper16,
 };
 
 pub use folder::Folder;
@@ -49,12 +50,16 @@ pub struct Recording {
     pub topic: Option<String>,
     /// Frames that were averaged.
     pub frames: usize,
+    /// Indices of the frames that were read to be averaged, damaged ones among them.
+    pub window: Range<u64>,
     /// Whole frames that there are.
     pub whole_frames: u64,
     /// Frames that are lost, if the recording is cut off or damaged.
     pub lost: Option<Lost>,
     /// What is damaged, a line each.
     pub damage: Vec<String>,
+    /// Metres per count of a depth image.
+    pub depth_unit: Option<f64>,
     /// How it is segmented: from the camera's file, else the default.
     pub segmentation: Segmentation,
 }
@@ -81,9 +86,35 @@ impl Recording {
                 let open = |frame: &PathBuf| Ok((frame.clone(), files::read(frame)?));
                 let recording = Self::take_frames(path, chosen.iter().map(open), options)?;
                 let whole_frames = frames.len() as u64 - recording.damage.len() as u64;
-                Ok(Self { whole_frames, ..recording })
+                Ok(Self { window, whole_frames, ..recording })
             }
         }
+    }
+
+    /// The frames that [`Recording::open`] would average, each by itself. The first tells what is
+    /// damaged and lost; a damaged frame is not among them.
+    ///
+    /// # Errors
+    /// As [`Recording::open`].
+    pub fn open_each(path: &Path, options: &ReadOptions) -> Result<Vec<Self>, DatasetError> {
+        let all = Self::open(path, options)?;
+        if all.frames == 1 {
+            return Ok(vec![all]);
+        }
+        let mut each = Vec::with_capacity(all.frames);
+        for index in all.window.clone() {
+            let one = ReadOptions { frames: 1, first_frame: Some(index), ..options.clone() };
+            match Self::open(path, &one) {
+                Ok(frame) => each.push(Self { damage: Vec::new(), lost: None, ..frame }),
+                // What is damaged is told already; all other misfits failed with all frames.
+                Err(_) if !all.damage.is_empty() => {}
+                Err(error) => return Err(error),
+            }
+        }
+        if let Some(first) = each.first_mut() {
+            (first.damage, first.lost) = (all.damage, all.lost);
+        }
+        Ok(each)
     }
 
     /// As [`Recording::open`], from anything that can be read and sought; `path` is its name in
@@ -135,9 +166,11 @@ impl Recording {
             source,
             topic: None,
             frames: 1,
+            window: 0..1,
             whole_frames: 1,
             lost: None,
             damage: Vec::new(),
+            depth_unit: None,
             segmentation,
         }
     }
@@ -176,6 +209,7 @@ impl Recording {
             whole_frames: mean.frames as u64,
             lost: (damaged > 0).then_some(Lost::Exactly(damaged)),
             damage: mean.damage,
+            depth_unit: Some(unit),
             ..Self::of_one(path.to_owned(), source, camera.segmentation.clone())
         })
     }
@@ -194,9 +228,11 @@ impl Recording {
         Ok(Self {
             topic: Some(read.topic),
             frames: read.frames,
+            window: read.window,
             whole_frames: read.whole,
             lost: read.lost,
             damage: read.damage,
+            depth_unit: Some(read.unit),
             ..Self::of_one(input.path().to_owned(), source, segmentation)
         })
     }
@@ -214,10 +250,28 @@ impl Recording {
     /// # Errors
     /// As [`Recording::formation`].
     pub fn formation_with(&self, segmentation: &Segmentation) -> Result<Formation, DatasetError> {
+        self.formation_of(self.level_with(segmentation)?)
+    }
+
+    /// The points of the formation of this recording that was levelled before.
+    ///
+    /// # Errors
+    /// [`DatasetError::Recording`] for an empty mask.
+    pub fn formation_of(&self, levelled: Levelled) -> Result<Formation, DatasetError> {
+        levelled
+            .into_formation()
+            .map_err(|source| DatasetError::Recording { path: self.path.clone(), source })
+    }
+
+    /// The ground, the heights above it and the mask, whether or not there is a grain.
+    ///
+    /// # Errors
+    /// As [`Recording::formation`] but for an empty mask.
+    pub fn level_with(&self, segmentation: &Segmentation) -> Result<Levelled, DatasetError> {
         match &self.source {
-            Source::Heights(map) => segment_height_map(map, segmentation),
+            Source::Heights(map) => level_height_map(map, segmentation),
             Source::Depth { camera, image, colour } => {
-                segment_depth(camera, image, colour.as_ref(), segmentation)
+                level_depth(camera, image, colour.as_ref(), segmentation)
             }
         }
         .map_err(|source| DatasetError::Recording { path: self.path.clone(), source })

@@ -24,5 +24,5 @@ fn the_camera_is_read() {
     let camera = CameraFile::load(&example("camera.toml")).unwrap();
     let lens = camera.lens.expect("the example has a lens");
     assert_eq!((lens.width, lens.height), (640, 480));
-    assert_eq!(camera.segmentation.downsample, 2);
+    assert_eq!((camera.segmentation.downsample, camera.segmentation.border_px), (None, 8));
 }

@@ -68,8 +68,9 @@ pub use pour::{Pour, Status};
 pub use preset::{Preset, SolverSettings};
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
-    BoxSide, CameraSpec, EndRule, Ends, Funnel, GRAVITY, Grains, Ground, Mesh, MeshFile, Motion,
-    Projection, Scene, Shape, Start, Wall,
+    BoxSide, CameraSpec, EndRule, Ends, Funnel, GRAVITY, Grains, Ground, Mask, Mesh, MeshFile,
+    Motion, NoiseSpec, Projection, Scene, SensorSpec, Shape, Start, StereoSpec, TimeOfFlightSpec,
+    Wall,
 };
 pub use simulation::Simulation;
 pub use solver::Method;

@@ -7,14 +7,16 @@ mod camera;
 mod mesh;
 mod motion;
 pub(crate) mod path;
+mod sensor;
 mod start;
 mod walls;
 
 use serde::{Deserialize, Serialize};
 
-pub use camera::{CameraSpec, Projection};
+pub use camera::{CameraSpec, Mask, Projection};
 pub use mesh::{Mesh, MeshFile};
 pub use motion::Motion;
+pub use sensor::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 pub use start::Start;
 pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
 

@@ -1,9 +1,12 @@
 //! Colour image and the range of colours that marks grains on dark velvet.
 
+mod pick;
+
 use serde::{Deserialize, Serialize};
 
 use crate::depth::decimate;
 use crate::error::{FeatureError, require_in, require_length};
+pub use pick::{Picked, pick_range};
 
 /// An 8-bit RGB image, registered to the depth image: same size, same viewpoint.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,6 +28,20 @@ impl ColourImage {
         let expected = width.saturating_mul(height).saturating_mul(3);
         require_length("rgb", rgb.len(), expected)?;
         Ok(Self { width, height, rgb })
+    }
+
+    /// Colour of pixel (u, v), which must lie inside.
+    fn at(&self, u: usize, v: usize) -> [u8; 3] {
+        let i = 3 * (v * self.width + u);
+        [self.rgb[i], self.rgb[i + 1], self.rgb[i + 2]]
+    }
+
+    /// Which pixels lie in the range, row by row.
+    ///
+    /// # Errors
+    /// `OutOfRange` for a range whose bounds are out of order, `LengthMismatch` for a broken image.
+    pub fn mask_of(&self, range: &HsvRange) -> Result<Vec<bool>, FeatureError> {
+        self.mask(range, 1)
     }
 
     /// Which pixels of the image down-sampled by `n` lie in the range.

@@ -100,6 +100,9 @@ pub enum FeatureError {
         /// Whether a range was given.
         range: bool,
     },
+    /// A stereo sensor was asked for a height map.
+    #[error("a stereo sensor needs a pinhole camera, got a height map without one")]
+    NeedsPinhole,
     /// The points do not span a plane.
     #[error(
         "points do not span a plane: their second largest spread is {got} m, it must exceed {min} m"

@@ -10,10 +10,11 @@
 //! | [`depth`] | depth image, down-sampling |
 //! | [`raster`] | spheres over a plane to a depth image or a height map, exact to the ray |
 //! | [`mod@height_map`] | heights on a regular grid, as a time-of-flight rig delivers them |
-//! | [`colour`] | colour image and the hue range that marks grains |
+//! | [`colour`] | colour image, the range of colours that marks grains, and how it is picked |
 //! | [`register`] | the colours of a depth image from a camera beside it |
-//! | [`sensor`] | the two noise models of a depth camera |
+//! | [`sensor`] | what a depth camera adds: the paper's noise, a fitted sensor, the fit |
 //! | [`plane`] | robust plane fit |
+//! | [`region`] | rectangles of pixels |
 //! | [`segment`] | image to the centred, re-oriented points of the formation |
 //! | [`stats`] | the registry of statistics |
 //!
@@ -45,6 +46,7 @@ pub mod error;
 pub mod height_map;
 pub mod plane;
 pub mod raster;
+pub mod region;
 pub mod register;
 mod rng;
 pub mod segment;
@@ -52,17 +54,19 @@ pub mod sensor;
 pub mod stats;
 
 pub use camera::{Camera, Intrinsics};
-pub use colour::{ColourImage, HsvRange};
+pub use colour::{ColourImage, HsvRange, Picked, pick_range};
 pub use depth::DepthImage;
 pub use error::FeatureError;
 pub use height_map::HeightMap;
-pub use plane::{Plane, PlaneFit, fit_plane};
+pub use plane::{Plane, PlaneFit, fit_plane, fit_plane_within};
 pub use raster::{height_map, render, render_grid};
+pub use region::Region;
 pub use register::register_colour;
 pub use segment::{
-    Formation, Segmentation, Threshold, grain_points, segment_depth, segment_height_map,
+    Formation, Kind, Levelled, Segmentation, Shape, Threshold, grain_points, level_depth,
+    level_height_map, segment_depth, segment_height_map,
 };
-pub use sensor::SensorNoise;
+pub use sensor::{DepthSensor, NoiseField, SensorNoise, StereoSensor, TimeOfFlightSensor};
 pub use stats::{
     DIAGNOSTICS, DiagnosticSettings, PAPER16, Prepared, Statistic, Survey, diagnostics, paper16,
 };

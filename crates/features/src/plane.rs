@@ -98,12 +98,27 @@ pub fn fit_plane(
     inlier_distance: f64,
     seed: u64,
 ) -> Result<PlaneFit, FeatureError> {
+    fit_plane_within(points, inlier_distance, std::f64::consts::FRAC_PI_2, seed)
+}
+
+/// As [`fit_plane`], of the planes that are tilted from the horizontal by at most `max_tilt_rad`: a
+/// wall is no ground, however much of it there is.
+///
+/// # Errors
+/// As [`fit_plane`].
+pub fn fit_plane_within(
+    points: &[Vector3<f64>],
+    inlier_distance: f64,
+    max_tilt_rad: f64,
+    seed: u64,
+) -> Result<PlaneFit, FeatureError> {
     require_in("inlier distance [m]", inlier_distance, f64::MIN_POSITIVE, 1e6)?;
+    require_in("largest tilt [rad]", max_tilt_rad, 0.0, std::f64::consts::FRAC_PI_2)?;
     require_finite("points", points.iter().flat_map(|p| [p.x, p.y, p.z]))?;
     if points.len() < 3 {
         return Err(FeatureError::TooFewPoints { what: "plane fit", got: points.len(), min: 3 });
     }
-    let start = match search(points, inlier_distance, seed) {
+    let start = match search(points, inlier_distance, max_tilt_rad.cos(), seed) {
         Some(plane) => plane,
         None => least_squares(points.iter())?.0,
     };
@@ -132,8 +147,14 @@ pub(crate) fn refine_plane(
     Ok(PlaneFit { plane, inliers, rms, tilt_rad: plane.tilt_rad() })
 }
 
-/// The best plane through three of the points, `None` when every sample was a line.
-fn search(points: &[Vector3<f64>], inlier_distance: f64, seed: u64) -> Option<Plane> {
+/// The best plane through three of the points whose normal is upright enough, `None` when every
+/// sample was a line or too steep.
+fn search(
+    points: &[Vector3<f64>],
+    inlier_distance: f64,
+    least_upright: f64,
+    seed: u64,
+) -> Option<Plane> {
     let mut stream = Stream::new(seed);
     let scored: Vec<Vector3<f64>> = if points.len() <= SCORED_POINTS {
         points.to_vec()
@@ -151,6 +172,9 @@ fn search(points: &[Vector3<f64>], inlier_distance: f64, seed: u64) -> Option<Pl
             continue;
         }
         let normal = cross.normalize();
+        if normal.z.abs() < least_upright {
+            continue;
+        }
         let plane = Plane { normal, offset: normal.dot(&a) };
         let (mut cost, mut inliers) = (0.0, 0_usize);
         for point in &scored {

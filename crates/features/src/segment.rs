@@ -1,17 +1,21 @@
 //! From an image to the points of the formation.
 //!
 //! Measured and simulated images take one path: valid pixels to points, ground plane, the frame in
-//! which the ground is z = 0, mask, points centred at their centroid. For a noise-free simulated
-//! image the plane is known and [`grain_points`] skips the fit.
+//! which the ground is z = 0, mask ([`Levelled`]), points centred at their centroid ([`Formation`]).
+//! For a noise-free simulated image the plane is known and [`grain_points`] skips the fit.
 
-mod cloud;
 mod component;
+mod flying;
+mod levelled;
 mod settings;
+mod shape;
 mod spacing;
 
 use nalgebra::{Vector2, Vector3};
 
+pub use levelled::Levelled;
 pub use settings::{Segmentation, Threshold};
+pub use shape::{Kind, Shape};
 
 use crate::camera::Camera;
 use crate::colour::ColourImage;
@@ -19,7 +23,7 @@ use crate::depth::{DepthImage, is_valid};
 use crate::error::{FeatureError, require_finite};
 use crate::height_map::HeightMap;
 use crate::plane::PlaneFit;
-use cloud::Cloud;
+use levelled::{Cloud, Footprint, flipped};
 
 /// The points of a formation and how they were found.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,8 +36,13 @@ pub struct Formation {
     pub width: usize,
     /// Rows of the mask `[px]`, after down-sampling.
     pub height: usize,
+    /// Height above the fitted ground `[m]` of every pixel, not only of the grains, row by row, shape
+    /// [height · width]; `None` = no data.
+    pub heights: Vec<Option<f64>>,
     /// The ground in the frame of the input, normal towards the camera.
     pub plane: PlaneFit,
+    /// Robust standard deviation of the ground about its plane `[m]`.
+    pub ground_sd: f64,
     /// Pixels that carry data, within the border.
     pub valid_count: usize,
     /// Pixels taken for grains.
@@ -43,7 +52,19 @@ pub struct Formation {
     pub threshold: f64,
     /// Where the centroid was in the levelled frame, before it was moved to 0 `[m]`.
     pub centroid: Vector2<f64>,
+    /// Volume between the ground and the surface of the grains' pixels `[m³]`; what is hidden under
+    /// an overhang counts as grain.
+    pub volume: f64,
+    /// Pile or ring.
+    pub shape: Shape,
+    /// The factor by which the image was down-sampled.
+    pub downsample: usize,
+    /// Width of a pixel on the ground, along x and y `[m/px]`.
+    pub resolution: (f64, f64),
 }
+
+/// Sides of the grid `[px]` on which the ground is looked for to choose the down-sampling.
+const GLANCE_PX: usize = 160;
 
 /// The formation in a depth image.
 ///
@@ -61,33 +82,7 @@ pub fn segment_depth(
     colour: Option<&ColourImage>,
     segmentation: &Segmentation,
 ) -> Result<Formation, FeatureError> {
-    segmentation.require_valid()?;
-    camera.require_valid()?;
-    image.require_valid()?;
-    camera.require_size(image.width, image.height)?;
-    let n = segmentation.downsample;
-    let grains = match (colour, &segmentation.colour) {
-        (Some(colour), Some(range)) => {
-            let (got, expected) = ((colour.width, colour.height), (image.width, image.height));
-            if got != expected {
-                return Err(FeatureError::SizeMismatch { what: "colour image", got, expected });
-            }
-            Some(colour.mask(range, n)?)
-        }
-        (None, None) => None,
-        (image, range) => return Err(incomplete_colour(image.is_some(), range.is_some())),
-    };
-    let (small_camera, small) = (camera.downsampled(n)?, image.downsample(n)?);
-    let point = |u: usize, v: usize| unproject_pixel(&small_camera, &small, u, v);
-    let inside = segmentation.inside(image.width, image.height);
-    let cloud =
-        Cloud::new(small.width, small.height, |u, v| if inside(u, v) { point(u, v) } else { None });
-    // The ground lies in front of the camera, whatever pose the caller believes it has.
-    let up = |fit: PlaneFit| {
-        let below = fit.plane.signed_distance(&camera.centre_in_world()) < 0.0;
-        if below { cloud::flipped(fit) } else { fit }
-    };
-    cloud.segment(segmentation, grains.as_deref(), up)
+    level_depth(camera, image, colour, segmentation)?.into_formation()
 }
 
 /// The formation in a height map; heights are positive up, NaN and non-finite pixels carry no data.
@@ -98,17 +93,99 @@ pub fn segment_height_map(
     map: &HeightMap,
     segmentation: &Segmentation,
 ) -> Result<Formation, FeatureError> {
+    level_height_map(map, segmentation)?.into_formation()
+}
+
+/// The ground, the heights above it and the mask of a depth image, whether or not there is a grain.
+///
+/// # Errors
+/// As [`segment_depth`] but for `EmptyMask`.
+pub fn level_depth(
+    camera: &Camera,
+    image: &DepthImage,
+    colour: Option<&ColourImage>,
+    segmentation: &Segmentation,
+) -> Result<Levelled, FeatureError> {
     segmentation.require_valid()?;
+    camera.require_valid()?;
+    image.require_valid()?;
+    camera.require_size(image.width, image.height)?;
+    let colour = match (colour, &segmentation.colour) {
+        (Some(colour), Some(range)) => {
+            let (got, expected) = ((colour.width, colour.height), (image.width, image.height));
+            if got != expected {
+                return Err(FeatureError::SizeMismatch { what: "colour image", got, expected });
+            }
+            Some((colour, range))
+        }
+        (None, None) => None,
+        (image, range) => return Err(incomplete_colour(image.is_some(), range.is_some())),
+    };
+    // The ground lies in front of the camera, whatever pose the caller believes it has.
+    let up = |fit: PlaneFit| {
+        let below = fit.plane.signed_distance(&camera.centre_in_world()) < 0.0;
+        if below { flipped(fit) } else { fit }
+    };
+    let image = flying::removed(image, camera, segmentation.flying_deg);
+    let side = image.width.min(image.height);
+    let cloud = |n: usize| depth_cloud(camera, &image, segmentation, n);
+    let grains = |n: usize| colour.map(|(colour, range)| colour.mask(range, n)).transpose();
+    let n = if segmentation.downsample.is_none() && segmentation.ground_resolution.is_some() {
+        // A pixel's width on the ground needs the ground: a glance at some pixels is enough.
+        let coarse = (side / GLANCE_PX).max(1);
+        let glance = cloud(coarse)?;
+        let (plane, _) = glance.ground(segmentation, grains(coarse)?.as_deref(), up)?;
+        segmentation.factor(glance.resolution(&plane).0 / coarse as f64, side)
+    } else {
+        segmentation.factor(1.0, side)
+    };
+    cloud(n)?.level(segmentation, grains(n)?.as_deref(), up)
+}
+
+/// The points of a depth image down-sampled by `n`.
+fn depth_cloud(
+    camera: &Camera,
+    image: &DepthImage,
+    segmentation: &Segmentation,
+    n: usize,
+) -> Result<Cloud, FeatureError> {
+    let (small_camera, small) = (camera.downsampled(n)?, image.downsample(n)?);
+    let inside = segmentation.inside(image.width, image.height, n);
+    let axis = camera.camera_from_world.inverse_transform_vector(&Vector3::z());
+    let footprint = Footprint::Pyramid {
+        fx: small_camera.intrinsics.fx,
+        fy: small_camera.intrinsics.fy,
+        centre: camera.centre_in_world(),
+        axis,
+    };
+    let point = |u: usize, v: usize| unproject_pixel(&small_camera, &small, u, v);
+    Ok(Cloud::new((small.width, small.height), n, footprint, |u, v| {
+        if inside(u, v) { point(u, v) } else { None }
+    }))
+}
+
+/// The ground, the heights above it and the mask of a height map, whether or not there is a grain.
+///
+/// # Errors
+/// As [`segment_height_map`] but for `EmptyMask`.
+pub fn level_height_map(
+    map: &HeightMap,
+    segmentation: &Segmentation,
+) -> Result<Levelled, FeatureError> {
+    segmentation.require_valid()?;
+    map.require_valid()?;
     if segmentation.colour.is_some() {
         return Err(incomplete_colour(false, true));
     }
-    let inside = segmentation.inside(map.width, map.height);
-    let small = map.downsample(segmentation.downsample)?;
-    let cloud = Cloud::new(small.width, small.height, |u, v| {
+    let n = segmentation.factor(map.resolution_x, map.width.min(map.height));
+    let inside = segmentation.inside(map.width, map.height, n);
+    let small = flying::removed_heights(map, segmentation.flying_deg).downsample(n)?;
+    let footprint = Footprint::Column { x: small.resolution_x, y: small.resolution_y };
+    let cloud = Cloud::new((small.width, small.height), n, footprint, |u, v| {
         let point = small.point(u, v);
         (inside(u, v) && point.z.is_finite()).then_some(point)
     });
-    cloud.segment(segmentation, None, |fit| fit)
+    cloud.level(segmentation, None, |fit| fit)
 }
 
 /// The points of a noise-free image that lie above `threshold` `[m]`, in the world, not centred.

@@ -1,6 +1,17 @@
-//! The two noise models of the paper: blur across the image, noise along the ray.
+//! What a depth camera adds to an image.
+//!
+//! [`SensorNoise`] is the paper's: blur across the image, independent noise along the ray.
+//! [`DepthSensor`] is a camera as it is fitted from flat frames by [`fit`].
+//! Derived in `docs/theory/sensor.md`.
 
 mod blur;
+mod depth_sensor;
+mod field;
+pub mod fit;
+mod holes;
+
+pub use depth_sensor::{DepthSensor, GRAZING_DEG, StereoSensor, TimeOfFlightSensor};
+pub use field::NoiseField;
 
 use serde::{Deserialize, Serialize};
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use granulcal_dataset::{CameraFile, png};
+use granulcal_dataset::{CameraFile, load_sensor, png, sensor_of};
 use granulcal_features::{DepthImage, SensorNoise};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -29,6 +29,7 @@ impl Camera {
     }
 
     /// Depth [m] of grains over the ground, with the noise of a sensor.
+    #[allow(clippy::too_many_arguments)] // Python's arguments.
     fn render<'py>(
         &self,
         py: Python<'py>,
@@ -37,14 +38,20 @@ impl Camera {
         depth_sigma: f64,
         blur_px: f64,
         seed: u64,
+        sensor: Option<PathBuf>,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let sensor = sensor.map(|path| load_sensor(&path)).transpose().map_err(error::dataset)?;
         let positions = Vectors::borrow("positions", positions)?;
         let radii = Numbers::borrow("radii", radii)?;
         let (positions, radii) = (positions.as_slice()?, radii.as_slice()?);
         let image = py
             .detach(|| {
                 let image = granulcal_features::render(&self.inner, positions, radii)?;
-                SensorNoise { blur_px, depth_sigma }.apply(&image, seed)
+                let image = SensorNoise { blur_px, depth_sigma }.apply(&image, seed)?;
+                match sensor {
+                    Some(sensor) => sensor_of(&sensor).observe(&self.inner, &image, seed),
+                    None => Ok(image),
+                }
             })
             .map_err(error::features)?;
         array::matrix(py, image.depth, image.height, image.width)

@@ -4,6 +4,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 
 use crate::array;
+use crate::levelled::{self, PlaneParts};
 
 /// The points of a formation and how they were found.
 #[pyclass(frozen, module = "granulcal._native")]
@@ -23,30 +24,51 @@ impl Formation {
         array::matrix(py, self.inner.mask.clone(), self.inner.height, self.inner.width)
     }
 
+    /// Heights above the ground [m] of all pixels, NaN where there is no data.
     #[getter]
-    fn normal(&self) -> (f64, f64, f64) {
-        let normal = self.inner.plane.plane.normal;
-        (normal.x, normal.y, normal.z)
+    fn heights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        levelled::heights(py, &self.inner.heights, self.inner.height, self.inner.width)
     }
 
     #[getter]
-    fn offset(&self) -> f64 {
-        self.inner.plane.plane.offset
+    fn plane(&self) -> PlaneParts {
+        levelled::plane_parts(&self.inner.plane)
     }
 
     #[getter]
-    fn plane_rms(&self) -> f64 {
-        self.inner.plane.rms
+    fn ground_sd(&self) -> f64 {
+        self.inner.ground_sd
     }
 
     #[getter]
-    fn plane_inliers(&self) -> usize {
-        self.inner.plane.inliers
+    fn volume(&self) -> f64 {
+        self.inner.volume
     }
 
     #[getter]
-    fn tilt_rad(&self) -> f64 {
-        self.inner.plane.tilt_rad
+    fn kind(&self) -> &'static str {
+        self.inner.shape.kind.name()
+    }
+
+    #[getter]
+    fn half_volume_radius(&self) -> f64 {
+        self.inner.shape.half_volume_radius
+    }
+
+    /// Mean heights in the middle and around it [m].
+    #[getter]
+    fn profile(&self) -> (f64, f64) {
+        (self.inner.shape.inner_height, self.inner.shape.rim_height)
+    }
+
+    #[getter]
+    fn downsample(&self) -> usize {
+        self.inner.downsample
+    }
+
+    #[getter]
+    fn resolution(&self) -> (f64, f64) {
+        self.inner.resolution
     }
 
     #[getter]

@@ -11,6 +11,7 @@ mod dataset;
 mod error;
 mod formation;
 mod generate;
+mod levelled;
 mod observation;
 mod pour;
 mod recording;
@@ -32,6 +33,8 @@ mod _native {
     use crate::formation::Formation;
     #[pymodule_export]
     use crate::generate::generate;
+    #[pymodule_export]
+    use crate::levelled::Levelled;
     #[pymodule_export]
     use crate::observation::Observation;
     #[pymodule_export]

@@ -1,7 +1,7 @@
 //! `features`: a recording to its statistics.
 
 use anyhow::Context as _;
-use granulcal_dataset::{Recording, npy};
+use granulcal_dataset::{Recording, npy, write_pictures};
 use granulcal_features::{
     DIAGNOSTICS, DiagnosticSettings, Formation, PAPER16, Segmentation, Statistic, Threshold,
     diagnostics,
@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 use crate::args::FeaturesArgs;
 use crate::context::{note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
+use crate::scene;
 
 pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     if args.list {
@@ -27,7 +28,18 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     for line in &recording.damage {
         note(&format!("warning: {line}"));
     }
-    let formation = recording.formation_with(&segmentation(args, &recording.segmentation))?;
+    let levelled = recording.level_with(&segmentation(args, &recording.segmentation)?)?;
+    if let Some(folder) = &args.debug_images {
+        // Before the formation: where none is found, the pictures say why.
+        let pictures = write_pictures(folder, &levelled)?;
+        note(&format!(
+            "pictures in {}: residual.png from -{residual:.2} mm (blue) to {residual:.2} mm (red), height.png from 0 (dark) to {:.2} mm (yellow), mask.png",
+            folder.display(),
+            1e3 * pictures.height,
+            residual = 1e3 * pictures.residual,
+        ));
+    }
+    let formation = recording.formation_of(levelled)?;
     let mut statistics = vec![named(&PAPER16, &recording.statistics_of(&formation)?)];
     if args.diagnostics {
         let values = diagnostics(&formation.points, &diagnostic_settings(args, &formation)?)
@@ -46,16 +58,20 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
 }
 
 /// The recording's own segmentation with what the command line changes.
-fn segmentation(args: &FeaturesArgs, own: &Segmentation) -> Segmentation {
+fn segmentation(args: &FeaturesArgs, own: &Segmentation) -> anyhow::Result<Segmentation> {
     let mut changed = own.clone();
+    if let Some(name) = &args.scene {
+        changed.downsample = None;
+        changed.ground_resolution = Some(scene::named(name)?.camera.ground_resolution());
+    }
     if let Some(height) = args.threshold {
         changed.height_threshold = Threshold::Absolute(height);
     }
     changed.border_px = args.border.unwrap_or(changed.border_px);
-    changed.downsample = args.downsample.unwrap_or(changed.downsample);
+    changed.downsample = args.downsample.or(changed.downsample);
     changed.max_height = args.max_height.or(changed.max_height);
     changed.min_component_px = args.min_component.unwrap_or(changed.min_component_px);
-    changed
+    Ok(changed)
 }
 
 /// What the diagnostic statistics need besides the points.
@@ -100,6 +116,16 @@ fn as_json(recording: &Recording, formation: &Formation, statistics: &[Named]) -
             "tilt_deg": plane.tilt_rad.to_degrees(),
             "rms_m": plane.rms,
             "inliers": plane.inliers,
+            "noise_m": formation.ground_sd,
+        },
+        "formation": {
+            "kind": formation.shape.kind.name(),
+            "volume_m3": formation.volume,
+            "half_volume_radius_m": formation.shape.half_volume_radius,
+        },
+        "pixel": {
+            "downsample": formation.downsample,
+            "width_m": [formation.resolution.0, formation.resolution.1],
         },
         "counts": {
             "frames": recording.frames,
@@ -128,10 +154,17 @@ fn print(recording: &Recording, formation: &Formation, statistics: &[Named]) -> 
         print_line(&format!("topic              {topic}"))?;
     }
     print_line(&format!(
-        "ground             tilt {:.2} deg, rms {:.2} mm, {} inliers",
+        "ground             tilt {:.2} deg, rms {:.2} mm, {} inliers, noise {:.2} mm",
         plane.tilt_rad.to_degrees(),
         plane.rms * 1e3,
-        plane.inliers
+        plane.inliers,
+        formation.ground_sd * 1e3
+    ))?;
+    print_line(&format!(
+        "formation          {}, {:.1} cm3, half of it within {:.1} mm",
+        formation.shape.kind.name(),
+        formation.volume * 1e6,
+        formation.shape.half_volume_radius * 1e3
     ))?;
     print_line(&format!(
         "pixels             {} of {} valid are grain (above {:.2} mm)",

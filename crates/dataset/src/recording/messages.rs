@@ -17,10 +17,13 @@ use crate::{CameraFile, DatasetError, Lost};
 pub(super) struct Averaged {
     pub(super) intrinsics: Intrinsics,
     pub(super) image: DepthImage,
+    /// Metres per count.
+    pub(super) unit: f64,
     pub(super) colour: Option<ColourImage>,
     pub(super) topic: String,
-    /// Frames that were averaged, and frames that are whole.
+    /// Frames that were averaged, those that were read for it, and those that are whole.
     pub(super) frames: usize,
+    pub(super) window: Range<u64>,
     pub(super) whole: u64,
     pub(super) lost: Option<Lost>,
     pub(super) damage: Vec<String>,
@@ -173,9 +176,11 @@ impl Pass<'_> {
         Ok(Averaged {
             intrinsics,
             image,
+            unit,
             colour,
             topic: self.depth.topic.clone(),
             frames,
+            window: self.window,
             whole: self.depth.whole() - self.undecodable,
             lost,
             damage,

@@ -3,6 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::sensor::SensorSpec;
 use super::{non_negative, positive};
 use crate::DemError;
 
@@ -15,6 +16,24 @@ pub enum Projection {
     Pinhole,
     /// A height map with square pixels, as processed recordings are stored.
     Orthographic,
+}
+
+/// How the pixels of the grains are told from the ground's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mask {
+    /// By the height in the image, noise and all.
+    #[default]
+    Height,
+    /// As colour tells grains from velvet: by what the pixel shows, however wrong its depth is.
+    Colour,
+}
+
+impl Mask {
+    #[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference.
+    fn is_height(&self) -> bool {
+        *self == Self::Height
+    }
 }
 
 /// A bird's-eye depth camera and how its image becomes grain points.
@@ -39,6 +58,12 @@ pub struct CameraSpec {
     pub depth_noise: f64,
     /// Height above the ground from which a pixel counts as grain `[m]`.
     pub height_threshold: f64,
+    /// How grains are told from the ground; with a noisy sensor, by colour.
+    #[serde(skip_serializing_if = "Mask::is_height")]
+    pub mask: Mask,
+    /// What the sensor adds to the image, after blur and depth noise; default nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<SensorSpec>,
 }
 
 impl Default for CameraSpec {
@@ -52,6 +77,8 @@ impl Default for CameraSpec {
             blur: 0.0,
             depth_noise: 0.0,
             height_threshold: 1e-3,
+            mask: Mask::Height,
+            sensor: None,
         }
     }
 }
@@ -61,6 +88,11 @@ impl CameraSpec {
     pub fn sees_ground(&self, x: f64, y: f64) -> bool {
         let half = 0.5 * self.field_width;
         x.abs() <= half && y.abs() <= half
+    }
+
+    /// Width of a pixel of the down-sampled image on the ground `[m/px]`.
+    pub fn ground_resolution(&self) -> f64 {
+        self.field_width / self.pixels as f64 * self.downsample as f64
     }
 
     pub(super) fn check(&self) -> Result<(), DemError> {
@@ -79,6 +111,6 @@ impl CameraSpec {
                 "in 1..=camera.pixels",
             ));
         }
-        Ok(())
+        self.sensor.map_or(Ok(()), |sensor| sensor.check())
     }
 }

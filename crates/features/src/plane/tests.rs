@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::rng::Stream;
 
 /// A tilted ground with noise, a fifth of it buried under a pile.
 fn scene(tilt: f64, noise: f64, seed: u64) -> Vec<Vector3<f64>> {
@@ -100,4 +101,24 @@ proptest! {
         prop_assert!((fit.plane.offset - offset).abs() < 1e-10);
         prop_assert_eq!(fit.inliers, 50);
     }
+}
+
+#[test]
+fn a_wall_is_no_ground() {
+    // Twice as many points on a wall at 70 degrees as on the ground below it.
+    let mut stream = Stream::new(5);
+    let mut points = Vec::new();
+    for i in 0..900 {
+        let (a, b) = (stream.uniform(), stream.uniform());
+        let error = 1e-3 * stream.normal();
+        points.push(if i % 3 == 0 {
+            Vector3::new(a, b, error)
+        } else {
+            Vector3::new(1.0 + 0.34 * a, b, 0.94 * a + error)
+        });
+    }
+    let largest = fit_plane(&points, 3e-3, 0).unwrap();
+    assert!(largest.tilt_rad > 1.1, "{largest:?}");
+    let ground = fit_plane_within(&points, 3e-3, 0.8, 0).unwrap();
+    assert!(ground.tilt_rad < 0.01 && ground.inliers > 280, "{ground:?}");
 }

@@ -2,7 +2,21 @@
 
 /// Clears the patches of fewer than `min_px` pixels; neighbours share an edge or a corner.
 pub(super) fn remove_small(mask: &mut [bool], width: usize, min_px: usize) {
-    if min_px <= 1 || width == 0 {
+    if min_px > 1 {
+        keep_patches(mask, width, |patch| patch.len() >= min_px);
+    }
+}
+
+/// Clears the patches without a peak: noise wanders over a threshold, grains stand well above it.
+///
+/// # Reference
+/// Thresholds in pairs: Canny 1986, doi:10.1109/TPAMI.1986.4767851.
+pub(super) fn remove_low(mask: &mut [bool], width: usize, is_peak: impl Fn(usize) -> bool) {
+    keep_patches(mask, width, |patch| patch.iter().any(|&pixel| is_peak(pixel)));
+}
+
+fn keep_patches(mask: &mut [bool], width: usize, is_kept: impl Fn(&[usize]) -> bool) {
+    if width == 0 {
         return;
     }
     let height = mask.len() / width;
@@ -29,7 +43,7 @@ pub(super) fn remove_small(mask: &mut [bool], width: usize, min_px: usize) {
                 }
             }
         }
-        if patch.len() < min_px {
+        if !is_kept(&patch) {
             for &pixel in &patch {
                 mask[pixel] = false;
             }
@@ -59,5 +73,14 @@ mod tests {
             remove_small(&mut got, 5, min_px);
             assert_eq!(got, mask(after)[..20], "min {min_px}");
         }
+    }
+
+    #[test]
+    fn keeps_patches_that_have_a_peak() {
+        let picture = "a..bb a...B ..... C....";
+        let letters: Vec<char> = picture.chars().filter(|c| !c.is_whitespace()).collect();
+        let mut got = mask(picture);
+        remove_low(&mut got, 5, |pixel| letters[pixel].is_uppercase());
+        assert_eq!(got, mask("...bb ....B ..... C....")[..20]);
     }
 }

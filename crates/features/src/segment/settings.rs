@@ -9,6 +9,10 @@ use crate::error::{FeatureError, require_in};
 /// Largest length `[m]` that a setting may have.
 const MAX_LENGTH: f64 = 1e3;
 
+/// Robust standard deviations of the ground that a patch of grains must reach. Five would do for noise
+/// that is the same all over the image; at its edge it is up to a quarter larger.
+const PEAK_SDS: f64 = 6.0;
+
 /// Height above the ground from which a pixel counts as grain.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -16,7 +20,8 @@ pub enum Threshold {
     /// This height `[m]`.
     Absolute(f64),
     /// Three robust standard deviations of the ground about its plane, but at least the floor:
-    /// what the sensor can tell from the ground.
+    /// what the sensor can tell from the ground. A patch must reach six of them somewhere, for
+    /// one pixel in 740 of Gaussian noise is above three, and correlated noise makes patches of them.
     Automatic {
         /// Least threshold `[m]`.
         floor: f64,
@@ -38,6 +43,14 @@ impl Threshold {
             Self::Automatic { floor } => floor.max(3.0 * ground_sd),
         }
     }
+
+    /// The height `[m]` that a patch of grains must reach somewhere; a fixed threshold asks for none.
+    pub(super) fn peak(self, ground_sd: f64) -> Option<f64> {
+        match self {
+            Self::Absolute(_) => None,
+            Self::Automatic { floor } => Some(floor.max(PEAK_SDS * ground_sd)),
+        }
+    }
 }
 
 /// How an image is segmented. The default suits an overhead depth camera at 0.3 m to 0.5 m.
@@ -50,11 +63,20 @@ pub struct Segmentation {
     pub colour: Option<HsvRange>,
     /// Frame of pixels at the edge of the full image that is ignored `[px]`; default 0.
     pub border_px: usize,
-    /// Keep the middle pixel of every n × n block; default 1, all (the paper: 10 for its D435).
-    pub downsample: usize,
-    /// Distance from the plane within which a pixel can be ground `[m]`; default 3 mm, above the
-    /// noise of a stereo camera at that height. It is brought down to the noise that is found.
-    pub inlier_distance: f64,
+    /// Keep the middle pixel of every n × n block (the paper: 10 for its D435); default the n with
+    /// which a pixel is as wide on the ground as `ground_resolution`, or 1 without one.
+    pub downsample: Option<usize>,
+    /// Width of a pixel on the ground that the down-sampled image should have `[m/px]`: that of the
+    /// simulated images. Default none.
+    pub ground_resolution: Option<f64>,
+    /// Distance from the plane within which a pixel can be ground `[m]`. Default automatic: from 3 mm
+    /// on it is doubled until the ground does not go on below it, then brought to the noise found.
+    pub inlier_distance: Option<f64>,
+    /// Tilt beyond which a plane is a wall and not the ground `[deg]`; default 45.
+    pub max_tilt_deg: f64,
+    /// Incidence beyond which two steps in a row from pixel to pixel are no surface but a pixel that
+    /// flies between two `[deg]`; default 80, 90 keeps all.
+    pub flying_deg: f64,
     /// Height above which a pixel is a fault (a funnel, a hand, a spike) and not data `[m]`; default
     /// none.
     pub max_height: Option<f64>,
@@ -71,8 +93,11 @@ impl Default for Segmentation {
             height_threshold: Threshold::default(),
             colour: None,
             border_px: 0,
-            downsample: 1,
-            inlier_distance: 0.003,
+            downsample: None,
+            ground_resolution: None,
+            inlier_distance: None,
+            max_tilt_deg: 45.0,
+            flying_deg: 80.0,
             max_height: None,
             min_component_px: 1,
             plane_seed: 0,
@@ -88,8 +113,24 @@ impl Segmentation {
             Threshold::Automatic { floor } => floor,
         };
         require_in("height_threshold [m]", threshold, 0.0, MAX_LENGTH)?;
-        require_in("inlier_distance [m]", self.inlier_distance, 1e-9, MAX_LENGTH)?;
-        require_in("max_height [m]", self.max_height.unwrap_or(MAX_LENGTH), 0.0, MAX_LENGTH)
+        let optional = |what, value: Option<f64>, min| {
+            require_in(what, value.unwrap_or(MAX_LENGTH), min, MAX_LENGTH)
+        };
+        optional("inlier_distance [m]", self.inlier_distance, 1e-9)?;
+        optional("ground_resolution [m/px]", self.ground_resolution, 1e-9)?;
+        optional("max_height [m]", self.max_height, 0.0)?;
+        require_in("max_tilt_deg [deg]", self.max_tilt_deg, 0.0, 90.0)?;
+        require_in("flying_deg [deg]", self.flying_deg, 0.0, 90.0)
+    }
+
+    /// The factor of down-sampling for an image whose pixels are `resolution` `[m/px]` wide on the
+    /// ground and which has `side` of them along its shorter side.
+    pub(super) fn factor(&self, resolution: f64, side: usize) -> usize {
+        match (self.downsample, self.ground_resolution) {
+            (Some(n), _) => n,
+            (None, Some(wanted)) => ((wanted / resolution).round() as usize).clamp(1, side.max(1)),
+            (None, None) => 1,
+        }
     }
 
     /// Whether a pixel of the down-sampled image lies inside the border of the full one.
@@ -97,8 +138,9 @@ impl Segmentation {
         &self,
         width: usize,
         height: usize,
+        n: usize,
     ) -> impl Fn(usize, usize) -> bool + use<> {
-        let (border, n) = (self.border_px, self.downsample);
+        let border = self.border_px;
         let kept = move |pixel: usize, side: usize| {
             let full = pixel * n + sample_offset(n);
             full >= border && full < side.saturating_sub(border)

@@ -1,0 +1,112 @@
+//! Arguments of the commands about the camera itself.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use granulcal_features::Region;
+
+use super::ReadArgs;
+
+/// Fit a depth camera's noise, fixed pattern, rounding and holes to frames of a flat surface
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Fits the sensor of a scene's camera to frames of something flat: a wall, a board, the empty bed.
+
+Record some ten frames of it without moving anything, from the distance at which you pour. One
+camera stands still: what the frames share is its fixed pattern, what differs is its noise.
+
+RECORDING is what `features` reads: a .bag or .mcap of one or more frames, 16-bit depth PNGs or a
+folder of them, with --camera, or .npz height maps. Each frame is looked at by itself. With
+--baseline the camera is stereo: errors are px of disparity, and depth errors grow with the
+square of the depth. Without, errors are metres, whatever the depth.
+
+Where the frames show more than the flat surface, --region says where it is; repeat it for
+several. --check are recordings that the fit does not see, to compare it with; --check-region is
+another part of the surface.
+
+What is printed: the parameters; then standard deviation and autocorrelation of the measured
+frames beside those of frames simulated with the fit, after the same trend removal. -o writes
+the TOML that stands in a scene, [camera.sensor], or goes to `render --sensor`.
+
+Example:
+  granulcal-cli fit-sensor wall.bag --baseline 0.05 -o sensor.toml
+  granulcal-cli fit-sensor wall/ --camera d435.toml --baseline 0.05 -o sensor.toml
+  granulcal-cli fit-sensor d0.png d1.png --camera d435.toml --baseline 0.05 \\
+      --region 30,10,100,290 --check-region 130,10,100,290
+  granulcal-cli fit-sensor bed_1.npz bed_2.npz bed_3.npz --check bed_4.npz bed_5.npz")]
+pub struct FitSensorArgs {
+    /// Recordings of a flat surface
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    #[command(flatten)]
+    pub read: ReadArgs,
+    /// Distance of the two imagers of a stereo camera [m]
+    #[arg(long, value_name = "METRES")]
+    pub baseline: Option<f64>,
+    /// Part of the frames that is flat; repeat as needed [default: the whole frame]
+    #[arg(long = "region", value_name = "X,Y,WIDTH,HEIGHT")]
+    pub regions: Vec<Region>,
+    /// Degree of the polynomial that is removed from the surface; 1 is a plane
+    #[arg(long, default_value_t = 2, value_name = "DEGREE")]
+    pub trend: usize,
+    /// Longest distance of the autocorrelation [px]
+    #[arg(long, default_value_t = 24, value_name = "PIXELS")]
+    pub max_lag: usize,
+    /// Maps were cut from the sensor's image up to so many pixels apart
+    #[arg(long, default_value_t = 0, value_name = "PIXELS")]
+    pub max_shift: usize,
+    /// Sessions that are simulated to correct and judge the fit
+    #[arg(long, default_value_t = 24, value_name = "N")]
+    pub sessions: usize,
+    /// Seed of the simulated sessions
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Recordings to compare with that the fit does not see [default: those of the fit]
+    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    pub check: Vec<PathBuf>,
+    /// Part of the frames to compare with; repeat as needed [default: as --region]
+    #[arg(long = "check-region", value_name = "X,Y,WIDTH,HEIGHT")]
+    pub check_regions: Vec<Region>,
+    /// Write the sensor as TOML
+    #[arg(long = "out", short = 'o', value_name = "SENSOR.toml")]
+    pub out: Option<PathBuf>,
+    /// Write sensor and all covariances as JSON
+    #[arg(long, value_name = "REPORT.json")]
+    pub report: Option<PathBuf>,
+    /// Print that JSON instead of the table
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Pick the range of colours that marks grains from an image
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Finds the range of hue, saturation and value that marks the grains of a colour image, for the
+table [segmentation.colour] of a camera's TOML.
+
+Point at some grains with --grains and, if you can, at some ground with --ground: rectangles of
+the image. The range is that of the grains, its bounds half way to the ground's where the two
+do not overlap. Without a rectangle the image is cut in two by brightness or saturation, and
+the smaller part is taken for grains.
+
+Look at the result: --mask writes the image with the grains outlined.
+
+Example:
+  granulcal-cli pick-colour pile.png --mask mask.png
+  granulcal-cli pick-colour pile.png --grains 300,220,40,40 --ground 20,20,80,80 --mask mask.png")]
+pub struct PickColourArgs {
+    /// 8-bit colour PNG
+    pub image: PathBuf,
+    /// Rectangle with grains only; repeat as needed
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT")]
+    pub grains: Vec<Region>,
+    /// Rectangle without grains; repeat as needed
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", requires = "grains")]
+    pub ground: Vec<Region>,
+    /// Write the image with the grains outlined
+    #[arg(long, value_name = "OUT.png")]
+    pub mask: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}

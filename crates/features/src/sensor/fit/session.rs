@@ -1,0 +1,211 @@
+//! Measured frames and simulated ones under one estimator.
+
+use super::components::Estimator;
+use super::covariance::{self, Split};
+use super::flat::{Patch, detrend};
+use super::frames::{FlatFrames, Optics};
+use super::{Comparison, FitSettings};
+use crate::error::FeatureError;
+use crate::region::Region;
+use crate::sensor::DepthSensor;
+use crate::sensor::depth_sensor::round_to;
+use crate::sensor::field::{SensorGrid, scatter};
+
+/// Frames of one sensor, their trends and residuals.
+pub(super) struct Session<'a> {
+    frames: &'a FlatFrames,
+    regions: Vec<Region>,
+    /// Region r of frame k.
+    patches: Vec<Vec<Patch>>,
+    shifts: Vec<(isize, isize)>,
+    trend_degree: usize,
+    max_lag: usize,
+}
+
+/// Covariances of simulated sessions.
+pub(super) struct Simulated {
+    pub(super) mean: Split,
+    pub(super) spread: Split,
+}
+
+impl<'a> Session<'a> {
+    pub(super) fn new(
+        frames: &'a FlatFrames,
+        settings: &FitSettings,
+    ) -> Result<Self, FeatureError> {
+        settings.require_valid()?;
+        let regions = frames.regions(&settings.regions)?;
+        let degree = settings.trend_degree;
+        let mut patches = Vec::with_capacity(frames.values.len());
+        for frame in 0..frames.values.len() {
+            let of = |region: &Region| {
+                let values = frames.cut(frame, region);
+                detrend(&values, region.width, degree, |v, t| frames.optics.error(v, t))
+            };
+            patches.push(regions.iter().map(of).collect::<Result<Vec<_>, _>>()?);
+        }
+        let shifts = covariance::shifts(&patches, settings.max_shift);
+        let max_lag = settings.max_lag;
+        Ok(Self { frames, regions, patches, shifts, trend_degree: degree, max_lag })
+    }
+
+    /// Covariances of the measured frames.
+    pub(super) fn measured(&self) -> Split {
+        covariance::split(&self.patches, &self.shifts, self.max_lag)
+    }
+
+    /// How the covariances were estimated.
+    pub(super) fn estimator(&self) -> Estimator {
+        let sizes = self.regions.iter().map(|region| (region.width, region.height)).collect();
+        Estimator::new(sizes, self.trend_degree, self.max_lag)
+    }
+
+    /// Mean variance of the errors of rounding: q²/12 of each step q.
+    pub(super) fn rounding_variance(&self, sensor: &DepthSensor) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for patch in self.patches.iter().flatten() {
+            for (trend, mask) in patch.trend.iter().zip(&patch.mask) {
+                let square = match sensor {
+                    DepthSensor::Stereo(sensor) => {
+                        let focal_baseline = sensor.focal_length * sensor.baseline;
+                        let unit = trend * trend / focal_baseline * sensor.depth_unit;
+                        sensor.quantisation.powi(2) + unit * unit
+                    }
+                    DepthSensor::TimeOfFlight(sensor) => sensor.depth_unit.powi(2),
+                };
+                sum += mask * square / 12.0;
+                count += mask;
+            }
+        }
+        sum / f64::max(count, 1.0)
+    }
+
+    /// Share of the pixels of the regions that have no data.
+    pub(super) fn dropout(&self) -> f64 {
+        let (mut lost, mut all) = (0, 0);
+        for frame in 0..self.frames.values.len() {
+            for region in &self.regions {
+                let values = self.frames.cut(frame, region);
+                lost += values.iter().filter(|v| !v.is_finite()).count();
+                all += values.len();
+            }
+        }
+        lost as f64 / f64::max(f64::from(all as u32), 1.0)
+    }
+
+    /// Mean and spread of the covariances of `sessions` simulated sessions on the measured trends.
+    pub(super) fn simulate(
+        &self,
+        sensor: &DepthSensor,
+        sessions: usize,
+        seed: u64,
+    ) -> Result<Simulated, FeatureError> {
+        let mut all = Vec::with_capacity(sessions);
+        for session in 0..sessions {
+            let patches = self.simulated_patches(sensor, scatter(seed ^ session as u64))?;
+            all.push(covariance::split(&patches, &self.shifts, self.max_lag));
+        }
+        let count = sessions as f64;
+        let mut mean = Split::zeros(self.max_lag);
+        let mut spread = Split::zeros(self.max_lag);
+        for split in &all {
+            mean.combine(split, |sum, value| sum + value / count);
+        }
+        for split in &all {
+            let mut off = split.clone();
+            off.combine(&mean, |value, mean| value - mean);
+            spread.combine(&off, |sum, off| sum + off * off / (count - 1.0));
+        }
+        let squares = spread.clone();
+        spread.combine(&squares, |_, square| square.sqrt());
+        Ok(Simulated { mean, spread })
+    }
+
+    /// One simulated session: the measured trends with new errors, after the same treatment.
+    fn simulated_patches(
+        &self,
+        sensor: &DepthSensor,
+        seed: u64,
+    ) -> Result<Vec<Vec<Patch>>, FeatureError> {
+        let reach = self.shifts.iter().map(|s| s.0.abs().max(s.1.abs())).max().unwrap_or(0);
+        let margin = reach as usize;
+        let mut simulated: Vec<Vec<Patch>> = vec![Vec::new(); self.patches.len()];
+        for (r, region) in self.regions.iter().enumerate() {
+            let (width, height) = (region.width, region.height);
+            let wide = SensorGrid::under(width + 2 * margin, height + 2 * margin, 1.0)?;
+            let seed_of = |what: u64| scatter(seed ^ scatter((r as u64) << 32 | what));
+            let pattern = sensor.fixed_pattern().sample(&wide, seed_of(0));
+            let grid = SensorGrid::under(width, height, 1.0)?;
+            for (k, simulated) in simulated.iter_mut().enumerate() {
+                let noise = sensor.noise().sample(&grid, seed_of(k as u64 + 1));
+                let measured = &self.patches[k][r];
+                let (x, y) = self.shifts[k];
+                let at = |u: usize, v: usize| {
+                    let column = (u + margin) as isize - x;
+                    let row = (v + margin) as isize - y;
+                    pattern[row as usize * wide.columns.len() + column as usize]
+                };
+                let values: Vec<f64> = (0..width * height)
+                    .map(|i| {
+                        if measured.mask[i] == 0.0 {
+                            return f64::NAN;
+                        }
+                        let error = noise[i] + at(i % width, i / width);
+                        self.frames.optics.disturbed(sensor, measured.trend[i], error)
+                    })
+                    .collect();
+                let optics = &self.frames.optics;
+                simulated
+                    .push(detrend(&values, width, self.trend_degree, |v, t| optics.error(v, t))?);
+            }
+        }
+        Ok(simulated)
+    }
+
+    /// Measured beside simulated.
+    pub(super) fn compare(
+        &self,
+        sensor: &DepthSensor,
+        settings: &FitSettings,
+    ) -> Result<Comparison, FeatureError> {
+        let simulated = self.simulate(sensor, settings.sessions, scatter(settings.seed))?;
+        let frames = self.patches.len();
+        let pixels: usize = self.patches.iter().flatten().map(Patch::count).sum();
+        Ok(Comparison {
+            unit: match sensor {
+                DepthSensor::Stereo(_) => "px",
+                DepthSensor::TimeOfFlight(_) => "m",
+            },
+            frames,
+            pixels: pixels / frames,
+            shifts: self.shifts.clone(),
+            measured: self.measured(),
+            model: simulated.mean,
+            spread: simulated.spread,
+        })
+    }
+}
+
+impl Optics {
+    /// The error of a value whose trend is known, in the sensor's unit.
+    fn error(&self, value: f64, trend: f64) -> f64 {
+        match self {
+            Self::TimeOfFlight { inverse: true, .. } => 1.0 / value - 1.0 / trend,
+            _ => value - trend,
+        }
+    }
+
+    /// The value that is delivered where the trend and an error meet.
+    fn disturbed(&self, sensor: &DepthSensor, trend: f64, error: f64) -> f64 {
+        match (self, sensor) {
+            (Self::Stereo { .. }, DepthSensor::Stereo(sensor)) => {
+                sensor.disparity(sensor.deliver(trend + error))
+            }
+            (Self::TimeOfFlight { inverse: true, .. }, DepthSensor::TimeOfFlight(sensor)) => {
+                1.0 / round_to(1.0 / trend + error, sensor.depth_unit)
+            }
+            (_, DepthSensor::TimeOfFlight(sensor)) => round_to(trend + error, sensor.depth_unit),
+            _ => trend + error,
+        }
+    }
+}
