@@ -60,7 +60,14 @@ fn begin() -> impl Strategy<Value = (usize, Start)> {
         let positions: Vec<_> = points.into_iter().map(place).collect();
         (positions.len(), Start::Positions { positions })
     });
-    prop_oneof![grid, ball, listed]
+    let tube = (0..GRAINS, vector(-30.0..30.0), 2.0..6.0f64).prop_map(|(count, from, spacing)| {
+        // A tube of 3 by 3 lanes, long enough.
+        let length = spacing * (count as f64 / 9.0 + 1.0) + 4.0;
+        let to = [from[0], from[1], from[2] + length];
+        let radius = 1.5 * spacing + 1.0;
+        (count, Start::Cylinder { from, to, radius, spacing, jitter: 0.0 })
+    });
+    prop_oneof![grid, ball, tube, listed]
 }
 
 /// A funnel for grains of radius 1: from one that a single grain just enters to a wide one.
@@ -194,6 +201,14 @@ fn scaled_start(start: Start, r: f64) -> Start {
         Start::Ball { height, solid_fraction, jitter } => {
             Start::Ball { height: r * height, solid_fraction, jitter }
         }
+        Start::Cylinder { from, to, radius, spacing, jitter } => Start::Cylinder {
+            from: from.map(|c| r * c),
+            to: to.map(|c| r * c),
+            // Rounding must not shut out grains that just fit.
+            radius: (1.0 + 1e-9) * r * radius,
+            spacing: (1.0 + 1e-9) * r * spacing,
+            jitter: r * jitter,
+        },
         Start::Positions { positions } => Start::Positions {
             positions: positions.into_iter().map(|p| p.map(|c| r * c)).collect(),
         },
