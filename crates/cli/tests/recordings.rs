@@ -162,5 +162,7 @@ fn a_recording_of_the_realsense_viewer_needs_one_command() {
         json(&place.expect(0, &["features", bag.to_str().unwrap(), "--downsample", "4", "--json"]));
     assert_eq!(found["statistics"].as_object().unwrap().len(), 16);
     assert_eq!(found["counts"]["frames"], 2);
-    assert!(found["plane"]["rms_m"].as_f64().unwrap() < 0.01, "{found}");
+    // The camera looks at a wall at 1.8 m, rough by some 27 mm, past a board that it sees edge on.
+    let plane = |name: &str| found["plane"][name].as_f64().unwrap();
+    assert!(plane("tilt_deg") < 10.0 && (0.01..0.04).contains(&plane("rms_m")), "{found}");
 }

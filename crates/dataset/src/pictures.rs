@@ -75,7 +75,8 @@ pub fn write_mask(path: &Path, image: &ColourImage, mask: &[bool]) -> Result<(),
 /// The colour at a place of a scale that runs from 0 to 1; beyond its ends it stays.
 fn ramp(colours: &[[u8; 3]], place: f64) -> [u8; 3] {
     let last = colours.len() - 1;
-    let place = place.clamp(0.0, 1.0) * last as f64;
+    // Of a range of no width every place is the first.
+    let place = if place.is_nan() { 0.0 } else { place.clamp(0.0, 1.0) } * last as f64;
     let below = (place as usize).min(last - 1);
     let share = place - below as f64;
     let (a, b) = (colours[below], colours[below + 1]);
