@@ -8,10 +8,13 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 RUST := $(shell find src crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
+CRITERION := $(or $(CARGO_TARGET_DIR),target)/criterion
+# Open3D brings packages that disturb pytest: it has an environment of its own.
+BENCH_VENV := build/bench-venv
 # Sets and dictionaries of words keep one order in every run.
 export PYTHONHASHSEED := 0
 
-.PHONY: help demo test test-rust test-python test-long bench-physics referee lint bench build clean
+.PHONY: help demo test test-rust test-python test-long bench-physics bench-features referee lint bench build fuzz clean
 
 help: ## list the verbs
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -49,14 +52,34 @@ lint: $(VENV)/.deps ## format, lints, types, spelling, documentation, licences
 	$(BIN)/pyright
 	$(BIN)/typos
 
-bench: ## criterion benchmarks; see benches/README.md
+bench: ## criterion benchmarks and one table of them with the bars; see benches/README.md
+	mkdir -p $(CRITERION) && touch $(CRITERION)/.started
 	cargo bench --locked
+	$(PYTHON) scripts/bench_table.py --newer-than $(CRITERION)/.started
+
+bench-features: $(VENV)/.native ## statistics and depth image beside scipy, dcor and Open3D in one run
+	test -x $(BENCH_VENV)/bin/python || $(PYTHON) -m venv $(BENCH_VENV)
+	$(BENCH_VENV)/bin/python -m pip install --quiet -r benches/peers/features-requirements.txt
+	PYTHONPATH=python $(BENCH_VENV)/bin/python benches/peers/features.py
 
 bench-physics: ## bulk laws against their closed forms, the table of docs/results/physics.md; LAWS="silo repose" chooses
 	cargo run --release --locked --example bench_physics -- $(LAWS)
 
 build: $(VENV)/.native ## the command line (target/release/granulcal-cli) and the Python package
 	cargo build --release --locked -p granulcal-cli
+
+# Seconds on each target.
+FUZZ_SECONDS ?= 600
+FUZZ_TARGETS ?= bag mcap png_toml npz
+
+fuzz: ## fuzz the readers of recordings, FUZZ_SECONDS (600) on each of FUZZ_TARGETS; installs nightly Rust and cargo-fuzz
+	rustup toolchain install nightly --profile minimal
+	cargo fuzz --version >/dev/null 2>&1 || cargo install cargo-fuzz --locked
+	for target in $(FUZZ_TARGETS); do \
+		mkdir -p fuzz/found/$$target; \
+		cargo +nightly fuzz run $$target fuzz/found/$$target fuzz/corpus/$$target -- \
+			-max_total_time=$(FUZZ_SECONDS) -max_len=65536 -timeout=30 -rss_limit_mb=1024; \
+	done
 
 clean: ## remove what was built, not what was measured
 	rm -rf target $(VENV) python/granulcal/_native.abi3.so

@@ -1,7 +1,10 @@
 //! Rendering 2000 grains under the bird's-eye camera of the paper.
 
+mod clock;
+
 use std::hint::black_box;
 
+use clock::CpuTime;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use granulcal::features::{Camera, height_map, render, render_grid};
 use nalgebra::Vector3;
@@ -23,7 +26,7 @@ fn heap() -> (Vec<Vector3<f64>>, Vec<f64>) {
     (positions, vec![RADIUS; GRAINS])
 }
 
-fn raster(criterion: &mut Criterion) {
+fn raster(criterion: &mut Criterion<CpuTime>) {
     let (positions, radii) = heap();
     let camera = Camera::overhead(0.29, 0.58, 1920).expect("the paper's camera");
     let mut group = criterion.benchmark_group("features/raster");
@@ -44,5 +47,9 @@ fn raster(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, raster);
+criterion_group! {
+    name = benches;
+    config = Criterion::default().with_measurement(CpuTime);
+    targets = raster
+}
 criterion_main!(benches);

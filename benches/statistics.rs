@@ -1,9 +1,12 @@
-//! The 16 statistics of a heap, as dense as down-sampled and full depth images give it.
+//! The statistics of a heap, as dense as down-sampled and full depth images give it.
+
+mod clock;
 
 use std::hint::black_box;
 
+use clock::CpuTime;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use granulcal::features::{PAPER16, Prepared, paper16};
+use granulcal::features::{DiagnosticSettings, PAPER16, Prepared, diagnostics, paper16};
 use nalgebra::Vector3;
 
 /// A cone with a rough surface, on a sunflower spiral.
@@ -20,7 +23,7 @@ fn cone(count: usize) -> Vec<Vector3<f64>> {
         .collect()
 }
 
-fn statistics(criterion: &mut Criterion) {
+fn statistics(criterion: &mut Criterion<CpuTime>) {
     let mut group = criterion.benchmark_group("features/statistics");
     for count in [1_000_usize, 10_000, 100_000] {
         let points = cone(count);
@@ -35,8 +38,18 @@ fn statistics(criterion: &mut Criterion) {
             b.iter(|| Prepared::new(black_box(&points)).map(|p| (statistic.value)(&p)));
         });
     }
+    group.throughput(Throughput::Elements(points.len() as u64));
+    let spacing = 0.06 * (std::f64::consts::PI / points.len() as f64).sqrt();
+    let settings = DiagnosticSettings { pour_axis: None, grain_diameter: 4e-3, spacing };
+    group.bench_function(BenchmarkId::new("diagnostics", points.len()), |b| {
+        b.iter(|| diagnostics(black_box(&points), &settings));
+    });
     group.finish();
 }
 
-criterion_group!(benches, statistics);
+criterion_group! {
+    name = benches;
+    config = Criterion::default().with_measurement(CpuTime);
+    targets = statistics
+}
 criterion_main!(benches);

@@ -17,7 +17,12 @@ from granulcal.prior import Parameter, Prior
 from granulcal.recording import Camera, Formation, Plane, Recording
 from granulcal.scene import Material, Scene
 from granulcal.simulate import Pour, simulate
-from granulcal.statistics import Statistics, statistics
+from granulcal.statistics import (
+    DiagnosticStatistics,
+    Statistics,
+    diagnostic_statistics,
+    statistics,
+)
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
@@ -27,6 +32,7 @@ __all__ = [
     "BayesSim",
     "Camera",
     "Dataset",
+    "DiagnosticStatistics",
     "Formation",
     "Material",
     "Parameter",
@@ -38,6 +44,7 @@ __all__ = [
     "Scene",
     "Statistics",
     "__version__",
+    "diagnostic_statistics",
     "generate",
     "simulate",
     "statistics",

@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,10 @@ Calibrates a granular simulator from depth images.
 Commands of the simulator (granulcal COMMAND --help tells more):
   simulate, generate, render, features, inspect, merge, completions
 """
-_EPILOG = "Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy."
+_EPILOG = (
+    "Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy "
+    "or some frames of a recording lost."
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -107,9 +111,20 @@ def _add_recordings(parser: argparse.ArgumentParser) -> None:
         "recording",
         type=Path,
         nargs="+",
-        help=".npz height map, 16-bit depth PNG or folder of PNGs; several: pours of one material",
+        help=".bag, .mcap, .npz height map, 16-bit depth PNG or folder of PNGs; "
+        "several: pours of one material",
     )
-    parser.add_argument("--camera", type=Path, help="TOML of the camera, for depth images")
+    parser.add_argument("--camera", type=Path, help="TOML of the camera; PNGs need it")
+    parser.add_argument("--topic", help="topic of the depth images, where several fit")
+    parser.add_argument("--camera-topic", help="topic of the lens, where several fit")
+    parser.add_argument("--colour-topic", help="topic of the colour images, where several fit")
+    parser.add_argument(
+        "--frames",
+        type=_frames,
+        default=10,
+        help="frames to average, or all (default: the last 10)",
+    )
+    parser.add_argument("--first-frame", type=int, help="index of the first of them, from 0")
     parser.add_argument("--scene", type=Path, help="refuse a model of another scene than this TOML")
 
 
@@ -187,42 +202,50 @@ def _infer(options: argparse.Namespace) -> int:
         options.out.write_text(text + "\n", encoding="utf-8")
     if options.json:
         print(json.dumps(document, indent=1))
-        return _DONE
+        return _outcome(recordings)
     print(f"{'parameter':<30}{'mode':>10}{'mean':>10}   90 % interval")
     for name, values in document["parameters"].items():
         low, high = values["interval90"]
         print(f"{name:<30}{values['mode']:>10.4g}{values['mean']:>10.4g}   {low:.4g} to {high:.4g}")
     for warning in document["warnings"]:
         print(f"note: {warning}", file=sys.stderr)
-    return _DONE
+    return _outcome(recordings)
 
 
 def _report(options: argparse.Namespace) -> int:
     from granulcal.calibrate import calibrate
     from granulcal.dataset import Dataset
+    from granulcal.recording import FRAMES
 
     if options.seeds < 1:
         raise ValueError(f"--seeds must be at least 1, got {options.seeds}")
     model = _model(options)
     data = Dataset.load(options.model / _TRAINING if options.data is None else options.data)
     names = " ".join(str(path) for path in options.recording)
-    camera = "" if options.camera is None else f" --camera {options.camera}"
+    flags = "".join(
+        f" --{name.replace('_', '-')} {getattr(options, name)}"
+        for name in ("camera", "topic", "camera_topic", "colour_topic", "first_frame")
+        if getattr(options, name) is not None
+    )
+    if options.frames != FRAMES:
+        flags += f" --frames {options.frames or 'all'}"
+    recordings = _recordings(options)
     found = calibrate(
         model,
         data,
-        _recordings(options),
+        recordings,
         report=options.out,
         seeds=options.seeds,
         threads=options.threads,
         title=f"Calibration from {names}",
         summary=f"Parameters of the scene {data.scene.name!r}, inferred from {names} "
         f"with a model trained on {len(data)} pours.",
-        command=f"granulcal report {options.model} {names}{camera} "
+        command=f"granulcal report {options.model} {names}{flags} "
         f"-o {options.out} --seeds {options.seeds}",
     )
     print(found.report)
     is_healthy = all(p.status != "unhealthy" for p in [*found.pours, *found.prior_pours])
-    return _DONE if is_healthy else _UNHEALTHY
+    return _outcome(recordings, is_healthy)
 
 
 def _reproduce(options: argparse.Namespace) -> int:
@@ -267,9 +290,37 @@ def _model(options: argparse.Namespace) -> Any:
 
 
 def _recordings(options: argparse.Namespace) -> list[Any]:
-    from granulcal.recording import Recording
+    from granulcal.recording import DamagedRecordingWarning, Recording
 
-    return [Recording.open(path, camera=options.camera) for path in options.recording]
+    opened: list[Any] = []
+    for path in options.recording:
+        with warnings.catch_warnings():
+            # Told below in the manner of a command line.
+            warnings.simplefilter("ignore", DamagedRecordingWarning)
+            recording = Recording.open(
+                path,
+                camera=options.camera,
+                topic=options.topic,
+                camera_topic=options.camera_topic,
+                colour_topic=options.colour_topic,
+                frames=options.frames,
+                first_frame=options.first_frame,
+            )
+        for line in recording.damage:
+            print(f"warning: {line}", file=sys.stderr)
+        if recording.lost is not None:
+            print(f"warning: {path}: {recording.lost}", file=sys.stderr)
+        opened.append(recording)
+    return opened
+
+
+def _frames(text: str) -> int | None:
+    return None if text == "all" else int(text)
+
+
+def _outcome(recordings: Sequence[Any], is_healthy: bool = True) -> int:
+    is_whole = all(recording.lost is None for recording in recordings)
+    return _DONE if is_healthy and is_whole else _UNHEALTHY
 
 
 if __name__ == "__main__":

@@ -16,13 +16,13 @@ from granulcal.prior import Prior
 from granulcal.progress import ProgressLine
 from granulcal.scene import Scene
 from granulcal.simulate import check_whole
-from granulcal.statistics import NAMES
+from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES
 
 __all__ = ["Dataset", "generate"]
 
 Array = NDArray[np.float64]
 
-_UNUSABLE = ("unhealthy", "no_grains_in_view")
+_UNUSABLE = ("unhealthy", "jammed", "no_grains_in_view")
 
 
 class Dataset:
@@ -37,6 +37,9 @@ class Dataset:
         theta_names: their paths in the scene.
         x: the statistics, shape (n, 16); NaN where no grains were in view.
         x_names: their names.
+        diagnostics: the diagnostic statistics, shape (n, 40); NaN where no grains were in view, and
+            in data sets that were made before there were any.
+        diagnostic_names: their names.
         status: how each pour ended.
         seed: seed of each pour, shape (n,).
         row: index of each pour, shape (n,).
@@ -51,6 +54,8 @@ class Dataset:
         self.theta_names: tuple[str, ...] = tuple(native.theta_names)
         self.x = native.x
         self.x_names: tuple[str, ...] = NAMES
+        self.diagnostics = native.diagnostics
+        self.diagnostic_names: tuple[str, ...] = DIAGNOSTIC_NAMES
         self.status: NDArray[np.str_] = np.array(native.status, dtype=np.str_)
         self.seed = native.pour_seed
         self.health = native.health
@@ -87,7 +92,7 @@ class Dataset:
 
     @property
     def is_usable(self) -> NDArray[np.bool_]:
-        """Which pours are healthy and have grains in view, shape (n,)."""
+        """Which pours are healthy, left the funnel and have grains in view, shape (n,)."""
         return ~np.isin(self.status, _UNUSABLE) & np.isfinite(self.x).all(axis=1)
 
     def status_counts(self) -> dict[str, int]:
@@ -98,8 +103,9 @@ class Dataset:
         """Returns every column by name, in the order of the Parquet file."""
         theta = {name: self.theta[:, i] for i, name in enumerate(self.theta_names)}
         x = {name: self.x[:, i] for i, name in enumerate(self.x_names)}
+        named = zip(self.diagnostic_names, self.diagnostics.T, strict=True)
         keys = {"row": self.row, **theta, "seed": self.seed, "status": self.status}
-        return {**keys, **self.health, **x}
+        return {**keys, **self.health, **x, **dict(named)}
 
     def to_pandas(self) -> Any:
         """Returns a pandas DataFrame of all columns.

@@ -1,5 +1,6 @@
 """Measured depth images and height maps, and a camera that makes such recordings of grains."""
 
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -9,14 +10,47 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
-from granulcal.statistics import Statistics, as_points, statistics
+from granulcal.statistics import (
+    DiagnosticStatistics,
+    Statistics,
+    as_points,
+    diagnostic_statistics,
+    statistics,
+)
 
-__all__ = ["Camera", "Formation", "Plane", "Recording"]
+__all__ = ["Camera", "DamagedRecordingWarning", "Formation", "Lost", "Plane", "Recording"]
 
 Array = NDArray[np.float64]
 
 # A tenth of a millimetre: finer than a depth camera at this range, and 16 bits reach 6.5 m.
 _DEPTH_UNIT = 1e-4
+
+# Frames that are averaged unless told otherwise: as many as Matl et al. 2020 average.
+FRAMES = 10
+
+
+class DamagedRecordingWarning(UserWarning):
+    """A recording is cut off or damaged; the frames that are whole were used."""
+
+
+@dataclass(frozen=True)
+class Lost:
+    """Frames of a damaged recording that are lost.
+
+    Attributes:
+        frames: their number.
+        how: how well it is known: `exactly`, `about` (by the bytes that are missing) or `at least`.
+    """
+
+    frames: int
+    how: str
+
+    def __str__(self) -> str:
+        """Returns a phrase for messages."""
+        if self.how == "at least" and self.frames == 0:
+            return "an unknown number of frames lost"
+        known = "" if self.how == "exactly" else f"{self.how} "
+        return f"{known}{self.frames} frame{'' if self.frames == 1 else 's'} lost"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +83,7 @@ class Formation:
         valid_count: pixels that carry data.
         threshold: height from which a pixel counts as grain [m].
         centroid: where the centroid was before it was moved to 0 [m].
+        spacing: distance on the ground of points from neighbouring pixels [m]; NaN of one point.
     """
 
     points: Array
@@ -57,10 +92,31 @@ class Formation:
     valid_count: int
     threshold: float
     centroid: tuple[float, float]
+    spacing: float
 
     def statistics(self) -> Statistics:
         """Returns the statistics of the points."""
         return statistics(self.points)
+
+    def diagnostic_statistics(
+        self, *, grain_diameter: float, pour_axis: tuple[float, float] | None = None
+    ) -> DiagnosticStatistics:
+        """Returns the diagnostic statistics of the points.
+
+        Args:
+            grain_diameter: diameter of a grain [m].
+            pour_axis: where the axis of the pour meets the levelled ground [m], in the frame in
+                which `centroid` is told; the centroid if None, which hides modes of order 1.
+
+        Raises:
+            ValueError: fewer than 3 points, or a length out of range.
+        """
+        axis = None
+        if pour_axis is not None:
+            axis = (pour_axis[0] - self.centroid[0], pour_axis[1] - self.centroid[1])
+        return diagnostic_statistics(
+            self.points, grain_diameter=grain_diameter, spacing=self.spacing, pour_axis=axis
+        )
 
     def height_image(self) -> Array:
         """Returns heights above the fitted ground [m], NaN where no grain is, shape (h, w)."""
@@ -72,8 +128,9 @@ class Formation:
 class Recording:
     """One measured formation: a height map, or a depth image with its camera.
 
-    Reads .npz height maps, 16-bit depth PNGs, and folders of such PNGs of one formation, which are
-    averaged. PNGs need the TOML of their camera.
+    Reads ROS 1 .bag files as the RealSense viewer saves them, .mcap files of ROS 2 and of Foxglove,
+    16-bit depth PNGs, folders of such frames, and .npz height maps. Of several frames the mean of
+    each pixel is taken over those that have data there. PNGs need the TOML of their camera.
 
     Example:
         >>> import tempfile
@@ -94,24 +151,81 @@ class Recording:
 
     @classmethod
     def open(
-        cls, path: str | PathLike[str], camera: str | PathLike[str] | None = None
+        cls,
+        path: str | PathLike[str],
+        camera: str | PathLike[str] | None = None,
+        *,
+        topic: str | None = None,
+        camera_topic: str | None = None,
+        colour_topic: str | None = None,
+        frames: int | None = FRAMES,
+        first_frame: int | None = None,
     ) -> "Recording":
         """Returns the recording at `path`.
 
+        A file that is cut off or damaged gives the frames that are whole, with a warning; `lost`
+        says how many are not.
+
         Args:
-            path: .npz, .png or a folder of .png.
-            camera: TOML of the camera, which depth images need and height maps have not.
+            path: .bag, .mcap, .npz, .png, or a folder of .png.
+            camera: TOML of the camera, which PNGs need and height maps have not; of a .bag or .mcap
+                it replaces lens, depth unit and segmentation, key by key.
+            topic: topic of the depth images, where several fit.
+            camera_topic: topic of the lens, where several fit.
+            colour_topic: topic of the colour images, where several fit; they are read when the
+                camera's TOML marks grains by colour.
+            frames: most frames that are averaged; None for all. The paper averages ten.
+            first_frame: index of the first of them, from 0; by default the last `frames` are taken.
 
         Raises:
             FileNotFoundError: a file does not exist.
-            ValueError: a file is no recording; the message says what is wrong with it.
+            ValueError: a file is no recording, or none or several topics fit; the message says what
+                is wrong and lists the topics.
         """
-        return cls(_native.Recording.open(path, camera), Path(path))
+        if frames is not None and frames < 1:
+            raise ValueError(f"frames must be at least 1, got {frames}")
+        if first_frame is not None and first_frame < 0:
+            raise ValueError(f"first_frame must be at least 0, got {first_frame}")
+        native = _native.Recording.open(
+            path,
+            camera,
+            topic=topic,
+            camera_topic=camera_topic,
+            colour_topic=colour_topic,
+            frames=frames,
+            first_frame=first_frame,
+        )
+        recording = cls(native, Path(path))
+        if recording.lost is not None:
+            text = f"{path}: {recording.lost}; {'; '.join(recording.damage)}"
+            warnings.warn(text, DamagedRecordingWarning, stacklevel=2)
+        return recording
 
     @property
     def frames(self) -> int:
         """Number of frames that were averaged."""
         return self._native.frames
+
+    @property
+    def whole_frames(self) -> int:
+        """Number of frames of the recording that are whole."""
+        return self._native.whole_frames
+
+    @property
+    def topic(self) -> str | None:
+        """Topic of the depth images; None for a recording without topics."""
+        return self._native.topic
+
+    @property
+    def lost(self) -> "Lost | None":
+        """Frames that are lost; None for a whole recording."""
+        found = self._native.lost
+        return None if found is None else Lost(*found)
+
+    @property
+    def damage(self) -> list[str]:
+        """What is cut off or damaged, a line each."""
+        return self._native.damage
 
     @cached_property
     def depth(self) -> NDArray[np.float32] | None:
@@ -180,6 +294,7 @@ class Recording:
             valid_count=found.valid_count,
             threshold=found.threshold,
             centroid=found.centroid,
+            spacing=float("nan") if found.spacing is None else found.spacing,
         )
 
     @cached_property

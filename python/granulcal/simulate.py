@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from granulcal import _native
 from granulcal.scene import Material, Scene
-from granulcal.statistics import Statistics
+from granulcal.statistics import DiagnosticStatistics, Statistics
 
 __all__ = ["Pour", "simulate"]
 
@@ -52,8 +52,18 @@ class Pour:
 
     @property
     def status(self) -> str:
-        """How the pour ended: `at_rest`, `out_of_view`, `horizon` or `unhealthy`."""
+        """How the pour ended: `at_rest`, `out_of_view`, `jammed`, `horizon` or `unhealthy`."""
         return self._native.status
+
+    @property
+    def grains_in_funnel(self) -> int:
+        """Grains whose centre is in the funnel at the end; 0 where the scene has none."""
+        return self._native.grains_in_funnel
+
+    @property
+    def state_hash(self) -> str:
+        """Hash of every bit of the final state, 32 hexadecimal digits: equal for equal pours."""
+        return self._native.state_hash
 
     @cached_property
     def health(self) -> dict[str, float]:
@@ -106,6 +116,16 @@ class Pour:
             ValueError: too few grains are in view.
         """
         return Statistics(self._observation.statistics())
+
+    def diagnostic_statistics(self) -> DiagnosticStatistics:
+        """Returns the diagnostic statistics of the image, about the scene's vertical axis.
+
+        Isolated grains are seen only by pixels finer than a grain: `camera.downsample` decides.
+
+        Raises:
+            ValueError: too few grains are in view.
+        """
+        return DiagnosticStatistics(self._observation.diagnostics())
 
     @cached_property
     def _observation(self) -> _native.Observation:

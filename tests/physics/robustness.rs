@@ -100,8 +100,8 @@ fn a_narrow_funnel_jams() {
     let pour = start(&scene).run();
     assert_finite(&pour);
     let above = pour.positions.iter().filter(|p| p.z > 0.05).count();
-    assert_eq!(pour.status, Status::AtRest);
-    assert!(above > 150 && pour.health.grains_lost == 0);
+    assert_eq!(pour.status, Status::Jammed);
+    assert!(above > 150 && pour.grains_in_funnel > 150 && pour.health.grains_lost == 0);
 }
 
 #[test]
@@ -113,7 +113,9 @@ fn grains_that_miss_the_funnel_fall_past_it() {
     scene.material = material(0.5, 0.3, 0.3);
     let pour = start(&scene).run();
     assert_finite(&pour);
-    assert!(matches!(pour.status, Status::AtRest | Status::OutOfView), "{:?}", pour.status);
+    // The pile reaches the stem: a few may stay in it.
+    assert_eq!(pour.status == Status::Jammed, pour.grains_in_funnel > 0);
+    assert!(pour.grains_in_funnel < 10, "{}", pour.grains_in_funnel);
     let above = pour.positions.iter().filter(|p| p.z > 0.02).count();
     assert!(above < 100 && pour.health.grains_lost == 0);
 }

@@ -80,6 +80,19 @@ def test_infer_prints_a_table(model, recording, capsys):
     assert len(lines) == 4
 
 
+def test_infer_reads_a_recording_that_is_cut_off_and_says_so(model, tmp_path, capsys):
+    data = Path(__file__).parents[2] / "crates" / "dataset" / "tests" / "data" / "recordings"
+    whole = (data / "ros2_16uc1_none.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) * 3 // 4])
+    assert main(["infer", str(model), str(cut), "--frames", "all", "--json"]) == 3
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["statistics"]
+    assert "cut.mcap: an unknown number of frames lost" in printed.err
+    assert main(["infer", str(model), str(cut), "--topic", "/nowhere"]) == 2
+    assert "/camera/depth/image_rect_raw" in capsys.readouterr().err
+
+
 def test_a_model_of_another_scene_is_refused(model, recording, small_scene, tmp_path, capsys):
     same, other = tmp_path / "same.toml", tmp_path / "other.toml"
     same.write_text(small_scene.to_toml())

@@ -1,8 +1,11 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import granulcal as gc
 from granulcal.compare import Scale, comparison_table, nearest_row, standardised_distance
+from granulcal.recording import DamagedRecordingWarning, Lost
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +76,61 @@ def test_a_height_map_is_read(tmp_path):
     assert recording.heights is not None
     assert recording.heights.shape == (80, 80)
     assert recording.statistics()["max_z"] == pytest.approx(0.020, abs=2e-4)
+
+
+# Recordings by other people's writers; see crates/dataset/tests/messages.rs for what they show.
+_RECORDINGS = Path(__file__).parents[2] / "crates" / "dataset" / "tests" / "data" / "recordings"
+
+
+def test_recordings_of_messages_are_read():
+    for name in ("realsense_bz2.bag", "ros2_32fc1_lz4.mcap", "foxglove_raw.mcap"):
+        recording = gc.Recording.open(_RECORDINGS / name)
+        assert (recording.frames, recording.whole_frames) == (3, 3)
+        assert recording.lost is None
+        assert recording.topic is not None
+        assert recording.depth is not None
+        assert recording.depth.shape == (8, 12)
+        # Pixel (u, v) = (5, 3) is on the block and never a hole: (500 + 10 + 9 - 40 + frame) mm.
+        assert recording.depth[3, 5] == pytest.approx(0.480)
+        assert 0 < recording.statistics()["max_z"] < 0.1
+    one = gc.Recording.open(_RECORDINGS / "foxglove_raw.mcap", frames=1, first_frame=0)
+    assert one.depth is not None
+    assert one.depth[3, 5] == pytest.approx(0.479)
+    every = gc.Recording.open(_RECORDINGS / "foxglove_raw.mcap", frames=None)
+    assert every.frames == 3
+    with pytest.raises(ValueError, match=r"there are: /depth.*no topic /nowhere"):
+        gc.Recording.open(_RECORDINGS / "foxglove_raw.mcap", topic="/nowhere")
+    with pytest.raises(ValueError, match="at least 1"):
+        gc.Recording.open(_RECORDINGS / "foxglove_raw.mcap", frames=0)
+
+
+def test_a_film_of_a_pour_is_a_recording(tmp_path):
+    film = tmp_path / "pour.mcap"
+    scene = tmp_path / "scene.toml"
+    scene.write_text(gc.Scene.drop(0.03, count=200, preset="fast").to_toml())
+    words = ["granulcal", "simulate", str(scene), "--seed", "2", "--mcap", str(film), "--json"]
+    assert gc._native.run_cli(words) == 0
+    seen = gc.Recording.open(film, frames=1).formation(height_threshold=1e-3).statistics()
+    pour = gc.simulate(gc.Scene.load(scene), seed=2)
+    for name in ("max_z", "mean_r"):
+        assert seen[name] == pytest.approx(pour.statistics()[name], rel=0.02), name
+
+
+def test_a_damaged_recording_warns_and_counts(tmp_path):
+    whole = (_RECORDINGS / "ros2_16uc1_none.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) // 2])
+    with pytest.warns(DamagedRecordingWarning, match=r"cut\.mcap: .* lost; .*byte"):
+        recording = gc.Recording.open(cut)
+    assert recording.frames in (1, 2)
+    assert recording.lost is not None
+    assert recording.lost.how == "at least"
+    assert recording.damage
+    assert str(Lost(0, "at least")) == "an unknown number of frames lost"
+    assert str(Lost(2, "about")) == "about 2 frames lost"
+    cut.write_bytes(whole[:100])
+    with pytest.raises(ValueError, match=r"cut\.mcap"):
+        gc.Recording.open(cut)
 
 
 def test_errors_name_the_file(pour, camera, tmp_path):

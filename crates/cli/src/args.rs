@@ -1,10 +1,11 @@
 //! The arguments: clap types and nothing else.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
-use granulcal_dataset::Shard;
+use granulcal_dataset::{ReadOptions, Shard};
 use granulcal_dem::Preset;
 
 use crate::commands::completions::CompletionsArgs;
@@ -16,10 +17,10 @@ use crate::commands::completions::CompletionsArgs;
 Start here:
   granulcal-cli simulate funnel                       one pour, its health and its 16 statistics
   granulcal-cli generate funnel default -n 100 -o d   100 pours with unknown material, as Parquet
-  granulcal-cli features pile.npz                     the same statistics of a measured pile
+  granulcal-cli features pile.bag                     the same statistics of a measured pile
 
 Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy or without
-grains in view, 130 stopped. Results go to stdout, progress and messages to stderr.")]
+grains in view or some frames of a recording lost, 130 stopped. Results go to stdout, progress and messages to stderr.")]
 pub struct Cli {
     #[command(flatten)]
     pub global: Global,
@@ -87,9 +88,16 @@ statistics of its depth image.
 The same scene, numbers and seed give the same result on any machine. The row of a data set
 is made again by setting its parameters and its seed.
 
+A long pour survives whatever stops it: with --checkpoint its whole state is kept in a file,
+at the start, every minute, when you stop it (Ctrl-C or SIGTERM) and at the end. The same
+command with --resume goes on from there, and every bit of the result is that of a pour that
+was never stopped. A checkpoint of another scene, seed, preset or version is refused.
+
 Example:
   granulcal-cli simulate funnel --set material.sliding_friction=0.5 --seed 1 --json
-  granulcal-cli simulate examples/drop.toml --mcap drop.mcap --positions grains.npy")]
+  granulcal-cli simulate examples/drop.toml --mcap drop.mcap --positions grains.npy
+  granulcal-cli simulate large.toml --checkpoint large.ckpt
+  granulcal-cli simulate large.toml --checkpoint large.ckpt --resume large.ckpt")]
 pub struct SimulateArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -102,6 +110,9 @@ pub struct SimulateArgs {
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+    /// Print the diagnostic statistics too: profile, azimuthal modes, tail, bodies
+    #[arg(long)]
+    pub diagnostics: bool,
     /// Write the final centres [m] as an array (n, 3)
     #[arg(long, value_name = "OUT.npy")]
     pub positions: Option<PathBuf>,
@@ -117,6 +128,21 @@ pub struct SimulateArgs {
     /// Frames per simulated second in the MCAP
     #[arg(long, default_value_t = 60.0, requires = "mcap")]
     pub fps: f64,
+    /// Keep the whole state in this file, for --resume
+    #[arg(long, value_name = "FILE", conflicts_with = "mcap")]
+    pub checkpoint: Option<PathBuf>,
+    /// Time between two checkpoints on the clock [s]; 0 for as often as possible
+    #[arg(long, value_name = "SECONDS", default_value = "60", requires = "checkpoint",
+        value_parser = parse_period)]
+    pub checkpoint_every: Duration,
+    /// Go on from a checkpoint of the same scene, seed and preset, on any number of threads
+    #[arg(long, value_name = "FILE", conflicts_with = "mcap")]
+    pub resume: Option<PathBuf>,
+}
+
+fn parse_period(text: &str) -> Result<Duration, String> {
+    let period = text.parse().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    period.ok_or_else(|| format!("must be a number of seconds, 0 or more, got {text:?}"))
 }
 
 /// Simulate many pours with parameters drawn from a prior, to Parquet
@@ -191,27 +217,36 @@ pub struct RenderArgs {
     pub depth_unit: f64,
 }
 
-/// Segment and describe a measured height map or depth image
+/// Segment and describe a measured recording
 #[derive(Debug, Args)]
 #[command(long_about = "\
 Finds the ground plane of a measured recording, levels it, takes the points above it and
 prints the same 16 statistics that simulated pours have.
 
-RECORDING is an .npz height map (arrays depthmap, xres, yres, zres, scale), a 16-bit depth
-PNG, or a folder of PNGs of one pile, which are averaged. PNGs need --camera: the TOML of
-lens, depth unit and segmentation.
+RECORDING is one of, as its content says:
+  .bag    ROS 1, as the RealSense viewer saves it: depth, lens and depth unit are in the file
+  .mcap   sensor_msgs/Image (16UC1, 32FC1), CompressedImage (PNG) and CameraInfo of ROS 2,
+          or RawImage, CompressedImage and CameraCalibration of Foxglove
+  .png    16-bit depth, or a folder of such frames; needs --camera, the TOML of lens and unit
+  .npz    height map: arrays depthmap, xres, yres, zres, scale
+
+Topics are found by type. Where several fit, the message lists them, and --topic, --camera-topic
+or --colour-topic picks one; `inspect` shows them all. Of the last ten frames (--frames,
+--first-frame) the mean of each pixel is taken over those that have data there. A file that is
+cut off or damaged gives the frames that are whole; the others are counted, exit code 3.
 
 Example:
-  granulcal-cli features pile.npz --threshold 0.002
-  granulcal-cli features frames/ --camera examples/camera.toml --json
+  granulcal-cli features pile.bag
+  granulcal-cli features pile.mcap --topic /camera/depth/image_rect_raw --frames 30 --json
+  granulcal-cli features frames/ --camera examples/camera.toml --threshold 0.002
+  granulcal-cli features pile.npz --diagnostics --grain-diameter 0.002
   granulcal-cli features --list")]
 pub struct FeaturesArgs {
     /// Recording to describe
     #[arg(required_unless_present = "list")]
     pub recording: Option<PathBuf>,
-    /// TOML of the camera that took a depth image
-    #[arg(long, value_name = "CAMERA.toml")]
-    pub camera: Option<PathBuf>,
+    #[command(flatten)]
+    pub read: ReadArgs,
     /// Height above the ground from which a pixel counts as grain [m]
     #[arg(long, value_name = "METRES")]
     pub threshold: Option<f64>,
@@ -233,17 +268,76 @@ pub struct FeaturesArgs {
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+    /// Print (or list) the diagnostic statistics too: profile, azimuthal modes, tail, bodies
+    #[arg(long)]
+    pub diagnostics: bool,
+    /// Diameter of a grain [m], which the diagnostic statistics need
+    #[arg(long, value_name = "METRES", requires = "diagnostics")]
+    pub grain_diameter: Option<f64>,
+    /// Where the axis of the pour meets the levelled ground [m], in the frame of the centroid that is
+    /// printed [default: the centroid]
+    #[arg(long, num_args = 2, value_names = ["X", "Y"], requires = "diagnostics",
+        allow_negative_numbers = true)]
+    pub pour_axis: Option<Vec<f64>>,
     /// List the statistics with unit and meaning
     #[arg(long, conflicts_with_all = ["recording", "camera"])]
     pub list: bool,
+}
+
+/// What of a recording is read.
+#[derive(Clone, Debug, Args)]
+pub struct ReadArgs {
+    /// TOML of the camera: lens, depth unit and segmentation. Images as PNG need it; for .bag and .mcap
+    /// it replaces what they say, key by key
+    #[arg(long, value_name = "CAMERA.toml")]
+    pub camera: Option<PathBuf>,
+    /// Topic of the depth images, where several fit
+    #[arg(long)]
+    pub topic: Option<String>,
+    /// Topic of the lens, where several fit
+    #[arg(long, value_name = "TOPIC")]
+    pub camera_topic: Option<String>,
+    /// Topic of the colour images, where several fit; read when the camera's TOML marks grains by colour
+    #[arg(long, value_name = "TOPIC")]
+    pub colour_topic: Option<String>,
+    /// Average so many frames, or `all`
+    #[arg(long, value_name = "N", default_value = "10", value_parser = parse_frames)]
+    pub frames: usize,
+    /// Index of the first frame that is averaged, from 0 [default: so that the last are]
+    #[arg(long, value_name = "INDEX")]
+    pub first_frame: Option<u64>,
+}
+
+impl ReadArgs {
+    /// The options of the library.
+    pub fn options(&self) -> ReadOptions {
+        ReadOptions {
+            camera: self.camera.clone(),
+            topic: self.topic.clone(),
+            colour_topic: self.colour_topic.clone(),
+            camera_topic: self.camera_topic.clone(),
+            frames: self.frames,
+            first_frame: self.first_frame,
+        }
+    }
+}
+
+fn parse_frames(text: &str) -> Result<usize, String> {
+    let refuse = || format!("must be `all` or a number from 1, got {text:?}");
+    match text {
+        "all" => Ok(usize::MAX),
+        number => number.parse().ok().filter(|&n| n > 0).ok_or_else(refuse),
+    }
 }
 
 /// Say what is in a scene, prior, data set, recording or MCAP file, or in one substep of a scene
 #[derive(Debug, Args)]
 #[command(long_about = "\
 Says what is in a file or folder: a scene, prior or camera (.toml), a data set (folder or
-.parquet), an array or height map (.npy, .npz), an image (.png) or a recording over time
-(.mcap). The whole file is read, so a damaged one is found.
+.parquet), an array or height map (.npy, .npz), an image (.png), a folder of frames, a checkpoint
+(.ckpt), or a recording over time (.bag, .mcap): its topics with types, counts and sizes, which of
+them `features` reads, with which lens and depth unit. The whole file is read, so a damaged one is
+found: it is said where, and how many frames are lost (exit code 3).
 
 With --contact-problem PATH is a scene, or one of the words `funnel` and `drop`: it is simulated
 until --time, and the contact problem of the next substep is written with its solution, as arrays
@@ -251,6 +345,7 @@ that docs/theory/contact-problem.md describes.
 
 Example:
   granulcal-cli inspect data/
+  granulcal-cli inspect pile.bag
   granulcal-cli inspect drop.mcap --json
   granulcal-cli inspect drop --set grains.count=60 --contact-problem frozen.npz --time 0.2")]
 pub struct InspectArgs {
@@ -308,6 +403,12 @@ mod tests {
     #[test]
     fn arguments_are_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn frames_are_a_number_or_all() {
+        assert_eq!((parse_frames("30"), parse_frames("all")), (Ok(30), Ok(usize::MAX)));
+        assert!(parse_frames("0").is_err() && parse_frames("ten").is_err());
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //! | 0 | done; also when whoever read stdout closed it |
 //! | 1 | failed: a disk that is full, a folder in use |
 //! | 2 | bad arguments or bad input |
-//! | 3 | done, but some pours are unhealthy or show no grains |
+//! | 3 | done, but some pours are unhealthy or show no grains, or a recording is cut off or damaged |
 //! | 130 | stopped by Ctrl-C or a termination signal; finished rows are kept |
 
 mod args;

@@ -13,6 +13,8 @@ pub enum Outcome {
     Done,
     /// As asked, but some pours cannot be used.
     SomeUnhealthy,
+    /// As asked, but the input is cut off or damaged and a part of it is lost.
+    SomeLost,
     /// The user stopped it.
     Stopped,
 }
@@ -22,7 +24,7 @@ impl Outcome {
     pub fn exit_code(self) -> u8 {
         match self {
             Self::Done => 0,
-            Self::SomeUnhealthy => 3,
+            Self::SomeUnhealthy | Self::SomeLost => 3,
             // As shells report a process that SIGINT ended.
             Self::Stopped => 130,
         }
@@ -31,6 +33,11 @@ impl Outcome {
     /// Done, or not quite.
     pub fn healthy_if(healthy: bool) -> Self {
         if healthy { Self::Done } else { Self::SomeUnhealthy }
+    }
+
+    /// Done, or not with all that there was.
+    pub fn whole_if(whole: bool) -> Self {
+        if whole { Self::Done } else { Self::SomeLost }
     }
 }
 

@@ -1,9 +1,12 @@
 //! Scenes and priors as arguments name them, and one pour of a scene.
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use granulcal_dataset::{DatasetError, Prior, load_prior, load_scene, record_pour};
+use granulcal_dataset::{
+    DatasetError, Prior, load_prior, load_scene, record_pour, resume_checkpoint, write_checkpoint,
+};
 use granulcal_dem::{Pour, Scene, Simulation};
 
 use crate::args::{SceneArgs, SceneChanges};
@@ -14,8 +17,8 @@ use crate::progress::PourProgress;
 const FUNNEL_HEIGHT: f64 = 0.12;
 /// Drop height of the built-in scene `[m]`.
 const DROP_HEIGHT: f64 = 0.1;
-/// Simulated time between two looks at the clock and at Ctrl-C `[s]`.
-const GLANCE: f64 = 0.01;
+/// Simulated time between two looks at the clock and at Ctrl-C `[s]`: some substeps, seconds for a million grains.
+const GLANCE: f64 = 0.002;
 
 /// The scene that the arguments describe.
 ///
@@ -55,24 +58,55 @@ pub fn prior(path: &Path) -> anyhow::Result<Prior> {
     }
 }
 
-/// Where a pour is recorded, and how many frames a simulated second.
-pub struct Film<'a> {
-    /// The MCAP file.
-    pub path: &'a Path,
-    /// Frames per simulated second.
-    pub fps: f64,
+/// What is kept of a pour while it runs.
+pub enum Keep<'a> {
+    /// Nothing.
+    Nothing,
+    /// Frames, in an MCAP file.
+    Film {
+        /// The file.
+        path: &'a Path,
+        /// Frames per simulated second.
+        fps: f64,
+    },
+    /// The newest state, to go on from.
+    Checkpoint {
+        /// The file.
+        path: &'a Path,
+        /// Least time between two writes.
+        every: Duration,
+    },
 }
 
-/// Simulates a scene to its end on so many threads; `None` when the user stopped it.
+/// A scene at its start, or at a checkpoint, on so many threads.
 ///
 /// # Errors
-/// What is wrong with the scene or the film.
+/// What is wrong with the scene or the checkpoint.
+pub fn start(
+    scene: &Scene,
+    seed: u64,
+    threads: usize,
+    resume: Option<&Path>,
+) -> Result<Simulation, DatasetError> {
+    let simulation = Simulation::new(scene, seed)
+        .and_then(|simulation| simulation.with_threads(threads))
+        .map_err(DatasetError::Simulation)?;
+    match resume {
+        Some(path) => resume_checkpoint(path, simulation),
+        None => Ok(simulation),
+    }
+}
+
+/// Simulates `scene` from where `simulation` is to its end; `None` when the user stopped it.
+///
+/// # Errors
+/// What is wrong with the file that is kept.
 pub fn pour(
     context: &Context,
     scene: &Scene,
     seed: u64,
-    threads: usize,
-    film: Option<&Film>,
+    simulation: Simulation,
+    keep: &Keep,
 ) -> Result<Option<Pour>, DatasetError> {
     let progress = PourProgress::new(context);
     let horizon = scene.end.horizon;
@@ -80,17 +114,37 @@ pub fn pour(
         progress.show(time, horizon);
         keeps_going()
     };
-    let mut simulation = Simulation::new(scene, seed)
-        .and_then(|simulation| simulation.with_threads(threads))
-        .map_err(DatasetError::Simulation)?;
-    let pour = if let Some(film) = film {
-        record_pour(simulation, scene, seed, film.fps, film.path, &mut watch)?
-    } else {
-        while simulation.ended().is_none() && watch(simulation.time()) {
-            simulation.advance(GLANCE);
+    let pour = match *keep {
+        Keep::Film { path, fps } => record_pour(simulation, scene, seed, fps, path, &mut watch)?,
+        Keep::Nothing => run(simulation, &mut watch, &mut |_, _| Ok(()))?,
+        Keep::Checkpoint { path, every } => {
+            let mut last = None;
+            run(simulation, &mut watch, &mut |simulation, must| {
+                if must || last.is_none_or(|last: Instant| last.elapsed() >= every) {
+                    write_checkpoint(path, simulation)?;
+                    last = Some(Instant::now());
+                }
+                Ok(())
+            })?
         }
-        simulation.ended().is_some().then(|| simulation.into_pour())
     };
     progress.finish();
     Ok(pour)
+}
+
+/// Goes on to the end, or until `watch` says no; `keep` is called at every glance, and with true at the last one.
+fn run(
+    mut simulation: Simulation,
+    watch: &mut dyn FnMut(f64) -> bool,
+    keep: &mut dyn FnMut(&Simulation, bool) -> Result<(), DatasetError>,
+) -> Result<Option<Pour>, DatasetError> {
+    loop {
+        let has_ended = simulation.ended().is_some();
+        let goes_on = !has_ended && watch(simulation.time());
+        keep(&simulation, !goes_on)?;
+        if !goes_on {
+            return Ok(has_ended.then(|| simulation.into_pour()));
+        }
+        simulation.advance(GLANCE);
+    }
 }

@@ -1,12 +1,15 @@
 //! The process boundary: exit codes, streams, files. What the numbers mean is tested elsewhere.
 
+mod place;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use granulcal_dataset::{Dataset, png};
-use granulcal_features::{DepthImage, PAPER16};
+use granulcal_features::{DIAGNOSTICS, DepthImage, PAPER16};
+use place::{Place, json, text};
 use serde_json::Value;
 
 /// A pour that takes milliseconds.
@@ -22,70 +25,6 @@ const TINY: [&str; 10] = [
     "--set",
     "camera.downsample=8",
 ];
-
-/// A folder of its own, and the binary run inside it.
-struct Place(tempfile::TempDir);
-
-impl Place {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn at(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        fs::write(self.at(name), bytes).unwrap();
-        self.at(name)
-    }
-
-    fn command(&self, args: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_granulcal-cli"));
-        command.args(args).current_dir(self.0.path()).stdin(Stdio::null());
-        command
-    }
-
-    fn run(&self, args: &[&str]) -> Output {
-        self.command(args).output().unwrap()
-    }
-
-    /// Runs, expects the exit code, returns stdout.
-    fn expect(&self, code: i32, args: &[&str]) -> String {
-        let output = self.run(args);
-        let (out, err) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(code), "{args:?}\nstdout: {out}\nstderr: {err}");
-        out
-    }
-
-    /// Runs what must be refused as bad input; every word must stand in the message.
-    fn refused(&self, args: &[&str], words: &[&str]) {
-        let before = self.listing();
-        let output = self.run(args);
-        let (out, err) = (text(&output.stdout), text(&output.stderr));
-        assert_eq!(output.status.code(), Some(2), "{args:?}\nstdout: {out}\nstderr: {err}");
-        assert_eq!(out, "", "{args:?}");
-        for word in words {
-            assert!(err.contains(word), "{args:?}: {word:?} is missing in\n{err}");
-        }
-        assert_eq!(self.listing(), before, "{args:?} left something on the disk");
-    }
-
-    fn listing(&self) -> Vec<PathBuf> {
-        let mut found: Vec<_> =
-            fs::read_dir(self.0.path()).unwrap().map(|e| e.unwrap().path()).collect();
-        found.sort();
-        found
-    }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-fn json(out: &str) -> Value {
-    serde_json::from_str(out).unwrap_or_else(|e| panic!("{e}: {out}"))
-}
 
 fn tiny<'a>(head: &[&'a str], tail: &[&'a str]) -> Vec<&'a str> {
     [head, &TINY, tail].concat()
@@ -192,11 +131,34 @@ fn a_rendered_image_is_described_like_its_pour() {
     };
     close("max_z", 3e-4);
     close("mean_r", 3e-3);
+    assert!(measured.get("diagnostics").is_none());
     place.expect(0, &tiny(&["simulate", "drop"], &["--positions", "g.npy"]));
     place.expect(0, &tiny(&["render", "drop", "-o", "b.png"], &["--positions", "g.npy"]));
     assert_eq!(fs::read(place.at("pile.png")).unwrap(), fs::read(place.at("b.png")).unwrap());
     let map = tiny(&["render", "drop", "-o", "m.npz"], &[]);
     place.refused(&map, &["m.npz", "pinhole", ".png"]);
+}
+
+#[test]
+fn diagnostic_statistics_are_printed_when_asked_for() {
+    let place = Place::new();
+    let more = ["--diagnostics", "--depth", "pile.png", "--set", "camera.downsample=4"];
+    let simulated = json(&place.expect(0, &tiny(&["simulate", "drop", "--json"], &more)));
+    let names: Vec<_> = simulated["diagnostics"].as_object().unwrap().keys().cloned().collect();
+    assert_eq!(names, DIAGNOSTICS.map(|s| s.name));
+    let recording =
+        ["features", "pile.png", "--camera", "pile.toml", "--threshold", "0.001", "--json"];
+    let with = |more: &[&'static str]| [&recording[..], &["--diagnostics"], more].concat();
+    let at = ["--grain-diameter", "0.004", "--pour-axis", "0", "-0.001"];
+    let measured = json(&place.expect(0, &with(&at)));
+    let of = |report: &Value, name: &str| report["diagnostics"][name].as_f64().unwrap();
+    let (seen, pour) = (of(&measured, "r_95"), of(&simulated, "r_95"));
+    assert!((seen - pour).abs() < 0.1 * pour, "{seen} {pour}");
+    assert!(of(&measured, "mass_cos_1") != of(&simulated, "mass_cos_1"));
+    place.refused(&with(&[]), &["--diagnostics", "--grain-diameter"]);
+    place.refused(&with(&["--grain-diameter=-1"]), &["grain diameter", "-1"]);
+    let alone = [&recording[..], &["--grain-diameter", "0.004"]].concat();
+    place.refused(&alone, &["--diagnostics"]);
 }
 
 #[test]
@@ -398,7 +360,7 @@ fn bad_recordings_are_named() {
     place.refused(&features("nothing", "camera.toml"), &["nothing", "no .png"]);
     place.write("map.npz", "PK\u{3}\u{4} but not really");
     place.refused(&["features", "map.npz"], &["map.npz"]);
-    place.refused(&["features", "camera.toml"], &["camera.toml", ".npz"]);
+    place.refused(&["features", "camera.toml"], &["camera.toml", ".npz", "ROS 1 bag", "width ="]);
     place.write("bad.npy", b"\x93NUMPY\x01\x00");
     let render = tiny(&["render", "drop", "-o", "o.png", "--positions", "bad.npy"], &[]);
     place.refused(&render, &["bad.npy", "truncated"]);
@@ -416,6 +378,8 @@ fn streams_are_kept_apart_and_a_closed_stdout_is_no_failure() {
     let quiet = place.run(&tiny(&["generate", "drop", "default", "-n", "3", "-o", "d", "-q"], &[]));
     assert_eq!(text(&quiet.stderr), "");
     assert!(place.expect(0, &["features", "--list"]).lines().count() == 16);
+    let diagnostics = place.expect(0, &["features", "--list", "--diagnostics"]);
+    assert_eq!(diagnostics.lines().count(), DIAGNOSTICS.len());
     assert!(place.expect(0, &["simulate", "--help"]).contains("Example:"));
     assert!(place.expect(0, &["completions", "bash"]).contains("granulcal-cli"));
     let usage = place.run(&[]);

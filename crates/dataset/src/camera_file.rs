@@ -1,4 +1,4 @@
-//! The TOML beside a measured depth image: lens, unit of depth, colour image, segmentation.
+//! The TOML beside a measured recording: lens, unit of depth, colour image, segmentation.
 
 use std::path::{Path, PathBuf};
 
@@ -10,86 +10,125 @@ use crate::{DatasetError, files};
 
 /// A depth camera as a file states it.
 ///
-/// `cx` and `cy` follow OpenCV and the RealSense SDK: the centre of the first pixel is (0, 0).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// Images as PNG need its lens and unit. A .bag or .mcap has its own, which are replaced by those that
+/// are given.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(into = "CameraToml")]
 pub struct CameraFile {
-    /// Columns `[px]`.
-    pub width: usize,
-    /// Rows `[px]`.
-    pub height: usize,
-    /// Focal length along x `[px]`.
-    pub fx: f64,
-    /// Focal length along y `[px]`.
-    pub fy: f64,
-    /// Principal point, x `[px]`.
-    pub cx: f64,
-    /// Principal point, y `[px]`.
-    pub cy: f64,
+    /// The lens; the six keys `width`, `height`, `fx`, `fy`, `cx`, `cy` of the file.
+    pub lens: Option<Intrinsics>,
     /// Metres per count of the depth image.
-    pub depth_unit: f64,
-    /// 8-bit RGB image of the same size and viewpoint; a path relative to the file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_unit: Option<f64>,
+    /// 8-bit RGB image of the same size and viewpoint; relative to the file where it stands in one.
     pub colour: Option<PathBuf>,
     /// How the image is segmented.
-    #[serde(default, skip_serializing_if = "is_default")]
     pub segmentation: Segmentation,
+}
+
+/// The keys of the file.
+///
+/// `cx` and `cy` follow OpenCV and the RealSense SDK: the centre of the first pixel is (0, 0).
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraToml {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    width: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    height: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fx: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fy: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cx: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cy: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    depth_unit: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    colour: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "is_default")]
+    segmentation: Segmentation,
 }
 
 fn is_default(segmentation: &Segmentation) -> bool {
     *segmentation == Segmentation::default()
 }
 
+impl From<CameraFile> for CameraToml {
+    fn from(file: CameraFile) -> Self {
+        let lens = file.lens;
+        Self {
+            width: lens.map(|lens| lens.width),
+            height: lens.map(|lens| lens.height),
+            fx: lens.map(|lens| lens.fx),
+            fy: lens.map(|lens| lens.fy),
+            cx: lens.map(|lens| lens.cx - 0.5),
+            cy: lens.map(|lens| lens.cy - 0.5),
+            depth_unit: file.depth_unit,
+            colour: file.colour,
+            segmentation: file.segmentation,
+        }
+    }
+}
+
 impl CameraFile {
     /// Reads and checks a camera; `colour` becomes relative to the working directory.
     ///
     /// # Errors
-    /// [`DatasetError::Io`], [`DatasetError::Toml`], or [`DatasetError::Recording`] and
-    /// [`DatasetError::Content`] for numbers that no camera has.
+    /// [`DatasetError::Io`], and those of [`CameraFile::parse`].
     pub fn load(path: &Path) -> Result<Self, DatasetError> {
-        let mut file: Self = toml::from_str(&files::read_text(path)?).map_err(|source| {
-            DatasetError::Toml { path: path.to_owned(), what: "camera", source: Box::new(source) }
-        })?;
-        if !(file.depth_unit > 0.0 && file.depth_unit.is_finite()) {
-            let found = file.depth_unit.to_string();
-            return Err(DatasetError::content(path, "depth_unit", found, "positive and finite"));
-        }
-        file.camera(path)?;
+        let mut file = Self::parse(path, &files::read_text(path)?)?;
         if let (Some(colour), Some(folder)) = (&file.colour, path.parent()) {
             file.colour = Some(folder.join(colour));
         }
         Ok(file)
     }
 
-    /// The camera of a file at `path`, at the origin of a world whose z axis points back at it.
-    pub(crate) fn camera(&self, path: &Path) -> Result<Camera, DatasetError> {
-        let intrinsics = Intrinsics::from_integer_centres(
-            self.width,
-            self.height,
-            self.fx,
-            self.fy,
-            self.cx,
-            self.cy,
-        )
-        .map_err(|source| DatasetError::Recording { path: path.to_owned(), source })?;
-        let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-        let camera_from_world = Isometry3::from_parts(Translation3::identity(), half_turn);
-        Ok(Camera { intrinsics, camera_from_world })
+    /// Checks the text of a file at `path`.
+    ///
+    /// # Errors
+    /// [`DatasetError::Toml`], or [`DatasetError::Recording`] and [`DatasetError::Content`] for
+    /// numbers that no camera has and for a lens of which a part is missing.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, DatasetError> {
+        let file: CameraToml = toml::from_str(text).map_err(|source| DatasetError::Toml {
+            path: path.to_owned(),
+            what: "camera",
+            source: Box::new(source),
+        })?;
+        if let Some(unit) = file.depth_unit
+            && !(unit > 0.0 && unit.is_finite())
+        {
+            let found = unit.to_string();
+            return Err(DatasetError::content(path, "depth_unit", found, "positive and finite"));
+        }
+        Ok(Self {
+            lens: file.lens(path)?,
+            depth_unit: file.depth_unit,
+            colour: file.colour,
+            segmentation: file.segmentation,
+        })
     }
 
     /// What stands beside a depth image that `camera` took.
     pub fn of(camera: &Camera, depth_unit: f64) -> Self {
-        let Intrinsics { width, height, fx, fy, cx, cy } = camera.intrinsics;
         Self {
-            width,
-            height,
-            fx,
-            fy,
-            cx: cx - 0.5,
-            cy: cy - 0.5,
-            depth_unit,
+            lens: Some(camera.intrinsics),
+            depth_unit: Some(depth_unit),
             colour: None,
             segmentation: Segmentation::default(),
+        }
+    }
+
+    /// The lens and the metres per count of the file at `path`, which images as PNG need.
+    pub(crate) fn lens_and_unit(&self, path: &Path) -> Result<(Intrinsics, f64), DatasetError> {
+        match (self.lens, self.depth_unit) {
+            (Some(lens), Some(unit)) => Ok((lens, unit)),
+            (lens, _) => {
+                let found = if lens.is_some() { "no depth_unit" } else { "no lens" };
+                let allowed = "width, height, fx, fy, cx, cy and depth_unit for an image as PNG";
+                Err(DatasetError::content(path, "the camera", found, allowed))
+            }
         }
     }
 
@@ -101,5 +140,58 @@ impl CameraFile {
         let text = toml::to_string(self)
             .map_err(|e| DatasetError::TomlWrite { what: "the camera", source: Box::new(e) })?;
         files::write_file(path, text.as_bytes())
+    }
+}
+
+impl CameraToml {
+    /// The lens: all six numbers or none.
+    fn lens(&self, path: &Path) -> Result<Option<Intrinsics>, DatasetError> {
+        let Self { width, height, fx, fy, cx, cy, .. } = *self;
+        let numbers = [width.map(|w| w as f64), height.map(|h| h as f64), fx, fy, cx, cy];
+        if numbers.iter().all(Option::is_none) {
+            return Ok(None);
+        }
+        let (Some(width), Some(height), Some(fx), Some(fy), Some(cx), Some(cy)) =
+            (width, height, fx, fy, cx, cy)
+        else {
+            let names = ["width", "height", "fx", "fy", "cx", "cy"];
+            let missing = names.iter().zip(numbers).filter(|(_, number)| number.is_none());
+            let missing: Vec<_> = missing.map(|(name, _)| *name).collect();
+            let found = format!("no {}", missing.join(", "));
+            let allowed = "given by all of width, height, fx, fy, cx, cy, or by none";
+            return Err(DatasetError::content(path, "the lens", found, allowed));
+        };
+        Intrinsics::from_integer_centres(width, height, fx, fy, cx, cy)
+            .map(Some)
+            .map_err(|source| DatasetError::Recording { path: path.to_owned(), source })
+    }
+}
+
+/// The camera with a lens, at the origin of a world whose z axis points back at it.
+pub(crate) fn camera_of(intrinsics: Intrinsics) -> Camera {
+    let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    let camera_from_world = Isometry3::from_parts(Translation3::identity(), half_turn);
+    Camera { intrinsics, camera_from_world }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lens_is_whole_or_absent() {
+        let parse = |text: &str| CameraFile::parse(Path::new("c.toml"), text);
+        let settings = parse("[segmentation]\nborder_px = 8\n").unwrap();
+        assert_eq!((settings.lens, settings.segmentation.border_px), (None, 8));
+        let error = settings.lens_and_unit(Path::new("c.toml")).unwrap_err().to_string();
+        assert!(error.contains("no lens"), "{error}");
+        let part = parse("width = 8\nheight = 6\nfx = 1.0\n").unwrap_err().to_string();
+        assert!(part.contains("no fy, cx, cy"), "{part}");
+        let lens = "width = 8\nheight = 6\nfx = 10.0\nfy = 10.0\ncx = 3.5\ncy = 2.5\n";
+        let file = parse(lens).unwrap();
+        assert_eq!(file.lens.unwrap().cx, 4.0);
+        assert_eq!(parse(&toml::to_string(&file).unwrap()).unwrap(), file);
+        let error = file.lens_and_unit(Path::new("c.toml")).unwrap_err().to_string();
+        assert!(error.contains("no depth_unit"), "{error}");
     }
 }

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use granulcal_features::PAPER16;
+use granulcal_features::stats::DIAGNOSTIC_COUNT;
+use granulcal_features::{DIAGNOSTICS, PAPER16};
 
 use crate::header::Header;
 use crate::manifest::{self, Manifest};
@@ -86,6 +87,17 @@ impl Dataset {
     /// The statistics, row by row, shape `[n, 16]`; NaN where no grains were in view.
     pub fn x(&self) -> Vec<f64> {
         self.rows.iter().flat_map(|row| row.statistics).collect()
+    }
+
+    /// Names of the diagnostic statistics, the columns of [`Dataset::diagnostics`].
+    pub fn diagnostic_names() -> [&'static str; DIAGNOSTIC_COUNT] {
+        DIAGNOSTICS.map(|statistic| statistic.name)
+    }
+
+    /// The diagnostic statistics, row by row, shape `[n, 40]`; NaN where the others are, and in data sets
+    /// that were made without them.
+    pub fn diagnostics(&self) -> Vec<f64> {
+        self.rows.iter().flat_map(|row| row.diagnostics).collect()
     }
 
     /// How many rows ended in each status, by its word.

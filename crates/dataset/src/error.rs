@@ -100,6 +100,14 @@ pub enum DatasetError {
     /// A simulation was refused.
     #[error("the simulation was refused")]
     Simulation(#[source] DemError),
+    /// A checkpoint is damaged, or of something else.
+    #[error("{} cannot be used", path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: DemError,
+    },
     /// One row of a batch cannot be made.
     #[error("row {row} of the data set cannot be made")]
     Row {
@@ -143,12 +151,12 @@ pub enum DatasetError {
         /// What the archive reader or writer said.
         source: zip::result::ZipError,
     },
-    /// A file is no readable MCAP.
-    #[error("{} is truncated, damaged or no MCAP file", path.display())]
+    /// An MCAP file could not be written.
+    #[error("cannot write {} as MCAP", path.display())]
     Mcap {
         /// The file.
         path: PathBuf,
-        /// What the reader or writer said.
+        /// What the writer said.
         source: mcap::McapError,
     },
     /// Two things that must be the same differ.
@@ -188,7 +196,7 @@ impl DatasetError {
             Self::Io { action, source, .. } => {
                 matches!(*action, "read" | "list") || source.kind() == io::ErrorKind::NotFound
             }
-            Self::TomlWrite { .. } | Self::Locked { .. } => false,
+            Self::TomlWrite { .. } | Self::Mcap { .. } | Self::Locked { .. } => false,
             Self::Row { source, .. } => source.is_bad_input(),
             _ => true,
         }

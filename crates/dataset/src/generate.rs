@@ -15,6 +15,7 @@ use std::time::Duration;
 
 use cpu_time::ThreadTime;
 use granulcal_dem::{Simulation, Status};
+use granulcal_features::stats::DIAGNOSTIC_COUNT;
 
 use crate::header::Header;
 use crate::manifest;
@@ -93,6 +94,8 @@ pub struct Progress {
     pub made: u64,
     /// Rows, resumed or made, whose numbers cannot be used: unhealthy, or no grains in view.
     pub unhealthy: u64,
+    /// Rows, resumed or made, in which grains remain in the funnel.
+    pub jammed: u64,
     /// Rows on disk beyond those asked for, left as they are.
     pub beyond: u64,
 }
@@ -232,6 +235,7 @@ impl Batch<'_> {
         let index = row.row / self.folder.chunk;
         self.progress.made += 1;
         self.progress.unhealthy += u64::from(!row.status.is_healthy());
+        self.progress.jammed += u64::from(row.status.is_jammed());
         let Some(chunk) = self.chunks.get_mut(&index) else { return Ok(()) };
         chunk.missing.retain(|&missing| missing != row.row);
         chunk.rows.push(row);
@@ -274,12 +278,17 @@ fn make_row(
     let Some(pour) = simulation.run_while(keep_going) else { return Ok(None) };
 
     let mut status = RowStatus::Pour(pour.status);
-    let mut statistics = [f64::NAN; 16];
-    match observe(&scene.camera, &pour, seed).map(|seen| seen.statistics) {
-        Ok(Ok(seen)) => statistics = seen,
+    let (mut statistics, mut diagnostics) = ([f64::NAN; 16], [f64::NAN; DIAGNOSTIC_COUNT]);
+    let seen = observe(&scene.camera, &pour, seed).and_then(|seen| {
+        let Ok(values) = seen.statistics else { return Ok(None) };
+        Ok(Some((values, seen.diagnostics().map_err(DatasetError::Features)?)))
+    });
+    match seen {
+        Ok(Some(values)) => (statistics, diagnostics) = values,
         // The grains of an unhealthy pour can be anywhere, NaN included: the status says enough.
         _ if pour.status == Status::Unhealthy => {}
-        Ok(Err(_)) => status = RowStatus::NoGrainsInView,
+        Ok(None) if pour.status == Status::Jammed => {}
+        Ok(None) => status = RowStatus::NoGrainsInView,
         Err(error) => return Err(error),
     }
     Ok(Some(Row {
@@ -291,6 +300,7 @@ fn make_row(
         health: pour.health,
         cpu_s: start.elapsed().as_secs_f64(),
         statistics,
+        diagnostics,
     }))
 }
 

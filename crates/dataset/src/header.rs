@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use granulcal_dem::Scene;
-use toml::{Table, Value};
 
 use crate::{DatasetError, Prior};
 
@@ -71,7 +70,8 @@ impl Header {
         let differs = |what: String, found: String, given: String| {
             Err(DatasetError::Differs { path: path.to_owned(), what, found, given })
         };
-        if let Some((key, found, given)) = difference(&self.scene_toml, &given.scene_toml) {
+        let difference = self.scene.first_difference(&given.scene);
+        if let Some((key, found, given)) = difference.map_err(DatasetError::Simulation)? {
             return differs(format!("scene.{key}"), found, given);
         }
         if self.prior != given.prior {
@@ -92,32 +92,6 @@ impl Header {
 fn describe(prior: &Prior) -> String {
     let of = |p: &crate::Parameter| format!("{} {:?}", p.path, p.distribution);
     prior.parameters().iter().map(of).collect::<Vec<_>>().join("; ")
-}
-
-/// The first key in which two TOML texts differ, and both values.
-fn difference(left: &str, right: &str) -> Option<(String, String, String)> {
-    let parse = |text: &str| text.parse::<Table>().map(Value::Table).ok();
-    let (left, right) = (parse(left)?, parse(right)?);
-    first_difference("", Some(&left), Some(&right))
-}
-
-fn first_difference(
-    path: &str,
-    left: Option<&Value>,
-    right: Option<&Value>,
-) -> Option<(String, String, String)> {
-    if left == right {
-        return None;
-    }
-    if let (Some(Value::Table(a)), Some(Value::Table(b))) = (left, right) {
-        let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
-        return keys.into_iter().find_map(|key| {
-            let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
-            first_difference(&path, a.get(key), b.get(key))
-        });
-    }
-    let show = |value: Option<&Value>| value.map_or("absent".to_owned(), Value::to_string);
-    Some((path.to_owned(), show(left), show(right)))
 }
 
 #[cfg(test)]

@@ -14,19 +14,28 @@
 //! | [`generate()`] | resumable batches |
 //! | [`Dataset`], [`merge`] | Parquet back into memory |
 //! | [`Recording`] | measured height maps and depth images |
+//! | [`Survey`] | what is in a .bag or .mcap |
 //! | [`png`], [`npy`] | 16-bit depth PNG, arrays |
 //! | [`record_pour`] | a pour over time as MCAP |
+//! | [`write_checkpoint`], [`resume_checkpoint`] | a pour that is stopped and goes on |
 
 mod camera_file;
+mod checkpoint_file;
 mod contact_problem_file;
 mod dataset;
 mod distribution;
 mod error;
+mod fault;
 mod files;
 mod generate;
 mod header;
+mod image_file;
+mod input;
 mod manifest;
 mod mcap_file;
+mod mean;
+mod message;
+mod message_file;
 mod normal;
 pub mod npy;
 mod npz;
@@ -37,9 +46,11 @@ mod random;
 mod recording;
 mod row;
 mod scene_file;
+mod survey;
 mod table;
 
 pub use camera_file::CameraFile;
+pub use checkpoint_file::{read_checkpoint_header, resume_checkpoint, write_checkpoint};
 pub use contact_problem_file::write_contact_problem;
 pub use dataset::{Dataset, merge};
 pub use distribution::Distribution;
@@ -47,10 +58,13 @@ pub use error::DatasetError;
 pub use files::write_file;
 pub use generate::{GenerateOptions, Progress, Shard, Summary, generate};
 pub use header::{Header, VERSION};
-pub use mcap_file::{McapSummary, Topic, record_pour, summarize_mcap};
+pub use input::ReadSeek;
+pub use mcap_file::record_pour;
+pub use message_file::{Damage, MessageFormat};
 pub use npz::{Npz, write_height_map};
 pub use observe::{Observation, TooFewGrains, View, look, observe, overhead};
 pub use prior::{Parameter, Prior};
-pub use recording::{Recording, Source, measured_data};
+pub use recording::{FRAMES, Folder, Frame, ReadOptions, Recording, Source, measured_data};
 pub use row::{Row, RowStatus};
 pub use scene_file::{load_prior, load_scene};
+pub use survey::{Choice, DepthUnit, Lost, Survey, Topic};

@@ -27,7 +27,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 
 use crate::files::PendingFile;
-use crate::{DatasetError, VERSION, View, files, look};
+use crate::{DatasetError, VERSION, View, look};
 
 const WORLD: &str = "world";
 const CAMERA: &str = "camera";
@@ -245,56 +245,4 @@ fn pose_of(time: f64, camera: &Camera) -> FrameTransform {
         translation: Some(Vector3 { x: at.x, y: at.y, z: at.z }),
         rotation: Some(Quaternion { x: turn.i, y: turn.j, z: turn.k, w: turn.w }),
     }
-}
-
-/// One topic of an MCAP file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Topic {
-    /// Its name.
-    pub topic: String,
-    /// Name of the schema, empty if it has none.
-    pub schema: String,
-    /// Encoding of the messages.
-    pub encoding: String,
-    /// How many messages.
-    pub messages: u64,
-}
-
-/// What an MCAP file holds.
-#[derive(Clone, Debug, PartialEq)]
-pub struct McapSummary {
-    /// The topics, by name.
-    pub topics: Vec<Topic>,
-    /// Time of the first message `[s]`.
-    pub start_s: f64,
-    /// Time of the last message `[s]`.
-    pub end_s: f64,
-}
-
-/// Reads a whole MCAP file, whoever wrote it, and says what is in it.
-///
-/// # Errors
-/// [`DatasetError::Io`], or [`DatasetError::Mcap`] for a file that is truncated, damaged or compressed
-/// in a way that this build does not read.
-pub fn summarize_mcap(path: &Path) -> Result<McapSummary, DatasetError> {
-    let bytes = files::read(path)?;
-    let failed = |source| DatasetError::Mcap { path: path.to_owned(), source };
-    let mut topics: BTreeMap<(String, u16), Topic> = BTreeMap::new();
-    let mut span: Option<(u64, u64)> = None;
-    for message in mcap::MessageStream::new(&bytes).map_err(failed)? {
-        let message = message.map_err(failed)?;
-        let (first, last) = span.unwrap_or((message.log_time, message.log_time));
-        span = Some((first.min(message.log_time), last.max(message.log_time)));
-        let channel = &message.channel;
-        let topic = topics.entry((channel.topic.clone(), channel.id)).or_insert_with(|| Topic {
-            topic: channel.topic.clone(),
-            schema: channel.schema.as_ref().map_or_else(String::new, |schema| schema.name.clone()),
-            encoding: channel.message_encoding.clone(),
-            messages: 0,
-        });
-        topic.messages += 1;
-    }
-    let (first, last) = span.unwrap_or((0, 0));
-    let topics = topics.into_values().collect();
-    Ok(McapSummary { topics, start_s: first as f64 * 1e-9, end_s: last as f64 * 1e-9 })
 }

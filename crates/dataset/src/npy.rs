@@ -2,15 +2,22 @@
 //!
 //! Reference: NumPy enhancement proposal 1, versions 1 to 3 of the format.
 
+mod header;
+
+use std::io::Read;
 use std::path::Path;
 
 use nalgebra::Vector3;
 
+use self::header::Source;
+use crate::input::Input;
 use crate::{DatasetError, files};
 
-const MAGIC: &[u8] = b"\x93NUMPY";
-/// Values beyond this in one array are a slip or a damaged header, not a recording.
-const MAX_VALUES: usize = 1 << 30;
+const MAGIC: &[u8; 6] = b"\x93NUMPY";
+/// Bytes that are turned into numbers at a time; a multiple of all sizes of a number.
+const BUFFER: usize = 8 << 10;
+/// Bytes beyond which one word is none.
+const MAX_WORD: usize = 1 << 16;
 /// Number types that are read.
 const NUMBERS: &str = "a number type (f4, f8, i1 to i8, u1 to u8)";
 
@@ -23,142 +30,92 @@ pub struct Array {
     pub values: Vec<f64>,
 }
 
-/// What a .npy header says.
-struct Parsed<'a> {
-    descr: String,
-    fortran_order: bool,
-    shape: Vec<usize>,
-    data: &'a [u8],
-}
-
-/// Names a fault of an array; `file` and `array` say where.
-struct Place<'a> {
-    file: &'a Path,
-    array: &'a str,
-}
-
-impl Place<'_> {
-    fn error(
-        &self,
-        what: &str,
-        found: impl Into<String>,
-        allowed: impl Into<String>,
-    ) -> DatasetError {
-        let what = if self.array.is_empty() {
-            what.to_owned()
-        } else {
-            format!("{what} of {}", self.array)
-        };
-        DatasetError::content(self.file, what, found, allowed)
-    }
-}
-
-/// Reads numbers from the bytes of a .npy file. `array` names it within `file`, empty for the file itself.
-pub(crate) fn parse(file: &Path, array: &str, bytes: &[u8]) -> Result<Array, DatasetError> {
-    let place = Place { file, array };
-    let parsed = parse_header(&place, bytes)?;
-    let bad_type = || place.error("the dtype", format!("{:?}", parsed.descr), NUMBERS);
-    let (big, kind, size) = split_descr(&parsed.descr).ok_or_else(bad_type)?;
+/// Reads numbers from a .npy file. `array` names it within `file`, empty for the file itself; the
+/// numbers take `limit` bytes at most.
+pub(crate) fn parse(
+    file: &Path,
+    array: &str,
+    reader: &mut dyn Read,
+    limit: u64,
+) -> Result<Array, DatasetError> {
+    let mut source = Source::new(file, array, reader);
+    let header = source.header()?;
+    let bad_type = || source.place.error("the dtype", format!("{:?}", header.descr), NUMBERS);
+    let (big, kind, size) = split_descr(&header.descr).ok_or_else(bad_type)?;
     let decode = decoder(kind, size).ok_or_else(bad_type)?;
-    let count = parsed.shape.iter().product::<usize>();
-    let data = exact(&place, parsed.data, count * size)?;
-    let mut values = Vec::with_capacity(count);
-    let mut buffer = [0u8; 8];
-    for raw in data.chunks_exact(size) {
-        buffer[..size].copy_from_slice(raw);
-        if big {
-            buffer[..size].reverse();
+    // Numbers in the other order stand twice in memory while they change places.
+    let copies = if header.fortran_order { 2 } else { 1 };
+    let needed = header.count.saturating_mul(8 * copies);
+    if needed as u64 > limit {
+        let (found, allowed) =
+            (format!("{:?}", header.shape), format!("at most {limit} bytes as f64"));
+        return Err(source.place.error("the shape", found, allowed));
+    }
+    let mut values = Vec::with_capacity(header.count);
+    let mut buffer = [0u8; BUFFER];
+    while values.len() < header.count {
+        let wanted = size * (header.count - values.len()).min(BUFFER / size);
+        let found = source.fill(&mut buffer[..wanted])?;
+        if found < wanted {
+            let found = values.len() * size + found;
+            return Err(source.truncated_data(found, header.count * size));
         }
-        values.push(decode(buffer));
+        for raw in buffer[..wanted].chunks_exact(size) {
+            let mut number = [0u8; 8];
+            number[..size].copy_from_slice(raw);
+            if big {
+                number[..size].reverse();
+            }
+            values.push(decode(number));
+        }
     }
-    if parsed.fortran_order {
-        values = to_row_major(&values, &parsed.shape);
+    source.end()?;
+    if header.fortran_order {
+        values = to_row_major(&values, &header.shape);
     }
-    Ok(Array { shape: parsed.shape, values })
+    Ok(Array { shape: header.shape, values })
 }
 
-/// Reads one word (`<U2` and its kin, or bytes) from the bytes of a .npy file.
-pub(crate) fn parse_text(file: &Path, array: &str, bytes: &[u8]) -> Result<String, DatasetError> {
-    let place = Place { file, array };
-    let parsed = parse_header(&place, bytes)?;
-    let bad =
-        || place.error("the dtype", format!("{:?}", parsed.descr), "one word of text (U or S)");
-    let (big, kind, size) = split_descr(&parsed.descr).ok_or_else(bad)?;
-    if parsed.shape.iter().product::<usize>() != 1 {
-        return Err(place.error("the shape", format!("{:?}", parsed.shape), "one value"));
+/// Reads one word (`<U2` and its kin, or bytes) from a .npy file.
+pub(crate) fn parse_text(
+    file: &Path,
+    array: &str,
+    reader: &mut dyn Read,
+) -> Result<String, DatasetError> {
+    let mut source = Source::new(file, array, reader);
+    let header = source.header()?;
+    let bad = || {
+        source.place.error("the dtype", format!("{:?}", header.descr), "one word of text (U or S)")
+    };
+    let (big, kind, size) = split_descr(&header.descr).ok_or_else(bad)?;
+    if header.count != 1 {
+        return Err(source.place.error("the shape", format!("{:?}", header.shape), "one value"));
     }
-    let text: String = match kind {
-        'U' => {
-            let data = exact(&place, parsed.data, size.saturating_mul(4))?;
-            let letter = |raw: &[u8]| {
-                let raw = [raw[0], raw[1], raw[2], raw[3]];
-                let code = if big { u32::from_be_bytes(raw) } else { u32::from_le_bytes(raw) };
-                char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER)
-            };
-            data.chunks_exact(4).map(letter).collect()
-        }
-        'S' => exact(&place, parsed.data, size)?.iter().map(|&b| char::from(b)).collect(),
+    let bytes = match kind {
+        'U' => size.saturating_mul(4),
+        'S' => size,
         _ => return Err(bad()),
     };
-    Ok(text.trim_end_matches('\0').to_owned())
-}
-
-fn parse_header<'a>(place: &Place, bytes: &'a [u8]) -> Result<Parsed<'a>, DatasetError> {
-    let truncated = || {
-        place.error("the .npy header", format!("truncated after {} bytes", bytes.len()), "complete")
-    };
-    if bytes.len() >= MAGIC.len() && !bytes.starts_with(MAGIC) {
-        return Err(place.error("the array", "other bytes", "in .npy format"));
+    if bytes > MAX_WORD {
+        let allowed = format!("at most {MAX_WORD} bytes");
+        return Err(source.place.error("the word", format!("{bytes} bytes"), allowed));
     }
-    let version = *bytes.get(MAGIC.len()).ok_or_else(truncated)?;
-    let (start, length): (usize, usize) = match (version, bytes) {
-        (1, [_, _, _, _, _, _, _, _, a, b, ..]) => (10, usize::from(u16::from_le_bytes([*a, *b]))),
-        (2 | 3, [_, _, _, _, _, _, _, _, a, b, c, d, ..]) => {
-            (12, u32::from_le_bytes([*a, *b, *c, *d]) as usize)
-        }
-        (1..=3, _) => return Err(truncated()),
-        (other, _) => return Err(place.error("the .npy version", other.to_string(), "1, 2 or 3")),
-    };
-    let text = bytes.get(start..start.saturating_add(length)).ok_or_else(truncated)?;
-    let text = String::from_utf8_lossy(text);
-    let shown = || text.trim().to_owned();
-    let parsed = (|| {
-        let descr = text_of(after_key(&text, "descr")?)?;
-        let fortran_order = match after_key(&text, "fortran_order")? {
-            order if order.starts_with("True") => true,
-            order if order.starts_with("False") => false,
-            _ => return None,
+    let mut data = vec![0; bytes];
+    let found = source.fill(&mut data)?;
+    if found < bytes {
+        return Err(source.truncated_data(found, bytes));
+    }
+    source.end()?;
+    let text: String = if kind == 'U' {
+        let letter = |raw: &[u8; 4]| {
+            let code = if big { u32::from_be_bytes(*raw) } else { u32::from_le_bytes(*raw) };
+            char::from_u32(code).unwrap_or(char::REPLACEMENT_CHARACTER)
         };
-        let shape = shape_of(after_key(&text, "shape")?)?;
-        Some((descr, fortran_order, shape))
-    })();
-    let allowed = "a dict of descr (one type), fortran_order and shape";
-    let (descr, fortran_order, shape) =
-        parsed.ok_or_else(|| place.error("the .npy header", shown(), allowed))?;
-    let count = shape.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
-    if count.is_none_or(|count| count > MAX_VALUES) {
-        let allowed = format!("at most {MAX_VALUES} values");
-        return Err(place.error("the shape", format!("{shape:?}"), allowed));
-    }
-    Ok(Parsed { descr, fortran_order, shape, data: &bytes[start + length..] })
-}
-
-/// The text behind `'key':` in a Python dict.
-fn after_key<'a>(dict: &'a str, key: &str) -> Option<&'a str> {
-    let quoted = [format!("'{key}'"), format!("\"{key}\"")];
-    let at = quoted.iter().find_map(|q| dict.find(q.as_str()).map(|i| i + q.len()))?;
-    Some(dict[at..].trim_start().strip_prefix(':')?.trim_start())
-}
-
-fn text_of(value: &str) -> Option<String> {
-    let quote = value.chars().next().filter(|c| matches!(c, '\'' | '"'))?;
-    value[1..].split_once(quote).map(|(text, _)| text.to_owned())
-}
-
-fn shape_of(value: &str) -> Option<Vec<usize>> {
-    let (inner, _) = value.strip_prefix('(')?.split_once(')')?;
-    let entries = inner.split(',').map(str::trim).filter(|entry| !entry.is_empty());
-    entries.map(|entry| entry.parse().ok()).collect()
+        data.as_chunks().0.iter().map(letter).collect()
+    } else {
+        data.iter().map(|&byte| char::from(byte)).collect()
+    };
+    Ok(text.trim_end_matches('\0').to_owned())
 }
 
 /// Byte order (true for big), kind and size of a type such as `<f8`.
@@ -190,14 +147,6 @@ fn decoder(kind: char, size: usize) -> Option<fn([u8; 8]) -> f64> {
         ('i', 8) => |b| i64::from_le_bytes(b) as f64,
         _ => return None,
     })
-}
-
-fn exact<'a>(place: &Place, data: &'a [u8], expected: usize) -> Result<&'a [u8], DatasetError> {
-    if data.len() < expected {
-        let found = format!("{} bytes, it is truncated", data.len());
-        return Err(place.error("the data", found, format!("{expected} bytes")));
-    }
-    Ok(&data[..expected])
 }
 
 /// First axis fastest to last axis fastest.
@@ -256,12 +205,20 @@ pub(crate) fn encode_text(word: &str) -> Vec<u8> {
     bytes
 }
 
+/// Most bytes `[B]` that the numbers of a file of `length` bytes may take: 16-bit numbers take four
+/// times as many as 64-bit ones, and small files may be packed well.
+pub(crate) fn array_limit(length: u64) -> u64 {
+    length.saturating_mul(4).max(64 << 20)
+}
+
 /// Reads any array of numbers.
 ///
 /// # Errors
 /// [`DatasetError::Io`], or [`DatasetError::Content`] for what is no array of numbers.
 pub fn read(path: &Path) -> Result<Array, DatasetError> {
-    parse(path, "", &files::read(path)?)
+    let input = Input::open(path)?;
+    let limit = array_limit(input.length());
+    parse(path, "", &mut input.into_reader()?, limit)
 }
 
 /// Reads points `[m]` from an array of shape (n, 3).

@@ -1,34 +1,56 @@
 //! NumPy's .npz archives, and height maps in them.
 
-use std::io::{Cursor, Read, Write};
+use std::io::{BufReader, Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 
 use granulcal_features::HeightMap;
 use zip::write::SimpleFileOptions;
 use zip::{ZipArchive, ZipWriter};
 
+use crate::input::{Input, ReadSeek};
 use crate::npy::{self, Array};
 use crate::{DatasetError, files};
 
-/// Bytes of one unpacked array beyond which an archive is refused; protects against zip bombs.
-const MAX_BYTES: u64 = 1 << 32;
+/// Arrays beyond which an archive is no recording.
+const MAX_ARRAYS: usize = 1 << 12;
+/// Bytes of the end record of an archive, and most bytes of the comment behind it.
+const END_RECORD: u64 = 22 + (u16::MAX as u64);
 
 /// An open archive.
-pub struct Npz {
+pub struct Npz<'a> {
     path: PathBuf,
-    archive: ZipArchive<Cursor<Vec<u8>>>,
+    archive: ZipArchive<BufReader<Box<dyn ReadSeek + 'a>>>,
+    /// Most bytes that the numbers of an array may take; protects against zip bombs.
+    limit: u64,
 }
 
-impl Npz {
+impl Npz<'static> {
     /// Opens an archive.
     ///
     /// # Errors
     /// [`DatasetError::Io`] or [`DatasetError::Npz`].
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
-        let bytes = files::read(path)?;
-        let archive = ZipArchive::new(Cursor::new(bytes))
-            .map_err(|source| DatasetError::Npz { path: path.to_owned(), source })?;
-        Ok(Self { path: path.to_owned(), archive })
+        Self::take(Input::open(path)?)
+    }
+}
+
+impl<'a> Npz<'a> {
+    pub(crate) fn take(mut input: Input<'a>) -> Result<Self, DatasetError> {
+        let (path, limit) = (input.path().to_owned(), npy::array_limit(input.length()));
+        let from = input.length().saturating_sub(END_RECORD);
+        let entries = claimed_entries(&input.read(from, END_RECORD)?);
+        if entries > MAX_ARRAYS {
+            let allowed = format!("at most {MAX_ARRAYS}");
+            return Err(DatasetError::content(
+                &path,
+                "the number of arrays",
+                entries.to_string(),
+                allowed,
+            ));
+        }
+        let archive = ZipArchive::new(input.into_reader()?)
+            .map_err(|source| DatasetError::Npz { path: path.clone(), source })?;
+        Ok(Self { path, archive, limit })
     }
 
     /// Names of the arrays, as NumPy shows them.
@@ -40,23 +62,17 @@ impl Npz {
         names
     }
 
-    fn bytes(&mut self, name: &str) -> Result<Vec<u8>, DatasetError> {
-        let names = self.names();
-        let broken = |source| DatasetError::Npz { path: self.path.clone(), source };
-        let file = match self.archive.by_name(&format!("{name}.npy")) {
-            Err(zip::result::ZipError::FileNotFound) => {
-                let what = format!("array {name}");
-                let found = format!("only {}", names.join(", "));
-                return Err(DatasetError::content(&self.path, what, found, "in the archive"));
-            }
-            other => other.map_err(broken)?,
-        };
-        let mut bytes = Vec::new();
-        file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(|source| DatasetError::Npz {
-            path: self.path.clone(),
-            source: source.into(),
-        })?;
-        Ok(bytes)
+    /// The bytes of an array's .npy file, as they are unpacked.
+    fn reader(&mut self, name: &str) -> Result<impl Read, DatasetError> {
+        let file_name = format!("{name}.npy");
+        if self.archive.index_for_name(&file_name).is_none() {
+            let what = format!("array {name}");
+            let found = format!("only {}", self.names().join(", "));
+            return Err(DatasetError::content(&self.path, what, found, "in the archive"));
+        }
+        self.archive
+            .by_name(&file_name)
+            .map_err(|source| DatasetError::Npz { path: self.path.clone(), source })
     }
 
     /// An array of numbers.
@@ -64,8 +80,13 @@ impl Npz {
     /// # Errors
     /// [`DatasetError::Content`] for a name that is not there or an array that is none of numbers.
     pub fn array(&mut self, name: &str) -> Result<Array, DatasetError> {
-        let bytes = self.bytes(name)?;
-        npy::parse(&self.path, name, &bytes)
+        let (path, limit) = (self.path.clone(), self.limit);
+        npy::parse(&path, name, &mut self.reader(name)?, limit)
+    }
+
+    fn text(&mut self, name: &str) -> Result<String, DatasetError> {
+        let path = self.path.clone();
+        npy::parse_text(&path, name, &mut self.reader(name)?)
     }
 
     /// One positive number.
@@ -96,8 +117,7 @@ impl Npz {
                 "(h, w)",
             ));
         };
-        let scale = self.bytes("scale")?;
-        let unit = match npy::parse_text(&self.path, "scale", &scale)?.as_str() {
+        let unit = match self.text("scale")?.as_str() {
             "mm" => 1e-3,
             "m" => 1.0,
             other => {
@@ -106,10 +126,18 @@ impl Npz {
             }
         };
         let (x, y, z) = (self.positive("xres")?, self.positive("yres")?, self.positive("zres")?);
-        let heights = array.values.iter().map(|value| value * z * unit).collect();
+        // In place: a large map stands in memory once.
+        let heights = array.values.into_iter().map(|value| value * z * unit).collect();
         HeightMap::new(width, height, x * unit, y * unit, heights)
             .map_err(|source| DatasetError::Recording { path: self.path.clone(), source })
     }
+}
+
+/// Most entries that any end record in the last bytes of an archive claims: each costs memory before
+/// it is looked at.
+fn claimed_entries(tail: &[u8]) -> usize {
+    let records = tail.windows(12).filter(|bytes| bytes.starts_with(b"PK\x05\x06"));
+    records.map(|bytes| usize::from(u16::from_le_bytes([bytes[10], bytes[11]]))).max().unwrap_or(0)
 }
 
 /// Writes a height map in metres, in the keys that [`Npz::height_map`] reads.

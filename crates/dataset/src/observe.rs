@@ -3,11 +3,12 @@
 use std::fmt;
 
 use granulcal_dem::{CameraSpec, Pour, Projection};
+use granulcal_features::stats::DIAGNOSTIC_COUNT;
 use granulcal_features::{
-    Camera, DepthImage, FeatureError, HeightMap, SensorNoise, grain_points, height_map, paper16,
-    render_grid,
+    Camera, DepthImage, DiagnosticSettings, FeatureError, HeightMap, SensorNoise, diagnostics,
+    grain_points, height_map, paper16, render_grid,
 };
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 use crate::DatasetError;
 use crate::random::camera_seed;
@@ -49,6 +50,19 @@ pub struct Observation {
     pub points: Vec<Vector3<f64>>,
     /// The paper's 16 statistics, or why there are none.
     pub statistics: Result<[f64; 16], TooFewGrains>,
+    /// What the diagnostic statistics have to know: the pour axis is the scene's z axis.
+    pub diagnostic_settings: DiagnosticSettings,
+}
+
+impl Observation {
+    /// The diagnostic statistics of the points.
+    ///
+    /// # Errors
+    /// `TooFewPoints` where there are no [`Observation::statistics`], `OutOfRange` for grains or pixels
+    /// of a size that none has.
+    pub fn diagnostics(&self) -> Result<[f64; DIAGNOSTIC_COUNT], FeatureError> {
+        diagnostics(&self.points, &self.diagnostic_settings)
+    }
 }
 
 /// Too few grains are in view for statistics; a property of the pour, not a mistake.
@@ -75,10 +89,15 @@ pub fn observe(
     pour_seed: u64,
 ) -> Result<Observation, DatasetError> {
     let view = look(camera, &pour.positions, &pour.radii, pour_seed)?;
+    let diagnostic_settings = DiagnosticSettings {
+        pour_axis: Some(Vector2::zeros()),
+        grain_diameter: 2.0 * pour.radii.iter().sum::<f64>() / pour.radii.len().max(1) as f64,
+        spacing: camera.field_width / camera.pixels as f64 * camera.downsample as f64,
+    };
     let points = match view.grain_points(camera.height_threshold) {
         Err(error) if is_too_few(&error) => {
             let statistics = Err(TooFewGrains(error));
-            return Ok(Observation { view, points: Vec::new(), statistics });
+            return Ok(Observation { view, points: Vec::new(), statistics, diagnostic_settings });
         }
         other => other.map_err(DatasetError::Features)?,
     };
@@ -86,7 +105,7 @@ pub fn observe(
         Err(error) if is_too_few(&error) => Err(TooFewGrains(error)),
         other => Ok(other.map_err(DatasetError::Features)?),
     };
-    Ok(Observation { view, points, statistics })
+    Ok(Observation { view, points, statistics, diagnostic_settings })
 }
 
 /// What the camera delivers of grains over the ground: rendered, down-sampled, disturbed.
@@ -156,7 +175,9 @@ mod tests {
             positions,
             status: Status::AtRest,
             health: Health::default(),
+            grains_in_funnel: 0,
             simulated_s: 1.0,
+            state_hash: 0,
         }
     }
 
@@ -172,6 +193,20 @@ mod tests {
         for (a, b) in pinhole.iter().zip(map).take(11) {
             assert!((a - b).abs() < 0.05 * b.abs(), "{pinhole:?} {map:?}");
         }
+    }
+
+    #[test]
+    fn every_grain_of_a_carpet_is_isolated() {
+        let camera = CameraSpec { downsample: 2, ..Scene::drop(0.1).camera };
+        let seen = observe(&camera, &carpet(0.0), 1).unwrap();
+        let diagnostics = seen.diagnostics().unwrap();
+        let value = |name| {
+            let names = granulcal_features::DIAGNOSTICS.map(|statistic| statistic.name);
+            diagnostics[names.iter().position(|n| *n == name).unwrap()]
+        };
+        assert_eq!((value("isolated_grains"), value("clusters")), (81.0, 0.0));
+        assert_eq!(value("count_in_view"), seen.points.len() as f64);
+        assert!(value("mass_cos_1").abs() < 0.01 && value("rim_sin_2").abs() < 0.05);
     }
 
     #[test]

@@ -4,18 +4,22 @@ use std::io::Cursor;
 use std::path::Path;
 
 use granulcal_features::{ColourImage, DepthImage};
-use image::{DynamicImage, ImageBuffer, ImageFormat, ImageReader, Luma};
+use image::{ImageBuffer, ImageFormat, Luma};
 
+use crate::image_file::{self, Unreadable};
+use crate::input::unpack_limit;
+use crate::mean::Mean;
 use crate::{DatasetError, files};
 
 /// Metres per count that depth is written with unless told otherwise: 0.1 mm, up to 6.5 m.
 pub const DEPTH_UNIT: f64 = 1e-4;
 
-fn decode(path: &Path) -> Result<DynamicImage, DatasetError> {
-    let bytes = files::read(path)?;
-    ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png)
-        .decode()
-        .map_err(|source| DatasetError::Png { path: path.to_owned(), source })
+/// The error of an image file at `path`.
+pub(crate) fn unreadable(path: &Path, error: Unreadable) -> DatasetError {
+    match error {
+        Unreadable::Damaged(source) => DatasetError::Png { path: path.to_owned(), source },
+        Unreadable::Unfit(fault) => fault.in_file(path),
+    }
 }
 
 /// Reads a 16-bit grey PNG as depth, `depth_unit` metres a count; 0 is no data.
@@ -23,34 +27,20 @@ fn decode(path: &Path) -> Result<DynamicImage, DatasetError> {
 /// # Errors
 /// [`DatasetError::Io`], [`DatasetError::Png`], or [`DatasetError::Content`] for other pixels.
 pub fn read_depth(path: &Path, depth_unit: f64) -> Result<DepthImage, DatasetError> {
-    let image = match decode(path)? {
-        DynamicImage::ImageLuma16(image) => image,
-        other => {
-            let found = format!("{:?}", other.color());
-            return Err(DatasetError::content(path, "the pixels", found, "16-bit grey (L16)"));
-        }
-    };
-    let depth = image.pixels().map(|Luma([count])| (f64::from(*count) * depth_unit) as f32);
-    let depth = depth.collect();
-    DepthImage::new(image.width() as usize, image.height() as usize, depth)
-        .map_err(|source| DatasetError::Recording { path: path.to_owned(), source })
+    let bytes = files::read(path)?;
+    image_file::depth(&bytes, unpack_limit(bytes.len() as u64))
+        .map_err(|error| unreadable(path, error))
+        .and_then(|frame| Mean::new(frame).finish(depth_unit).map_err(|fault| fault.in_file(path)))
 }
 
-/// Reads an 8-bit RGB PNG; an alpha channel is dropped.
+/// Reads an 8-bit RGB PNG or JPEG; an alpha channel is dropped.
 ///
 /// # Errors
 /// As [`read_depth`].
 pub fn read_colour(path: &Path) -> Result<ColourImage, DatasetError> {
-    let image = match decode(path)? {
-        image @ (DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_)) => image.into_rgb8(),
-        other => {
-            let found = format!("{:?}", other.color());
-            return Err(DatasetError::content(path, "the pixels", found, "8-bit colour (Rgb8)"));
-        }
-    };
-    let (width, height) = (image.width() as usize, image.height() as usize);
-    ColourImage::new(width, height, image.into_raw())
-        .map_err(|source| DatasetError::Recording { path: path.to_owned(), source })
+    let bytes = files::read(path)?;
+    image_file::colour(&bytes, unpack_limit(bytes.len() as u64))
+        .map_err(|error| unreadable(path, error))
 }
 
 /// Writes depth as 16-bit grey PNG, `depth_unit` metres a count.

@@ -1,5 +1,9 @@
 //! Measured height maps and depth images, described by the same code as simulated ones.
 
+mod folder;
+mod messages;
+mod options;
+
 use std::path::{Path, PathBuf};
 
 use granulcal_features::{
@@ -7,7 +11,13 @@ use granulcal_features::{
     segment_height_map,
 };
 
-use crate::{CameraFile, DatasetError, Npz, png};
+pub use folder::Folder;
+pub use options::{FRAMES, ReadOptions};
+
+use crate::camera_file::camera_of;
+use crate::input::{Input, ReadSeek};
+use crate::message_file::MessageFormat;
+use crate::{CameraFile, DatasetError, Lost, Npz, files, png};
 
 /// What was measured.
 #[derive(Clone, Debug)]
@@ -25,6 +35,9 @@ pub enum Source {
     },
 }
 
+/// A PNG frame: its name and its bytes, or why it cannot be read.
+pub type Frame = Result<(PathBuf, Vec<u8>), DatasetError>;
+
 /// One measured formation.
 #[derive(Clone, Debug)]
 pub struct Recording {
@@ -32,81 +45,159 @@ pub struct Recording {
     pub path: PathBuf,
     /// What was measured.
     pub source: Source,
+    /// Topic of the depth images, if it has topics.
+    pub topic: Option<String>,
     /// Frames that were averaged.
     pub frames: usize,
+    /// Whole frames that there are.
+    pub whole_frames: u64,
+    /// Frames that are lost, if the recording is cut off or damaged.
+    pub lost: Option<Lost>,
+    /// What is damaged, a line each.
+    pub damage: Vec<String>,
     /// How it is segmented: from the camera's file, else the default.
     pub segmentation: Segmentation,
 }
 
 impl Recording {
-    /// Opens a recording: an .npz height map, a 16-bit depth PNG, or a folder of such PNGs of one
-    /// formation, which are averaged. PNGs need the TOML of their camera.
+    /// Opens a recording: a ROS 1 .bag, an .mcap, an .npz height map, a 16-bit depth PNG, or a folder
+    /// of such PNGs of one formation or of one .bag or .mcap. What a file is says its content.
+    ///
+    /// Of several frames the mean is taken, pixel by pixel over those that have data there. A file
+    /// that is cut off or damaged gives the frames that are whole; [`Recording::lost`] counts the
+    /// others.
     ///
     /// # Errors
     /// [`DatasetError`] names the file, what was found and what is allowed.
-    pub fn open(path: &Path, camera: Option<&Path>) -> Result<Self, DatasetError> {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        let frames = match extension.as_deref() {
-            _ if path.is_dir() => frames_in(path)?,
-            Some("npz") => return Self::open_npz(path, camera),
-            Some("png") => vec![path.to_owned()],
-            other => {
-                // A name without a file deserves the plainer message.
-                std::fs::metadata(path).map_err(DatasetError::io("read", path))?;
-                let found = other.unwrap_or("no extension").to_owned();
-                let allowed = ".npz, .png or a folder of .png";
-                return Err(DatasetError::content(path, "a recording", found, allowed));
+    pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, DatasetError> {
+        if !path.is_dir() {
+            return Self::take(Input::open(path)?, options);
+        }
+        match Folder::open(path)? {
+            Folder::Messages(file) => Self::take(Input::open(&file)?, options),
+            Folder::Frames(frames) => {
+                let window = options.window(path, frames.len() as u64)?;
+                let chosen = &frames[window.start as usize..window.end as usize];
+                let open = |frame: &PathBuf| Ok((frame.clone(), files::read(frame)?));
+                let recording = Self::take_frames(path, chosen.iter().map(open), options)?;
+                let whole_frames = frames.len() as u64 - recording.damage.len() as u64;
+                Ok(Self { whole_frames, ..recording })
             }
-        };
-        let Some(camera) = camera else {
-            let allowed = "given for depth images (--camera camera.toml)";
+        }
+    }
+
+    /// As [`Recording::open`], from anything that can be read and sought; `path` is its name in
+    /// messages.
+    ///
+    /// # Errors
+    /// As [`Recording::open`].
+    pub fn read(
+        path: &Path,
+        reader: impl ReadSeek,
+        options: &ReadOptions,
+    ) -> Result<Self, DatasetError> {
+        Self::take(Input::new(path, reader)?, options)
+    }
+
+    fn take(mut input: Input<'_>, options: &ReadOptions) -> Result<Self, DatasetError> {
+        let first = input.read(0, 16)?;
+        if MessageFormat::of(&first).is_some() {
+            return Self::take_messages(input, options);
+        }
+        let path = input.path().to_owned();
+        match &first[..] {
+            [b'P', b'K', 3 | 5, _, ..] => Self::take_npz(input, options),
+            [0x89, b'P', b'N', b'G', ..] => {
+                let frame = input.read_all()?;
+                options.window(&path, 1)?;
+                Self::take_frames(&path, [Ok((path.clone(), frame))], options)
+            }
+            _ => Err(other_content(&path, &first)),
+        }
+    }
+
+    fn take_npz(input: Input<'_>, options: &ReadOptions) -> Result<Self, DatasetError> {
+        let path = input.path().to_owned();
+        if let Some(camera) = &options.camera {
+            let (found, allowed) = (camera.display().to_string(), "absent: a height map has none");
+            return Err(DatasetError::content(&path, "the camera", found, allowed));
+        }
+        options.refuse_topics(&path)?;
+        options.window(&path, 1)?;
+        let source = Source::Heights(Npz::take(input)?.height_map()?);
+        Ok(Self::of_one(path, source, Segmentation::default()))
+    }
+
+    /// A recording of one frame.
+    fn of_one(path: PathBuf, source: Source, segmentation: Segmentation) -> Self {
+        Self {
+            path,
+            source,
+            topic: None,
+            frames: 1,
+            whole_frames: 1,
+            lost: None,
+            damage: Vec::new(),
+            segmentation,
+        }
+    }
+
+    fn take_frames(
+        path: &Path,
+        frames: impl IntoIterator<Item = Frame>,
+        options: &ReadOptions,
+    ) -> Result<Self, DatasetError> {
+        options.refuse_topics(path)?;
+        let Some(camera) = &options.camera else {
+            let allowed = "given for depth images as PNG (--camera camera.toml)";
             return Err(DatasetError::content(path, "the camera", "none", allowed));
         };
-        Self::open_frames(path, &frames, camera)
+        Self::of_frames(path, frames, &CameraFile::load(camera)?, camera)
     }
 
-    fn open_npz(path: &Path, camera: Option<&Path>) -> Result<Self, DatasetError> {
-        if let Some(camera) = camera {
-            let found = camera.display().to_string();
-            return Err(DatasetError::content(
-                path,
-                "the camera",
-                found,
-                "absent: a height map has none",
-            ));
-        }
-        let map = Npz::open(path)?.height_map()?;
-        let source = Source::Heights(map);
-        let segmentation = Segmentation::default();
-        Ok(Self { path: path.to_owned(), source, frames: 1, segmentation })
-    }
-
-    fn open_frames(
+    /// The mean of PNG frames, each with its name, that the camera of the file at `camera_path` took.
+    /// A damaged PNG is lost, any other misfit an error.
+    ///
+    /// # Errors
+    /// As [`Recording::open`].
+    pub fn of_frames(
         path: &Path,
-        frames: &[PathBuf],
+        frames: impl IntoIterator<Item = Frame>,
+        camera: &CameraFile,
         camera_path: &Path,
     ) -> Result<Self, DatasetError> {
-        let file = CameraFile::load(camera_path)?;
-        let camera = file.camera(camera_path)?;
-        let mut mean = Mean::new(file.width * file.height);
-        for frame in frames {
-            let image = png::read_depth(frame, file.depth_unit)?;
-            if (image.width, image.height) != (file.width, file.height) {
-                let found = format!("{}x{}", image.width, image.height);
-                let allowed =
-                    format!("{}x{} as in {}", file.width, file.height, camera_path.display());
-                return Err(DatasetError::content(frame, "the size", found, allowed));
-            }
-            mean.add(&image);
-        }
-        let image = DepthImage::new(file.width, file.height, mean.finish())
-            .map_err(|source| DatasetError::Recording { path: path.to_owned(), source })?;
-        let colour = file.colour.as_deref().map(png::read_colour).transpose()?;
+        let (lens, unit) = camera.lens_and_unit(camera_path)?;
+        let mean = folder::average(path, frames, (lens, unit, camera_path))?;
+        let colour = camera.colour.as_deref().map(png::read_colour).transpose()?;
+        let source = Source::Depth { camera: camera_of(lens), image: mean.image, colour };
+        let damaged = mean.damage.len() as u64;
         Ok(Self {
-            path: path.to_owned(),
-            source: Source::Depth { camera, image, colour },
-            frames: frames.len(),
-            segmentation: file.segmentation,
+            frames: mean.frames,
+            whole_frames: mean.frames as u64,
+            lost: (damaged > 0).then_some(Lost::Exactly(damaged)),
+            damage: mean.damage,
+            ..Self::of_one(path.to_owned(), source, camera.segmentation.clone())
+        })
+    }
+
+    fn take_messages(mut input: Input<'_>, options: &ReadOptions) -> Result<Self, DatasetError> {
+        let file = options.camera.as_deref().map(CameraFile::load).transpose()?;
+        let read = messages::read(&mut input, options, file.as_ref())?;
+        let beside = file.as_ref().and_then(|file| file.colour.as_deref());
+        let colour = match beside.map(png::read_colour).transpose()? {
+            Some(colour) => Some(colour),
+            None => read.colour,
+        };
+        let source =
+            Source::Depth { camera: camera_of(read.intrinsics), image: read.image, colour };
+        let segmentation = file.map(|file| file.segmentation).unwrap_or_default();
+        Ok(Self {
+            topic: Some(read.topic),
+            frames: read.frames,
+            whole_frames: read.whole,
+            lost: read.lost,
+            damage: read.damage,
+            ..Self::of_one(input.path().to_owned(), source, segmentation)
         })
     }
 
@@ -150,47 +241,17 @@ impl Recording {
     }
 }
 
-/// Mean per pixel over the frames that have data there.
-struct Mean {
-    sums: Vec<f64>,
-    counts: Vec<u32>,
-}
-
-impl Mean {
-    fn new(pixels: usize) -> Self {
-        Self { sums: vec![0.0; pixels], counts: vec![0; pixels] }
-    }
-
-    fn add(&mut self, image: &DepthImage) {
-        for ((sum, count), &depth) in self.sums.iter_mut().zip(&mut self.counts).zip(&image.depth) {
-            if depth > 0.0 {
-                *sum += f64::from(depth);
-                *count += 1;
-            }
+/// A file that is no recording.
+fn other_content(path: &Path, first: &[u8]) -> DatasetError {
+    let found = match first {
+        [] => "an empty file".to_owned(),
+        _ if first.starts_with(b"#ROSBAG V") => {
+            format!("{:?}", String::from_utf8_lossy(first).trim())
         }
-    }
-
-    fn finish(&self) -> Vec<f32> {
-        let mean = |(&sum, &count): (&f64, &u32)| match count {
-            0 => 0.0,
-            count => (sum / f64::from(count)) as f32,
-        };
-        self.sums.iter().zip(&self.counts).map(mean).collect()
-    }
-}
-
-/// The PNGs of a folder, in order of their names.
-fn frames_in(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
-    let list = || DatasetError::io("list", folder);
-    let entries = std::fs::read_dir(folder).map_err(list())?;
-    let entries = entries.collect::<Result<Vec<_>, _>>().map_err(list())?;
-    let is_png = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
-    let mut frames: Vec<_> = entries.iter().map(std::fs::DirEntry::path).filter(is_png).collect();
-    frames.sort();
-    if frames.is_empty() {
-        return Err(DatasetError::content(folder, "the folder", "no .png", "depth frames as .png"));
-    }
-    Ok(frames)
+        _ => format!("{:?}", String::from_utf8_lossy(first)),
+    };
+    let allowed = "a ROS 1 bag (#ROSBAG V2.0), MCAP, .npz or .png, or a folder of .png";
+    DatasetError::content(path, "the first bytes of a recording", found, allowed)
 }
 
 /// The folder of measured data that tests use: `$GRANULCAL_DATA`, else `../shared/data/measured`

@@ -3,11 +3,12 @@
 use std::fmt;
 
 use granulcal_dem::{Health, Status};
+use granulcal_features::stats::DIAGNOSTIC_COUNT;
 
 /// How a row ended: as its pour, or with too few grains in view to describe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RowStatus {
-    /// The pour ended like this, and its statistics are finite.
+    /// The pour ended like this. The statistics are finite unless it is unhealthy or jammed out of view.
     Pour(Status),
     /// Too few grains are in view; the statistics are NaN.
     NoGrainsInView,
@@ -35,9 +36,14 @@ impl RowStatus {
         format!("one of {}", words.join(", "))
     }
 
-    /// Whether the numbers of the row can be used.
+    /// Whether the simulation can be trusted and shows something.
     pub fn is_healthy(self) -> bool {
         self != Self::Pour(Status::Unhealthy) && self != Self::NoGrainsInView
+    }
+
+    /// Whether the flow stopped with grains in the funnel: a healthy row, but not of a whole formation.
+    pub fn is_jammed(self) -> bool {
+        self == Self::Pour(Status::Jammed)
     }
 }
 
@@ -64,8 +70,10 @@ pub struct Row {
     pub health: Health,
     /// CPU time of simulation and camera `[s]`; the one number that differs between runs.
     pub cpu_s: f64,
-    /// The paper's 16 statistics, NaN where [`RowStatus::NoGrainsInView`].
+    /// The paper's 16 statistics, NaN where too few grains are in view.
     pub statistics: [f64; 16],
+    /// The diagnostic statistics, NaN where the statistics are and in files that were written without.
+    pub diagnostics: [f64; DIAGNOSTIC_COUNT],
 }
 
 impl Row {
@@ -79,5 +87,6 @@ impl Row {
             && self.simulated_s == other.simulated_s
             && bits(&self.parameters) == bits(&other.parameters)
             && bits(&self.statistics) == bits(&other.statistics)
+            && bits(&self.diagnostics) == bits(&other.diagnostics)
     }
 }

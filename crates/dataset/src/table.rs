@@ -8,6 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use granulcal_dem::Health;
+use granulcal_features::stats::DIAGNOSTIC_COUNT;
 use parquet::basic::Compression;
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
@@ -33,13 +34,12 @@ const SEED_KEY: &str = "granulcal.seed";
 /// # Errors
 /// [`DatasetError::Io`] or [`DatasetError::Parquet`].
 pub(crate) fn write(path: &Path, header: &Header, rows: &[Row]) -> Result<(), DatasetError> {
-    let bytes = encode(header, rows)
+    let bytes = encode(header, rows, &columns(&header.prior.names()))
         .map_err(|source| DatasetError::Parquet { path: path.to_owned(), source })?;
     files::write_file(path, &bytes)
 }
 
-fn encode(header: &Header, rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
-    let columns = columns(&header.prior.names());
+fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, ParquetError> {
     let fields = columns.iter().map(|c| c.schema().map(Arc::new)).collect::<Result<Vec<_>, _>>()?;
     let schema = Arc::new(Type::group_type_builder("granulcal").with_fields(fields).build()?);
     let metadata = [
@@ -57,7 +57,7 @@ fn encode(header: &Header, rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
     let mut bytes = Vec::new();
     let mut file = SerializedFileWriter::new(&mut bytes, schema, Arc::new(properties))?;
     let mut group = file.next_row_group()?;
-    for column in &columns {
+    for column in columns {
         let Some(mut writer) = group.next_column()? else { break };
         match &column.access {
             Access::Count { get, .. } => {
@@ -91,7 +91,12 @@ pub(crate) fn read(path: &Path) -> Result<(Header, Vec<Row>), DatasetError> {
     let parquet = |source| DatasetError::Parquet { path: path.to_owned(), source };
     let file = SerializedFileReader::new(bytes::Bytes::from(bytes)).map_err(parquet)?;
     let header = read_header(path, &file)?;
-    let columns = columns(&header.prior.names());
+    let mut columns = columns(&header.prior.names());
+    // Files without the diagnostic statistics end before them; they stay NaN.
+    let found = file.metadata().file_metadata().schema_descr().num_columns();
+    if found + DIAGNOSTIC_COUNT == columns.len() {
+        columns.truncate(found);
+    }
     check_columns(path, &file, &columns)?;
 
     let count = usize::try_from(file.metadata().file_metadata().num_rows()).unwrap_or(0);
@@ -134,6 +139,7 @@ fn blank(parameters: usize) -> Row {
         health: Health::default(),
         cpu_s: f64::NAN,
         statistics: [f64::NAN; 16],
+        diagnostics: [f64::NAN; DIAGNOSTIC_COUNT],
     }
 }
 
@@ -217,4 +223,39 @@ fn check_columns(
         return Err(DatasetError::content(path, "the number of columns", found, allowed));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use granulcal_dem::Scene;
+
+    use super::*;
+    use crate::Prior;
+
+    #[test]
+    fn files_without_diagnostic_statistics_are_read() {
+        let header = Header::new(&Scene::drop(0.1), &Prior::default(), 7).unwrap();
+        let parameters = header.prior.parameters().len();
+        let written = Row {
+            statistics: [0.25; 16],
+            diagnostics: [0.5; DIAGNOSTIC_COUNT],
+            ..blank(parameters)
+        };
+        let mut listed = columns(&header.prior.names());
+        listed.truncate(listed.len() - DIAGNOSTIC_COUNT);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("old.parquet");
+        files::write_file(
+            &path,
+            &encode(&header, std::slice::from_ref(&written), &listed).unwrap(),
+        )
+        .unwrap();
+        let (_, rows) = read(&path).unwrap();
+        assert_eq!(rows[0].statistics, written.statistics);
+        assert!(rows[0].diagnostics.iter().all(|value| value.is_nan()));
+        // One column less is a column too few.
+        listed.pop();
+        files::write_file(&path, &encode(&header, &[written], &listed).unwrap()).unwrap();
+        assert!(read(&path).unwrap_err().to_string().contains("chi_scale"));
+    }
 }

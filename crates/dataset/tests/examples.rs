@@ -22,6 +22,7 @@ fn scenes_and_priors_fit() {
 #[test]
 fn the_camera_is_read() {
     let camera = CameraFile::load(&example("camera.toml")).unwrap();
-    assert_eq!((camera.width, camera.height), (640, 480));
+    let lens = camera.lens.expect("the example has a lens");
+    assert_eq!((lens.width, lens.height), (640, 480));
     assert_eq!(camera.segmentation.downsample, 2);
 }

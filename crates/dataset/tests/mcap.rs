@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use foxglove::Decode;
 use foxglove::messages::{CameraCalibration, PointCloud, RawImage};
-use granulcal_dataset::{DatasetError, View, look, record_pour, summarize_mcap};
+use granulcal_dataset::{Lost, ReadOptions, Recording, Source, Survey, View, look, record_pour};
 use granulcal_dem::{Scene, Simulation};
 
 fn scene() -> Scene {
@@ -87,11 +87,25 @@ fn schemas_counts_stamps_and_bytes_are_those_of_the_pour() {
     assert_eq!(metadata.metadata["seed"], "4");
     assert_eq!(metadata.metadata["status"], pour.status.name());
 
-    let ours = summarize_mcap(&path).unwrap();
+    let ours = Survey::open(&path).unwrap();
     assert_eq!(ours.topics.len(), 4);
     assert!((ours.end_s - pour.simulated_s).abs() < 1e-9);
+    assert!(ours.damage().is_empty());
+
+    // The film is a recording too: its last frame is the camera's image of the pour at rest.
+    let last_frame = ReadOptions { frames: 1, ..ReadOptions::default() };
+    let recording = Recording::open(&path, &last_frame).unwrap();
+    let Source::Depth { camera: read, image: seen, .. } = &recording.source else {
+        panic!("a depth image is expected");
+    };
+    assert_eq!(seen.depth, image.depth);
+    assert_eq!(read.intrinsics, camera.intrinsics);
+    assert_eq!(recording.whole_frames, stamps.len() as u64);
+
     std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-    assert!(matches!(summarize_mcap(&path), Err(DatasetError::Mcap { .. })));
+    let half = Recording::open(&path, &last_frame).unwrap();
+    assert!(matches!(half.lost, Some(Lost::AtLeast(_))), "{:?}", half.lost);
+    assert!(half.whole_frames < recording.whole_frames && half.whole_frames > 0);
 }
 
 #[test]

@@ -3,7 +3,8 @@
 //! Reads places and velocities (gravity included), writes the batches.
 
 use crate::bed::Bed;
-use crate::contact::{Batch, ContactSet};
+use crate::contact::Batch;
+use crate::contact_set::ContactSet;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, widest};
 use crate::law;
 use crate::wall::Wall;
@@ -38,13 +39,13 @@ pub(crate) struct Candidate {
 widest! {
     /// Refreshes the contacts between grains at the beginning of a substep and lists the possible impacts.
     pub(crate) fn assemble_pairs<W>(
-        set: &mut ContactSet,
+        batches: &mut [Batch],
         bed: &Bed,
         dt: f64,
         candidates: &mut Vec<Candidate>,
     ) -> Seen {
         let mut overlap = Reg::<W>::splat(0.0);
-        for batch in &mut set.batches {
+        for batch in batches {
             let place = |body: u32| W::load_row(&bed.places[body as usize]);
             let (i, j) = (each(&batch.i, place), each(&batch.j, place));
             let (gap, distance) = pair_geometry::<W>(batch, i, j, &mut overlap);
@@ -100,8 +101,8 @@ widest! {
 widest! {
     /// Refreshes the batches of pairs in which a grain has had an impact, as they are when the later one of
     /// their last impacts happened.
-    pub(crate) fn refresh_pairs<W>(set: &mut ContactSet, bed: &Bed, dt: f64) {
-        for batch in &mut set.batches {
+    pub(crate) fn refresh_pairs<W>(batches: &mut [Batch], bed: &Bed, dt: f64) {
+        for batch in batches {
             let mut clocks = Lanes::ZERO;
             for lane in batch.lanes() {
                 let (i, j) = (batch.i[lane] as usize, batch.j[lane] as usize);
@@ -237,5 +238,5 @@ fn finish<W: Width>(batch: &mut Batch, bias: Reg<W>) {
     bias.store(&mut batch.bias);
     let n = Reg3::<W>::load(&batch.normal);
     let lambda_t = Reg3::load(&batch.lambda_t);
-    (lambda_t - n.scale(n.dot(lambda_t))).store(&mut batch.lambda_t);
+    lambda_t.minus(n.dot(lambda_t), n).store(&mut batch.lambda_t);
 }

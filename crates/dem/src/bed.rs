@@ -3,15 +3,20 @@
 use std::marker::PhantomData;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::lanes::{Row, Width};
+use crate::parallel::Threads;
 use crate::scene::Scene;
+
+/// Grains that a thread takes at once.
+const SHARE: usize = if cfg!(test) { 16 } else { 4096 };
 
 /// Linear and scaled angular velocity of one body, a cache line.
 ///
 /// `spin` is `r * omega` `[m/s]`: with it the contact equations of unequal spheres have the
 /// same coefficients as those of equal ones. The fourth numbers are zero.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[repr(C, align(64))]
 pub(crate) struct Body {
     pub velocity: Row,
@@ -70,7 +75,7 @@ impl<'a> SharedBodies<'a> {
 
 /// Grains as arrays. `places` and `bodies` have one entry more than there are grains: the resting body that
 /// walls and empty lanes refer to.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Bed {
     /// Centre and radius of each grain `[m]`.
     pub places: Vec<Row>,
@@ -97,6 +102,22 @@ impl Bed {
             clocks: vec![0.0; count],
             inverse_mass: vec![1.0; count],
         }
+    }
+
+    /// Whether this can have become of `start`: as many grains, as large and as heavy, at the begin of a substep.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check_like(&self, start: &Self) -> Result<(), &'static str> {
+        let count = start.count();
+        let is_like = self.places.len() == count + 1
+            && self.bodies.len() == count + 1
+            && self.clocks == start.clocks
+            && self.inverse_mass == start.inverse_mass
+            && self.places.iter().zip(&start.places).all(|(a, b)| a.0[3] == b.0[3])
+            && self.places[count] == start.places[count]
+            && self.bodies[count] == start.bodies[count];
+        if is_like { Ok(()) } else { Err("grains that are not the scene's") }
     }
 
     pub fn count(&self) -> usize {
@@ -152,11 +173,14 @@ impl Bed {
     }
 
     /// v += g dt.
-    pub fn accelerate(&mut self, gravity: &Vector3<f64>, dt: f64) {
+    pub fn accelerate(&mut self, gravity: &Vector3<f64>, dt: f64, threads: &Threads) {
         let (count, step) = (self.count(), gravity * dt);
-        for body in &mut self.bodies[..count] {
-            body.velocity.add(&step);
-        }
+        let accelerate = |bodies: &mut [Body]| {
+            for body in bodies {
+                body.velocity.add(&step);
+            }
+        };
+        threads.shares(&mut self.bodies[..count], SHARE, accelerate, |(), ()| ());
     }
 
     /// Where a grain is at `time` `[s]` into the substep, and its radius.
@@ -241,7 +265,7 @@ mod tests {
         // energy rises by m g dt (v + g dt / 2).
         let (mut bed, gravity, dt) = (bed(), Vector3::new(0.0, 0.0, -9.81), 1e-3);
         let before = bed.energy(&gravity);
-        bed.accelerate(&gravity, dt);
+        bed.accelerate(&gravity, dt, &Threads::default());
         bed.move_on(dt);
         let mass = bed.inverse_mass.iter().map(|m| 1.0 / m).sum::<f64>();
         let expected = -0.5 * mass * (9.81 * dt).powi(2);

@@ -4,21 +4,34 @@
 //! complete as long as every grain is within half the margin of its path. A grain that leaves it gets a new path
 //! and the contacts that lie on it; when many do, the list is made afresh.
 
+mod check;
+
+use std::ops::Range;
+
 use crate::Material;
-use crate::assemble::{self, Seen};
+use crate::assemble::{self, Candidate, Seen};
 use crate::bed::Bed;
-use crate::contact::{ContactLaw, ContactSet, Listed};
+use crate::blocks::Blocks;
+use crate::contact::{Batch, ContactLaw, Listed};
+use crate::contact_set::ContactSet;
 use crate::impact::Impacts;
-use crate::neighbor::{PairSearch, Path};
+use crate::neighbor::{Neighbours, PairSearch};
+use crate::parallel::Threads;
+use crate::partners::Partners;
+use crate::path::{Ball, Path, Reach};
 use crate::preset::SolverSettings;
 use crate::scene::Scene;
 use crate::wall::{Wall, walls_of};
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 /// Share of the grains from which on a new list is cheaper than single new paths.
 const MANY: usize = 16;
 /// Gap below which a contact is listed among those that will act, in radii of a typical grain `[-]`.
 const NEAR: f64 = 0.02;
+
+/// Batches or grains that a thread takes at once.
+const SHARE: usize = if cfg!(test) { 4 } else { 512 };
 
 /// What the contacts are made of: walls, material and settings of one simulation.
 #[derive(Clone, Debug)]
@@ -27,6 +40,7 @@ pub(crate) struct Surroundings {
     pub material: Material,
     pub gravity: Vector3<f64>,
     pub settings: SolverSettings,
+    pub threads: Threads,
     /// Radius of a typical grain `[m]`, the length that the settings are relative to.
     pub radius: f64,
     /// Gap below which a pair is listed in any case `[m]`.
@@ -41,6 +55,7 @@ impl Surroundings {
             material: scene.material,
             gravity: scene.gravity.into(),
             settings,
+            threads: Threads::default(),
             radius: scene.grains.radius(),
             margin: settings.margin * scene.grains.radius(),
         }
@@ -50,6 +65,12 @@ impl Surroundings {
     pub fn set_settings(&mut self, settings: SolverSettings) {
         self.margin = settings.margin * self.radius;
         self.settings = settings;
+    }
+
+    /// What a list must hold to be complete until the next one.
+    pub fn reach(&self) -> Reach {
+        let interval = self.settings.dt * self.settings.list_period as f64;
+        Reach { interval, near: NEAR * self.radius, far: self.margin }
     }
 
     /// The coefficients of a contact between two grains.
@@ -76,22 +97,32 @@ fn contact_law(material: &Material, inverse_mass: [f64; 2], lever: [f64; 2]) -> 
 }
 
 /// Pairs and grains at walls, with their search.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Contacts {
     pub pairs: ContactSet,
     pub at_walls: ContactSet,
     search: PairSearch,
-    found: Vec<(u32, u32)>,
+    #[serde(skip)]
+    blocks: Blocks,
+    #[serde(skip)]
+    found: Vec<Neighbours>,
+    #[serde(skip)]
+    around_path: Vec<u32>,
+    #[serde(skip)]
     listed: Vec<Listed>,
+    #[serde(skip)]
     far: Vec<Listed>,
-    /// For each grain those that it is listed with: grains, and walls with the number of grains added.
-    partners: Vec<Vec<u32>>,
+    /// Grains, and walls with the number of grains added.
+    partners: Partners,
+    #[serde(skip)]
+    near_walls: Vec<(Listed, bool)>,
     /// The way of each grain, from the time of the list on.
     paths: Vec<Path>,
-    /// Grains whose path is newer than the list.
-    renewed: Vec<u32>,
+    /// Paths that are newer than the list.
+    renewed: usize,
     /// Substeps since the list was made.
     age: usize,
+    #[serde(skip)]
     strayed: Vec<u32>,
 }
 
@@ -109,14 +140,16 @@ impl Contacts {
         }
         let now = self.age as f64 * around.settings.dt;
         self.strayed.clear();
-        let dt = around.settings.dt;
-        for (grain, path) in self.paths.iter().enumerate() {
-            let at_end = bed.position(grain) + dt * bed.velocity(grain);
-            if is_off(&(at_end - path.at(now + dt)), around) {
-                self.strayed.push(grain as u32);
+        let (dt, paths) = (around.settings.dt, &self.paths);
+        around.threads.gather_ranges(paths.len(), SHARE, &mut self.strayed, |grains, strayed| {
+            for grain in grains {
+                let at_end = bed.position(grain) + dt * bed.velocity(grain);
+                if is_off(&(at_end - paths[grain].at(now + dt)), around) {
+                    strayed.push(grain as u32);
+                }
             }
-        }
-        if (self.strayed.len() + self.renewed.len()) * MANY > bed.count() {
+        });
+        if (self.strayed.len() + self.renewed) * MANY > bed.count() {
             self.list(bed, around);
             return;
         }
@@ -143,8 +176,8 @@ impl Contacts {
     }
 
     /// Those that a grain is listed with: grains, and walls with the number of grains added.
-    pub fn partners(&self, grain: usize) -> &[u32] {
-        &self.partners[grain]
+    pub fn partners(&self, grain: usize) -> impl Iterator<Item = u32> + '_ {
+        self.partners.of(grain)
     }
 
     /// Gaps, normals and biases of every listed contact, and what may be an impact.
@@ -157,7 +190,11 @@ impl Contacts {
     ) -> Seen {
         let (dt, found) = (around.settings.dt, &mut impacts.candidates);
         self.age += 1;
-        let pairs = assemble::assemble_pairs(&mut self.pairs, bed, dt, found);
+        let assemble = |batches: &mut [Batch], found: &mut Vec<Candidate>| {
+            assemble::assemble_pairs(batches, bed, dt, found)
+        };
+        let batches = &mut self.pairs.batches;
+        let pairs = around.threads.gather(batches, SHARE, found, assemble, Seen::max);
         let walls =
             assemble::assemble_walls(&mut self.at_walls, &around.walls, bed, dt, lost, found);
         pairs.max(walls)
@@ -165,7 +202,10 @@ impl Contacts {
 
     /// The same for the contacts of grains that have had an impact.
     pub fn assemble_again(&mut self, bed: &Bed, around: &Surroundings) {
-        assemble::refresh_pairs(&mut self.pairs, bed, around.settings.dt);
+        let refresh = |batches: &mut [Batch]| {
+            assemble::refresh_pairs(batches, bed, around.settings.dt);
+        };
+        around.threads.shares(&mut self.pairs.batches, SHARE, refresh, |(), ()| ());
         assemble::refresh_walls(&mut self.at_walls, &around.walls, bed, around.settings.dt);
     }
 
@@ -177,49 +217,62 @@ impl Contacts {
     /// A new list for all grains.
     fn list(&mut self, bed: &Bed, around: &Surroundings) {
         self.age = 0;
-        self.renewed.clear();
-        self.paths.clear();
-        self.paths.extend(
-            (0..bed.count()).map(|i| Path { from: bed.position(i), velocity: bed.velocity(i) }),
-        );
-        self.partners.resize(bed.count(), Vec::new());
-        self.partners.iter_mut().for_each(Vec::clear);
-        let interval = around.settings.dt * around.settings.list_period as f64;
+        self.renewed = 0;
+        self.paths = Path::all_of(bed);
+        let reach = around.reach();
+        let interval = reach.interval;
 
-        self.search.pairs(bed, &self.paths, interval, around.margin, &mut self.found);
+        self.search.pairs(bed, &self.paths, reach, &around.threads, &mut self.found);
+        self.blocks.place(self.search.middles(), self.search.longest(), around.radius);
         // Contacts that will act come first: their batches are full of them, the others are passed over whole.
         self.listed.clear();
         self.far.clear();
-        for &(i, partner) in &self.found {
-            let contact = Listed { i, partner };
-            let near = [i, partner].map(|n| bed.radius(n as usize)).iter().sum::<f64>()
-                + NEAR * around.radius;
-            let [a, b] = [i, partner].map(|n| &self.paths[n as usize]);
-            if a.comes_within(b, near, interval) {
-                self.listed.push(contact);
-            } else {
-                self.far.push(contact);
-            }
-            self.partners[i as usize].push(partner);
-            self.partners[partner as usize].push(i);
+        for &Neighbours { i, j: partner, come_near } in &self.found {
+            if come_near { &mut self.listed } else { &mut self.far }.push(Listed { i, partner });
         }
         self.listed.append(&mut self.far);
-        self.pairs.rebuild(&self.listed, bed.count(), false, |contact| {
+        self.pairs.rebuild(&self.listed, &self.blocks, bed.count(), false, |contact| {
             around.pair_law(bed, contact.i as usize, contact.partner as usize)
         });
 
+        self.list_walls(bed, around, interval);
         self.listed.clear();
-        for (grain, path) in self.paths.iter().enumerate() {
-            let range = bed.radius(grain) + around.margin + interval * path.velocity.norm();
-            for (number, wall) in around.walls.iter().enumerate() {
-                if wall.surface.may_reach(&path.from, range) {
-                    self.listed.push(Listed { i: grain as u32, partner: number as u32 });
-                    self.partners[grain].push((bed.count() + number) as u32);
+        for &(contact, is_near) in &self.near_walls {
+            if is_near { &mut self.listed } else { &mut self.far }.push(contact);
+        }
+        self.listed.append(&mut self.far);
+        self.at_walls.rebuild(&self.listed, &self.blocks, bed.count(), true, |contact| {
+            around.wall_law(bed, contact.i as usize, contact.partner as usize)
+        });
+    }
+
+    /// Lists the walls within reach of each grain, and whether they may be touched.
+    fn list_walls(&mut self, bed: &Bed, around: &Surroundings, interval: f64) {
+        self.near_walls.clear();
+        let (paths, walls) = (&self.paths, &around.walls);
+        let list = |grains: Range<usize>, found: &mut Vec<(Listed, bool)>| {
+            for grain in grains {
+                let Path { from, velocity } = &paths[grain];
+                let near = bed.radius(grain) + NEAR * around.radius + interval * velocity.norm();
+                let range = near + around.margin - NEAR * around.radius;
+                for (number, wall) in walls.iter().enumerate() {
+                    if wall.surface.may_reach(from, range) {
+                        let contact = Listed { i: grain as u32, partner: number as u32 };
+                        found.push((contact, wall.surface.may_reach(from, near)));
+                    }
                 }
             }
-        }
-        self.at_walls.rebuild(&self.listed, bed.count(), true, |contact| {
-            around.wall_law(bed, contact.i as usize, contact.partner as usize)
+        };
+        around.threads.gather_ranges(bed.count(), SHARE, &mut self.near_walls, list);
+        let (found, near_walls, count) = (&self.found, &self.near_walls, bed.count() as u32);
+        self.partners.rebuild(bed.count(), |add| {
+            for pair in found {
+                add(pair.i, pair.j);
+                add(pair.j, pair.i);
+            }
+            for (contact, _) in near_walls {
+                add(contact.i, count + contact.partner);
+            }
         });
     }
 
@@ -230,18 +283,15 @@ impl Contacts {
         let (at, velocity) = (bed.position(grain), bed.velocity(grain));
         let path = Path { from: at, velocity };
         self.paths[grain] = Path { from: at - now * velocity, velocity };
-        self.renewed.push(grain as u32);
+        self.renewed += 1;
 
-        let half_way = 0.5 * left * velocity;
-        let reach = bed.radius(grain) + half_way.norm() + around.margin;
-        self.found.clear();
-        let mut visit = |other: usize| self.found.push((grain as u32, other as u32));
-        self.search.around(&(at + half_way), reach, &mut visit);
-        // Those with a new path may have left the cell in which the search knows them.
-        self.renewed.iter().for_each(|&other| visit(other as usize));
-        for number in 0..self.found.len() {
-            let other = self.found[number].1 as usize;
-            if other == grain || self.partners[grain].contains(&(other as u32)) {
+        let ball = Ball::swept(&path, bed.radius(grain), left, around.margin);
+        self.around_path.clear();
+        self.search.around(&ball, |other| self.around_path.push(other));
+        self.search.add(grain as u32, &ball);
+        for number in 0..self.around_path.len() {
+            let other = self.around_path[number] as usize;
+            if other == grain || self.partners.has(grain, other as u32) {
                 continue;
             }
             let theirs = &self.paths[other];
@@ -249,8 +299,8 @@ impl Contacts {
             let limit = bed.radius(grain) + bed.radius(other) + around.margin;
             if path.comes_within(&theirs, limit, left) {
                 let (i, j) = (grain.min(other), grain.max(other));
-                self.partners[i].push(j as u32);
-                self.partners[j].push(i as u32);
+                self.partners.add(i, j as u32);
+                self.partners.add(j, i as u32);
                 let contact = Listed { i: i as u32, partner: j as u32 };
                 self.pairs.append(contact, false, around.pair_law(bed, i, j));
             }
@@ -258,8 +308,8 @@ impl Contacts {
         let range = bed.radius(grain) + around.margin + left * velocity.norm();
         for (number, wall) in around.walls.iter().enumerate() {
             let partner = (bed.count() + number) as u32;
-            if !self.partners[grain].contains(&partner) && wall.surface.may_reach(&at, range) {
-                self.partners[grain].push(partner);
+            if !self.partners.has(grain, partner) && wall.surface.may_reach(&at, range) {
+                self.partners.add(grain, partner);
                 let contact = Listed { i: grain as u32, partner: number as u32 };
                 self.at_walls.append(contact, true, around.wall_law(bed, grain, number));
             }

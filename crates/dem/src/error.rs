@@ -51,6 +51,62 @@ pub enum DemError {
     /// The operating system gave no threads.
     #[error("cannot start the threads for a simulation")]
     Threads(#[source] rayon::ThreadPoolBuildError),
+    /// Bytes that are no checkpoint.
+    #[error("a checkpoint begins with \"granulcal checkpoint\", this begins with {found:?}")]
+    NotACheckpoint {
+        /// The first bytes, as text.
+        found: String,
+    },
+    /// A checkpoint that has lost bytes, or has some too many.
+    #[error("the checkpoint is truncated or damaged: {expected} bytes expected, got {got}")]
+    CheckpointLength {
+        /// The length that it says it has `[bytes]`, or the least that there is.
+        expected: u64,
+        /// Its length `[bytes]`.
+        got: usize,
+    },
+    /// A checkpoint in which bytes have changed.
+    #[error("the checkpoint is damaged: its hash must be {stored:032x}, got {computed:032x}")]
+    CheckpointDamaged {
+        /// The hash at its end.
+        stored: u128,
+        /// The hash of what stands before.
+        computed: u128,
+    },
+    /// A checkpoint in a format that this version does not read.
+    #[error("the checkpoint must have format {allowed}, got {got}, written by granulcal {version}")]
+    CheckpointFormat {
+        /// Its format.
+        got: u32,
+        /// The format of this version.
+        allowed: u32,
+        /// The version that wrote it.
+        version: String,
+    },
+    /// A checkpoint of another version, which may compute other bits.
+    #[error("the checkpoint must be written by granulcal {allowed}, got {got}")]
+    CheckpointVersion {
+        /// The version that wrote it.
+        got: String,
+        /// This version.
+        allowed: &'static str,
+    },
+    /// A checkpoint of another scene, seed or settings.
+    #[error("the checkpoint is of another pour: {what} is {found} there, but {given} is given")]
+    CheckpointDiffers {
+        /// What differs.
+        what: Box<str>,
+        /// What the checkpoint says.
+        found: Box<str>,
+        /// What was given.
+        given: Box<str>,
+    },
+    /// A checkpoint with a state that no simulation of its scene can have; granulcal has not written it.
+    #[error("the checkpoint's state must be one of its scene, got {what}")]
+    CheckpointState {
+        /// What is wrong.
+        what: &'static str,
+    },
     /// A solver method that does not exist.
     #[error("method must be one of nsgs, newton_pcr, reference, got {got:?}")]
     UnknownMethod {

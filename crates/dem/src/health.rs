@@ -13,7 +13,8 @@ pub struct Health {
     pub mean_residual: f64,
     /// Worst natural-map residual over rms normal impulse of the sampled substeps `[-]`.
     pub worst_residual: f64,
-    /// Largest rise of mechanical energy above its lowest value so far, over the energy at the start `[-]`.
+    /// Largest rise of mechanical energy above its lowest value so far `[-]`, over the energy at the start, or over what
+    /// lifts every grain by its radius and sets it in motion as the end rule sees it, if that is more.
     pub energy_created: f64,
     /// Grains whose centre passed through a wall; must be 0.
     pub grains_lost: usize,
@@ -29,12 +30,12 @@ pub struct Health {
     pub mean_contacts: f64,
 }
 
-/// Energy that a pour may create, over its energy at the start, before it is called unhealthy. Correcting
+/// Energy that a pour may create, [`Health::energy_created`], before it is called unhealthy. Correcting
 /// penetrations lifts grains a little; an unstable solver multiplies energy.
 pub const MAX_ENERGY_CREATED: f64 = 0.01;
 
 /// Collects the health of a running simulation.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct HealthWatch {
     worst_penetration: f64,
     residual_sum: f64,
@@ -43,6 +44,7 @@ pub(crate) struct HealthWatch {
     contacts_sum: f64,
     contacts_samples: usize,
     start_energy: f64,
+    least_scale: f64,
     energy: f64,
     lowest_energy: f64,
     created: f64,
@@ -53,7 +55,8 @@ pub(crate) struct HealthWatch {
 }
 
 impl HealthWatch {
-    pub fn new(grains: usize, energy: f64) -> Self {
+    /// For so many grains with this energy at the start; energy created is compared with `least_scale` at least.
+    pub fn new(grains: usize, energy: f64, least_scale: f64) -> Self {
         Self {
             worst_penetration: 0.0,
             residual_sum: 0.0,
@@ -62,6 +65,7 @@ impl HealthWatch {
             contacts_sum: 0.0,
             contacts_samples: 0,
             start_energy: energy,
+            least_scale,
             energy,
             lowest_energy: energy,
             created: 0.0,
@@ -132,6 +136,11 @@ impl HealthWatch {
         }
     }
 
+    /// Whether there is a flag for each of so many grains.
+    pub fn is_of(&self, grains: usize) -> bool {
+        self.lost.len() == grains
+    }
+
     pub fn is_healthy(&self, max_penetration: f64) -> bool {
         self.is_finite()
             && self.worst_penetration <= max_penetration
@@ -140,6 +149,7 @@ impl HealthWatch {
     }
 
     fn energy_created(&self) -> f64 {
-        if self.start_energy > 0.0 { self.created / self.start_energy } else { 0.0 }
+        let scale = self.start_energy.max(self.least_scale);
+        if scale > 0.0 { self.created / scale } else { 0.0 }
     }
 }

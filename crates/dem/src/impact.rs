@@ -19,6 +19,9 @@ use crate::law::{IMPACT_SPEED, TANGENTIAL_INERTIA};
 /// Impacts of one grain in a substep, at most; what is left then is for the contact solve.
 const MAX_IMPACTS: u32 = 1024;
 
+/// Candidates that a thread takes at once.
+const SHARE: usize = if cfg!(test) { 4 } else { 512 };
+
 /// An impact to come.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Event {
@@ -27,6 +30,24 @@ struct Event {
     pair: Candidate,
     /// Impacts that both had had when this one was foreseen.
     counts: [u32; 2],
+}
+
+impl Event {
+    /// The impact of a pair, if there is one in this substep after `now`.
+    fn next(
+        pair: Candidate,
+        now: f64,
+        counts: [u32; 2],
+        bed: &Bed,
+        around: &Surroundings,
+    ) -> Option<Self> {
+        let time = match other_grain(pair, bed) {
+            Some(j) => time_of_pair(pair.i as usize, j, now, bed),
+            None => time_at_wall(pair, now, bed, around),
+        };
+        let time = time.filter(|&time| time < around.settings.dt)?;
+        Some(Self { time, pair, counts })
+    }
 }
 
 impl Eq for Event {}
@@ -51,6 +72,7 @@ pub(crate) struct Impacts {
     /// What may be an impact in this substep.
     pub candidates: Vec<Candidate>,
     queue: BinaryHeap<Event>,
+    foreseen: Vec<Event>,
     /// Impacts of each grain in this substep.
     counts: Vec<u32>,
     /// The grains with impacts.
@@ -68,9 +90,13 @@ impl Impacts {
         around: &Surroundings,
     ) -> usize {
         self.counts.resize(bed.count(), 0);
-        for number in 0..self.candidates.len() {
-            self.foresee(self.candidates[number], 0.0, bed, around);
-        }
+        let foreseen = |candidates: &mut [Candidate], found: &mut Vec<Event>| {
+            let event = |&mut pair| Event::next(pair, 0.0, [0; 2], bed, around);
+            found.extend(candidates.iter_mut().filter_map(event));
+        };
+        let candidates = &mut self.candidates;
+        around.threads.gather(candidates, SHARE, &mut self.foreseen, foreseen, |(), ()| ());
+        self.queue.extend(self.foreseen.drain(..));
         let mut resolved = 0;
         while let Some(Event { time, pair, counts }) = self.queue.pop() {
             if counts != self.counts_of(pair) || !collide(pair, time, bed, around) {
@@ -114,7 +140,7 @@ impl Impacts {
             return;
         }
         self.partners.clear();
-        self.partners.extend_from_slice(contacts.partners(grain));
+        self.partners.extend(contacts.partners(grain));
         for number in 0..self.partners.len() {
             let partner = self.partners[number];
             let pair = if (partner as usize) < grain {
@@ -128,13 +154,7 @@ impl Impacts {
 
     /// Queues the impact of a pair, if there is one after `now`.
     fn foresee(&mut self, pair: Candidate, now: f64, bed: &Bed, around: &Surroundings) {
-        let time = match other_grain(pair, bed) {
-            Some(j) => time_of_pair(pair.i as usize, j, now, bed),
-            None => time_at_wall(pair, now, bed, around),
-        };
-        if let Some(time) = time.filter(|&time| time < around.settings.dt) {
-            self.queue.push(Event { time, pair, counts: self.counts_of(pair) });
-        }
+        self.queue.extend(Event::next(pair, now, self.counts_of(pair), bed, around));
     }
 }
 
@@ -201,8 +221,8 @@ struct Meeting {
 }
 
 impl Meeting {
-    fn with_grain(i: usize, j: usize, bed: &Bed, around: &Surroundings) -> Self {
-        let apart = bed.position(i) - bed.position(j);
+    fn with_grain(i: usize, j: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
+        let apart = bed.place_at(i, time).vector() - bed.place_at(j, time).vector();
         let distance = apart.norm();
         Self {
             law: around.pair_law(bed, i, j),
@@ -215,7 +235,8 @@ impl Meeting {
     }
 
     fn with_wall(i: usize, wall: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
-        let normal = around.walls[wall].surface.nearest(&bed.position(i)).normal;
+        let place = bed.place_at(i, time).vector();
+        let normal = around.walls[wall].surface.nearest(&place).normal;
         Self {
             law: around.wall_law(bed, i, wall),
             material: around.walls[wall].material,
@@ -228,13 +249,11 @@ impl Meeting {
 }
 
 /// Lets two collide at `time` if they still approach fast enough: Newton's restitution, Coulomb's friction
-/// and rolling friction, each solved exactly in this order. False if they do not.
+/// and rolling friction, each solved exactly in this order. If they do not, both stay as they are.
 fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> bool {
     let (i, other) = (pair.i as usize, other_grain(pair, bed));
-    bed.advance(i, time);
     let meeting = if let Some(j) = other {
-        bed.advance(j, time);
-        Meeting::with_grain(i, j, bed, around)
+        Meeting::with_grain(i, j, time, bed, around)
     } else {
         Meeting::with_wall(i, pair.partner as usize - bed.count(), time, bed, around)
     };
@@ -244,6 +263,10 @@ fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> 
     let w_n = normal.dot(&dv);
     if w_n + falling >= -IMPACT_SPEED {
         return false;
+    }
+    bed.advance(i, time);
+    if let Some(j) = other {
+        bed.advance(j, time);
     }
     let a_n = c_i + c_j;
     let lambda_n = -(1.0 + material.restitution) * (w_n + falling) / a_n;

@@ -1,7 +1,8 @@
 //! Eight numbers side by side: the arithmetic of one batch of contacts.
 //!
 //! [`Lanes`] is how they lie in memory, [`Reg`] how they are computed with, on whatever registers a
-//! [`Width`] has. No fused multiply-add and no approximate reciprocal: every width gives the same bits.
+//! [`Width`] has. Every operation is correctly rounded, the fused multiply-add too, and none is an approximate
+//! reciprocal: every width gives the same bits.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -17,17 +18,18 @@ pub(crate) use avx512::Avx512;
 use nalgebra::Vector3;
 pub(crate) use portable::Portable;
 pub(crate) use reg::{Reg, Reg3};
+use serde::{Deserialize, Serialize};
 
 /// Contacts in a batch.
 pub(crate) const LANES: usize = 8;
 
 /// One number for each contact of a batch, in memory.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[repr(C, align(64))]
 pub(crate) struct Lanes(pub [f64; LANES]);
 
 /// Four numbers of one grain, in memory: a vector and a fourth number.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[repr(C, align(32))]
 pub(crate) struct Row(pub [f64; 4]);
 
@@ -54,7 +56,7 @@ impl Row {
 }
 
 /// One 3-vector for each contact of a batch, component by component, in memory.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Lanes3 {
     pub x: Lanes,
     pub y: Lanes,
@@ -109,6 +111,10 @@ pub(crate) trait Width: Copy {
     fn add(a: Self::Value, b: Self::Value) -> Self::Value;
     fn sub(a: Self::Value, b: Self::Value) -> Self::Value;
     fn mul(a: Self::Value, b: Self::Value) -> Self::Value;
+    /// `a * b + c`, rounded once.
+    fn mul_add(a: Self::Value, b: Self::Value, c: Self::Value) -> Self::Value;
+    /// `c - a * b`, rounded once.
+    fn mul_sub_from(a: Self::Value, b: Self::Value, c: Self::Value) -> Self::Value;
     fn div(a: Self::Value, b: Self::Value) -> Self::Value;
     fn sqrt(a: Self::Value) -> Self::Value;
     /// `yes` where `a < b`, `no` elsewhere (also where either is NaN).
@@ -118,6 +124,10 @@ pub(crate) trait Width: Copy {
         yes: Self::Value,
         no: Self::Value,
     ) -> Self::Value;
+    /// `b` where `a < b`, `a` elsewhere (also where either is NaN).
+    fn max(a: Self::Value, b: Self::Value) -> Self::Value;
+    /// `a` where `a < b`, `b` elsewhere (also where either is NaN).
+    fn min(a: Self::Value, b: Self::Value) -> Self::Value;
     /// One bit for each lane in which `a < b`.
     fn less_bits(a: Self::Value, b: Self::Value) -> u32;
     fn load_row(from: &Row) -> Self::Quad;
@@ -126,6 +136,19 @@ pub(crate) trait Width: Copy {
     fn columns(rows: [Self::Quad; LANES]) -> [Self::Value; 4];
     /// Four columns as their eight rows.
     fn rows(columns: [Self::Value; 4]) -> [Self::Quad; LANES];
+}
+
+/// The widest registers that kernels may use `[bits]`. Only tests ask for less, to compare.
+#[cfg(test)]
+pub(crate) static WIDEST: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(512);
+
+/// Whether kernels may use registers of so many bits.
+#[inline(always)]
+pub(crate) fn may_use(bits: u32) -> bool {
+    #[cfg(test)]
+    return bits <= WIDEST.load(std::sync::atomic::Ordering::Relaxed);
+    #[cfg(not(test))]
+    return bits <= 512;
 }
 
 /// Compiles a function three times, for AVX-512, AVX2 and the target's baseline, and calls the widest
@@ -145,18 +168,22 @@ macro_rules! widest {
                 fn avx512($($arg: $kind),*) $(-> $out)? {
                     with::<$crate::lanes::Avx512>($($arg),*)
                 }
-                #[target_feature(enable = "avx2")]
+                #[target_feature(enable = "avx2,fma")]
                 fn avx2($($arg: $kind),*) $(-> $out)? {
                     with::<$crate::lanes::Avx2>($($arg),*)
                 }
-                if is_x86_feature_detected!("avx512vl")
+                if $crate::lanes::may_use(512)
+                    && is_x86_feature_detected!("avx512vl")
                     && is_x86_feature_detected!("avx512dq")
                     && is_x86_feature_detected!("avx512bw")
                 {
                     // SAFETY: the features were detected on this machine.
                     return unsafe { avx512($($arg),*) };
                 }
-                if is_x86_feature_detected!("avx2") {
+                if $crate::lanes::may_use(256)
+                    && is_x86_feature_detected!("avx2")
+                    && is_x86_feature_detected!("fma")
+                {
                     // SAFETY: the feature was detected on this machine.
                     return unsafe { avx2($($arg),*) };
                 }
@@ -182,9 +209,9 @@ mod tests {
         let values: [W::Value; LANES] = std::array::from_fn(|r| {
             let (a, b) = (W::load(&a[r]), W::load(&b[r]));
             let square = W::add(W::mul(a, a), W::splat(0.5));
-            let root = W::sub(W::sqrt(square), W::div(b, square));
+            let root = W::mul_add(a, b, W::mul_sub_from(b, W::sqrt(square), W::div(b, square)));
             bits = bits << 4 ^ W::less_bits(a, b);
-            W::select_less(a, b, root, W::mul(root, b))
+            W::min(W::select_less(a, b, root, W::mul(root, b)), W::max(a, b))
         });
         let [p, q, r, s, t, u, v, w] = values;
         let rows = [W::rows([p, q, r, s]), W::rows([t, u, v, w])];
@@ -219,7 +246,7 @@ mod tests {
         let expected = exercise::<Portable>(&a, &b);
         assert_eq!(exercise_widest(&a, &b), expected);
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
             assert_eq!(exercise::<Avx2>(&a, &b), expected);
         }
     }

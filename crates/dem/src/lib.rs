@@ -31,15 +31,22 @@
 
 mod assemble;
 mod bed;
+mod blocks;
+mod checkpoint;
 mod contact;
+mod contact_set;
 mod contacts;
 mod error;
+mod frozen_search;
 mod health;
 mod impact;
 mod lanes;
 mod law;
 mod material;
 mod neighbor;
+mod parallel;
+mod partners;
+mod path;
 mod pour;
 mod preset;
 mod problem;
@@ -49,7 +56,9 @@ mod solver;
 mod wall;
 mod wall_load;
 
+pub use checkpoint::CheckpointHeader;
 pub use error::DemError;
+pub use frozen_search::FrozenSearch;
 pub use health::{Health, MAX_ENERGY_CREATED};
 pub use material::{
     Material, WallMaterial, rolling_friction_from_length, rolling_friction_to_length,

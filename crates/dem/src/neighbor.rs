@@ -5,71 +5,117 @@
 //! that come near on their straight paths are the answer. A dense grid of cells holds the centres, x
 //! fastest, so that neighbouring cells of a row are one range of slots.
 
+mod check;
+
+use std::ops::Range;
+
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::bed::Bed;
 use crate::lanes::widest;
+use crate::parallel::Threads;
+use crate::path::{Ball, Path, Reach};
 
 /// Upper bound of the number of cells: clearing them must stay cheaper than the search itself.
 const MAX_CELLS: f64 = 65_536.0;
 /// Balls tested at once.
 const CHUNK: usize = 16;
-/// What rounding to single precision may hide in a grid of metres `[m]`.
-const ROUNDING: f64 = 1e-6;
+/// Rows of cells that a thread takes at once.
+const ROWS: usize = if cfg!(test) { 4 } else { 64 };
 
 /// The search and its buffers.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct PairSearch {
+    #[serde(skip)]
     middles: Vec<Vector3<f64>>,
+    #[serde(skip)]
     reaches: Vec<f64>,
+    /// Grains that were added since, each with the next one of its cell; the last of each cell.
+    added: Vec<Added>,
+    latest: Vec<u32>,
+    /// Added grains that fit into no cell.
+    outside: Vec<u32>,
     /// Lower corner of the grid `[m]` and the width of a cell `[m]`.
-    corner: Vector3<f64>,
+    corner: [f64; 3],
     edge: f64,
     cells: [usize; 3],
     /// First slot of each cell, and the end.
     starts: Vec<u32>,
+    #[serde(skip)]
     cell_of: Vec<u32>,
     /// Grains in the order of their cells.
     order: Vec<u32>,
     /// Centre from the grid's corner and grown radius, in the order of the cells; single precision for speed.
+    #[serde(skip)]
     x: Vec<f32>,
+    #[serde(skip)]
     y: Vec<f32>,
+    #[serde(skip)]
     z: Vec<f32>,
+    #[serde(skip)]
     reach: Vec<f32>,
 }
 
 impl PairSearch {
-    /// Fills `found` with every pair `(i, j)`, `i < j`, of grains whose gap falls below `margin` `[m]` within
-    /// `interval` `[s]` on their paths. Each pair once; the order depends on the state alone.
+    /// Fills `found` with every pair of grains that come within `reach` of each other on their paths. Each pair once;
+    /// the order depends on the state alone.
     pub fn pairs(
         &mut self,
         bed: &Bed,
         paths: &[Path],
-        interval: f64,
-        margin: f64,
-        found: &mut Vec<(u32, u32)>,
+        reach: Reach,
+        threads: &Threads,
+        found: &mut Vec<Neighbours>,
     ) {
         found.clear();
         self.starts.clear();
+        self.added.clear();
+        self.outside.clear();
         if bed.count() < 2 {
             return;
         }
-        self.sweep_balls(bed, interval, margin);
+        self.sweep_balls(bed, paths, reach);
         self.sort_into_cells();
-        overlapping(self, found);
-        found.retain(|&(i, j)| {
-            let (i, j) = (i as usize, j as usize);
-            let limit = bed.radius(i) + bed.radius(j) + margin;
-            paths[i].comes_within(&paths[j], limit, interval)
+        let search = &*self;
+        threads.gather_ranges(self.cells[1] * self.cells[2], ROWS, found, |rows, found| {
+            let first = found.len();
+            overlapping(search, rows, found);
+            keep_from(found, first, |pair| pair.follow(bed, paths, reach));
         });
     }
 
-    /// Calls `visit` for every grain whose swept ball may overlap the ball of radius `reach` `[m]` about `point`.
-    pub fn around(&self, point: &Vector3<f64>, reach: f64, mut visit: impl FnMut(usize)) {
+    /// Centres of the swept balls at the last search for at least two grains.
+    pub fn middles(&self) -> &[Vector3<f64>] {
+        &self.middles
+    }
+
+    /// How far apart the centres of two overlapping swept balls are at most.
+    pub fn longest(&self) -> f64 {
+        self.edge
+    }
+
+    /// Adds a grain's new swept ball to those that [`Self::around`] finds.
+    pub fn add(&mut self, grain: u32, ball: &Ball) {
+        let from_corner = (ball.middle - Vector3::from(self.corner)) / self.edge;
+        let is_inside = |axis: usize| (0.0..self.cells[axis] as f64).contains(&from_corner[axis]);
+        if self.starts.is_empty() || ball.reach > 0.5 * self.edge || !(0..3).all(is_inside) {
+            self.outside.push(grain);
+            return;
+        }
+        let [x, y, z] = [0, 1, 2].map(|axis| from_corner[axis] as usize);
+        let latest = &mut self.latest[(z * self.cells[1] + y) * self.cells[0] + x];
+        self.added.push(Added { grain, before: *latest });
+        *latest = self.added.len() as u32;
+    }
+
+    /// Calls `visit` for every grain whose swept ball, as searched or added, may overlap this one.
+    pub fn around(&self, ball: &Ball, mut visit: impl FnMut(u32)) {
+        self.outside.iter().for_each(|&grain| visit(grain));
         if self.starts.is_empty() {
             return;
         }
-        let reach = reach + 0.5 * self.edge;
+        let (point, reach) = (&ball.middle, ball.reach + 0.5 * self.edge);
         let [(x0, x1), (y0, y1), (z0, z1)] = [0, 1, 2].map(|axis| {
             let cell = |at: f64| {
                 let cell = ((at - self.corner[axis]) / self.edge).floor();
@@ -84,20 +130,27 @@ impl PairSearch {
                 let (first, last) = (row + x0, row + x1.max(x0));
                 let slots = self.starts[first] as usize..self.starts[last] as usize;
                 for &grain in &self.order[slots] {
-                    visit(grain as usize);
+                    visit(grain);
+                }
+                for &latest in &self.latest[first..last] {
+                    let mut next = latest;
+                    while next != 0 {
+                        let Added { grain, before } = self.added[next as usize - 1];
+                        visit(grain);
+                        next = before;
+                    }
                 }
             }
         }
     }
 
-    fn sweep_balls(&mut self, bed: &Bed, interval: f64, margin: f64) {
+    fn sweep_balls(&mut self, bed: &Bed, paths: &[Path], reach: Reach) {
         self.middles.clear();
         self.reaches.clear();
-        for grain in 0..bed.count() {
-            let position = bed.position(grain);
-            let half_way = 0.5 * interval * bed.velocity(grain);
-            self.middles.push(position + half_way);
-            self.reaches.push(bed.radius(grain) + half_way.norm() + 0.5 * margin + ROUNDING);
+        for (grain, path) in paths.iter().enumerate() {
+            let ball = Ball::swept(path, bed.radius(grain), reach.interval, reach.far);
+            self.middles.push(ball.middle);
+            self.reaches.push(ball.reach);
         }
     }
 
@@ -117,12 +170,14 @@ impl PairSearch {
             edge *= 1.25;
         }
         self.cells = [0, 1, 2].map(|axis| (extent[axis] / edge) as usize + 1);
-        self.corner = low;
+        self.corner = low.into();
         self.edge = edge;
 
         let total = self.cells.iter().product::<usize>();
         self.starts.clear();
         self.starts.resize(total + 1, 0);
+        self.latest.clear();
+        self.latest.resize(total, 0);
         self.cell_of.clear();
         for middle in &self.middles {
             let [x, y, z] = [0, 1, 2].map(|axis| ((middle[axis] - low[axis]) / edge) as usize);
@@ -156,7 +211,7 @@ impl PairSearch {
 
     /// Partners of every grain of the row of cells `(y, z)` among the slots that come after it.
     #[inline(always)]
-    fn row(&self, y: usize, z: usize, found: &mut Vec<(u32, u32)>) {
+    fn row(&self, y: usize, z: usize, found: &mut Vec<Neighbours>) {
         let [nx, ny, nz] = self.cells;
         let row = |y: usize, z: usize| (z * ny + y) * nx;
         // The rows that come after this one and touch it.
@@ -186,7 +241,7 @@ impl PairSearch {
 
     /// Appends the balls of `begin..end` that overlap the ball in `slot`.
     #[inline(always)]
-    fn partners(&self, slot: usize, mut begin: usize, end: usize, found: &mut Vec<(u32, u32)>) {
+    fn partners(&self, slot: usize, mut begin: usize, end: usize, found: &mut Vec<Neighbours>) {
         while begin < end {
             let mut hits = self.near(slot, begin);
             if end - begin < CHUNK {
@@ -196,7 +251,7 @@ impl PairSearch {
                 let other = begin + hits.trailing_zeros() as usize;
                 hits &= hits - 1;
                 let (i, j) = (self.order[slot], self.order[other]);
-                found.push((i.min(j), i.max(j)));
+                found.push(Neighbours { i: i.min(j), j: i.max(j), come_near: false });
             }
             begin += CHUNK;
         }
@@ -224,43 +279,52 @@ impl PairSearch {
 }
 
 widest! {
-    /// All pairs of overlapping swept balls, in the order of the slots.
-    fn overlapping<W>(search: &PairSearch, found: &mut Vec<(u32, u32)>) {
-        for z in 0..search.cells[2] {
-            for y in 0..search.cells[1] {
-                search.row(y, z, found);
-            }
+    /// All pairs of overlapping swept balls whose first is in these rows of cells, in the order of the slots.
+    fn overlapping<W>(search: &PairSearch, rows: Range<usize>, found: &mut Vec<Neighbours>) {
+        for row in rows {
+            search.row(row % search.cells[1], row / search.cells[1], found);
         }
     }
 }
 
-/// A grain's straight way.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Path {
-    pub from: Vector3<f64>,
-    pub velocity: Vector3<f64>,
+/// Keeps of the items from `first` on those that `is_kept` says.
+fn keep_from<T: Copy>(items: &mut Vec<T>, first: usize, mut is_kept: impl FnMut(&mut T) -> bool) {
+    let mut end = first;
+    for number in first..items.len() {
+        let mut item = items[number];
+        if is_kept(&mut item) {
+            items[end] = item;
+            end += 1;
+        }
+    }
+    items.truncate(end);
 }
 
-impl Path {
-    #[inline]
-    pub fn at(&self, time: f64) -> Vector3<f64> {
-        self.from + time * self.velocity
-    }
+/// A grain that was added to a cell, and the number, from 1 on, of the one that was added to it before.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct Added {
+    grain: u32,
+    before: u32,
+}
 
-    /// Whether the way comes within `limit` `[m]` of another in the next `interval` `[s]`.
+/// Two grains, `i < j`, whose paths come within reach of each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Neighbours {
+    pub i: u32,
+    pub j: u32,
+    /// Whether they come near, and not only within the margin.
+    pub come_near: bool,
+}
+
+impl Neighbours {
+    /// Whether they are within reach on their paths; notes whether they come near.
     #[inline]
-    pub fn comes_within(&self, other: &Self, limit: f64, interval: f64) -> bool {
-        let apart = self.from - other.from;
-        if apart.norm_squared() < limit * limit {
-            return true;
-        }
-        let relative = self.velocity - other.velocity;
-        let closing = -apart.dot(&relative);
-        if closing <= 0.0 {
-            return false;
-        }
-        let nearest = (closing / relative.norm_squared()).min(interval);
-        (apart + nearest * relative).norm_squared() < limit * limit
+    fn follow(&mut self, bed: &Bed, paths: &[Path], reach: Reach) -> bool {
+        let (i, j) = (self.i as usize, self.j as usize);
+        let nearest = paths[i].nearest_squared(&paths[j], reach.interval);
+        let touching = bed.radius(i) + bed.radius(j);
+        self.come_near = nearest < (touching + reach.near).powi(2);
+        nearest < (touching + reach.far).powi(2)
     }
 }
 
@@ -283,16 +347,20 @@ mod tests {
         bed
     }
 
-    fn brute_force(bed: &Bed, interval: f64, margin: f64) -> Vec<(u32, u32)> {
+    fn brute_force(bed: &Bed, reach: Reach) -> Vec<Neighbours> {
         let pairs = (0..bed.count()).flat_map(|i| (i + 1..bed.count()).map(move |j| (i, j)));
+        let path = |grain| Path { from: bed.position(grain), velocity: bed.velocity(grain) };
+        let within = |i, j, gap| {
+            let limit = bed.radius(i) + bed.radius(j) + gap;
+            path(i).comes_within(&path(j), limit, reach.interval)
+        };
         pairs
-            .filter(|&(i, j)| {
-                let path =
-                    |grain| Path { from: bed.position(grain), velocity: bed.velocity(grain) };
-                let limit = bed.radius(i) + bed.radius(j) + margin;
-                path(i).comes_within(&path(j), limit, interval)
+            .filter(|&(i, j)| within(i, j, reach.far))
+            .map(|(i, j)| Neighbours {
+                i: i as u32,
+                j: j as u32,
+                come_near: within(i, j, reach.near),
             })
-            .map(|(i, j)| (i as u32, j as u32))
             .collect()
     }
 
@@ -307,9 +375,13 @@ mod tests {
             let paths: Vec<Path> = (0..bed.count())
                 .map(|i| Path { from: bed.position(i), velocity: bed.velocity(i) })
                 .collect();
-            PairSearch::default().pairs(&bed, &paths, interval, 0.0005, &mut pairs);
-            pairs.sort_unstable();
-            prop_assert_eq!(pairs, brute_force(&bed, interval, 0.0005));
+            let reach = Reach { interval, near: 0.0001, far: 0.0005 };
+            for threads in [1, 2] {
+                let threads = Threads::new(threads).unwrap();
+                PairSearch::default().pairs(&bed, &paths, reach, &threads, &mut pairs);
+                pairs.sort_unstable();
+                prop_assert_eq!(&pairs, &brute_force(&bed, reach));
+            }
         }
     }
 }

@@ -15,6 +15,8 @@ pub enum Status {
     AtRest,
     /// Every grain that still moves is out of the camera's view.
     OutOfView,
+    /// The flow has stopped, but grains remain in the funnel.
+    Jammed,
     /// The end rule's horizon was reached first.
     Horizon,
     /// A bound of [`Health`] was broken; the numbers are not to be trusted.
@@ -23,13 +25,15 @@ pub enum Status {
 
 impl Status {
     /// Every status.
-    pub const ALL: [Self; 4] = [Self::AtRest, Self::OutOfView, Self::Horizon, Self::Unhealthy];
+    pub const ALL: [Self; 5] =
+        [Self::AtRest, Self::OutOfView, Self::Jammed, Self::Horizon, Self::Unhealthy];
 
     /// The word used in Parquet, on the command line and in Python.
     pub fn name(self) -> &'static str {
         match self {
             Self::AtRest => "at_rest",
             Self::OutOfView => "out_of_view",
+            Self::Jammed => "jammed",
             Self::Horizon => "horizon",
             Self::Unhealthy => "unhealthy",
         }
@@ -57,6 +61,10 @@ pub struct Pour {
     pub status: Status,
     /// Whether it can be trusted, in numbers.
     pub health: Health,
+    /// Grains whose centre is in the funnel ([`crate::Funnel::holds`]); 0 where there is none.
+    pub grains_in_funnel: usize,
     /// Simulated time `[s]`.
     pub simulated_s: f64,
+    /// [`crate::Simulation::state_hash`] at the end: equal hashes are equal pours, to the last bit.
+    pub state_hash: u128,
 }

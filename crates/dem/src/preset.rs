@@ -58,7 +58,7 @@ impl FromStr for Preset {
 }
 
 /// What a preset stands for.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolverSettings {
     /// How the contact problem of a substep is solved.
     pub method: Method,

@@ -6,7 +6,8 @@
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::bed::{Bed, Body, INVERSE_INERTIA};
-use crate::contact::{Batch, ContactSet};
+use crate::contact::Batch;
+use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
 
 /// Residual at which a solution counts as converged, over the fastest velocity or impulse `[-]`: some

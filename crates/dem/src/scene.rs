@@ -4,7 +4,7 @@
 //! ground is the plane z = 0 and gravity points down unless the scene says otherwise.
 
 mod camera;
-mod path;
+pub(crate) mod path;
 mod start;
 mod walls;
 

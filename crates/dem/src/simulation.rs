@@ -1,28 +1,31 @@
-//! A pour in time: the substep, the end rule, the health.
+//! A pour in time: the substep and the health; when it ends is in `simulation/end.rs`, its state as bytes in
+//! `simulation/state.rs`.
+
+mod end;
+mod state;
 
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::DemError;
 use crate::assemble::Seen;
 use crate::bed::Bed;
 use crate::contacts::{Contacts, Surroundings};
+use crate::frozen_search::FrozenSearch;
 use crate::health::{Health, HealthWatch};
 use crate::impact::Impacts;
+use crate::parallel::Threads;
 use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
 use crate::problem::{ContactProblem, SWEEPS_A_LOOK};
-use crate::scene::{CameraSpec, EndRule, Scene};
+use crate::scene::Scene;
 use crate::solver::frozen::FrozenSolve;
 use crate::solver::{self, nsgs};
 use crate::wall_load::{self, WallLoad};
 
 /// Examinations between two looks at the residual, which costs about a sweep.
 const RESIDUAL_PERIOD: usize = 4;
-/// Looks at the end rule within which a pour must seem ended twice.
-const REST_LOOKS: usize = 16;
 /// A scene in motion.
 ///
 /// Each substep (Moreau's time stepping; docs/theory/contact.md, box 3):
@@ -34,15 +37,19 @@ pub struct Simulation {
     contacts: Contacts,
     around: Surroundings,
     impacts: Impacts,
-    end: EndRule,
-    camera: CameraSpec,
+    origin: Arc<Origin>,
     substep: usize,
     watch: HealthWatch,
-    /// Threads for large scenes; small ones stay on the calling thread.
-    pool: Option<Arc<ThreadPool>>,
     /// The last end that the end rule saw, and at which substep.
     seemed_ended: Option<(Status, usize)>,
     ended: Option<Status>,
+}
+
+/// What a simulation is of.
+#[derive(Debug)]
+struct Origin {
+    scene: Scene,
+    seed: u64,
 }
 
 impl Simulation {
@@ -54,16 +61,16 @@ impl Simulation {
         scene.check()?;
         let bed = Bed::new(scene, seed);
         let gravity = Vector3::from(scene.gravity);
+        let lift = gravity.norm() * scene.grains.radius();
+        let least_scale = (lift + scene.end.kinetic_energy) * bed.count() as f64;
         Ok(Self {
-            watch: HealthWatch::new(bed.count(), bed.energy(&gravity)),
+            watch: HealthWatch::new(bed.count(), bed.energy(&gravity), least_scale),
             contacts: Contacts::default(),
             around: Surroundings::new(scene),
             bed,
             impacts: Impacts::default(),
-            end: scene.end,
-            camera: scene.camera,
+            origin: Arc::new(Origin { scene: scene.clone(), seed }),
             substep: 0,
-            pool: None,
             seemed_ended: None,
             ended: None,
         })
@@ -85,16 +92,13 @@ impl Simulation {
     /// # Errors
     /// [`DemError::Threads`] if `threads` is 0 or the system gives none.
     pub fn with_threads(mut self, threads: usize) -> Result<Self, DemError> {
-        if threads == 0 {
-            return Err(DemError::range("threads", 0.0, "at least 1"));
-        }
-        self.pool = if threads == 1 {
-            None
-        } else {
-            let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-            Some(Arc::new(pool.map_err(DemError::Threads)?))
-        };
+        self.around.threads = Threads::new(threads)?;
         Ok(self)
+    }
+
+    /// The solver's settings: the preset's, unless they were replaced.
+    pub fn settings(&self) -> &SolverSettings {
+        &self.around.settings
     }
 
     /// Simulated time `[s]`.
@@ -221,7 +225,9 @@ impl Simulation {
             angular_velocities: self.angular_velocities(),
             status: self.ended.unwrap_or(Status::Horizon),
             health: self.health(),
+            grains_in_funnel: self.in_funnel().count(),
             simulated_s: self.time(),
+            state_hash: self.state_hash(),
             positions: self.positions(),
             radii: self.radii(),
         }
@@ -231,7 +237,7 @@ impl Simulation {
     fn assemble(&mut self) -> Seen {
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
         contacts.follow(bed, around);
-        bed.accelerate(&around.gravity, around.settings.dt);
+        bed.accelerate(&around.gravity, around.settings.dt, &around.threads);
         let seen = contacts.assemble(bed, around, self.watch.lost_mut(), &mut self.impacts);
         if self.impacts.resolve(bed, contacts, around) > 0 {
             contacts.assemble_again(bed, around);
@@ -249,8 +255,18 @@ impl Simulation {
         FrozenSolve::new([pairs, at_walls], copy.bed, self.around.radius)
     }
 
+    /// The search for pairs of the present state, for studies of its cost; the simulation stays as it is.
+    pub fn frozen_search(&self) -> FrozenSearch {
+        FrozenSearch::new(self.bed.clone(), &self.around)
+    }
+
     /// One substep.
     fn step(&mut self) {
+        let threads = self.around.threads.clone();
+        threads.run(|| self.step_here());
+    }
+
+    fn step_here(&mut self) {
         let seen = self.assemble();
         self.solve();
         self.bed.move_on(self.around.settings.dt);
@@ -264,9 +280,9 @@ impl Simulation {
     /// Solves the lasting contacts.
     fn solve(&mut self) {
         let Contacts { pairs, at_walls, .. } = &mut self.contacts;
-        let (bodies, pool) = (&mut self.bed.bodies, self.pool.as_deref());
-        let (settings, radius) = (&self.around.settings, self.around.radius);
-        let work = solver::solve(&mut [pairs, at_walls], bodies, settings, radius, pool);
+        let (bodies, around) = (&mut self.bed.bodies, &self.around);
+        let sets = &mut [pairs, at_walls];
+        let work = solver::solve(sets, bodies, &around.settings, around.radius, &around.threads);
         self.watch.see_solve(&work);
     }
 
@@ -287,30 +303,7 @@ impl Simulation {
             self.ended = Some(Status::Unhealthy);
         }
     }
-
-    /// How the pour has ended, if it has. It must have looked so twice within [`REST_LOOKS`]: a grain at the
-    /// top of its bounce is slow, too, but once, while a pile whose last grain trembles is slow now and then.
-    fn end_reached(&mut self) -> Option<Status> {
-        let now = self.looks_ended()?;
-        let window = REST_LOOKS * self.around.settings.list_period;
-        let seen = self.seemed_ended.replace((now, self.substep));
-        let again = seen.is_some_and(|(then, at)| then == now && self.substep - at <= window);
-        (again || now == Status::Horizon).then_some(now)
-    }
-
-    fn looks_ended(&self) -> Option<Status> {
-        let threshold = self.end.kinetic_energy;
-        let energies: Vec<f64> = (0..self.bed.count()).map(|i| self.bed.translation(i)).collect();
-        if energies.iter().sum::<f64>() <= threshold * energies.len() as f64 {
-            return Some(Status::AtRest);
-        }
-        let still = |(grain, energy): (usize, &f64)| {
-            let at = self.bed.position(grain);
-            *energy <= threshold || !self.camera.sees_ground(at.x, at.y)
-        };
-        if energies.iter().enumerate().all(still) {
-            return Some(Status::OutOfView);
-        }
-        (self.time() >= self.end.horizon).then_some(Status::Horizon)
-    }
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,12 +7,12 @@
 use std::fmt;
 use std::str::FromStr;
 
-use rayon::ThreadPool;
+use crate::parallel::Threads;
 use serde::{Deserialize, Serialize};
 
 use crate::DemError;
 use crate::bed::Body;
-use crate::contact::ContactSet;
+use crate::contact_set::ContactSet;
 use crate::preset::SolverSettings;
 
 mod components;
@@ -86,16 +86,16 @@ pub(crate) fn solve(
     bodies: &mut [Body],
     settings: &SolverSettings,
     radius: f64,
-    pool: Option<&ThreadPool>,
+    threads: &Threads,
 ) -> Work {
     for set in sets.iter_mut() {
-        nsgs::warm_start(set, bodies, pool);
+        nsgs::warm_start(set, bodies, threads);
     }
     let too_fast = settings.closing * radius / settings.dt;
     match settings.method {
-        Method::Nsgs => nsgs::solve(sets, bodies, settings, radius, pool),
-        Method::NewtonPcr => newton_pcr::solve(sets, bodies, &settings.newton, too_fast, pool),
-        Method::Reference => reference::solve(sets, bodies, &settings.reference, pool),
+        Method::Nsgs => nsgs::solve(sets, bodies, settings, radius, threads),
+        Method::NewtonPcr => newton_pcr::solve(sets, bodies, &settings.newton, too_fast, threads),
+        Method::Reference => reference::solve(sets, bodies, &settings.reference, threads),
     }
 }
 

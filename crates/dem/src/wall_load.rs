@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::contact::ContactSet;
+use crate::contact_set::ContactSet;
 
 /// Force of all grains on one wall, over the mass of a grain, from the impulses of the lasting contacts in a
 /// substep: lambda / dt. Over g it is the number of grains that the wall carries. At rest it is exact; while

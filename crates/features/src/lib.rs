@@ -11,13 +11,14 @@
 //! | [`raster`] | spheres over a plane to a depth image or a height map, exact to the ray |
 //! | [`mod@height_map`] | heights on a regular grid, as a time-of-flight rig delivers them |
 //! | [`colour`] | colour image and the hue range that marks grains |
+//! | [`register`] | the colours of a depth image from a camera beside it |
 //! | [`sensor`] | the two noise models of a depth camera |
 //! | [`plane`] | robust plane fit |
 //! | [`segment`] | image to the centred, re-oriented points of the formation |
 //! | [`stats`] | the registry of statistics |
 //!
 //! Lengths are metres. In the world frame the ground is z = 0 and z points up.
-//! The equations are derived in `docs/theory/features.md`.
+//! The equations are derived in `docs/theory/features.md` and `docs/theory/statistics.md`.
 //!
 //! ```
 //! use granulcal_features::{Camera, grain_points, paper16, render_grid};
@@ -35,6 +36,8 @@
 //! # Ok::<(), granulcal_features::FeatureError>(())
 //! ```
 
+#![allow(clippy::inline_always)] // what is compiled for wider registers must be inlined to reach them
+
 pub mod camera;
 pub mod colour;
 pub mod depth;
@@ -42,6 +45,7 @@ pub mod error;
 pub mod height_map;
 pub mod plane;
 pub mod raster;
+pub mod register;
 mod rng;
 pub mod segment;
 pub mod sensor;
@@ -54,8 +58,11 @@ pub use error::FeatureError;
 pub use height_map::HeightMap;
 pub use plane::{Plane, PlaneFit, fit_plane};
 pub use raster::{height_map, render, render_grid};
+pub use register::register_colour;
 pub use segment::{
     Formation, Segmentation, Threshold, grain_points, segment_depth, segment_height_map,
 };
 pub use sensor::SensorNoise;
-pub use stats::{PAPER16, Prepared, Statistic, paper16};
+pub use stats::{
+    DIAGNOSTICS, DiagnosticSettings, PAPER16, Prepared, Statistic, Survey, diagnostics, paper16,
+};

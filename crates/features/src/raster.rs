@@ -56,19 +56,24 @@ pub fn render_grid(
     let rows = SampledAxis::new(height, step, k.fy, k.cy);
 
     let (mut depth, sees_horizon) = ground_depth(camera, &columns, &rows);
-    for (position, &radius) in positions.iter().zip(radii) {
+    let grains = positions.iter().zip(radii).filter_map(|(position, &radius)| {
         let centre = camera.camera_from_world * nalgebra::Point3::from(*position);
-        let Some(grain) = SphereInView::new(centre.coords, radius) else { continue };
-        let (first_row, end_row) = rows.covered(grain.slopes_y);
-        let (first, end) = columns.covered(grain.slopes_x);
-        if first >= end {
-            continue;
+        SphereInView::new(centre.coords, radius)
+    });
+    // The widest registers of the machine: no step is fused, so the bits are the same on all.
+    pulp::Arch::new().dispatch(|| {
+        for grain in grains {
+            let (first_row, end_row) = rows.covered(grain.slopes_y);
+            let (first, end) = columns.covered(grain.slopes_x);
+            if first >= end {
+                continue;
+            }
+            for row in first_row..end_row {
+                let pixels = &mut depth[row * width + first..row * width + end];
+                grain.draw_row(rows.slopes[row], &columns.slopes[first..end], pixels);
+            }
         }
-        for row in first_row..end_row {
-            let pixels = &mut depth[row * width + first..row * width + end];
-            grain.draw_row(rows.slopes[row], &columns.slopes[first..end], pixels);
-        }
-    }
+    });
     if sees_horizon {
         for value in &mut depth {
             *value = if value.is_finite() { *value } else { 0.0 };
@@ -84,18 +89,29 @@ fn ground_depth(camera: &Camera, columns: &SampledAxis, rows: &SampledAxis) -> (
     // World z of the ray (x, y, 1) is `up` times it.
     let rotation = camera.camera_from_world.rotation.to_rotation_matrix();
     let up = rotation.matrix().column(2).into_owned();
-    let mut depth = Vec::with_capacity(columns.slopes.len() * rows.slopes.len());
+    let width = columns.slopes.len();
+    let mut depth = vec![0.0; width * rows.slopes.len()];
     let mut sees_horizon = false;
-    for &y in &rows.slopes {
-        let up_at_row = up.y * y + up.z;
-        depth.extend(columns.slopes.iter().map(|&x| {
-            let ground = (-height / (up.x * x + up_at_row)) as f32;
-            if ground > 0.0 { ground } else { f32::INFINITY }
-        }));
-        // 1/depth is linear along a row, so only its ends can be the first to miss the ground.
-        let row = &depth[depth.len() - columns.slopes.len()..];
-        sees_horizon |= [row.first(), row.last()].into_iter().flatten().any(|d| d.is_infinite());
-    }
+    let draw = || {
+        for (pixels, &y) in depth.chunks_exact_mut(width).zip(&rows.slopes) {
+            let up_at_row = up.y * y + up.z;
+            let ground_at = |x: f64| {
+                let ground = (-height / (up.x * x + up_at_row)) as f32;
+                if ground > 0.0 { ground } else { f32::INFINITY }
+            };
+            if up.x == 0.0 {
+                // Not tilted sideways: the ground has one depth along a row.
+                pixels.fill(ground_at(0.0));
+            } else {
+                for (pixel, &x) in pixels.iter_mut().zip(&columns.slopes) {
+                    *pixel = ground_at(x);
+                }
+            }
+            // 1/depth is linear along a row, so only its ends can be the first to miss the ground.
+            sees_horizon |= pixels[0].is_infinite() || pixels[width - 1].is_infinite();
+        }
+    };
+    pulp::Arch::new().dispatch(draw);
     (depth, sees_horizon)
 }
 

@@ -7,6 +7,7 @@
 mod cloud;
 mod component;
 mod settings;
+mod spacing;
 
 use nalgebra::{Vector2, Vector3};
 

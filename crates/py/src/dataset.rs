@@ -62,6 +62,12 @@ impl Dataset {
     }
 
     #[getter]
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let columns = granulcal_dataset::Dataset::diagnostic_names().len();
+        array::matrix(py, self.inner.diagnostics(), self.inner.rows.len(), columns)
+    }
+
+    #[getter]
     fn row<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u64>> {
         self.column(py, |row| row.row)
     }

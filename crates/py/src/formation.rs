@@ -60,6 +60,11 @@ impl Formation {
     }
 
     #[getter]
+    fn spacing(&self) -> Option<f64> {
+        self.inner.spacing()
+    }
+
+    #[getter]
     fn centroid(&self) -> (f64, f64) {
         (self.inner.centroid.x, self.inner.centroid.y)
     }

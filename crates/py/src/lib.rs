@@ -45,7 +45,7 @@ mod _native {
     #[pymodule_export]
     use crate::simulate::simulate;
     #[pymodule_export]
-    use crate::statistics::{paper16, statistics_table};
+    use crate::statistics::{diagnostics, paper16, statistics_table};
 
     /// Version of the Rust crates.
     #[pymodule_export]

@@ -5,7 +5,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::array;
+use crate::{array, error};
 
 /// A pour as the scene's camera saw it.
 #[pyclass(frozen, module = "granulcal._native")]
@@ -45,5 +45,13 @@ impl Observation {
             Ok(values) => Ok(PyArray1::from_slice(py, values)),
             Err(too_few) => Err(PyValueError::new_err(too_few.to_string())),
         }
+    }
+
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        if let Err(too_few) = &self.inner.statistics {
+            return Err(PyValueError::new_err(too_few.to_string()));
+        }
+        let values = self.inner.diagnostics().map_err(error::features)?;
+        Ok(PyArray1::from_slice(py, &values))
     }
 }

@@ -73,6 +73,16 @@ impl Pour {
     }
 
     #[getter]
+    fn grains_in_funnel(&self) -> usize {
+        self.inner.grains_in_funnel
+    }
+
+    #[getter]
+    fn state_hash(&self) -> String {
+        format!("{:032x}", self.inner.state_hash)
+    }
+
+    #[getter]
     fn simulated_s(&self) -> f64 {
         self.inner.simulated_s
     }

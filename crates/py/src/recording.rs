@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use granulcal_dataset::Source;
+use granulcal_dataset::{ReadOptions, Source};
 use granulcal_features::Threshold;
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -19,10 +19,53 @@ pub(crate) struct Recording {
 #[pymethods]
 impl Recording {
     #[staticmethod]
-    #[pyo3(signature = (path, camera=None))]
-    fn open(py: Python<'_>, path: PathBuf, camera: Option<PathBuf>) -> PyResult<Self> {
-        let inner = py.detach(|| granulcal_dataset::Recording::open(&path, camera.as_deref()));
+    #[pyo3(signature = (
+        path,
+        camera = None,
+        *,
+        topic = None,
+        camera_topic = None,
+        colour_topic = None,
+        frames = None,
+        first_frame = None,
+    ))]
+    #[allow(clippy::too_many_arguments)] // Python's keywords.
+    fn open(
+        py: Python<'_>,
+        path: PathBuf,
+        camera: Option<PathBuf>,
+        topic: Option<String>,
+        camera_topic: Option<String>,
+        colour_topic: Option<String>,
+        frames: Option<usize>,
+        first_frame: Option<u64>,
+    ) -> PyResult<Self> {
+        let frames = frames.unwrap_or(usize::MAX);
+        let options =
+            ReadOptions { camera, topic, colour_topic, camera_topic, frames, first_frame };
+        let inner = py.detach(|| granulcal_dataset::Recording::open(&path, &options));
         Ok(Self { inner: inner.map_err(error::dataset)? })
+    }
+
+    #[getter]
+    fn topic(&self) -> Option<&str> {
+        self.inner.topic.as_deref()
+    }
+
+    #[getter]
+    fn whole_frames(&self) -> u64 {
+        self.inner.whole_frames
+    }
+
+    /// Frames that are lost and how well that is known, or None.
+    #[getter]
+    fn lost(&self) -> Option<(u64, &'static str)> {
+        self.inner.lost.map(|lost| (lost.frames(), lost.how()))
+    }
+
+    #[getter]
+    fn damage(&self) -> Vec<String> {
+        self.inner.damage.clone()
     }
 
     #[getter]

@@ -112,7 +112,7 @@ class BayesSim:
             x: statistics, own units, shape (n, s), if the first argument is an array.
             prior: the prior that the parameters were drawn from, unless the data set has it.
             seed: seed of every random choice.
-            status: status of each pour; `unhealthy` and `no_grains_in_view` are excluded.
+            status: status of each pour; `unhealthy`, `jammed` and `no_grains_in_view` are excluded.
             x_names: names of the statistics.
             scene: scene of the pours, saved with the model: TOML text, or has `to_toml()`.
             quiet: print nothing.

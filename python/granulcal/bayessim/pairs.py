@@ -16,7 +16,8 @@ __all__ = ["TrainingPairs"]
 Array = NDArray[np.float64]
 
 KEPT_STATUSES = ("at_rest", "out_of_view", "horizon")
-EXCLUDED_STATUSES = ("unhealthy", "no_grains_in_view")
+# A jammed pour is healthy, but no formation: what is learned is p(theta | x, the funnel emptied).
+EXCLUDED_STATUSES = ("unhealthy", "jammed", "no_grains_in_view")
 # Fewer pairs than this cannot be split into training, validation and test.
 FEWEST_PAIRS = 50
 

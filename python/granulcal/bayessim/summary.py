@@ -21,8 +21,8 @@ class TrainingSummary:
         train_count: pairs that each member was trained on.
         validation_count: pairs that decided when each member stopped.
         test_count: pairs kept for the calibration check.
-        excluded: number of pairs left out by reason: `unhealthy`, `no_grains_in_view`,
-            `non_finite`.
+        excluded: number of pairs left out by reason: `unhealthy`, `jammed`,
+            `no_grains_in_view`, `non_finite`.
         horizon_count: pairs kept although their simulation ended at its time limit.
         epoch_count: passes over the pairs until the last member stopped.
         best_epochs: pass whose weights were kept, for each member.

@@ -1,23 +1,39 @@
 //! `features`: a recording to its statistics.
 
+use anyhow::Context as _;
 use granulcal_dataset::{Recording, npy};
-use granulcal_features::{Formation, PAPER16, Segmentation, Threshold};
+use granulcal_features::{
+    DIAGNOSTICS, DiagnosticSettings, Formation, PAPER16, Segmentation, Statistic, Threshold,
+    diagnostics,
+};
 use serde_json::{Map, Value, json};
 
 use crate::args::FeaturesArgs;
-use crate::context::{print_json, print_line};
+use crate::context::{note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
 
 pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     if args.list {
-        return list(args.json);
+        return if args.diagnostics {
+            list(&DIAGNOSTICS, args.json)
+        } else {
+            list(&PAPER16, args.json)
+        };
     }
     let Some(path) = &args.recording else {
         return Err(BadArgument("a recording, or --list, must be given".to_owned()).into());
     };
-    let recording = Recording::open(path, args.camera.as_deref())?;
+    let recording = Recording::open(path, &args.read.options())?;
+    for line in &recording.damage {
+        note(&format!("warning: {line}"));
+    }
     let formation = recording.formation_with(&segmentation(args, &recording.segmentation))?;
-    let statistics = recording.statistics_of(&formation)?;
+    let mut statistics = vec![named(&PAPER16, &recording.statistics_of(&formation)?)];
+    if args.diagnostics {
+        let values = diagnostics(&formation.points, &diagnostic_settings(args, &formation)?)
+            .with_context(|| format!("describing {}", path.display()))?;
+        statistics.push(named(&DIAGNOSTICS, &values));
+    }
     if let Some(path) = &args.points {
         npy::write_points(path, &formation.points)?;
     }
@@ -26,7 +42,7 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     } else {
         print(&recording, &formation, &statistics)?;
     }
-    Ok(Outcome::Done)
+    Ok(Outcome::whole_if(recording.lost.is_none()))
 }
 
 /// The recording's own segmentation with what the command line changes.
@@ -42,14 +58,42 @@ fn segmentation(args: &FeaturesArgs, own: &Segmentation) -> Segmentation {
     changed
 }
 
-fn as_json(recording: &Recording, formation: &Formation, statistics: &[f64; 16]) -> Value {
-    let named = PAPER16.iter().zip(statistics);
-    let statistics: Map<_, _> =
-        named.map(|(s, value)| (s.name.to_owned(), Value::from(*value))).collect();
+/// What the diagnostic statistics need besides the points.
+fn diagnostic_settings(
+    args: &FeaturesArgs,
+    formation: &Formation,
+) -> anyhow::Result<DiagnosticSettings> {
+    let Some(grain_diameter) = args.grain_diameter else {
+        return Err(BadArgument("--diagnostics needs --grain-diameter".to_owned()).into());
+    };
+    // The points are centred; the axis is given where the centroid is told.
+    let pour_axis = args.pour_axis.as_ref().map(|axis| {
+        let mut from_centroid = -formation.centroid;
+        from_centroid.x += axis[0];
+        from_centroid.y += axis[1];
+        from_centroid
+    });
+    // A single point has no neighbour, and is refused as too few.
+    let spacing = formation.spacing().unwrap_or(grain_diameter);
+    Ok(DiagnosticSettings { pour_axis, grain_diameter, spacing })
+}
+
+/// Name, unit and value of each statistic.
+type Named = Vec<(&'static str, &'static str, f64)>;
+
+fn named<P>(registry: &[Statistic<P>], values: &[f64]) -> Named {
+    registry.iter().zip(values).map(|(s, &value)| (s.name, s.unit, value)).collect()
+}
+
+fn as_json(recording: &Recording, formation: &Formation, statistics: &[Named]) -> Value {
+    let object = |family: &Named| -> Map<_, _> {
+        family.iter().map(|(name, _, value)| ((*name).to_owned(), Value::from(*value))).collect()
+    };
     let plane = &formation.plane;
-    json!({
+    let mut report = json!({
         "recording": recording.path.display().to_string(),
-        "statistics": statistics,
+        "topic": recording.topic,
+        "statistics": statistics.first().map(object),
         "plane": {
             "normal": plane.plane.normal.as_slice(),
             "offset_m": plane.plane.offset,
@@ -59,21 +103,30 @@ fn as_json(recording: &Recording, formation: &Formation, statistics: &[f64; 16])
         },
         "counts": {
             "frames": recording.frames,
+            "whole_frames": recording.whole_frames,
             "valid": formation.valid_count,
             "grains": formation.masked_count,
         },
+        "lost": recording.lost.map(|lost| json!({
+            "frames": lost.frames(),
+            "how": lost.how(),
+            "damage": recording.damage,
+        })),
         "threshold_m": formation.threshold,
         "centroid_m": formation.centroid.as_slice(),
-    })
+    });
+    if let Some(diagnostics) = statistics.get(1) {
+        report["diagnostics"] = object(diagnostics).into();
+    }
+    report
 }
 
-fn print(
-    recording: &Recording,
-    formation: &Formation,
-    statistics: &[f64; 16],
-) -> anyhow::Result<()> {
+fn print(recording: &Recording, formation: &Formation, statistics: &[Named]) -> anyhow::Result<()> {
     let plane = &formation.plane;
     print_line(&format!("recording          {}", recording.path.display()))?;
+    if let Some(topic) = &recording.topic {
+        print_line(&format!("topic              {topic}"))?;
+    }
     print_line(&format!(
         "ground             tilt {:.2} deg, rms {:.2} mm, {} inliers",
         plane.tilt_rad.to_degrees(),
@@ -81,26 +134,31 @@ fn print(
         plane.inliers
     ))?;
     print_line(&format!(
-        "pixels             {} of {} valid are grain (above {:.2} mm), {} frames",
+        "pixels             {} of {} valid are grain (above {:.2} mm)",
         formation.masked_count,
         formation.valid_count,
         formation.threshold * 1e3,
-        recording.frames
     ))?;
-    for (statistic, value) in PAPER16.iter().zip(statistics) {
-        print_line(&format!("{:<18} {value:<12.6} {}", statistic.name, statistic.unit))?;
+    print_line(&format!(
+        "frames             {} of {} averaged{}",
+        recording.frames,
+        recording.whole_frames,
+        recording.lost.map_or_else(String::new, |lost| format!(", {lost}"))
+    ))?;
+    for (name, unit, value) in statistics.iter().flatten() {
+        print_line(&format!("{name:<18} {value:<12.6} {unit}"))?;
     }
     Ok(())
 }
 
-fn list(json: bool) -> anyhow::Result<Outcome> {
+fn list<P>(registry: &[Statistic<P>], json: bool) -> anyhow::Result<Outcome> {
     if json {
-        let entry = |s: &granulcal_features::Statistic| json!({ "name": s.name, "unit": s.unit, "doc": s.doc });
-        print_json(&PAPER16.iter().map(entry).collect::<Vec<_>>())?;
+        let entry = |s: &Statistic<P>| json!({ "name": s.name, "unit": s.unit, "doc": s.doc });
+        print_json(&registry.iter().map(entry).collect::<Vec<_>>())?;
     } else {
-        for statistic in &PAPER16 {
+        for statistic in registry {
             print_line(&format!(
-                "{:<12} [{:^3}]  {}",
+                "{:<15} [{:^3}]  {}",
                 statistic.name, statistic.unit, statistic.doc
             ))?;
         }

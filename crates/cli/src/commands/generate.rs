@@ -41,13 +41,15 @@ fn report(args: &GenerateArgs, summary: &Summary) -> anyhow::Result<Outcome> {
             "made": progress.made,
             "resumed": progress.resumed,
             "unhealthy": progress.unhealthy,
+            "jammed": progress.jammed,
             "stopped": stopped,
         }))?;
     } else {
         let folder = args.out.display();
         print_line(&format!(
-            "{folder}: {complete} of {} rows complete, {} made now, {} unhealthy or without grains",
-            progress.total, progress.made, progress.unhealthy
+            "{folder}: {complete} of {} rows complete, {} made now, {} unhealthy or without grains, \
+             {} jammed",
+            progress.total, progress.made, progress.unhealthy, progress.jammed
         ))?;
     }
     if progress.beyond > 0 {

@@ -1,29 +1,34 @@
 //! `inspect`: what is in a file, or in one substep of a scene.
 
 mod contact_problem;
+mod recording;
 
 use std::path::Path;
 
 use anyhow::anyhow;
 use granulcal_dataset::{
-    CameraFile, Dataset, DatasetError, Npz, Prior, load_prior, load_scene, npy, png, summarize_mcap,
+    CameraFile, Dataset, DatasetError, Folder, Npz, Prior, load_prior, load_scene, npy, png,
+    read_checkpoint_header,
 };
 use granulcal_dem::Scene;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use crate::args::InspectArgs;
 use crate::context::{print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
 
+/// Letters within which small things stand on one line.
+const ONE_LINE: usize = 110;
 /// How many missing rows are named.
 const NAMED_GAPS: usize = 5;
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
+    let mut is_whole = true;
     let facts = if let Some(out) = &args.contact_problem {
         contact_problem::write(&args.path, out, &args.substep)?
     } else {
         args.substep.refuse_any()?;
-        inspect(&args.path)?
+        inspect(&args.path, &mut is_whole)?
     };
     if args.json {
         print_json(&facts)?;
@@ -32,12 +37,16 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
             print_line(&line)?;
         }
     }
-    Ok(Outcome::Done)
+    Ok(Outcome::whole_if(is_whole))
 }
 
-fn inspect(path: &Path) -> anyhow::Result<Value> {
+fn inspect(path: &Path, is_whole: &mut bool) -> anyhow::Result<Value> {
     if path.is_dir() {
-        return Ok(dataset_facts(&Dataset::open(path)?));
+        return match Folder::open(path) {
+            Ok(Folder::Frames(frames)) => Ok(recording::folder_facts(&frames, is_whole)),
+            Ok(Folder::Messages(file)) => recording::facts(&file, is_whole),
+            Err(_) => Ok(dataset_facts(&Dataset::open(path)?)),
+        };
     }
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     match ending.as_str() {
@@ -51,10 +60,11 @@ fn inspect(path: &Path) -> anyhow::Result<Value> {
         }
         "npz" => npz_facts(path),
         "png" => png_facts(path),
-        "mcap" => mcap_facts(path),
+        "ckpt" => checkpoint_facts(path),
+        "bag" | "mcap" => recording::facts(path, is_whole),
         other => {
             let found = if other.is_empty() { "no ending" } else { other };
-            let allowed = "a folder or .parquet, .toml, .npy, .npz, .png, .mcap";
+            let allowed = "a folder or .parquet, .toml, .npy, .npz, .png, .bag, .mcap, .ckpt";
             let path = path.display();
             Err(BadArgument(format!("{path}: must be {allowed}, found {found}")).into())
         }
@@ -91,7 +101,7 @@ fn prior_facts(prior: &Prior) -> Value {
     let describe = |p: &granulcal_dataset::Parameter| {
         (p.path.clone(), Value::from(format!("{:?}", p.distribution)))
     };
-    prior.parameters().iter().map(describe).collect::<serde_json::Map<_, _>>().into()
+    prior.parameters().iter().map(describe).collect::<Map<_, _>>().into()
 }
 
 /// A .toml can be any of three things: the first that reads it wins, else all three say why not.
@@ -154,16 +164,15 @@ fn png_facts(path: &Path) -> anyhow::Result<Value> {
     }
 }
 
-fn mcap_facts(path: &Path) -> anyhow::Result<Value> {
-    let summary = summarize_mcap(path)?;
-    let topic = |t: granulcal_dataset::Topic| {
-        (t.topic, json!({ "schema": t.schema, "encoding": t.encoding, "messages": t.messages }))
-    };
+fn checkpoint_facts(path: &Path) -> anyhow::Result<Value> {
+    let header = read_checkpoint_header(path)?;
     Ok(json!({
-        "kind": "recording over time",
-        "start_s": summary.start_s,
-        "end_s": summary.end_s,
-        "topics": summary.topics.into_iter().map(topic).collect::<serde_json::Map<_, _>>(),
+        "kind": "checkpoint",
+        "version": header.version,
+        "seed": header.seed,
+        "substeps": header.substep,
+        "simulated_s": header.time(),
+        "scene": scene_facts(&header.scene),
     }))
 }
 
@@ -184,13 +193,35 @@ fn lines(value: &Value, indent: &str) -> Vec<String> {
     let mut lines = Vec::new();
     for (key, value) in entries {
         match value {
-            Value::Object(_) => {
-                lines.push(format!("{indent}{key}:"));
-                lines.extend(self::lines(value, &format!("{indent}  ")));
+            Value::Object(inner) => {
+                if let Some(text) = on_one_line(inner) {
+                    lines.push(format!("{indent}{key}: {text}"));
+                } else {
+                    lines.push(format!("{indent}{key}:"));
+                    lines.extend(self::lines(value, &format!("{indent}  ")));
+                }
             }
             Value::String(text) => lines.push(format!("{indent}{key}: {text}")),
+            Value::Array(entries)
+                if entries.iter().all(Value::is_string) && !entries.is_empty() =>
+            {
+                lines.push(format!("{indent}{key}:"));
+                let texts = entries.iter().filter_map(Value::as_str);
+                lines.extend(texts.map(|text| format!("{indent}  {text}")));
+            }
             other => lines.push(format!("{indent}{key}: {other}")),
         }
     }
     lines
+}
+
+/// Few plain values, `key value` each.
+fn on_one_line(entries: &Map<String, Value>) -> Option<String> {
+    let text = |(key, value): (&String, &Value)| match value {
+        Value::Object(_) | Value::Array(_) => None,
+        Value::String(text) => Some(format!("{key} {text}")),
+        other => Some(format!("{key} {other}")),
+    };
+    let texts = entries.iter().map(text).collect::<Option<Vec<_>>>()?.join(", ");
+    (texts.len() <= ONE_LINE && !texts.is_empty()).then_some(texts)
 }

@@ -8,21 +8,21 @@ use granulcal_dem::{Projection, Scene};
 use crate::args::RenderArgs;
 use crate::context::{Context, print_line};
 use crate::outcome::{BadArgument, Outcome};
-use crate::scene;
+use crate::scene::{self, Keep};
 
 pub fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
     let scene = scene::load(&args.scene)?;
     check_name(&args.out, &scene)?;
-    let (positions, radii) = match &args.positions {
-        Some(path) => {
-            let positions = npy::read_points(path)?;
-            let radii = vec![scene.grains.radius(); positions.len()];
-            (positions, radii)
-        }
-        None => match scene::pour(context, &scene, args.seed, 1, None)? {
+    let (positions, radii) = if let Some(path) = &args.positions {
+        let positions = npy::read_points(path)?;
+        let radii = vec![scene.grains.radius(); positions.len()];
+        (positions, radii)
+    } else {
+        let simulation = scene::start(&scene, args.seed, 1, None)?;
+        match scene::pour(context, &scene, args.seed, simulation, &Keep::Nothing)? {
             Some(pour) => (pour.positions, pour.radii),
             None => return Ok(Outcome::Stopped),
-        },
+        }
     };
     let view = look(&scene.camera, &positions, &radii, args.seed)?;
     write_view(&args.out, &view, args.depth_unit)?;

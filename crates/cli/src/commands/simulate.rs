@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use cpu_time::ProcessTime;
 use granulcal_dataset::{DatasetError, RowStatus, npy, observe};
 use granulcal_dem::{Health, Pour, Scene};
-use granulcal_features::PAPER16;
+use granulcal_features::{DIAGNOSTICS, PAPER16, Statistic};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -14,7 +14,7 @@ use super::render::{check_name, write_view};
 use crate::args::SimulateArgs;
 use crate::context::{Context, print_json, print_line};
 use crate::outcome::Outcome;
-use crate::scene::{self, Film};
+use crate::scene::{self, Keep};
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -26,8 +26,14 @@ struct Report {
     cpu_s: f64,
     wall_s: f64,
     simulated_s: f64,
+    grains_in_funnel: usize,
+    /// Hash of every bit of the final state, in hexadecimal digits.
+    state_hash: String,
     /// Null with too few grains in view.
     statistics: Option<Map<String, Value>>,
+    /// Absent unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    diagnostics: Option<Map<String, Value>>,
 }
 
 pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
@@ -36,9 +42,19 @@ pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
         check_name(path, &scene)?;
     }
     let (clock, start) = (ProcessTime::now(), Instant::now());
-    let film = args.mcap.as_deref().map(|path| Film { path, fps: args.fps });
-    let Some(pour) = scene::pour(context, &scene, args.seed, args.threads, film.as_ref())? else {
-        tracing::warn!("stopped; nothing was written");
+    let keep = match (&args.mcap, &args.checkpoint) {
+        (Some(path), _) => Keep::Film { path, fps: args.fps },
+        (None, Some(path)) => Keep::Checkpoint { path, every: args.checkpoint_every },
+        (None, None) => Keep::Nothing,
+    };
+    let simulation = scene::start(&scene, args.seed, args.threads, args.resume.as_deref())?;
+    let Some(pour) = scene::pour(context, &scene, args.seed, simulation, &keep)? else {
+        if let Keep::Checkpoint { path, .. } = keep {
+            let path = path.display();
+            tracing::warn!("stopped; the same command with --resume {path} goes on");
+        } else {
+            tracing::warn!("stopped; nothing was written");
+        }
         return Ok(Outcome::Stopped);
     };
     let mut report = Report {
@@ -49,7 +65,10 @@ pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
         cpu_s: 0.0,
         wall_s: 0.0,
         simulated_s: pour.simulated_s,
+        grains_in_funnel: pour.grains_in_funnel,
+        state_hash: format!("{:032x}", pour.state_hash),
         statistics: None,
+        diagnostics: None,
     };
     let status = describe(&scene, &pour, args, &mut report)?;
     report.cpu_s = clock.elapsed().as_secs_f64();
@@ -80,20 +99,26 @@ fn describe(
     if let Some(path) = &args.depth {
         write_view(path, &seen.view, args.depth_unit).context("writing --depth")?;
     }
-    match seen.statistics {
+    match &seen.statistics {
         Ok(values) => {
-            let named = PAPER16.iter().zip(values);
-            report.statistics =
-                Some(named.map(|(s, value)| (s.name.to_owned(), Value::from(value))).collect());
+            report.statistics = Some(by_name(&PAPER16, values));
+            if args.diagnostics {
+                report.diagnostics = Some(by_name(&DIAGNOSTICS, &seen.diagnostics()?));
+            }
             Ok(status)
         }
         Err(reason) => {
             tracing::warn!("{reason}");
-            let status = if status.is_healthy() { RowStatus::NoGrainsInView } else { status };
+            let says_enough = !status.is_healthy() || status.is_jammed();
+            let status = if says_enough { status } else { RowStatus::NoGrainsInView };
             report.status = status.name();
             Ok(status)
         }
     }
+}
+
+fn by_name<P>(registry: &[Statistic<P>], values: &[f64]) -> Map<String, Value> {
+    registry.iter().zip(values).map(|(s, &value)| (s.name.to_owned(), value.into())).collect()
 }
 
 fn print(report: &Report, json: bool) -> anyhow::Result<()> {
@@ -108,9 +133,21 @@ fn print(report: &Report, json: bool) -> anyhow::Result<()> {
     print_line(&format!("worst penetration  {:.4} radii", health.worst_penetration))?;
     print_line(&format!("energy created     {:.2e}", health.energy_created))?;
     print_line(&format!("grains lost        {}", health.grains_lost))?;
-    let Some(statistics) = &report.statistics else { return Ok(()) };
-    for statistic in &PAPER16 {
-        let value = statistics.get(statistic.name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    if report.grains_in_funnel > 0 {
+        print_line(&format!("grains in funnel   {}", report.grains_in_funnel))?;
+    }
+    print_line(&format!("state              {}", report.state_hash))?;
+    print_family(&PAPER16, report.statistics.as_ref())?;
+    print_family(&DIAGNOSTICS, report.diagnostics.as_ref())
+}
+
+fn print_family<P>(
+    registry: &[Statistic<P>],
+    values: Option<&Map<String, Value>>,
+) -> anyhow::Result<()> {
+    let Some(values) = values else { return Ok(()) };
+    for statistic in registry {
+        let value = values.get(statistic.name).and_then(Value::as_f64).unwrap_or(f64::NAN);
         print_line(&format!("{:<18} {value:<12.6} {}", statistic.name, statistic.unit))?;
     }
     Ok(())

@@ -82,6 +82,7 @@ impl Folder {
             plan.progress.beyond += beyond.len() as u64;
             plan.progress.unhealthy +=
                 kept.iter().filter(|row| !row.status.is_healthy()).count() as u64;
+            plan.progress.jammed += kept.iter().filter(|row| row.status.is_jammed()).count() as u64;
             let missing: Vec<_> =
                 (first..end).filter(|&i| kept.iter().all(|row| row.row != i)).collect();
             if !missing.is_empty() {

@@ -4,6 +4,14 @@ fn here() -> &'static Path {
     Path::new("a.npy")
 }
 
+fn parse(file: &Path, array: &str, mut bytes: &[u8]) -> Result<Array, DatasetError> {
+    super::parse(file, array, &mut bytes, 1 << 20)
+}
+
+fn parse_text(file: &Path, array: &str, mut bytes: &[u8]) -> Result<String, DatasetError> {
+    super::parse_text(file, array, &mut bytes)
+}
+
 fn custom(descr: &str, order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     let dict = format!("{{'descr': {descr}, 'fortran_order': {order}, 'shape': {shape}, }}\n");
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -35,8 +43,11 @@ fn other_orders_and_types_are_read() {
 
 #[test]
 fn faults_are_named() {
-    let cases: [(Vec<u8>, &str); 8] = [
+    let cases: [(Vec<u8>, &str); 11] = [
         (Vec::new(), "truncated after 0 bytes"),
+        (custom("'<f8'", "False", "(131073,)", &[]), "at most 1048576 bytes as f64"),
+        (custom("'<u1'", "True", "(65537,)", &[]), "at most 1048576 bytes as f64"),
+        (b"\x93NUMPY\x02\x00\xff\xff\xff\xff".to_vec(), "at most 65536 bytes"),
         (b"not an array at all".to_vec(), "in .npy format"),
         (encode(&[2], [1.0, 2.0])[..20].to_vec(), "truncated after 20 bytes"),
         (encode(&[2], [1.0]), "16 bytes"),

@@ -1,6 +1,6 @@
 //! The columns of a data set, listed once.
 
-use granulcal_features::PAPER16;
+use granulcal_features::{DIAGNOSTICS, PAPER16};
 use parquet::basic::{ConvertedType, LogicalType, Repetition, Type as Physical};
 use parquet::errors::ParquetError;
 use parquet::schema::types::Type;
@@ -126,6 +126,13 @@ pub(super) fn columns(parameters: &[&str]) -> Vec<Column> {
             statistic.name,
             move |r| r.statistics[i],
             move |r, v| r.statistics[i] = v,
+        ));
+    }
+    for (i, statistic) in DIAGNOSTICS.iter().enumerate() {
+        columns.push(Column::number(
+            statistic.name,
+            move |r| r.diagnostics[i],
+            move |r, v| r.diagnostics[i] = v,
         ));
     }
     columns

@@ -3,8 +3,9 @@
 
 use std::arch::x86_64::{
     __m256d, _CMP_LT_OQ, _mm256_add_pd, _mm256_blendv_pd, _mm256_cmp_pd, _mm256_div_pd,
-    _mm256_load_pd, _mm256_movemask_pd, _mm256_mul_pd, _mm256_permute2f128_pd, _mm256_set1_pd,
-    _mm256_sqrt_pd, _mm256_store_pd, _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd,
+    _mm256_fmadd_pd, _mm256_fnmadd_pd, _mm256_load_pd, _mm256_max_pd, _mm256_min_pd,
+    _mm256_movemask_pd, _mm256_mul_pd, _mm256_permute2f128_pd, _mm256_set1_pd, _mm256_sqrt_pd,
+    _mm256_store_pd, _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd,
 };
 
 use super::{LANES, Lanes, Row, Width};
@@ -50,6 +51,14 @@ impl Width for Avx2 {
         unsafe { [_mm256_mul_pd(a[0], b[0]), _mm256_mul_pd(a[1], b[1])] }
     }
     #[inline(always)]
+    fn mul_add(a: Pair, b: Pair, c: Pair) -> Pair {
+        unsafe { [_mm256_fmadd_pd(a[0], b[0], c[0]), _mm256_fmadd_pd(a[1], b[1], c[1])] }
+    }
+    #[inline(always)]
+    fn mul_sub_from(a: Pair, b: Pair, c: Pair) -> Pair {
+        unsafe { [_mm256_fnmadd_pd(a[0], b[0], c[0]), _mm256_fnmadd_pd(a[1], b[1], c[1])] }
+    }
+    #[inline(always)]
     fn div(a: Pair, b: Pair) -> Pair {
         unsafe { [_mm256_div_pd(a[0], b[0]), _mm256_div_pd(a[1], b[1])] }
     }
@@ -67,6 +76,15 @@ impl Width for Avx2 {
         }
     }
 
+    // The machine's maximum takes its second operand where the first is not greater.
+    #[inline(always)]
+    fn max(a: Pair, b: Pair) -> Pair {
+        unsafe { [_mm256_max_pd(b[0], a[0]), _mm256_max_pd(b[1], a[1])] }
+    }
+    #[inline(always)]
+    fn min(a: Pair, b: Pair) -> Pair {
+        unsafe { [_mm256_min_pd(a[0], b[0]), _mm256_min_pd(a[1], b[1])] }
+    }
     #[inline(always)]
     fn less_bits(a: Pair, b: Pair) -> u32 {
         unsafe {

@@ -4,9 +4,10 @@
 use std::arch::x86_64::{
     __m256d, __m512d, _CMP_LT_OQ, _mm256_load_pd, _mm256_store_pd, _mm512_add_pd,
     _mm512_castpd256_pd512, _mm512_castpd512_pd256, _mm512_cmp_pd_mask, _mm512_div_pd,
-    _mm512_extractf64x4_pd, _mm512_insertf64x4, _mm512_load_pd, _mm512_mask_blend_pd,
-    _mm512_mul_pd, _mm512_permutex2var_pd, _mm512_set_epi64, _mm512_set1_pd, _mm512_shuffle_f64x2,
-    _mm512_sqrt_pd, _mm512_store_pd, _mm512_sub_pd, _mm512_unpackhi_pd, _mm512_unpacklo_pd,
+    _mm512_extractf64x4_pd, _mm512_fmadd_pd, _mm512_fnmadd_pd, _mm512_insertf64x4, _mm512_load_pd,
+    _mm512_mask_blend_pd, _mm512_max_pd, _mm512_min_pd, _mm512_mul_pd, _mm512_permutex2var_pd,
+    _mm512_set_epi64, _mm512_set1_pd, _mm512_shuffle_f64x2, _mm512_sqrt_pd, _mm512_store_pd,
+    _mm512_sub_pd, _mm512_unpackhi_pd, _mm512_unpacklo_pd,
 };
 
 use super::{LANES, Lanes, Row, Width};
@@ -45,6 +46,14 @@ impl Width for Avx512 {
         unsafe { _mm512_mul_pd(a, b) }
     }
     #[inline(always)]
+    fn mul_add(a: __m512d, b: __m512d, c: __m512d) -> __m512d {
+        unsafe { _mm512_fmadd_pd(a, b, c) }
+    }
+    #[inline(always)]
+    fn mul_sub_from(a: __m512d, b: __m512d, c: __m512d) -> __m512d {
+        unsafe { _mm512_fnmadd_pd(a, b, c) }
+    }
+    #[inline(always)]
     fn div(a: __m512d, b: __m512d) -> __m512d {
         unsafe { _mm512_div_pd(a, b) }
     }
@@ -57,6 +66,15 @@ impl Width for Avx512 {
         unsafe { _mm512_mask_blend_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b), no, yes) }
     }
 
+    // The machine's maximum takes its second operand where the first is not greater.
+    #[inline(always)]
+    fn max(a: __m512d, b: __m512d) -> __m512d {
+        unsafe { _mm512_max_pd(b, a) }
+    }
+    #[inline(always)]
+    fn min(a: __m512d, b: __m512d) -> __m512d {
+        unsafe { _mm512_min_pd(a, b) }
+    }
     #[inline(always)]
     fn less_bits(a: __m512d, b: __m512d) -> u32 {
         unsafe { u32::from(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b)) }

@@ -44,6 +44,18 @@ impl Width for Portable {
         zip(a, b, |a, b| a * b)
     }
     #[inline(always)]
+    fn mul_add(a: [f64; LANES], b: [f64; LANES], c: [f64; LANES]) -> [f64; LANES] {
+        let mut out = c;
+        for lane in 0..LANES {
+            out[lane] = a[lane].mul_add(b[lane], c[lane]);
+        }
+        out
+    }
+    #[inline(always)]
+    fn mul_sub_from(a: [f64; LANES], b: [f64; LANES], c: [f64; LANES]) -> [f64; LANES] {
+        Self::mul_add(a.map(|a| -a), b, c)
+    }
+    #[inline(always)]
     fn div(a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
         zip(a, b, |a, b| a / b)
     }
@@ -65,6 +77,14 @@ impl Width for Portable {
             }
         }
         out
+    }
+    #[inline(always)]
+    fn max(a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
+        zip(a, b, |a, b| if a < b { b } else { a })
+    }
+    #[inline(always)]
+    fn min(a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
+        zip(a, b, |a, b| if a < b { a } else { b })
     }
     #[inline(always)]
     fn less_bits(a: [f64; LANES], b: [f64; LANES]) -> u32 {

@@ -49,14 +49,26 @@ impl<W: Width> Reg<W> {
         Self(W::select_less(self.0, other.0, yes.0, no.0))
     }
 
+    /// `self * factor + other`, rounded once.
+    #[inline(always)]
+    pub fn times_plus(self, factor: Self, other: Self) -> Self {
+        Self(W::mul_add(self.0, factor.0, other.0))
+    }
+
+    /// `self - a * b`, rounded once.
+    #[inline(always)]
+    pub fn minus(self, a: Self, b: Self) -> Self {
+        Self(W::mul_sub_from(a.0, b.0, self.0))
+    }
+
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
-        self.if_less(other, other, self)
+        Self(W::max(self.0, other.0))
     }
 
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
-        self.if_less(other, self, other)
+        Self(W::min(self.0, other.0))
     }
 }
 
@@ -75,21 +87,41 @@ impl<W: Width> Reg3<W> {
 
     #[inline(always)]
     pub fn dot(self, other: Self) -> Reg<W> {
-        self.x * other.x + self.y * other.y + self.z * other.z
+        self.x.times_plus(other.x, self.y.times_plus(other.y, self.z * other.z))
     }
 
     #[inline(always)]
     pub fn cross(self, other: Self) -> Self {
         Self {
-            x: self.y * other.z - self.z * other.y,
-            y: self.z * other.x - self.x * other.z,
-            z: self.x * other.y - self.y * other.x,
+            x: (self.y * other.z).minus(self.z, other.y),
+            y: (self.z * other.x).minus(self.x, other.z),
+            z: (self.x * other.y).minus(self.y, other.x),
         }
     }
 
     #[inline(always)]
     pub fn scale(self, factor: Reg<W>) -> Self {
         Self { x: self.x * factor, y: self.y * factor, z: self.z * factor }
+    }
+
+    /// `self + factor * other`.
+    #[inline(always)]
+    pub fn plus(self, factor: Reg<W>, other: Self) -> Self {
+        Self {
+            x: factor.times_plus(other.x, self.x),
+            y: factor.times_plus(other.y, self.y),
+            z: factor.times_plus(other.z, self.z),
+        }
+    }
+
+    /// `self - factor * other`.
+    #[inline(always)]
+    pub fn minus(self, factor: Reg<W>, other: Self) -> Self {
+        Self {
+            x: self.x.minus(factor, other.x),
+            y: self.y.minus(factor, other.y),
+            z: self.z.minus(factor, other.z),
+        }
     }
 
     #[inline(always)]

@@ -64,8 +64,45 @@ impl Scene {
         }
     }
 
+    /// The path of the first thing in which another scene differs, with what stands there in this one and in the
+    /// other; `None` if the two are the same scene.
+    ///
+    /// # Errors
+    /// [`DemError::TomlWrite`] if a number cannot be written.
+    pub fn first_difference(
+        &self,
+        other: &Self,
+    ) -> Result<Option<(String, String, String)>, DemError> {
+        let (here, there) = (Value::Table(self.tree()?), Value::Table(other.tree()?));
+        Ok(first_difference("", Some(&here), Some(&there)))
+    }
+
     fn tree(&self) -> Result<Table, DemError> {
         Table::try_from(self).map_err(|e| DemError::TomlWrite(Box::new(e)))
+    }
+}
+
+/// The first thing in which two trees differ, which stand at `path`: its own path and both values.
+pub(crate) fn first_difference(
+    path: &str,
+    left: Option<&Value>,
+    right: Option<&Value>,
+) -> Option<(String, String, String)> {
+    let at = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+    match (left, right) {
+        _ if left == right => None,
+        (Some(Value::Table(a)), Some(Value::Table(b))) => {
+            let mut keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+            keys.find_map(|key| first_difference(&at(key), a.get(key), b.get(key)))
+        }
+        (Some(Value::Array(a)), Some(Value::Array(b))) => {
+            let mut entries = 0..a.len().max(b.len());
+            entries.find_map(|n| first_difference(&at(&n.to_string()), a.get(n), b.get(n)))
+        }
+        _ => {
+            let show = |value: Option<&Value>| value.map_or("absent".to_owned(), Value::to_string);
+            Some((path.to_owned(), show(left), show(right)))
+        }
     }
 }
 
@@ -128,6 +165,24 @@ mod tests {
         assert_eq!(changed.with("grains.count", 100.0).unwrap().grains.count, 100);
         let ground = scene.with("scene.ground.material.restitution", 0.1).unwrap();
         assert_eq!(ground.ground.material.restitution, Some(0.1));
+    }
+
+    #[test]
+    fn the_first_difference_has_a_path() {
+        let scene = Scene::funnel(0.12);
+        let difference = |other: &Scene| scene.first_difference(other).unwrap();
+        assert_eq!(difference(&scene), None);
+        let changed = scene.with("funnel.height", 0.05).unwrap();
+        let expected = ("funnel.height".to_owned(), "0.12".to_owned(), "0.05".to_owned());
+        assert_eq!(difference(&changed), Some(expected));
+        let mut sideways = scene.clone();
+        sideways.gravity[1] = 1.0;
+        let expected = ("gravity.1".to_owned(), "0.0".to_owned(), "1.0".to_owned());
+        assert_eq!(difference(&sideways), Some(expected));
+        let mut rough = scene.clone();
+        rough.ground.material.restitution = Some(0.1);
+        let (path, here, _) = difference(&rough).unwrap();
+        assert_eq!((path.as_str(), here.as_str()), ("ground", "absent"));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Walls as a scene states them: the ground, the funnel and further shapes, each with a material of its own.
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{finite, positive};
@@ -88,6 +89,15 @@ impl Funnel {
                 material: self.material,
             },
         ]
+    }
+
+    /// Whether a grain's centre `[m]` is in the funnel: above its tip and within the stem, the cone or, above the rim,
+    /// the rim's circle.
+    pub fn holds(&self, centre: &Vector3<f64>) -> bool {
+        let rise = centre.z - self.height;
+        let share = ((rise - self.stem_length) / self.cone_length).clamp(0.0, 1.0);
+        let radius = self.stem_radius + share * (self.rim_radius - self.stem_radius);
+        rise > 0.0 && centre.xy().norm() < radius
     }
 
     pub(super) fn check(&self, grains: &Material, radius: f64) -> Result<(), DemError> {

@@ -4,7 +4,8 @@
 //! to velocities of bodies, and `collect` is J, from there to velocities at the contacts. No matrix is formed.
 
 use crate::bed::{Body, SharedBodies};
-use crate::contact::{Batch, ContactSet};
+use crate::contact::Batch;
+use crate::contact_set::ContactSet;
 use crate::lanes::{Lanes, Reg, Reg3, Width, widest};
 use crate::solver::nsgs::Velocities;
 

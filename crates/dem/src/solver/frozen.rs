@@ -4,7 +4,8 @@ use nalgebra::Vector3;
 
 use crate::DemError;
 use crate::bed::Bed;
-use crate::contact::ContactSet;
+use crate::contact_set::ContactSet;
+use crate::parallel::Threads;
 use crate::preset::SolverSettings;
 use crate::solver::{self, nsgs::ResidualSums};
 
@@ -56,7 +57,7 @@ impl FrozenSolve {
         settings.check()?;
         let Self { mut sets, mut bed, radius } = self.clone();
         let mut both = sets.each_mut();
-        let work = solver::solve(&mut both, &mut bed.bodies, settings, radius, None);
+        let work = solver::solve(&mut both, &mut bed.bodies, settings, radius, &Threads::default());
         let residual = ResidualSums::of(&both, &mut bed.bodies).relative();
         let batches = sets.iter().flat_map(|set| &set.batches);
         let grains = &bed.bodies[..bed.count()];
@@ -79,12 +80,12 @@ impl FrozenSolve {
         let mut warm = self.clone();
         let mut warm_sets = warm.sets.each_mut();
         for set in &mut warm_sets {
-            solver::nsgs::warm_start(set, &mut warm.bed.bodies, None);
+            solver::nsgs::warm_start(set, &mut warm.bed.bodies, &Threads::default());
         }
         let before = ResidualSums::of(&warm_sets, &mut warm.bed.bodies).squares();
         let Self { mut sets, mut bed, radius } = self.clone();
         let mut both = sets.each_mut();
-        solver::solve(&mut both, &mut bed.bodies, settings, radius, None);
+        solver::solve(&mut both, &mut bed.bodies, settings, radius, &Threads::default());
         [before, ResidualSums::of(&both, &mut bed.bodies).squares()]
     }
 }

@@ -10,11 +10,12 @@
 //! lambda <- projection on the cones,  v to match
 //! ```
 
-use rayon::ThreadPool;
+use serde::{Deserialize, Serialize};
 
 use crate::bed::Body;
-use crate::contact::ContactSet;
+use crate::contact_set::ContactSet;
 use crate::law::TANGENTIAL_INERTIA;
+use crate::parallel::Threads;
 use crate::solver::Work;
 use crate::solver::components::{
     Components, Parts, add_scaled, batches, collect, impulses, scale_and_add, spread,
@@ -28,7 +29,7 @@ mod guard;
 pub use complementarity::Complementarity;
 
 /// How Newton's method is run.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NewtonSettings {
     /// Newton steps in a substep.
     pub outer: usize,
@@ -59,10 +60,10 @@ pub(super) fn solve(
     bodies: &mut [Body],
     settings: &NewtonSettings,
     too_fast: f64,
-    pool: Option<&ThreadPool>,
+    threads: &Threads,
 ) -> Work {
     let mut work = Work::default();
-    let mut guard = Guard::new(sets, bodies, pool);
+    let mut guard = Guard::new(sets, bodies, threads);
     let mut velocities = vec![Components::ZERO; batches(sets).count()];
     for _ in 0..settings.outer {
         collect(sets, bodies, &mut velocities);

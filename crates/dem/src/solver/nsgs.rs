@@ -13,21 +13,16 @@
 //! between unequal spheres sliding and rolling couple, and the three lines are one pass inside the contact.
 //! Contacts of a batch share no grain: the order within a batch cannot change a bit.
 
-use rayon::ThreadPool;
-use rayon::prelude::*;
+use crate::parallel::Threads;
 
 use crate::assemble::vectors;
 use crate::bed::{Body, INVERSE_INERTIA, SharedBodies};
-use crate::contact::{Batch, ContactSet, LawLanes};
+use crate::contact::{Batch, LawLanes};
+use crate::contact_set::ContactSet;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Width, each, widest};
 use crate::law::{TANGENTIAL_INERTIA, project_ball};
 use crate::preset::SolverSettings;
 use crate::solver::Work;
-
-/// Batches of a colour below which a second thread costs more than it brings.
-const PARALLEL_BATCHES: usize = 512;
-/// Batches that a thread takes at once.
-const SHARE: usize = 64;
 
 /// How far a sweep still was from the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,30 +46,31 @@ pub(super) fn solve(
     bodies: &mut [Body],
     settings: &SolverSettings,
     radius: f64,
-    pool: Option<&ThreadPool>,
+    threads: &Threads,
 ) -> Work {
     let too_fast = settings.closing * radius / settings.dt;
     let settled = settings.settled * radius / settings.dt;
     let mut work = Work::default();
     let mut has_settled = false;
-    for sweeps in 1..settings.max_sweeps {
+    for sweeps in 1..=settings.max_sweeps {
         // The last sweeps are plain ones: they leave a contact by itself exactly solved.
         let is_enough = has_settled || sweeps >= settings.sweeps;
         let relaxation = if is_enough { 1.0 } else { settings.relaxation };
-        let Progress { closing, change } = sweep(sets, bodies, Manner::relaxed(relaxation), pool);
+        let Progress { closing, change } =
+            sweep(sets, bodies, Manner::relaxed(relaxation), threads);
         work = Work { sweeps, closing, ..work };
         if is_enough && closing <= too_fast {
             return work;
         }
         has_settled = change <= settled;
     }
-    Work { sweeps: settings.max_sweeps, unconverged: work.closing > too_fast, ..work }
+    Work { unconverged: work.closing > too_fast, ..work }
 }
 
 /// Sweeps `count` times, from velocities that contain the impulses.
 pub(crate) fn sweep_plainly(sets: &mut [&mut ContactSet], bodies: &mut [Body], count: usize) {
     for _ in 0..count {
-        sweep(sets, bodies, Manner::relaxed(1.0), None);
+        sweep(sets, bodies, Manner::relaxed(1.0), &Threads::default());
     }
 }
 
@@ -102,7 +98,7 @@ pub(super) fn sweep(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
     manner: Manner,
-    pool: Option<&ThreadPool>,
+    threads: &Threads,
 ) -> Progress {
     let mut worst = Progress::default();
     for set in sets {
@@ -110,42 +106,33 @@ pub(super) fn sweep(
         let sweep = |batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>| {
             kernel(batches, laws, bodies, manner)
         };
-        worst = worst.max(for_each_colour(set, bodies, pool, sweep));
+        worst = worst.max(for_each_phase(set, bodies, threads, sweep));
     }
     worst
 }
 
 /// Adds what the impulses that the contacts of a set carry do to the velocities: the warm start.
-pub(super) fn warm_start(set: &mut ContactSet, bodies: &mut [Body], pool: Option<&ThreadPool>) {
+pub(super) fn warm_start(set: &mut ContactSet, bodies: &mut [Body], threads: &Threads) {
     let kernel = if set.is_at_walls() { apply_walls } else { apply_pairs };
-    for_each_colour(set, bodies, pool, kernel);
+    for_each_phase(set, bodies, threads, kernel);
 }
 
 /// Calls `kernel` for the batches of every colour, in parts; returns the worst of its values. The batches of a
-/// colour share no grain and may go to the threads of `pool` in any order without changing a bit.
-fn for_each_colour(
+/// colour share no grain and may go to the threads in any order without changing a bit.
+fn for_each_phase(
     set: &mut ContactSet,
     bodies: &mut [Body],
-    pool: Option<&ThreadPool>,
+    threads: &Threads,
     kernel: impl Fn(&mut [Batch], &[LawLanes], &SharedBodies<'_>) -> Progress + Sync,
 ) -> Progress {
     // The kernels index the bodies without looking: the indices were made for as many.
     assert_eq!(set.grains() + 1, bodies.len());
-    let ContactSet { batches, laws, colours, .. } = set;
+    let ContactSet { batches, laws, parts, phases, .. } = set;
     let bodies = SharedBodies::new(bodies);
-    let Some(pool) = pool else {
-        return kernel(batches, laws, &bodies);
-    };
     let mut largest = Progress::default();
-    for colour in colours.iter() {
-        let batches = &mut batches[colour.batches.clone()];
-        if batches.len() < PARALLEL_BATCHES || !colour.is_disjoint {
-            largest = largest.max(kernel(batches, laws, &bodies));
-            continue;
-        }
-        let shares = batches.par_chunks_mut(SHARE);
-        let values = shares.map(|batches| kernel(batches, laws, &bodies));
-        largest = largest.max(pool.install(|| values.reduce(Progress::default, Progress::max)));
+    for phase in phases.iter() {
+        let work = |batches: &mut [Batch]| kernel(batches, laws, &bodies);
+        largest = largest.max(threads.parts(batches, &parts[phase.clone()], work, Progress::max));
     }
     largest
 }
@@ -251,7 +238,7 @@ impl<W: Width> Velocities<W> {
     #[inline(always)]
     #[allow(unsafe_code)]
     pub fn gather<const AT_WALLS: bool>(batch: &Batch, bodies: &SharedBodies<'_>) -> Self {
-        // SAFETY: the indices are in bounds (`for_each_colour`), and a body is another batch's only if it rests.
+        // SAFETY: the indices are in bounds (`for_each_phase`), and a body is another batch's only if it rests.
         let body = |body| unsafe { bodies.load::<W>(body) };
         let [v_i, w_i] = pairs(each(&batch.i, body));
         let rest = Reg3 { x: Reg::splat(0.0), y: Reg::splat(0.0), z: Reg::splat(0.0) };
@@ -271,12 +258,12 @@ impl<W: Width> Velocities<W> {
     #[inline(always)]
     pub fn push(&mut self, law: &LawLanes, n: &Reg3<W>, normal: Reg<W>, tangential: Reg3<W>) {
         let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
-        let force = n.scale(normal) + tangential;
+        let force = tangential.plus(normal, *n);
         let twist = n.cross(tangential).scale(Reg::splat(INVERSE_INERTIA));
-        self.v_i = self.v_i + force.scale(mass_i);
-        self.v_j = self.v_j - force.scale(mass_j);
-        self.w_i = self.w_i - twist.scale(mass_i);
-        self.w_j = self.w_j - twist.scale(mass_j);
+        self.v_i = self.v_i.plus(mass_i, force);
+        self.v_j = self.v_j.minus(mass_j, force);
+        self.w_i = self.w_i.minus(mass_i, twist);
+        self.w_j = self.w_j.minus(mass_j, twist);
     }
 
     /// Applies rolling impulses.
@@ -284,8 +271,8 @@ impl<W: Width> Velocities<W> {
     pub fn roll(&mut self, law: &LawLanes, rolling: Reg3<W>) {
         let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
         let step = rolling.scale(Reg::splat(INVERSE_INERTIA));
-        self.w_i = self.w_i + step.scale(mass_i * Reg::load(&law.lever_i));
-        self.w_j = self.w_j - step.scale(mass_j * Reg::load(&law.lever_j));
+        self.w_i = self.w_i.plus(mass_i * Reg::load(&law.lever_i), step);
+        self.w_j = self.w_j.minus(mass_j * Reg::load(&law.lever_j), step);
     }
 }
 
@@ -303,7 +290,7 @@ impl<W: Width> Impulses<W> {
     #[inline(always)]
     fn square_of_change(&self, old: &Self) -> Reg<W> {
         let (n, t, r) = (self.n - old.n, self.t - old.t, self.r - old.r);
-        n * n + t.dot(t) + r.dot(r)
+        n.times_plus(n, t.dot(t)) + r.dot(r)
     }
 
     #[inline(always)]
@@ -362,24 +349,24 @@ fn local_solution<W: Width>(
     let n = Reg3::load(&batch.normal);
     let compliance_n = relaxation * Reg::load(&law.compliance_n);
     let compliance_t = compliance_n * Reg::splat(1.0 / TANGENTIAL_INERTIA);
-    let lambda_n = (old.n + closing * compliance_n).max(Reg::splat(0.0));
+    let lambda_n = closing.times_plus(compliance_n, old.n).max(Reg::splat(0.0));
 
     let Velocities { v_i, w_i, v_j, w_j } = *velocities;
     let dv = v_i - v_j;
-    let u_t = dv + n.cross(w_i + w_j) - n.scale(n.dot(dv));
+    let u_t = (dv + n.cross(w_i + w_j)).minus(n.dot(dv), n);
     let limit = Reg::load(&law.sliding_friction) * lambda_n;
-    let lambda_t = project_ball(old.t - u_t.scale(compliance_t), limit);
+    let lambda_t = project_ball(old.t.minus(compliance_t, u_t), limit);
     velocities.push(law, &n, lambda_n - old.n, lambda_t - old.t);
 
-    // At a wall the tangential impulse has just changed the rolling velocity: take it afresh.
-    let Velocities { w_i, w_j, .. } = *velocities;
-    let rho = w_i.scale(Reg::load(&law.lever_i)) - w_j.scale(Reg::load(&law.lever_j));
-    let wanted = old.r - rho.scale(relaxation * Reg::load(&law.compliance_r));
+    // Where sliding changes the rolling velocity take it afresh; elsewhere need not wait for the friction.
+    let (w_i, w_j) = if law.couples { (velocities.w_i, velocities.w_j) } else { (w_i, w_j) };
+    let rho = w_i.scale(Reg::load(&law.lever_i)).minus(Reg::load(&law.lever_j), w_j);
+    let wanted = old.r.minus(relaxation * Reg::load(&law.compliance_r), rho);
     let about = n.dot(wanted);
     let limit = Reg::load(&law.rolling_friction) * lambda_n;
-    let rolling = project_ball(wanted - n.scale(about), limit);
+    let rolling = project_ball(wanted.minus(about, n), limit);
     let limit = Reg::load(&law.torsional_friction) * lambda_n;
-    let lambda_r = rolling + n.scale(about.min(limit).max(Reg::splat(0.0) - limit));
+    let lambda_r = rolling.plus(about.min(limit).max(Reg::splat(0.0) - limit), n);
     velocities.roll(law, lambda_r - old.r);
     Impulses { n: lambda_n, t: lambda_t, r: lambda_r }
 }

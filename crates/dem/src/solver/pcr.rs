@@ -4,7 +4,7 @@
 //! A row whose S is infinite has P = 0: its unknown keeps the value that it starts with, exactly.
 
 use crate::bed::Body;
-use crate::contact::ContactSet;
+use crate::contact_set::ContactSet;
 use crate::lanes::{Lanes, Reg, widest};
 use crate::solver::components::{
     COUNT, Components, add_scaled, collect, dot, scale_and_add, spread,
@@ -110,6 +110,7 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
+    use crate::blocks::Blocks;
     use crate::contact::{ContactLaw, Listed};
     use crate::lanes::LANES;
 
@@ -121,7 +122,7 @@ mod tests {
     fn triangle() -> ContactSet {
         let listed = [(0, 1), (0, 2), (1, 2)].map(|(i, partner)| Listed { i, partner });
         let mut set = ContactSet::default();
-        set.rebuild(&listed, 3, false, |contact| ContactLaw {
+        set.rebuild(&listed, &Blocks::default(), 3, false, |contact| ContactLaw {
             inverse_mass: [contact.i, contact.partner].map(|grain| [1.0, 2.0, 0.5][grain as usize]),
             lever: [0.3, 0.7],
             sliding_friction: 0.5,

@@ -11,10 +11,11 @@
 //!     else:      lambda <- lambda + beta p,  p <- beta p - g
 //! ```
 
-use rayon::ThreadPool;
+use serde::{Deserialize, Serialize};
 
 use crate::bed::Body;
-use crate::contact::ContactSet;
+use crate::contact_set::ContactSet;
+use crate::parallel::Threads;
 use crate::solver::Work;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, dot, impulses, put_impulses, scale_and_add, spread,
@@ -25,7 +26,7 @@ use crate::solver::nsgs::{self, Manner, ResidualSums};
 const LOOK: usize = 8;
 
 /// How far the reference is iterated.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceSettings {
     /// Natural-map residual over the rms normal impulse at which to stop `[-]`.
     pub residual: f64,
@@ -44,7 +45,7 @@ pub(super) fn solve(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
     settings: &ReferenceSettings,
-    pool: Option<&ThreadPool>,
+    threads: &Threads,
 ) -> Work {
     let count = sets.iter().map(|set| set.batches.len()).sum();
     let mut direction = vec![Components::ZERO; count]; // p
@@ -53,7 +54,7 @@ pub(super) fn solve(
     let mut work = Work { unconverged: true, ..Work::default() };
     let mut before = impulses(sets);
     loop {
-        work.closing = nsgs::sweep(sets, bodies, Manner::EXACT, pool).closing;
+        work.closing = nsgs::sweep(sets, bodies, Manner::EXACT, threads).closing;
         work.sweeps += 1;
         let is_last = work.sweeps >= settings.max_sweeps;
         if (work.sweeps.is_multiple_of(LOOK) || is_last)

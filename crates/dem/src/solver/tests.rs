@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::blocks::Blocks;
 use crate::contact::{ContactLaw, Listed};
 use crate::lanes::Row;
 use crate::preset::Preset;
@@ -15,7 +16,7 @@ use crate::{Material, Scene, Simulation};
 fn contact(at_wall: bool, bias: f64, law: ContactLaw) -> ContactSet {
     let mut set = ContactSet::default();
     let listed = [Listed { i: 0, partner: u32::from(!at_wall) }];
-    set.rebuild(&listed, 2, at_wall, |_| law);
+    set.rebuild(&listed, &Blocks::default(), 2, at_wall, |_| law);
     set.batches[0].normal.set(0, [0.0, 0.0, 1.0]);
     set.batches[0].bias.0[0] = bias;
     set
@@ -66,7 +67,7 @@ fn solved(
     settings: &SolverSettings,
 ) -> (ContactSet, Vec<Body>, Work) {
     let (mut set, mut bodies) = (set.clone(), bodies.to_vec());
-    let work = solve(&mut [&mut set], &mut bodies, settings, 2e-3, None);
+    let work = solve(&mut [&mut set], &mut bodies, settings, 2e-3, &Threads::default());
     (set, bodies, work)
 }
 

@@ -35,6 +35,7 @@ impl SphereInView {
     /// positive numbers in the denominator, so that nothing cancels. A ray that misses has the
     /// root of a negative number, NaN, which is not less than anything: no branch is needed and
     /// the loop vectorises.
+    #[inline(always)]
     pub(super) fn draw_row(&self, y: f64, columns: &[f64], pixels: &mut [f32]) {
         let c = &self.centre;
         let (along_row, square_row) = (y * c.y + c.z, y * y + 1.0);

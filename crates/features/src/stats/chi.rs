@@ -7,12 +7,13 @@
 //! scale)`, with bounds. Without the lower one the likelihood has no maximum (k < 1, b → min r makes
 //! it infinite); without the upper one it often has none either (data skewed to the left, such as
 //! a uniform disc, push k → ∞, b → -∞ towards the normal distribution). Both are derived in
-//! `docs/theory/features.md`. Equal radii give k = 1, b = r, A = 0.
+//! `docs/theory/statistics.md`. Equal radii give k = 1, b = r, A = 0.
 //!
 //! Source: the paper, Summary Statistic Extraction.
 
 mod fit;
 mod gamma;
+mod log_sum;
 
 pub use fit::{ChiFit, MAX_DF, MIN_DF};
 

@@ -8,7 +8,10 @@
 //!
 //! Source: the paper, Summary Statistic Extraction.
 
-use super::prepared::{is_constant, mean};
+use nalgebra::Vector2;
+
+use super::prepared::is_constant;
+use super::sum::{extremes, mean, sum};
 use super::{Behaviour, Statistic};
 
 /// Excess kurtosis of the distance from the centroid.
@@ -26,15 +29,14 @@ fn kurtosis(values: &[f64]) -> f64 {
         return 0.0;
     }
     let middle = mean(values);
-    let reach = values.iter().map(|v| (v - middle).abs()).fold(0.0, f64::max);
+    let (low, high) = extremes(values);
     // In units of the largest deviation no power underflows, however small the formation.
-    let (mut second, mut fourth) = (0.0, 0.0);
-    for value in values {
-        let square = ((value - middle) / reach).powi(2);
-        second += square;
-        fourth += square * square;
-    }
-    values.len() as f64 * fourth / (second * second) - 3.0
+    let reach = f64::max(high - middle, middle - low);
+    let powers = sum(values, |v| {
+        let square = ((v - middle) / reach).powi(2);
+        Vector2::new(square, square * square)
+    });
+    values.len() as f64 * powers.y / (powers.x * powers.x) - 3.0
 }
 
 #[cfg(test)]

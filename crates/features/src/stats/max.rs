@@ -6,8 +6,8 @@
 //!
 //! Source: the paper, Summary Statistic Extraction.
 
-use super::prepared::{Prepared, extremes};
-use super::{Behaviour, Statistic};
+use super::sum::extremes;
+use super::{Behaviour, Prepared, Statistic};
 
 /// Height of the highest point above the ground.
 pub const MAX_Z: Statistic = Statistic {

@@ -6,7 +6,7 @@
 //!
 //! Source: the paper, Summary Statistic Extraction.
 
-use super::prepared::mean;
+use super::sum::mean;
 use super::{Behaviour, Statistic};
 
 /// Mean height of the points above the ground.

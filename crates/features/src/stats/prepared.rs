@@ -6,10 +6,11 @@ use nalgebra::{Vector2, Vector3};
 
 use super::MIN_POINTS;
 use super::chi::ChiFit;
+use super::sum::{extremes, sum};
 use crate::error::{FeatureError, require_finite, require_in};
 
-/// Largest coordinate `[m]`: its fourth power is far from overflow.
-const MAX_COORDINATE: f64 = 1e6;
+/// Largest coordinate `[m]`: its square, summed over any number of points, is far from overflow.
+pub const MAX_COORDINATE: f64 = 1e100;
 
 /// Relative range below which values count as equal. The rounding of coordinates and of r leaves a
 /// few 1e-16 of the value; nothing that was measured is this exact.
@@ -22,8 +23,17 @@ pub struct Prepared {
     y: Vec<f64>,
     z: Vec<f64>,
     r: Vec<f64>,
+    /// Two statistics read one order.
+    r_ranking: OnceCell<Vec<Ranked>>,
     /// Three statistics read one fit.
     chi: OnceCell<ChiFit>,
+}
+
+/// A value and the point that it belongs to.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ranked {
+    pub(super) value: f64,
+    pub(super) point: u32,
 }
 
 impl Prepared {
@@ -32,21 +42,14 @@ impl Prepared {
     /// # Errors
     /// As [`super::paper16`].
     pub fn new(points: &[Vector3<f64>]) -> Result<Self, FeatureError> {
-        if points.len() < MIN_POINTS {
-            let got = points.len();
-            return Err(FeatureError::TooFewPoints { what: "statistics", got, min: MIN_POINTS });
-        }
-        require_finite("points", points.iter().flat_map(|p| [p.x, p.y, p.z]))?;
-        for &coordinate in points.iter().flatten() {
-            require_in("point [m]", coordinate, -MAX_COORDINATE, MAX_COORDINATE)?;
-        }
-        let centroid = points.iter().map(Vector3::xy).sum::<Vector2<f64>>() / points.len() as f64;
-        let x: Vec<_> = points.iter().map(|p| p.x - centroid.x).collect();
-        let y: Vec<_> = points.iter().map(|p| p.y - centroid.y).collect();
+        require_points("statistics", points)?;
+        let (origin, offset) = centroid(points);
+        let x: Vec<_> = points.iter().map(|p| (p.x - origin.x) - offset.x).collect();
+        let y: Vec<_> = points.iter().map(|p| (p.y - origin.y) - offset.y).collect();
         let z = points.iter().map(|p| p.z).collect();
         // The coordinates are bounded, so the square root is as safe as `hypot` and much faster.
         let r = x.iter().zip(&y).map(|(x, y)| (x * x + y * y).sqrt()).collect();
-        Ok(Self { x, y, z, r, chi: OnceCell::new() })
+        Ok(Self { x, y, z, r, r_ranking: OnceCell::new(), chi: OnceCell::new() })
     }
 
     /// x from the centroid `[m]`.
@@ -73,18 +76,69 @@ impl Prepared {
     pub fn chi(&self) -> &ChiFit {
         self.chi.get_or_init(|| ChiFit::new(&self.r))
     }
+
+    /// r in ascending order.
+    pub(super) fn r_ranking(&self) -> &[Ranked] {
+        self.r_ranking.get_or_init(|| ranking(&self.r))
+    }
 }
 
-/// Arithmetic mean; 0 of nothing.
-pub(super) fn mean(values: &[f64]) -> f64 {
-    if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
+/// Refuses too few points, and points that are nowhere.
+pub(super) fn require_points(
+    what: &'static str,
+    points: &[Vector3<f64>],
+) -> Result<(), FeatureError> {
+    if points.len() < MIN_POINTS {
+        return Err(FeatureError::TooFewPoints { what, got: points.len(), min: MIN_POINTS });
+    }
+    // One comparison a coordinate tells the good from the bad; NaN fails it too.
+    if points.iter().flatten().all(|coordinate| coordinate.abs() <= MAX_COORDINATE) {
+        return Ok(());
+    }
+    require_finite("points", points.iter().flat_map(|p| [p.x, p.y, p.z]))?;
+    let range = |&coordinate| require_in("point [m]", coordinate, -MAX_COORDINATE, MAX_COORDINATE);
+    points.iter().flatten().try_for_each(range)
 }
 
-/// Smallest and largest value.
-pub(super) fn extremes(values: &[f64]) -> (f64, f64) {
-    values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+/// The centroid of x and y as a point and the rest of the way from it. Whoever counts from the point
+/// first loses no digits to an offset of the whole formation.
+pub(super) fn centroid(points: &[Vector3<f64>]) -> (Vector2<f64>, Vector2<f64>) {
+    let origin = points.first().map_or_else(Vector2::zeros, Vector3::xy);
+    let from_origin = sum(points, |p| p.xy() - origin);
+    (origin, from_origin / points.len().max(1) as f64)
+}
+
+/// The values in ascending order, each with its index.
+///
+/// Into buckets of equal width first, then each bucket by comparisons: linear in the number of values
+/// where they are spread out, and never worse than a sort.
+pub(super) fn ranking(values: &[f64]) -> Vec<Ranked> {
+    const VALUES_PER_BUCKET: usize = 4;
+    let (low, high) = extremes(values);
+    let last = values.len() / VALUES_PER_BUCKET;
+    let scale = (last + 1) as f64 / (high - low);
+    // Rounding keeps the order of the products; equal values, 0 · ∞, share the first bucket.
+    let bucket_of = |value: f64| (((value - low) * scale) as usize).min(last);
+    let mut ends = vec![0; last + 2];
+    for &value in values {
+        ends[bucket_of(value) + 1] += 1;
+    }
+    for bucket in 0..=last {
+        ends[bucket + 1] += ends[bucket];
+    }
+    let mut ranking = vec![Ranked { value: 0.0, point: 0 }; values.len()];
+    for (point, &value) in (0..).zip(values) {
+        // Counts from the bucket's start to its end, which is the next one's start.
+        let place = &mut ends[bucket_of(value)];
+        ranking[*place] = Ranked { value, point };
+        *place += 1;
+    }
+    let mut start = 0;
+    for &end in &ends[..=last] {
+        ranking[start..end].sort_unstable_by(|a, b| a.value.total_cmp(&b.value));
+        start = end;
+    }
+    ranking
 }
 
 /// Whether all values are equal up to rounding.
@@ -92,4 +146,32 @@ pub(super) fn is_constant(values: &[f64]) -> bool {
     let (low, high) = extremes(values);
     // Also true of no values, where high < low.
     high - low <= EQUAL * low.abs().max(high.abs()) || high <= low
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Stream;
+
+    #[test]
+    fn ranking_is_a_permutation_in_ascending_order() {
+        let mut stream = Stream::new(7);
+        for count in [0, 1, 2, 3, 4, 5, 100, 1001] {
+            for shape in 0..4 {
+                let value = |stream: &mut Stream| match shape {
+                    0 => stream.uniform(),
+                    1 => stream.normal().powi(9),
+                    2 => stream.index(3) as f64,
+                    _ => 0.25,
+                };
+                let values: Vec<f64> = (0..count).map(|_| value(&mut stream)).collect();
+                let ranking = ranking(&values);
+                assert!(ranking.is_sorted_by(|a, b| a.value <= b.value));
+                let mut points: Vec<_> = ranking.iter().map(|ranked| ranked.point).collect();
+                points.sort_unstable();
+                assert!(points.into_iter().eq(0..count as u32));
+                assert!(ranking.iter().all(|r| r.value == values[r.point as usize]));
+            }
+        }
+    }
 }

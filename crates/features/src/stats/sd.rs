@@ -7,7 +7,7 @@
 //!
 //! Source: the paper, Summary Statistic Extraction.
 
-use super::prepared::mean;
+use super::sum::{mean, sum};
 use super::{Behaviour, Statistic};
 
 /// Standard deviation of the height.
@@ -23,7 +23,7 @@ pub const SD_Z: Statistic = Statistic {
 pub const SD_X: Statistic = Statistic {
     name: "sd_x",
     unit: "m",
-    doc: "standard deviation of the points along x",
+    doc: "standard deviation of the points along x; turns with the axes",
     behaviour: Behaviour::AXIS_LENGTH,
     value: |points| sd(points.x()),
 };
@@ -32,7 +32,7 @@ pub const SD_X: Statistic = Statistic {
 pub const SD_Y: Statistic = Statistic {
     name: "sd_y",
     unit: "m",
-    doc: "standard deviation of the points along y",
+    doc: "standard deviation of the points along y; turns with the axes",
     behaviour: Behaviour::AXIS_LENGTH,
     value: |points| sd(points.y()),
 };
@@ -49,7 +49,7 @@ pub const SD_R: Statistic = Statistic {
 /// Population standard deviation, in two passes so that a large mean costs no digits.
 fn sd(values: &[f64]) -> f64 {
     let middle = mean(values);
-    let squares: f64 = values.iter().map(|v| (v - middle) * (v - middle)).sum();
+    let squares = sum(values, |v| (v - middle) * (v - middle));
     (squares / values.len().max(1) as f64).sqrt()
 }
 

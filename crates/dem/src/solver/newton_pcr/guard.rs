@@ -5,10 +5,10 @@
 //! none does, a Gauss-Seidel sweep takes its place. At the end the impulses may do no more work than the biases ask
 //! for, or sweeps follow. Nothing that is not finite passes, since no comparison with it holds.
 
-use rayon::ThreadPool;
+use crate::parallel::Threads;
 
 use crate::bed::Body;
-use crate::contact::ContactSet;
+use crate::contact_set::ContactSet;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, batches, collect, impulses, put_impulses, spread,
 };
@@ -27,7 +27,7 @@ pub(super) struct Guard<'a> {
     merit: f64,
     /// M^-1 J^T of a step.
     change: Vec<Body>,
-    pool: Option<&'a ThreadPool>,
+    threads: &'a Threads,
     /// Steps that were damped or replaced.
     pub acted: usize,
     /// Sweeps that replaced a step.
@@ -35,15 +35,11 @@ pub(super) struct Guard<'a> {
 }
 
 impl<'a> Guard<'a> {
-    pub fn new(
-        sets: &[&mut ContactSet],
-        bodies: &mut [Body],
-        pool: Option<&'a ThreadPool>,
-    ) -> Self {
+    pub fn new(sets: &[&mut ContactSet], bodies: &mut [Body], threads: &'a Threads) -> Self {
         Self {
             merit: merit(sets, bodies),
             change: vec![Body::default(); bodies.len()],
-            pool,
+            threads,
             acted: 0,
             sweeps: 0,
         }
@@ -92,7 +88,7 @@ impl<'a> Guard<'a> {
     }
 
     fn sweep(&mut self, sets: &mut [&mut ContactSet], bodies: &mut [Body]) {
-        nsgs::sweep(sets, bodies, Manner::EXACT, self.pool);
+        nsgs::sweep(sets, bodies, Manner::EXACT, self.threads);
         self.merit = merit(sets, bodies);
         self.acted += 1;
         self.sweeps += 1;

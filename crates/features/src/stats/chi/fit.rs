@@ -1,7 +1,9 @@
 //! Maximum likelihood of the shifted, scaled chi distribution by its profile over the shift.
 
 use super::gamma::{gamma_shape, ln_gamma};
-use crate::stats::prepared::{extremes, is_constant, mean};
+use super::log_sum::{ln_and_inverse_sums, ln_sum};
+use crate::stats::prepared::is_constant;
+use crate::stats::sum::{extremes, mean, sum};
 
 /// Fewest degrees of freedom: below, the likelihood is unbounded.
 pub const MIN_DF: f64 = 1.0;
@@ -11,10 +13,13 @@ pub const MAX_DF: f64 = 100.0;
 /// Largest distance of the shift below the smallest radius, in ranges of the data: for k ≤ 100 the
 /// likelihood rises towards smaller distances from (k - 1) = 99 ranges on.
 const MAX_GAP: f64 = 99.0;
-/// Smallest distance that is searched; closer, k is 1 to all digits, which is tried by itself.
-const MIN_GAP: f64 = 1e-15;
-/// Points of the search grid in ln(gap), 0.6 apart.
-const GRID: usize = 65;
+/// Smallest distance of the shift below the smallest radius, in ranges of the data. Rounding of r must
+/// not put a radius below the shift, where the density is 0; the likelihood cannot tell it from none.
+const MIN_GAP: f64 = 1e-12;
+/// The same in roundings of the largest radius, which decide where the range is much smaller.
+const MIN_GAP_ROUNDINGS: f64 = 8.0;
+/// Points of the search grid in ln(gap), at most 0.6 apart.
+const GRID: usize = 55;
 /// Steps of the root search at most; it converges faster than linearly.
 const ROOT_STEPS: usize = 100;
 /// Relative width of the bracket at which the root search ends.
@@ -25,7 +30,7 @@ const ROOT_TOLERANCE: f64 = 1e-14;
 pub struct ChiFit {
     /// Degrees of freedom k `[-]`, within [[`MIN_DF`], [`MAX_DF`]].
     pub df: f64,
-    /// Shift b `[m]`, at most the smallest radius.
+    /// Shift b `[m]`, below the smallest radius, if by 1e-12 of the range (equal radii: that radius).
     pub shift: f64,
     /// Scale A `[m]`.
     pub scale: f64,
@@ -43,12 +48,13 @@ impl ChiFit {
         let (min, max) = extremes(radii);
         let range = max - min;
         if is_constant(radii) {
-            let square = radii.iter().map(|r| (r - min) * (r - min)).sum::<f64>();
+            let square = sum(radii, |r| (r - min) * (r - min));
             let scale = (square / radii.len() as f64).sqrt();
             return Self { df: MIN_DF, shift: min, scale };
         }
         let data = UnitData::new(radii.iter().map(|r| (r - min) / range).collect());
-        let best = data.best();
+        let rounding = f64::EPSILON * max.abs().max(min.abs()) / range;
+        let best = data.best(MIN_GAP.max(MIN_GAP_ROUNDINGS * rounding));
         Self { df: best.df, shift: min - best.gap * range, scale: best.scale * range }
     }
 }
@@ -74,17 +80,17 @@ struct UnitData {
 impl UnitData {
     fn new(values: Vec<f64>) -> Self {
         let middle = mean(&values);
-        let squares: f64 = values.iter().map(|v| (v - middle) * (v - middle)).sum();
+        let squares = sum(&values, |v| (v - middle) * (v - middle));
         let variance = squares / values.len() as f64;
         Self { values, mean: middle, variance }
     }
 
     /// The global maximum: the half-normal end of the range against every local maximum inside.
-    fn best(&self) -> Profile {
-        let step = (MAX_GAP / MIN_GAP).ln() / (GRID - 1) as f64;
-        let gap_of = |i: usize| MIN_GAP * (step * i as f64).exp();
+    fn best(&self, min_gap: f64) -> Profile {
+        let step = (MAX_GAP / min_gap).ln() / (GRID - 1) as f64;
+        let gap_of = |i: usize| min_gap * (step * i as f64).exp();
         let grid: Vec<Profile> = (0..GRID).map(|i| self.profile(gap_of(i))).collect();
-        let mut best = self.half_normal();
+        let mut best = self.half_normal(min_gap);
         for (i, point) in grid.iter().enumerate() {
             let left = grid[i.saturating_sub(1)];
             let right = grid[(i + 1).min(GRID - 1)];
@@ -101,16 +107,21 @@ impl UnitData {
     }
 
     /// k = 1 with the shift at the smallest value, where that k is best placed.
-    fn half_normal(&self) -> Profile {
-        let mean_square = self.mean_square(0.0);
+    fn half_normal(&self, gap: f64) -> Profile {
+        let mean_square = self.mean_square(gap);
         let likelihood = log_likelihood(MIN_DF, mean_square, 0.0);
-        Profile { gap: 0.0, df: MIN_DF, scale: mean_square.sqrt(), likelihood }
+        Profile { gap, df: MIN_DF, scale: mean_square.sqrt(), likelihood }
     }
 
     /// For a fixed shift, (v - b)² follows a gamma distribution of shape k/2: one equation for k,
     /// then A² = mean (v - b)² / k.
     fn profile(&self, gap: f64) -> Profile {
-        let (mean_square, mean_ln) = (self.mean_square(gap), self.mean_ln(gap));
+        self.profile_with(gap, ln_sum(&self.values, gap) / self.count())
+    }
+
+    /// The same where the mean of ln(v + gap) is known.
+    fn profile_with(&self, gap: f64, mean_ln: f64) -> Profile {
+        let mean_square = self.mean_square(gap);
         let log_ratio = mean_square.ln() - 2.0 * mean_ln;
         let df = 2.0 * gamma_shape(log_ratio, 0.5 * MIN_DF, 0.5 * MAX_DF);
         let likelihood = log_likelihood(df, mean_square, mean_ln);
@@ -152,35 +163,19 @@ impl UnitData {
     /// Derivative of the profile likelihood with respect to the gap. k and A are best for the gap,
     /// so only the explicit dependence counts (or k is at a bound and does not move).
     fn slope(&self, gap: f64) -> f64 {
-        let df = self.profile(gap).df;
-        let inverse = self.values.iter().map(|v| 1.0 / (v + gap)).sum::<f64>();
-        let mean_inverse = inverse / self.values.len() as f64;
-        (df - 1.0) * mean_inverse - df * (self.mean + gap) / self.mean_square(gap)
+        let (ln, inverse) = ln_and_inverse_sums(&self.values, gap);
+        let df = self.profile_with(gap, ln / self.count()).df;
+        let square = self.mean_square(gap);
+        (df - 1.0) * inverse / self.count() - df * (self.mean + gap) / square
+    }
+
+    fn count(&self) -> f64 {
+        self.values.len() as f64
     }
 
     /// Mean of (v + gap)².
     fn mean_square(&self, gap: f64) -> f64 {
         self.variance + (self.mean + gap) * (self.mean + gap)
-    }
-
-    /// Mean of ln(v + gap), as logarithms of products of 16: v + gap is within [1e-15, 100], so
-    /// none overflows, and 16 times fewer logarithms are taken.
-    fn mean_ln(&self, gap: f64) -> f64 {
-        const LANES: usize = 4;
-        const FACTORS: usize = 16;
-        let mut sum = 0.0;
-        for chunk in self.values.chunks(LANES * FACTORS) {
-            let (rows, rest) = chunk.as_chunks::<LANES>();
-            let mut products = [1.0; LANES];
-            for row in rows {
-                for (product, v) in products.iter_mut().zip(row) {
-                    *product *= v + gap;
-                }
-            }
-            sum += products.map(f64::ln).iter().sum::<f64>();
-            sum += rest.iter().map(|v| (v + gap).ln()).sum::<f64>();
-        }
-        sum / self.values.len() as f64
     }
 }
 

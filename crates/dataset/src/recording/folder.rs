@@ -1,0 +1,106 @@
+//! A folder of frames, or of what a ROS 2 recorder writes.
+
+use std::path::{Path, PathBuf};
+
+use granulcal_features::{DepthImage, Intrinsics};
+
+use super::Frame;
+use crate::DatasetError;
+use crate::image_file::{self, Unreadable};
+use crate::input::unpack_limit;
+use crate::mean::Mean;
+use crate::png::unreadable;
+
+/// A folder that is a recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Folder {
+    /// Depth frames, in order of their names.
+    Frames(Vec<PathBuf>),
+    /// One recording of messages.
+    Messages(PathBuf),
+}
+
+impl Folder {
+    /// Looks what a folder holds.
+    ///
+    /// # Errors
+    /// [`DatasetError::Io`], or [`DatasetError::Content`] for a folder with none or several of them.
+    pub fn open(folder: &Path) -> Result<Self, DatasetError> {
+        let list = || DatasetError::io("list", folder);
+        let entries = std::fs::read_dir(folder).map_err(list())?;
+        let entries = entries.collect::<Result<Vec<_>, _>>().map_err(list())?;
+        let mut files: Vec<_> = entries.iter().map(std::fs::DirEntry::path).collect();
+        files.sort();
+        let of = |ending: &str| -> Vec<PathBuf> {
+            let fits = |path: &&PathBuf| {
+                path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
+            };
+            files.iter().filter(fits).cloned().collect()
+        };
+        let frames = of("png");
+        if !frames.is_empty() {
+            return Ok(Self::Frames(frames));
+        }
+        let messages = [of("mcap"), of("bag")].concat();
+        if let [one] = &messages[..] {
+            return Ok(Self::Messages(one.clone()));
+        }
+        let found = match (messages.len(), of("db3").len()) {
+            (0, 0) => "no .png, .mcap or .bag".to_owned(),
+            // The other storage of ROS 2.
+            (0, _) => {
+                "an SQLite recording (.db3), which `ros2 bag convert` turns into .mcap".to_owned()
+            }
+            (count, _) => format!("{count} recordings of messages; give one of them"),
+        };
+        let allowed = "depth frames as .png, or one .mcap or .bag";
+        Err(DatasetError::content(folder, "the folder", found, allowed))
+    }
+}
+
+/// The mean of PNG frames, and what could not be read of them.
+pub(super) struct Average {
+    pub(super) image: DepthImage,
+    /// Frames that were averaged.
+    pub(super) frames: usize,
+    /// Why others were not, a line each.
+    pub(super) damage: Vec<String>,
+}
+
+/// Averages frames that a camera took: its lens, its unit and the name of its file.
+pub(super) fn average(
+    folder: &Path,
+    frames: impl IntoIterator<Item = Frame>,
+    (lens, unit, camera_path): (Intrinsics, f64, &Path),
+) -> Result<Average, DatasetError> {
+    let mut mean: Option<Mean> = None;
+    let (mut damage, mut first_error) = (Vec::new(), None);
+    for frame in frames {
+        let (path, bytes) = frame?;
+        let frame = match image_file::depth(&bytes, unpack_limit(bytes.len() as u64)) {
+            Ok(frame) => frame,
+            Err(Unreadable::Damaged(source)) => {
+                damage.push(format!("{}: {source}", path.display()));
+                first_error.get_or_insert(DatasetError::Png { path, source });
+                continue;
+            }
+            Err(unfit) => return Err(unreadable(&path, unfit)),
+        };
+        if (frame.width, frame.height) != (lens.width, lens.height) {
+            let found = format!("{}x{}", frame.width, frame.height);
+            let allowed = format!("{}x{} as in {}", lens.width, lens.height, camera_path.display());
+            return Err(DatasetError::content(&path, "the size", found, allowed));
+        }
+        match &mut mean {
+            None => mean = Some(Mean::new(frame)),
+            Some(mean) => mean.add(&frame).map_err(|fault| fault.in_file(&path))?,
+        }
+    }
+    let Some(mean) = mean else {
+        let nothing = || DatasetError::content(folder, "the frames", "none", "at least one");
+        return Err(first_error.unwrap_or_else(nothing));
+    };
+    let frames = mean.frames();
+    let image = mean.finish(unit).map_err(|fault| fault.in_file(folder))?;
+    Ok(Average { image, frames, damage })
+}

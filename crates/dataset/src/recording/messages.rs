@@ -1,0 +1,211 @@
+//! A .bag or .mcap: a first pass finds the topics, a second averages the frames.
+
+use std::ops::{ControlFlow, Range};
+
+use granulcal_features::{ColourImage, DepthImage, Intrinsics, register_colour};
+
+use super::ReadOptions;
+use crate::fault::Fault;
+use crate::input::Input;
+use crate::mean::Mean;
+use crate::message::{self, Picture};
+use crate::message_file::{Channel, Message, walk};
+use crate::survey::{Survey, Topic};
+use crate::{CameraFile, DatasetError, Lost};
+
+/// What was read.
+pub(super) struct Averaged {
+    pub(super) intrinsics: Intrinsics,
+    pub(super) image: DepthImage,
+    pub(super) colour: Option<ColourImage>,
+    pub(super) topic: String,
+    /// Frames that were averaged, and frames that are whole.
+    pub(super) frames: usize,
+    pub(super) whole: u64,
+    pub(super) lost: Option<Lost>,
+    pub(super) damage: Vec<String>,
+}
+
+pub(super) fn read(
+    input: &mut Input<'_>,
+    options: &ReadOptions,
+    camera: Option<&CameraFile>,
+) -> Result<Averaged, DatasetError> {
+    let survey = Survey::take(input)?;
+    let depth = survey.depth(options.topic.as_deref())?;
+    let intrinsics = match camera.and_then(|file| file.lens) {
+        Some(lens) => lens,
+        None => survey.lens(depth, options.camera_topic.as_deref())?.1,
+    };
+    let unit = match camera.and_then(|file| file.depth_unit) {
+        Some(unit) => unit,
+        None => survey.unit(depth)?.metres,
+    };
+    // An image beside the camera's TOML comes first; see the caller.
+    let wants_colour =
+        camera.is_some_and(|file| file.segmentation.colour.is_some() && file.colour.is_none());
+    let colour = match &options.colour_topic {
+        None if !wants_colour => None,
+        name => Some(survey.colour(name.as_deref())?),
+    };
+    let mut pass = Pass {
+        survey: &survey,
+        depth,
+        colour,
+        size: (intrinsics.width, intrinsics.height),
+        limit: input.unpack_limit(),
+        window: options.window(input.path(), depth.whole())?,
+        next: 0,
+        mean: None,
+        undecodable: 0,
+        fault: None,
+        colour_message: None,
+    };
+    walk(survey.format, input, &mut |message| pass.take(message))?;
+    pass.finish(intrinsics, unit)
+}
+
+/// The second pass.
+struct Pass<'s> {
+    survey: &'s Survey,
+    depth: &'s Topic,
+    colour: Option<&'s Topic>,
+    /// Columns and rows that the lens has.
+    size: (usize, usize),
+    limit: u64,
+    window: Range<u64>,
+    /// Index of the next depth frame.
+    next: u64,
+    mean: Option<Mean>,
+    /// Frames of the window whose pixels cannot be unpacked, and why the first cannot.
+    undecodable: u64,
+    fault: Option<Fault>,
+    /// The last colour image before the end of the window, or the first behind it.
+    colour_message: Option<(Channel, Vec<u8>)>,
+}
+
+impl Pass<'_> {
+    fn take(&mut self, message: &Message<'_>) -> Result<ControlFlow<()>, DatasetError> {
+        let is_done = self.next >= self.window.end;
+        if self.depth.is_of(message.channel) && !is_done {
+            self.depth_frame(message)?;
+        } else if self.colour.is_some_and(|colour| colour.is_of(message.channel))
+            && (!is_done || self.colour_message.is_none())
+        {
+            self.colour_message = Some((message.channel.clone(), message.data.to_vec()));
+        }
+        let has_colour = self.colour.is_none() || self.colour_message.is_some();
+        Ok(if self.next >= self.window.end && has_colour {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        })
+    }
+
+    fn depth_frame(&mut self, message: &Message<'_>) -> Result<(), DatasetError> {
+        let readable = |picture: Picture| picture.facts().map(|_| ());
+        let picture = message::picture(message.channel, message.data);
+        // What the first pass could not read was counted there.
+        if picture.clone().and_then(readable).is_err() {
+            return Ok(());
+        }
+        let index = self.next;
+        self.next += 1;
+        if !self.window.contains(&index) {
+            return Ok(());
+        }
+        let place = format!("frame {index} of {}", self.depth.topic);
+        let refuse = |fault: Fault| fault.of(&place).in_file(&self.survey.path);
+        let frame = match picture.and_then(|picture| picture.depth(self.limit)) {
+            Ok(frame) => frame,
+            Err(fault) => {
+                self.undecodable += 1;
+                self.fault.get_or_insert_with(|| fault.of(&place));
+                return Ok(());
+            }
+        };
+        if (frame.width, frame.height) != self.size {
+            let found = format!("{}x{}", frame.width, frame.height);
+            let allowed = format!("{}x{}, as the lens has it", self.size.0, self.size.1);
+            return Err(refuse(Fault::new("the size", found, allowed)));
+        }
+        match &mut self.mean {
+            None => self.mean = Some(Mean::new(frame)),
+            Some(mean) => mean.add(&frame).map_err(refuse)?,
+        }
+        Ok(())
+    }
+
+    fn finish(self, intrinsics: Intrinsics, unit: f64) -> Result<Averaged, DatasetError> {
+        let path = &self.survey.path;
+        let mut damage: Vec<_> = self
+            .survey
+            .damage()
+            .iter()
+            .map(|damage| format!("{}: {damage}", path.display()))
+            .collect();
+        damage.extend(self.fault.iter().map(|fault| format!("{}: {fault}", path.display())));
+        let lost = self.survey.lost(self.depth);
+        let lost = match (lost, self.undecodable) {
+            (lost, 0) => lost,
+            (None, more) => Some(Lost::Exactly(more)),
+            (Some(lost), more) => Some(lost.plus(more)),
+        };
+        let Some(mean) = self.mean else {
+            let nothing = || Fault::new("the frames", "none", "whole");
+            return Err(self.fault.unwrap_or_else(nothing).in_file(path));
+        };
+        let frames = mean.frames();
+        let image = mean.finish(unit).map_err(|fault| fault.in_file(path))?;
+        let colour = match (self.colour, &self.colour_message) {
+            (Some(topic), Some((channel, data))) => {
+                let refuse = |fault: Fault| fault.of(&channel.topic).in_file(path);
+                let picture = message::picture(channel, data).map_err(refuse)?;
+                let colour = picture.colour(self.limit).map_err(refuse)?;
+                Some(registered(self.survey, (self.depth, &image, &intrinsics), topic, colour)?)
+            }
+            (Some(topic), None) => {
+                let what = format!("the images of {}", topic.topic);
+                return Err(DatasetError::content(path, what, "none", "whole"));
+            }
+            (None, _) => None,
+        };
+        Ok(Averaged {
+            intrinsics,
+            image,
+            colour,
+            topic: self.depth.topic.clone(),
+            frames,
+            whole: self.depth.whole() - self.undecodable,
+            lost,
+            damage,
+        })
+    }
+}
+
+/// The colours of the depth image's pixels.
+fn registered(
+    survey: &Survey,
+    (depth, image, lens): (&Topic, &DepthImage, &Intrinsics),
+    topic: &Topic,
+    colour: ColourImage,
+) -> Result<ColourImage, DatasetError> {
+    if let Some(colour_from_depth) = survey.extrinsics(depth, topic) {
+        let colour_lens = survey.lens(topic, None)?.1;
+        return register_colour(image, lens, &colour, &colour_lens, &colour_from_depth)
+            .map_err(|source| DatasetError::Recording { path: survey.path.clone(), source });
+    }
+    let has_size = (colour.width, colour.height) == (image.width, image.height);
+    if has_size && depth.frame_id() == topic.frame_id() {
+        return Ok(colour);
+    }
+    let what = format!("the colour topic {}", topic.topic);
+    let found = format!("{}x{} in frame {:?}", colour.width, colour.height, topic.frame_id());
+    let allowed = format!(
+        "registered to the depth, {}x{} in frame {:?}, unless the RealSense viewer recorded it",
+        image.width,
+        image.height,
+        depth.frame_id()
+    );
+    Err(DatasetError::content(&survey.path, what, found, allowed))
+}

@@ -1,0 +1,94 @@
+//! What of a recording is read.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use crate::DatasetError;
+
+/// Frames that are averaged unless told otherwise: as many as Matl et al. 2020 average.
+pub const FRAMES: usize = 10;
+
+/// What of a recording is read, and what is known besides.
+#[derive(Clone, Debug)]
+pub struct ReadOptions {
+    /// TOML of the camera: images as PNG need it, for the others it replaces what they say.
+    pub camera: Option<PathBuf>,
+    /// Topic of the depth images, where several fit.
+    pub topic: Option<String>,
+    /// Topic of the colour images, where several fit.
+    pub colour_topic: Option<String>,
+    /// Topic of the lens, where several fit.
+    pub camera_topic: Option<String>,
+    /// Most frames that are averaged; at least 1.
+    pub frames: usize,
+    /// Index of the first of them, counted from 0; else the last `frames` frames are taken.
+    pub first_frame: Option<u64>,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            camera: None,
+            topic: None,
+            colour_topic: None,
+            camera_topic: None,
+            frames: FRAMES,
+            first_frame: None,
+        }
+    }
+}
+
+impl ReadOptions {
+    /// The defaults, with a camera.
+    pub fn with_camera(camera: impl Into<PathBuf>) -> Self {
+        Self { camera: Some(camera.into()), ..Self::default() }
+    }
+
+    /// Which of `whole` frames are averaged.
+    pub(super) fn window(&self, path: &Path, whole: u64) -> Result<Range<u64>, DatasetError> {
+        let count = self.frames as u64;
+        if count == 0 {
+            let (what, got) = ("the number of frames", "0".to_owned());
+            return Err(DatasetError::Argument { what, got, allowed: "at least 1" });
+        }
+        let first = self.first_frame.unwrap_or(whole.saturating_sub(count));
+        if first >= whole {
+            let allowed = format!("below {whole}, the number of frames");
+            return Err(DatasetError::content(path, "the first frame", first.to_string(), allowed));
+        }
+        Ok(first..whole.min(first.saturating_add(count)))
+    }
+
+    /// Refuses names of topics for a file that has none.
+    pub(super) fn refuse_topics(&self, path: &Path) -> Result<(), DatasetError> {
+        match [&self.topic, &self.colour_topic, &self.camera_topic].into_iter().flatten().next() {
+            None => Ok(()),
+            Some(topic) => {
+                let allowed = "absent: only .bag and .mcap have topics";
+                Err(DatasetError::content(path, "the topic", topic.as_str(), allowed))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_frames_are_taken_unless_told_otherwise() {
+        let window = |frames, first_frame, whole| {
+            let options = ReadOptions { frames, first_frame, ..ReadOptions::default() };
+            options.window(Path::new("a"), whole).ok()
+        };
+        assert_eq!(window(10, None, 30), Some(20..30));
+        assert_eq!(window(10, None, 3), Some(0..3));
+        assert_eq!(window(usize::MAX, None, 30), Some(0..30));
+        assert_eq!(window(5, Some(2), 30), Some(2..7));
+        assert_eq!(window(5, Some(28), 30), Some(28..30));
+        assert_eq!(window(usize::MAX, Some(28), 30), Some(28..30));
+        assert_eq!(window(5, Some(30), 30), None);
+        assert_eq!(window(0, None, 30), None);
+        assert_eq!(window(1, None, 0), None);
+    }
+}

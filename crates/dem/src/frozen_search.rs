@@ -1,0 +1,37 @@
+//! One search for pairs, frozen: what studies of its cost repeat.
+
+use crate::bed::Bed;
+use crate::contacts::Surroundings;
+use crate::neighbor::{Neighbours, PairSearch};
+use crate::parallel::Threads;
+use crate::path::{Path, Reach};
+
+/// The grains of a moment, whose neighbours can be searched again and again.
+#[derive(Clone, Debug)]
+pub struct FrozenSearch {
+    bed: Bed,
+    paths: Vec<Path>,
+    reach: Reach,
+    threads: Threads,
+    search: PairSearch,
+    found: Vec<Neighbours>,
+}
+
+impl FrozenSearch {
+    pub(crate) fn new(bed: Bed, around: &Surroundings) -> Self {
+        Self {
+            paths: Path::all_of(&bed),
+            reach: around.reach(),
+            threads: around.threads.clone(),
+            search: PairSearch::default(),
+            found: Vec::new(),
+            bed,
+        }
+    }
+
+    /// Lists the pairs that may touch before the next list and returns their number.
+    pub fn pairs(&mut self) -> usize {
+        self.search.pairs(&self.bed, &self.paths, self.reach, &self.threads, &mut self.found);
+        self.found.len()
+    }
+}

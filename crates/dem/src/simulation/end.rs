@@ -1,0 +1,59 @@
+//! When a pour ends, and how: docs/theory/contact.md, "End and health".
+
+use super::Simulation;
+use crate::pour::Status;
+
+/// Looks at the end rule within which a pour must seem ended twice.
+const REST_LOOKS: usize = 16;
+
+impl Simulation {
+    /// How the pour has ended, if it has. It must have looked so twice within [`REST_LOOKS`]: a grain at the
+    /// top of its bounce is slow, too, but once, while a pile whose last grain trembles is slow now and then.
+    pub(super) fn end_reached(&mut self) -> Option<Status> {
+        let energies: Vec<f64> = (0..self.bed.count()).map(|i| self.bed.translation(i)).collect();
+        let Some(now) = self.looks_still(&energies) else {
+            let is_over = self.time() >= self.origin.scene.end.horizon;
+            let how =
+                if self.flow_has_stopped(&energies) { Status::Jammed } else { Status::Horizon };
+            return is_over.then_some(how);
+        };
+        let window = REST_LOOKS * self.around.settings.list_period;
+        let seen = self.seemed_ended.replace((now, self.substep));
+        let again = seen.is_some_and(|(then, at)| then == now && self.substep - at <= window);
+        again.then_some(now)
+    }
+
+    /// How the pour would end if it stayed as it looks now.
+    fn looks_still(&self, energies: &[f64]) -> Option<Status> {
+        let (scene, threshold) = (&self.origin.scene, self.origin.scene.end.kinetic_energy);
+        let jammed_or = |status| {
+            let is_jammed = self.in_funnel().next().is_some();
+            Some(if is_jammed { Status::Jammed } else { status })
+        };
+        if energies.iter().sum::<f64>() <= threshold * energies.len() as f64 {
+            return jammed_or(Status::AtRest);
+        }
+        let still = |(grain, energy): (usize, &f64)| {
+            let at = self.bed.position(grain);
+            *energy <= threshold || !scene.camera.sees_ground(at.x, at.y)
+        };
+        if energies.iter().enumerate().all(still) { jammed_or(Status::OutOfView) } else { None }
+    }
+
+    /// Whether grains remain in the funnel and are, on average, as slow as those of a pour at rest.
+    fn flow_has_stopped(&self, energies: &[f64]) -> bool {
+        let (mut sum, mut count) = (0.0, 0);
+        for grain in self.in_funnel() {
+            sum += energies[grain];
+            count += 1;
+        }
+        count > 0 && sum <= self.origin.scene.end.kinetic_energy * f64::from(count)
+    }
+
+    /// The grains that are in the funnel, if the scene has one.
+    pub(super) fn in_funnel(&self) -> impl Iterator<Item = usize> {
+        let funnel = self.origin.scene.funnel.as_ref();
+        let is_held = move |grain| funnel.is_some_and(|f| f.holds(&self.bed.position(grain)));
+        (0..self.bed.count()).filter(move |&grain| is_held(grain))
+    }
+}

@@ -1,0 +1,104 @@
+//! A simulation's whole state as bytes, and back: what a checkpoint holds.
+//!
+//! All that a substep reads is stored: places, velocities, contacts with their impulses, colours and lists, paths,
+//! health and end rule. What follows from the scene (walls, material, settings) is in the header, and buffers that
+//! every use fills anew are left out (`serde(skip)`). The bytes are a function of the state alone: equal bytes are
+//! equal bits.
+
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
+
+use super::Simulation;
+use crate::DemError;
+use crate::bed::Bed;
+use crate::checkpoint::{self, CheckpointHeader};
+use crate::contacts::Contacts;
+use crate::health::HealthWatch;
+use crate::impact::Impacts;
+use crate::pour::Status;
+
+/// What changes as a simulation goes on.
+#[derive(Serialize, Deserialize)]
+struct State<'a> {
+    substep: usize,
+    seemed_ended: Option<(Status, usize)>,
+    ended: Option<Status>,
+    bed: Cow<'a, Bed>,
+    contacts: Cow<'a, Contacts>,
+    watch: Cow<'a, HealthWatch>,
+}
+
+impl Simulation {
+    /// The whole state with what it is of, to go on from with [`Simulation::resume`]; valid at any substep.
+    /// docs/theory/checkpoint.md has the layout.
+    pub fn checkpoint(&self) -> Vec<u8> {
+        checkpoint::seal(&self.header(), &self.state())
+    }
+
+    /// Goes on from a checkpoint of this scene, seed and settings, whatever the number of threads of either:
+    /// every bit from here on is that of the simulation that wrote it.
+    ///
+    /// ```
+    /// use granulcal_dem::{Scene, Simulation};
+    ///
+    /// let mut scene = Scene::drop(0.02);
+    /// scene.grains.count = 10;
+    /// let mut first = Simulation::new(&scene, 7)?;
+    /// first.advance(0.05);
+    /// let second = Simulation::new(&scene, 7)?.resume(&first.checkpoint())?;
+    /// assert_eq!(second.run(), first.run());
+    /// # Ok::<(), granulcal_dem::DemError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// What [`CheckpointHeader::read`] says; [`DemError::CheckpointDiffers`] for another scene, seed or settings;
+    /// [`DemError::CheckpointState`] for a state that granulcal has not written.
+    pub fn resume(mut self, checkpoint: &[u8]) -> Result<Self, DemError> {
+        let (header, state) = checkpoint::open(checkpoint)?;
+        header.require_same(&self.header())?;
+        let strange = |what| DemError::CheckpointState { what };
+        let (state, rest): (State<'_>, _) =
+            postcard::take_from_bytes(state).map_err(|_| strange("bytes that are no state"))?;
+        if !rest.is_empty() {
+            return Err(strange("more bytes than a state has"));
+        }
+        let State { substep, seemed_ended, ended, bed, contacts, watch } = state;
+        let (bed, contacts, watch) = (bed.into_owned(), contacts.into_owned(), watch.into_owned());
+        bed.check_like(&self.bed).map_err(strange)?;
+        contacts.check(self.bed.count(), self.around.walls.len()).map_err(strange)?;
+        if !watch.is_of(self.bed.count()) {
+            return Err(strange("health of another number of grains"));
+        }
+        if substep != header.substep || seemed_ended.is_some_and(|(_, at)| at > substep) {
+            return Err(strange("substeps that do not fit"));
+        }
+        (self.substep, self.seemed_ended, self.ended) = (substep, seemed_ended, ended);
+        (self.bed, self.contacts, self.watch) = (bed, contacts, watch);
+        self.impacts = Impacts::default();
+        Ok(self)
+    }
+
+    /// A hash of every bit of the state: XXH3-128 of the bytes that a checkpoint keeps of it. Equal hashes are
+    /// equal simulations, whatever machine, threads or pieces of time made them.
+    pub fn state_hash(&self) -> u128 {
+        checkpoint::hash(&self.state())
+    }
+
+    fn header(&self) -> CheckpointHeader {
+        let (scene, seed) = (&self.origin.scene, self.origin.seed);
+        CheckpointHeader::new(scene, seed, self.around.settings, self.substep)
+    }
+
+    fn state(&self) -> Vec<u8> {
+        let state = State {
+            substep: self.substep,
+            seemed_ended: self.seemed_ended,
+            ended: self.ended,
+            bed: Cow::Borrowed(&self.bed),
+            contacts: Cow::Borrowed(&self.contacts),
+            watch: Cow::Borrowed(&self.watch),
+        };
+        postcard::to_stdvec(&state).expect("a state in memory")
+    }
+}

@@ -1,0 +1,249 @@
+//! Whole scenes drawn at random, most of them hostile: nothing panics, hangs or is NaN, and the outcome says what
+//! happened. A scene that was ever found to break something has a test of its own in `tests/physics/robustness.rs`.
+
+use granulcal_dem::{
+    EndRule, Funnel, Grains, Ground, MAX_ENERGY_CREATED, Material, Preset, Scene, Shape,
+    Simulation, Start, Status, Wall, WallMaterial,
+};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+/// Most grains and most substeps of a scene: together they bound the work.
+const GRAINS: usize = 40;
+const SUBSTEPS: f64 = 400.0;
+
+/// Scenes drawn: as many as take some seconds, or as `PROPTEST_CASES` says for a longer search.
+fn cases() -> u32 {
+    std::env::var("PROPTEST_CASES").map_or(128, |cases| cases.parse().expect("a number of cases"))
+}
+
+/// A number between the bounds with a uniform logarithm.
+fn log(low: f64, high: f64) -> impl Strategy<Value = f64> {
+    (low.ln()..high.ln()).prop_map(f64::exp)
+}
+
+fn vector(range: std::ops::Range<f64>) -> impl Strategy<Value = [f64; 3]> {
+    prop::array::uniform3(range)
+}
+
+fn material() -> impl Strategy<Value = Material> {
+    let coefficient = |max: f64| prop_oneof![Just(0.0), Just(max), 0.0..1.0f64];
+    let share = || prop_oneof![Just(0.0), Just(1.0), 0.0..1.0f64];
+    (coefficient(10.0), coefficient(1e3), coefficient(1e3), share(), share()).prop_map(
+        |(sliding_friction, rolling_friction, torsional_friction, e, e_t)| Material {
+            sliding_friction,
+            rolling_friction,
+            torsional_friction,
+            restitution: e,
+            tangential_restitution: e_t,
+        },
+    )
+}
+
+/// Where the grains of radius 1 begin.
+fn begin() -> impl Strategy<Value = (usize, Start)> {
+    let count = || prop_oneof![Just(0usize), Just(1), 0..=GRAINS];
+    let grid = (count(), prop_oneof![Just(2.0), 2.0..6.0f64], 0.0..1.0f64, -30.0..30.0f64)
+        .prop_map(|(count, spacing, share, base)| {
+            let jitter = share * (spacing - 2.0) / 12f64.sqrt();
+            (count, Start::Grid { counts: [3, 3, 5], spacing, jitter, base })
+        });
+    let ball =
+        (count(), 0.0..100.0f64, log(1e-3, 0.74)).prop_map(|(count, height, solid_fraction)| {
+            (count, Start::Ball { height, solid_fraction, jitter: 0.0 })
+        });
+    // Anywhere: apart, overlapping, in one point, below the ground, far away.
+    let extent = prop_oneof![Just(0.0), log(1e-3, 1e2), log(1e2, 1e6)];
+    let listed = (prop::collection::vec(vector(-1.0..1.0), 0..=GRAINS), extent, -3.0..60.0f64);
+    let listed = listed.prop_map(|(points, extent, height)| {
+        let place = |[x, y, z]: [f64; 3]| [extent * x, extent * y, extent * z + height];
+        let positions: Vec<_> = points.into_iter().map(place).collect();
+        (positions.len(), Start::Positions { positions })
+    });
+    prop_oneof![grid, ball, listed]
+}
+
+/// A funnel for grains of radius 1: from one that a single grain just enters to a wide one.
+fn funnel() -> impl Strategy<Value = Funnel> {
+    (log(0.1, 30.0), log(1.001, 10.0), log(1.0, 10.0), log(0.1, 30.0), log(0.1, 10.0)).prop_map(
+        |(height, stem_radius, widening, cone_length, stem_length)| Funnel {
+            height,
+            stem_radius,
+            rim_radius: stem_radius * widening,
+            cone_length,
+            stem_length,
+            material: WallMaterial::default(),
+        },
+    )
+}
+
+/// A wall among grains of radius 1.
+fn wall() -> impl Strategy<Value = Wall> {
+    let end = || vector(-20.0..20.0);
+    let shape = prop_oneof![
+        (end(), vector(-1.0..1.0)).prop_map(|(point, normal)| Shape::Plane { point, normal }),
+        (end(), end(), log(0.1, 30.0), log(0.1, 30.0)).prop_map(
+            |(from, to, radius_from, radius_to)| Shape::Cone { from, to, radius_from, radius_to }
+        ),
+        (end(), end(), log(0.1, 30.0)).prop_map(|(from, to, radius)| Shape::Cylinder {
+            from,
+            to,
+            radius
+        }),
+    ];
+    let material = prop::option::of(material()).prop_map(|material| WallMaterial {
+        sliding_friction: material.map(|m| m.sliding_friction),
+        restitution: material.map(|m| m.restitution),
+        ..WallMaterial::default()
+    });
+    (shape, material).prop_map(|(shape, material)| Wall { shape, material })
+}
+
+fn gravity() -> impl Strategy<Value = [f64; 3]> {
+    let down = log(1e-3, 1e3).prop_map(|g| [0.0, 0.0, -g]);
+    let any = (vector(-1.0..1.0), log(1e-3, 1e3)).prop_map(|(v, g)| v.map(|c| g * c));
+    prop_oneof![Just([0.0; 3]), Just([0.0, 0.0, -9.81]), down, any]
+}
+
+/// A scene whose lengths are `radius` times those that are drawn.
+fn scene() -> impl Strategy<Value = Scene> {
+    let radius = prop_oneof![Just(2e-3), Just(2e-3), log(1e-6, 1e3)];
+    let walls = prop::collection::vec(wall(), 0..4);
+    let end = (1.0..SUBSTEPS, log(1e-14, 1e-2));
+    let preset = prop::sample::select(&Preset::ALL[..]);
+    (radius, begin(), prop::option::of(funnel()), walls, gravity(), material(), preset, end)
+        .prop_map(
+            |(
+                radius,
+                (count, start),
+                funnel,
+                walls,
+                gravity,
+                material,
+                preset,
+                (substeps, energy),
+            )| Scene {
+                name: "random".to_owned(),
+                preset,
+                gravity,
+                material,
+                grains: Grains { count, diameter: 2.0 * radius, density: 1300.0 },
+                start: scaled_start(start, radius),
+                ground: Ground::default(),
+                funnel: funnel.map(|funnel| scaled_funnel(funnel, radius)),
+                walls: walls.into_iter().map(|wall| scaled_wall(wall, radius)).collect(),
+                end: EndRule { horizon: substeps * preset.settings().dt, kinetic_energy: energy },
+                camera: granulcal_dem::CameraSpec::default(),
+            },
+        )
+}
+
+fn scaled_start(start: Start, r: f64) -> Start {
+    match start {
+        Start::Grid { counts, spacing, jitter, base } => {
+            // Rounding must not make neighbours of touching ones overlap.
+            Start::Grid {
+                counts,
+                spacing: (1.0 + 1e-9) * r * spacing,
+                jitter: r * jitter,
+                base: r * base,
+            }
+        }
+        Start::Ball { height, solid_fraction, jitter } => {
+            Start::Ball { height: r * height, solid_fraction, jitter }
+        }
+        Start::Positions { positions } => Start::Positions {
+            positions: positions.into_iter().map(|p| p.map(|c| r * c)).collect(),
+        },
+    }
+}
+
+fn scaled_funnel(funnel: Funnel, r: f64) -> Funnel {
+    Funnel {
+        height: r * funnel.height,
+        rim_radius: r * funnel.rim_radius,
+        stem_radius: r * funnel.stem_radius,
+        cone_length: r * funnel.cone_length,
+        stem_length: r * funnel.stem_length,
+        material: funnel.material,
+    }
+}
+
+fn scaled_wall(wall: Wall, r: f64) -> Wall {
+    let times = |v: [f64; 3]| v.map(|c| r * c);
+    let shape = match wall.shape {
+        Shape::Plane { point, normal } => Shape::Plane { point: times(point), normal },
+        Shape::Cone { from, to, radius_from, radius_to } => Shape::Cone {
+            from: times(from),
+            to: times(to),
+            radius_from: r * radius_from,
+            radius_to: r * radius_to,
+        },
+        Shape::Cylinder { from, to, radius } => {
+            Shape::Cylinder { from: times(from), to: times(to), radius: r * radius }
+        }
+    };
+    Wall { shape, ..wall }
+}
+
+/// Mechanical energy per mass of a grain, from what everybody can see `[m^2/s^2]`.
+fn energy(simulation: &Simulation, gravity: Vector3<f64>) -> f64 {
+    let spins = simulation.angular_velocities();
+    let moving = simulation.velocities().into_iter().zip(simulation.radii()).zip(spins);
+    let kinetic = moving.map(|((v, r), w)| 0.5 * v.norm_squared() + 0.2 * (r * w).norm_squared());
+    let potential = simulation.positions().into_iter().map(|x| -gravity.dot(&x));
+    kinetic.sum::<f64>() + potential.sum::<f64>()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(cases()))]
+    #[test]
+    fn whatever_the_scene_the_outcome_says_what_happened(scene in scene(), cut in 0.0..1.0f64) {
+        let mut simulation = Simulation::new(&scene, 1).expect("a valid scene");
+        let settings = *simulation.settings();
+        let gravity = Vector3::from(scene.gravity);
+        let cut = cut * scene.end.horizon;
+        let (mut lowest, mut created) = (energy(&simulation, gravity), 0f64);
+        let lift = gravity.norm() * scene.grains.radius() + scene.end.kinetic_energy;
+        let scale = lowest.max(scene.grains.count as f64 * lift);
+        let mut resumed = None;
+        let looks = (scene.end.horizon / settings.dt / settings.list_period as f64) as usize + 20;
+        for _ in 0..looks {
+            simulation.advance(settings.list_period as f64 * settings.dt);
+            let now = energy(&simulation, gravity);
+            created = created.max(now - lowest);
+            lowest = lowest.min(now);
+            if resumed.is_none() && simulation.time() >= cut {
+                let bytes = simulation.checkpoint();
+                resumed = Some(Simulation::new(&scene, 1).unwrap().resume(&bytes).unwrap());
+            }
+        }
+        // The horizon is the end, but for the looks that rest may take.
+        prop_assert!(simulation.ended().is_some(), "{} s of {}", simulation.time(), scene.end.horizon);
+        if let Some(resumed) = resumed {
+            prop_assert_eq!(resumed.run().state_hash, simulation.state_hash());
+        }
+
+        let pour = simulation.into_pour();
+        let vectors = [&pour.positions, &pour.velocities, &pour.angular_velocities];
+        prop_assert!(vectors.into_iter().flatten().flat_map(|v| v.iter()).all(|c| c.is_finite()));
+        let health = pour.health;
+        prop_assert!(health.worst_penetration.is_finite() && health.energy_created.is_finite());
+        let is_sound = health.grains_lost == 0
+            && health.worst_penetration <= settings.max_penetration
+            && health.energy_created <= MAX_ENERGY_CREATED;
+        prop_assert_eq!(is_sound, pour.status != Status::Unhealthy, "{:?} {:?}", pour.status, health);
+        if is_sound {
+            prop_assert!(created <= MAX_ENERGY_CREATED * scale * (1.0 + 1e-9), "{created} {health:?}");
+        }
+        let held = scene.funnel.map_or(0, |funnel| {
+            pour.positions.iter().filter(|centre| funnel.holds(centre)).count()
+        });
+        prop_assert_eq!(held, pour.grains_in_funnel);
+        match pour.status {
+            Status::Jammed => prop_assert!(held > 0),
+            Status::AtRest | Status::OutOfView => prop_assert_eq!(held, 0),
+            Status::Horizon | Status::Unhealthy => {}
+        }
+    }
+}
