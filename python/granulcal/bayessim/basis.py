@@ -59,7 +59,11 @@ class Basis:
         v = (u - self.centre) / self.scale
         phase = v @ self.frequencies.T
         size = len(self.frequencies) ** -0.5
-        parts = [_POLYNOMIAL * polynomial(v, self.degree), size * np.cos(phase), size * np.sin(phase)]
+        parts = [
+            _POLYNOMIAL * polynomial(v, self.degree),
+            size * np.cos(phase),
+            size * np.sin(phase),
+        ]
         return np.concatenate(parts, axis=1)
 
 

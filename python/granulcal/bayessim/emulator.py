@@ -14,26 +14,22 @@ Reference:
     Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63, 2001.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.bayessim.basis import Basis, learn_length_scales
+from granulcal.bayessim.basis import Basis
 from granulcal.bayessim.noise import Noise, fit_log_scale
-from granulcal.bayessim.ridge import Ridge
+from granulcal.bayessim.ridge import Ridge, RidgeFit
 
-__all__ = ["Emulator", "Leftover", "Prediction"]
+__all__ = ["Emulator", "Prediction"]
 
 Array = NDArray[np.float64]
 
-# Features of the means at half, once and twice the learnt length scales; the evidence chooses.
-_MULTIPLES = (0.5, 1.0, 2.0)
 _SCALE_FEATURES = 16
 # Scales change more slowly over the parameters than means do.
 _SCALE_STRETCH = 2.0
-# Rounds of means given scales, scales given means.
-_ROUNDS = 2
 # Points at which the uncertainty of the means is tabulated before it is fitted.
 _UNCERTAINTY_POINTS = 1500
 
@@ -52,21 +48,10 @@ class Prediction:
     scales: Array
     unknown: Array
 
-
-@dataclass(frozen=True)
-class Leftover:
-    """What the fit leaves of its own pairs, each pair predicted from the others.
-
-    Attributes:
-        residuals: shape (n, s).
-        standardised: residuals over their predicted standard deviations, shape (n, s).
-        influence: for statistic j, pair i: the change of the coefficients of j when pair i is left
-            out, shape (s, n, d).
-    """
-
-    residuals: Array
-    standardised: Array
-    influence: Array
+    def row(self, i: int) -> "Prediction":
+        """Returns what is expected at one of the points."""
+        rows = slice(i, i + 1)
+        return Prediction(self.means[rows], self.scales[rows], self.unknown[rows])
 
 
 @dataclass(frozen=True)
@@ -74,8 +59,7 @@ class Emulator:
     """Density of s statistics given p coordinates.
 
     Attributes:
-        bases: features of the means, one for each multiple of the length scales.
-        base: which of `bases` a statistic uses, shape (s,).
+        basis: features of the means.
         coefficients: of the means, shape (s, d).
         scale_basis: features of the log scales.
         scale_coefficients: of the log scale of one observation, shape (s, e).
@@ -85,8 +69,7 @@ class Emulator:
         spread: standard deviation of the training statistics, shape (s,).
     """
 
-    bases: tuple[Basis, ...]
-    base: NDArray[np.intp]
+    basis: Basis
     coefficients: Array
     scale_basis: Basis
     scale_coefficients: Array
@@ -94,77 +77,73 @@ class Emulator:
     noise: Noise
     shift: Array
     spread: Array
-    leftover: Leftover | None = field(default=None, compare=False)
 
     @classmethod
     def fit(
-        cls, u: Array, y: Array, *, features: int = 64, varying_scale: bool = True, seed: int = 0
-    ) -> "Emulator":
-        """Returns the emulator of pairs `u` (n, p), `y` (n, s).
+        cls,
+        u: Array,
+        y: Array,
+        length_scales: Array,
+        *,
+        features: int,
+        varying_scale: bool,
+        seed: int = 0,
+    ) -> tuple["Emulator", Array]:
+        """Returns the emulator of pairs and what it leaves of them.
 
         Args:
-            u: coordinates of the parameters.
-            y: statistics, already brought to a shape that noise around a mean can have.
+            u: coordinates of the parameters, shape (n, p).
+            y: statistics, in a form that noise around a mean can have, shape (n, s).
+            length_scales: of `learn_length_scales`, shape (p,).
             features: random frequencies of each basis.
             varying_scale: whether the scale of the noise may change over the parameters.
             seed: seed of the frequencies.
+
+        Returns:
+            The emulator, and the residuals of each pair under a fit to the other pairs over the
+            scale of the noise, shape (n, s).
         """
         shift, spread = y.mean(axis=0), y.std(axis=0)
         spread = np.where(spread > 0, spread, 1.0)
         z = (y - shift) / spread
         count, statistics = z.shape
-        base_length = learn_length_scales(u, z, features=features, seed=seed)
-        bases = tuple(
-            Basis.draw(u, base_length * multiple, features=features, seed=seed)
-            for multiple in _MULTIPLES
-        )
-        designs = [basis(u) for basis in bases]
-        ridges = [Ridge(design) for design in designs]
-        evidence = np.array([[r.fit(z[:, j]).log_evidence for r in ridges] for j in range(statistics)])
-        base = evidence.argmax(axis=1)
+        basis = Basis.draw(u, length_scales, features=features, seed=seed)
+        design = basis(u)
+        equal = Ridge(design)
         scale_basis = Basis.draw(
-            u, _SCALE_STRETCH * base_length, features=_SCALE_FEATURES, seed=seed + 1, degree=2
+            u, _SCALE_STRETCH * length_scales, features=_SCALE_FEATURES, seed=seed + 1, degree=2
         )
         scale_design = scale_basis(u)
         points = _spread_points(u, _UNCERTAINTY_POINTS)
-        point_designs = [basis(points) for basis in bases]
+        point_design = basis(points)
         point_scale_design = scale_basis(points)
         scale_coefficients = np.zeros((statistics, scale_design.shape[1]))
         unknown_coefficients = np.zeros_like(scale_coefficients)
-        coefficients = np.zeros((statistics, designs[0].shape[1]))
-        residuals, white = np.zeros_like(z), np.zeros_like(z)
-        influence = np.zeros((statistics, count, designs[0].shape[1]))
+        coefficients = np.zeros((statistics, design.shape[1]))
+        white = np.zeros_like(z)
         smooth = Ridge(point_scale_design)
         for j in range(statistics):
-            design = designs[base[j]]
-            ridge, weights = ridges[base[j]], np.ones(count)
-            for round_number in range(_ROUNDS if varying_scale else 1):
-                fit = ridge.fit(z[:, j])
-                left = fit.loo_residuals(z[:, j])
-                # A residual from the others is wider than the noise by the others' uncertainty.
-                noise = left * np.sqrt(1 - fit.leverage)
-                log_scale_coefficients = fit_log_scale(
-                    scale_design, noise, constant=not varying_scale
-                )
-                if varying_scale and round_number + 1 < _ROUNDS:
-                    log_scale = scale_design @ log_scale_coefficients
-                    weights = np.exp(-2 * (log_scale - log_scale.mean()))
-                    weights /= weights.mean()
-                    ridge = Ridge(design, weights)
+            fit, weights = equal.fit(z[:, j]), np.ones(count)
+            noise = _noise(fit, z[:, j])
+            log_scale_coefficients = fit_log_scale(scale_design, noise, constant=not varying_scale)
+            if varying_scale:
+                # Scales given means, then means given scales, then scales again.
+                log_scale = scale_design @ log_scale_coefficients
+                weights = np.exp(-2 * (log_scale - log_scale.mean()))
+                weights /= weights.mean()
+                fit = Ridge(design, weights).fit(z[:, j])
+                noise = _noise(fit, z[:, j])
+                log_scale_coefficients = fit_log_scale(scale_design, noise)
             scale = np.exp(scale_design @ log_scale_coefficients)
             # The ridge's own unit of variance: that of a pair of weight 1.
             unit = float(np.exp(np.mean(np.log(scale**2 * weights))))
-            unknown = np.sqrt(unit * np.sum((point_designs[base[j]] @ fit.root) ** 2, axis=1))
+            unknown = np.sqrt(unit * np.sum((point_design @ fit.root) ** 2, axis=1))
             coefficients[j] = fit.coefficients
             scale_coefficients[j] = log_scale_coefficients
             unknown_coefficients[j] = smooth.fit(np.log(np.maximum(unknown, 1e-9))).coefficients
-            residuals[:, j] = left
             white[:, j] = noise / scale
-            change = (design @ fit.root) @ fit.root.T
-            influence[j] = -change * (weights * left)[:, None]
-        return cls(
-            bases=bases,
-            base=base,
+        emulator = cls(
+            basis=basis,
             coefficients=coefficients,
             scale_basis=scale_basis,
             scale_coefficients=scale_coefficients,
@@ -172,16 +151,25 @@ class Emulator:
             noise=Noise.fit(white),
             shift=shift,
             spread=spread,
-            leftover=Leftover(residuals, white, influence),
+        )
+        return emulator, white
+
+    def first(self, count: int, noise: Noise) -> "Emulator":
+        """Returns the emulator of the first `count` statistics, with a noise of their own."""
+        rows = slice(0, count)
+        return replace(
+            self,
+            coefficients=self.coefficients[rows],
+            scale_coefficients=self.scale_coefficients[rows],
+            unknown_coefficients=self.unknown_coefficients[rows],
+            noise=noise,
+            shift=self.shift[rows],
+            spread=self.spread[rows],
         )
 
     def predict(self, u: Array) -> Prediction:
         """Returns what is expected at `u` (n, p)."""
-        means = np.empty((len(u), len(self.base)))
-        for number, basis in enumerate(self.bases):
-            mine = self.base == number
-            if mine.any():
-                means[:, mine] = basis(u) @ self.coefficients[mine].T
+        means = self.basis(u) @ self.coefficients.T
         design = self.scale_basis(u)
         scales = np.exp(design @ self.scale_coefficients.T)
         unknown = np.exp(design @ self.unknown_coefficients.T)
@@ -189,16 +177,16 @@ class Emulator:
             self.shift + self.spread * means, self.spread * scales, self.spread * unknown
         )
 
-    def log_likelihood(self, y: Array, prediction: Prediction, *, power: float = 1.0) -> Array:
-        """Returns log p(y | u) of one observation `y` (s,) or (n, s) at each predicted u, (n,)."""
-        total = np.hypot(prediction.scales, prediction.unknown)
-        return power * self.noise.log_density(y - prediction.means, total)
-
-    def simulate(self, u: Array, generator: np.random.Generator, *, inflation: float = 1.0) -> Array:
+    def simulate(self, u: Array, generator: np.random.Generator, *, widening: float = 1.0) -> Array:
         """Returns one observation at each row of `u` (n, p), the means' uncertainty included."""
         prediction = self.predict(u)
-        total = inflation * np.hypot(prediction.scales, prediction.unknown)
+        total = widening * np.hypot(prediction.scales, prediction.unknown)
         return prediction.means + total * self.noise.sample(len(u), generator)
+
+
+def _noise(fit: RidgeFit, z: Array) -> Array:
+    """Residuals; those from the others are wider than the noise by the others' uncertainty."""
+    return fit.loo_residuals(z) * np.sqrt(1 - fit.leverage)
 
 
 def _spread_points(u: Array, count: int) -> Array:
