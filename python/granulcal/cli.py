@@ -101,7 +101,14 @@ def _add_train(commands: Any) -> None:
     parser.add_argument("data", type=Path, help="folder of `generate`, or one Parquet file")
     parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the model")
     parser.add_argument("--seed", type=int, default=0, help="seed of the training (default: 0)")
-    parser.add_argument("--recipe", help="settings by name: snr (default) or plain (the paper's)")
+    parser.add_argument(
+        "--method",
+        choices=("auto", "emulated", "distilled", "mdrff", "plain"),
+        default="auto",
+        help="emulated: learn the statistics of a material; mdrff: learn the material of "
+        "statistics; auto (default): the better of these two; distilled: a network that imitates "
+        "the emulator; plain: the paper's recipe",
+    )
     parser.set_defaults(run=_train)
 
 
@@ -165,8 +172,7 @@ def _train(options: argparse.Namespace) -> int:
     from granulcal.dataset import Dataset
 
     data = Dataset.load(options.data)
-    settings = {} if options.recipe is None else {"recipe": options.recipe}
-    model = BayesSim.fit(data, seed=options.seed, **settings)
+    model = BayesSim.fit(data, seed=options.seed, method=options.method)
     model.save(options.out)
     data.save(options.out / _TRAINING)
     print(f"model written to {options.out}")
