@@ -249,7 +249,7 @@ def _sheet(path: Path, seen: Sequence[Seen], columns: int) -> None:
         if mask.any():
             axis.contour(mask, levels=[0.5], colors="k", linewidths=0.5)
         axis.set_title(f"{each.name}: {each.kind}, {1e3 * top:.0f} mm", fontsize=5.5, pad=2)
-    figure.savefig(path, dpi=100)
+    figure.savefig(path, dpi=84)
     plt.close(figure)
     with Image.open(path) as picture:
         picture.convert("RGB").quantize(32).save(path, optimize=True)
