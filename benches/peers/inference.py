@@ -1,11 +1,11 @@
 """Posteriors of granulcal beside sbi's, in one run: sbibm tasks, and held-out pours of a data set.
 
-    make bench-inference                            # installs sbi and sbibm in an environment of its own
+    pip install -r benches/peers/inference-requirements.txt
     python benches/peers/inference.py sbibm --simulations 1000 --out build/sbibm.csv
     python benches/peers/inference.py pours DATA --train 500 1000 --test 300 --out build/pours.csv
 
-Rows are appended to the CSV file as they are done, and rows already there are not run again. Seconds
-are processor times of this process on one thread; a busy machine makes them longer.
+Rows are appended to the CSV file as they are done, and rows already there are not run again.
+Seconds are processor times of this process on one thread; a busy machine makes them longer.
 
 Reference:
     Lueckmann, Boelts, Greenberg, Goncalves and Macke, Benchmarking simulation-based inference,
@@ -47,6 +47,7 @@ class Sbi:
         self.prior, self.estimator = prior, estimator
 
     def fit(self, u: np.ndarray, x: np.ndarray) -> "Sbi":
+        """Trains on coordinates (n, p) and statistics (n, s)."""
         from sbi.inference import NPE
 
         inference = NPE(self.prior, density_estimator=self.estimator, show_progress_bars=False)
@@ -58,10 +59,12 @@ class Sbi:
         return self
 
     def sample(self, x: np.ndarray, n: int) -> np.ndarray:
+        """Returns `n` draws of the coordinates given statistics (s,)."""
         observed = torch.as_tensor(x, dtype=torch.float32)[None]
         return self.posterior.sample((n,), x=observed, show_progress_bars=False).numpy()
 
     def log_prob(self, u: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Returns log densities of coordinates (n, p) given statistics (s,)."""
         observed = torch.as_tensor(x, dtype=torch.float32)[None]
         points = torch.as_tensor(u, dtype=torch.float32)
         return self.posterior.log_prob(points, x=observed).numpy()
@@ -75,15 +78,18 @@ class Ours:
         self.prior, self.method = prior, method
 
     def fit(self, u: np.ndarray, x: np.ndarray) -> "Ours":
+        """Trains on coordinates (n, p) and statistics (n, s)."""
         theta = self.prior.from_unconstrained(u)
         self.model = BayesSim.fit(theta, x, self.prior, quiet=True, method=self.method)
         print(f"    {self.model.summary}", flush=True)
         return self
 
     def sample(self, x: np.ndarray, n: int) -> np.ndarray:
+        """Returns `n` draws of the coordinates given statistics (s,)."""
         return self.prior.to_unconstrained(self.model.posterior(x).sample(n, seed=1))
 
     def log_prob(self, u: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Returns log densities of coordinates (n, p) given statistics (s,)."""
         return self.model.posterior(x).coordinate_log_prob(self.prior.from_unconstrained(u))
 
 
@@ -185,6 +191,7 @@ def run_pours(options: argparse.Namespace, add: Callable[..., None], done: set[t
 
 
 def main() -> None:
+    """Runs what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", choices=("sbibm", "pours"))
     parser.add_argument("data", type=Path, nargs="?", help="data set of `granulcal generate`")

@@ -133,6 +133,7 @@ def quasi_normal(count: int, dimension: int) -> Array:
     return normal[:, :dimension]
 
 
+@lru_cache(maxsize=8)
 def quasi_prior(prior: Prior, count: int) -> Array:
     """Returns evenly spread draws of the prior's coordinates, shape (count, p)."""
     uniform = quasi_uniform(count, len(prior.free))

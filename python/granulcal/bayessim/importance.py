@@ -11,6 +11,7 @@ Reference:
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,6 +135,7 @@ def mix(narrow: Mixture, wide: Mixture, wide_share: float) -> Mixture:
     )
 
 
+@lru_cache(maxsize=4)
 def prior_normal(prior: Prior) -> Mixture:
     """Normal with the prior's mean and covariance: some draws are always inside the bounds."""
     draws = prior.to_unconstrained(prior.sample(1000, seed=0))

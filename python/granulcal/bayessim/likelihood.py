@@ -7,9 +7,9 @@ $$ L(u) = t_\nu(\bar y; m(u), V_k), \qquad
    V_k = c^2 (s^2 + h^2) - (1 - 1/k) s^2 $$
 
 (axis by axis, with one correlation R), s the scale of a pour's noise, h that of what the pairs
-leave unknown about the mean, and $c \ge 1$ a widening. For one pour this is the widened noise. For many,
-only the noise itself averages away: the widening and h are errors of the emulator, which all pours
-share.
+leave unknown about the mean, and $c \ge 1$ a widening. For one pour this is the widened noise. For
+many, only the noise itself averages away: the widening and h are errors of the emulator, which all
+pours share.
 
 Which r and c, and whether the noise changes over the parameters, is chosen by held-out pairs: the
 parameters of pairs that an emulator has not seen are to be most probable under its posterior.

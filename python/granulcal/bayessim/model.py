@@ -13,12 +13,14 @@ from granulcal.bayessim.arrays import as_real
 from granulcal.bayessim.calibration import Calibration
 from granulcal.bayessim.config import Config
 from granulcal.bayessim.likelihood import Likelihood
+from granulcal.bayessim.misfit import Misfit, MisfitReference
 from granulcal.bayessim.pairs import TrainingPairs
 from granulcal.bayessim.standardise import Standardiser
 from granulcal.bayessim.summary import TrainingSummary
 from granulcal.bayessim.trainer import Progress
 from granulcal.bayessim.training import train_model
 from granulcal.errors import ObservationError
+from granulcal.identifiability import Identifiability
 from granulcal.posterior import OutOfRange, Posterior
 from granulcal.prior import Prior
 
@@ -44,7 +46,9 @@ class BayesSim:
         likelihood: the emulator of the statistics.
         amortised: the network, or None if the posterior is that of the emulator.
         summary: what the training did, with every excluded pair counted.
+        misfit_reference: residuals that an observation of a right model can have.
         calibration: check on pairs that were not trained on, or None if there were too few.
+        identifiability: what an observation tells on average, or None likewise.
         scene_toml: the scene of the training data, or None.
 
     Reference:
@@ -69,8 +73,10 @@ class BayesSim:
         likelihood: Likelihood,
         amortised: Amortised | None,
         x_names: tuple[str, ...],
+        misfit_reference: MisfitReference,
         summary: TrainingSummary,
         calibration: Calibration | None = None,
+        identifiability: Identifiability | None = None,
         scene_toml: str | None = None,
     ) -> None:
         """Joins the parts of a trained model; use `fit` or `load`."""
@@ -81,7 +87,9 @@ class BayesSim:
         self.amortised = amortised
         self.x_names = x_names
         self.summary = summary
+        self.misfit_reference = misfit_reference
         self.calibration = calibration
+        self.identifiability = identifiability
         self.scene_toml = scene_toml
 
     @classmethod
@@ -137,10 +145,14 @@ class BayesSim:
             likelihood=made.likelihood,
             amortised=made.amortised,
             x_names=pairs.x_names,
+            misfit_reference=made.misfit,
             summary=made.summary,
             calibration=Calibration.of(
                 pairs.prior, made.posteriors, made.truth, draw_count=_CHECK_DRAWS
             )
+            if enough
+            else None,
+            identifiability=Identifiability.average(made.posteriors, made.truth)
             if enough
             else None,
             scene_toml=pairs.scene_toml,
@@ -149,6 +161,8 @@ class BayesSim:
             print(model.summary)
             unchecked = "  calibration not checked: too few pours to keep some aside"
             print(unchecked if model.calibration is None else model.calibration)
+            if model.identifiability is not None:
+                print(model.identifiability)
         return model
 
     @property
@@ -178,6 +192,20 @@ class BayesSim:
             mixtures = self.amortised.mixtures(z)
             return Posterior.from_mixtures(self.prior, mixtures, warnings=warnings)
         return Posterior.from_conditions(self.prior, [(self.likelihood, z)], warnings=warnings)
+
+    def misfit(self, x_obs: ArrayLike) -> Misfit:
+        """Returns whether any parameters explain one observation, or several of one material.
+
+        Ask this before the posterior: it answers under the model, right or wrong.
+
+        Args:
+            x_obs: statistics, own units, shape (s,) for one pour or (k, s) for k pours.
+
+        Raises:
+            ObservationError: another shape, or a statistic that is not finite.
+        """
+        z = self.standardiser.apply(self._checked(x_obs), clip=False)
+        return self.misfit_reference.test(self.likelihood, z, self.x_names)
 
     def check(self, theta: ArrayLike, x: ArrayLike, *, draw_count: int = 1000) -> Calibration:
         """Returns the calibration on pairs, which must not have been trained on.

@@ -18,6 +18,7 @@ from granulcal.bayessim.config import Config
 from granulcal.bayessim.summary import TrainingSummary
 from granulcal.bayessim.tensors import Tensors, model_tensors
 from granulcal.errors import ModelFormatError, PriorError
+from granulcal.identifiability import Identifiability
 from granulcal.prior import Prior
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def load_model(path: str | PathLike[str]) -> "BayesSim":
         config = Config(**document["config"])
         x_names = tuple(document["x_names"])
         tensors = Tensors(tensors, folder / _TENSORS_NAME, len(prior.names), len(x_names))
-        calibration = document["calibration"]
+        calibration, known = document["calibration"], document["identifiability"]
         return BayesSim(
             prior=prior,
             config=config,
@@ -89,6 +90,8 @@ def load_model(path: str | PathLike[str]) -> "BayesSim":
             likelihood=tensors.likelihood(prior, config, document["emulator"]),
             amortised=tensors.amortised(config) if document["has_network"] else None,
             x_names=x_names,
+            misfit_reference=tensors.misfit(),
+            identifiability=None if known is None else Identifiability.from_dict(known),
             summary=TrainingSummary.from_dict(document["summary"]),
             calibration=None if calibration is None else Calibration.from_dict(calibration),
             scene_toml=document["scene_toml"],
@@ -119,6 +122,9 @@ def _document(model: "BayesSim") -> dict[str, Any]:
             "axis_count": likelihood.axis_count,
         },
         "summary": model.summary.as_dict(),
+        "identifiability": None
+        if model.identifiability is None
+        else model.identifiability.as_dict(),
         "calibration": None if model.calibration is None else model.calibration.as_dict(),
     }
 

@@ -12,6 +12,7 @@ from granulcal.bayessim.basis import Basis
 from granulcal.bayessim.config import Config
 from granulcal.bayessim.emulator import Emulator
 from granulcal.bayessim.likelihood import Likelihood
+from granulcal.bayessim.misfit import MisfitReference
 from granulcal.bayessim.network import HeadLayout, Network
 from granulcal.bayessim.noise import Noise
 from granulcal.bayessim.signal import SignalAxes
@@ -49,6 +50,9 @@ def model_tensors(model: "BayesSim") -> dict[str, NDArray[Any]]:
         "emulator_leading_root": likelihood.leading.noise.root,
         "emulator_y_shift": emulator.shift,
         "emulator_y_spread": emulator.spread,
+        "misfit_squares": model.misfit_reference.squares,
+        "misfit_residuals": model.misfit_reference.residuals,
+        "misfit_noise": model.misfit_reference.noise,
     }
     if model.amortised is not None:
         network = model.amortised.network
@@ -120,6 +124,14 @@ class Tensors:
         leading = emulator.first(count, Noise(root, scalars["leading_degrees"]))
         axes = SignalAxes(self.take("emulator_axes", s, s), self.take("emulator_relevance", s))
         return Likelihood(prior, axes, emulator, leading, scalars["widening"])
+
+    def misfit(self) -> MisfitReference:
+        """Returns the residuals of held-out pairs."""
+        return MisfitReference(
+            self.take("misfit_squares", None),
+            self.take("misfit_residuals", None, self.s),
+            self.take("misfit_noise", None, self.s),
+        )
 
     def amortised(self, config: Config) -> Amortised:
         """Returns the network."""

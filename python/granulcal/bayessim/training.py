@@ -11,6 +11,7 @@ from granulcal.bayessim.amortised import Amortised
 from granulcal.bayessim.config import Config
 from granulcal.bayessim.density import TruncatedMixture
 from granulcal.bayessim.likelihood import EmulatorChoice, Fold, Likelihood
+from granulcal.bayessim.misfit import MisfitReference
 from granulcal.bayessim.pairs import TrainingPairs
 from granulcal.bayessim.standardise import Standardiser
 from granulcal.bayessim.summary import TrainingSummary
@@ -36,6 +37,7 @@ class Trained:
         standardiser: of the statistics.
         likelihood: the emulator.
         amortised: the network, or None if the posterior is that of the emulator.
+        misfit: residuals of held-out pairs.
         summary: what was done.
         posteriors: posteriors of pairs that were not trained on.
         truth: their parameters, own units, shape (t, p).
@@ -44,6 +46,7 @@ class Trained:
     standardiser: Standardiser
     likelihood: Likelihood
     amortised: Amortised | None
+    misfit: MisfitReference
     summary: TrainingSummary
     posteriors: list[Posterior]
     truth: Array
@@ -137,14 +140,12 @@ class _Work:
     def _likelihood(
         self, rows: NDArray[np.intp], order: NDArray[np.intp] | None = None
     ) -> tuple[Likelihood, list[Fold], EmulatorChoice]:
-        return Likelihood.fit(
-            self.u[rows],
-            self.z[rows],
-            self.prior,
-            features=self.config.emulator_features,
-            seed=self.seed,
-            order=order,
+        u, z, prior = self.u[rows], self.z[rows], self.prior
+        found = Likelihood.fit(
+            u, z, prior, features=self.config.emulator_features, seed=self.seed, order=order
         )
+        self.misfit = MisfitReference.of(found[1], u, z)
+        return found
 
     def _network(self) -> tuple[Amortised, TrainingResult]:
         return Amortised.fit(
@@ -179,6 +180,7 @@ class _Work:
             self.standardiser,
             likelihood,
             None,
+            self.misfit,
             summary,
             posteriors,
             self.pairs.theta[rows[chosen]],
@@ -193,7 +195,13 @@ class _Work:
         method = "mdrff" if self.config.method == "auto" else self.config.method
         summary = self._summary(method, choice, result, len(self.rest), len(rows))
         return Trained(
-            self.standardiser, likelihood, amortised, summary, posteriors, self.pairs.theta[rows]
+            self.standardiser,
+            likelihood,
+            amortised,
+            self.misfit,
+            summary,
+            posteriors,
+            self.pairs.theta[rows],
         )
 
     def _of_the_prior(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
