@@ -208,6 +208,13 @@ impl Scene {
         for (index, wall) in self.walls.iter().enumerate() {
             wall.check(&format!("walls.{index}"), &self.material, &self.grains)?;
         }
+        let (dt, diameter) = (self.preset.settings().dt, self.grains.diameter);
+        let walls = self.walls.iter().enumerate();
+        let named = walls.map(|(index, wall)| (format!("walls.{index}"), &wall.motion));
+        let funnel = self.funnel.iter().map(|funnel| ("funnel".to_owned(), &funnel.motion));
+        for (name, motion) in named.chain(funnel) {
+            motion.check_jumps(&name, dt, diameter)?;
+        }
         self.camera.check()
     }
 }

@@ -136,7 +136,7 @@ fn motion() -> impl Strategy<Value = Motion> {
     let spin = (vector(-20.0..20.0), vector(-1.0..1.0), -30.0..30.0, times()).prop_map(
         |(point, axis, rate, (begin, _))| Motion::Spin { point, axis, rate, begin, end: None },
     );
-    let shake = (vector(-2.0..2.0), 0.0..100.0, times()).prop_map(
+    let shake = (vector(-1.0..1.0), 0.0..100.0, times()).prop_map(
         |(amplitude, frequency, (begin, length))| Motion::Shake {
             amplitude,
             frequency,

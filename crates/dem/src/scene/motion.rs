@@ -104,6 +104,33 @@ impl Motion {
         }
     }
 
+    /// The fastest that it moves without turning `[m/s]`.
+    fn fastest(&self) -> f64 {
+        match self {
+            Self::Still | Self::Spin { .. } => 0.0,
+            Self::Lift { velocity, .. } => Vector3::from(*velocity).norm(),
+            Self::Shake { amplitude, frequency, .. } => {
+                std::f64::consts::TAU * frequency * Vector3::from(*amplitude).norm()
+            }
+            Self::Trajectory { knots, .. } => {
+                let speed = |pair: &[[f64; 8]]| {
+                    let [from, to] = [&pair[0], &pair[1]].map(|k| Vector3::new(k[1], k[2], k[3]));
+                    (to - from).norm() / (pair[1][0] - pair[0][0])
+                };
+                knots.windows(2).map(speed).fold(0.0, f64::max)
+            }
+        }
+    }
+
+    /// Refuses a wall that jumps over grains: in a substep of `dt` `[s]` it may go as far as a grain is thick.
+    pub(super) fn check_jumps(&self, name: &str, dt: f64, diameter: f64) -> Result<(), DemError> {
+        if self.fastest() * dt <= diameter {
+            return Ok(());
+        }
+        let allowed = "at most a grain's diameter in a substep";
+        Err(DemError::range(format!("{name}.motion (speed) [m/s]"), self.fastest(), allowed))
+    }
+
     pub(super) fn check(&self, name: &str) -> Result<(), DemError> {
         let all_finite = |field: &str, values: &[f64]| {
             values.iter().try_for_each(|&value| finite(&format!("{name}.motion.{field}"), value))
@@ -231,6 +258,20 @@ mod tests {
         let turned = at(&motion, 1.5, [1.0, 0.0, 0.0]) - Vector3::new(0.2, 0.0, 0.0);
         assert!((turned - Vector3::new(half, half, 0.0)).norm() < 1e-12, "{turned}");
         assert!((at(&motion, 7.0, [1.0, 0.0, 0.0]) - Vector3::new(0.3, 1.0, 0.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_wall_that_jumps_over_grains_is_refused() {
+        let still = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+        let mut there = still;
+        (there[0], there[1]) = (1e-3, 0.05);
+        let jump = Motion::Trajectory { file: None, knots: vec![still, there] };
+        let (dt, diameter) = (5e-4, 4e-3);
+        let message = jump.check_jumps("walls.2", dt, diameter).unwrap_err().to_string();
+        assert!(message.contains("walls.2.motion (speed)") && message.contains("50"), "{message}");
+        there[0] = 0.1;
+        let slow = Motion::Trajectory { file: None, knots: vec![still, there] };
+        slow.check_jumps("walls.2", dt, diameter).unwrap();
     }
 
     #[test]
