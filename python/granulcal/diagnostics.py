@@ -36,6 +36,7 @@ __all__ = [
     "plot_sbc",
     "sbc_ranks",
     "tarp",
+    "uniform_p_value",
 ]
 
 Array = NDArray[np.float64]
@@ -201,7 +202,7 @@ def sbc_ranks(
     ranks = np.array(rows, dtype=np.int64)
     # Spread evenly inside its step, a uniform rank is uniform on [0, 1].
     jitter = np.random.default_rng(seed).random(ranks.shape)
-    p_values = np.array([_uniform_p_value(c) for c in ((ranks + jitter) / (draw_count + 1)).T])
+    p_values = np.array([uniform_p_value(c) for c in ((ranks + jitter) / (draw_count + 1)).T])
     return RankTest(ranks, draw_count, p_values)
 
 
@@ -239,7 +240,7 @@ def tarp(
     values = np.array(shares)
     jitter = np.random.default_rng(seed).random(len(values))
     spread = (values * draw_count + jitter) / (draw_count + 1)
-    return Tarp(values, _uniform_p_value(spread))
+    return Tarp(values, uniform_p_value(spread))
 
 
 def plot_coverage(coverage: Coverage, path: str | PathLike[str] | None = None) -> "Figure":
@@ -304,7 +305,7 @@ def _matched(posteriors: Iterable[Samplable], truth: Array) -> Iterable[Samplabl
         raise ValueError(f"posteriors must be one for each of {len(truth)} truths, got {more}")
 
 
-def _uniform_p_value(values: Array) -> float:
+def uniform_p_value(values: Array) -> float:
     """Kolmogorov-Smirnov p-value of uniform `values`, by the limiting series with Stephens' fix."""
     count = len(values)
     ordered = np.sort(values)

@@ -12,7 +12,8 @@ many, only the noise itself averages away: the widening and h are errors of the 
 pours share.
 
 Which r and c, and whether the noise changes over the parameters, is chosen by held-out pairs: the
-parameters of pairs that an emulator has not seen are to be most probable under its posterior.
+parameters of pairs that an emulator has not seen are to be most probable under its posterior, among
+those choices whose highest-density regions hold them as often as they claim.
 
 Reference:
     Wood, Statistical inference for noisy nonlinear ecological dynamic systems, Nature 466, 2010
@@ -40,6 +41,7 @@ from granulcal.bayessim.importance import (
 )
 from granulcal.bayessim.noise import Noise
 from granulcal.bayessim.signal import SignalAxes
+from granulcal.diagnostics import uniform_p_value
 from granulcal.prior import Prior
 
 __all__ = ["EmulatorChoice", "Fold", "Likelihood", "joint_density"]
@@ -53,6 +55,8 @@ _FOLDS = 4
 # Held-out pairs that choose, and that the fit is checked on afterwards.
 _HELD_OUT = 240
 _CELLS = 4096
+# Levels of held-out truths must be uniform with at least this Kolmogorov-Smirnov p-value.
+_LEAST_P_VALUE = 0.1
 _EFFORT = Effort(pool=3000, draws=1500, rounds=5, effective=150.0, good_share=0.25)
 
 
@@ -132,6 +136,7 @@ class Likelihood:
         parts = [order[start::_FOLDS] for start in range(_FOLDS)]
         counts = sorted({min(count, z.shape[1]) for count in AXIS_COUNTS})
         scores: dict[tuple[bool, int], Array] = {}
+        levels: dict[tuple[bool, int], Array] = {}
         fits: dict[tuple[bool, int], list[Likelihood]] = {}
         for varying in (False, True):
             for part in parts:
@@ -140,21 +145,25 @@ class Likelihood:
                 grown = _Growing.fit(u[train], z[train], prior, lengths, features, varying, seed)
                 for count in counts:
                     found = grown.leading(count)
-                    score = found.held_out_scores(u[held], z[held])
+                    score, level = found.held_out_scores(u[held], z[held])
                     key = varying, count
                     scores[key] = np.column_stack([scores[key], score]) if key in scores else score
+                    levels[key] = np.column_stack([levels[key], level]) if key in levels else level
                     fits.setdefault(key, []).append(found)
-        best = max(scores, key=lambda key: scores[key].mean(axis=1).max())
-        means = scores[best].mean(axis=1)
-        widening = WIDENINGS[int(means.argmax())]
+        best, chosen = _most_probable_of_the_honest(scores, levels)
+        widening = WIDENINGS[chosen]
         linear = [
             linear_scores(u, z, np.setdiff1d(everything, part), part[: _HELD_OUT // _FOLDS])
             for part in parts
         ]
         choice = EmulatorChoice(
-            best[1], widening, best[0], float(means.max()), float(np.concatenate(linear).mean())
+            best[1],
+            widening,
+            best[0],
+            float(scores[best][chosen].mean()),
+            float(np.concatenate(linear).mean()),
         )
-        held_scores = np.split(scores[best][int(means.argmax())], np.cumsum(_lengths(parts))[:-1])
+        held_scores = np.split(scores[best][chosen], np.cumsum(_lengths(parts))[:-1])
         folds = [
             Fold(fit.widened(widening), part[: _HELD_OUT // _FOLDS], score)
             for fit, part, score in zip(fits[best], parts, held_scores, strict=True)
@@ -194,13 +203,20 @@ class Likelihood:
         scales = pooled_scales(prediction, len(z), self.widening)
         return self.leading.noise.log_density(mean - prediction.means, scales)
 
-    def held_out_scores(self, u: Array, z: Array) -> Array:
-        """Returns log posterior densities of `u` (n, p) given `z` (n, s), shape (widenings, n)."""
+    def held_out_scores(self, u: Array, z: Array) -> tuple[Array, Array]:
+        """Returns what the posteriors given `z` (n, s) say of the true `u` (n, p).
+
+        Returns:
+            Log density and level of the smallest highest-density region that holds it, each of
+            shape (widenings, n).
+        """
         y = self.axes.apply(z)[:, : self.axis_count]
         noise, here, factors = self.leading.noise, self.leading.predict(u), np.array(WIDENINGS)
         cells = self.at_cells
         totals = np.hypot(cells.scales, cells.unknown)
-        scores = np.empty((len(factors), len(u)))
+        scores, levels = np.empty((2, len(factors), len(u)))
+        cell_prior = self.prior.coordinate_log_prob(self.cells)
+        at_truth = self.prior.coordinate_log_prob(u)
         for i in range(len(u)):
             fits = noise.log_densities(y[i] - cells.means, totals, factors)
             scale = np.hypot(here.scales[i], here.unknown[i])
@@ -209,8 +225,11 @@ class Likelihood:
             fits = np.column_stack([fits, truth])
             largest = fits.max(axis=1)
             evidence = np.log(np.mean(np.exp(fits - largest[:, None]), axis=1)) + largest
-            scores[:, i] = truth - evidence
-        return scores + self.prior.coordinate_log_prob(u)
+            scores[:, i] = truth - evidence + at_truth[i]
+            denser = fits[:, :-1] + cell_prior > truth[:, None] + at_truth[i]
+            shares = np.exp(fits - largest[:, None])
+            levels[:, i] = np.sum(shares[:, :-1] * denser, axis=1) / shares.sum(axis=1)
+        return scores, levels
 
     def simulate(self, u: Array, generator: np.random.Generator) -> Array:
         """Returns one draw of the leading axes at each row of `u` (n, p), shape (n, r)."""
@@ -300,6 +319,20 @@ def linear_scores(u: Array, z: Array, train: NDArray[np.intp], held: NDArray[np.
     covariance = errors[train].T @ errors[train] / len(train) + 1e-9 * np.eye(u.shape[1])
     white = np.linalg.solve(np.linalg.cholesky(covariance), errors[held].T)
     return -0.5 * (np.sum(white**2, axis=0) + np.linalg.slogdet(2 * np.pi * covariance)[1])
+
+
+def _most_probable_of_the_honest(
+    scores: dict[tuple[bool, int], Array], levels: dict[tuple[bool, int], Array]
+) -> tuple[tuple[bool, int], int]:
+    """Key and index of the highest mean score among those whose levels may be uniform."""
+    ranked = sorted(
+        ((float(row.mean()), key, i) for key, rows in scores.items() for i, row in enumerate(rows)),
+        reverse=True,
+    )
+    for _, key, i in ranked:
+        if uniform_p_value(levels[key][i]) >= _LEAST_P_VALUE:
+            return key, i
+    return ranked[0][1:]
 
 
 def _lengths(parts: list[NDArray[np.intp]]) -> list[int]:

@@ -127,7 +127,7 @@ class MisfitReference:
         best, square, left = _best_fit(likelihood, at_cells, mean, pours)
         null_squares, null_residuals = self.squares, self.residuals
         if pours > 1:
-            null_squares, null_residuals = self._replicates(likelihood, at_cells, best, pours)
+            null_squares, null_residuals = self._replicates(likelihood, best, pours)
         spread = np.maximum(null_residuals.std(axis=0), 1e-12)
         sizes = (left @ back) / spread
         null_largest = np.abs(null_residuals / spread).max(axis=1)
@@ -146,9 +146,7 @@ class MisfitReference:
         )
         return Misfit(pours, float(p_value), joint, statistics)
 
-    def _replicates(
-        self, likelihood: Likelihood, at_cells: Prediction, u: Array, pours: int
-    ) -> tuple[Array, Array]:
+    def _replicates(self, likelihood: Likelihood, u: Array, pours: int) -> tuple[Array, Array]:
         """Q and residuals of sets of pours at `u` (p,)."""
         generator = np.random.default_rng(0)
         here = likelihood.emulator.predict(u[None])
@@ -161,7 +159,8 @@ class MisfitReference:
             own, common = self.noise[chosen[:-1]].mean(axis=0), self.noise[chosen[-1]]
             unknown = here.unknown[0] * (root @ generator.standard_normal(len(root)))
             error = np.sqrt(1 - shared) * own + np.sqrt(shared) * common + unknown
-            square, left = _best_fit(likelihood, at_cells, here.means[0] + error, pours)[1:]
+            # A fit near u is no better than the best one: false alarms can only become fewer.
+            square, left = _improve(likelihood, u, here.means[0] + error, pours)[1:]
             squares.append(square)
             residuals.append(left @ back)
         return np.array(squares), np.array(residuals)
@@ -171,6 +170,16 @@ def _best_fit(
     likelihood: Likelihood, at_cells: Prediction, mean: Array, pours: int
 ) -> tuple[Array, float, Array]:
     """Returns the best u (p,), Q there and the residual (s,): best cell, then Gauss-Newton."""
+    whiten = np.linalg.inv(likelihood.emulator.noise.root).T
+    scales = pooled_scales(at_cells, pours, likelihood.widening)
+    squares = np.sum(((mean - at_cells.means) / scales @ whiten) ** 2, axis=1)
+    return _improve(likelihood, likelihood.cells[int(squares.argmin())], mean, pours)
+
+
+def _improve(
+    likelihood: Likelihood, u: Array, mean: Array, pours: int
+) -> tuple[Array, float, Array]:
+    """Returns a better u (p,), Q there and the residual (s,), by Gauss-Newton from `u`."""
     emulator = likelihood.emulator
     whiten = np.linalg.inv(emulator.noise.root).T
 
@@ -178,7 +187,6 @@ def _best_fit(
         scales = pooled_scales(prediction, pours, likelihood.widening)
         return np.sum(((mean - prediction.means) / scales @ whiten) ** 2, axis=1)
 
-    u = likelihood.cells[int(squares(at_cells).argmin())]
     low, high = likelihood.prior.unconstrained_bounds.T
     here = emulator.predict(u[None])
     square = float(squares(here)[0])
