@@ -11,10 +11,7 @@ from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-
-from granulcal.bayessim.features import draw_frequencies
 
 __all__ = ["Basis", "learn_length_scales"]
 
@@ -85,6 +82,8 @@ def learn_length_scales(u: Array, z: Array, *, features: int, seed: int) -> Arra
         features: random frequencies.
         seed: seed of the frequencies.
     """
+    import torch
+
     chosen = np.random.default_rng(seed).permutation(len(u))[:_PAIRS]
     spread = u.std(axis=0)
     v = (u[chosen] - u.mean(axis=0)) / np.where(spread > 0, spread, 1.0)
@@ -119,4 +118,6 @@ def learn_length_scales(u: Array, z: Array, *, features: int, seed: int) -> Arra
 
 
 def _frequencies(count: int, dimension: int, seed: int) -> Array:
+    from granulcal.bayessim.features import draw_frequencies
+
     return draw_frequencies(count, dimension, kernel="matern52", seed=seed).numpy()
