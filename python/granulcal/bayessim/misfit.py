@@ -187,7 +187,8 @@ def _improve(
         scales = pooled_scales(prediction, pours, likelihood.widening)
         return np.sum(((mean - prediction.means) / scales @ whiten) ** 2, axis=1)
 
-    low, high = likelihood.prior.unconstrained_bounds.T
+    # The emulator knows nothing beyond the prior, which may have no bounds of its own.
+    low, high = likelihood.cells.min(axis=0), likelihood.cells.max(axis=0)
     here = emulator.predict(u[None])
     square = float(squares(here)[0])
     for _ in range(_STEPS):

@@ -81,7 +81,7 @@ class TrainingSummary:
         dropped = ", ".join(f"{n} {why}" for why, n in self.excluded.items() if n) or "none"
         lines = [
             f"BayesSim ({self.method}): {self.pair_count} pours, left out: {dropped}; trained on "
-            f"{self.train_count}, {self.fit_seconds:.1f} s of processor time",
+            f"{self.train_count}{self._time()}",
             f"  {self.choice}",
         ]
         if self.best_epochs:
@@ -92,6 +92,10 @@ class TrainingSummary:
         if self.horizon_count:
             lines.append(f"  {self.horizon_count} pours ended at the time limit, kept")
         return "\n".join(lines + [f"  note: {note}" for note in self.notes])
+
+    def _time(self) -> str:
+        known = np.isfinite(self.fit_seconds)
+        return f", {self.fit_seconds:.1f} s of processor time" if known else ""
 
 
 def _finite(value: float) -> float | None:
