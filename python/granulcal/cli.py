@@ -22,6 +22,7 @@ Calibrates a granular simulator from depth images.
 
   granulcal generate scene.toml prior.toml -n 1000 -o pours   simulate a training set
   granulcal train pours -o model                              train BayesSim on it
+  granulcal check model                                       may its intervals be trusted?
   granulcal infer model couscous.png --camera camera.toml     posterior of the material
   granulcal report model couscous.png --camera camera.toml -o report.html
 
@@ -29,8 +30,8 @@ Commands of the simulator (granulcal COMMAND --help tells more):
   simulate, generate, render, features, fit-sensor, pick-colour, inspect, merge, completions
 """
 _EPILOG = (
-    "Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy "
-    "or some frames of a recording lost."
+    "Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy, "
+    "some frames of a recording lost, or a model that fails its check."
 )
 
 
@@ -74,7 +75,7 @@ def _guarded(command: Callable[[], int]) -> int:
 
 
 def _commands() -> tuple[str, ...]:
-    return ("train", "infer", "report", "reproduce", "demo")
+    return ("train", "check", "infer", "report", "reproduce", "demo")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -88,6 +89,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.set_defaults(run=None)
     commands = parser.add_subparsers(title="commands of the inference", metavar="COMMAND")
     _add_train(commands)
+    _add_check(commands)
     _add_infer(commands)
     _add_report(commands)
     _add_reproduce(commands)
@@ -101,8 +103,26 @@ def _add_train(commands: Any) -> None:
     parser.add_argument("data", type=Path, help="folder of `generate`, or one Parquet file")
     parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the model")
     parser.add_argument("--seed", type=int, default=0, help="seed of the training (default: 0)")
-    parser.add_argument("--recipe", help="settings by name: snr (default) or plain (the paper's)")
+    parser.add_argument(
+        "--method",
+        choices=("auto", "emulated", "distilled", "mdrff", "plain"),
+        default="auto",
+        help="emulated: learn the statistics of a material; mdrff: learn the material of "
+        "statistics; auto (default): the better of these two; distilled: a network that imitates "
+        "the emulator; plain: the paper's recipe",
+    )
     parser.set_defaults(run=_train)
+
+
+def _add_check(commands: Any) -> None:
+    text = "say what a model was made from and whether its posteriors hold the truth"
+    parser = commands.add_parser("check", help=text, description=text)
+    parser.add_argument("model", type=Path, help="folder of `train`")
+    parser.add_argument(
+        "--data", type=Path, help="pours that the model was not trained on, to check it with"
+    )
+    parser.add_argument("--plots", type=Path, help="write coverage.png and sbc.png to this folder")
+    parser.set_defaults(run=_check)
 
 
 def _add_recordings(parser: argparse.ArgumentParser) -> None:
@@ -165,22 +185,53 @@ def _train(options: argparse.Namespace) -> int:
     from granulcal.dataset import Dataset
 
     data = Dataset.load(options.data)
-    settings = {} if options.recipe is None else {"recipe": options.recipe}
-    model = BayesSim.fit(data, seed=options.seed, **settings)
+    model = BayesSim.fit(data, seed=options.seed, method=options.method)
     model.save(options.out)
     data.save(options.out / _TRAINING)
     print(f"model written to {options.out}")
     return _DONE
 
 
+def _check(options: argparse.Namespace) -> int:
+    from granulcal.bayessim import BayesSim
+    from granulcal.bayessim.pairs import TrainingPairs
+    from granulcal.dataset import Dataset
+
+    model = BayesSim.load(options.model)
+    print(model.summary)
+    calibration = model.calibration
+    if options.data is not None:
+        pairs = TrainingPairs.gather(Dataset.load(options.data), prior=model.prior, fewest=10)
+        if pairs.x_names != model.x_names:
+            raise ValueError(
+                f"{options.data} has the statistics {pairs.x_names}, the model {model.x_names}"
+            )
+        print(f"on the {len(pairs.theta)} usable pours of {options.data}:")
+        calibration = model.check(pairs.theta, pairs.x)
+    if calibration is None:
+        print("  not checked: too few pours to keep some aside; give some with --data")
+        return _UNHEALTHY
+    print(calibration)
+    if model.identifiability is not None:
+        print(model.identifiability)
+    if options.plots is not None:
+        calibration.plot(options.plots)
+        print(f"plots written to {options.plots}")
+    return _DONE if calibration.is_calibrated else _UNHEALTHY
+
+
 def _infer(options: argparse.Namespace) -> int:
     import numpy as np
+
+    from granulcal.identifiability import Identifiability
 
     model = _model(options)
     recordings = _recordings(options)
     matched = {} if model.scene_toml is None else _matched(model.scene_toml)
     observed = [recording.formation(**matched).statistics() for recording in recordings]
-    posterior = model.posterior(np.array([np.asarray(each) for each in observed]))
+    statistics = np.array([np.asarray(each) for each in observed])
+    misfit, posterior = model.misfit(statistics), model.posterior(statistics)
+    known = Identifiability.of(posterior)
     if options.plot is not None:
         posterior.pair_plot(options.plot)
     mode, mean, region = posterior.mode(), posterior.mean(), posterior.credible_region(0.9)
@@ -194,6 +245,16 @@ def _infer(options: argparse.Namespace) -> int:
             }
             for i, name in enumerate(posterior.names)
         },
+        "inside_model": {
+            "is_inside": misfit.is_inside,
+            "p_value": misfit.p_value,
+            "joint_p_value": misfit.joint_p_value,
+            "statistics": {
+                s.name: {"residual": s.residual, "p_value": s.p_value} for s in misfit.statistics
+            },
+        },
+        "identifiability": known.as_dict(),
+        "calibrated": model.calibration is not None and model.calibration.is_calibrated,
         "warnings": [str(warning) for warning in posterior.warnings],
         "statistics": [each.to_dict() for each in observed],
     }
@@ -204,10 +265,14 @@ def _infer(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(document, indent=1))
         return _outcome(recordings)
+    print(misfit)
     print(f"{'parameter':<30}{'mode':>10}{'mean':>10}   90 % interval")
     for name, values in document["parameters"].items():
         low, high = values["interval90"]
         print(f"{name:<30}{values['mode']:>10.4g}{values['mean']:>10.4g}   {low:.4g} to {high:.4g}")
+    print(known)
+    if model.calibration is None or not model.calibration.is_calibrated:
+        print("note: the model's own check failed: see `granulcal check`", file=sys.stderr)
     for warning in document["warnings"]:
         print(f"note: {warning}", file=sys.stderr)
     return _outcome(recordings)

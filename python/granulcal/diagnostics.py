@@ -1,16 +1,18 @@
 """Is a posterior calibrated? Ranks and coverage of true parameters, with the band of chance.
 
-Both checks take any objects with `sample(n, seed)` and `log_prob(theta)`, one for each true
+All checks take any objects with `sample(n, seed)` and `log_prob(theta)`, one for each true
 parameter, drawn from the prior together with its observation.
 
 Reference:
     Talts, Betancourt, Simpson, Vehtari and Gelman, Validating Bayesian inference algorithms with
     simulation-based calibration, arXiv:1804.06788, 2018.
+    Lemos, Coogan, Hezaveh and Perreault-Levasseur, Sampling-based accuracy testing of posterior
+    estimators for general inference, ICML 2023 (TARP).
     Hermans et al., A trust crisis in simulation-based inference?, TMLR 2022 (expected coverage).
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Protocol
@@ -27,11 +29,14 @@ __all__ = [
     "Coverage",
     "CoverageCount",
     "RankTest",
+    "Tarp",
     "binomial_band",
     "expected_coverage",
     "plot_coverage",
     "plot_sbc",
     "sbc_ranks",
+    "tarp",
+    "uniform_p_value",
 ]
 
 Array = NDArray[np.float64]
@@ -114,6 +119,20 @@ class RankTest:
         return bool(self.p_values.min() >= significance / len(self.p_values))
 
 
+@dataclass(frozen=True)
+class Tarp:
+    """Coverage of balls around random points.
+
+    Attributes:
+        shares: share of a posterior's draws nearer to the random point than the truth is; uniform
+            on [0, 1] if the posteriors are right, shape (n,).
+        p_value: Kolmogorov-Smirnov p-value of uniform shares.
+    """
+
+    shares: Array
+    p_value: float
+
+
 def binomial_band(total: int, share: float, *, probability: float = 0.95) -> tuple[int, int]:
     """Returns the central range of Binomial(total, share) that holds at least `probability`."""
     tail = (1 - probability) / 2
@@ -133,6 +152,7 @@ def expected_coverage(
     levels: Sequence[float] = _LEVELS,
     draw_count: int = 1000,
     seed: int = 0,
+    significance: float = 0.05,
 ) -> Coverage:
     """Returns how often highest-density regions hold the truth.
 
@@ -142,6 +162,7 @@ def expected_coverage(
         levels: nominal shares, each between 0 and 1.
         draw_count: draws of each posterior.
         seed: seed of the draws.
+        significance: chance that a calibrated posterior leaves any of the bands.
     """
     for level in levels:
         if not 0 < level < 1:
@@ -154,7 +175,7 @@ def expected_coverage(
         draws = posterior.sample(draw_count, seed=seed + i)
         shares.append(float(np.mean(log_density(draws) > log_density(truth[i : i + 1])[0])))
     truth_levels = np.array(shares)
-    probability = 1 - 0.05 / len(levels)
+    probability = 1 - significance / len(levels)
     counts = []
     for level in levels:
         band = binomial_band(len(truth), level, probability=probability)
@@ -181,8 +202,45 @@ def sbc_ranks(
     ranks = np.array(rows, dtype=np.int64)
     # Spread evenly inside its step, a uniform rank is uniform on [0, 1].
     jitter = np.random.default_rng(seed).random(ranks.shape)
-    p_values = np.array([_uniform_p_value(c) for c in ((ranks + jitter) / (draw_count + 1)).T])
+    p_values = np.array([uniform_p_value(c) for c in ((ranks + jitter) / (draw_count + 1)).T])
     return RankTest(ranks, draw_count, p_values)
+
+
+def tarp(
+    posteriors: Iterable[Samplable],
+    theta: ArrayLike,
+    points: ArrayLike,
+    *,
+    draw_count: int = 1000,
+    seed: int = 0,
+    coordinates: Callable[[Array], Array] | None = None,
+) -> Tarp:
+    """Returns the coverage of balls around random points, which need no density.
+
+    Over all random points a posterior passes only if it is the true one (Lemos et al. 2023,
+    theorem 3); with one point for each truth it is one more test beside ranks and regions.
+
+    Args:
+        posteriors: one for each row of `theta`; may be a generator.
+        theta: true parameters, own units, shape (n, p).
+        points: random points, own units, shape (n, p), for example draws of the prior.
+        draw_count: draws of each posterior.
+        seed: seed of the draws.
+        coordinates: map of parameters (m, p) to where distances are taken; None: as they are.
+    """
+    truth, centres = as_matrix("theta", theta), as_matrix("points", points)
+    shares = []
+    for i, posterior in enumerate(_matched(posteriors, truth)):
+        rows = np.concatenate(
+            [centres[i : i + 1], truth[i : i + 1], posterior.sample(draw_count, seed=seed + i)]
+        )
+        placed = rows if coordinates is None else coordinates(rows)
+        distances = np.linalg.norm(placed[1:] - placed[0], axis=1)
+        shares.append(float(np.mean(distances[1:] < distances[0])))
+    values = np.array(shares)
+    jitter = np.random.default_rng(seed).random(len(values))
+    spread = (values * draw_count + jitter) / (draw_count + 1)
+    return Tarp(values, uniform_p_value(spread))
 
 
 def plot_coverage(coverage: Coverage, path: str | PathLike[str] | None = None) -> "Figure":
@@ -247,7 +305,7 @@ def _matched(posteriors: Iterable[Samplable], truth: Array) -> Iterable[Samplabl
         raise ValueError(f"posteriors must be one for each of {len(truth)} truths, got {more}")
 
 
-def _uniform_p_value(values: Array) -> float:
+def uniform_p_value(values: Array) -> float:
     """Kolmogorov-Smirnov p-value of uniform `values`, by the limiting series with Stephens' fix."""
     count = len(values)
     ordered = np.sort(values)

@@ -9,12 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.arrays import as_matrix
 from granulcal.bayessim.density import Density, TruncatedMixture
+from granulcal.bayessim.importance import FEWEST_EFFECTIVE
+from granulcal.bayessim.likelihood import Likelihood, joint_density
 from granulcal.bayessim.mixture import Mixture
-from granulcal.bayessim.product import (
-    FEWEST_EFFECTIVE,
-    LEAST_LOG_EVIDENCE_RATIO,
-    ProductDensity,
-)
+from granulcal.bayessim.product import LEAST_LOG_EVIDENCE_RATIO, product_density
 from granulcal.prior import Prior
 
 if TYPE_CHECKING:
@@ -223,12 +221,33 @@ class Posterior:
         ]
         if len(factors) == 1:
             return cls(prior, factors[0], warnings=tuple(found))
-        product = ProductDensity.of(prior, factors)
+        product = product_density(prior, factors)
         if product.effective_sample_size < FEWEST_EFFECTIVE:
             found.append(FewEffectiveDraws(product.effective_sample_size, FEWEST_EFFECTIVE))
         if product.log_normaliser < LEAST_LOG_EVIDENCE_RATIO:
             found.append(PoursDisagree(product.log_normaliser, LEAST_LOG_EVIDENCE_RATIO))
         return cls(prior, product, warnings=tuple(found))
+
+    @classmethod
+    def from_conditions(
+        cls,
+        prior: Prior,
+        conditions: list[tuple[Likelihood, Array]],
+        *,
+        warnings: tuple[Any, ...] = (),
+    ) -> "Posterior":
+        """Returns the posterior of one material under one or several conditions.
+
+        Args:
+            prior: the prior.
+            conditions: for each the emulated likelihood and its k standardised pours, shape (k, s).
+            warnings: what is known beforehand.
+        """
+        density = joint_density(prior, conditions)
+        found = list(warnings)
+        if density.effective_sample_size < FEWEST_EFFECTIVE:
+            found.append(FewEffectiveDraws(density.effective_sample_size, FEWEST_EFFECTIVE))
+        return cls(prior, density, warnings=tuple(found))
 
     @property
     def names(self) -> list[str]:

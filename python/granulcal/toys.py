@@ -148,7 +148,7 @@ class PileStandIn:
 
 
 def main() -> None:
-    """Prints loss on the stand-in, exact loss, coverage and time of each recipe."""
+    """Prints loss on the stand-in, exact loss, coverage and time of each method."""
     import argparse
 
     from granulcal.bayessim import BayesSim
@@ -166,13 +166,15 @@ def main() -> None:
         prior_loss = -float(np.mean(toy.prior.log_prob(new_theta)))
         exact = -float(np.mean(toy.exact_log_prob(new_theta, new_x))) - prior_loss
         print(f"seed {seed}: exact {exact:.2f}")
-        for recipe in ("snr", "plain"):
-            model = BayesSim.fit(theta, x, toy.prior, seed=seed, quiet=True, recipe=recipe)
+        for method in ("emulated", "distilled", "mdrff", "plain"):
+            model = BayesSim.fit(theta, x, toy.prior, seed=seed, quiet=True, method=method)
             check = model.check(new_theta, new_x)
-            counts = ", ".join(f"{c.level:.0%} {c.inside / c.total:.3f}" for c in check.coverage)
+            counts = ", ".join(
+                f"{c.level:.0%} {c.inside / c.total:.3f}" for c in check.coverage.counts
+            )
             print(
-                f"seed {seed}: {recipe} {check.posterior_loss - prior_loss:.2f}, {counts}, "
-                f"{model.summary.fit_seconds:.1f} s, {model.summary.epoch_count} epochs"
+                f"seed {seed}: {method} {check.posterior_loss - prior_loss:.2f}, {counts}, "
+                f"fit {model.summary.fit_seconds:.1f} s"
             )
 
 

@@ -100,7 +100,7 @@ fn a_tilted_plane_is_tilted_gravity() {
     let grains = material(0.5, 0.1, 0.5);
     let mut tilted = one_grain(0.1 + RADIUS / cos, grains);
     let shape = Shape::Plane { point: [0.0, 0.0, 0.1], normal: [sin, 0.0, cos] };
-    tilted.walls.push(Wall { shape, material: WallMaterial::default() });
+    tilted.walls.push(Wall::fixed(shape, WallMaterial::default()));
     let mut simulation = start(&tilted);
     simulation.advance(TIME);
     let on_plane = motion(&simulation, 0);

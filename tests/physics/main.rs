@@ -10,6 +10,8 @@ mod counters;
 mod determinism;
 mod impact;
 mod incline;
+mod meshes;
+mod moving_walls;
 mod packing;
 mod rebound;
 mod restitution;

@@ -13,7 +13,7 @@ fn assert_finite(pour: &Pour) {
 }
 
 fn wall(shape: Shape) -> Wall {
-    Wall { shape, material: WallMaterial::default() }
+    Wall::fixed(shape, WallMaterial::default())
 }
 
 #[test]

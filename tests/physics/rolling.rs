@@ -17,14 +17,14 @@ fn ramp(sliding_friction: f64, rolling_friction: f64) -> Scene {
     let drop = 0.05;
     let mut scene =
         one_grain(drop + RADIUS / cos, material(sliding_friction, rolling_friction, 0.0));
-    scene.walls.push(Wall {
-        shape: Shape::Plane { point: [0.0, 0.0, drop], normal: [sin, 0.0, cos] },
-        material: WallMaterial {
+    scene.walls.push(Wall::fixed(
+        Shape::Plane { point: [0.0, 0.0, drop], normal: [sin, 0.0, cos] },
+        WallMaterial {
             sliding_friction: Some(0.0),
             rolling_friction: Some(0.0),
             ..WallMaterial::default()
         },
-    });
+    ));
     scene
 }
 
@@ -90,10 +90,8 @@ fn torsion_stops_a_spinning_grain() {
             ..WallMaterial::default()
         },
     };
-    scene.walls.push(Wall {
-        shape: Shape::Plane { point: [0.05, 0.0, 0.0], normal: [-1.0, 1.0, 0.0] },
-        material: WallMaterial::default(),
-    });
+    let shape = Shape::Plane { point: [0.05, 0.0, 0.0], normal: [-1.0, 1.0, 0.0] };
+    scene.walls.push(Wall::fixed(shape, WallMaterial::default()));
     let mut simulation = start(&scene);
     while motion(&simulation, 0).w.norm() == 0.0 {
         simulation.advance(1.0 / 1500.0);

@@ -4,6 +4,7 @@ import runpy
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 _EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -28,6 +29,28 @@ def test_every_example_is_run_here():
 def test_one_pour(capsys):
     _run("one_pour.py", "--count", "100")
     assert "chi_df" in capsys.readouterr().out
+
+
+def test_side_view(tmp_path):
+    pytest.importorskip("matplotlib")
+    np.save(tmp_path / "at.npy", np.random.default_rng(0).uniform(0.0, 0.05, (40, 3)))
+    out = tmp_path / "side.png"
+    _run("side_view.py", str(tmp_path / "at.npy"), "-o", str(out))
+    assert out.read_bytes().startswith(b"\x89PNG")
+
+
+def test_funnel_stl_is_what_stands_there(tmp_path, monkeypatch):
+    script = tmp_path / "funnel_stl.py"
+    script.write_text((_EXAMPLES / "funnel_stl.py").read_text())
+    monkeypatch.setattr(sys, "argv", [str(script)])
+    runpy.run_path(str(script), run_name="__main__")
+    made = (tmp_path / "funnel.stl").read_bytes()
+    there = (_EXAMPLES / "funnel.stl").read_bytes()
+    assert len(made) == len(there)
+    # Sines may differ by a rounding from machine to machine.
+    numbers = [np.frombuffer(stl[84:], np.uint8).reshape(-1, 50)[:, :48] for stl in (made, there)]
+    made, there = (np.ascontiguousarray(n).view("<f4") for n in numbers)
+    np.testing.assert_allclose(made, there, rtol=1e-6, atol=1e-5)
 
 
 def test_describe_recording(capsys):

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use granulcal_dem::Scene;
 
-use crate::{DatasetError, Prior};
+use crate::{DatasetError, Prior, scene_file};
 
 /// The version of granulcal that writes.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -50,8 +50,12 @@ impl Header {
         version: String,
         seed: u64,
     ) -> Result<Self, DatasetError> {
-        let scene = Scene::from_toml(scene_toml)
-            .map_err(|source| DatasetError::Scene { path: path.to_owned(), source })?;
+        let wrong = |source| DatasetError::Scene { path: path.to_owned(), source };
+        let mut scene = Scene::parse(scene_toml).map_err(wrong)?;
+        // Rows can be read where the scene's meshes are not; who simulates it is told.
+        if scene_file::fill(&mut scene, Path::new("")).is_ok() {
+            scene.check().map_err(wrong)?;
+        }
         Ok(Self {
             scene,
             prior: Prior::from_toml(prior_toml)?,

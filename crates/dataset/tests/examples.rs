@@ -14,6 +14,9 @@ fn scenes_and_priors_fit() {
     let funnel = load_scene(&example("funnel.toml")).unwrap();
     assert_eq!(funnel, Scene::funnel(0.12));
     load_scene(&example("drop.toml")).unwrap().check().unwrap();
+    for name in ["drum.toml", "mesh_funnel.toml"] {
+        load_scene(&example(name)).unwrap();
+    }
     let prior = load_prior(&example("prior.toml")).unwrap();
     prior.check(&funnel).unwrap();
     assert_eq!(prior.parameters()[..3], *Prior::default().parameters());

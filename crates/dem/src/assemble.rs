@@ -7,7 +7,7 @@ use crate::contact::Batch;
 use crate::contact_set::ContactSet;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, widest};
 use crate::law;
-use crate::wall::Wall;
+use crate::wall::Walls;
 
 /// Distance below which two centres are one point and the normal is the vertical `[m]`.
 const COINCIDENT: f64 = 1e-12;
@@ -72,7 +72,7 @@ widest! {
     /// centre went through a wall.
     pub(crate) fn assemble_walls<W>(
         set: &mut ContactSet,
-        walls: &[Wall],
+        walls: &Walls,
         bed: &Bed,
         dt: f64,
         lost: &mut [bool],
@@ -80,17 +80,19 @@ widest! {
     ) -> Seen {
         let mut seen = Seen::default();
         for number in 0..set.batches.len() {
-            let gap = Reg::<W>::load(&wall_geometry(set, number, walls, bed, &mut seen));
+            let (gap, follows) = wall_geometry(set, number, walls, bed, &mut seen);
+            let gap = Reg::<W>::load(&gap);
             let (batch, at) = (&mut set.batches[number], &mut set.at_walls[number]);
             for lane in batch.lanes() {
                 lost[batch.i[lane] as usize] |= at.went_through[lane];
             }
             let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
             let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
+            let w_n = w_n - Reg::load(&follows);
             finish(batch, law::bias_lanes(gap, dt));
             let closes = closing_bits(gap, w_n, dt);
             for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
-                let partner = bed.count() as u32 + u32::from(at.wall[lane]);
+                let partner = bed.count() as u32 + at.wall[lane];
                 candidates.push(Candidate { i: batch.i[lane], partner });
             }
         }
@@ -130,7 +132,7 @@ widest! {
 
 widest! {
     /// The same for the contacts at walls.
-    pub(crate) fn refresh_walls<W>(set: &mut ContactSet, walls: &[Wall], bed: &Bed, dt: f64) {
+    pub(crate) fn refresh_walls<W>(set: &mut ContactSet, walls: &Walls, bed: &Bed, dt: f64) {
         for number in 0..set.batches.len() {
             let mut clocks = Lanes::ZERO;
             for lane in set.batches[number].lanes() {
@@ -139,10 +141,12 @@ widest! {
             if clocks == Lanes::ZERO {
                 continue;
             }
-            let gap = Reg::<W>::load(&wall_geometry(set, number, walls, bed, &mut Seen::default()));
+            let (gap, follows) = wall_geometry(set, number, walls, bed, &mut Seen::default());
+            let gap = Reg::<W>::load(&gap);
             let batch = &mut set.batches[number];
             let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
             let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
+            let w_n = w_n - Reg::load(&follows);
             finish(batch, law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt));
         }
     }
@@ -209,27 +213,32 @@ fn pair_geometry<W: Width>(
     (gap, distance)
 }
 
-/// Sets the normals and returns the gaps of a batch at walls; a grain that has had an impact is seen where it
-/// was then.
+/// Sets the normals of a batch at walls and returns the gaps, and how fast the walls move along them; a grain that has had
+/// an impact is seen where it was then.
 fn wall_geometry(
     set: &mut ContactSet,
     number: usize,
-    walls: &[Wall],
+    walls: &Walls,
     bed: &Bed,
     seen: &mut Seen,
-) -> Lanes {
+) -> (Lanes, Lanes) {
     let (batch, at) = (&mut set.batches[number], &mut set.at_walls[number]);
-    let mut gap = Lanes::splat(f64::INFINITY);
+    let (mut gap, mut follows) = (Lanes::splat(f64::INFINITY), Lanes::ZERO);
     for lane in batch.lanes() {
         let i = batch.i[lane] as usize;
-        let near = walls[at.wall[lane] as usize].surface.nearest(&bed.position(i));
+        let (surface, place) = (at.wall[lane] as usize, bed.position(i));
+        let (wall, near) = (walls.wall(surface), walls.nearest(surface, &place, bed.clocks[i]));
+        if wall.is_moving() && near.distance.is_finite() {
+            let touching = place - near.distance * near.normal;
+            follows.0[lane] = near.normal.dot(&wall.motion_at(&touching).0);
+        }
         batch.normal.set(lane, near.normal.into());
         gap.0[lane] = near.distance - bed.radius(i);
         at.went_through[lane] |= near.side * at.side[lane] < 0;
         at.side[lane] = near.side;
         seen.penetration = seen.penetration.max(-gap.0[lane] / bed.radius(i));
     }
-    gap
+    (gap, follows)
 }
 
 /// Bias and tangent plane of a batch whose normals are fresh.

@@ -29,7 +29,7 @@ pub(crate) struct Body {
 /// resting body, which they do share, is never written.
 pub(crate) struct SharedBodies<'a> {
     first: *mut Body,
-    /// Grains; the resting body comes after them.
+    /// All bodies.
     count: u32,
     lifetime: PhantomData<&'a mut [Body]>,
 }
@@ -39,42 +39,42 @@ pub(crate) struct SharedBodies<'a> {
 unsafe impl Sync for SharedBodies<'_> {}
 
 impl<'a> SharedBodies<'a> {
-    /// Shares `bodies`, of which the last is the resting one.
+    /// Shares `bodies`, the grains first.
     pub fn new(bodies: &'a mut [Body]) -> Self {
-        let count = bodies.len() as u32 - 1;
+        let count = bodies.len() as u32;
         Self { first: bodies.as_mut_ptr(), count, lifetime: PhantomData }
     }
 
     /// Velocity and spin of a body.
     ///
     /// # Safety
-    /// `body` is at most the number of grains, and nobody writes it now.
+    /// `body` is one of the bodies, and nobody writes it now.
     #[inline(always)]
     #[allow(unsafe_code)]
     pub unsafe fn load<W: Width>(&self, body: u32) -> (W::Quad, W::Quad) {
-        debug_assert!(body <= self.count);
+        debug_assert!(body < self.count);
         // SAFETY: in bounds and not written, as the caller promises.
         let body = unsafe { &*self.first.add(body as usize) };
         (W::load_row(&body.velocity), W::load_row(&body.spin))
     }
 
-    /// Puts velocity and spin of a grain back.
+    /// Puts velocity and spin of a body back.
     ///
     /// # Safety
-    /// `grain` is less than the number of grains, and nobody else reads or writes it now.
+    /// `body` is one of the bodies, not the resting one, and nobody else reads or writes it now.
     #[inline(always)]
     #[allow(unsafe_code)]
-    pub unsafe fn store<W: Width>(&self, grain: u32, velocity: W::Quad, spin: W::Quad) {
-        debug_assert!(grain < self.count);
+    pub unsafe fn store<W: Width>(&self, body: u32, velocity: W::Quad, spin: W::Quad) {
+        debug_assert!(body < self.count);
         // SAFETY: in bounds and nobody else's, as the caller promises.
-        let body = unsafe { &mut *self.first.add(grain as usize) };
+        let body = unsafe { &mut *self.first.add(body as usize) };
         W::store_row(velocity, &mut body.velocity);
         W::store_row(spin, &mut body.spin);
     }
 }
 
 /// Grains as arrays. `places` and `bodies` have one entry more than there are grains: the resting body that
-/// walls and empty lanes refer to.
+/// walls and empty lanes refer to. Where walls move, further bodies stand for them, one for each contact.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Bed {
     /// Centre and radius of each grain `[m]`.
@@ -111,7 +111,7 @@ impl Bed {
     pub fn check_like(&self, start: &Self) -> Result<(), &'static str> {
         let count = start.count();
         let is_like = self.places.len() == count + 1
-            && self.bodies.len() == count + 1
+            && self.bodies.len() > count
             && self.clocks == start.clocks
             && self.inverse_mass == start.inverse_mass
             && self.places.iter().zip(&start.places).all(|(a, b)| a.0[3] == b.0[3])
@@ -170,6 +170,11 @@ impl Bed {
         (0..self.count())
             .map(|i| self.kinetic_energy(i) - gravity.dot(&self.position(i)) / self.inverse_mass[i])
             .sum()
+    }
+
+    /// Makes room for so many bodies that stand for moving walls, after the resting one.
+    pub fn resize_wall_bodies(&mut self, count: usize) {
+        self.bodies.resize(self.count() + 1 + count, Body::default());
     }
 
     /// v += g dt.

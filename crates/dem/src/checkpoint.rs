@@ -138,7 +138,7 @@ pub(crate) fn open(bytes: &[u8]) -> Result<(CheckpointHeader, &[u8]), DemError> 
     if version != VERSION {
         return Err(DemError::CheckpointVersion { got: version, allowed: VERSION });
     }
-    let scene = Scene::from_toml(&scene)?;
+    let scene = Scene::parse(&scene)?;
     Ok((CheckpointHeader { version, scene, seed, settings, substep }, state))
 }
 

@@ -55,7 +55,7 @@ pub(crate) struct LawLanes {
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct WallLanes {
     /// Wall of each contact.
-    pub wall: [u16; LANES],
+    pub wall: [u32; LANES],
     /// Side of the wall's shell at the last look (see `wall::Nearest::side`).
     pub side: [i8; LANES],
     /// Whether the grain's centre has changed sides.

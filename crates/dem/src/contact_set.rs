@@ -9,6 +9,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use crate::bed::Body;
 use crate::blocks::Blocks;
 use crate::contact::{Batch, ContactLaw, LawLanes, Listed, WallLanes};
 use crate::lanes::LANES;
@@ -17,6 +18,18 @@ use crate::lanes::LANES;
 const COLOURS: usize = 63;
 /// Appended batches that are looked through for a free lane.
 const APPEND_LOOK_BACK: usize = 8;
+
+/// What the second body of every contact of a set is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Second {
+    /// A grain.
+    #[default]
+    Grain,
+    /// A wall, and the resting body.
+    RestingWall,
+    /// A wall that may move, and a body of the contact's own that stands for it.
+    MovingWall,
+}
 
 /// All contacts of a kind (pairs of grains, or grains at walls), block after block and in it colour after colour.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -29,8 +42,9 @@ pub(crate) struct ContactSet {
     pub phases: Vec<Range<usize>>,
     /// One for each batch at walls, none for pairs.
     pub at_walls: Vec<WallLanes>,
-    /// Grains; every index in a batch is at most this, the resting body's.
+    /// Grains; every index in a batch is at most this, the resting body's, but for those of moving walls.
     grains: usize,
+    second: Second,
     /// Batches that were coloured; those after them hold contacts that were appended.
     coloured: usize,
     /// The contact law behind each entry of `laws`, if all its lanes share one.
@@ -68,24 +82,48 @@ impl ContactSet {
         !self.at_walls.is_empty()
     }
 
-    /// Grains that the contacts are between.
-    pub fn grains(&self) -> usize {
-        self.grains
+    /// Whether each contact has a body of its own that stands for a moving wall.
+    pub fn has_wall_bodies(&self) -> bool {
+        self.second == Second::MovingWall
+    }
+
+    /// Bodies that stand for moving walls.
+    pub fn wall_bodies(&self) -> usize {
+        if self.has_wall_bodies() { LANES * self.batches.len() } else { 0 }
+    }
+
+    /// The body that stands for the wall of a contact.
+    fn wall_body(&self, number: usize, lane: usize) -> u32 {
+        let own = if self.has_wall_bodies() { 1 + number * LANES + lane } else { 0 };
+        (self.grains + own) as u32
+    }
+
+    /// Every lane in use, as batch and lane.
+    pub fn lanes(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let batches = self.batches.iter().enumerate();
+        batches.flat_map(|(number, batch)| batch.lanes().map(move |lane| (number, lane)))
+    }
+
+    /// Whether the kernels, which index without looking, may be let loose on these bodies.
+    pub fn fits(&self, bodies: &[Body]) -> bool {
+        bodies.len() > self.grains + self.wall_bodies()
     }
 
     /// Replaces the list: puts the contacts of each block into batches, colour after colour, and hands the impulses
     /// on.
     ///
-    /// `at_walls` says what `partner` means; `law` gives a contact's coefficients.
+    /// `second` says what `partner` means; `law` gives a contact's coefficients.
     pub fn rebuild(
         &mut self,
         listed: &[Listed],
         blocks: &Blocks,
         grains: usize,
-        at_walls: bool,
+        second: Second,
         law: impl Fn(&Listed) -> ContactLaw,
     ) {
         self.collect_carried(grains);
+        let at_walls = second != Second::Grain;
+        self.second = second;
         self.grains = grains;
         self.masks.resize(grains, 0);
         self.batches.clear();
@@ -129,13 +167,12 @@ impl ContactSet {
             next[colour] += if colour == COLOURS { LANES } else { 1 };
             let (number, lane) = (slot / LANES, slot % LANES);
             self.set_law(number, lane, law(contact));
+            let j = if at_walls { self.wall_body(number, lane) } else { contact.partner };
             let batch = &mut self.batches[number];
             batch.used += 1;
-            batch.i[lane] = contact.i;
+            (batch.i[lane], batch.j[lane]) = (contact.i, j);
             if at_walls {
-                self.at_walls[number].wall[lane] = contact.partner as u16;
-            } else {
-                batch.j[lane] = contact.partner;
+                self.at_walls[number].wall[lane] = contact.partner;
             }
             let range = self.carried_starts[contact.i as usize] as usize
                 ..self.carried_starts[contact.i as usize + 1] as usize;
@@ -153,7 +190,7 @@ impl ContactSet {
     /// Adds one contact, without impulses, between two lists: into one of the last batches if it shares no
     /// grain with that, else into a new one. Appended contacts are solved after all others.
     pub fn append(&mut self, contact: Listed, at_wall: bool, law: ContactLaw) {
-        let (i, j) = (contact.i, if at_wall { self.grains as u32 } else { contact.partner });
+        let (i, j) = (contact.i, contact.partner);
         let fits = |batch: &Batch| {
             let mut lanes = batch.lanes();
             let shared = |lane: usize| {
@@ -180,13 +217,12 @@ impl ContactSet {
         });
         let lane = self.batches[number].used as usize;
         self.set_law(number, lane, law);
+        let j = if at_wall { self.wall_body(number, lane) } else { j };
         let batch = &mut self.batches[number];
         batch.used += 1;
-        batch.i[lane] = i;
+        (batch.i[lane], batch.j[lane]) = (i, j);
         if at_wall {
-            self.at_walls[number].wall[lane] = contact.partner as u16;
-        } else {
-            batch.j[lane] = j;
+            self.at_walls[number].wall[lane] = contact.partner;
         }
     }
 
@@ -248,7 +284,7 @@ impl ContactSet {
             for lane in batch.lanes().filter(|&lane| worth(batch, lane)) {
                 let slot = &mut self.carried_starts[batch.i[lane] as usize + 1];
                 self.carried[*slot as usize] = Carried {
-                    partner: at_wall.map_or(batch.j[lane], |at| u32::from(at.wall[lane])),
+                    partner: at_wall.map_or(batch.j[lane], |at| at.wall[lane]),
                     lambda_n: batch.lambda_n.0[lane],
                     lambda_t: batch.lambda_t.get(lane),
                     lambda_r: batch.lambda_r.get(lane),
@@ -325,7 +361,7 @@ mod tests {
         // 80 grains that all touch need more colours than a mask holds.
         let listed = all_pairs(80);
         let mut set = ContactSet::default();
-        set.rebuild(&listed, &Blocks::default(), 80, false, |_| law(0.5));
+        set.rebuild(&listed, &Blocks::default(), 80, Second::Grain, |_| law(0.5));
         assert_eq!(set.len(), listed.len());
         let mut found = Vec::new();
         for batch in &set.batches {
@@ -344,7 +380,9 @@ mod tests {
     fn impulses_and_laws_follow_their_contact() {
         let mut set = ContactSet::default();
         let friction = |contact: &Listed| f64::from(contact.i) + 0.01 * f64::from(contact.partner);
-        set.rebuild(&all_pairs(9), &Blocks::default(), 9, false, |contact| law(friction(contact)));
+        set.rebuild(&all_pairs(9), &Blocks::default(), 9, Second::Grain, |contact| {
+            law(friction(contact))
+        });
         for batch in &mut set.batches {
             for lane in batch.lanes() {
                 batch.lambda_n.0[lane] = f64::from(batch.i[lane] * 100 + batch.j[lane]);
@@ -353,7 +391,7 @@ mod tests {
         // The next list has fewer contacts in another order.
         let mut fewer: Vec<Listed> = all_pairs(9).into_iter().filter(|c| c.partner != 4).collect();
         fewer.reverse();
-        set.rebuild(&fewer, &Blocks::default(), 9, false, |contact| law(friction(contact)));
+        set.rebuild(&fewer, &Blocks::default(), 9, Second::Grain, |contact| law(friction(contact)));
         assert_eq!(set.len(), fewer.len());
         for batch in &set.batches {
             for lane in batch.lanes() {

@@ -10,18 +10,19 @@ use std::ops::Range;
 
 use crate::Material;
 use crate::assemble::{self, Candidate, Seen};
-use crate::bed::Bed;
+use crate::bed::{Bed, Body};
 use crate::blocks::Blocks;
 use crate::contact::{Batch, ContactLaw, Listed};
-use crate::contact_set::ContactSet;
+use crate::contact_set::{ContactSet, Second};
 use crate::impact::Impacts;
+use crate::lanes::Row;
 use crate::neighbor::{Neighbours, PairSearch};
 use crate::parallel::Threads;
 use crate::partners::Partners;
 use crate::path::{Ball, Path, Reach};
 use crate::preset::SolverSettings;
 use crate::scene::Scene;
-use crate::wall::{Wall, walls_of};
+use crate::wall::Walls;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -36,7 +37,9 @@ const SHARE: usize = if cfg!(test) { 4 } else { 512 };
 /// What the contacts are made of: walls, material and settings of one simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Surroundings {
-    pub walls: Vec<Wall>,
+    pub walls: Walls,
+    /// Whether any wall may move.
+    pub has_moving_walls: bool,
     pub material: Material,
     pub gravity: Vector3<f64>,
     pub settings: SolverSettings,
@@ -50,8 +53,10 @@ pub(crate) struct Surroundings {
 impl Surroundings {
     pub fn new(scene: &Scene) -> Self {
         let settings = scene.preset.settings();
+        let walls = Walls::of(scene);
         Self {
-            walls: walls_of(scene),
+            has_moving_walls: walls.any_moving(),
+            walls,
             material: scene.material,
             gravity: scene.gravity.into(),
             settings,
@@ -65,6 +70,15 @@ impl Surroundings {
     pub fn set_settings(&mut self, settings: SolverSettings) {
         self.margin = settings.margin * self.radius;
         self.settings = settings;
+    }
+
+    /// Takes the walls that move to the substep that begins at `time` `[s]`.
+    pub fn move_walls(&mut self, time: f64) {
+        let (dt, interval) = (self.settings.dt, self.reach().interval);
+        for placement in self.walls.placements() {
+            placement.move_to(time, dt);
+            placement.look_ahead(time, interval);
+        }
     }
 
     /// What a list must hold to be complete until the next one.
@@ -82,7 +96,9 @@ impl Surroundings {
 
     /// The coefficients of a contact between a grain and a wall.
     pub fn wall_law(&self, bed: &Bed, i: usize, wall: usize) -> ContactLaw {
-        contact_law(&self.walls[wall].material, [bed.inverse_mass[i], 0.0], [1.0, 0.0])
+        // The spin of a moving wall is in units of the grain's radius, so that its lever is the grain's.
+        let lever = if self.has_moving_walls { [1.0, 1.0] } else { [1.0, 0.0] };
+        contact_law(&self.walls.wall(wall).material, [bed.inverse_mass[i], 0.0], lever)
     }
 }
 
@@ -209,6 +225,44 @@ impl Contacts {
         assemble::refresh_walls(&mut self.at_walls, &around.walls, bed, around.settings.dt);
     }
 
+    /// Puts the walls' motion into the bodies that stand for them, one for each contact at a wall.
+    ///
+    /// A contact sees its second body's surface at `v_j - n x w_j`, so `v_j = v_wall + n x w_j` with `w_j = r omega_wall`.
+    pub fn move_walls(&self, bed: &mut Bed, around: &Surroundings) {
+        if !around.has_moving_walls {
+            return;
+        }
+        bed.resize_wall_bodies(self.at_walls.wall_bodies());
+        for (number, lane) in self.at_walls.lanes() {
+            let (batch, at) = (&self.at_walls.batches[number], &self.at_walls.at_walls[number]);
+            let (grain, normal) = (batch.i[lane] as usize, Vector3::from(batch.normal.get(lane)));
+            let radius = bed.radius(grain);
+            let touching = bed.position(grain) - radius * normal;
+            let (velocity, omega) = around.walls.wall(at.wall[lane] as usize).motion_at(&touching);
+            let spin = radius * omega;
+            bed.bodies[batch.j[lane] as usize] = Body {
+                velocity: Row::new(&(velocity + normal.cross(&spin)), 0.0),
+                spin: Row::new(&spin, 0.0),
+            };
+        }
+    }
+
+    /// Work that the walls have done on the grains in the lasting contacts of the substep, per typical mass
+    /// `[m^2/s^2]`: impulse times the velocity of the wall, moment times its turning.
+    pub fn work_of_walls(&self, bed: &Bed) -> f64 {
+        let work = |(number, lane): (usize, usize)| {
+            let batch = &self.at_walls.batches[number];
+            let [normal, lambda_t, lambda_r] = [&batch.normal, &batch.lambda_t, &batch.lambda_r]
+                .map(|l| Vector3::from(l.get(lane)));
+            let body = &bed.bodies[batch.j[lane] as usize];
+            let spin = body.spin.vector();
+            let velocity = body.velocity.vector() - normal.cross(&spin);
+            let force = batch.lambda_n.0[lane] * normal + lambda_t;
+            force.dot(&velocity) + lambda_r.dot(&spin)
+        };
+        self.at_walls.lanes().map(work).sum()
+    }
+
     /// Number of listed contacts.
     pub fn count(&self) -> usize {
         self.pairs.len() + self.at_walls.len()
@@ -231,7 +285,7 @@ impl Contacts {
             if come_near { &mut self.listed } else { &mut self.far }.push(Listed { i, partner });
         }
         self.listed.append(&mut self.far);
-        self.pairs.rebuild(&self.listed, &self.blocks, bed.count(), false, |contact| {
+        self.pairs.rebuild(&self.listed, &self.blocks, bed.count(), Second::Grain, |contact| {
             around.pair_law(bed, contact.i as usize, contact.partner as usize)
         });
 
@@ -241,7 +295,8 @@ impl Contacts {
             if is_near { &mut self.listed } else { &mut self.far }.push(contact);
         }
         self.listed.append(&mut self.far);
-        self.at_walls.rebuild(&self.listed, &self.blocks, bed.count(), true, |contact| {
+        let second = if around.has_moving_walls { Second::MovingWall } else { Second::RestingWall };
+        self.at_walls.rebuild(&self.listed, &self.blocks, bed.count(), second, |contact| {
             around.wall_law(bed, contact.i as usize, contact.partner as usize)
         });
     }
@@ -255,12 +310,10 @@ impl Contacts {
                 let Path { from, velocity } = &paths[grain];
                 let near = bed.radius(grain) + NEAR * around.radius + interval * velocity.norm();
                 let range = near + around.margin - NEAR * around.radius;
-                for (number, wall) in walls.iter().enumerate() {
-                    if wall.surface.may_reach(from, range) {
-                        let contact = Listed { i: grain as u32, partner: number as u32 };
-                        found.push((contact, wall.surface.may_reach(from, near)));
-                    }
-                }
+                walls.reached(from, range, |surface| {
+                    let contact = Listed { i: grain as u32, partner: surface as u32 };
+                    found.push((contact, walls.may_reach(surface, from, near)));
+                });
             }
         };
         around.threads.gather_ranges(bed.count(), SHARE, &mut self.near_walls, list);
@@ -306,14 +359,15 @@ impl Contacts {
             }
         }
         let range = bed.radius(grain) + around.margin + left * velocity.norm();
-        for (number, wall) in around.walls.iter().enumerate() {
-            let partner = (bed.count() + number) as u32;
-            if !self.partners.has(grain, partner) && wall.surface.may_reach(&at, range) {
-                self.partners.add(grain, partner);
-                let contact = Listed { i: grain as u32, partner: number as u32 };
-                self.at_walls.append(contact, true, around.wall_law(bed, grain, number));
+        let (partners, at_walls) = (&mut self.partners, &mut self.at_walls);
+        around.walls.reached(&at, range, |surface| {
+            let partner = (bed.count() + surface) as u32;
+            if !partners.has(grain, partner) {
+                partners.add(grain, partner);
+                let contact = Listed { i: grain as u32, partner: surface as u32 };
+                at_walls.append(contact, true, around.wall_law(bed, grain, surface));
             }
-        }
+        });
     }
 }
 

@@ -48,6 +48,14 @@ pub enum DemError {
         /// The length it must have.
         expected: usize,
     },
+    /// A mesh that cannot be a wall.
+    #[error("mesh {file} {reason}")]
+    Mesh {
+        /// The file that it stands in.
+        file: String,
+        /// What is wrong with it, and what is allowed.
+        reason: String,
+    },
     /// The operating system gave no threads.
     #[error("cannot start the threads for a simulation")]
     Threads(#[source] rayon::ThreadPoolBuildError),

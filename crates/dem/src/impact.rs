@@ -73,6 +73,8 @@ pub(crate) struct Impacts {
     pub candidates: Vec<Candidate>,
     queue: BinaryHeap<Event>,
     foreseen: Vec<Event>,
+    /// Work that walls have done in impacts since it was last asked for, per typical mass `[m^2/s^2]`.
+    pub work_of_walls: f64,
     /// Impacts of each grain in this substep.
     counts: Vec<u32>,
     /// The grains with impacts.
@@ -99,9 +101,11 @@ impl Impacts {
         self.queue.extend(self.foreseen.drain(..));
         let mut resolved = 0;
         while let Some(Event { time, pair, counts }) = self.queue.pop() {
-            if counts != self.counts_of(pair) || !collide(pair, time, bed, around) {
+            if counts != self.counts_of(pair) {
                 continue;
             }
+            let Some(work) = collide(pair, time, bed, around) else { continue };
+            self.work_of_walls += work;
             resolved += 1;
             for grain in [pair.i, pair.partner] {
                 let grain = grain as usize;
@@ -188,11 +192,16 @@ fn time_of_pair(i: usize, j: usize, now: f64, bed: &Bed) -> Option<f64> {
 /// When a grain touches a wall, on the parabola of which the substep is the chord.
 fn time_at_wall(pair: Candidate, now: f64, bed: &Bed, around: &Surroundings) -> Option<f64> {
     let (grain, dt) = (pair.i as usize, around.settings.dt);
-    let wall = &around.walls[pair.partner as usize - bed.count()];
+    let surface = pair.partner as usize - bed.count();
     let place = bed.place_at(grain, now);
-    let near = wall.surface.nearest(&place.vector());
+    let near = around.walls.nearest(surface, &place.vector(), now);
+    if near.distance.is_infinite() {
+        return None;
+    }
     let gap = near.distance - place.0[3];
-    let w_n = near.normal.dot(&bed.velocity(grain));
+    let touching = place.vector() - near.distance * near.normal;
+    let w_n =
+        near.normal.dot(&(bed.velocity(grain) - around.walls.wall(surface).motion_at(&touching).0));
     let fall = near.normal.dot(&around.gravity);
     if gap <= 0.0 {
         return (w_n + fall * (now - 0.5 * dt) < -IMPACT_SPEED).then_some(now);
@@ -234,15 +243,21 @@ impl Meeting {
         }
     }
 
-    fn with_wall(i: usize, wall: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
+    fn with_wall(i: usize, surface: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
         let place = bed.place_at(i, time).vector();
-        let normal = around.walls[wall].surface.nearest(&place).normal;
+        let law = around.wall_law(bed, i, surface);
+        let (wall, near) =
+            (around.walls.wall(surface), around.walls.nearest(surface, &place, time));
+        let normal = near.normal;
+        let (velocity, omega) = wall.motion_at(&(place - near.distance * normal));
+        let spin = bed.radius(i) * omega;
         Self {
-            law: around.wall_law(bed, i, wall),
-            material: around.walls[wall].material,
+            law,
+            material: wall.material,
             normal,
-            velocity: Vector3::zeros(),
-            spin: Vector3::zeros(),
+            // The contact sees the surface of its second body at v - n x w.
+            velocity: velocity + normal.cross(&spin),
+            spin,
             falling: normal.dot(&around.gravity) * (time - 0.5 * around.settings.dt),
         }
     }
@@ -250,7 +265,8 @@ impl Meeting {
 
 /// Lets two collide at `time` if they still approach fast enough: Newton's restitution, Coulomb's friction
 /// and rolling friction, each solved exactly in this order. If they do not, both stay as they are.
-fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> bool {
+/// Returns the work of a moving wall per typical mass `[m^2/s^2]`.
+fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> Option<f64> {
     let (i, other) = (pair.i as usize, other_grain(pair, bed));
     let meeting = if let Some(j) = other {
         Meeting::with_grain(i, j, time, bed, around)
@@ -262,7 +278,7 @@ fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> 
     let dv = bed.velocity(i) - velocity;
     let w_n = normal.dot(&dv);
     if w_n + falling >= -IMPACT_SPEED {
-        return false;
+        return None;
     }
     bed.advance(i, time);
     if let Some(j) = other {
@@ -293,8 +309,9 @@ fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> 
         let body = &mut bed.bodies[j];
         body.velocity.add(&(-c_j * force));
         body.spin.add(&(-c_j * (l_j * roll + twist)));
+        return Some(0.0);
     }
-    true
+    Some(force.dot(&(velocity - normal.cross(&spin_j))) + lambda_r.dot(&spin_j))
 }
 
 /// The vector, or the part of it that is as long as `limit`.

@@ -47,6 +47,7 @@ mod neighbor;
 mod parallel;
 mod partners;
 mod path;
+mod placement;
 mod pour;
 mod preset;
 mod problem;
@@ -67,8 +68,9 @@ pub use pour::{Pour, Status};
 pub use preset::{Preset, SolverSettings};
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
-    CameraSpec, EndRule, Funnel, GRAVITY, Grains, Ground, Mask, NoiseSpec, Projection, Scene,
-    SensorSpec, Shape, Start, StereoSpec, TimeOfFlightSpec, Wall,
+    BoxSide, CameraSpec, EndRule, Ends, Funnel, GRAVITY, Grains, Ground, Mask, Mesh, MeshFile,
+    Motion, NoiseSpec, Projection, Scene, SensorSpec, Shape, Start, StereoSpec, TimeOfFlightSpec,
+    Wall,
 };
 pub use simulation::Simulation;
 pub use solver::Method;

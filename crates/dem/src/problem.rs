@@ -38,7 +38,8 @@ pub struct FrozenContact {
     pub normal: Vector3<f64>,
     /// Unit tangents; `(t1, t2, n)` is right-handed.
     pub tangents: [Vector3<f64>; 2],
-    /// Levers `R_eff / r_i` and `R_eff / r_j`, 1 and 0 at a wall `[-]`.
+    /// Levers `R_eff / r_i` and `R_eff / r_j`, 1 and 0 at a wall `[-]` (1 and 1 where walls move: the second
+    /// counts only in the bias).
     pub lever: [f64; 2],
     /// Sliding friction mu_s `[-]`.
     pub sliding_friction: f64,
@@ -46,7 +47,7 @@ pub struct FrozenContact {
     pub rolling_friction: f64,
     /// Torsional friction mu_t `[-]`.
     pub torsional_friction: f64,
-    /// Bias of the six rows `[m/s]`: b, then zeros.
+    /// Bias of the six rows `[m/s]`: b, then zeros; less the wall's own motion where it moves.
     pub bias: Vector6<f64>,
     /// Impulses over a typical mass along the six rows that granulcal found `[m/s]`; the last three over R_eff.
     pub impulse: Vector6<f64>,
@@ -91,7 +92,7 @@ pub struct ContactProblem {
 
 impl FrozenContact {
     /// Reads lane `lane` of a batch; the impulses are those of the warm start.
-    fn read(set: &ContactSet, number: usize, lane: usize) -> Self {
+    fn read(set: &ContactSet, number: usize, lane: usize, bodies: &[Body]) -> Self {
         let batch = &set.batches[number];
         let law = &set.laws[batch.law as usize];
         let partner = match set.at_walls.get(number) {
@@ -112,6 +113,10 @@ impl FrozenContact {
             bias: batch.bias.0[lane] * Vector6::x(),
             impulse: Vector6::zeros(),
         };
+        if set.has_wall_bodies() {
+            let wall = motion(&bodies[batch.j[lane] as usize]);
+            contact.bias += contact.jacobian(Side::Partner) * wall;
+        }
         contact.take_impulse(batch, lane);
         contact
     }
@@ -207,7 +212,9 @@ impl ContactProblem {
     /// Reads assembled contacts; `bed` holds the free velocities, without the warm start.
     pub(crate) fn new(bed: &Bed, contacts: &Contacts, time: f64, dt: f64) -> Self {
         let free_velocities = bed.bodies[..bed.count()].iter().map(motion).collect();
-        let contacts = lanes(contacts).map(|at| FrozenContact::read(at.0, at.1, at.2)).collect();
+        let contacts = lanes(contacts)
+            .map(|(set, number, lane)| FrozenContact::read(set, number, lane, &bed.bodies))
+            .collect();
         let mut problem = Self {
             time,
             dt,
@@ -221,9 +228,10 @@ impl ContactProblem {
     }
 
     /// Takes over the impulses after `sweeps` more sweeps.
-    pub(crate) fn take_impulses(&mut self, contacts: &Contacts, sweeps: usize) {
+    pub(crate) fn take_impulses(&mut self, contacts: &Contacts, bodies: &[Body], sweeps: usize) {
         self.contacts.clear();
-        self.contacts.extend(lanes(contacts).map(|at| FrozenContact::read(at.0, at.1, at.2)));
+        let read = |(set, number, lane)| FrozenContact::read(set, number, lane, bodies);
+        self.contacts.extend(lanes(contacts).map(read));
         self.sort();
         self.sweeps += sweeps;
     }
@@ -337,7 +345,12 @@ impl ContactProblem {
 fn lanes(contacts: &Contacts) -> impl Iterator<Item = (&ContactSet, usize, usize)> {
     [&contacts.pairs, &contacts.at_walls].into_iter().flat_map(|set| {
         let batches = set.batches.iter().enumerate();
-        batches.flat_map(move |(number, batch)| batch.lanes().map(move |lane| (set, number, lane)))
+        let lanes =
+            batches.flat_map(|(number, batch)| batch.lanes().map(move |lane| (number, lane)));
+        // A facet of which a neighbour is nearer is infinitely far.
+        let is_one =
+            |&(number, lane): &(usize, usize)| set.batches[number].bias.0[lane].is_finite();
+        lanes.filter(is_one).map(move |(number, lane)| (set, number, lane))
     })
 }
 

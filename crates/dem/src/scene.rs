@@ -4,6 +4,8 @@
 //! ground is the plane z = 0 and gravity points down unless the scene says otherwise.
 
 mod camera;
+mod mesh;
+mod motion;
 pub(crate) mod path;
 mod sensor;
 mod start;
@@ -12,9 +14,11 @@ mod walls;
 use serde::{Deserialize, Serialize};
 
 pub use camera::{CameraSpec, Mask, Projection};
+pub use mesh::{Mesh, MeshFile};
+pub use motion::Motion;
 pub use sensor::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 pub use start::Start;
-pub use walls::{Funnel, Ground, Shape, Wall};
+pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
 
 use crate::{DemError, Material, Preset};
 
@@ -130,9 +134,17 @@ impl Scene {
     /// [`DemError::Toml`] for what is not TOML of a scene (unknown keys included),
     /// [`DemError::OutOfRange`] for numbers that no scene can have.
     pub fn from_toml(text: &str) -> Result<Self, DemError> {
-        let scene: Self = toml::from_str(text).map_err(|e| DemError::Toml(Box::new(e)))?;
+        let scene = Self::parse(text)?;
         scene.check()?;
         Ok(scene)
+    }
+
+    /// Reads a scene whose files are still to be read, and checks nothing else.
+    ///
+    /// # Errors
+    /// [`DemError::Toml`] for what is not TOML of a scene.
+    pub fn parse(text: &str) -> Result<Self, DemError> {
+        toml::from_str(text).map_err(|e| DemError::Toml(Box::new(e)))
     }
 
     /// The scene as TOML; [`Scene::from_toml`] reads it back unchanged.
@@ -141,6 +153,38 @@ impl Scene {
     /// [`DemError::TomlWrite`] if a number cannot be written.
     pub fn to_toml(&self) -> Result<String, DemError> {
         toml::to_string(self).map_err(|e| DemError::TomlWrite(Box::new(e)))
+    }
+
+    /// The mesh files that walls name.
+    pub fn mesh_files(&mut self) -> impl Iterator<Item = &mut MeshFile> {
+        self.walls.iter_mut().filter_map(|wall| match &mut wall.shape {
+            Shape::Mesh(file) => Some(file),
+            _ => None,
+        })
+    }
+
+    /// How the funnel and the walls move.
+    pub fn motions(&mut self) -> impl Iterator<Item = &mut Motion> {
+        let walls = self.walls.iter_mut().map(|wall| &mut wall.motion);
+        walls.chain(self.funnel.iter_mut().map(|funnel| &mut funnel.motion))
+    }
+
+    /// Takes over the meshes that another scene has read from the same files.
+    pub(crate) fn take_meshes(&mut self, other: &Self) {
+        for (mine, theirs) in self.walls.iter_mut().zip(&other.walls) {
+            if let (Shape::Mesh(mine), Shape::Mesh(theirs)) = (&mut mine.shape, &theirs.shape)
+                && mine.file == theirs.file
+            {
+                mine.mesh.clone_from(&theirs.mesh);
+            }
+        }
+    }
+
+    /// When the last wall has come to rest, or the horizon if one never does `[s]`.
+    pub fn moves_until(&self) -> f64 {
+        let walls = self.walls.iter().map(|wall| &wall.motion);
+        let motions = walls.chain(self.funnel.iter().map(|funnel| &funnel.motion));
+        motions.map(Motion::end).fold(0.0, f64::max).min(self.end.horizon)
     }
 
     /// Checks every number of the scene.
@@ -162,7 +206,14 @@ impl Scene {
             funnel.check(&self.material, self.grains.radius())?;
         }
         for (index, wall) in self.walls.iter().enumerate() {
-            wall.check(&format!("walls.{index}"), &self.material)?;
+            wall.check(&format!("walls.{index}"), &self.material, &self.grains)?;
+        }
+        let (dt, diameter) = (self.preset.settings().dt, self.grains.diameter);
+        let walls = self.walls.iter().enumerate();
+        let named = walls.map(|(index, wall)| (format!("walls.{index}"), &wall.motion));
+        let funnel = self.funnel.iter().map(|funnel| ("funnel".to_owned(), &funnel.motion));
+        for (name, motion) in named.chain(funnel) {
+            motion.check_jumps(&name, dt, diameter)?;
         }
         self.camera.check()
     }

@@ -161,7 +161,7 @@ impl Simulation {
     /// and stem if there is one, then the scene's walls in their order. See [`WallLoad`].
     pub fn wall_loads(&self) -> Vec<WallLoad> {
         let dt = self.around.settings.dt;
-        wall_load::of(&self.contacts.at_walls, self.around.walls.len(), dt)
+        wall_load::of(&self.contacts.at_walls, &self.around.walls, dt)
     }
 
     /// How the pour ended, once it has.
@@ -186,7 +186,7 @@ impl Simulation {
             problem.put_velocities(&mut bed.bodies);
             let Contacts { pairs, at_walls, .. } = &mut *contacts;
             nsgs::sweep_plainly(&mut [pairs, at_walls], &mut bed.bodies, SWEEPS_A_LOOK);
-            problem.take_impulses(contacts, SWEEPS_A_LOOK);
+            problem.take_impulses(contacts, &bed.bodies, SWEEPS_A_LOOK);
         }
         problem
     }
@@ -235,6 +235,7 @@ impl Simulation {
 
     /// Lists and assembles the contacts of a substep, lets gravity act and resolves the impacts.
     fn assemble(&mut self) -> Seen {
+        self.around.move_walls(self.substep as f64 * self.around.settings.dt);
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
         contacts.follow(bed, around);
         bed.accelerate(&around.gravity, around.settings.dt, &around.threads);
@@ -243,6 +244,7 @@ impl Simulation {
             contacts.assemble_again(bed, around);
             bed.rewind();
         }
+        contacts.move_walls(bed, around);
         seen
     }
 
@@ -269,11 +271,20 @@ impl Simulation {
     fn step_here(&mut self) {
         let seen = self.assemble();
         self.solve();
+        self.count_work_of_walls();
         self.bed.move_on(self.around.settings.dt);
         self.watch.see_penetration(seen.penetration);
         self.substep += 1;
         if self.substep.is_multiple_of(self.around.settings.list_period) {
             self.examine();
+        }
+    }
+
+    /// What moving walls put into the grains is not created.
+    fn count_work_of_walls(&mut self) {
+        if self.around.has_moving_walls {
+            let in_impacts = std::mem::take(&mut self.impacts.work_of_walls);
+            self.watch.see_work(in_impacts + self.contacts.work_of_walls(&self.bed));
         }
     }
 

@@ -1,18 +1,173 @@
-//! Walls as the solver sees them: distance and normal of the nearest point to a grain's centre.
+//! Walls as the solver sees them: distance and normal of the nearest point to a grain's centre. A wall has one or more
+//! surfaces, and a grain may touch each of them once.
 //!
 //! A frustum (cone or cylinder) is a thin shell of revolution. In the half plane through its axis and
 //! the grain it is a straight segment, so the nearest point is the nearest point of a segment.
 
+mod facets;
+
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
-use crate::scene::{Scene, Shape};
+use crate::placement::Placement;
+use crate::scene::{self, BoxSide, Ends, Motion, Scene, Shape};
 use crate::{Material, WallMaterial};
+use facets::Facets;
 
-/// A wall with its resolved material.
+/// A wall with its resolved material, and where it is if it moves.
 #[derive(Clone, Debug)]
 pub(crate) struct Wall {
-    pub surface: Surface,
+    surfaces: Vec<Surface>,
+    /// The triangles of a mesh, numbered after the surfaces.
+    facets: Option<Arc<Facets>>,
     pub material: Material,
+    pub placement: Option<Placement>,
+}
+
+impl Wall {
+    /// Surfaces and facets, each of which a grain may touch once.
+    fn count(&self) -> usize {
+        self.surfaces.len() + self.facets.as_ref().map_or(0, |facets| facets.count())
+    }
+
+    fn nearest_there(&self, number: usize, centre: &Vector3<f64>) -> Nearest {
+        match (self.surfaces.get(number), &self.facets) {
+            (None, Some(facets)) => facets.nearest(number - self.surfaces.len(), centre),
+            _ => self.surfaces[number].nearest(centre),
+        }
+    }
+
+    /// The nearest point of a surface to a centre at `now` `[s]` into the substep.
+    fn nearest(&self, number: usize, centre: &Vector3<f64>, now: f64) -> Nearest {
+        let Some(placement) = &self.placement else { return self.nearest_there(number, centre) };
+        let near = self.nearest_there(number, &placement.seen(centre, now));
+        Nearest { normal: placement.turned(&near.normal), ..near }
+    }
+
+    /// Where a centre is in the wall's stated place, and how near a surface that comes nearer than `range` until the next list
+    /// may be.
+    fn seen(&self, centre: &Vector3<f64>, range: f64) -> (Vector3<f64>, f64) {
+        match &self.placement {
+            None => (*centre, range),
+            Some(placement) => (placement.seen(centre, 0.0), range + placement.reach_at(centre)),
+        }
+    }
+
+    /// Whether a surface may come nearer than `range` `[m]` until the next list; false only when it surely does not.
+    fn may_reach(&self, number: usize, centre: &Vector3<f64>, range: f64) -> bool {
+        let (centre, range) = self.seen(centre, range);
+        match (self.surfaces.get(number), &self.facets) {
+            (None, Some(facets)) => facets.may_reach(number - self.surfaces.len(), &centre, range),
+            _ => self.surfaces[number].may_reach(&centre, range),
+        }
+    }
+
+    /// Calls `found` for every surface that may come nearer than `range` `[m]` until the next list.
+    fn reached(&self, centre: &Vector3<f64>, range: f64, mut found: impl FnMut(usize)) {
+        let (centre, range) = self.seen(centre, range);
+        for (number, surface) in self.surfaces.iter().enumerate() {
+            if surface.may_reach(&centre, range) {
+                found(number);
+            }
+        }
+        if let Some(facets) = &self.facets {
+            facets.reached(&centre, range, |facet| found(self.surfaces.len() + facet));
+        }
+    }
+
+    /// Whether it may move.
+    pub fn is_moving(&self) -> bool {
+        self.placement.is_some()
+    }
+
+    /// Velocity and angular velocity in this substep of the wall's point at `x` `[m/s]`, `[rad/s]`.
+    pub fn motion_at(&self, x: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        let still = (Vector3::zeros(), Vector3::zeros());
+        let moving = self.placement.as_ref().filter(|placement| placement.moves());
+        moving.map_or(still, |p| (p.velocity_at(x), p.angular_velocity()))
+    }
+}
+
+/// All walls of a scene, the ground first, with their surfaces numbered through.
+#[derive(Clone, Debug)]
+pub(crate) struct Walls {
+    all: Vec<Wall>,
+    /// The number of each wall's first surface.
+    first: Vec<u32>,
+    /// The wall of each surface.
+    owner: Vec<u32>,
+}
+
+impl Walls {
+    pub fn of(scene: &Scene) -> Self {
+        let ground = Shape::Plane { point: [0.0; 3], normal: [0.0, 0.0, 1.0] };
+        let resolve = |shape: &Shape, material: &WallMaterial, motion: &Motion| Wall {
+            surfaces: surfaces(shape),
+            facets: facets(shape).map(Arc::new),
+            material: material.over(&scene.material),
+            placement: Placement::new(motion),
+        };
+        let of = |wall: &scene::Wall| resolve(&wall.shape, &wall.material, &wall.motion);
+        let mut all = vec![resolve(&ground, &scene.ground.material, &Motion::Still)];
+        all.extend(scene.funnel.iter().flat_map(scene::Funnel::walls).map(|wall| of(&wall)));
+        all.extend(scene.walls.iter().map(of));
+        let (mut first, mut owner) = (Vec::new(), Vec::new());
+        for (number, wall) in all.iter().enumerate() {
+            first.push(owner.len() as u32);
+            owner.resize(owner.len() + wall.count(), number as u32);
+        }
+        Self { all, first, owner }
+    }
+
+    /// Number of surfaces.
+    pub fn surfaces(&self) -> usize {
+        self.owner.len()
+    }
+
+    /// Number of walls.
+    pub fn count(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Whether any may move.
+    pub fn any_moving(&self) -> bool {
+        self.all.iter().any(Wall::is_moving)
+    }
+
+    /// Where the walls that may move are.
+    pub fn placements(&mut self) -> impl Iterator<Item = &mut Placement> {
+        self.all.iter_mut().filter_map(|wall| wall.placement.as_mut())
+    }
+
+    /// The number of a surface's wall.
+    pub fn owner(&self, surface: usize) -> usize {
+        self.owner[surface] as usize
+    }
+
+    /// A surface's wall.
+    pub fn wall(&self, surface: usize) -> &Wall {
+        &self.all[self.owner(surface)]
+    }
+
+    /// The nearest point of a surface to a centre at `now` `[s]` into the substep.
+    pub fn nearest(&self, surface: usize, centre: &Vector3<f64>, now: f64) -> Nearest {
+        let owner = self.owner(surface);
+        self.all[owner].nearest(surface - self.first[owner] as usize, centre, now)
+    }
+
+    /// Whether a surface may come nearer than `range` `[m]` until the next list.
+    pub fn may_reach(&self, surface: usize, centre: &Vector3<f64>, range: f64) -> bool {
+        let owner = self.owner(surface);
+        self.all[owner].may_reach(surface - self.first[owner] as usize, centre, range)
+    }
+
+    /// Calls `found` for every surface that may come nearer than `range` `[m]` until the next list, in their order.
+    pub fn reached(&self, centre: &Vector3<f64>, range: f64, mut found: impl FnMut(usize)) {
+        for (wall, &first) in self.all.iter().zip(&self.first) {
+            wall.reached(centre, range, |number| found(first as usize + number));
+        }
+    }
 }
 
 /// The surfaces that the solver knows.
@@ -22,6 +177,8 @@ pub(crate) enum Surface {
     Plane { point: Vector3<f64>, normal: Vector3<f64> },
     /// The shell of a truncated cone or cylinder.
     Frustum(Frustum),
+    /// A flat disc that touches grains on both sides.
+    Disc { centre: Vector3<f64>, normal: Vector3<f64>, radius: f64 },
 }
 
 /// A shell of revolution whose generator is a segment.
@@ -60,6 +217,9 @@ impl Surface {
                 Nearest { distance, normal: *normal, side }
             }
             Self::Frustum(shell) => shell.nearest(centre),
+            Self::Disc { centre: middle, normal, radius } => {
+                nearest_of_disc(middle, normal, *radius, centre)
+            }
         }
     }
 
@@ -72,6 +232,7 @@ impl Surface {
                 (centre - shell.middle).norm_squared() < reach * reach
                     && shell.nearest(centre).distance < range
             }
+            Self::Disc { .. } => self.nearest(centre).distance < range,
         }
     }
 }
@@ -108,37 +269,80 @@ impl Frustum {
     }
 }
 
+fn nearest_of_disc(
+    middle: &Vector3<f64>,
+    normal: &Vector3<f64>,
+    radius: f64,
+    centre: &Vector3<f64>,
+) -> Nearest {
+    let offset = centre - middle;
+    let height = offset.dot(normal);
+    let outward = offset - height * normal;
+    let beyond = outward.norm() - radius;
+    if beyond <= 0.0 {
+        let side = if height < 0.0 { -1 } else { 1 };
+        return Nearest { distance: height.abs(), normal: f64::from(side) * normal, side };
+    }
+    let gap = height * normal + outward * (beyond / outward.norm());
+    let distance = gap.norm();
+    Nearest { distance, normal: gap / distance, side: 0 }
+}
+
 fn any_normal(axis: &Vector3<f64>) -> Vector3<f64> {
     let other = if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
     axis.cross(&other).normalize()
 }
 
-/// Every wall of a scene, the ground first.
-pub(crate) fn walls_of(scene: &Scene) -> Vec<Wall> {
-    let ground = Shape::Plane { point: [0.0; 3], normal: [0.0, 0.0, 1.0] };
-    let resolve = |shape: &Shape, material: &WallMaterial| Wall {
-        surface: surface(shape),
-        material: material.over(&scene.material),
+/// The surfaces of a shape, but for those of a mesh.
+fn surfaces(shape: &Shape) -> Vec<Surface> {
+    let shell = |from: &[f64; 3], to: &[f64; 3], at_from: f64, at_to: f64, closed: Ends| {
+        let (from, to) = (Vector3::from(*from), Vector3::from(*to));
+        let axis = (to - from).normalize();
+        let disc =
+            |end: Vector3<f64>, radius: f64| Surface::Disc { centre: end, normal: axis, radius };
+        let mut surfaces = vec![Surface::Frustum(Frustum::new(from, to, at_from, at_to))];
+        surfaces.extend(closed.at_from().then(|| disc(from, at_from)));
+        surfaces.extend(closed.at_to().then(|| disc(to, at_to)));
+        surfaces
     };
-    let mut walls = vec![resolve(&ground, &scene.ground.material)];
-    if let Some(funnel) = &scene.funnel {
-        walls.extend(funnel.walls().iter().map(|wall| resolve(&wall.shape, &wall.material)));
+    match shape {
+        Shape::Plane { point, normal } => {
+            let normal = Vector3::from(*normal).normalize();
+            vec![Surface::Plane { point: (*point).into(), normal }]
+        }
+        Shape::Disc { centre, normal, radius } => {
+            let normal = Vector3::from(*normal).normalize();
+            vec![Surface::Disc { centre: (*centre).into(), normal, radius: *radius }]
+        }
+        Shape::Cone { from, to, radius_from, radius_to, closed } => {
+            shell(from, to, *radius_from, *radius_to, *closed)
+        }
+        Shape::Cylinder { from, to, radius, closed } => shell(from, to, *radius, *radius, *closed),
+        Shape::Box { .. } | Shape::Mesh(_) => Vec::new(),
     }
-    walls.extend(scene.walls.iter().map(|wall| resolve(&wall.shape, &wall.material)));
-    walls
 }
 
-fn surface(shape: &Shape) -> Surface {
-    match *shape {
-        Shape::Plane { point, normal } => {
-            Surface::Plane { point: point.into(), normal: Vector3::from(normal).normalize() }
+/// The triangles of a box or a mesh.
+fn facets(shape: &Shape) -> Option<Facets> {
+    match shape {
+        Shape::Box { min, max, open } => {
+            let corner = |number: usize| {
+                let side =
+                    |axis: usize| if number >> axis & 1 == 1 { max[axis] } else { min[axis] };
+                Vector3::new(side(0), side(1), side(2))
+            };
+            let corners: Vec<_> = (0..8).map(corner).collect();
+            let sides = BoxSide::ALL.into_iter().filter(|side| !open.contains(side));
+            let triangles: Vec<_> = sides.flat_map(BoxSide::triangles).collect();
+            Some(Facets::new(&corners, &triangles))
         }
-        Shape::Cone { from, to, radius_from, radius_to } => {
-            Surface::Frustum(Frustum::new(from.into(), to.into(), radius_from, radius_to))
+        Shape::Mesh(file) => {
+            let mesh = file.mesh.as_ref().expect("a checked scene");
+            let scaled = |v: &[f64; 3]| file.unit * Vector3::from(*v);
+            let vertices: Vec<_> = mesh.vertices().iter().map(scaled).collect();
+            Some(Facets::new(&vertices, mesh.triangles()))
         }
-        Shape::Cylinder { from, to, radius } => {
-            Surface::Frustum(Frustum::new(from.into(), to.into(), radius, radius))
-        }
+        _ => None,
     }
 }
 
@@ -154,9 +358,54 @@ mod tests {
     const FROM: [f64; 3] = [0.01, -0.02, 0.1];
     const SIDES: u32 = 720;
 
+    fn one(shape: &Shape) -> Surface {
+        surfaces(shape).remove(0)
+    }
+
+    /// A tube of radius 20 mm from the origin on.
+    fn tube(to: [f64; 3], closed: Ends) -> Shape {
+        Shape::Cylinder { from: [0.0; 3], to, radius: 0.02, closed }
+    }
+
+    #[test]
+    fn closed_ends_are_discs() {
+        let [_, floor, lid] = &surfaces(&tube([0.0, 0.0, 0.1], Ends::Both))[..] else {
+            panic!("a shell and two discs")
+        };
+        let centre = Vector3::new(0.01, 0.0, 0.03);
+        let near = floor.nearest(&centre);
+        assert_eq!((near.distance, near.normal, near.side), (0.03, Vector3::z(), 1));
+        assert!((lid.nearest(&centre).normal + Vector3::z()).norm() < 1e-15);
+        // Beyond the rim the nearest point is on it.
+        let near = floor.nearest(&Vector3::new(0.0, 0.023, -0.004));
+        assert!((near.distance - 0.005).abs() < 1e-15 && near.side == 0);
+        assert!((near.normal - Vector3::new(0.0, 0.6, -0.8)).norm() < 1e-12);
+        assert_eq!(surfaces(&tube([0.0, 0.0, 0.1], Ends::From)).len(), 2);
+    }
+
+    #[test]
+    fn a_box_has_the_sides_that_are_not_open() {
+        let open = vec![BoxSide::ZMax];
+        let tray = Shape::Box { min: [-0.1, -0.1, 0.0], max: [0.1, 0.1, 0.05], open };
+        let tray = facets(&tray).expect("facets");
+        assert_eq!(tray.count(), 10);
+        let mut touched = Vec::new();
+        let centre = Vector3::new(0.097, 0.02, 0.004);
+        tray.reached(&centre, 0.01, |number| {
+            let near = tray.nearest(number, &centre);
+            if near.distance < 0.01 {
+                touched.push((near.distance, near.normal));
+            }
+        });
+        touched.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let [(side, out_of_side), (floor, up)] = touched[..] else { panic!("{touched:?}") };
+        assert!((side - 0.003).abs() < 1e-12 && (floor - 0.004).abs() < 1e-12);
+        assert!((out_of_side + Vector3::x()).norm() < 1e-12 && (up - Vector3::z()).norm() < 1e-12);
+    }
+
     /// A frustum from [`FROM`] to `to`.
     fn frustum(to: [f64; 3], radius_from: f64, radius_to: f64) -> Surface {
-        surface(&Shape::Cone { from: FROM, to, radius_from, radius_to })
+        one(&Shape::Cone { from: FROM, to, radius_from, radius_to, closed: Ends::None })
     }
 
     /// The same shell as triangles between two rings of [`SIDES`] points.
@@ -226,11 +475,12 @@ mod tests {
 
     #[test]
     fn side_changes_when_the_shell_is_crossed() {
-        let cone = surface(&Shape::Cone {
+        let cone = one(&Shape::Cone {
             from: [0.0; 3],
             to: [0.0, 0.0, 0.1],
             radius_from: 0.02,
             radius_to: 0.06,
+            closed: Ends::None,
         });
         let side = |x: f64, z: f64| cone.nearest(&Vector3::new(x, 0.0, z)).side;
         // At half the height the shell is at 0.04.
@@ -242,8 +492,7 @@ mod tests {
 
     #[test]
     fn normal_points_from_the_shell_to_the_centre() {
-        let cylinder =
-            surface(&Shape::Cylinder { from: [0.0; 3], to: [0.0, 0.0, 0.1], radius: 0.02 });
+        let cylinder = one(&tube([0.0, 0.0, 0.1], Ends::None));
         let inside = cylinder.nearest(&Vector3::new(0.0, 0.015, 0.05));
         assert!((inside.normal + Vector3::y()).norm() < 1e-15);
         assert!((inside.distance - 0.005).abs() < 1e-15);
@@ -258,21 +507,20 @@ mod tests {
     #[test]
     fn a_centre_on_the_axis_or_on_the_shell_has_a_normal() {
         for axis in [[0.0, 0.0, 0.1], [0.1, 0.0, 0.0], [0.0, -0.1, 0.0]] {
-            let shape =
-                Shape::Cone { from: [0.0; 3], to: axis, radius_from: 0.01, radius_to: 0.02 };
-            let near = surface(&shape).nearest(&(0.5 * Vector3::from(axis)));
+            let (radius_from, radius_to, closed) = (0.01, 0.02, Ends::None);
+            let shape = Shape::Cone { from: [0.0; 3], to: axis, radius_from, radius_to, closed };
+            let near = one(&shape).nearest(&(0.5 * Vector3::from(axis)));
             assert!((near.normal.norm() - 1.0).abs() < 1e-12, "{near:?}");
             assert!(near.distance > 0.0 && near.distance < 0.015 && near.side == -1);
         }
-        let shape = Shape::Cylinder { from: [0.0; 3], to: [0.0, 0.0, 0.1], radius: 0.02 };
-        let near = surface(&shape).nearest(&Vector3::new(0.02, 0.0, 0.05));
+        let near = one(&tube([0.0, 0.0, 0.1], Ends::None)).nearest(&Vector3::new(0.02, 0.0, 0.05));
         assert_eq!(near.distance, 0.0);
         assert!((near.normal + Vector3::x()).norm() < 1e-15); // inwards
     }
 
     #[test]
     fn plane_has_a_sign() {
-        let plane = surface(&Shape::Plane { point: [0.0, 0.0, 1.0], normal: [0.0, 3.0, 4.0] });
+        let plane = one(&Shape::Plane { point: [0.0, 0.0, 1.0], normal: [0.0, 3.0, 4.0] });
         let above = plane.nearest(&Vector3::new(7.0, 3.0, 5.0));
         assert!((above.distance - 5.0).abs() < 1e-15 && above.side == 1);
         assert!((above.normal - Vector3::new(0.0, 0.6, 0.8)).norm() < 1e-15);
@@ -286,10 +534,14 @@ mod tests {
     fn ground_comes_first_and_materials_resolve() {
         let mut scene = Scene::funnel(0.12);
         scene.ground.material.restitution = Some(0.1);
-        let walls = walls_of(&scene);
-        assert_eq!(walls.len(), 3);
-        assert!(matches!(walls[0].surface, Surface::Plane { .. }));
-        assert_eq!(walls[0].material, Material { restitution: 0.1, ..scene.material });
-        assert_eq!(walls[1].material, scene.material);
+        let open = Vec::new();
+        let shape = Shape::Box { min: [0.0; 3], max: [1.0; 3], open };
+        scene.walls.push(scene::Wall::fixed(shape, WallMaterial::default()));
+        let walls = Walls::of(&scene);
+        assert_eq!((walls.count(), walls.surfaces()), (4, 3 + 12));
+        assert!(matches!(walls.all[0].surfaces[..], [Surface::Plane { .. }]));
+        assert_eq!(walls.wall(0).material, Material { restitution: 0.1, ..scene.material });
+        assert_eq!(walls.wall(1).material, scene.material);
+        assert_eq!((walls.owner(2), walls.owner(3), walls.owner(14)), (2, 3, 3));
     }
 }

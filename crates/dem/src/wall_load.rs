@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::contact_set::ContactSet;
+use crate::wall::Walls;
 
 /// Force of all grains on one wall, over the mass of a grain, from the impulses of the lasting contacts in a
 /// substep: lambda / dt. Over g it is the number of grains that the wall carries. At rest it is exact; while
@@ -15,12 +16,12 @@ pub struct WallLoad {
     pub normal_force: f64,
 }
 
-/// The loads of `walls` walls.
-pub(crate) fn of(at_walls: &ContactSet, walls: usize, dt: f64) -> Vec<WallLoad> {
-    let mut loads = vec![WallLoad::default(); walls];
+/// The loads of the walls, each over all its surfaces.
+pub(crate) fn of(at_walls: &ContactSet, walls: &Walls, dt: f64) -> Vec<WallLoad> {
+    let mut loads = vec![WallLoad::default(); walls.count()];
     for (batch, at) in at_walls.batches.iter().zip(&at_walls.at_walls) {
         for lane in batch.lanes() {
-            let load = &mut loads[at.wall[lane] as usize];
+            let load = &mut loads[walls.owner(at.wall[lane] as usize)];
             let normal = Vector3::from(batch.normal.get(lane));
             let lambda_n = batch.lambda_n.0[lane];
             // The normal points to the grain: the wall feels the opposite.
@@ -63,7 +64,7 @@ mod tests {
         scene.material = Material::new(0.0, 0.0, 0.0).unwrap();
         for x in [-1.0, 1.0] {
             let shape = Shape::Plane { point: [0.0, 0.0, 0.1], normal: [x, 0.0, 1.0] };
-            scene.walls.push(Wall { shape, material: WallMaterial::default() });
+            scene.walls.push(Wall::fixed(shape, WallMaterial::default()));
         }
         let height = 0.1 + 0.002 * 2f64.sqrt();
         let loads = loads(&mut scene, [0.0, 0.0, height]);

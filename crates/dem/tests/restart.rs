@@ -27,7 +27,7 @@ fn funnel() -> Scene {
     scene.material = Material { tangential_restitution: 0.3, ..Material::default() };
     let shape = Shape::Plane { point: [0.0; 3], normal: [0.1, 0.0, 1.0] };
     let material = WallMaterial { sliding_friction: Some(0.2), ..WallMaterial::default() };
-    scene.walls.push(Wall { shape, material });
+    scene.walls.push(Wall::fixed(shape, material));
     scene.end.horizon = 0.5;
     scene
 }

@@ -1,6 +1,6 @@
 //! Class `Scene`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use granulcal_dem as dem;
 use pyo3::prelude::*;
@@ -34,7 +34,8 @@ impl Scene {
 
     #[staticmethod]
     fn from_toml(text: &str) -> PyResult<Self> {
-        dem::Scene::from_toml(text).map(|inner| Self { inner }).map_err(error::dem)
+        let scene = granulcal_dataset::scene_from_text(text, Path::new(""));
+        scene.map(|inner| Self { inner }).map_err(error::dataset)
     }
 
     #[staticmethod]

@@ -6,16 +6,19 @@ Torch is loaded when a model is first trained, and not before.
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from granulcal.bayessim.calibration import Calibration
     from granulcal.bayessim.config import Config
+    from granulcal.bayessim.misfit import Misfit
     from granulcal.bayessim.model import BayesSim
-    from granulcal.bayessim.summary import Calibration, TrainingSummary
+    from granulcal.bayessim.summary import TrainingSummary
 
-__all__ = ["BayesSim", "Calibration", "Config", "TrainingSummary"]
+__all__ = ["BayesSim", "Calibration", "Config", "Misfit", "TrainingSummary"]
 
 _HOMES = {
     "BayesSim": "model",
-    "Calibration": "summary",
+    "Calibration": "calibration",
     "Config": "config",
+    "Misfit": "misfit",
     "TrainingSummary": "summary",
 }
 

@@ -6,9 +6,20 @@ from typing import Any
 __all__ = ["Config"]
 
 KERNELS = ("matern12", "matern32", "matern52", "rbf")
-RECIPES = ("snr", "plain")
+METHODS = ("auto", "emulated", "distilled", "mdrff", "plain")
 # The recipe of Ramos, Possas & Fox (2019) apart from z-scoring and early stopping.
 _PLAIN = {"linear_start": False, "snr": False, "jitter": 0.0, "ensemble": 1, "weight_decay": 0.0}
+
+# Synthetic pairs have no end: large batches and steps, nothing that guards against too few pairs.
+_DISTILLED = {
+    "jitter": 0.0,
+    "ensemble": 1,
+    "weight_decay": 0.0,
+    "batch_size": 256,
+    "learning_rate": 3e-3,
+    "max_epochs": 40,
+}
+_DEFAULTS = {"plain": _PLAIN, "distilled": _DISTILLED}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,8 +27,10 @@ class Config:
     """How a mixture density random feature network is built and trained.
 
     Attributes:
-        recipe: `snr` is the default: statistics scaled by their signal-to-noise, jitter of the
-            inputs, an ensemble. `plain` is the original recipe; it only changes defaults.
+        method: `emulated`: likelihood of an emulator of the statistics. `mdrff`: network trained on
+            the pairs. `auto`, the default: both, and the one that says more about held-out pairs is
+            kept. `distilled`: network trained on synthetic pairs of the emulator. `plain`: the
+            original recipe of the network. The last two only change the network's defaults.
         kernel: kernel whose spectrum the frequencies are drawn from.
         features: number of random frequencies; each gives a cosine and a sine.
         components: Gaussians in the mixture of one member.
@@ -33,10 +46,12 @@ class Config:
         patience: passes without a better validation loss before a member stops.
         validation_share: share of the pairs that only decide when to stop.
         test_share: share of the pairs kept for the calibration check, never trained on.
+        synthetic: synthetic pairs of `distilled`.
+        emulator_features: random frequencies of the emulator.
         weight_decay: decoupled decay of the weights on the random features (AdamW).
     """
 
-    recipe: str = "snr"
+    method: str = "auto"
     kernel: str = "matern52"
     features: int = 250
     components: int = 5
@@ -52,15 +67,26 @@ class Config:
     validation_share: float = 0.1
     test_share: float = 0.1
     weight_decay: float = 0.3
+    synthetic: int = 20_000
+    emulator_features: int = 32
 
     def __post_init__(self) -> None:
         """Checks every setting; the message names it, what was found and what is allowed."""
-        for name, allowed in (("recipe", RECIPES), ("kernel", KERNELS)):
+        for name, allowed in (("method", METHODS), ("kernel", KERNELS)):
             if getattr(self, name) not in allowed:
                 raise ValueError(
                     f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}"
                 )
-        for name in ("features", "components", "ensemble", "batch_size", "max_epochs", "patience"):
+        for name in (
+            "features",
+            "components",
+            "ensemble",
+            "batch_size",
+            "max_epochs",
+            "patience",
+            "synthetic",
+            "emulator_features",
+        ):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < 1:
                 raise ValueError(f"{name} must be a whole number of at least 1, got {value!r}")
@@ -88,7 +114,7 @@ class Config:
 
     @classmethod
     def from_options(cls, **options: Any) -> "Config":
-        """Returns the recipe's settings with `options` put over them.
+        """Returns the method's settings with `options` put over them.
 
         Raises:
             ValueError: an option that does not exist, or a value that is not allowed.
@@ -97,8 +123,7 @@ class Config:
         unknown = sorted(set(options) - set(known))
         if unknown:
             raise ValueError(f"unknown option {', '.join(unknown)}; known are {', '.join(known)}")
-        defaults = _PLAIN if options.get("recipe") == "plain" else {}
-        return cls(**{**defaults, **options})
+        return cls(**{**_DEFAULTS.get(str(options.get("method")), {}), **options})
 
     def as_dict(self) -> dict[str, Any]:
         """Returns the settings as plain values, for JSON."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from granulcal.bayessim.mixture import Mixture
 from granulcal.prior import Prior
 
-__all__ = ["Density", "TruncatedMixture", "quasi_normal"]
+__all__ = ["Density", "TruncatedMixture", "quasi_normal", "quasi_prior"]
 
 Array = NDArray[np.float64]
 
@@ -104,26 +104,41 @@ class TruncatedMixture:
 
 
 @lru_cache(maxsize=8)
-def quasi_normal(count: int, dimension: int) -> Array:
-    """Returns evenly spread standard normal points, always the same, shape (count, dimension).
+def quasi_uniform(count: int, dimension: int) -> Array:
+    """Returns evenly spread points of the unit cube, always the same, shape (count, dimension).
 
-    Additive recurrence on powers of the generalised golden ratio, carried to the normal by the
-    Box-Muller transform.
+    Additive recurrence on powers of the generalised golden ratio.
 
     Reference:
         Niederreiter, Random number generation and quasi-Monte Carlo methods, 1992, section 3.1.
-        Box and Muller, Annals of Mathematical Statistics 29, 1958.
     """
-    columns = dimension + dimension % 2
     ratio = 2.0
     for _ in range(60):
-        ratio = (1 + ratio) ** (1 / (columns + 1))
-    steps = ratio ** -np.arange(1, columns + 1)
-    uniform = (0.5 + np.arange(1, count + 1)[:, None] * steps) % 1
+        ratio = (1 + ratio) ** (1 / (dimension + 1))
+    steps = ratio ** -np.arange(1, dimension + 1)
+    return (0.5 + np.arange(1, count + 1)[:, None] * steps) % 1
+
+
+@lru_cache(maxsize=8)
+def quasi_normal(count: int, dimension: int) -> Array:
+    """Returns evenly spread standard normal points, always the same, shape (count, dimension).
+
+    Evenly spread uniform points carried to the normal by the transform of Box and Muller (Annals of
+    Mathematical Statistics 29, 1958).
+    """
+    uniform = quasi_uniform(count, dimension + dimension % 2)
     radius = np.sqrt(-2 * np.log(1 - uniform[:, 0::2]))
     angle = 2 * np.pi * uniform[:, 1::2]
     normal = np.concatenate([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
     return normal[:, :dimension]
+
+
+@lru_cache(maxsize=8)
+def quasi_prior(prior: Prior, count: int) -> Array:
+    """Returns evenly spread draws of the prior's coordinates, shape (count, p)."""
+    uniform = quasi_uniform(count, len(prior.free))
+    columns = [p.quantile(uniform[:, i]) for i, p in enumerate(prior.free)]
+    return prior.to_unconstrained(np.column_stack(columns))
 
 
 def _is_inside(prior: Prior, u: Array) -> NDArray[np.bool_]:

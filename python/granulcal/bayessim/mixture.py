@@ -61,7 +61,7 @@ class Mixture:
         log_det = np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
         with np.errstate(divide="ignore"):
             constant = np.log(self.weights) + log_det - 0.5 * self.dimension * np.log(2 * np.pi)
-        return constant[:, None] - 0.5 * np.einsum("knj,knj->kn", whitened, whitened)
+        return constant[:, None] - 0.5 * np.sum(whitened**2, axis=-1)
 
     def log_prob(self, u: Array) -> Array:
         """Returns the log density at `u` (n, p), shape (n,)."""

@@ -1,7 +1,6 @@
 """BayesSim: train once on simulated pairs, then a posterior for any observation."""
 
 import hashlib
-import time
 from collections.abc import Callable, Sequence
 from os import PathLike
 from typing import Any
@@ -9,17 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from granulcal.bayessim.amortised import Amortised
 from granulcal.bayessim.arrays import as_real
+from granulcal.bayessim.calibration import Calibration
 from granulcal.bayessim.config import Config
-from granulcal.bayessim.mixture import Mixture
-from granulcal.bayessim.network import Network
+from granulcal.bayessim.likelihood import Likelihood
+from granulcal.bayessim.misfit import Misfit, MisfitReference
 from granulcal.bayessim.pairs import TrainingPairs
-from granulcal.bayessim.signal import SignalAxes
 from granulcal.bayessim.standardise import Standardiser
-from granulcal.bayessim.summary import Calibration, TrainingSummary
-from granulcal.bayessim.trainer import Progress, train
-from granulcal.diagnostics import expected_coverage
+from granulcal.bayessim.summary import TrainingSummary
+from granulcal.bayessim.trainer import Progress
+from granulcal.bayessim.training import train_model
 from granulcal.errors import ObservationError
+from granulcal.identifiability import Identifiability
 from granulcal.posterior import OutOfRange, Posterior
 from granulcal.prior import Prior
 
@@ -27,14 +28,13 @@ __all__ = ["BayesSim"]
 
 Array = NDArray[np.float64]
 
-# Below ten test pairs a coverage says nothing; from 300 pairs on, at least 50 are spared for it.
+# Below ten test pairs a coverage says nothing.
 _FEWEST_TEST_PAIRS = 10
-_WORTHWHILE_TEST_PAIRS = 50
-_PAIRS_FOR_A_WORTHWHILE_TEST = 300
+_CHECK_DRAWS = 1000
 
 
 class BayesSim:
-    """Posterior of a simulator's parameters from statistics, by a mixture density network.
+    """Posterior of a simulator's parameters from statistics.
 
     Made by `fit` or `load`.
 
@@ -42,8 +42,13 @@ class BayesSim:
         prior: the prior that the model was trained under.
         config: settings of the training.
         x_names: names of the statistics.
+        standardiser: what brings statistics to spread 1.
+        likelihood: the emulator of the statistics.
+        amortised: the network, or None if the posterior is that of the emulator.
         summary: what the training did, with every excluded pair counted.
+        misfit_reference: residuals that an observation of a right model can have.
         calibration: check on pairs that were not trained on, or None if there were too few.
+        identifiability: what an observation tells on average, or None likewise.
         scene_toml: the scene of the training data, or None.
 
     Reference:
@@ -54,7 +59,7 @@ class BayesSim:
         >>> from granulcal.toys import LinearGaussian
         >>> toy = LinearGaussian.random()
         >>> theta, x = toy.simulate(200)
-        >>> model = BayesSim.fit(theta, x, toy.prior, quiet=True, max_epochs=5)
+        >>> model = BayesSim.fit(theta, x, toy.prior, quiet=True, method="emulated")
         >>> model.posterior(x[0]).sample(10).shape
         (10, 3)
     """
@@ -64,27 +69,27 @@ class BayesSim:
         *,
         prior: Prior,
         config: Config,
-        network: Network,
         standardiser: Standardiser,
-        axes: SignalAxes,
-        target_shift: Array,
-        target_scale: Array,
+        likelihood: Likelihood,
+        amortised: Amortised | None,
         x_names: tuple[str, ...],
+        misfit_reference: MisfitReference,
         summary: TrainingSummary,
         calibration: Calibration | None = None,
+        identifiability: Identifiability | None = None,
         scene_toml: str | None = None,
     ) -> None:
         """Joins the parts of a trained model; use `fit` or `load`."""
         self.prior = prior
         self.config = config
-        self.network = network
         self.standardiser = standardiser
-        self.axes = axes
-        self.target_shift = target_shift
-        self.target_scale = target_scale
+        self.likelihood = likelihood
+        self.amortised = amortised
         self.x_names = x_names
         self.summary = summary
+        self.misfit_reference = misfit_reference
         self.calibration = calibration
+        self.identifiability = identifiability
         self.scene_toml = scene_toml
 
     @classmethod
@@ -98,6 +103,7 @@ class BayesSim:
         status: Sequence[str] | None = None,
         x_names: Sequence[str] | None = None,
         scene: Any = None,
+        proposal: Prior | None = None,
         quiet: bool = False,
         progress: Callable[[Progress], None] | None = None,
         **config: Any,
@@ -115,9 +121,10 @@ class BayesSim:
             status: status of each pour; `unhealthy`, `jammed` and `no_grains_in_view` are excluded.
             x_names: names of the statistics.
             scene: scene of the pours, saved with the model: TOML text, or has `to_toml()`.
+            proposal: what the parameters were drawn from, if it was not the prior.
             quiet: print nothing.
             progress: called after each pass over the pairs.
-            **config: settings of `Config`, for example `recipe="plain"` or `components=10`.
+            **config: settings of `Config`, for example `method="plain"` or `components=10`.
 
         Raises:
             TrainingDataError: pairs that cannot be trained on; the message says why.
@@ -129,65 +136,34 @@ class BayesSim:
         pairs = TrainingPairs.gather(
             data_or_theta, x, prior=prior, status=status, x_names=x_names, scene=scene
         )
-        model, test = cls._train(pairs, settings, int(seed), progress)
-        if len(test) >= _FEWEST_TEST_PAIRS:
-            model.calibration = model.check(pairs.theta[test], pairs.x[test])
-        if not quiet:
-            print(model.summary)
-            unchecked = f"  calibration not checked: {len(test)} test pairs only"
-            print(unchecked if model.calibration is None else model.calibration)
-        return model
-
-    @classmethod
-    def _train(
-        cls,
-        pairs: TrainingPairs,
-        config: Config,
-        seed: int,
-        progress: Callable[[Progress], None] | None,
-    ) -> tuple["BayesSim", NDArray[np.intp]]:
-        started = time.process_time()
-        order = np.random.default_rng(seed).permutation(len(pairs.theta))
-        test, rest = np.split(order, [_test_count(len(order), config.test_share)])
-        u = pairs.prior.to_unconstrained(pairs.theta[rest])
-        shift, scale = u.mean(axis=0), u.std(axis=0)
-        scale = np.where(scale > 0, scale, 1.0)
-        standardiser = Standardiser.fit(pairs.x[rest])
-        z = standardiser.apply(pairs.x[rest])
-        targets = (u - shift) / scale
-        axes = SignalAxes.fit(targets, z) if config.snr else SignalAxes.identity(z.shape[1])
-        result = train(
-            targets, axes.apply(z), axes.relevance, config=config, seed=seed, progress=progress
-        )
-        constant = [n for n, c in zip(pairs.x_names, standardiser.is_constant, strict=True) if c]
-        summary = TrainingSummary(
-            status=result.status,
-            pair_count=pairs.pair_count,
-            train_count=result.train_count,
-            validation_count=result.validation_count,
-            test_count=len(test),
-            excluded=pairs.excluded,
-            horizon_count=pairs.horizon_count,
-            epoch_count=result.epoch_count,
-            best_epochs=result.best_epochs,
-            train_losses=result.train_losses,
-            validation_losses=result.validation_losses,
-            fit_seconds=time.process_time() - started,
-            notes=(f"never changed in training: {', '.join(constant)}",) if constant else (),
-        )
+        made = train_model(pairs, settings, int(seed), proposal=proposal, progress=progress)
+        enough = len(made.posteriors) >= _FEWEST_TEST_PAIRS
         model = cls(
             prior=pairs.prior,
-            config=config,
-            network=result.network,
-            standardiser=standardiser,
-            axes=axes,
-            target_shift=shift,
-            target_scale=scale,
+            config=settings,
+            standardiser=made.standardiser,
+            likelihood=made.likelihood,
+            amortised=made.amortised,
             x_names=pairs.x_names,
-            summary=summary,
+            misfit_reference=made.misfit,
+            summary=made.summary,
+            calibration=Calibration.of(
+                pairs.prior, made.posteriors, made.truth, draw_count=_CHECK_DRAWS
+            )
+            if enough
+            else None,
+            identifiability=Identifiability.average(made.posteriors, made.truth)
+            if enough
+            else None,
             scene_toml=pairs.scene_toml,
         )
-        return model, test
+        if not quiet:
+            print(model.summary)
+            unchecked = "  calibration not checked: too few pours to keep some aside"
+            print(unchecked if model.calibration is None else model.calibration)
+            if model.identifiability is not None:
+                print(model.identifiability)
+        return model
 
     @property
     def scene_hash(self) -> str | None:
@@ -199,9 +175,9 @@ class BayesSim:
     def posterior(self, x_obs: ArrayLike) -> Posterior:
         """Returns the posterior given one observation, or several of one material.
 
-        Several pours share their parameters, so their posteriors are multiplied and the prior
-        divided out k - 1 times; this is not an average, and it narrows as k grows. Errors of the
-        network are multiplied too: trust k pours no more than the calibration of one allows.
+        Several pours share their parameters. Under the emulator they have one likelihood, in which
+        the noise averages away and the emulator's own uncertainty does not; a network's posteriors
+        are multiplied and the prior divided out k - 1 times. Neither is an average of posteriors.
 
         Args:
             x_obs: statistics, own units, shape (s,) for one pour or (k, s) for k pours.
@@ -210,9 +186,26 @@ class BayesSim:
             ObservationError: another shape, or a statistic that is not finite.
         """
         observed = self._checked(x_obs)
-        return Posterior.from_mixtures(
-            self.prior, self._mixtures(observed), warnings=self._range_warnings(observed)
-        )
+        warnings = self._range_warnings(observed)
+        z = self.standardiser.apply(observed)
+        if self.amortised is not None:
+            mixtures = self.amortised.mixtures(z)
+            return Posterior.from_mixtures(self.prior, mixtures, warnings=warnings)
+        return Posterior.from_conditions(self.prior, [(self.likelihood, z)], warnings=warnings)
+
+    def misfit(self, x_obs: ArrayLike) -> Misfit:
+        """Returns whether any parameters explain one observation, or several of one material.
+
+        Ask this before the posterior: it answers under the model, right or wrong.
+
+        Args:
+            x_obs: statistics, own units, shape (s,) for one pour or (k, s) for k pours.
+
+        Raises:
+            ObservationError: another shape, or a statistic that is not finite.
+        """
+        z = self.standardiser.apply(self._checked(x_obs), clip=False)
+        return self.misfit_reference.test(self.likelihood, z, self.x_names)
 
     def check(self, theta: ArrayLike, x: ArrayLike, *, draw_count: int = 1000) -> Calibration:
         """Returns the calibration on pairs, which must not have been trained on.
@@ -222,16 +215,9 @@ class BayesSim:
             x: their statistics, own units, shape (n, s).
             draw_count: draws of each posterior.
         """
-        truth = as_real("theta", theta)
-        mixtures = self._mixtures(self._checked(x))
-        posteriors = [Posterior.from_mixture(self.prior, mixture) for mixture in mixtures]
-        densities = [p.log_prob(t)[0] for p, t in zip(posteriors, truth, strict=True)]
-        return Calibration(
-            test_count=len(truth),
-            posterior_loss=float(-np.mean(densities)),
-            prior_loss=float(-np.mean(self.prior.log_prob(truth))),
-            coverage=expected_coverage(posteriors, truth, draw_count=draw_count).counts,
-        )
+        truth, observed = as_real("theta", theta), self._checked(x)
+        posteriors = [self.posterior(row) for row in observed]
+        return Calibration.of(self.prior, posteriors, truth, draw_count=draw_count)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Writes the folder `path`: model.json and weights.safetensors, all or nothing."""
@@ -250,18 +236,6 @@ class BayesSim:
         from granulcal.bayessim.storage import load_model
 
         return load_model(path)
-
-    def _mixtures(self, x: Array) -> list[Mixture]:
-        """One mixture over the prior's coordinates for each row of `x` (n, s)."""
-        inputs = self.axes.apply(self.standardiser.apply(x))
-        return [
-            Mixture(
-                mixture.weights,
-                self.target_shift + self.target_scale * mixture.means,
-                mixture.factors / self.target_scale[:, None],
-            )
-            for mixture in self.network.mixtures(inputs)
-        ]
 
     def _checked(self, x_obs: ArrayLike) -> Array:
         observed = as_real("x_obs", x_obs)
@@ -292,10 +266,3 @@ class BayesSim:
                     )
                 )
         return tuple(found)
-
-
-def _test_count(pair_count: int, share: float) -> int:
-    count = round(share * pair_count)
-    if share > 0 and pair_count >= _PAIRS_FOR_A_WORTHWHILE_TEST:
-        count = max(count, _WORTHWHILE_TEST_PAIRS)
-    return count

@@ -56,6 +56,7 @@ class TrainingPairs:
         status: Sequence[str] | None = None,
         x_names: Sequence[str] | None = None,
         scene: Any = None,
+        fewest: int = FEWEST_PAIRS,
     ) -> "TrainingPairs":
         """Returns the usable pairs of a data set, or of two arrays.
 
@@ -100,10 +101,10 @@ class TrainingPairs:
         excluded["non_finite"] = int(np.sum(is_healthy & ~is_finite))
         keep = is_healthy & is_finite
         _check_inside(theta[keep], prior)
-        if keep.sum() < FEWEST_PAIRS:
+        if keep.sum() < fewest:
             dropped = ", ".join(f"{count} {reason}" for reason, count in excluded.items())
             raise TrainingDataError(
-                f"at least {FEWEST_PAIRS} usable pairs are needed, got {int(keep.sum())} "
+                f"at least {fewest} usable pairs are needed, got {int(keep.sum())} "
                 f"of {len(theta)} (excluded: {dropped})"
             )
         return cls(

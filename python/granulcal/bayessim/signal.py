@@ -38,8 +38,8 @@ class SignalAxes:
     """Inputs of the network: standardised statistics times `matrix`.
 
     Attributes:
-        matrix: columns are axes scaled to unit spread, shape (s, s).
-        relevance: factor on each axis' frequencies, root mean square 1, shape (s,).
+        matrix: columns are axes scaled to unit spread, shape (s, a).
+        relevance: factor on each axis' frequencies, root mean square 1, shape (a,).
     """
 
     matrix: Array
@@ -66,8 +66,16 @@ class SignalAxes:
         relevance /= np.sqrt(np.mean(relevance**2))
         return cls(whiten @ axes / np.sqrt(np.maximum(variances, 0.1)), relevance)
 
+    def first(self, count: int) -> "SignalAxes":
+        """Returns the `count` axes that tell most."""
+        relevance = self.relevance[:count]
+        return SignalAxes(
+            np.ascontiguousarray(self.matrix[:, :count]),
+            relevance / np.sqrt(np.mean(relevance**2)),
+        )
+
     def apply(self, x: Array) -> Array:
-        """Returns the network's inputs for standardised statistics `x` (n, s), shape (n, s)."""
+        """Returns the network's inputs for standardised statistics `x` (n, s), shape (n, a)."""
         return x @ self.matrix
 
 

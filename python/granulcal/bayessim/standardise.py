@@ -50,9 +50,20 @@ class Standardiser:
         """Whether a statistic never changed in training, shape (s,)."""
         return self.low == self.high
 
-    def apply(self, x: Array) -> Array:
-        """Returns standardised statistics (n, s), values beyond the training range moved to it."""
-        return (_warp(np.clip(x, self.low, self.high), self.is_log) - self.shift) / self.scale
+    def apply(self, x: Array, *, clip: bool = True) -> Array:
+        """Returns standardised statistics (n, s).
+
+        Values beyond the training range are moved to it, unless `clip` is false; a logarithm is
+        then still taken of a value no lower than a thousandth of the lowest.
+        """
+        low, high = (
+            (self.low, self.high) if clip else (self._floor, np.full_like(self.high, np.inf))
+        )
+        return (_warp(np.clip(x, low, high), self.is_log) - self.shift) / self.scale
+
+    @property
+    def _floor(self) -> Array:
+        return np.where(self.is_log, 1e-3 * self.low, -np.inf)
 
     def is_outside(self, x: Array) -> NDArray[np.bool_]:
         """Returns which statistics lie beyond the training range, shape (n, s)."""

@@ -8,18 +8,17 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import torch
 from safetensors import SafetensorError
 from safetensors.numpy import load as read_tensors
 from safetensors.numpy import save as tensor_bytes
 
+from granulcal import _native
+from granulcal.bayessim.calibration import Calibration
 from granulcal.bayessim.config import Config
-from granulcal.bayessim.network import HeadLayout, Network
-from granulcal.bayessim.signal import SignalAxes
-from granulcal.bayessim.standardise import Standardiser
-from granulcal.bayessim.summary import Calibration, TrainingSummary
+from granulcal.bayessim.summary import TrainingSummary
+from granulcal.bayessim.tensors import Tensors, model_tensors
 from granulcal.errors import ModelFormatError, PriorError
+from granulcal.identifiability import Identifiability
 from granulcal.prior import Prior
 
 if TYPE_CHECKING:
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["load_model", "save_model"]
 
-FORMAT, VERSION, KIND = "granulcal-bayessim", 1, "mdrff"
+FORMAT, VERSION = "granulcal-bayessim", 2
 _JSON_NAME, _TENSORS_NAME = "model.json", "weights.safetensors"
 
 
@@ -47,7 +46,7 @@ def save_model(model: "BayesSim", path: str | PathLike[str]) -> None:
         new.mkdir()
         text = json.dumps(_document(model), indent=1, allow_nan=False) + "\n"
         (new / _JSON_NAME).write_text(text, encoding="utf-8")
-        (new / _TENSORS_NAME).write_bytes(tensor_bytes(_tensors(model)))
+        (new / _TENSORS_NAME).write_bytes(tensor_bytes(model_tensors(model)))
         if target.exists():
             os.rename(target, old)
         try:
@@ -82,29 +81,18 @@ def load_model(path: str | PathLike[str]) -> "BayesSim":
         prior = Prior.from_toml(document["prior_toml"])
         config = Config(**document["config"])
         x_names = tuple(document["x_names"])
-        summary = _summary(document["summary"])
-        calibration = document["calibration"]
-        layout = HeadLayout(config.components, len(prior.names))
-        _check_shapes(tensors, _shapes(config, layout, len(x_names)), folder / _TENSORS_NAME)
+        tensors = Tensors(tensors, folder / _TENSORS_NAME, len(prior.names), len(x_names))
+        calibration, known = document["calibration"], document["identifiability"]
         return BayesSim(
             prior=prior,
             config=config,
-            network=Network(
-                layout,
-                *(
-                    torch.from_numpy(tensors[n])
-                    for n in ("frequencies", "linear", "fourier", "bias")
-                ),
-            ),
-            standardiser=Standardiser(
-                tensors["x_is_log"].astype(bool),
-                *(tensors[name] for name in ("x_shift", "x_scale", "x_low", "x_high")),
-            ),
-            axes=SignalAxes(tensors["axes_matrix"], tensors["axes_relevance"]),
-            target_shift=tensors["target_shift"],
-            target_scale=tensors["target_scale"],
+            standardiser=tensors.standardiser(),
+            likelihood=tensors.likelihood(prior, config, document["emulator"]),
+            amortised=tensors.amortised(config) if document["has_network"] else None,
             x_names=x_names,
-            summary=summary,
+            misfit_reference=tensors.misfit(),
+            identifiability=None if known is None else Identifiability.from_dict(known),
+            summary=TrainingSummary.from_dict(document["summary"]),
             calibration=None if calibration is None else Calibration.from_dict(calibration),
             scene_toml=document["scene_toml"],
         )
@@ -115,87 +103,44 @@ def load_model(path: str | PathLike[str]) -> "BayesSim":
 
 
 def _document(model: "BayesSim") -> dict[str, Any]:
+    likelihood = model.likelihood
     return {
         "format": FORMAT,
         "version": VERSION,
-        "kind": KIND,
+        "made_by": f"granulcal {_native.__version__}",
         "prior_toml": model.prior.to_toml(),
         "theta_names": model.prior.names,
         "x_names": list(model.x_names),
         "config": model.config.as_dict(),
         "scene_toml": model.scene_toml,
         "scene_hash": model.scene_hash,
+        "has_network": model.amortised is not None,
+        "emulator": {
+            "widening": likelihood.widening,
+            "degrees": likelihood.emulator.noise.degrees,
+            "leading_degrees": likelihood.leading.noise.degrees,
+            "axis_count": likelihood.axis_count,
+        },
         "summary": model.summary.as_dict(),
+        "identifiability": None
+        if model.identifiability is None
+        else model.identifiability.as_dict(),
         "calibration": None if model.calibration is None else model.calibration.as_dict(),
-    }
-
-
-def _tensors(model: "BayesSim") -> dict[str, np.ndarray]:
-    network, standardiser = model.network, model.standardiser
-    tensors = {
-        "frequencies": network.frequencies.numpy(),
-        "linear": network.linear.detach().numpy(),
-        "fourier": network.fourier.detach().numpy(),
-        "bias": network.bias.detach().numpy(),
-        "x_is_log": standardiser.is_log.astype(np.uint8),
-        "x_shift": standardiser.shift,
-        "x_scale": standardiser.scale,
-        "x_low": standardiser.low,
-        "x_high": standardiser.high,
-        "axes_matrix": model.axes.matrix,
-        "axes_relevance": model.axes.relevance,
-        "target_shift": model.target_shift,
-        "target_scale": model.target_scale,
-    }
-    return {name: np.ascontiguousarray(array) for name, array in tensors.items()}
-
-
-def _shapes(config: Config, layout: HeadLayout, inputs: int) -> dict[str, tuple[int, ...]]:
-    members, p = config.ensemble, layout.dimension
-    return {
-        "frequencies": (members, config.features, inputs),
-        "linear": (members, inputs, layout.size),
-        "fourier": (members, 2 * config.features, layout.size),
-        "bias": (members, 1, layout.size),
-        **{f"x_{name}": (inputs,) for name in ("is_log", "shift", "scale", "low", "high")},
-        "axes_matrix": (inputs, inputs),
-        "axes_relevance": (inputs,),
-        "target_shift": (p,),
-        "target_scale": (p,),
     }
 
 
 def _check_header(document: Any, where: Path) -> None:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise ModelFormatError(f"{where} is not a {FORMAT} file")
-    for key, expected in (("version", VERSION), ("kind", KIND)):
-        if document.get(key) != expected:
-            raise ModelFormatError(
-                f"{where}: {key} must be {expected!r}, got {document.get(key)!r}"
-            )
-
-
-def _check_shapes(
-    tensors: dict[str, np.ndarray], shapes: dict[str, tuple[int, ...]], where: Path
-) -> None:
-    for name, shape in shapes.items():
-        if name not in tensors:
-            raise ModelFormatError(f"{where} has no tensor {name}")
-        array = tensors[name]
-        if array.shape != shape:
-            raise ModelFormatError(f"{where}: {name} must have shape {shape}, got {array.shape}")
-        if not np.all(np.isfinite(array)):
-            raise ModelFormatError(f"{where}: {name} must be finite")
-
-
-def _summary(values: dict[str, Any]) -> TrainingSummary:
-    lists = {
-        name: tuple(float("nan") if each is None else each for each in value)
-        for name, value in values.items()
-        if isinstance(value, list)
-    }
-    # Processor time is not part of the model: it would make equal models differ.
-    return TrainingSummary(**{**values, **lists, "fit_seconds": float("nan")})
+    found = document.get("version")
+    if found != VERSION:
+        made_by = document.get("made_by", "an earlier granulcal")
+        newer = isinstance(found, int) and found > VERSION
+        advice = "update granulcal" if newer else "train the model again"
+        raise ModelFormatError(
+            f"{where}: version must be {VERSION} (granulcal {_native.__version__}), got {found!r} "
+            f"(made by {made_by}): {advice}"
+        )
 
 
 def _is_empty(path: Path) -> bool:

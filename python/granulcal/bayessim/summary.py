@@ -1,13 +1,11 @@
-"""What a training run did, and how well the result is calibrated, as numbers."""
+"""What a training run did, as numbers and in plain words."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from granulcal.diagnostics import CoverageCount
-
-__all__ = ["Calibration", "TrainingSummary"]
+__all__ = ["TrainingSummary"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,35 +13,41 @@ class TrainingSummary:
     """Counts and losses of one training run.
 
     Attributes:
-        status: `diverged` if a member never had a finite validation loss, `stopped_early` if every
-            member ran out of patience, else `epoch_limit`.
+        method: how the posterior is made: `emulated`, `distilled`, `mdrff` or `plain`.
+        choice: what was chosen by held-out pairs, in words.
         pair_count: pairs given, before any was excluded.
-        train_count: pairs that each member was trained on.
-        validation_count: pairs that decided when each member stopped.
-        test_count: pairs kept for the calibration check.
+        train_count: pairs that the emulator, or each member of the network, was trained on.
+        test_count: pairs of the calibration check.
         excluded: number of pairs left out by reason: `unhealthy`, `jammed`,
             `no_grains_in_view`, `non_finite`.
         horizon_count: pairs kept although their simulation ended at its time limit.
+        status: of the network: `diverged` if a member never had a finite validation loss,
+            `stopped_early` if every member ran out of patience, `epoch_limit`, or `none`.
+        validation_count: pairs that decided when each member stopped.
         epoch_count: passes over the pairs until the last member stopped.
         best_epochs: pass whose weights were kept, for each member.
         train_losses: mean negative log density of a member's last pass, standardised [nat].
         validation_losses: lowest validation loss of each member, standardised [nat].
+        curve: mean training and validation loss of each pass, standardised [nat].
         fit_seconds: processor time of the whole fit [s].
         notes: what else a reader should know, for example statistics that never changed.
     """
 
-    status: str
+    method: str
+    choice: str
     pair_count: int
     train_count: int
-    validation_count: int
     test_count: int
     excluded: dict[str, int]
     horizon_count: int
-    epoch_count: int
-    best_epochs: tuple[int, ...]
-    train_losses: tuple[float, ...]
-    validation_losses: tuple[float, ...]
-    fit_seconds: float
+    status: str = "none"
+    validation_count: int = 0
+    epoch_count: int = 0
+    best_epochs: tuple[int, ...] = ()
+    train_losses: tuple[float, ...] = ()
+    validation_losses: tuple[float, ...] = ()
+    curve: tuple[tuple[float, float], ...] = ()
+    fit_seconds: float = float("nan")
     notes: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
@@ -54,71 +58,45 @@ class TrainingSummary:
         values = asdict(self)
         del values["fit_seconds"]
         for name in ("train_losses", "validation_losses"):
-            values[name] = [loss if np.isfinite(loss) else None for loss in values[name]]
+            values[name] = [_finite(loss) for loss in values[name]]
+        values["curve"] = [[_finite(loss) for loss in pair] for pair in values["curve"]]
         return values
 
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> "TrainingSummary":
+        """Returns what `as_dict` gave; the time is not known any more."""
+        nan = float("nan")
+        losses = {
+            name: tuple(nan if each is None else each for each in values[name])
+            for name in ("train_losses", "validation_losses")
+        }
+        curve = tuple(
+            (nan if a is None else a, nan if b is None else b) for a, b in values["curve"]
+        )
+        rest = {"best_epochs": tuple(values["best_epochs"]), "notes": tuple(values["notes"])}
+        return cls(**{**values, **losses, **rest, "curve": curve})
+
     def __str__(self) -> str:
-        """The counts in one or two lines."""
+        """The counts in a few lines."""
         dropped = ", ".join(f"{n} {why}" for why, n in self.excluded.items() if n) or "none"
         lines = [
-            f"BayesSim: {self.pair_count} pairs, excluded: {dropped}; "
-            f"{self.train_count} train, {self.validation_count} validation, {self.test_count} test",
-            f"  {len(self.best_epochs)} member(s), {self.epoch_count} epochs ({self.status}), "
-            f"{self.fit_seconds:.1f} s of processor time",
+            f"BayesSim ({self.method}): {self.pair_count} pours, left out: {dropped}; trained on "
+            f"{self.train_count}{self._time()}",
+            f"  {self.choice}",
         ]
+        if self.best_epochs:
+            lines.append(
+                f"  {len(self.best_epochs)} network(s), {self.epoch_count} passes ({self.status}), "
+                f"{self.validation_count} pours decided when to stop"
+            )
         if self.horizon_count:
-            lines.append(f"  {self.horizon_count} pairs ended at the time limit, kept")
+            lines.append(f"  {self.horizon_count} pours ended at the time limit, kept")
         return "\n".join(lines + [f"  note: {note}" for note in self.notes])
 
+    def _time(self) -> str:
+        known = np.isfinite(self.fit_seconds)
+        return f", {self.fit_seconds:.1f} s of processor time" if known else ""
 
-@dataclass(frozen=True, kw_only=True)
-class Calibration:
-    """Check of a model on pairs that it has never seen.
 
-    Attributes:
-        test_count: pairs looked at.
-        posterior_loss: mean of -log posterior density at the truth, own units [nat].
-        prior_loss: mean of -log prior density at the truth, own units [nat].
-        coverage: one count for each level.
-    """
-
-    test_count: int
-    posterior_loss: float
-    prior_loss: float
-    coverage: tuple[CoverageCount, ...]
-
-    @property
-    def is_calibrated(self) -> bool:
-        """Whether every count lies in its band; the bands hold jointly at 95 %."""
-        return all(count.is_within_band for count in self.coverage)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns plain values, for JSON."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> "Calibration":
-        """Returns what `as_dict` gave."""
-        coverage = tuple(CoverageCount(**count) for count in values["coverage"])
-        return cls(**{**values, "coverage": coverage})
-
-    def __str__(self) -> str:
-        """The check as a few lines; a level outside its band is shouted."""
-        gain = self.prior_loss - self.posterior_loss
-        lines = [
-            f"  calibration on {self.test_count} unseen pairs: -log density at the truth "
-            f"{self.posterior_loss:.2f} (prior {self.prior_loss:.2f}, gain {gain:.2f} nat)"
-        ]
-        for count in self.coverage:
-            lines.append(
-                f"  {count.level:.0%} region holds {count.inside}/{count.total} truths "
-                f"(chance allows {count.low}..{count.high})"
-            )
-        wrong = [count for count in self.coverage if not count.is_within_band]
-        if wrong:
-            sides = {"OVERCONFIDENT" if c.inside < c.low else "TOO WIDE" for c in wrong}
-            levels = ", ".join(f"{count.level:.0%}" for count in wrong)
-            lines.append(f"  !!! NOT CALIBRATED at {levels}: {' and '.join(sorted(sides))} !!!")
-        if not np.isfinite(self.posterior_loss) or gain <= 0:
-            lines.append("  !!! THE POSTERIOR IS NO BETTER THAN THE PRIOR !!!")
-        return "\n".join(lines)
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

@@ -45,6 +45,7 @@ class TrainingResult:
     best_epochs: tuple[int, ...]
     train_losses: tuple[float, ...]
     validation_losses: tuple[float, ...]
+    curve: tuple[tuple[float, float], ...]
 
 
 def train(
@@ -54,6 +55,7 @@ def train(
     *,
     config: Config,
     seed: int,
+    weights: Array | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> TrainingResult:
     """Returns the ensemble trained on standardised pairs.
@@ -64,6 +66,7 @@ def train(
         relevance: factor on each statistic's frequencies, shape (s,).
         config: settings.
         seed: seed of the frequencies, the splits, the batches and the jitter.
+        weights: of each pair in the loss, shape (n,); None: all the same.
         progress: called after each pass.
 
     The thread count of torch is set to 1 meanwhile: the sums, and so the result, would otherwise
@@ -72,17 +75,27 @@ def train(
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        return _Training(u, x, relevance, config, seed).run(progress)
+        return _Training(u, x, relevance, config, seed, weights).run(progress)
     finally:
         torch.set_num_threads(threads)
 
 
 class _Training:
-    def __init__(self, u: Array, x: Array, relevance: Array, config: Config, seed: int) -> None:
+    def __init__(
+        self,
+        u: Array,
+        x: Array,
+        relevance: Array,
+        config: Config,
+        seed: int,
+        weights: Array | None,
+    ) -> None:
         self.config = config
         self.generator = torch.Generator().manual_seed(seed)
         self.u = torch.from_numpy(u).float()
         self.x = torch.from_numpy(x).float()
+        weights = np.ones(len(u)) if weights is None else weights / weights.mean()
+        self.weights = torch.from_numpy(weights).float()
         members = config.ensemble
         validation_count = max(1, round(config.validation_share * len(x)))
         order = torch.stack([self._permutation(len(x)) for _ in range(members)])
@@ -123,6 +136,7 @@ class _Training:
         best_epoch = torch.zeros(members, dtype=torch.long)
         train_loss = torch.zeros(members)
         epoch, status = 0, "epoch_limit"
+        curve = []
         for epoch in range(1, config.max_epochs + 1):
             train_loss = self._one_pass(optimizer)
             schedule.step()
@@ -133,6 +147,7 @@ class _Training:
             best_epoch[is_better] = epoch
             for kept, tensor in zip(self.best, parameters, strict=True):
                 kept[is_better] = tensor.detach()[is_better]
+            curve.append((float(train_loss.mean()), float(loss.mean())))
             if progress is not None:
                 means = (float(train_loss.mean()), float(best_loss.mean()))
                 progress(Progress(epoch, config.max_epochs, *means))
@@ -151,6 +166,7 @@ class _Training:
             best_epochs=tuple(best_epoch.tolist()),
             train_losses=tuple(train_loss.tolist()),
             validation_losses=tuple(best_loss.tolist()),
+            curve=tuple(curve),
         )
 
     def _one_pass(self, optimizer: torch.optim.Optimizer) -> torch.Tensor:
@@ -169,7 +185,8 @@ class _Training:
         x, u = self.x[rows], self.u[rows]
         if jitter:
             x = x + jitter * torch.randn(x.shape, generator=self.generator)
-        return -self.network.layout.log_density(self.network.outputs(x), u).mean(dim=1)
+        log_density = self.network.layout.log_density(self.network.outputs(x), u)
+        return -(self.weights[rows] * log_density).mean(dim=1)
 
     def _permutation(self, count: int) -> torch.Tensor:
         return torch.randperm(count, generator=self.generator)

@@ -50,7 +50,7 @@ pub fn fill(width: f64, count: usize, material: Material, seed: u64) -> Filled {
     let floor = Shape::Plane { point: [0.0, 0.0, bottom], normal: [0.0, 0.0, 1.0] };
     let walls = vec![
         tube(radius, 0.0, top_of(&rained), WallMaterial::default()),
-        Wall { shape: floor, material: WallMaterial::default() },
+        Wall::fixed(floor, WallMaterial::default()),
     ];
     let positions = settle(&scene(&rained, material, walls));
 

@@ -1,7 +1,7 @@
 //! Grains packed in a cylinder: rained in, settled, and handed on to a scene with other walls.
 
 use granulcal::dem::{
-    CameraSpec, EndRule, GRAVITY, Grains, Ground, Material, Preset, Scene, Shape, Simulation,
+    CameraSpec, EndRule, Ends, GRAVITY, Grains, Ground, Material, Preset, Scene, Shape, Simulation,
     SolverSettings, Start, Wall, WallMaterial,
 };
 use nalgebra::Vector3;
@@ -41,7 +41,7 @@ pub fn start(scene: &Scene) -> Simulation {
 /// A cylinder about the z axis, `radius`, `from` and `to` in metres.
 pub fn tube(radius: f64, from: f64, to: f64, material: WallMaterial) -> Wall {
     let (from, to) = ([0.0, 0.0, from], [0.0, 0.0, to]);
-    Wall { shape: Shape::Cylinder { from, to, radius }, material }
+    Wall::fixed(Shape::Cylinder { from, to, radius, closed: Ends::None }, material)
 }
 
 /// A flat ring about the z axis at `height` `[m]`: a cone that has next to no height.
@@ -52,8 +52,9 @@ pub fn ring(inner_radius: f64, outer_radius: f64, height: f64) -> Wall {
         to: [0.0, 0.0, height + RISE],
         radius_from: inner_radius,
         radius_to: outer_radius,
+        closed: Ends::None,
     };
-    Wall { shape, material: WallMaterial::default() }
+    Wall::fixed(shape, WallMaterial::default())
 }
 
 /// `count` grains on a loose lattice in a cylinder of `radius` `[m]` above `floor` `[m]`, each moved a little

@@ -2,7 +2,7 @@
 //!
 //! The plate fixes the heap's foot, so that every material has an angle, one that rolls freely as well.
 
-use granulcal::dem::{Material, Shape, Wall, WallMaterial};
+use granulcal::dem::{Ends, Material, Shape, Wall, WallMaterial};
 use nalgebra::Vector3;
 
 use super::fit;
@@ -46,13 +46,13 @@ pub fn measure(radius: f64, material: Material, seed: u64) -> f64 {
         to: [0.0, 0.0, rim],
         radius_from: 0.5 * OUTLET * DIAMETER,
         radius_to: neck,
+        closed: Ends::None,
     };
     let plain = WallMaterial::default();
-    let funnel =
-        vec![Wall { shape: cone, material: plain }, tube(neck, rim, top_of(&rained), plain)];
+    let funnel = vec![Wall::fixed(cone, plain), tube(neck, rim, top_of(&rained), plain)];
     let mut closed = funnel.clone();
     let lid = Shape::Plane { point: [0.0, 0.0, tip], normal: [0.0, 0.0, 1.0] };
-    closed.push(Wall { shape: lid, material: plain });
+    closed.push(Wall::fixed(lid, plain));
     let filled = settle(&scene(&rained, material, closed));
 
     let mut walls = funnel;

@@ -1,6 +1,6 @@
 //! Whether contacts that were read from bytes can be solved: the kernels index without looking.
 
-use super::{Batch, ContactSet, LANES};
+use super::{ContactSet, LANES, Second};
 
 impl ContactSet {
     /// Whether the contacts are between so many grains and, if they are at walls, so many walls.
@@ -17,24 +17,29 @@ impl ContactSet {
             return Ok(());
         }
         require(self.grains == grains, "contacts of another number of grains")?;
-        for batch in &self.batches {
+        let is_at_walls = self.second != Second::Grain;
+        require(is_at_walls == walls.is_some(), "contacts of another kind")?;
+        for (number, batch) in self.batches.iter().enumerate() {
             require((batch.law as usize) < self.laws.len(), "a contact without a law")?;
-            self.check_lanes(batch, walls.is_some())?;
+            self.check_lanes(number, is_at_walls)?;
         }
         for at in &self.at_walls {
-            let fits = at.wall.iter().all(|&wall| usize::from(wall) < walls.unwrap_or(0));
+            let fits = at.wall.iter().all(|&wall| (wall as usize) < walls.unwrap_or(0));
             require(fits, "a contact at a wall that the scene has not")?;
         }
         self.check_parts()
     }
 
     /// Lanes in use have grains, the others the resting body.
-    fn check_lanes(&self, batch: &Batch, is_at_walls: bool) -> Result<(), &'static str> {
+    fn check_lanes(&self, number: usize, is_at_walls: bool) -> Result<(), &'static str> {
+        let batch = &self.batches[number];
         let (used, resting) = (batch.used as usize, self.grains as u32);
         let (i, j) = (&batch.i, &batch.j);
         let fits = used <= LANES
             && i[..used].iter().all(|&grain| grain < resting)
-            && j[..used].iter().all(|&grain| (grain < resting) != is_at_walls && grain <= resting)
+            && j[..used].iter().enumerate().all(|(lane, &body)| {
+                if is_at_walls { body == self.wall_body(number, lane) } else { body < resting }
+            })
             && i[used..].iter().chain(&j[used..]).all(|&body| body == resting);
         if fits { Ok(()) } else { Err("a contact of grains that the scene has not") }
     }

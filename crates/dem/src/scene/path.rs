@@ -1,6 +1,7 @@
 //! Numbers of a scene by their path, for example `material.sliding_friction` or `scene.funnel.height`.
 //!
-//! A scene as TOML is a tree of tables; a path walks it. `scene.` in front may be left out.
+//! A scene as TOML is a tree of tables and lists; a path walks it, entries of lists by their number from 0. `scene.` in
+//! front may be left out.
 
 use toml::{Table, Value};
 
@@ -28,9 +29,10 @@ impl Scene {
             insert(&mut tree, path, value)?;
         }
         let paths = || values.iter().map(|(path, _)| *path).collect::<Vec<_>>().join(", ");
-        let changed: Self = Value::Table(tree)
+        let mut changed: Self = Value::Table(tree)
             .try_into()
             .map_err(|e: toml::de::Error| path_error(&paths(), e.message()))?;
+        changed.take_meshes(self);
         changed.check()?;
         *self = changed;
         Ok(())
@@ -41,26 +43,23 @@ impl Scene {
     /// # Errors
     /// [`DemError::Path`] if nothing or no number stands there.
     pub fn get(&self, path: &str) -> Result<f64, DemError> {
-        let tree = self.tree()?;
-        let mut found = None;
-        let mut table = &tree;
+        let mut found = &Value::Table(self.tree()?);
         for key in keys(path) {
-            let value = table.get(key).ok_or_else(|| {
-                let here: Vec<_> = table.keys().map(String::as_str).collect();
-                path_error(path, &format!("no {key:?} here, only {}", here.join(", ")))
-            })?;
-            found = Some(value);
-            if let Value::Table(inner) = value {
-                table = inner;
-            }
+            found = match found {
+                Value::Table(table) => table.get(key).ok_or_else(|| {
+                    let here: Vec<_> = table.keys().map(String::as_str).collect();
+                    path_error(path, &format!("no {key:?} here, only {}", here.join(", ")))
+                })?,
+                Value::Array(entries) => &entries[entry(path, key, entries.len())?],
+                other => {
+                    return Err(path_error(path, &format!("a {} stands there", other.type_str())));
+                }
+            };
         }
         match found {
-            Some(Value::Float(number)) => Ok(*number),
-            Some(Value::Integer(number)) => Ok(*number as f64),
-            other => {
-                let kind = other.map_or("nothing", Value::type_str);
-                Err(path_error(path, &format!("a {kind} stands there")))
-            }
+            Value::Float(number) => Ok(*number),
+            Value::Integer(number) => Ok(*number as f64),
+            other => Err(path_error(path, &format!("a {} stands there", other.type_str()))),
         }
     }
 
@@ -121,39 +120,61 @@ fn path_error(path: &str, reason: &str) -> DemError {
 /// Puts `value` at `path`. A missing number or table of coefficients is created, and whether it may exist
 /// is the scene's to say; other missing tables are not: a height must not conjure up a funnel.
 fn insert(tree: &mut Table, path: &str, value: f64) -> Result<(), DemError> {
+    let keys: Vec<&str> = keys(path).collect();
+    let Some((last, first)) = keys.split_last() else { return Err(path_error(path, "is empty")) };
+    // An entry of a list stands where a number of a table does.
     let mut table = tree;
-    let mut keys = keys(path).peekable();
-    while let Some(key) = keys.next() {
-        if keys.peek().is_none() {
-            let number = match table.get(key) {
-                Some(Value::Integer(_)) if value.fract() == 0.0 => Value::Integer(value as i64),
-                Some(Value::Integer(_)) => {
-                    return Err(path_error(path, &format!("must be a whole number, got {value}")));
-                }
-                None | Some(Value::Float(_)) => Value::Float(value),
-                Some(other) => {
-                    let reason = format!("a {} stands there, not a number", other.type_str());
-                    return Err(path_error(path, &reason));
-                }
-            };
-            table.insert(key.to_owned(), number);
-            return Ok(());
-        }
+    let mut first = first.iter().copied().peekable();
+    while let Some(key) = first.next() {
         if !table.contains_key(key) && key != MATERIAL && key != GROUND {
             return Err(path_error(path, &format!("this scene has no {key:?}")));
         }
-        let entry = table.entry(key.to_owned()).or_insert_with(|| Value::Table(Table::new()));
-        let kind = entry.type_str();
-        table = entry
+        let mut here = table.entry(key.to_owned()).or_insert_with(|| Value::Table(Table::new()));
+        while let Value::Array(entries) = here {
+            let count = entries.len();
+            let Some(number) = first.next() else {
+                let number = &mut entries[entry(path, last, count)?];
+                return set_number(path, number, value);
+            };
+            here = &mut entries[entry(path, number, count)?];
+        }
+        let kind = here.type_str();
+        table = here
             .as_table_mut()
             .ok_or_else(|| path_error(path, &format!("{key:?} is a {kind}, not a table")))?;
     }
+    let number = table.entry((*last).to_owned()).or_insert(Value::Float(value));
+    set_number(path, number, value)
+}
+
+/// Replaces a number by another; a whole number stays one.
+fn set_number(path: &str, place: &mut Value, value: f64) -> Result<(), DemError> {
+    *place = match place {
+        Value::Integer(_) if value.fract() == 0.0 => Value::Integer(value as i64),
+        Value::Integer(_) => {
+            return Err(path_error(path, &format!("must be a whole number, got {value}")));
+        }
+        Value::Float(_) => Value::Float(value),
+        other => {
+            let reason = format!("a {} stands there, not a number", other.type_str());
+            return Err(path_error(path, &reason));
+        }
+    };
     Ok(())
+}
+
+/// A key as the number of one of `count` entries of a list.
+fn entry(path: &str, key: &str, count: usize) -> Result<usize, DemError> {
+    let number = key.parse().ok().filter(|&number| number < count);
+    number.ok_or_else(|| {
+        path_error(path, &format!("{key:?} must be one of {count} entries, counted from 0"))
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Motion, Shape, Wall, WallMaterial};
 
     #[test]
     fn sets_and_gets_by_path() {
@@ -165,6 +186,28 @@ mod tests {
         assert_eq!(changed.with("grains.count", 100.0).unwrap().grains.count, 100);
         let ground = scene.with("scene.ground.material.restitution", 0.1).unwrap();
         assert_eq!(ground.ground.material.restitution, Some(0.1));
+    }
+
+    #[test]
+    fn entries_of_lists_have_numbers() {
+        let mut scene = Scene::funnel(0.12);
+        let shape = Shape::Plane { point: [0.0; 3], normal: [0.0, 0.0, 1.0] };
+        let motion = Motion::Lift { velocity: [0.0, 0.0, 0.1], begin: 0.5, end: 1.0 };
+        scene.walls.push(Wall { motion, ..Wall::fixed(shape, WallMaterial::default()) });
+        let changed = scene.with("walls.0.motion.velocity.2", 0.3).unwrap();
+        assert_eq!(changed.get("scene.walls.0.motion.velocity.2").unwrap(), 0.3);
+        assert_eq!(
+            changed.with("walls.0.motion.end", 2.0).unwrap().get("walls.0.motion.end").unwrap(),
+            2.0
+        );
+        let tilted = scene.with("gravity.0", 1.0).unwrap();
+        assert_eq!(tilted.gravity, [1.0, 0.0, -9.81]);
+        let stone = scene.with("walls.0.material.restitution", 0.2).unwrap();
+        assert_eq!(stone.walls[0].material.restitution, Some(0.2));
+        for path in ["walls.1.motion.end", "gravity.3", "gravity.x", "gravity", "walls.0"] {
+            assert!(matches!(scene.with(path, 1.0), Err(DemError::Path { .. })), "{path}");
+            assert!(scene.get(path).is_err(), "{path}");
+        }
     }
 
     #[test]

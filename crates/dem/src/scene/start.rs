@@ -5,7 +5,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use super::{Grains, Scene, finite, non_negative, positive};
+use super::{Funnel, Grains, Scene, finite, non_negative, positive};
 use crate::DemError;
 
 /// Solid fraction of the closest packing of equal spheres, pi / sqrt(18).
@@ -32,6 +32,20 @@ pub enum Start {
         height: f64,
         /// Share of the lattice's volume that is grain `[-]`.
         solid_fraction: f64,
+        /// Half width of a uniform seeded displacement along each axis `[m]`.
+        jitter: f64,
+    },
+    /// The inside of a cylinder, filled from its lowest point up on a cubic lattice along its axis: to settle in a tube, a
+    /// drum or a hopper.
+    Cylinder {
+        /// Centre of one end `[m]`.
+        from: [f64; 3],
+        /// Centre of the other end `[m]`.
+        to: [f64; 3],
+        /// Radius `[m]`; no grain reaches beyond it.
+        radius: f64,
+        /// Distance of neighbours `[m]`.
+        spacing: f64,
         /// Half width of a uniform seeded displacement along each axis `[m]`.
         jitter: f64,
     },
@@ -66,6 +80,21 @@ impl Start {
                     lattice_spacing(grains.diameter, solid_fraction) - grains.diameter,
                 )?;
             }
+            &Self::Cylinder { from, to, radius, spacing, jitter } => {
+                for (name, end) in [("from", from), ("to", to)] {
+                    end.iter().try_for_each(|&c| finite(&format!("start.{name}"), c))?;
+                }
+                let length = (Vector3::from(to) - Vector3::from(from)).norm();
+                positive("start (distance of from and to)", length)?;
+                positive("start.radius", radius)?;
+                positive("start.spacing", spacing)?;
+                jitter_fits(jitter, spacing - grains.diameter)?;
+                let capacity = cylinder(grains, from, to, radius, spacing, jitter).len();
+                if grains.count > capacity {
+                    let count = grains.count;
+                    return Err(DemError::StartTooSmall { kind: "cylinder", capacity, count });
+                }
+            }
             Self::Positions { positions } => {
                 let (got, expected) = (positions.len(), grains.count);
                 if got != expected {
@@ -85,12 +114,18 @@ impl Start {
     pub(crate) fn positions(&self, scene: &Scene, seed: u64) -> Vec<Vector3<f64>> {
         let (mut positions, jitter) = match self {
             &Self::Grid { counts, spacing, jitter, base } => {
-                let floor = scene.funnel.map_or(0.0, |funnel| funnel.rim_height());
+                let floor = scene.funnel.as_ref().map_or(0.0, Funnel::rim_height);
                 (grid(scene.grains.count, counts, spacing, floor + base), jitter)
             }
             &Self::Ball { height, solid_fraction, jitter } => {
                 let spacing = lattice_spacing(scene.grains.diameter, solid_fraction);
                 (ball(&scene.grains, spacing, height + jitter), jitter)
+            }
+            &Self::Cylinder { from, to, radius, spacing, jitter } => {
+                let mut points = cylinder(&scene.grains, from, to, radius, spacing, jitter);
+                points.sort_by(|a, b| a.z.total_cmp(&b.z));
+                points.truncate(scene.grains.count);
+                (points, jitter)
             }
             Self::Positions { positions } => {
                 return positions.iter().map(|&position| Vector3::from(position)).collect();
@@ -133,6 +168,43 @@ fn grid(count: usize, counts: [usize; 3], spacing: f64, bottom: f64) -> Vec<Vect
             Vector3::new(centred(x, counts[0]), centred(y, counts[1]), bottom + spacing * z as f64)
         })
         .collect()
+}
+
+/// The points of a cubic lattice along the axis of a cylinder at which a grain that may move by `jitter` fits into it.
+fn cylinder(
+    grains: &Grains,
+    from: [f64; 3],
+    to: [f64; 3],
+    radius: f64,
+    spacing: f64,
+    jitter: f64,
+) -> Vec<Vector3<f64>> {
+    let (from, to) = (Vector3::from(from), Vector3::from(to));
+    let length = (to - from).norm();
+    let axis = (to - from) / length;
+    let u = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
+    let v = axis.cross(&u);
+    let margin = grains.radius() + 3f64.sqrt() * jitter;
+    let (room, free) = (radius - margin, length - 2.0 * margin);
+    if room < 0.0 || free < 0.0 {
+        return Vec::new();
+    }
+    let layers = (free / spacing).floor() as i64 + 1;
+    let side = (room / spacing).floor() as i64;
+    let first = 0.5 * (length - spacing * (layers - 1) as f64);
+    let mut points = Vec::new();
+    for layer in 0..layers {
+        let middle = from + (first + spacing * layer as f64) * axis;
+        for a in -side..=side {
+            for b in -side..=side {
+                let (a, b) = (spacing * a as f64, spacing * b as f64);
+                if a.hypot(b) <= room {
+                    points.push(middle + a * u + b * v);
+                }
+            }
+        }
+    }
+    points
 }
 
 /// The `count` lattice points nearest to the centre of a face-centred cubic lattice, lowest point at `height`.
@@ -199,6 +271,33 @@ mod tests {
         let extent = points.iter().map(|p| p.x.abs()).fold(0.0, f64::max);
         let expected = (2000.0f64 / 0.6).cbrt() * 0.002;
         assert!((extent + 0.002 - expected).abs() < 0.1 * expected, "{extent} {expected}");
+    }
+
+    #[test]
+    fn a_cylinder_is_filled_from_below_and_holds_its_grains() {
+        for (from, to) in [([0.1, 0.0, 0.05], [0.1, 0.02, 0.05]), ([0.0; 3], [0.01, 0.02, 0.05])] {
+            let mut scene = Scene::drop(0.1);
+            scene.grains.diameter = 2.4e-3;
+            scene.grains.count = 300;
+            let (radius, spacing, jitter) = (0.03, 2.8e-3, 1e-4);
+            scene.start = Start::Cylinder { from, to, radius, spacing, jitter };
+            scene.check().unwrap();
+            let points = scene.start.positions(&scene, 2);
+            assert!(nearest_pair(&points) >= scene.grains.diameter);
+            let (from, to) = (Vector3::from(from), Vector3::from(to));
+            let axis = (to - from).normalize();
+            for point in &points {
+                let along = (point - from).dot(&axis);
+                let out = (point - from - along * axis).norm();
+                assert!(out <= 0.03 - 1.2e-3 && along >= 1.2e-3);
+                assert!(along <= (to - from).norm() - 1.2e-3);
+            }
+            let highest = points.iter().map(|p| p.z).fold(f64::MIN, f64::max);
+            assert!(highest < 0.6 * (0.05 + 0.03), "{highest}");
+            scene.grains.count = 10_000;
+            let error = scene.check().unwrap_err();
+            assert!(matches!(error, DemError::StartTooSmall { kind: "cylinder", .. }), "{error}");
+        }
     }
 
     #[test]

@@ -10,6 +10,9 @@ impl Simulation {
     /// How the pour has ended, if it has. It must have looked so twice within [`REST_LOOKS`]: a grain at the
     /// top of its bounce is slow, too, but once, while a pile whose last grain trembles is slow now and then.
     pub(super) fn end_reached(&mut self) -> Option<Status> {
+        if self.time() < self.origin.scene.moves_until() {
+            return None;
+        }
         let energies: Vec<f64> = (0..self.bed.count()).map(|i| self.bed.translation(i)).collect();
         let Some(now) = self.looks_still(&energies) else {
             let is_over = self.time() >= self.origin.scene.end.horizon;
@@ -53,7 +56,8 @@ impl Simulation {
     /// The grains that are in the funnel, if the scene has one.
     pub(super) fn in_funnel(&self) -> impl Iterator<Item = usize> {
         let funnel = self.origin.scene.funnel.as_ref();
-        let is_held = move |grain| funnel.is_some_and(|f| f.holds(&self.bed.position(grain)));
+        let time = self.time();
+        let is_held = move |grain| funnel.is_some_and(|f| f.holds(&self.bed.position(grain), time));
         (0..self.bed.count()).filter(move |&grain| is_held(grain))
     }
 }

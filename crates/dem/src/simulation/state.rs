@@ -66,7 +66,7 @@ impl Simulation {
         let State { substep, seemed_ended, ended, bed, contacts, watch } = state;
         let (bed, contacts, watch) = (bed.into_owned(), contacts.into_owned(), watch.into_owned());
         bed.check_like(&self.bed).map_err(strange)?;
-        contacts.check(self.bed.count(), self.around.walls.len()).map_err(strange)?;
+        contacts.check(self.bed.count(), self.around.walls.surfaces()).map_err(strange)?;
         if !watch.is_of(self.bed.count()) {
             return Err(strange("health of another number of grains"));
         }

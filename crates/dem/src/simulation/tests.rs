@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use super::*;
 use crate::contact_set::ContactSet;
 use crate::lanes::WIDEST;
-use crate::scene::{Funnel, Shape, Start, Wall};
+use crate::scene::{Ends, Funnel, Shape, Start, Wall};
 use crate::{Preset, WallMaterial};
 
 /// Some hundred grains through a funnel. In tests blocks and shares of loops are so small that threads share them.
@@ -63,8 +63,8 @@ fn an_impact_that_does_not_happen_moves_no_grain() {
     let from = [-5e-4, 0.0, 7.02e-3 + 0.05];
     scene.start = Start::Positions { positions: vec![from] };
     let (from, to) = ([0.0, -0.1, 0.05], [0.0, 0.1, 0.05]);
-    let shape = Shape::Cylinder { from, to, radius: 5e-3 };
-    scene.walls.push(Wall { shape, material: WallMaterial::default() });
+    let shape = Shape::Cylinder { from, to, radius: 5e-3, closed: Ends::None };
+    scene.walls.push(Wall::fixed(shape, WallMaterial::default()));
     let mut simulation = start(&scene);
     let velocity = Vector3::new(5.0, 0.0, 0.2);
     simulation.set_motion(0, velocity, Vector3::zeros()).expect("a grain");

@@ -7,7 +7,7 @@ use crate::bed::{Body, SharedBodies};
 use crate::contact::Batch;
 use crate::contact_set::ContactSet;
 use crate::lanes::{Lanes, Reg, Reg3, Width, widest};
-use crate::solver::nsgs::Velocities;
+use crate::solver::nsgs::{Velocities, is_at_rest};
 
 /// Numbers of a contact: one normal, three tangential, three rolling, one of torsion.
 pub(super) const COUNT: usize = 8;
@@ -120,7 +120,7 @@ pub(super) fn collect(
 
 widest! {
     fn spread_set<W>(set: &ContactSet, impulses: &[Components], bodies: &mut [Body]) {
-        if set.is_at_walls() {
+        if is_at_rest(set) {
             spread_batches::<W, true>(set, impulses, bodies);
         } else {
             spread_batches::<W, false>(set, impulses, bodies);
@@ -136,7 +136,7 @@ fn spread_batches<W: Width, const AT_WALLS: bool>(
     bodies: &mut [Body],
 ) {
     // Bodies are indexed without looking: the indices were made for as many.
-    assert_eq!(set.grains() + 1, bodies.len());
+    assert!(set.fits(bodies));
     let bodies = SharedBodies::new(bodies);
     for (batch, impulses) in set.batches.iter().zip(impulses) {
         let law = &set.laws[batch.law as usize];
@@ -158,7 +158,7 @@ fn each_row<W: Width>(components: &Components) -> [Reg<W>; COUNT] {
 
 widest! {
     fn collect_set<W>(set: &ContactSet, bodies: &mut [Body], at_contacts: &mut [Components]) {
-        assert_eq!(set.grains() + 1, bodies.len());
+        assert!(set.fits(bodies));
         let bodies = SharedBodies::new(bodies);
         for (batch, at_contacts) in set.batches.iter().zip(at_contacts) {
             let law = &set.laws[batch.law as usize];

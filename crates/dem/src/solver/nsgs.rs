@@ -93,6 +93,11 @@ impl Manner {
     }
 }
 
+/// Whether the second body of every contact of a set rests and need not be read.
+pub(super) fn is_at_rest(set: &ContactSet) -> bool {
+    set.is_at_walls() && !set.has_wall_bodies()
+}
+
 /// One sweep over the sets in their order.
 pub(super) fn sweep(
     sets: &mut [&mut ContactSet],
@@ -102,7 +107,7 @@ pub(super) fn sweep(
 ) -> Progress {
     let mut worst = Progress::default();
     for set in sets {
-        let kernel = if set.is_at_walls() { sweep_walls } else { sweep_pairs };
+        let kernel = if is_at_rest(set) { sweep_walls } else { sweep_pairs };
         let sweep = |batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>| {
             kernel(batches, laws, bodies, manner)
         };
@@ -113,7 +118,7 @@ pub(super) fn sweep(
 
 /// Adds what the impulses that the contacts of a set carry do to the velocities: the warm start.
 pub(super) fn warm_start(set: &mut ContactSet, bodies: &mut [Body], threads: &Threads) {
-    let kernel = if set.is_at_walls() { apply_walls } else { apply_pairs };
+    let kernel = if is_at_rest(set) { apply_walls } else { apply_pairs };
     for_each_phase(set, bodies, threads, kernel);
 }
 
@@ -126,7 +131,7 @@ fn for_each_phase(
     kernel: impl Fn(&mut [Batch], &[LawLanes], &SharedBodies<'_>) -> Progress + Sync,
 ) -> Progress {
     // The kernels index the bodies without looking: the indices were made for as many.
-    assert_eq!(set.grains() + 1, bodies.len());
+    assert!(set.fits(bodies));
     let ContactSet { batches, laws, parts, phases, .. } = set;
     let bodies = SharedBodies::new(bodies);
     let mut largest = Progress::default();
@@ -450,7 +455,7 @@ widest! {
         squares: &mut f64,
         impulses: &mut f64,
     ) {
-        assert_eq!(set.grains() + 1, bodies.len());
+        assert!(set.fits(bodies));
         let bodies = SharedBodies::new(bodies);
         for batch in &set.batches {
             let law = &set.laws[batch.law as usize];

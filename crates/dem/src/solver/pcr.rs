@@ -112,6 +112,7 @@ mod tests {
     use super::*;
     use crate::blocks::Blocks;
     use crate::contact::{ContactLaw, Listed};
+    use crate::contact_set::Second;
     use crate::lanes::LANES;
 
     /// Axis of the normal of each contact of the triangle.
@@ -122,7 +123,7 @@ mod tests {
     fn triangle() -> ContactSet {
         let listed = [(0, 1), (0, 2), (1, 2)].map(|(i, partner)| Listed { i, partner });
         let mut set = ContactSet::default();
-        set.rebuild(&listed, &Blocks::default(), 3, false, |contact| ContactLaw {
+        set.rebuild(&listed, &Blocks::default(), 3, Second::Grain, |contact| ContactLaw {
             inverse_mass: [contact.i, contact.partner].map(|grain| [1.0, 2.0, 0.5][grain as usize]),
             lever: [0.3, 0.7],
             sliding_friction: 0.5,

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::blocks::Blocks;
 use crate::contact::{ContactLaw, Listed};
+use crate::contact_set::Second;
 use crate::lanes::Row;
 use crate::preset::Preset;
 use crate::solver::newton_pcr::{Complementarity, NewtonSettings};
@@ -16,7 +17,8 @@ use crate::{Material, Scene, Simulation};
 fn contact(at_wall: bool, bias: f64, law: ContactLaw) -> ContactSet {
     let mut set = ContactSet::default();
     let listed = [Listed { i: 0, partner: u32::from(!at_wall) }];
-    set.rebuild(&listed, &Blocks::default(), 2, at_wall, |_| law);
+    let second = if at_wall { Second::RestingWall } else { Second::Grain };
+    set.rebuild(&listed, &Blocks::default(), 2, second, |_| law);
     set.batches[0].normal.set(0, [0.0, 0.0, 1.0]);
     set.batches[0].bias.0[0] = bias;
     set

@@ -1,0 +1,302 @@
+//! A mesh as the solver sees it: a contact for each place where its distance to a grain is least nearby.
+//!
+//! A grain in a corner touches two faces, one on a flat wall touches one triangle of it. So each triangle reports its nearest
+//! point if that is a local minimum of the distance over the whole mesh: inside the triangle it always is, on an edge
+//! only if the distance does not fall into the triangle across, at a corner only if it falls along no edge that leaves
+//! it. Of the triangles that share such an edge or corner the first reports it.
+//!
+//! The library's vectors are converted here and nowhere else.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use nalgebra::Vector3;
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::math::Vector as ParryVector;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
+use parry3d_f64::query::{PointQuery, PointQueryWithLocation};
+use parry3d_f64::shape::{Triangle, TrianglePointLocation};
+
+use super::Nearest;
+
+/// Shares of a triangle and sines of angles that are zero but for rounding `[-]`.
+const ROUNDING: f64 = 1e-9;
+
+/// The triangles of a mesh, in metres.
+#[derive(Clone, Debug)]
+pub(crate) struct Facets {
+    all: Vec<Facet>,
+    /// What lies across the edges, edge after edge.
+    across: Vec<Across>,
+    corners: Vec<Corner>,
+    /// Directions in which edges leave the corners, corner after corner.
+    leaving: Vec<Vector3<f64>>,
+    tree: Bvh,
+}
+
+#[derive(Clone, Debug)]
+struct Facet {
+    triangle: Triangle,
+    normal: Vector3<f64>,
+    corners: [u32; 3],
+    /// Edges AB, BC and CA into `Facets::across`.
+    edges: [Range<u32>; 3],
+}
+
+/// A triangle across an edge.
+#[derive(Clone, Debug)]
+struct Across {
+    facet: u32,
+    /// From the edge into that triangle, at right angles to the edge.
+    inwards: Vector3<f64>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Corner {
+    /// The first triangle that has it.
+    owner: u32,
+    /// Into `Facets::leaving`.
+    leaving: Range<u32>,
+}
+
+fn parry(v: &Vector3<f64>) -> ParryVector {
+    ParryVector::new(v.x, v.y, v.z)
+}
+
+fn plain(v: ParryVector) -> Vector3<f64> {
+    Vector3::new(v.x, v.y, v.z)
+}
+
+impl Facets {
+    /// The facets of `triangles`, each three of `vertices` `[m]`; every one has an area.
+    pub fn new(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Self {
+        let mut at_edge: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
+        let mut at_corner = vec![Vec::new(); vertices.len()];
+        for (number, &[a, b, c]) in triangles.iter().enumerate() {
+            for edge in [[a, b], [b, c], [c, a]] {
+                at_edge.entry(sorted(edge)).or_default().push(number as u32);
+            }
+            for corner in [a, b, c] {
+                at_corner[corner as usize].push(number as u32);
+            }
+        }
+        let mut across = Vec::new();
+        let all: Vec<Facet> = triangles
+            .iter()
+            .enumerate()
+            .map(|(number, &corners)| {
+                let [a, b, c] = corners.map(|corner| vertices[corner as usize]);
+                let [i, j, k] = corners;
+                let edges = [[i, j], [j, k], [k, i]].map(|edge| {
+                    let first = across.len() as u32;
+                    for &other in &at_edge[&sorted(edge)] {
+                        if other as usize != number {
+                            let inwards = inwards(vertices, edge, triangles[other as usize]);
+                            across.push(Across { facet: other, inwards });
+                        }
+                    }
+                    first..across.len() as u32
+                });
+                let triangle = Triangle::new(parry(&a), parry(&b), parry(&c));
+                let normal = (b - a).cross(&(c - a)).normalize();
+                Facet { triangle, normal, corners, edges }
+            })
+            .collect();
+        let mut leaving = Vec::new();
+        let corners = at_corner
+            .iter()
+            .enumerate()
+            .map(|(corner, users)| {
+                let first = leaving.len() as u32;
+                for &user in users {
+                    for other in triangles[user as usize] {
+                        if other as usize != corner {
+                            leaving.push(vertices[other as usize] - vertices[corner]);
+                        }
+                    }
+                }
+                let owner = users.first().copied().unwrap_or_default();
+                Corner { owner, leaving: first..leaving.len() as u32 }
+            })
+            .collect();
+        let boxes = all.iter().map(|facet| facet.triangle.local_aabb()).enumerate();
+        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, boxes);
+        Self { all, across, corners, leaving, tree }
+    }
+
+    /// Number of triangles.
+    pub fn count(&self) -> usize {
+        self.all.len()
+    }
+
+    /// The nearest point of one triangle, infinitely far if it is not one to touch, or another triangle's.
+    pub fn nearest(&self, number: usize, centre: &Vector3<f64>) -> Nearest {
+        let facet = &self.all[number];
+        let (point, location) =
+            facet.triangle.project_local_point_and_get_location(parry(centre), false);
+        let offset = centre - plain(point.point);
+        let (is_own, is_inside) = match location {
+            TrianglePointLocation::OnEdge(edge, _) => {
+                (self.owns_edge(number, edge, &offset), false)
+            }
+            TrianglePointLocation::OnVertex(corner) => {
+                (self.owns_corner(number, corner, &offset), false)
+            }
+            TrianglePointLocation::OnFace(_, shares) => {
+                (!self.is_on_edge_of_earlier(number, shares, &offset), true)
+            }
+            TrianglePointLocation::OnSolid => (true, true),
+        };
+        if !is_own {
+            return Nearest { distance: f64::INFINITY, normal: facet.normal, side: 0 };
+        }
+        let distance = offset.norm();
+        let normal = if distance > 0.0 { offset / distance } else { facet.normal };
+        let height = offset.dot(&facet.normal);
+        let side = if is_inside && height != 0.0 { height.signum() as i8 } else { 0 };
+        Nearest { distance, normal, side }
+    }
+
+    /// Whether the distance at this edge falls into no triangle across, and none of them comes first.
+    fn owns_edge(&self, number: usize, edge: u32, offset: &Vector3<f64>) -> bool {
+        let Range { start, end } = self.all[number].edges[edge as usize];
+        self.across[start as usize..end as usize]
+            .iter()
+            .all(|across| across.facet as usize > number && !falls(offset, &across.inwards))
+    }
+
+    /// Whether a point inside the triangle, where it has these shares of A, B and C, is as well on an edge that an
+    /// earlier triangle reports.
+    fn is_on_edge_of_earlier(
+        &self,
+        number: usize,
+        shares: [f64; 3],
+        offset: &Vector3<f64>,
+    ) -> bool {
+        let [a, b, c] = shares.map(|share| share < ROUNDING);
+        [c, a, b].into_iter().zip(&self.all[number].edges).any(|(is_on_edge, edge)| {
+            let across = &self.across[edge.start as usize..edge.end as usize];
+            let earlier =
+                |other: &Across| (other.facet as usize) < number && !falls(offset, &other.inwards);
+            is_on_edge && across.iter().any(earlier)
+        })
+    }
+
+    /// Whether the distance at this corner falls along no edge, and no other triangle with it comes first.
+    fn owns_corner(&self, number: usize, corner: u32, offset: &Vector3<f64>) -> bool {
+        let Corner { owner, leaving } =
+            &self.corners[self.all[number].corners[corner as usize] as usize];
+        let leaving = &self.leaving[leaving.start as usize..leaving.end as usize];
+        *owner as usize == number && leaving.iter().all(|edge| !falls(offset, edge))
+    }
+
+    /// Whether a triangle is nearer than `range` `[m]`.
+    pub fn may_reach(&self, number: usize, centre: &Vector3<f64>, range: f64) -> bool {
+        self.all[number].triangle.distance_to_local_point(parry(centre), false) < range
+    }
+
+    /// Calls `found` for every triangle that is nearer than `range` `[m]`, in the order of their numbers.
+    pub fn reached(&self, centre: &Vector3<f64>, range: f64, mut found: impl FnMut(usize)) {
+        let (centre_there, half) = (parry(centre), ParryVector::splat(range));
+        let around = Aabb::new(centre_there - half, centre_there + half);
+        let mut numbers: Vec<u32> = self.tree.intersect_aabb(&around).collect();
+        numbers.sort_unstable();
+        for number in numbers {
+            if self.may_reach(number as usize, centre, range) {
+                found(number as usize);
+            }
+        }
+    }
+}
+
+/// Whether the distance falls in this direction, by more than rounding.
+fn falls(offset: &Vector3<f64>, direction: &Vector3<f64>) -> bool {
+    offset.dot(direction) > ROUNDING * offset.norm() * direction.norm()
+}
+
+fn sorted([a, b]: [u32; 2]) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// From an edge into a triangle that has it, at right angles to the edge.
+fn inwards(vertices: &[Vector3<f64>], [from, to]: [u32; 2], triangle: [u32; 3]) -> Vector3<f64> {
+    let third = triangle.into_iter().find(|&corner| corner != from && corner != to);
+    let [from, to] = [from, to].map(|corner| vertices[corner as usize]);
+    let third = vertices[third.expect("three corners") as usize];
+    let along = (to - from).normalize();
+    let into = third - from;
+    into - into.dot(&along) * along
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A cube from -1 to 1, seen from inside and outside.
+    fn cube() -> Facets {
+        let corner = |n: u32| {
+            let bit = |at: u32| if n >> at & 1 == 1 { 1.0 } else { -1.0 };
+            Vector3::new(bit(0), bit(1), bit(2))
+        };
+        let vertices: Vec<_> = (0..8).map(corner).collect();
+        let faces =
+            [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+        let triangles: Vec<[u32; 3]> =
+            faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        Facets::new(&vertices, &triangles)
+    }
+
+    /// Distances of all contacts within `range` of a point, in ascending order.
+    fn touched(facets: &Facets, centre: [f64; 3], range: f64) -> Vec<f64> {
+        let centre = Vector3::from(centre);
+        let mut distances = Vec::new();
+        facets.reached(&centre, range, |number| {
+            let near = facets.nearest(number, &centre);
+            if near.distance < range {
+                assert!((near.normal.norm() - 1.0).abs() < 1e-12);
+                distances.push(near.distance);
+            }
+        });
+        distances.sort_by(f64::total_cmp);
+        distances
+    }
+
+    #[test]
+    fn each_place_is_touched_once() {
+        let cube = cube();
+        let near = |expected: &[f64], centre| {
+            let got = touched(&cube, centre, 0.5);
+            assert_eq!(got.len(), expected.len(), "{centre:?} {got:?}");
+            assert!(got.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{got:?}");
+        };
+        near(&[], [0.0, 0.1, 0.2]);
+        near(&[0.1], [0.3, 0.2, -0.9]); // a face from inside
+        near(&[0.1], [0.3, 0.3, -0.9]); // on the diagonal of the face, which two triangles share
+        near(&[0.1], [0.3, 0.2, -1.1]); // and from outside
+        near(&[0.1, 0.2], [0.9, 0.3, 0.8]); // in an edge from inside: two faces
+        near(&[0.1, 0.2, 0.3], [0.9, 0.7, 0.8]); // in a corner: three
+        near(&[0.1], [1.06, 0.2, 1.08]); // beyond an edge: the edge, once
+        near(&[(3.0f64 * 0.01).sqrt()], [1.1, 1.1, -1.1]); // beyond a corner: the corner, once
+    }
+
+    proptest! {
+        #[test]
+        fn the_least_distance_is_that_of_all_triangles(centre in prop::array::uniform3(-1.6f64..1.6)) {
+            let cube = cube();
+            let point = Vector3::from(centre);
+            let all = (0..cube.count()).map(|n| {
+                cube.all[n].triangle.distance_to_local_point(parry(&point), false)
+            });
+            let least = all.fold(f64::INFINITY, f64::min);
+            let got = touched(&cube, centre, 3.0);
+            prop_assert!((got[0] - least).abs() < 1e-12, "{got:?} {least}");
+            // Outside a convex body there is one nearest point.
+            if point.amax() > 1.0 {
+                let here = got.iter().filter(|d| **d < least + 1e-9).count();
+                prop_assert_eq!(here, 1, "{:?}", got);
+            }
+        }
+    }
+}

@@ -1,0 +1,55 @@
+"""Draws the grains of a pour from the side.
+
+Run: granulcal simulate examples/drum.toml --positions drum.npy
+     python examples/side_view.py drum.npy --diameter 2.4e-3 -o drum.png
+"""
+
+import argparse
+
+import matplotlib as mpl
+import numpy as np
+from numpy.typing import NDArray
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.collections import EllipseCollection
+
+
+def draw(positions: NDArray[np.float64], diameter: float, out: str) -> None:
+    """Draws centres, shape (n, 3) [m], as discs in the plane y = 0, the nearest last."""
+    x, y, z = 1e3 * positions[np.argsort(positions[:, 1])[::-1]].T
+    figure, axes = plt.subplots(figsize=(5, 5), layout="constrained")
+    sizes = np.full(len(x), 1e3 * diameter)
+    shade = plt.get_cmap("copper")(np.interp(-y, (-y.max(), -y.min() + 1e-9), (0.4, 1.0)))
+    axes.add_collection(
+        EllipseCollection(
+            sizes,
+            sizes,
+            0 * sizes,
+            units="x",
+            offsets=np.stack([x, z], 1),
+            offset_transform=axes.transData,
+            facecolors=shade,
+            edgecolors="black",
+            linewidths=0.3,
+        )
+    )
+    axes.set(xlabel="x [mm]", ylabel="z [mm]", aspect="equal")
+    margin = 1e3 * diameter
+    axes.set_xlim(x.min() - margin, x.max() + margin)
+    axes.set_ylim(min(0.0, z.min() - margin), z.max() + margin)
+    figure.savefig(out, dpi=80)
+
+
+def main() -> None:
+    """Draws the file that is named."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("positions", help="centres of the grains, .npy of shape (n, 3) [m]")
+    parser.add_argument("--diameter", type=float, default=4e-3, help="of a grain [m]")
+    parser.add_argument("-o", "--out", default="side.png", help="the picture")
+    arguments = parser.parse_args()
+    draw(np.load(arguments.positions), arguments.diameter, arguments.out)
+
+
+if __name__ == "__main__":
+    main()
