@@ -344,13 +344,10 @@ impl ContactProblem {
 /// Every lane in use of every listed contact, as set, batch and lane.
 fn lanes(contacts: &Contacts) -> impl Iterator<Item = (&ContactSet, usize, usize)> {
     [&contacts.pairs, &contacts.at_walls].into_iter().flat_map(|set| {
-        let batches = set.batches.iter().enumerate();
-        let lanes =
-            batches.flat_map(|(number, batch)| batch.lanes().map(move |lane| (number, lane)));
         // A facet of which a neighbour is nearer is infinitely far.
         let is_one =
             |&(number, lane): &(usize, usize)| set.batches[number].bias.0[lane].is_finite();
-        lanes.filter(is_one).map(move |(number, lane)| (set, number, lane))
+        set.lanes().filter(is_one).map(move |(number, lane)| (set, number, lane))
     })
 }
 
