@@ -8,6 +8,7 @@ mod bulk_laws;
 mod collision;
 mod counters;
 mod determinism;
+mod effects;
 mod impact;
 mod incline;
 mod meshes;

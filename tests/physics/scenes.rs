@@ -1,7 +1,8 @@
 //! The scenes that the tests share, and how a single grain is followed.
 
 use granulcal::dem::{
-    CameraSpec, EndRule, GRAVITY, Grains, Ground, Material, Preset, Scene, Simulation, Start,
+    CameraSpec, Effects, EndRule, GRAVITY, Grains, Ground, Material, Preset, Scene, Simulation,
+    Start,
 };
 use nalgebra::Vector3;
 
@@ -21,6 +22,7 @@ pub fn block(counts: [usize; 3], spacing: f64, base: f64, material: Material) ->
         ground: Ground::default(),
         funnel: None,
         walls: Vec::new(),
+        effects: Effects::default(),
         end: EndRule { horizon: 100.0, kinetic_energy: f64::MIN_POSITIVE },
         camera: CameraSpec { field_width: 1e3, ..CameraSpec::default() },
     }

@@ -95,12 +95,19 @@ impl Bed {
         let radius = scene.grains.radius();
         let mut places: Vec<Row> =
             scene.start.positions(scene, seed).iter().map(|at| Row::new(at, radius)).collect();
+        let mut inverse_mass = vec![1.0; count];
+        if let Some(radii) = scene.effects.polydispersity.radii(count, radius, seed) {
+            for ((place, inverse), own) in places.iter_mut().zip(&mut inverse_mass).zip(radii) {
+                place.0[3] = own;
+                *inverse = (radius / own).powi(3);
+            }
+        }
         places.push(Row::default());
         Self {
             places,
             bodies: vec![Body::default(); count + 1],
             clocks: vec![0.0; count],
-            inverse_mass: vec![1.0; count],
+            inverse_mass,
         }
     }
 
@@ -172,9 +179,22 @@ impl Bed {
             .sum()
     }
 
+    /// Work of an acceleration on all grains within `dt` `[s]`, per typical mass `[m^2/s^2]`.
+    pub fn work_of(&self, acceleration: &Vector3<f64>, dt: f64) -> f64 {
+        let step = dt * acceleration;
+        let work = |i| (self.velocity(i) + 0.5 * step).dot(&step) / self.inverse_mass[i];
+        (0..self.count()).map(work).sum()
+    }
+
     /// Makes room for so many bodies that stand for moving walls, after the resting one.
     pub fn resize_wall_bodies(&mut self, count: usize) {
         self.bodies.resize(self.count() + 1 + count, Body::default());
+    }
+
+    /// Adds an impulse over a typical mass `[m/s]` to a grain's centre.
+    pub fn kick(&mut self, grain: usize, impulse: &Vector3<f64>) {
+        let step = self.inverse_mass[grain] * impulse;
+        self.bodies[grain].velocity.add(&step);
     }
 
     /// v += g dt.

@@ -14,6 +14,7 @@ use crate::bed::{Bed, Body};
 use crate::blocks::Blocks;
 use crate::contact::{Batch, ContactLaw, Listed};
 use crate::contact_set::{ContactSet, Second};
+use crate::effect::Acting;
 use crate::impact::Impacts;
 use crate::lanes::Row;
 use crate::neighbor::{Neighbours, PairSearch};
@@ -41,7 +42,9 @@ pub(crate) struct Surroundings {
     /// Whether any wall may move.
     pub has_moving_walls: bool,
     pub material: Material,
+    /// Gravity in the present substep `[m/s^2]`.
     pub gravity: Vector3<f64>,
+    pub effects: Acting,
     pub settings: SolverSettings,
     pub threads: Threads,
     /// Radius of a typical grain `[m]`, the length that the settings are relative to.
@@ -54,21 +57,23 @@ impl Surroundings {
     pub fn new(scene: &Scene) -> Self {
         let settings = scene.preset.settings();
         let walls = Walls::of(scene);
+        let (effects, radius) = (Acting::of(scene), scene.grains.radius());
         Self {
             has_moving_walls: walls.any_moving(),
             walls,
             material: scene.material,
-            gravity: scene.gravity.into(),
+            gravity: effects.gravity,
             settings,
             threads: Threads::default(),
-            radius: scene.grains.radius(),
-            margin: settings.margin * scene.grains.radius(),
+            radius,
+            margin: effects.reach().max(settings.margin * radius),
+            effects,
         }
     }
 
     /// Replaces the preset's settings.
     pub fn set_settings(&mut self, settings: SolverSettings) {
-        self.margin = settings.margin * self.radius;
+        self.margin = self.effects.reach().max(settings.margin * self.radius);
         self.settings = settings;
     }
 

@@ -285,7 +285,8 @@ fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> 
         bed.advance(j, time);
     }
     let a_n = c_i + c_j;
-    let lambda_n = -(1.0 + material.restitution) * (w_n + falling) / a_n;
+    let restitution = around.effects.restitution_at(material.restitution, -(w_n + falling));
+    let lambda_n = -(1.0 + restitution) * (w_n + falling) / a_n;
 
     let spin_i = bed.bodies[i].spin.vector();
     let u_t = dv + normal.cross(&(spin_i + spin_j)) - w_n * normal;

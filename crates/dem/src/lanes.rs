@@ -53,6 +53,12 @@ impl Row {
         self.0[1] += step.y;
         self.0[2] += step.z;
     }
+
+    /// Multiplies the vector by `factor`.
+    #[inline(always)]
+    pub fn scale(&mut self, factor: f64) {
+        self.0[..3].iter_mut().for_each(|c| *c *= factor);
+    }
 }
 
 /// One 3-vector for each contact of a batch, component by component, in memory.

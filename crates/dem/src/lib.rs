@@ -36,6 +36,7 @@ mod checkpoint;
 mod contact;
 mod contact_set;
 mod contacts;
+mod effect;
 mod error;
 mod frozen_search;
 mod health;
@@ -58,6 +59,10 @@ mod wall;
 mod wall_load;
 
 pub use checkpoint::CheckpointHeader;
+pub use effect::{
+    Adhesion, Capillary, Effects, Fluid, GroundUnlike, Polydispersity, RestitutionSpeed, Tilt,
+    Vibration,
+};
 pub use error::DemError;
 pub use frozen_search::FrozenSearch;
 pub use health::{Health, MAX_ENERGY_CREATED};

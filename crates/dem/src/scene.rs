@@ -18,8 +18,10 @@ pub use mesh::{Mesh, MeshFile};
 pub use motion::Motion;
 pub use sensor::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 pub use start::Start;
+pub(crate) use start::unit_interval;
 pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
 
+use crate::effect::Effects;
 use crate::{DemError, Material, Preset};
 
 /// Standard gravity as the peers' scenes use it `[m/s^2]`.
@@ -53,6 +55,9 @@ pub struct Scene {
     /// Further walls.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub walls: Vec<Wall>,
+    /// What the plain model lacks, each off unless stated.
+    #[serde(default, skip_serializing_if = "Effects::is_plain")]
+    pub effects: Effects,
     /// When the pour ends.
     #[serde(default)]
     pub end: EndRule,
@@ -113,6 +118,7 @@ impl Scene {
             ground: Ground::default(),
             funnel: Some(Funnel { height, ..Funnel::default() }),
             walls: Vec::new(),
+            effects: Effects::default(),
             end: EndRule::default(),
             camera: CameraSpec::default(),
         }
@@ -180,11 +186,12 @@ impl Scene {
         }
     }
 
-    /// When the last wall has come to rest, or the horizon if one never does `[s]`.
+    /// When the last wall has come to rest and the last effect that ends has, or the horizon if one never does `[s]`.
     pub fn moves_until(&self) -> f64 {
         let walls = self.walls.iter().map(|wall| &wall.motion);
         let motions = walls.chain(self.funnel.iter().map(|funnel| &funnel.motion));
-        motions.map(Motion::end).fold(0.0, f64::max).min(self.end.horizon)
+        let last = motions.map(Motion::end).fold(self.effects.acts_until(), f64::max);
+        last.min(self.end.horizon)
     }
 
     /// Checks every number of the scene.
@@ -202,6 +209,7 @@ impl Scene {
         }
         self.start.check(&self.grains)?;
         self.ground.check(&self.material)?;
+        self.effects.check()?;
         if let Some(funnel) = &self.funnel {
             funnel.check(&self.material, self.grains.radius())?;
         }

@@ -12,6 +12,7 @@ use crate::DemError;
 use crate::assemble::Seen;
 use crate::bed::Bed;
 use crate::contacts::{Contacts, Surroundings};
+use crate::effect::Bridges;
 use crate::frozen_search::FrozenSearch;
 use crate::health::{Health, HealthWatch};
 use crate::impact::Impacts;
@@ -37,6 +38,8 @@ pub struct Simulation {
     contacts: Contacts,
     around: Surroundings,
     impacts: Impacts,
+    /// Liquid bridges between grains.
+    bridges: Bridges,
     origin: Arc<Origin>,
     substep: usize,
     watch: HealthWatch,
@@ -60,15 +63,17 @@ impl Simulation {
     pub fn new(scene: &Scene, seed: u64) -> Result<Self, DemError> {
         scene.check()?;
         let bed = Bed::new(scene, seed);
-        let gravity = Vector3::from(scene.gravity);
+        let around = Surroundings::new(scene);
+        let gravity = around.gravity;
         let lift = gravity.norm() * scene.grains.radius();
         let least_scale = (lift + scene.end.kinetic_energy) * bed.count() as f64;
         Ok(Self {
             watch: HealthWatch::new(bed.count(), bed.energy(&gravity), least_scale),
             contacts: Contacts::default(),
-            around: Surroundings::new(scene),
+            around,
             bed,
             impacts: Impacts::default(),
+            bridges: Bridges::default(),
             origin: Arc::new(Origin { scene: scene.clone(), seed }),
             substep: 0,
             seemed_ended: None,
@@ -236,16 +241,41 @@ impl Simulation {
     /// Lists and assembles the contacts of a substep, lets gravity act and resolves the impacts.
     fn assemble(&mut self) -> Seen {
         self.around.move_walls(self.substep as f64 * self.around.settings.dt);
+        self.contacts.follow(&self.bed, &self.around);
+        self.accelerate();
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
-        contacts.follow(bed, around);
-        bed.accelerate(&around.gravity, around.settings.dt, &around.threads);
         let seen = contacts.assemble(bed, around, self.watch.lost_mut(), &mut self.impacts);
         if self.impacts.resolve(bed, contacts, around) > 0 {
             contacts.assemble_again(bed, around);
             bed.rewind();
         }
         contacts.move_walls(bed, around);
+        self.pull();
         seen
+    }
+
+    /// Lets gravity and drag act.
+    fn accelerate(&mut self) {
+        let dt = self.around.settings.dt;
+        if self.around.effects.vibration.is_some() {
+            // The middle of the substep, where velocities are.
+            self.around.gravity = self.around.effects.gravity_at(self.time() + 0.5 * dt);
+            let shaking = self.around.gravity - self.around.effects.gravity;
+            self.watch.see_work(self.bed.work_of(&shaking, dt));
+        }
+        let (bed, around) = (&mut self.bed, &self.around);
+        bed.accelerate(&around.gravity, dt, &around.threads);
+        if let Some(drag) = &around.effects.drag {
+            drag.act(bed, &around.gravity, dt);
+        }
+    }
+
+    /// Lets pulls act, after the impacts: what a pull adds in a substep to a closed contact is not an impact.
+    fn pull(&mut self) {
+        if let Some(pull) = &self.around.effects.pull {
+            let (walls, dt) = (&self.around.walls, self.around.settings.dt);
+            pull.act(&mut self.bed, &self.contacts, walls, &mut self.bridges, dt);
+        }
     }
 
     /// The contact problem that the coming substep has to solve, for studies of solvers; the simulation stays as
@@ -305,7 +335,7 @@ impl Simulation {
             self.watch.see_residual(residual.relative());
         }
         self.watch.see_contacts(self.contacts.count());
-        self.watch.see_energy(self.bed.energy(&self.around.gravity));
+        self.watch.see_energy(self.bed.energy(&self.around.effects.gravity));
         self.ended = self.end_reached().map(|status| {
             let trusted = self.watch.is_healthy(self.around.settings.max_penetration);
             if trusted { status } else { Status::Unhealthy }

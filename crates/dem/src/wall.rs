@@ -110,6 +110,7 @@ impl Walls {
         };
         let of = |wall: &scene::Wall| resolve(&wall.shape, &wall.material, &wall.motion);
         let mut all = vec![resolve(&ground, &scene.ground.material, &Motion::Still)];
+        all[0].material = scene.effects.ground.of(all[0].material);
         all.extend(scene.funnel.iter().flat_map(scene::Funnel::walls).map(|wall| of(&wall)));
         all.extend(scene.walls.iter().map(of));
         let (mut first, mut owner) = (Vec::new(), Vec::new());

@@ -1,8 +1,8 @@
 //! Grains packed in a cylinder: rained in, settled, and handed on to a scene with other walls.
 
 use granulcal::dem::{
-    CameraSpec, EndRule, Ends, GRAVITY, Grains, Ground, Material, Preset, Scene, Shape, Simulation,
-    SolverSettings, Start, Wall, WallMaterial,
+    CameraSpec, Effects, EndRule, Ends, GRAVITY, Grains, Ground, Material, Preset, Scene, Shape,
+    Simulation, SolverSettings, Start, Wall, WallMaterial,
 };
 use nalgebra::Vector3;
 
@@ -28,6 +28,7 @@ pub fn scene(positions: &[Vector3<f64>], material: Material, walls: Vec<Wall>) -
         ground: Ground::default(),
         funnel: None,
         walls,
+        effects: Effects::default(),
         end: EndRule { horizon: 1e3, kinetic_energy: f64::MIN_POSITIVE },
         camera: CameraSpec { field_width: 1e3, ..CameraSpec::default() },
     }

@@ -108,6 +108,7 @@ pub(crate) fn first_difference(
 /// Tables that a scene leaves out where they say nothing.
 const MATERIAL: &str = "material";
 const GROUND: &str = "ground";
+const EFFECTS: &str = "effects";
 
 fn keys(path: &str) -> impl Iterator<Item = &str> {
     path.strip_prefix("scene.").unwrap_or(path).split('.')
@@ -125,10 +126,13 @@ fn insert(tree: &mut Table, path: &str, value: f64) -> Result<(), DemError> {
     // An entry of a list stands where a number of a table does.
     let mut table = tree;
     let mut first = first.iter().copied().peekable();
+    let mut is_effect = false;
     while let Some(key) = first.next() {
-        if !table.contains_key(key) && key != MATERIAL && key != GROUND {
+        let may_be_new = [MATERIAL, GROUND, EFFECTS].contains(&key) || is_effect;
+        if !table.contains_key(key) && !may_be_new {
             return Err(path_error(path, &format!("this scene has no {key:?}")));
         }
+        is_effect = key == EFFECTS;
         let mut here = table.entry(key.to_owned()).or_insert_with(|| Value::Table(Table::new()));
         while let Value::Array(entries) = here {
             let count = entries.len();

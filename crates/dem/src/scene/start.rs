@@ -155,7 +155,7 @@ fn lattice_spacing(diameter: f64, solid_fraction: f64) -> f64 {
 }
 
 /// The top 53 bits of a random word as a number in [0, 1).
-fn unit_interval(word: u64) -> f64 {
+pub(crate) fn unit_interval(word: u64) -> f64 {
     (word >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 

@@ -14,6 +14,7 @@ use crate::DemError;
 use crate::bed::Bed;
 use crate::checkpoint::{self, CheckpointHeader};
 use crate::contacts::Contacts;
+use crate::effect::Bridges;
 use crate::health::HealthWatch;
 use crate::impact::Impacts;
 use crate::pour::Status;
@@ -26,6 +27,7 @@ struct State<'a> {
     ended: Option<Status>,
     bed: Cow<'a, Bed>,
     contacts: Cow<'a, Contacts>,
+    bridges: Cow<'a, Bridges>,
     watch: Cow<'a, HealthWatch>,
 }
 
@@ -63,7 +65,7 @@ impl Simulation {
         if !rest.is_empty() {
             return Err(strange("more bytes than a state has"));
         }
-        let State { substep, seemed_ended, ended, bed, contacts, watch } = state;
+        let State { substep, seemed_ended, ended, bed, contacts, bridges, watch } = state;
         let (bed, contacts, watch) = (bed.into_owned(), contacts.into_owned(), watch.into_owned());
         bed.check_like(&self.bed).map_err(strange)?;
         contacts.check(self.bed.count(), self.around.walls.surfaces()).map_err(strange)?;
@@ -75,6 +77,7 @@ impl Simulation {
         }
         (self.substep, self.seemed_ended, self.ended) = (substep, seemed_ended, ended);
         (self.bed, self.contacts, self.watch) = (bed, contacts, watch);
+        self.bridges = bridges.into_owned();
         self.impacts = Impacts::default();
         Ok(self)
     }
@@ -97,6 +100,7 @@ impl Simulation {
             ended: self.ended,
             bed: Cow::Borrowed(&self.bed),
             contacts: Cow::Borrowed(&self.contacts),
+            bridges: Cow::Borrowed(&self.bridges),
             watch: Cow::Borrowed(&self.watch),
         };
         postcard::to_stdvec(&state).expect("a state in memory")

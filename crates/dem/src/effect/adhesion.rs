@@ -1,0 +1,43 @@
+//! Dry adhesion: surfaces that touch pull each other with a constant force, the pull-off force.
+//!
+//! For rigid grains only the pull-off force of JKR, `F = 3 pi gamma R_eff`, is left, with `R_eff = r_i r_j / (r_i + r_j)` (r at
+//! a flat wall) and gamma half the work of adhesion; DMT's is 4/3 of it, and a simplified JKR (SJKR) differs in how the
+//! force sets in over an overlap that rigid grains do not have. Source: Johnson, Kendall and Roberts, Proc. R. Soc. A
+//! 324 (1971) 301, doi:10.1098/rspa.1971.0141; Derjaguin, Muller and Toporov, J. Colloid Interface Sci. 53 (1975) 314.
+//! Dimensional screen: roughness cuts an ideal surface's pull 10 to 100 times; no effect below a Bond number of 0.03.
+
+use serde::{Deserialize, Serialize};
+
+use crate::DemError;
+use crate::scene::{non_negative, positive};
+
+/// Dry adhesion; prior of `bond`: log-uniform over 0.003 to 0.3.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Adhesion {
+    /// Pull of two touching typical grains over the weight of one `[-]`.
+    pub bond: f64,
+    /// Gap up to which surfaces count as touching, in radii of a typical grain `[-]`.
+    pub range: f64,
+    /// Pull at walls over that at a wall like the grains `[-]`.
+    pub walls: f64,
+}
+
+impl Default for Adhesion {
+    fn default() -> Self {
+        Self { bond: 0.0, range: 5e-3, walls: 1.0 }
+    }
+}
+
+impl Adhesion {
+    pub(super) fn check(&self) -> Result<(), DemError> {
+        non_negative("effects.adhesion.bond", self.bond)?;
+        positive("effects.adhesion.range", self.range)?;
+        non_negative("effects.adhesion.walls", self.walls)
+    }
+
+    /// Pull over that of touching typical grains `[-]`; lengths in radii of a typical grain.
+    pub(super) fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
+        if gap <= self.range { derjaguin } else { 0.0 }
+    }
+}

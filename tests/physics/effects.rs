@@ -1,0 +1,242 @@
+//! Every effect by itself, on one or two grains, against its closed form; docs/theory/effects.md.
+
+use std::f64::consts::PI;
+
+use granulcal::dem::{
+    Adhesion, Capillary, Fluid, GRAVITY, Grains, GroundUnlike, Motion, Polydispersity,
+    RestitutionSpeed, Scene, Shape, Start, Status, Tilt, Vibration, Wall, WallMaterial,
+};
+use nalgebra::Vector3;
+
+use crate::scenes::{RADIUS, bits, drop_of, material, one_grain, start};
+
+/// Substep of the preset `[s]`.
+const DT: f64 = 1.0 / 2000.0;
+
+/// One grain that touches a ceiling from below.
+fn hanging() -> Scene {
+    let mut scene = one_grain(0.1, material(0.5, 0.1, 0.5));
+    scene.walls.push(Wall {
+        shape: Shape::Disc {
+            centre: [0.0, 0.0, 0.1 + RADIUS],
+            normal: [0.0, 0.0, -1.0],
+            radius: 0.05,
+        },
+        material: WallMaterial::default(),
+        motion: Motion::Still,
+    });
+    scene
+}
+
+fn fallen(scene: &Scene) -> f64 {
+    let mut simulation = start(scene);
+    simulation.advance(0.2);
+    0.1 - simulation.positions()[0].z
+}
+
+#[test]
+fn an_effect_that_is_off_changes_no_bit() {
+    let plain = drop_of(120, 0.05, material(0.5, 0.1, 0.6));
+    let mut said = plain.clone();
+    said.effects.capillary.volume = 1e-2;
+    said.effects.adhesion.range = 0.1;
+    said.effects.fluid.added_mass = 0.0;
+    said.effects.vibration.frequency = 10.0;
+    said.effects.restitution_speed.reference = 3.0;
+    assert!(!said.effects.is_plain());
+    assert_eq!(bits(&after(&plain, 0.3)), bits(&after(&said, 0.3)));
+}
+
+fn after(scene: &Scene, seconds: f64) -> granulcal::dem::Simulation {
+    let mut simulation = start(scene);
+    simulation.advance(seconds);
+    simulation
+}
+
+#[test]
+fn a_bridge_or_adhesion_holds_a_grain_at_a_ceiling_up_to_its_pull() {
+    // The pull at a flat wall is twice that of a pair: 2 bond m g against m g.
+    for (bond, holds) in [(0.52, true), (0.48, false)] {
+        let mut scene = hanging();
+        scene.effects.capillary = Capillary { bond, ..Capillary::default() };
+        assert_eq!(fallen(&scene) < 1e-4, holds, "capillary {bond}: {}", fallen(&scene));
+        let mut scene = hanging();
+        scene.effects.adhesion = Adhesion { bond, ..Adhesion::default() };
+        assert_eq!(fallen(&scene) < 1e-4, holds, "adhesion {bond}: {}", fallen(&scene));
+    }
+}
+
+/// Two touching grains without weight that are sent apart at `speed` `[m/s]` each: how far apart they are in the end.
+fn parted(capillary: Capillary, speed: f64) -> f64 {
+    let mut scene = one_grain(0.1, material(0.5, 0.1, 0.5));
+    scene.grains.count = 2;
+    scene.start = Start::Positions { positions: vec![[0.0, 0.0, 0.1], [2.0 * RADIUS, 0.0, 0.1]] };
+    scene.effects.capillary = capillary;
+    // The weight that the bond is relative to stands across the pair; both fall alike.
+    let mut simulation = start(&scene);
+    simulation.advance(2.0 * DT);
+    // Velocities live half a substep earlier, before half of what the bridge takes in one.
+    let speed = speed + 0.5 * capillary.bond * GRAVITY * DT;
+    simulation.set_motion(0, Vector3::new(-speed, 0.0, 0.0), Vector3::zeros()).unwrap();
+    simulation.set_motion(1, Vector3::new(speed, 0.0, 0.0), Vector3::zeros()).unwrap();
+    simulation.advance(0.1);
+    let at = simulation.positions();
+    at[1].x - at[0].x - 2.0 * RADIUS
+}
+
+#[test]
+fn two_grains_part_when_their_energy_is_the_bridges() {
+    let wet = Capillary { bond: 2.0, volume: 1e-2, ..Capillary::default() };
+    // Integral of Willett's force up to rupture, over the mass: 2 bond's of kinetic energy v^2 / 2 pay for it.
+    let rupture = wet.volume.cbrt() * RADIUS;
+    let steps = 20_000;
+    let energy: f64 = (0..steps)
+        .map(|k| {
+            let s = (f64::from(k) + 0.5) / f64::from(steps) * rupture;
+            let scaled = s / RADIUS * (1.0 / wet.volume).sqrt();
+            wet.bond * GRAVITY / (1.0 + 1.05 * scaled + 2.5 * scaled * scaled)
+        })
+        .sum::<f64>()
+        * rupture
+        / f64::from(steps);
+    let escape = energy.sqrt();
+    assert!(parted(wet, 1.03 * escape) > rupture, "{}", parted(wet, 1.03 * escape));
+    assert!(parted(wet, 0.97 * escape) < 1e-4, "{}", parted(wet, 0.97 * escape));
+}
+
+#[test]
+fn a_bridge_does_not_pull_before_grains_have_touched() {
+    let mut scene = one_grain(0.1, material(0.5, 0.1, 0.5));
+    scene.grains.count = 2;
+    let gap = 0.02 * RADIUS;
+    scene.start =
+        Start::Positions { positions: vec![[0.0, 0.0, 0.1], [2.0 * RADIUS + gap, 0.0, 0.1]] };
+    scene.effects.capillary = Capillary { bond: 5.0, volume: 1e-2, ..Capillary::default() };
+    let at = after(&scene, 0.05).positions();
+    assert_eq!(at[1].x - at[0].x, 2.0 * RADIUS + gap);
+}
+
+#[test]
+fn terminal_speed_is_schillers_and_naumanns() {
+    // Glycerol, water, and ten times as thick: Re 0.03, 1700, 120.
+    for (density, viscosity) in [(1260.0, 1.4), (1000.0, 1e-3), (1000.0, 1e-2)] {
+        let mut scene = one_grain(5.0, material(0.5, 0.1, 0.5));
+        scene.grains = Grains { count: 1, diameter: 2.0 * RADIUS, density: 2500.0 };
+        scene.effects.fluid = Fluid { density, viscosity, added_mass: 0.5 };
+        let speed = -after(&scene, 2.0).velocities()[0].z;
+        let reynolds = density * speed * 2.0 * RADIUS / viscosity;
+        let coefficient = if reynolds < 1000.0 {
+            24.0 / reynolds * (1.0 + 0.15 * reynolds.powf(0.687))
+        } else {
+            0.44
+        };
+        let weight = (2500.0 - density) * GRAVITY * 4.0 / 3.0 * PI * RADIUS.powi(3);
+        let drag = coefficient / 8.0 * PI * density * (2.0 * RADIUS * speed).powi(2);
+        assert!((drag / weight - 1.0).abs() < 1e-3, "Re {reynolds}: {}", drag / weight);
+    }
+}
+
+#[test]
+fn a_grain_in_a_perfect_fluid_falls_with_buoyancy_and_added_mass() {
+    let mut scene = one_grain(1.0, material(0.5, 0.1, 0.5));
+    scene.grains.density = 2000.0;
+    scene.effects.fluid = Fluid { density: 1000.0, viscosity: 0.0, added_mass: 0.5 };
+    let simulation = after(&scene, 20.0 * DT);
+    let begun = -simulation.velocities()[0].z / 0.01;
+    // (rho - rho_f) / (rho + rho_f / 2) g, before drag has grown.
+    assert!((begun / (0.4 * GRAVITY) - 1.0).abs() < 5e-3, "{begun}");
+}
+
+#[test]
+fn restitution_falls_with_the_speed_of_the_impact() {
+    let rebound = |drop: f64, effect: RestitutionSpeed| {
+        let mut scene = one_grain(RADIUS + drop, material(0.5, 0.1, 0.6));
+        scene.effects.restitution_speed = effect;
+        let mut simulation = start(&scene);
+        simulation.advance((2.0 * drop / GRAVITY).sqrt() + 2.0 * DT);
+        let at = simulation.positions()[0].z;
+        simulation.advance(DT);
+        let upwards = (simulation.positions()[0].z - at) / DT + 0.5 * GRAVITY * DT;
+        let height = at - RADIUS + upwards * upwards / (2.0 * GRAVITY);
+        (height / drop).sqrt()
+    };
+    let plastic = RestitutionSpeed { exponent: 0.25, reference: 1.0 };
+    for drop in [0.02, 0.1, 0.4] {
+        let speed = (2.0 * GRAVITY * drop).sqrt();
+        let expected = 0.6 * speed.powf(-0.25);
+        let found = rebound(drop, plastic);
+        assert!((found - expected).abs() < 2e-3, "{drop}: {found} {expected}");
+    }
+}
+
+#[test]
+fn a_soft_ground_takes_what_it_says() {
+    let mut scene = one_grain(RADIUS + 0.05, material(0.5, 0.1, 0.8));
+    scene.effects.ground = GroundUnlike { restitution: 0.5, ..GroundUnlike::default() };
+    let mut highest: f64 = 0.0;
+    let mut simulation = start(&scene);
+    simulation.advance((2.0 * 0.05 / GRAVITY).sqrt() + 4.0 * DT);
+    for _ in 0..400 {
+        highest = highest.max(simulation.positions()[0].z - RADIUS);
+        simulation.advance(DT);
+    }
+    assert!((highest / (0.16 * 0.05) - 1.0).abs() < 0.02, "{highest}");
+}
+
+#[test]
+fn a_grain_slides_down_a_tilted_table() {
+    let tilt = 0.05;
+    let mut scene = one_grain(RADIUS, material(0.0, 0.0, 0.0));
+    scene.effects.tilt = Tilt { x: 0.0, y: tilt };
+    let speed = after(&scene, 0.2).velocities()[0].x;
+    assert!((speed / (0.2 * GRAVITY * tilt.sin()) - 1.0).abs() < 1e-6, "{speed}");
+}
+
+#[test]
+fn a_shaken_grain_lifts_off_above_one_g() {
+    for (acceleration, lifts) in [(0.9, false), (1.5, true)] {
+        let mut scene = one_grain(RADIUS, material(0.5, 0.1, 0.5));
+        scene.effects.vibration =
+            Vibration { acceleration, frequency: 20.0, begin: 0.05, duration: 0.2 };
+        let mut simulation = start(&scene);
+        let mut highest: f64 = 0.0;
+        for _ in 0..700 {
+            simulation.advance(DT);
+            highest = highest.max(simulation.positions()[0].z - RADIUS);
+        }
+        assert_eq!(highest > 1e-4, lifts, "{acceleration}: {highest}");
+    }
+}
+
+#[test]
+fn grains_of_all_sizes_come_to_rest_and_hold_together_when_wet() {
+    let mut scene = drop_of(150, 0.03, material(0.5, 0.1, 0.3));
+    scene.start = Start::Grid { counts: [5, 5, 6], spacing: 9e-3, jitter: 1e-4, base: 0.01 };
+    scene.effects.polydispersity = Polydispersity { cv: 0.25, diameters: Vec::new() };
+    let dry = granulcal::dem::Simulation::new(&scene, 3).unwrap().run();
+    assert_eq!(dry.status, Status::AtRest, "{:?}", dry.health);
+    scene.effects.capillary = Capillary { bond: 3.0, ..Capillary::default() };
+    let wet = granulcal::dem::Simulation::new(&scene, 3).unwrap().run();
+    assert_eq!(wet.status, Status::AtRest, "{:?}", wet.health);
+    let spread = |pour: &granulcal::dem::Pour| {
+        pour.positions.iter().map(|p| p.x.hypot(p.y)).sum::<f64>() / pour.positions.len() as f64
+    };
+    assert!(spread(&wet) < 0.9 * spread(&dry), "{} {}", spread(&wet), spread(&dry));
+    // And a checkpoint keeps the bridges.
+    let mut first = start(&scene);
+    first.advance(0.2);
+    let second = start(&scene).resume(&first.checkpoint()).unwrap();
+    assert!(first.run() == second.run());
+}
+
+#[test]
+fn unknown_effects_and_impossible_numbers_are_named() {
+    let scene = Scene::funnel(0.1);
+    let error = scene.with("effects.magnetism.strength", 1.0).unwrap_err().to_string();
+    assert!(error.contains("magnetism") && error.contains("capillary"), "{error}");
+    let error = scene.with("effects.capillary.bond", -1.0).unwrap_err().to_string();
+    assert_eq!(error, "effects.capillary.bond must be zero or positive, and finite, got -1");
+    let wet = scene.with("effects.capillary.bond", 1.5).unwrap();
+    assert_eq!(wet.effects.capillary.bond, 1.5);
+    assert_eq!(Scene::from_toml(&wet.to_toml().unwrap()).unwrap(), wet);
+}
