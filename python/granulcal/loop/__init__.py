@@ -4,6 +4,9 @@
 """
 
 from granulcal.loop.design import Design, Effect
+from granulcal.loop.experiment import Experiment, next_experiment
+from granulcal.loop.fallback import Discrepancy
+from granulcal.loop.misfit import Improvement, compare
 from granulcal.loop.observation import Observation
 from granulcal.loop.surrogate import Surrogate
 from granulcal.loop.thresholds import Thresholds
@@ -12,13 +15,18 @@ from granulcal.loop.verdict import Verdict
 
 __all__ = [
     "Design",
+    "Discrepancy",
     "Effect",
+    "Experiment",
+    "Improvement",
     "Observation",
     "Power",
     "Surrogate",
     "Thresholds",
     "Trace",
     "Verdict",
+    "compare",
+    "next_experiment",
     "power",
     "trace",
 ]

@@ -10,6 +10,7 @@ nuisance. Vectors stack the conditions: entry h m + i is statistic i under condi
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,7 @@ class Local:
         v: prior z-scores of the point around which this holds, shape (p,).
         correlations: R_h times the Hotelling factor, shape (H, m, m).
         error_roots: of the mean's uncertainty: without effects, then for each effect the part that
-            psi multiplies and the part that psi^2 does, shape (m, H, 1 + 2 K, d).
+            psi multiplies and the part that psi^2 does, shape (1 + 2 K, H, m, d).
         nuisance: covariance of the declared nuisances, shape (H m, H m).
     """
 
@@ -83,7 +84,9 @@ class Local:
             counts,
             v,
             correlations,
-            roots.reshape(size, count, 1 + 2 * len(effects), -1),
+            np.ascontiguousarray(
+                roots.reshape(size, count, 1 + 2 * len(effects), -1).transpose(2, 1, 0, 3)
+            ),
             nuisance,
         )
 
@@ -145,27 +148,38 @@ class Local:
 
     def error_covariance(self, psi: Array) -> Array:
         """Returns U, shape (H m, H m)."""
-        return self._error(self.error_root(psi))
+        return self._error(self.error_root(psi)) if psi.any() else self._base_error
 
     def direction_error(self, k: int) -> Array:
         """Returns the covariance of `direction(k)`, shape (H m, H m)."""
-        roots = self.error_roots[:, :, 1 + 2 * k] + 0.5 * self.error_roots[:, :, 2 + 2 * k]
-        if self.surrogate.design.effects[k].is_two_sided:
-            roots = self.error_roots[:, :, 1 + 2 * k]
-        return self._error(roots)
+        return self._direction_errors[k]
 
     def error_root(self, psi: Array) -> Array:
-        """Returns the root of the mean's uncertainty, shape (m, H, d)."""
-        root = self.error_roots[:, :, 0]
+        """Returns the root of the mean's uncertainty, shape (H, m, d)."""
+        root = self.error_roots[0]
         for k in np.nonzero(psi)[0]:
-            linear, square = self.error_roots[:, :, 1 + 2 * k], self.error_roots[:, :, 2 + 2 * k]
+            linear, square = self.error_roots[1 + 2 * k], self.error_roots[2 + 2 * k]
             root = root + psi[k] * linear + psi[k] ** 2 * square
         return root
 
+    @cached_property
+    def _direction_errors(self) -> list[Array]:
+        found = []
+        for k, effect in enumerate(self.surrogate.design.effects):
+            root = self.error_roots[1 + 2 * k]
+            if not effect.is_two_sided:
+                root = root + 0.5 * self.error_roots[2 + 2 * k]
+            found.append(self._error(root))
+        return found
+
+    @cached_property
+    def _base_error(self) -> Array:
+        return self._error(self.error_roots[0])
+
     def _error(self, roots: Array) -> Array:
-        flat = roots.transpose(1, 0, 2).reshape(self.size, -1)
+        flat = roots.reshape(self.size, -1)
         count = len(self.conditions)
-        return (flat @ flat.T) * np.tile(_unit(self.surrogate.correlation), (count, count))
+        return (flat @ flat.T) * self.surrogate.tiled_correlation(count)
 
     def _means(self, v: Array, psi: Array) -> Array:
         count, conditions = len(self.conditions), self.conditions
@@ -178,9 +192,3 @@ class Local:
         count = len(self.conditions)
         theta = np.tile(cube_from_normal(v), (count, 1))
         return self.surrogate.scale(theta, self.conditions, np.tile(psi, (count, 1)))
-
-
-def _unit(moment: Array) -> Array:
-    """Correlation of a covariance."""
-    scale = np.sqrt(np.diag(moment))
-    return moment / np.outer(scale, scale)

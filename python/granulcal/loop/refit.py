@@ -28,7 +28,7 @@ __all__ = ["Model", "fit_none", "fit_pair", "fit_single"]
 
 Array = NDArray[np.float64]
 
-_NODES = 33
+_NODES = 17
 _FINE = 1001
 _BOX_DRAWS = 4000
 
@@ -73,7 +73,7 @@ def fit_none(fit: Fit, thresholds: Thresholds) -> Model:
 def fit_single(local: Local, target: Array, base: Fit, k: int, thresholds: Thresholds) -> Model:
     """Returns the model with effect `k` alone."""
     effect = local.surrogate.design.effects[k]
-    nodes = np.linspace(effect.low, 1.0, _NODES)
+    nodes = np.linspace(effect.low, 1.0, 2 * _NODES - 1 if effect.is_two_sided else _NODES)
     fits: list[Fit | None] = [None] * len(nodes)
     start = int(np.abs(nodes).argmin())
     # Outwards from no effect, each node from its neighbour.

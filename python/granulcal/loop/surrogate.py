@@ -203,6 +203,11 @@ class Surrogate:
         """Number of statistics m."""
         return len(self.names)
 
+    def tiled_correlation(self, count: int) -> Array:
+        """Returns the archive's correlation for every pair of `count` conditions."""
+        scale = np.sqrt(np.diag(self.correlation))
+        return np.tile(self.correlation / np.outer(scale, scale), (count, count))
+
     def standardise(self, x: ArrayLike) -> Array:
         """Returns z of statistics in the archive's units and columns, shape (n, s) to (n, m).
 
@@ -255,7 +260,20 @@ class Surrogate:
 
     def mean(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns m at rows of (theta, condition, psi), shape (n, m)."""
-        return self.features(theta, condition, psi) @ self.coefficients.T
+        u = np.column_stack([theta, condition])
+        main = self.basis(u)
+        width = main.shape[1]
+        total = main @ self.coefficients[:, :width].T
+        active = np.nonzero(psi.any(axis=0))[0]
+        if len(active) == 0:
+            return total
+        first, second = _effect_columns(u)
+        step = first.shape[1] + second.shape[1]
+        for k in active:
+            strength, start = psi[:, k : k + 1], width + k * step
+            columns = np.concatenate([strength * first, strength**2 * second], axis=1)
+            total += columns @ self.coefficients[:, start : start + step].T
+        return total
 
     def scale(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns s at rows of (theta, condition, psi), shape (n, m)."""

@@ -121,7 +121,8 @@ class Trace:
         thresholds: what was fixed beforehand.
         seed: of all random numbers.
         theta_sd: standard deviations of theta's z-scores at the base fit, shape (p,).
-        models: the fits themselves (not in the JSON).
+        models: the models themselves, in the order of `explanations` (not in the JSON).
+        base_fit: the fit without effects (not in the JSON).
         local: the surrogate at the conditions (not in the JSON).
     """
 
@@ -138,6 +139,7 @@ class Trace:
     seed: int
     theta_sd: Array
     models: tuple[Model, ...]
+    base_fit: Fit
     local: Local
 
     @property
@@ -234,6 +236,7 @@ def trace(
         seed=seed,
         theta_sd=np.sqrt(np.diag(np.linalg.inv(normal))),
         models=tuple(m for m, _ in explained),
+        base_fit=fit,
         local=local,
     )
 
