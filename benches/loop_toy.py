@@ -119,8 +119,10 @@ def _delta(surrogate: Surrogate, many: list[Observation]) -> float:
     stack = Stack.of(surrogate, many)
     local, fit = fit_base(surrogate, stack, 0)
     count = len(stack.counts)
-    noise = np.diag(local.pour_covariance(fit.v, fit.psi)).reshape(count, -1)
-    square = (fit.residual.reshape(count, -1) ** 2 - noise)[:, :16].sum(axis=1).mean()
+    back = surrogate.from_axes
+    root = local.in_statistics(np.linalg.cholesky(local.pour_covariance(fit.v, fit.psi)))
+    noise = np.sum(root**2, axis=1).reshape(count, -1)
+    square = ((fit.residual.reshape(count, -1) @ back) ** 2 - noise)[:, :16].sum(axis=1).mean()
     return sqrt(max(float(square), 0.0))
 
 
@@ -154,9 +156,10 @@ def _removed(
     stack = Stack.of(surrogate, [Observation.of("", [h], m) for h, m in zip(SEALED, measured, strict=True)])
     base = Stack.of(surrogate, [Observation.of("", [h], m) for h, m in zip(SEALED, before, strict=True)])
     gp = Discrepancy.of(local, found.base_fit)
-    gap = stack.means - base.means
+    gap = (stack.means - base.means) @ surrogate.from_axes
     left = gap - np.array([gp.predict([h])[0] for h in SEALED])
-    noise = np.sum(np.diag(local.pour_covariance(found.base_fit.v, local.none()))[:16])
+    root = np.linalg.cholesky(local.pour_covariance(found.base_fit.v, local.none()))
+    noise = np.sum(local.in_statistics(root)[:16] ** 2)
     noise = noise * POURS / MANY * 2
     was, now = (float((g[:, :16] ** 2).sum(axis=1).mean()) - noise for g in (gap, left))
     return removed, 1 - now / was if was > 0 else float("nan")

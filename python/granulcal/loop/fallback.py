@@ -53,16 +53,18 @@ class Discrepancy:
     def of(cls, local: Local, fit: Fit) -> "Discrepancy":
         """Returns the discrepancy that a base fit leaves."""
         count, size = len(local.conditions), local.surrogate.size
-        covariance = fit.root @ fit.root.T
-        constraint = np.linalg.solve(covariance, fit.slopes)
-        normal = fit.slopes.T @ constraint + np.eye(len(fit.v))
-        expected = covariance - fit.slopes @ np.linalg.solve(normal, fit.slopes.T)
-        excess = fit.residual**2 - np.diag(expected)
+        root, slopes = local.in_statistics(fit.root), local.in_statistics(fit.slopes)
+        residual = local.in_statistics(fit.residual)
+        covariance = root @ root.T
+        constraint = np.linalg.solve(covariance, slopes)
+        normal = slopes.T @ constraint + np.eye(len(fit.v))
+        expected = covariance - slopes @ np.linalg.solve(normal, slopes.T)
+        excess = residual**2 - np.diag(expected)
         variances = np.maximum(excess.reshape(count, size).mean(axis=0), 0.0)
         bare = cls(local.conditions, variances, constraint, np.empty(0), np.empty((0, 0)))
         kernel = bare._kernel(local.conditions, local.conditions)
         precision = np.linalg.inv(kernel + covariance)
-        return cls(local.conditions, variances, constraint, precision @ fit.residual, precision)
+        return cls(local.conditions, variances, constraint, precision @ residual, precision)
 
     def predict(self, condition: ArrayLike) -> tuple[Array, Array]:
         """Returns the correction of z at a condition (q,) and its standard deviation, each (m,).

@@ -117,7 +117,7 @@ def draw_errors(local: Local, fit: Fit, count: int, generator: np.random.Generat
         noise = surrogate.noise - near @ surrogate.noise
         parts.append(scales[h] * noise[chosen].mean(axis=1))
     errors = np.concatenate(parts, axis=1)
-    shared = local.error_covariance(fit.psi) + local.nuisance
+    shared = local.error_covariance(fit.v, fit.psi) + local.nuisance
     shared[np.diag_indices_from(shared)] += _JITTER
     root = np.linalg.cholesky(shared)
     return errors + generator.standard_normal((count, len(local.conditions) * size)) @ root.T

@@ -1,12 +1,12 @@
 r"""The surrogate at the conditions of one experiment, and the covariance of its mean pours there.
 
 $$ V(\theta, \psi) = \mathrm{diag}_h \frac{s R_h s}{n_h} \frac{\nu}{\nu - m - 1}
-   + U(\psi) + \sum_{k\ \mathrm{nuisance}} \gamma_k^2 N_k N_k^T $$
+   + U(\psi) + \lambda s^2 + \sum_{k\ \mathrm{nuisance}} \gamma_k^2 N_k N_k^T $$
 
 $R_h$ is the correlation of archive rows near the point; U is the posterior covariance of the
 surrogate's mean, shared by all pours of a condition and correlated between conditions; it is a
 polynomial in $\psi$ whose coefficients are taken at one theta. $N_k$ is the direction of a declared
-nuisance. Vectors stack the conditions: entry h m + i is statistic i under condition h.
+nuisance. Vectors stack the conditions: entry h m + i is axis i under condition h.
 """
 
 from dataclasses import dataclass
@@ -95,6 +95,12 @@ class Local:
         """H m."""
         return len(self.conditions) * self.surrogate.size
 
+    def in_statistics(self, columns: Array) -> Array:
+        """Returns stacked `columns` (H m, any) on axes as those of standardised statistics."""
+        count, size = len(self.conditions), self.surrogate.size
+        cube = columns.reshape(count, size, -1)
+        return np.matmul(self.surrogate.from_axes, cube).reshape(columns.shape)
+
     def none(self) -> Array:
         """Returns strengths of 0, shape (K,)."""
         return np.zeros(len(self.surrogate.design.effects))
@@ -134,7 +140,7 @@ class Local:
 
     def covariance(self, v: Array, psi: Array) -> Array:
         """Returns V, shape (H m, H m)."""
-        return self.pour_covariance(v, psi) + self.error_covariance(psi) + self.nuisance
+        return self.pour_covariance(v, psi) + self.error_covariance(v, psi) + self.nuisance
 
     def pour_covariance(self, v: Array, psi: Array) -> Array:
         """Returns the covariance of the means of pours, shape (H m, H m)."""
@@ -146,9 +152,12 @@ class Local:
             total[part, part] = correlation * np.outer(scale[h], scale[h])
         return total
 
-    def error_covariance(self, psi: Array) -> Array:
-        """Returns U, shape (H m, H m)."""
-        return self._error(self.error_root(psi)) if psi.any() else self._base_error
+    def error_covariance(self, v: Array, psi: Array) -> Array:
+        """Returns U and what the features cannot follow, shape (H m, H m)."""
+        total = self._error(self.error_root(psi)) if psi.any() else self._base_error.copy()
+        lack = self.surrogate.lack * self._scales(v, psi) ** 2
+        total[np.diag_indices_from(total)] += lack.ravel()
+        return total
 
     def direction_error(self, k: int) -> Array:
         """Returns the covariance of `direction(k)`, shape (H m, H m)."""
@@ -177,9 +186,13 @@ class Local:
         return self._error(self.error_roots[0])
 
     def _error(self, roots: Array) -> Array:
-        flat = roots.reshape(self.size, -1)
-        count = len(self.conditions)
-        return (flat @ flat.T) * self.surrogate.tiled_correlation(count)
+        """Errors on different axes are independent."""
+        count, size = len(self.conditions), self.surrogate.size
+        each = np.matmul(roots.transpose(1, 0, 2), roots.transpose(1, 2, 0))
+        total = np.zeros((count, size, count, size))
+        axis = np.arange(size)
+        total[:, axis, :, axis] = each
+        return total.reshape(count * size, count * size)
 
     def _means(self, v: Array, psi: Array) -> Array:
         count, conditions = len(self.conditions), self.conditions

@@ -78,7 +78,7 @@ class Scores:
         gap = local.conditions[:, None] - local.conditions[None]
         kernel = np.exp(-0.5 * np.sum(gap**2, axis=2) / DISCREPANCY_LENGTH**2)
         kernel_root = np.linalg.cholesky(kernel + 1e-9 * np.eye(len(kernel)))
-        smooth = whiten @ np.kron(kernel_root, np.eye(local.surrogate.size))
+        smooth = whiten @ np.kron(kernel_root, local.surrogate.axes)
         precision = np.concatenate([np.ones(len(fit.v)), np.zeros(len(fit.active))])
         scores = cls(
             effects=effects,

@@ -1,14 +1,25 @@
 r"""One emulator of all pours: statistics given parameters, condition and strengths of effects.
 
+Statistics of one pile repeat each other. With the correlation C of what a quadratic leaves of the
+standardised z, the axes $y = C^{-1/2} z$ have noise of unit size and no correlation, so that the
+surrogate's errors on different axes are independent, and an axis that many statistics agree on is
+as well known as it deserves. On the axes
+
 $$ m(\theta, c, \psi) = f_0(\theta, c)
    + \sum_k \psi_k g_k(\theta, c) + \psi_k^2 h_k(\theta, c), \qquad
-   z = m + s(\theta, c, \psi) \epsilon, \quad \epsilon \sim (0, R) $$
+   y = m + s(\theta, c, \psi) \epsilon, \quad \epsilon \sim (0, R) $$
 
 $f_0$ is a quadratic and random features of a Matern kernel; $g_k$ a quadratic, $h_k$ a linear
 function, each with a prior width learnt for every statistic and effect (`blocks.py`). log s is a
 function of the same coordinates and of the strengths. What the archive leaves unknown about m is
 the posterior of the coefficients, the same for all pours of a condition and correlated between
-conditions; nothing about it averages away with more measured pours.
+conditions; nothing about it averages away with more measured pours. What the features cannot follow
+would pass for noise of a pour; it shows as left-out residuals that near rows share,
+
+$$ \lambda_j = \overline{(e_i / s_i)(e_{i'} / s_{i'})} + \overline{h_{ii'}} $$
+
+over pairs of near base rows i, i' (h: what the posterior's own covariance takes from the product of
+two left-out residuals), and counts as error of the surrogate, $\lambda_j s_j^2$.
 
 Reference:
     Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63, 2001.
@@ -50,6 +61,8 @@ _LARGEST_SHARE = 0.9
 # Rows of the archive whose residuals are kept from R, to make replicates of.
 _DONOR_SHARE = 0.35
 _LEAST_ROWS = 60
+# Pairs of near rows that show what the features cannot follow.
+_LACK_ROWS, _NEIGHBOURS = 2000, 4
 
 
 @dataclass(frozen=True)
@@ -62,6 +75,7 @@ class Surrogate:
         columns: their columns in the archive, shape (m,).
         dropped: statistics that are not used, with the reason.
         transforms: scale of each statistic.
+        axes: C^-1/2, symmetric, shape (m, m).
         labels: names of all statistics of the archive, s of them.
         raw_spread: standard deviation of each of these over the base pours, own unit, shape (s,).
         raw_range: smallest and largest value of each, shape (2, s).
@@ -70,7 +84,8 @@ class Surrogate:
         roots: of the coefficients' posterior covariances, shape (m, d, d).
         scale_basis: features of the log scales over (theta, c).
         scale_coefficients: shape (m, e).
-        correlation: R over the archive, shape (m, m).
+        correlation: R over the archive, nearly the identity, shape (m, m).
+        lack: lambda, variance of what the features cannot follow over that of noise, shape (m,).
         white: whitened residual of each row under the fit to the others, shape (n, m).
         noise: the same, of the scale of the noise alone, shape (n, m).
         rows: (theta, c) of each row, shape (n, p + q).
@@ -84,6 +99,7 @@ class Surrogate:
     columns: NDArray[np.intp]
     dropped: dict[str, str]
     transforms: tuple[Transform, ...]
+    axes: Array
     labels: tuple[str, ...]
     raw_spread: Array
     raw_range: Array
@@ -93,6 +109,7 @@ class Surrogate:
     scale_basis: Basis
     scale_coefficients: Array
     correlation: Array
+    lack: Array
     white: Array
     noise: Array
     rows: Array
@@ -149,7 +166,10 @@ class Surrogate:
         quadratic = polynomial(2 * u[base] - 1, 2)
         transforms = tuple(Transform.choose(x_[base, j], quadratic) for j in columns)
         z = np.column_stack([t(x_[:, j]) for t, j in zip(transforms, columns, strict=True)])
-        lengths = learn_length_scales(u[base], z[base], features=min(features, 64), seed=seed)
+        axes = _axes(z[base], quadratic)
+        z = z @ axes
+        spread = z[base].std(axis=0)
+        lengths = learn_length_scales(u[base], z[base] / spread, features=min(features, 64), seed=seed)
         basis = Basis.draw(u, lengths, features=features, seed=seed, degree=2)
         scale_basis = Basis.draw(
             u, _SCALE_STRETCH * lengths, features=_SCALE_FEATURES, seed=seed + 1, degree=2
@@ -160,7 +180,8 @@ class Surrogate:
         coefficients = np.empty((size, design_matrix.shape[1]))
         roots = np.empty((size, design_matrix.shape[1], design_matrix.shape[1]))
         scale_coefficients = np.empty((size, scale_matrix.shape[1]))
-        white, noise, dof = np.empty((count, size)), np.empty((count, size)), 0.0
+        white, noise, scales = np.empty((3, count, size))
+        dof = 0.0
         gram = design_matrix.T @ design_matrix
         ones = np.ones(count)
         for j in range(size):
@@ -172,6 +193,7 @@ class Surrogate:
             scale = np.exp(scale_matrix @ scale_coefficients[j])
             coefficients[j], roots[j] = fit.coefficients, fit.root
             white[:, j], noise[:, j] = fit.left_out / scale, fit.noise / scale
+            scales[:, j] = scale
             dof += fit.dof / size
         noise /= np.sqrt(np.mean(np.clip(noise, -6, 6) ** 2, axis=0))
         is_donor = np.random.default_rng(seed).random(count) < _DONOR_SHARE
@@ -181,6 +203,7 @@ class Surrogate:
             columns=columns,
             dropped=dropped,
             transforms=transforms,
+            axes=axes,
             labels=labels,
             raw_spread=np.nanstd(finite[base], axis=0),
             raw_range=np.stack([np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)]),
@@ -190,6 +213,7 @@ class Surrogate:
             scale_basis=scale_basis,
             scale_coefficients=scale_coefficients,
             correlation=_correlation(noise, np.ones(count)),
+            lack=_lack(basis, u[base], design_matrix[base], roots, white[base], scales[base]),
             white=white,
             noise=noise,
             rows=u,
@@ -203,13 +227,8 @@ class Surrogate:
         """Number of statistics m."""
         return len(self.names)
 
-    def tiled_correlation(self, count: int) -> Array:
-        """Returns the archive's correlation for every pair of `count` conditions."""
-        scale = np.sqrt(np.diag(self.correlation))
-        return np.tile(self.correlation / np.outer(scale, scale), (count, count))
-
     def standardise(self, x: ArrayLike) -> Array:
-        """Returns z of statistics in the archive's units and columns, shape (n, s) to (n, m).
+        """Returns y of statistics in the archive's units and columns, shape (n, s) to (n, m).
 
         Raises:
             ObservationError: another number of columns, or a value that is not finite.
@@ -223,7 +242,12 @@ class Surrogate:
         if not np.isfinite(used).all():
             bad = self.names[int(np.nonzero(~np.isfinite(used).all(axis=0))[0][0])]
             raise ObservationError(f"statistic {bad} of an observed pour is not finite")
-        return np.column_stack([t(used[:, j]) for j, t in enumerate(self.transforms)])
+        return np.column_stack([t(used[:, j]) for j, t in enumerate(self.transforms)]) @ self.axes
+
+    @property
+    def from_axes(self) -> Array:
+        """C^1/2: y times it is z, shape (m, m)."""
+        return np.linalg.inv(self.axes)
 
     def beyond(self, observations: Sequence["Observation"]) -> tuple[str, ...]:
         """Returns which observed statistics lie outside the range of all archive pours.
@@ -259,7 +283,7 @@ class Surrogate:
         return linear, square
 
     def mean(self, theta: Array, condition: Array, psi: Array) -> Array:
-        """Returns m at rows of (theta, condition, psi), shape (n, m)."""
+        """Returns m at rows of (theta, condition, psi), axes, shape (n, m)."""
         u = np.column_stack([theta, condition])
         main = self.basis(u)
         width = main.shape[1]
@@ -296,6 +320,36 @@ class Surrogate:
         share = effective / (effective + 4 * self.size)
         local = _correlation(self.noise, near + 1e-12)
         return share * local + (1 - share) * self.correlation
+
+
+def _lack(
+    basis: Basis, u: Array, features: Array, roots: Array, white: Array, scales: Array
+) -> Array:
+    """Lambda of each axis; pairs are each of up to `_LACK_ROWS` rows with its nearest."""
+    metric = np.sqrt(np.mean(basis.frequencies**2, axis=0)) / basis.scale
+    v = u * metric
+    chosen = np.random.default_rng(0).permutation(len(u))[:_LACK_ROWS]
+    gaps = np.sum(v[chosen] ** 2, axis=1)[:, None] + np.sum(v**2, axis=1) - 2 * v[chosen] @ v.T
+    gaps[np.arange(len(chosen)), chosen] = np.inf
+    near = np.argpartition(gaps, _NEIGHBOURS, axis=1)[:, :_NEIGHBOURS]
+    held = np.clip(white, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
+    products = np.mean(held[chosen][:, None] * held[near], axis=(0, 1))
+    shared = np.empty(len(products))
+    for j, root in enumerate(roots):
+        along = (features @ root) / scales[:, j : j + 1]
+        shared[j] = np.mean(np.einsum("nd,nkd->nk", along[chosen], along[near], optimize=True))
+    return np.maximum(products + shared, 0.0)
+
+
+def _axes(z: Array, quadratic: Array) -> Array:
+    """C^-1/2 of what a quadratic leaves, C shrunk a little to its diagonal."""
+    hat = np.linalg.qr(quadratic)[0]
+    left = z - hat @ (hat.T @ z)
+    held = np.clip(left / left.std(axis=0), -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
+    moment = (held * left.std(axis=0)).T @ (held * left.std(axis=0)) / len(z)
+    moment = (1 - _SHRINKAGE) * moment + _SHRINKAGE * np.diag(np.diag(moment))
+    values, vectors = np.linalg.eigh(moment)
+    return (vectors / np.sqrt(values)) @ vectors.T
 
 
 def _usable(x: Array, labels: tuple[str, ...]) -> tuple[NDArray[np.intp], dict[str, str]]:

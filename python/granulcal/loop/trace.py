@@ -219,7 +219,7 @@ def trace(
         tested = _models(local, target, fit, rules, seed)
     merged = families(scores)
     verdict = decide(design, gate, none, tested, rules, merged)
-    spread = np.sqrt(np.diag(fit.root @ fit.root.T))
+    spread = np.sqrt(np.sum(local.in_statistics(fit.root) ** 2, axis=1))
     explained = sorted(tested, key=lambda pair: -pair[0].log_probability)
     normal = scores.slopes.T @ scores.slopes + np.eye(len(fit.v))
     return Trace(
@@ -230,7 +230,7 @@ def trace(
         power=Power.of(surrogate, scores),
         labels=stack.labels,
         statistics=surrogate.names,
-        residuals=(fit.residual / spread).reshape(len(stack.counts), -1),
+        residuals=(local.in_statistics(fit.residual) / spread).reshape(len(stack.counts), -1),
         beyond=surrogate.beyond(observations),
         thresholds=rules,
         seed=seed,
