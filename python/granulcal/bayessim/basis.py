@@ -69,7 +69,10 @@ def polynomial(v: Array, degree: int) -> Array:
     columns = [np.ones(len(v))]
     for power in range(1, degree + 1):
         for term in combinations_with_replacement(range(v.shape[1]), power):
-            columns.append(np.prod(v[:, list(term)], axis=1))
+            column = v[:, term[0]]
+            for i in term[1:]:
+                column = column * v[:, i]
+            columns.append(column)
     return np.stack(columns, axis=1)
 
 

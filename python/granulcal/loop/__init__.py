@@ -1,0 +1,32 @@
+"""Closing the loop: is a residual left, which effect left it, and what is gone when it is added.
+
+`docs/theory/loop.md` derives what the files do.
+"""
+
+from granulcal.loop.design import Design, Effect
+from granulcal.loop.experiment import Experiment, next_experiment
+from granulcal.loop.fallback import Discrepancy
+from granulcal.loop.misfit import Improvement, compare
+from granulcal.loop.observation import Observation
+from granulcal.loop.surrogate import Surrogate
+from granulcal.loop.thresholds import Thresholds
+from granulcal.loop.trace import Power, Trace, power, trace
+from granulcal.loop.verdict import Verdict
+
+__all__ = [
+    "Design",
+    "Discrepancy",
+    "Effect",
+    "Experiment",
+    "Improvement",
+    "Observation",
+    "Power",
+    "Surrogate",
+    "Thresholds",
+    "Trace",
+    "Verdict",
+    "compare",
+    "next_experiment",
+    "power",
+    "trace",
+]

@@ -1,0 +1,174 @@
+r"""Joint fits of parameters and strengths, compared by their evidence.
+
+$$ Z_A = \int p(\psi_A) \int N(\bar z; m(v, \psi_A), V) N(v; 0, I) \, dv \, d\psi_A, \qquad
+   \int \cdot \, dv \approx N(\bar z; \hat m, \hat V) N(\hat v; 0, I)
+   \frac{(2 \pi)^{p / 2}}{|J^T V^{-1} J + I|^{1/2}} $$
+
+One strength is integrated on a grid of its uniform prior, theta by Laplace's method at the best
+theta of each node: strengths are bounded and ridges are bent, both of which a single normal gets
+wrong. Two strengths take Laplace's method jointly, the normal cut to the priors' box. A model's log
+probability adds the log of its prior share.
+
+Reference:
+    Tierney and Kadane, Accurate approximations for posterior moments, JASA 81, 1986.
+    MacKay, Information theory, inference and learning algorithms, 2003, chapters 27 and 28.
+"""
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.loop.baseline import Fit, improve
+from granulcal.loop.local import Local
+from granulcal.loop.thresholds import Thresholds
+
+__all__ = ["Model", "fit_none", "fit_pair", "fit_single"]
+
+Array = NDArray[np.float64]
+
+_NODES = 17
+_FINE = 1001
+_BOX_DRAWS = 4000
+
+
+@dataclass(frozen=True)
+class Model:
+    """One explanation.
+
+    Attributes:
+        effects: indices of its effects, at most two.
+        fit: its best fit.
+        log_evidence: log Z [nat].
+        log_probability: log Z plus log prior share [nat], not normalised.
+        strengths: posterior mean of each strength, shape (|A|,).
+        intervals: of each strength, shape (|A|, 2).
+        at_end: whether a strength's posterior leans on the end of its prior.
+    """
+
+    effects: tuple[int, ...]
+    fit: Fit
+    log_evidence: float
+    log_probability: float
+    strengths: Array
+    intervals: Array
+    at_end: bool
+
+
+def fit_none(fit: Fit, thresholds: Thresholds) -> Model:
+    """Returns the model without effects, from its fit."""
+    log_evidence = _laplace(fit)
+    return Model(
+        (),
+        fit,
+        log_evidence,
+        log_evidence + float(np.log(thresholds.null_share)),
+        np.empty(0),
+        np.empty((0, 2)),
+        False,
+    )
+
+
+def fit_single(local: Local, target: Array, base: Fit, k: int, thresholds: Thresholds) -> Model:
+    """Returns the model with effect `k` alone."""
+    effect = local.surrogate.design.effects[k]
+    nodes = np.linspace(effect.low, 1.0, 2 * _NODES - 1 if effect.is_two_sided else _NODES)
+    fits: list[Fit | None] = [None] * len(nodes)
+    start = int(np.abs(nodes).argmin())
+    # Outwards from no effect, each node from its neighbour.
+    for path in (range(start, len(nodes)), range(start, -1, -1)):
+        v = base.v
+        for i in path:
+            psi = local.none()
+            psi[k] = nodes[i]
+            found = improve(local, target, v, psi, (), steps=4)
+            fits[i], v = found, found.v
+    known = [fit for fit in fits if fit is not None]
+    logs = np.array([_laplace(fit) for fit in known])
+    fine = np.linspace(effect.low, 1.0, _FINE)
+    density = _cubic(nodes, logs, fine)
+    largest = float(density.max())
+    weights = np.exp(density - largest)
+    mass = _trapezoid(weights, fine)
+    log_evidence = largest + float(np.log(mass / (1 - effect.low)))
+    mean = _trapezoid(weights * fine, fine) / mass
+    steps = np.concatenate([[0.0], np.cumsum((weights[1:] + weights[:-1]) / 2 * np.diff(fine))])
+    tail = (1 - thresholds.level) / 2
+    interval = np.interp([tail, 1 - tail], steps / steps[-1], fine)
+    best = float(fine[int(density.argmax())])
+    psi = local.none()
+    psi[k] = best
+    v = known[int(np.abs(nodes - best).argmin())].v
+    fit = improve(local, target, v, psi, (k,))
+    count = len(local.surrogate.design.candidates)
+    return Model(
+        (k,),
+        fit,
+        log_evidence,
+        log_evidence + float(np.log(thresholds.single_share / count)),
+        np.array([mean]),
+        interval[None],
+        bool(weights[-1] > 0.2 or (effect.is_two_sided and weights[0] > 0.2)),
+    )
+
+
+def fit_pair(
+    local: Local, target: Array, start: Fit, pair: tuple[int, int], thresholds: Thresholds
+) -> Model:
+    """Returns the model with two effects, from a fit with one of them."""
+    psi = start.psi.copy()
+    for k in pair:
+        if psi[k] == 0:
+            psi[k] = 0.2
+    fit = improve(local, target, start.v, psi, pair, steps=16)
+    effects = local.surrogate.design.effects
+    low = np.array([effects[k].low for k in pair])
+    white = np.linalg.solve(fit.root, fit.slopes)
+    precision = np.concatenate([np.ones(len(fit.v)), np.full(2, 1e-6)])
+    normal = white.T @ white + np.diag(precision)
+    covariance = np.linalg.inv(normal)[len(fit.v) :, len(fit.v) :]
+    centre = fit.psi[list(pair)]
+    draws = centre + np.random.default_rng(0).standard_normal((_BOX_DRAWS, 2)) @ (
+        np.linalg.cholesky(covariance).T
+    )
+    inside = draws[((draws >= low) & (draws <= 1)).all(axis=1)]
+    share = max(len(inside), 1) / _BOX_DRAWS
+    log_evidence = fit.log_density + 0.5 * len(normal) * float(np.log(2 * np.pi))
+    log_evidence += -0.5 * float(np.linalg.slogdet(normal)[1]) + float(np.log(share))
+    log_evidence -= float(np.log(1 - low).sum())
+    tail = (1 - thresholds.level) / 2
+    used = inside if len(inside) > 10 else centre[None]
+    count = comb(len(local.surrogate.design.candidates), 2)
+    left = 1 - thresholds.null_share - thresholds.single_share
+    return Model(
+        pair,
+        fit,
+        log_evidence,
+        log_evidence + float(np.log(left / count)),
+        used.mean(axis=0),
+        np.quantile(used, [tail, 1 - tail], axis=0).T,
+        bool((centre > 0.98).any()),
+    )
+
+
+def _laplace(fit: Fit) -> float:
+    """Log integral over theta at the strengths of a fit."""
+    p = len(fit.v)
+    white = np.linalg.solve(fit.root, fit.slopes[:, :p])
+    log_det = float(np.linalg.slogdet(white.T @ white + np.eye(p))[1])
+    return fit.log_density + 0.5 * p * float(np.log(2 * np.pi)) - 0.5 * log_det
+
+
+def _cubic(x: Array, y: Array, at: Array) -> Array:
+    """Catmull-Rom interpolation on even nodes."""
+    slopes = np.gradient(y, x)
+    i = np.clip(np.searchsorted(x, at) - 1, 0, len(x) - 2)
+    width = x[i + 1] - x[i]
+    t = (at - x[i]) / width
+    a = (1 + 2 * t) * (1 - t) ** 2 * y[i] + t * (1 - t) ** 2 * width * slopes[i]
+    return a + t**2 * (3 - 2 * t) * y[i + 1] + t**2 * (t - 1) * width * slopes[i + 1]
+
+
+def _trapezoid(y: Array, x: Array) -> float:
+    return float(np.sum((y[1:] + y[:-1]) / 2 * np.diff(x)))

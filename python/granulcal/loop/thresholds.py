@@ -1,0 +1,40 @@
+"""Every number that turns a p-value or an evidence into a word, fixed before data are looked at."""
+
+from dataclasses import asdict, dataclass
+
+__all__ = ["Thresholds"]
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """Thresholds of a verdict; write them down before the first residual.
+
+    Attributes:
+        detect: largest p of the gate at which a residual is called detected.
+        name: largest p of the gate at which an effect may be named.
+        adequate: smallest p of the gate after a fit for that fit to count as an explanation.
+        rivals: models within this of the best log evidence are not told apart [nat].
+        null_share, single_share: prior probability of no effect, and of one effect; the rest is
+            that of two.
+        pairs: largest number of pairs of effects that are fitted.
+        replicates: of the gate before any effect is fitted.
+        replicates_after: of the gate after each fit.
+        refits: replicates that are refitted in full to scale the linear ones.
+        level: of intervals.
+    """
+
+    detect: float = 0.05
+    name: float = 0.01
+    adequate: float = 0.02
+    rivals: float = 3.0
+    null_share: float = 0.5
+    single_share: float = 0.4
+    pairs: int = 4
+    replicates: int = 2000
+    replicates_after: int = 600
+    refits: int = 32
+    level: float = 0.95
+
+    def to_dict(self) -> dict[str, float]:
+        """Returns the numbers by name."""
+        return asdict(self)

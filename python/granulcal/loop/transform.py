@@ -1,0 +1,79 @@
+r"""A monotone scale for each statistic, in which its noise is nearest to normal.
+
+Of $t(x) = x$, $\log x$ (positive statistics) and $\mathrm{asinh}((x - a) / b)$ (a the median, b half
+the interquartile range) the one with the largest profile likelihood of a quadratic regression,
+
+$$ \ell = -\tfrac n2 \log \hat\sigma^2_t + \sum_i \log |t'(x_i)| $$
+
+Reference:
+    Box and Cox, An analysis of transformations, JRSS B 26, 1964, equation 9.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Transform"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Transform:
+    """z = (t(x) - shift) / spread for one statistic.
+
+    Attributes:
+        kind: `identity`, `log` or `asinh`.
+        centre: a of asinh; the smallest value that log accepts.
+        width: b of asinh.
+        shift: mean of t over the archive's base pours.
+        spread: its standard deviation there.
+    """
+
+    kind: str
+    centre: float
+    width: float
+    shift: float
+    spread: float
+
+    @classmethod
+    def choose(cls, x: Array, features: Array) -> "Transform":
+        """Returns the best transform of `x` (n,) given regression features (n, d)."""
+        low, centre, high = np.quantile(x, [0.25, 0.5, 0.75])
+        width = max((high - low) / 2, 1e-3 * float(x.std()), 1e-300)
+        tried = [cls("identity", 0.0, 1.0, 0.0, 1.0), cls("asinh", centre, width, 0.0, 1.0)]
+        if x.min() > 0:
+            tried.append(cls("log", float(x.min()) / 2, 1.0, 0.0, 1.0))
+        hat = np.linalg.qr(features)[0]
+        best, best_score = tried[0], -np.inf
+        for transform in tried:
+            t = transform._t(x)
+            left = t - hat @ (hat.T @ t)
+            score = -0.5 * len(x) * np.log(max(float(left @ left) / len(x), 1e-300))
+            score += float(np.log(np.maximum(transform._slope(x), 1e-300)).sum())
+            # A transform has to be worth it.
+            score += 5.0 if transform.kind == "identity" else 0.0
+            if score > best_score:
+                best, best_score = transform, score
+        t = best._t(x)
+        spread = float(t.std())
+        return cls(best.kind, best.centre, best.width, float(t.mean()), spread or 1.0)
+
+    def __call__(self, x: Array) -> Array:
+        """Returns z of `x`, any shape."""
+        return (self._t(x) - self.shift) / self.spread
+
+    def _t(self, x: Array) -> Array:
+        if self.kind == "log":
+            return np.log(np.maximum(x, self.centre))
+        if self.kind == "asinh":
+            return np.arcsinh((x - self.centre) / self.width)
+        return np.asarray(x, dtype=np.float64)
+
+    def _slope(self, x: Array) -> Array:
+        if self.kind == "log":
+            return 1 / np.maximum(x, self.centre)
+        if self.kind == "asinh":
+            return 1 / np.sqrt((x - self.centre) ** 2 + self.width**2)
+        return np.ones_like(x)
