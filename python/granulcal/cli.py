@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from granulcal import _native
+from granulcal.loop import command
 
 __all__ = ["main"]
 
@@ -25,6 +26,7 @@ Calibrates a granular simulator from depth images.
   granulcal check model                                       may its intervals be trusted?
   granulcal infer model couscous.png --camera camera.toml     posterior of the material
   granulcal report model couscous.png --camera camera.toml -o report.html
+  granulcal close-loop loop.toml -o loop                      what does the model lack?
 
 Commands of the simulator (granulcal COMMAND --help tells more):
   simulate, generate, render, features, fit-sensor, pick-colour, inspect, merge, completions
@@ -75,7 +77,7 @@ def _guarded(command: Callable[[], int]) -> int:
 
 
 def _commands() -> tuple[str, ...]:
-    return ("train", "check", "infer", "report", "reproduce", "demo")
+    return ("train", "check", "infer", "report", "close-loop", "reproduce", "demo")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -92,6 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_check(commands)
     _add_infer(commands)
     _add_report(commands)
+    command.add(commands)
     _add_reproduce(commands)
     commands.add_parser("demo", help="the whole job on a recording with a known truth")
     return parser

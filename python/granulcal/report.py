@@ -122,7 +122,7 @@ def write_report(
     measured = np.asarray(observed, dtype=float)
     scale = Scale.of(data)
     simulated = [np.asarray(pour.statistics()) for pour in pours]
-    page = _template().render(
+    page = template(_TEMPLATE).render(
         title=title,
         summary=summary,
         notes=[*notes, *(str(warning) for warning in posterior.warnings)],
@@ -149,7 +149,8 @@ def write_report(
     return target
 
 
-def _template() -> Any:
+def template(name: str) -> Any:
+    """Returns a page's template of the folder `templates`."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -159,22 +160,23 @@ def _template() -> Any:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(_TEMPLATE)
+    return environment.get_template(name)
 
 
 def _formations(measured: Array, pour: Pour) -> str:
     simulated = pour.points()
     centred = simulated - np.array([*simulated[:, :2].mean(axis=0), 0.0])
-    return _data_uri(formation_figure({"measured": measured, "simulated": centred}))
+    return data_uri(formation_figure({"measured": measured, "simulated": centred}))
 
 
 def _pair_plot(posterior: "Posterior", truth: ArrayLike | None) -> str:
     buffer = BytesIO()
     posterior.pair_plot(truth=truth).savefig(buffer, format="png", dpi=120)
-    return _data_uri(buffer.getvalue())
+    return data_uri(buffer.getvalue())
 
 
-def _data_uri(png: bytes) -> str:
+def data_uri(png: bytes) -> str:
+    """Returns a picture as the source of an `img`."""
     return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
 
 

@@ -1,0 +1,291 @@
+"""The archive: every pour that the loop has ever run, as data sets in one folder.
+
+    archive/
+      archive.json        scene, prior, conditions, library, sizes; written first, refused if another
+      base/               pours of the plain model, conditions and parameters from their priors
+      effect-NAME/        the same with one effect at a strength from its prior
+
+Each part is a data set of `generate`: it is stopped and continued anywhere and has the same rows.
+"""
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal import _native
+from granulcal.dataset import Dataset, generate
+from granulcal.errors import TrainingDataError
+from granulcal.loop.design import Design
+from granulcal.loop.library import LibraryEffect, fingerprint
+from granulcal.prior import Parameter, Prior
+from granulcal.scene import Scene
+from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES, REGISTRY
+
+__all__ = ["Archive", "Plan", "Pours"]
+
+Array = NDArray[np.float64]
+
+_RECORD = "archive.json"
+# Strengths at which an effect of a whole number is tried.
+_WHOLE_STRENGTHS = (0.25, 0.5, 0.75, 1.0)
+# Seeds of the parts, so that no two share a pour.
+_SEED_STEP = 1009
+# Scaled copies of base pours for an effect of the camera, which needs no pour of its own.
+_CAMERA_COPIES = 400
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What an archive is of.
+
+    Attributes:
+        scene: the base scene.
+        prior: of the material.
+        conditions: path and range of each condition input, q of them.
+        library: the effects.
+        base: pours of the plain model.
+        each: pours of each effect.
+        seed: of all of them.
+    """
+
+    scene: Scene
+    prior: Prior
+    conditions: tuple[tuple[str, float, float], ...]
+    library: tuple[LibraryEffect, ...]
+    base: int
+    each: int
+    seed: int = 0
+
+    def record(self) -> dict[str, object]:
+        """Returns what another run must agree with to use the same archive; sizes may grow."""
+        return {
+            "version": _native.__version__,
+            "scene": self.scene.to_toml(),
+            "prior": self.prior.to_toml(),
+            "conditions": [list(condition) for condition in self.conditions],
+            "library": fingerprint(self.library),
+            "effects": [effect.name for effect in self.library],
+            "seed": self.seed,
+        }
+
+    @property
+    def design(self) -> Design:
+        """The coordinates of the loop."""
+        return Design(
+            parameters=tuple(self.prior.names),
+            conditions=tuple(path for path, _, _ in self.conditions),
+            effects=tuple(effect.design() for effect in self.library),
+        )
+
+    @property
+    def pours(self) -> int:
+        """Pours of the whole archive."""
+        own = [e for e in self.library if not e.camera]
+        return self.base + self.each * len(own)
+
+    def cube(self, theta: Array) -> Array:
+        """Returns parameters (n, p) as unit coordinates."""
+        return cube(self.prior, theta)
+
+    def unit_condition(self, values: Array) -> Array:
+        """Returns condition inputs (n, q) as unit coordinates."""
+        low = np.array([low for _, low, _ in self.conditions])
+        high = np.array([high for _, _, high in self.conditions])
+        return (values - low) / (high - low)
+
+
+@dataclass(frozen=True)
+class Pours:
+    """Rows of an archive in unit coordinates.
+
+    Attributes:
+        theta: shape (n, p).
+        condition: shape (n, q).
+        psi: shape (n, K).
+        x: statistics in their units, shape (n, s).
+        names: of the statistics.
+        left_out: pours that were not usable.
+    """
+
+    theta: Array
+    condition: Array
+    psi: Array
+    x: Array
+    names: tuple[str, ...]
+    left_out: int
+
+
+class Archive:
+    """A folder of pours.
+
+    Args:
+        folder: where it is, or will be.
+        plan: what it is of.
+
+    Raises:
+        TrainingDataError: the folder holds the archive of something else, or of another version.
+    """
+
+    def __init__(self, folder: Path, plan: Plan) -> None:
+        """Opens or begins it."""
+        self.folder, self.plan = folder, plan
+        path = folder / _RECORD
+        mine = plan.record()
+        if path.exists():
+            theirs = json.loads(path.read_text(encoding="utf-8"))
+            for key, value in mine.items():
+                if theirs.get(key) != value:
+                    raise TrainingDataError(
+                        f"{path} is of another {key}: it has {_short(theirs.get(key))}, this run "
+                        f"{_short(value)}; give another folder with --archive"
+                    )
+            return
+        if folder.exists() and any(folder.iterdir()):
+            raise TrainingDataError(f"{folder} is not empty and has no {_RECORD}")
+        folder.mkdir(parents=True, exist_ok=True)
+        beside = path.with_suffix(".part")
+        beside.write_text(json.dumps(mine, indent=1), encoding="utf-8")
+        os.replace(beside, path)
+
+    def fill(
+        self,
+        *,
+        threads: int | None = None,
+        say: Callable[[str], None] = print,
+        progress: bool = True,
+    ) -> None:
+        """Runs every pour that is planned and missing; stops and resumes anywhere."""
+        parts = self._parts()
+        for number, (name, scene, prior, count, seed) in enumerate(parts, start=1):
+            say(f"archive {number}/{len(parts)}: {name}, {count} pours")
+            generate(
+                scene,
+                prior,
+                count,
+                seed=seed,
+                out=self.folder / name,
+                threads=threads,
+                progress=progress,
+            )
+
+    def pours(self) -> Pours:
+        """Returns all usable rows.
+
+        Raises:
+            TrainingDataError: a part is missing.
+        """
+        plan, chosen = self.plan, statistics_of_the_loop()
+        rows: list[tuple[Array, Array, Array, Array]] = []
+        left_out = 0
+        for name, scene, _, count, _ in self._parts():
+            folder = self.folder / name
+            if not folder.exists():
+                raise TrainingDataError(f"{folder} is missing: fill the archive first")
+            data = Dataset.load(folder)
+            usable = data.is_usable & np.isfinite(data.diagnostics[:, _finite_diagnostics()]).all(axis=1)
+            usable[count:] = False
+            left_out += int((~usable[:count]).sum())
+            columns = {path: data.theta[usable, i] for i, path in enumerate(data.theta_names)}
+            values = np.column_stack([data.x, data.diagnostics])[usable]
+            n = int(usable.sum())
+            theta = np.column_stack([columns[path] for path in plan.prior.names])
+            inputs = [columns[path] for path, _, _ in plan.conditions]
+            condition = np.column_stack(inputs) if inputs else np.zeros((n, 0))
+            psi = np.zeros((n, len(plan.library)))
+            for k, effect in enumerate(plan.library):
+                own = effect.at(plan.scene)
+                if effect.whole and name.startswith(f"effect-{effect.name}"):
+                    psi[:, k] = own.strength(np.full(n, scene.get(effect.path)))
+                elif effect.path in columns:
+                    psi[:, k] = own.strength(columns[effect.path])
+            rows.append((plan.cube(theta), plan.unit_condition(condition), psi, values[:, chosen]))
+        names = tuple(np.array([*NAMES, *DIAGNOSTIC_NAMES])[chosen])
+        rows.extend(self._camera_rows(rows[0], names))
+        theta, condition, psi, x = (np.concatenate(part) for part in zip(*rows, strict=True))
+        return Pours(theta, condition, psi, x, names, left_out)
+
+    def _camera_rows(
+        self, base: tuple[Array, Array, Array, Array], names: Sequence[str]
+    ) -> list[tuple[Array, Array, Array, Array]]:
+        """Base pours seen with other lengths, for each effect that is one of the camera."""
+        power = {s.name: s.length_power for s in REGISTRY}
+        powers = np.array([power[name] for name in names])
+        found = []
+        for k, effect in enumerate(self.plan.library):
+            if not effect.camera:
+                continue
+            random = np.random.default_rng(self.plan.seed + k)
+            rows = random.permutation(len(base[0]))[:_CAMERA_COPIES]
+            strength = random.uniform(-1.0 if effect.is_two_sided else 0.0, 1.0, len(rows))
+            theta, condition, psi, x = (part[rows].copy() for part in base)
+            psi[:, k] = strength
+            found.append((theta, condition, psi, x * (1.0 + effect.full * strength[:, None]) ** powers))
+        return found
+
+    def _parts(self) -> list[tuple[str, Scene, Prior, int, int]]:
+        """Name, scene, prior, pours and seed of each data set."""
+        plan = self.plan
+        inputs = [
+            Parameter(path=path, distribution="uniform", low=low, high=high)
+            for path, low, high in plan.conditions
+        ]
+        common = [*plan.prior.parameters, *inputs]
+        parts = [("base", plan.scene, Prior(common), plan.base, plan.seed)]
+        for k, entry in enumerate(plan.library, start=1):
+            if entry.camera:
+                continue
+            effect, seed = entry.at(plan.scene), plan.seed + _SEED_STEP * k
+            name = f"effect-{effect.name}"
+            if effect.whole:
+                share = -(-plan.each // len(_WHOLE_STRENGTHS))
+                for number, psi in enumerate(_WHOLE_STRENGTHS):
+                    scene = plan.scene.with_({effect.path: effect.value(psi)})
+                    parts.append(
+                        (f"{name}-{number}", scene, Prior(common), share, seed + number + 1)
+                    )
+                continue
+            parts.append((name, plan.scene, Prior([*common, effect.parameter()]), plan.each, seed))
+        return parts
+
+
+def statistics_of_the_loop() -> NDArray[np.intp]:
+    """Returns which of the 16 and the diagnostic statistics the loop looks at.
+
+    All of the paper's, and the diagnostics that are finite for every formation of grains.
+    """
+    return np.concatenate([np.arange(len(NAMES)), len(NAMES) + _finite_diagnostics()])
+
+
+def _finite_diagnostics() -> NDArray[np.intp]:
+    wanted = [i for i, name in enumerate(DIAGNOSTIC_NAMES) if not name.startswith(_LEFT_OUT)]
+    return np.array(wanted, dtype=np.intp)
+
+
+# A slope of a tail that few formations have.
+_LEFT_OUT = ("tail_index",)
+
+
+def cube(prior: Prior, theta: Array) -> Array:
+    """Returns parameters (n, p) by the distribution function of each."""
+    from granulcal.loop.design import cube_from_normal
+
+    coordinates = prior.to_unconstrained(theta)
+    for i, parameter in enumerate(prior.free):
+        if parameter.distribution == "normal":
+            coordinates[:, i] = cube_from_normal(coordinates[:, i])
+    return coordinates
+
+
+def from_cube(prior: Prior, u: Array) -> Array:
+    """Returns parameters in own units of unit coordinates (n, p)."""
+    return np.column_stack([p.quantile(u[:, i]) for i, p in enumerate(prior.free)])
+
+
+def _short(value: object) -> str:
+    text = str(value)
+    return text if len(text) < 80 else text[:77] + "..."

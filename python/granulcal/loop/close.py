@@ -1,0 +1,327 @@
+"""`close_loop`: from recordings to a verdict, with the error before and after.
+
+The steps are those of docs/theory/loop.md: register what is fixed; fill the archive; say what could be
+seen; fit and test; refit the library; decide; simulate the base and the augmented model; open the
+sealed conditions once; run the placebo; write the report.
+"""
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.errors import ObservationError
+from granulcal.loop.archive import Archive, Plan, from_cube, statistics_of_the_loop
+from granulcal.loop.experiment import Experiment, next_experiment
+from granulcal.loop.forward import Forward
+from granulcal.loop.misfit import Improvement, compare
+from granulcal.loop.observation import Observation
+from granulcal.loop.preregistration import register, write_beside
+from granulcal.loop.surrogate import Surrogate
+from granulcal.loop.task import FIT, SEALED, Condition, Task
+from granulcal.loop.thresholds import Thresholds
+from granulcal.loop.trace import Explanation, Power, Trace, power, trace
+from granulcal.scene import Scene
+from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES
+
+__all__ = ["Closed", "close_loop"]
+
+Array = NDArray[np.float64]
+
+# Simulated pours of each model under each condition.
+_REPLICATES = 10
+# Fewest pours of the base and of each effect from which a surrogate is any use.
+_LEAST_BASE, _LEAST_EACH = 300, 40
+# Shares of a budget: the base model has more directions than any one effect.
+_BASE_SHARE = 0.4
+# Seeds of replicates, apart from those of the archive.
+_SEED = 7_000_003
+
+
+@dataclass(frozen=True)
+class Closed:
+    """What the loop found.
+
+    Attributes:
+        task: what was asked.
+        trace: fit, gate, refits and verdict on the conditions to fit.
+        power: what could be seen, before the data.
+        fit: error before and after, conditions to fit.
+        sealed: the same of the sealed conditions; None without any.
+        placebo: the same pipeline on pours of the base model at its fit.
+        experiments: which further pours would tell most.
+        pours: that this analysis needed: archive, replicates, placebo.
+        registration: SHA-256 of what was fixed beforehand.
+        measured: statistics of every condition's pours, by name.
+        simulated: of the base and of the augmented model, by condition's name.
+    """
+
+    task: Task
+    trace: Trace
+    power: Power
+    fit: Improvement
+    sealed: Improvement | None
+    placebo: Trace
+    experiments: tuple[Experiment, ...]
+    pours: int
+    registration: str
+    measured: dict[str, Array]
+    simulated: dict[str, tuple[Array, Array]]
+
+    def scene(self, condition: Condition, one: Explanation) -> Scene:
+        """Returns the scene of a model at its best fit under a condition."""
+        return _scene(self.task, condition, one)
+
+    def strengths(self) -> dict[str, tuple[float, float, float]]:
+        """Low, middle and high of each named effect's number, in the scene's unit."""
+        found: dict[str, tuple[float, float, float]] = {}
+        for one in self.trace.explanations:
+            for name, middle, (low, high) in zip(
+                one.effects, one.strengths, one.intervals, strict=True
+            ):
+                if name in self.trace.verdict.named and name not in found:
+                    effect = _effect(self.task, name)
+                    if not effect.camera:
+                        ends = sorted((effect.value(low), effect.value(high)))
+                        found[name] = (ends[0], effect.value(middle), ends[1])
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns everything for JSON."""
+        verdict = self.trace.verdict
+
+        def squares(improvement: Improvement | None) -> dict[str, float] | None:
+            if improvement is None:
+                return None
+            before, after = improvement.total_before, improvement.total_after
+            return {"before": before.square, "after": after.square}
+
+        return {
+            "verdict": verdict.kind,
+            "named": list(verdict.named),
+            "families": list(verdict.families),
+            "p": verdict.p,
+            "reason": verdict.reason,
+            "strength": self.strengths(),
+            "misfit": {"fit": squares(self.fit), "sealed": squares(self.sealed)},
+            "pours": self.pours,
+            "placebo": {"verdict": self.placebo.verdict.kind, "p": self.placebo.verdict.p},
+            "registration_sha256": self.registration,
+            "fit": self.fit.to_dict(),
+            "sealed": None if self.sealed is None else self.sealed.to_dict(),
+            "parameters": _parameters(self.task, self.trace),
+            "next_experiments": [one.to_dict() for one in self.experiments],
+            "power_before_data": self.power.to_dict(),
+            "trace": self.trace.to_dict(),
+        }
+
+
+def close_loop(
+    task: Task,
+    out: str | os.PathLike[str],
+    *,
+    archive: str | os.PathLike[str] | None = None,
+    budget: int = 4000,
+    threads: int | None = None,
+    seed: int = 0,
+    thresholds: Thresholds | None = None,
+    say: Callable[[str], None] = print,
+) -> Closed:
+    """Finds what a model lacks, adds it, and tells the error before and after.
+
+    Args:
+        task: scene, prior, recordings.
+        out: folder of the report; one that was cut off goes on.
+        archive: folder of the pours, shared between analyses of one scene; `out`/archive if None.
+        budget: pours, all told.
+        threads: pours at once; one for each core if None.
+        seed: of everything.
+        thresholds: of the verdict.
+        say: is told each step.
+
+    Raises:
+        ObservationError: recordings that do not fit the scene, or a budget that is too small.
+        TrainingDataError: an archive of something else.
+    """
+    folder, rules = Path(out), thresholds or Thresholds()
+    workers = threads or os.cpu_count() or 1
+    plan = _plan(task, budget, seed)
+    chosen = statistics_of_the_loop()
+    names = tuple(np.array([*NAMES, *DIAGNOSTIC_NAMES])[chosen])
+    registration = register(folder, task, plan, rules, seed, names)
+    say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
+
+    store = Archive(folder / "archive" if archive is None else Path(archive), plan)
+    store.fill(threads=threads, say=say)
+    rows = store.pours()
+    say(f"surrogate of {len(rows.x)} pours ({rows.left_out} left out: jammed, unhealthy, unseen)")
+    surrogate = Surrogate.fit(
+        plan.design, rows.theta, rows.condition, rows.psi, rows.x, names=rows.names, seed=seed
+    )
+    fitted = task.of(FIT)
+    counts = [len(condition.recordings) for condition in fitted]
+    middle = np.full(len(task.prior.names), 0.5)
+    sights = power(surrogate, middle, [task.unit(c) for c in fitted], counts)
+    say(_power_table(sights))
+
+    measured = {c.name: c.statistics(task.scene) for c in fitted}
+    observed = [Observation.of(c.name, task.unit(c), measured[c.name][:, chosen]) for c in fitted]
+    found = trace(surrogate, observed, rules, seed=seed)
+    say(f"verdict {found.verdict.kind}: {found.verdict.reason}")
+
+    forward = Forward(folder / "pours", workers)
+    simulated = {
+        c.name: _both(forward, task, c, found, seed) for c in task.conditions
+    }
+    fit = _compare(fitted, measured, simulated, surrogate, seed)
+    hidden = task.of(SEALED)
+    # Opened here, once, after everything that could be chosen has been.
+    measured |= {c.name: c.statistics(task.scene) for c in hidden}
+    sealed = _compare(hidden, measured, simulated, surrogate, seed) if hidden else None
+
+    blank = [
+        Observation.of(c.name, task.unit(c), _placebo(forward, task, c, found, seed)[:, chosen])
+        for c in fitted
+    ]
+    placebo = trace(surrogate, blank, rules, seed=seed + 1)
+    say(f"placebo {placebo.verdict.kind}: {placebo.verdict.reason}")
+    experiments = next_experiment(surrogate, found, _candidates(task))
+    closed = Closed(
+        task=task,
+        trace=found,
+        power=sights,
+        fit=fit,
+        sealed=sealed,
+        placebo=placebo,
+        experiments=tuple(experiments),
+        pours=plan.pours + _needed(task),
+        registration=registration,
+        measured=measured,
+        simulated=simulated,
+    )
+    write_beside(folder / "verdict.json", json.dumps(closed.to_dict(), indent=1) + "\n")
+    return closed
+
+
+def _plan(task: Task, budget: int, seed: int) -> Plan:
+    """Sizes of the archive that a budget affords.
+
+    Raises:
+        ObservationError: it affords too little, with what would be enough.
+    """
+    own = sum(not effect.camera for effect in task.library)
+    spare = budget - _needed(task)
+    base = int(_BASE_SHARE * spare)
+    each = (spare - base) // max(own, 1)
+    if base < _LEAST_BASE or each < _LEAST_EACH:
+        enough = _needed(task) + int(
+            max(_LEAST_BASE / _BASE_SHARE, _LEAST_EACH * own / (1 - _BASE_SHARE)) + 1
+        )
+        raise ObservationError(
+            f"a budget of {budget} pours is too small for {own} effects and "
+            f"{len(task.conditions)} conditions; {enough} would be enough"
+        )
+    return Plan(
+        scene=task.at_first(),
+        prior=task.prior,
+        conditions=task.inputs,
+        library=task.library,
+        base=base,
+        each=each,
+        seed=seed,
+    )
+
+
+def _needed(task: Task) -> int:
+    """Pours besides the archive: both models under every condition, and the placebo."""
+    placebo = sum(len(c.recordings) for c in task.of(FIT))
+    return 2 * _REPLICATES * len(task.conditions) + placebo
+
+
+def _effect(task: Task, name: str) -> Any:
+    return next(e for e in task.library if e.name == name).at(task.at_first())
+
+
+def _scene(task: Task, condition: Condition, one: Explanation) -> Scene:
+    """The scene of a model at its best fit under a condition."""
+    theta = from_cube(task.prior, one.theta[None])[0]
+    values = {**task.prior.fixed, **dict(zip(task.prior.names, theta.tolist(), strict=True))}
+    for name, psi in zip(one.effects, one.best_strengths, strict=True):
+        effect = _effect(task, name)
+        if not effect.camera:
+            values[effect.path] = effect.value(float(psi))
+    return task.scene.with_({**values, **condition.at})
+
+
+def _both(
+    forward: Forward, task: Task, condition: Condition, found: Trace, seed: int
+) -> tuple[Array, Array]:
+    """Pours of the base and of the augmented model."""
+    seeds = [_SEED + seed + i for i in range(_REPLICATES)]
+    before = forward.pours(_scene(task, condition, found.base), seeds)
+    if found.best is found.base:
+        return before, before
+    return before, forward.pours(_scene(task, condition, found.best), seeds)
+
+
+def _placebo(
+    forward: Forward, task: Task, condition: Condition, found: Trace, seed: int
+) -> Array:
+    seeds = [_SEED + seed + _REPLICATES + i for i in range(len(condition.recordings))]
+    return forward.pours(_scene(task, condition, found.base), seeds)
+
+
+def _compare(
+    conditions: tuple[Condition, ...],
+    measured: dict[str, Array],
+    simulated: dict[str, tuple[Array, Array]],
+    surrogate: Surrogate,
+    seed: int,
+) -> Improvement:
+    """The paper's 16 statistics, over their spread in the archive."""
+    size = len(NAMES)
+    spread = surrogate.raw_spread[:size]
+    return compare(
+        [c.name for c in conditions],
+        [measured[c.name][:, :size] for c in conditions],
+        [simulated[c.name][0][:, :size] for c in conditions],
+        [simulated[c.name][1][:, :size] for c in conditions],
+        spread,
+        seed=seed,
+    )
+
+
+def _candidates(task: Task) -> list[tuple[str, Array]]:
+    """Conditions that further pours might have: each input over its range, the others in the middle."""
+    found = []
+    for i, (path, low, high) in enumerate(task.inputs):
+        for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+            at = np.full(len(task.inputs), 0.5)
+            at[i] = share
+            found.append((f"{path} = {low + share * (high - low):.4g}", at))
+    return found
+
+
+def _parameters(task: Task, found: Trace) -> dict[str, dict[str, float]]:
+    """Parameters before and after, in their own units: how far the missing effect had bent them."""
+    before = from_cube(task.prior, found.base.theta[None])[0]
+    after = from_cube(task.prior, found.best.theta[None])[0]
+    return {
+        name: {"before": float(b), "after": float(a)}
+        for name, b, a in zip(task.prior.names, before, after, strict=True)
+    }
+
+
+def _power_table(sights: Power) -> str:
+    lines = ["what these pours could show (kappa: share that the parameters cannot mimic):"]
+    lines.append(f"  {'effect':<24}{'kappa':>8}{'smallest strength seen in 80 %':>34}")
+    for name, kappa, least in zip(sights.effects, sights.kappa, sights.detectable, strict=True):
+        shown = "-" if np.isnan(kappa) else f"{kappa:.2f}"
+        size = f"{least:.2f}" if least <= 1 else "none of its range"
+        lines.append(f"  {name:<24}{shown:>8}{size:>34}")
+    return "\n".join(lines)

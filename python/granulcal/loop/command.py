@@ -1,0 +1,77 @@
+"""The word `close-loop` of the command line."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+__all__ = ["add"]
+
+_TEXT = "find what the model lacks, add it, and report the error before and after"
+_DESCRIPTION = """\
+Find what the model lacks, add it, and report the error before and after.
+
+TASK is a TOML file: a scene, a prior of the material, and recordings under at least one condition
+(pour heights, fluids, drum speeds), each condition to `fit` or `sealed`:
+
+    scene = "scene.toml"
+    prior = "prior.toml"
+    [[conditions]]
+    name = "4 cm"
+    at = { "funnel.height" = 0.04 }
+    use = "fit"
+    recordings = ["04cm/pour-0.png", "04cm/pour-1.png"]
+
+Written to the folder -o: preregistration.json (before any data is looked at), verdict.json,
+report.html. The archive of pours may serve many tasks of one scene; all of it is resumed after an
+interruption. Verdicts: NONE, RESIDUAL (not sure enough for a name), EFFECT, SET (not told apart),
+EFFECTS (two), UNEXPLAINED.
+"""
+
+
+def add(commands: Any) -> None:
+    """Adds the word to the command line."""
+    parser = commands.add_parser(
+        "close-loop",
+        help=_TEXT,
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("task", type=Path, help="TOML file, or the folder with its loop.toml")
+    parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the report")
+    parser.add_argument(
+        "--archive", type=Path, help="folder of the pours (default: OUT/archive)"
+    )
+    parser.add_argument(
+        "--budget", type=int, default=4000, help="pours, all told (default: 4000)"
+    )
+    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from granulcal.loop.close import close_loop
+    from granulcal.loop.page import write_page
+    from granulcal.loop.task import Task
+
+    path = options.task / "loop.toml" if options.task.is_dir() else options.task
+    task = Task.load(path)
+    closed = close_loop(
+        task,
+        options.out,
+        archive=options.archive,
+        budget=options.budget,
+        threads=options.threads,
+        seed=options.seed,
+    )
+    page = options.out / "report.html"
+    archive = "" if options.archive is None else f" --archive {options.archive}"
+    write_page(
+        closed,
+        page,
+        command=f"granulcal close-loop {path} -o {options.out}{archive} "
+        f"--budget {options.budget} --seed {options.seed}",
+        title=f"Closing the loop on {path}",
+    )
+    print(page)
+    return 0

@@ -1,0 +1,61 @@
+"""Pours of one model under every condition: what a verdict is held against. Kept, never run twice."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal import _native
+from granulcal.scene import Scene
+from granulcal.simulate import simulate
+
+__all__ = ["Forward"]
+
+Array = NDArray[np.float64]
+
+_UNUSABLE = ("unhealthy", "jammed")
+
+
+class Forward:
+    """Runs pours and keeps their statistics, by scene and seed.
+
+    Args:
+        folder: of the kept ones.
+        threads: pours at once.
+    """
+
+    def __init__(self, folder: Path, threads: int) -> None:
+        """Begins or goes on with a folder."""
+        self.folder, self.threads = folder, threads
+        self.ran = 0
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def pours(self, scene: Scene, seeds: Sequence[int]) -> Array:
+        """Returns the 16 and the diagnostic statistics of usable pours, shape (n <= len(seeds), 56)."""
+        text = json.dumps([_native.__version__, scene.to_toml(), list(seeds)])
+        path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.npy"
+        if path.exists():
+            return np.load(path)
+        with ThreadPoolExecutor(self.threads) as pool:
+            rows = [row for row in pool.map(lambda seed: _row(scene, seed), seeds) if row is not None]
+        self.ran += len(seeds)
+        found = np.array(rows).reshape(len(rows), -1)
+        beside = path.with_suffix(".part.npy")
+        np.save(beside, found)
+        beside.replace(path)
+        return found
+
+
+def _row(scene: Scene, seed: int) -> Array | None:
+    pour = simulate(scene, seed=seed)
+    if pour.status in _UNUSABLE:
+        return None
+    try:
+        return np.concatenate([pour.statistics(), pour.diagnostic_statistics()])
+    except ValueError:
+        # Too few grains in view.
+        return None

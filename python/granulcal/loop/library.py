@@ -1,0 +1,238 @@
+"""The library of effects that the loop looks for: each a number of a scene that the base model lacks.
+
+An effect is a path of the scene, its value when off and its value at full strength, psi = 1. What the
+simulator does with it, with equation and source, is in docs/theory/effects.md.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.errors import TrainingDataError
+from granulcal.loop.design import Effect
+from granulcal.prior import Parameter
+from granulcal.scene import Scene
+
+__all__ = ["FUNNEL", "LibraryEffect", "by_name", "fingerprint"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LibraryEffect:
+    """One entry of the library.
+
+    Attributes:
+        name: in every table.
+        family: effects of one family are one finding.
+        path: the number of the scene.
+        off: its value without the effect, in `unit`.
+        full: its value at psi = 1.
+        unit: of the number.
+        doc: what it is, in a line.
+        is_two_sided: whether psi reaches down to -1.
+        is_ratio: psi scales the logarithm: value = off (full / off)^psi.
+        whole: the number is whole: strengths are tried at a few values.
+        relative: `off` is the scene's own number, `full` a multiple of it.
+        camera: power p of `(1 + full psi)^(p length)` by which lengths scale: costs no pour.
+        nuisance_sd: of a declared tolerance, in psi; None for a candidate.
+        is_shared: of a tolerance: one value for all conditions.
+    """
+
+    name: str
+    family: str = ""
+    path: str = ""
+    off: float = 0.0
+    full: float = 1.0
+    unit: str = "-"
+    doc: str = ""
+    is_two_sided: bool = False
+    is_ratio: bool = False
+    whole: bool = False
+    relative: bool = False
+    camera: bool = False
+    nuisance_sd: float | None = None
+    is_shared: bool = True
+
+    def at(self, scene: Scene) -> "LibraryEffect":
+        """Returns the effect with the scene's own numbers put in for relative ones."""
+        if not self.relative:
+            return self
+        off = scene.get(self.path)
+        values = {**asdict(self), "off": off, "full": off * self.full, "relative": False}
+        return LibraryEffect(**values)
+
+    def value(self, psi: float) -> float:
+        """Returns the number of the scene at strength `psi`."""
+        if self.is_ratio:
+            return self.off * (self.full / self.off) ** psi
+        value = self.off + psi * (self.full - self.off)
+        return float(round(value)) if self.whole else value
+
+    def strength(self, value: Array) -> Array:
+        """Returns psi at values (n,) of the number."""
+        if self.is_ratio:
+            return np.log(value / self.off) / math.log(self.full / self.off)
+        return (value - self.off) / (self.full - self.off)
+
+    def parameter(self) -> Parameter:
+        """Returns the distribution of the number over the effect's strengths."""
+        ends = sorted((self.value(-1.0 if self.is_two_sided else 0.0), self.value(1.0)))
+        kind = "log_uniform" if self.is_ratio else "uniform"
+        return Parameter(path=self.path, distribution=kind, low=ends[0], high=ends[1])
+
+    def design(self) -> Effect:
+        """Returns the effect as the statistics of the loop know it."""
+        return Effect(
+            self.name,
+            is_two_sided=self.is_two_sided,
+            family=self.family,
+            nuisance_sd=self.nuisance_sd,
+            is_shared=self.is_shared,
+        )
+
+
+FUNNEL: tuple[LibraryEffect, ...] = (
+    LibraryEffect(
+        name="cohesion.capillary",
+        family="cohesion",
+        path="effects.capillary.bond",
+        full=0.6,
+        doc="liquid bridges; pull of touching grains over a grain's weight",
+    ),
+    LibraryEffect(
+        name="cohesion.dry",
+        family="cohesion",
+        path="effects.adhesion.bond",
+        full=0.6,
+        doc="adhesion of touching grains over a grain's weight",
+    ),
+    LibraryEffect(
+        name="ground.restitution",
+        family="ground.restitution",
+        path="effects.ground.restitution",
+        off=1.0,
+        full=0.0,
+        doc="restitution at the ground over that between grains: a soft ground",
+    ),
+    LibraryEffect(
+        name="ground.sliding",
+        path="effects.ground.sliding_friction",
+        off=1.0,
+        full=0.25,
+        is_two_sided=True,
+        is_ratio=True,
+        doc="sliding friction at the ground over that between grains",
+    ),
+    LibraryEffect(
+        name="ground.rolling",
+        path="effects.ground.rolling_friction",
+        off=1.0,
+        full=0.25,
+        is_two_sided=True,
+        is_ratio=True,
+        doc="rolling friction at the ground over that between grains",
+    ),
+    LibraryEffect(
+        name="polydispersity",
+        path="effects.polydispersity.cv",
+        full=0.22,
+        doc="standard deviation over mean of the diameters",
+    ),
+    LibraryEffect(
+        name="restitution.speed",
+        path="effects.restitution_speed.exponent",
+        full=0.3,
+        doc="exponent q of e = e_0 v^-q",
+    ),
+    LibraryEffect(
+        name="drag",
+        path="effects.fluid.viscosity",
+        full=8e-3,
+        unit="Pa s",
+        doc="Stokes' drag of a fluid at rest",
+    ),
+    LibraryEffect(
+        name="tilt.x",
+        family="tilt",
+        path="effects.tilt.x",
+        full=0.09,
+        unit="rad",
+        is_two_sided=True,
+        doc="turn of the table about x",
+    ),
+    LibraryEffect(
+        name="tilt.y",
+        family="tilt",
+        path="effects.tilt.y",
+        full=0.09,
+        unit="rad",
+        is_two_sided=True,
+        doc="turn of the table about y",
+    ),
+    LibraryEffect(
+        name="vibration",
+        path="effects.vibration.acceleration",
+        full=1.5,
+        unit="g",
+        doc="shaking of the table after the pour",
+    ),
+    LibraryEffect(
+        name="count",
+        path="grains.count",
+        full=0.75,
+        relative=True,
+        whole=True,
+        is_two_sided=False,
+        doc="fewer grains than stated",
+    ),
+    LibraryEffect(
+        name="diameter",
+        path="grains.diameter",
+        full=0.85,
+        relative=True,
+        unit="m",
+        is_two_sided=True,
+        doc="grains of another diameter than stated",
+    ),
+    LibraryEffect(
+        name="restitution.tangential",
+        path="material.tangential_restitution",
+        full=0.6,
+        doc="part of the sliding velocity that a sticking impact turns back",
+    ),
+    LibraryEffect(
+        name="camera.scale",
+        camera=True,
+        full=0.01,
+        is_two_sided=True,
+        nuisance_sd=1.0,
+        doc="lengths of the image are 1 % too large (a tolerance)",
+    ),
+)
+"""What a pour through a funnel may lack."""
+
+
+def by_name(names: Iterable[str], library: Sequence[LibraryEffect] = FUNNEL) -> tuple[LibraryEffect, ...]:
+    """Returns the named entries in the library's order.
+
+    Raises:
+        TrainingDataError: a name that the library does not have.
+    """
+    wanted = list(names)
+    known = [effect.name for effect in library]
+    unknown = [name for name in wanted if name not in known]
+    if unknown:
+        raise TrainingDataError(f"no effect {', '.join(unknown)}; there are {', '.join(known)}")
+    return tuple(effect for effect in library if effect.name in wanted)
+
+
+def fingerprint(library: Sequence[LibraryEffect]) -> str:
+    """Returns a hash of everything that the library says."""
+    text = json.dumps([asdict(effect) for effect in library], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,78 @@
+"""What is fixed before the first residual is looked at, in a file with a hash."""
+
+import hashlib
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from granulcal import _native
+from granulcal.errors import ObservationError
+from granulcal.loop.archive import Plan
+from granulcal.loop.library import fingerprint
+from granulcal.loop.task import Task
+from granulcal.loop.thresholds import Thresholds
+
+__all__ = ["register", "write_beside"]
+
+_NAME = "preregistration.json"
+
+
+def register(
+    folder: Path, task: Task, plan: Plan, thresholds: Thresholds, seed: int, statistics: tuple[str, ...]
+) -> str:
+    """Writes the file, or finds it as it is; returns its SHA-256.
+
+    Raises:
+        ObservationError: the folder holds the registration of another analysis.
+    """
+    document: dict[str, Any] = {
+        "version": _native.__version__,
+        "scene": plan.scene.to_toml(),
+        "prior": plan.prior.to_toml(),
+        "conditions": [
+            {"name": c.name, "at": c.at, "use": c.use, "recordings": _digests(c.recordings)}
+            for c in task.conditions
+        ],
+        "library": [asdict(effect) for effect in task.library],
+        "library_sha256": fingerprint(task.library),
+        "statistics": list(statistics),
+        "archive": {"base": plan.base, "each": plan.each, "seed": plan.seed},
+        "thresholds": thresholds.to_dict(),
+        "seed": seed,
+    }
+    text = json.dumps(document, indent=1) + "\n"
+    path = folder / _NAME
+    if path.exists():
+        found = path.read_text(encoding="utf-8")
+        if found != text:
+            theirs = json.loads(found)
+            differing = [k for k, v in json.loads(text).items() if theirs.get(k) != v]
+            raise ObservationError(
+                f"{path} was registered for another analysis ({', '.join(differing)} differ); "
+                "what was fixed stays fixed: give another folder with -o"
+            )
+    else:
+        write_beside(path, text)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def write_beside(path: Path, text: str) -> None:
+    """Writes a whole file or none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(path.name + ".part")
+    beside.write_text(text, encoding="utf-8")
+    os.replace(beside, path)
+
+
+def _digests(recordings: tuple[Path, ...]) -> list[str]:
+    """Hashes of the files, so that they cannot be exchanged; nothing of them is looked at."""
+    found = []
+    for path in recordings:
+        files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+        digest = hashlib.sha256()
+        for file in files:
+            digest.update(file.read_bytes())
+        found.append(f"{path.name} {digest.hexdigest()}")
+    return found
