@@ -82,7 +82,11 @@ class Study:
     def pours(self, theta: Array, height: float, psi: dict[str, float], seeds: range) -> Array:
         """Pours of a material (unit coordinates) with effects."""
         values = dict(
-            zip(self.plan.prior.names, from_cube(self.plan.prior, theta[None])[0].tolist(), strict=True)
+            zip(
+                self.plan.prior.names,
+                from_cube(self.plan.prior, theta[None])[0].tolist(),
+                strict=True,
+            )
         )
         for name, strength in psi.items():
             effect = next(e for e in FUNNEL if e.name == name).at(self.plan.scene)
@@ -101,7 +105,10 @@ class Study:
     def row(self, index: int, nulls: int) -> dict[str, Any] | None:
         """Returns the row of one set; None if its pours jam."""
         generator = np.random.default_rng([index, 41])
-        theta, truth = generator.uniform(0.05, 0.95, len(self.plan.prior.names)), truth_of(index, nulls)
+        theta, truth = (
+            generator.uniform(0.05, 0.95, len(self.plan.prior.names)),
+            truth_of(index, nulls),
+        )
         psi = {} if truth is None else {truth[0]: truth[1]}
         first = 1_000_000 + 1000 * index
         sets = [self.pours(theta, h, psi, range(first, first + POURS)) for h in FIT]
@@ -164,7 +171,9 @@ class Study:
         singles = [one for one in found.explanations if len(one.effects) == 1]
         candidates = self.surrogate.design.candidates
         row["first"] = (
-            singles[0].effects[0] if singles else names[candidates[int(found.gate.squares.argmax())]]
+            singles[0].effects[0]
+            if singles
+            else names[candidates[int(found.gate.squares.argmax())]]
         )
         if found.verdict.kind in ("EFFECT", "SET", "EFFECTS"):
             sealed = squares(SEALED, found.best)

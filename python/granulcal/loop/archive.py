@@ -187,7 +187,9 @@ class Archive:
             if not folder.exists():
                 raise TrainingDataError(f"{folder} is missing: fill the archive first")
             data = Dataset.load(folder)
-            usable = data.is_usable & np.isfinite(data.diagnostics[:, _finite_diagnostics()]).all(axis=1)
+            usable = data.is_usable & np.isfinite(data.diagnostics[:, _finite_diagnostics()]).all(
+                axis=1
+            )
             usable[count:] = False
             left_out += int((~usable[:count]).sum())
             columns = {path: data.theta[usable, i] for i, path in enumerate(data.theta_names)}
@@ -224,7 +226,9 @@ class Archive:
             strength = random.uniform(-1.0 if effect.is_two_sided else 0.0, 1.0, len(rows))
             theta, condition, psi, x = (part[rows].copy() for part in base)
             psi[:, k] = strength
-            found.append((theta, condition, psi, x * (1.0 + effect.full * strength[:, None]) ** powers))
+            found.append(
+                (theta, condition, psi, x * (1.0 + effect.full * strength[:, None]) ** powers)
+            )
         return found
 
     def _parts(self) -> list[tuple[str, Scene, Prior, int, int]]:

@@ -175,9 +175,7 @@ def close_loop(
     say(f"verdict {found.verdict.kind}: {found.verdict.reason}")
 
     forward = Forward(folder / "pours", workers)
-    simulated = {
-        c.name: _both(forward, task, c, found, seed) for c in task.conditions
-    }
+    simulated = {c.name: _both(forward, task, c, found, seed) for c in task.conditions}
     fit = _compare(fitted, measured, simulated, surrogate, seed)
     hidden = task.of(SEALED)
     # Opened here, once, after everything that could be chosen has been.
@@ -269,9 +267,7 @@ def _both(
     return before, forward.pours(_scene(task, condition, found.best), seeds)
 
 
-def _placebo(
-    forward: Forward, task: Task, condition: Condition, found: Trace, seed: int
-) -> Array:
+def _placebo(forward: Forward, task: Task, condition: Condition, found: Trace, seed: int) -> Array:
     seeds = [_SEED + seed + _REPLICATES + i for i in range(len(condition.recordings))]
     return forward.pours(_scene(task, condition, found.base), seeds)
 

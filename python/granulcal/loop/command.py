@@ -38,12 +38,8 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("task", type=Path, help="TOML file, or the folder with its loop.toml")
     parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the report")
-    parser.add_argument(
-        "--archive", type=Path, help="folder of the pours (default: OUT/archive)"
-    )
-    parser.add_argument(
-        "--budget", type=int, default=4000, help="pours, all told (default: 4000)"
-    )
+    parser.add_argument("--archive", type=Path, help="folder of the pours (default: OUT/archive)")
+    parser.add_argument("--budget", type=int, default=4000, help="pours, all told (default: 4000)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
     parser.set_defaults(run=_run)

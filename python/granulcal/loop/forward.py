@@ -41,7 +41,9 @@ class Forward:
         if path.exists():
             return np.load(path)
         with ThreadPoolExecutor(self.threads) as pool:
-            rows = [row for row in pool.map(lambda seed: _row(scene, seed), seeds) if row is not None]
+            rows = [
+                row for row in pool.map(lambda seed: _row(scene, seed), seeds) if row is not None
+            ]
         self.ran += len(seeds)
         found = np.array(rows).reshape(len(rows), -1)
         beside = path.with_suffix(".part.npy")

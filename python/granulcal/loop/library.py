@@ -194,7 +194,7 @@ FUNNEL: tuple[LibraryEffect, ...] = (
     LibraryEffect(
         name="diameter",
         path="grains.diameter",
-        full=0.85,
+        full=0.9,
         relative=True,
         unit="m",
         is_two_sided=True,
@@ -218,7 +218,9 @@ FUNNEL: tuple[LibraryEffect, ...] = (
 """What a pour through a funnel may lack."""
 
 
-def by_name(names: Iterable[str], library: Sequence[LibraryEffect] = FUNNEL) -> tuple[LibraryEffect, ...]:
+def by_name(
+    names: Iterable[str], library: Sequence[LibraryEffect] = FUNNEL
+) -> tuple[LibraryEffect, ...]:
     """Returns the named entries in the library's order.
 
     Raises:

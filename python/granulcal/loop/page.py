@@ -142,5 +142,3 @@ def _measured_points(closed: Closed, condition: Condition) -> Any:
 
 def _number(value: float) -> str:
     return f"{value:.3g}"
-
-

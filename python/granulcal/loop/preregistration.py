@@ -20,7 +20,12 @@ _NAME = "preregistration.json"
 
 
 def register(
-    folder: Path, task: Task, plan: Plan, thresholds: Thresholds, seed: int, statistics: tuple[str, ...]
+    folder: Path,
+    task: Task,
+    plan: Plan,
+    thresholds: Thresholds,
+    seed: int,
+    statistics: tuple[str, ...],
 ) -> str:
     """Writes the file, or finds it as it is; returns its SHA-256.
 

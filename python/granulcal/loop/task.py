@@ -214,7 +214,11 @@ def camera_beside(path: Path) -> Path | None:
     """Returns the camera of a PNG: its own TOML, or `camera.toml` in its folder or the one above."""
     if path.suffix != ".png":
         return None
-    near = [path.with_suffix(".toml"), path.parent / "camera.toml", path.parent.parent / "camera.toml"]
+    near = [
+        path.with_suffix(".toml"),
+        path.parent / "camera.toml",
+        path.parent.parent / "camera.toml",
+    ]
     return next((file for file in near if file.exists()), None)
 
 

@@ -1,0 +1,187 @@
+"""The loop as a user calls it: a task file, an archive, a verdict; small pours, but real ones."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.cli import main
+from granulcal.errors import ObservationError, TrainingDataError
+from granulcal.loop.archive import Archive, Plan
+from granulcal.loop.library import FUNNEL, by_name, fingerprint
+from granulcal.loop.task import Task
+from granulcal.recording import Camera
+
+SCENE = """
+name = "small"
+[grains]
+count = 90
+diameter = 4e-3
+density = 1300.0
+[start]
+kind = "grid"
+counts = [5, 5, 4]
+spacing = 6e-3
+jitter = 5e-4
+base = 0.02
+[end]
+horizon = 2.0
+[camera]
+projection = "pinhole"
+height = 0.3
+field_width = 0.3
+pixels = 220
+downsample = 1
+height_threshold = 1e-3
+"""
+PRIOR = """
+[[parameter]]
+path = "material.sliding_friction"
+distribution = "uniform"
+low = 0.3
+high = 0.8
+[[parameter]]
+path = "material.restitution"
+distribution = "uniform"
+low = 0.2
+high = 0.6
+"""
+HEIGHTS = {"low": 0.02, "high": 0.06, "between": 0.04}
+TRUTH = {
+    "material.sliding_friction": 0.5,
+    "material.rolling_friction": 0.1,
+    "material.restitution": 0.4,
+}
+
+
+def make(
+    folder: Path, extra: dict[str, float], effects: str = '["tilt.y", "ground.restitution"]'
+) -> Path:
+    """Writes scene, prior, recordings and the task of pours with `extra` numbers in the scene."""
+    folder.mkdir()
+    (folder / "scene.toml").write_text(SCENE)
+    (folder / "prior.toml").write_text(PRIOR)
+    camera = Camera.overhead(height=0.3, field_width=0.3, pixels=220)
+    lines = ['scene = "scene.toml"', 'prior = "prior.toml"', f"effects = {effects}"]
+    for name, base in HEIGHTS.items():
+        names = []
+        for seed in range(3):
+            scene = gc.Scene.load(folder / "scene.toml").with_(
+                {**TRUTH, **extra, "start.base": base}
+            )
+            pour = gc.simulate(scene, seed=100 + seed)
+            image, _ = camera.record(pour.positions, pour.radii, folder / f"{name}-{seed}")
+            names.append(str(Path(image).relative_to(folder)))
+        use = "sealed" if name == "between" else "fit"
+        lines += ["[[conditions]]", f'name = "{name}"', f'at = {{ "start.base" = {base} }}']
+        lines += [f'use = "{use}"', f"recordings = {json.dumps(names)}"]
+    (folder / "loop.toml").write_text("\n".join(lines) + "\n")
+    return folder / "loop.toml"
+
+
+@pytest.fixture(scope="module")
+def tilted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A task whose table is tilted by 4 degrees."""
+    return make(tmp_path_factory.mktemp("loop") / "tilted", {"effects.tilt.y": 0.07})
+
+
+@pytest.mark.slow
+def test_a_tilted_table_is_found_named_and_removed(
+    tilted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    words = ["close-loop", str(tilted), "-o", str(out), "--budget", "1100"]
+    assert main(words) == 0
+    told = capsys.readouterr().out
+    assert told.index("registered before any data") < told.index("kappa") < told.index("verdict")
+    verdict = json.loads((out / "verdict.json").read_text())
+    assert verdict["verdict"] == "EFFECT" and verdict["named"] == ["tilt.y"]
+    low, middle, high = verdict["strength"]["tilt.y"]
+    assert low < 0.07 < high and abs(middle - 0.07) < 0.03
+    assert verdict["misfit"]["sealed"]["after"] < 0.5 * verdict["misfit"]["sealed"]["before"]
+    page = (out / "report.html").read_text()
+    assert "tilt.y" in page and "data:image/png" in page
+    # Again: nothing is run twice, and the same comes out.
+    before = (out / "verdict.json").read_text()
+    assert main(words) == 0
+    assert (out / "verdict.json").read_text() == before
+    # What was registered stays: another seed is another analysis.
+    assert main([*words, "--seed", "1"]) == 2
+    assert "registered for another analysis" in capsys.readouterr().err
+
+
+def test_a_budget_that_is_too_small_says_what_is_enough(
+    tilted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["close-loop", str(tilted), "-o", str(tmp_path / "out"), "--budget", "100"]
+    assert main(words) == 2
+    assert "817 would be enough" in capsys.readouterr().err
+
+
+def test_what_a_task_file_lacks_is_named(tilted: Path, tmp_path: Path) -> None:
+    text = tilted.read_text()
+
+    def load(changed: str) -> Task:
+        file = tilted.parent / f"{tmp_path.name}.toml"
+        file.write_text(changed)
+        return Task.load(file)
+
+    with pytest.raises(ObservationError, match="unknown scenes"):
+        load(
+            text.replace("scene =", "scenes =", 1).replace(
+                "prior =", 'scene = "scene.toml"\nprior =', 1
+            )
+        )
+    with pytest.raises(ObservationError, match='must be "fit" or "sealed", got "test"'):
+        load(text.replace('"sealed"', '"test"'))
+    with pytest.raises(ObservationError, match="at least 3 pours in conditions to fit, got 0"):
+        load(text.replace('"fit"', '"sealed"'))
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        load(text.replace("low-0", "nowhere"))
+    with pytest.raises(TrainingDataError, match="no effect magnetism; there are cohesion"):
+        load(text.replace("tilt.y", "magnetism"))
+
+
+def test_a_recording_in_other_units_is_refused(tilted: Path) -> None:
+    task = Task.load(tilted)
+    # Grains of 0.4 mm under a camera that saw grains of 4 mm: a volume 1000 times off.
+    small = task.scene.with_({"grains.diameter": 4e-4, "start.spacing": 6e-4, "start.jitter": 5e-5})
+    with pytest.raises(ObservationError, match="times that: is the recording of this scene"):
+        task.conditions[0].statistics(small)
+
+
+def test_an_archive_of_something_else_is_refused(tmp_path: Path) -> None:
+    scene, prior = gc.Scene.from_toml(SCENE), gc.Prior.from_toml(PRIOR)
+    plan = Plan(
+        scene=scene,
+        prior=prior,
+        conditions=(("start.base", 0.02, 0.06),),
+        library=by_name(["tilt.y"]),
+        base=4,
+        each=4,
+    )
+    folder = tmp_path / "archive"
+    Archive(folder, plan).fill(threads=1, say=lambda _: None, progress=False)
+    pours = Archive(folder, plan).pours()
+    assert len(pours.x) == 8 and pours.left_out == 0
+    assert np.all(pours.psi[:4] == 0) and np.all(np.abs(pours.psi[4:]) <= 1)
+    other = Plan(**{**plan.__dict__, "scene": scene.with_({"grains.count": 80})})
+    with pytest.raises(TrainingDataError, match="is of another scene"):
+        Archive(folder, other)
+
+
+def test_effects_turn_strengths_into_numbers_and_back() -> None:
+    scene = gc.Scene.from_toml(SCENE)
+    for entry in FUNNEL:
+        if entry.camera:
+            continue
+        effect = entry.at(scene)
+        for psi in (0.25, 0.5, 1.0):
+            found = effect.strength(np.array([effect.value(psi)]))[0]
+            assert abs(found - psi) < (0.03 if effect.whole else 1e-9)
+            # Every strength is a number that the scene takes.
+            changed = scene.with_({effect.path: effect.value(psi)})
+            assert changed.get(effect.path) == effect.value(psi)
+    assert fingerprint(FUNNEL) != fingerprint(FUNNEL[1:])
