@@ -339,7 +339,7 @@ def _lack(
     shared = np.empty(len(products))
     for j, root in enumerate(roots):
         along = (features @ root) / scales[:, j : j + 1]
-        shared[j] = np.mean(np.einsum("nd,nkd->nk", along[chosen], along[near], optimize=True))
+        shared[j] = np.mean(np.einsum("ij,ikj->ik", along[chosen], along[near], optimize=True))
     return np.maximum(products + shared, 0.0)
 
 
