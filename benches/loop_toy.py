@@ -153,8 +153,12 @@ def _removed(
     removed = compare(labels, *cut, spread, draws=100).removed
     # The correction lives on the transformed scale.
     local = found.local
-    stack = Stack.of(surrogate, [Observation.of("", [h], m) for h, m in zip(SEALED, measured, strict=True)])
-    base = Stack.of(surrogate, [Observation.of("", [h], m) for h, m in zip(SEALED, before, strict=True)])
+    stack = Stack.of(
+        surrogate, [Observation.of("", [h], m) for h, m in zip(SEALED, measured, strict=True)]
+    )
+    base = Stack.of(
+        surrogate, [Observation.of("", [h], m) for h, m in zip(SEALED, before, strict=True)]
+    )
     gp = Discrepancy.of(local, found.base_fit)
     gap = (stack.means - base.means) @ surrogate.from_axes
     left = gap - np.array([gp.predict([h])[0] for h in SEALED])
@@ -204,7 +208,10 @@ def table(paths: list[Path]) -> None:
         _rate("  of these the first is right", [r["first"] == r["effects"][0] for r in named])
     named = [r for r in single if r["verdict"] in say]
     _rate("single, named: truth in the set", [r["effects"][0] in r["named"] for r in named])
-    _rate("single, p <= .01: UNEXPLAINED", [r["verdict"] == "UNEXPLAINED" for r in single if r["p"] <= 0.01])
+    _rate(
+        "single, p <= .01: UNEXPLAINED",
+        [r["verdict"] == "UNEXPLAINED" for r in single if r["p"] <= 0.01],
+    )
     if named:
         print(f"| mean size of the set | {np.mean([len(r['named']) for r in named]):.2f} | |")
     spoken = [r for r in rows if r["kind"] in ("null", "single", "pair")]
@@ -248,7 +255,8 @@ def _median(name: str, values: list[float]) -> None:
     known = [v for v in values if v is not None and np.isfinite(v)]
     if known:
         low, middle, high = np.quantile(known, [0.25, 0.5, 0.75])
-        print(f"| {name}: median (quartiles), n = {len(known)} | {middle:.2f} ({low:.2f}, {high:.2f}) | |")
+        shown = f"{middle:.2f} ({low:.2f}, {high:.2f})"
+        print(f"| {name}: median (quartiles), n = {len(known)} | {shown} | |")
 
 
 def _read(paths: list[Path]) -> list[dict[str, Any]]:

@@ -140,7 +140,8 @@ def compare(
     Args:
         labels: of the conditions.
         measured: pours.
-        before, after: simulated pours of the base and of the augmented model.
+        before: simulated pours of the base model.
+        after: simulated pours of the augmented model.
         spread: standard deviation of each statistic over the archive, shape (s,).
         draws: of the bootstrap.
         seed: of it.
@@ -181,7 +182,10 @@ def compare(
     ]
     whole = [
         Distance(
-            float(errors[i].mean()), float(floors[i].mean()), float(total[i]), _interval(totals[:, i])
+            float(errors[i].mean()),
+            float(floors[i].mean()),
+            float(total[i]),
+            _interval(totals[:, i]),
         )
         for i in range(2)
     ]

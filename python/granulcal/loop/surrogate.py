@@ -169,7 +169,9 @@ class Surrogate:
         axes = _axes(z[base], quadratic)
         z = z @ axes
         spread = z[base].std(axis=0)
-        lengths = learn_length_scales(u[base], z[base] / spread, features=min(features, 64), seed=seed)
+        lengths = learn_length_scales(
+            u[base], z[base] / spread, features=min(features, 64), seed=seed
+        )
         basis = Basis.draw(u, lengths, features=features, seed=seed, degree=2)
         scale_basis = Basis.draw(
             u, _SCALE_STRETCH * lengths, features=_SCALE_FEATURES, seed=seed + 1, degree=2
@@ -337,7 +339,7 @@ def _lack(
     shared = np.empty(len(products))
     for j, root in enumerate(roots):
         along = (features @ root) / scales[:, j : j + 1]
-        shared[j] = np.mean(np.einsum("nd,nkd->nk", along[chosen], along[near], optimize=True))
+        shared[j] = np.mean(np.einsum("ij,ikj->ik", along[chosen], along[near], optimize=True))
     return np.maximum(products + shared, 0.0)
 
 

@@ -1,8 +1,8 @@
-r"""A stand-in for pours: a cone, a ring and scattered grains, whose exact missing effects are known.
+r"""A stand-in for pours: a cone, a ring and scattered grains, whose missing effects are known.
 
 Each pour has `GRAINS` points. A share stays in a cone whose slope grows with both frictions, the
-others spread to a ring and beyond, farther with the height of the fall and with restitution. Noise of
-a pour moves slope, spread and share of all its grains together. All statistics are computed from
+others spread to a ring and beyond, farther with the height of the fall and with restitution. Noise
+of a pour moves slope, spread and share of all its grains together. All statistics are computed from
 the points by the same code as for real formations.
 
 Eight effects are offered to the tracer, three are never: `fewer_grains`, `slump`, `slot`. No number
@@ -62,9 +62,7 @@ class PileLoopToy:
         """Names of the statistics."""
         return (*NAMES, *DIAGNOSTICS)
 
-    def archive(
-        self, base: int, per_effect: int, seed: int
-    ) -> tuple[Array, Array, Array, Array]:
+    def archive(self, base: int, per_effect: int, seed: int) -> tuple[Array, Array, Array, Array]:
         """Returns theta, condition, psi and statistics of base and effect pours."""
         generator = np.random.default_rng(seed)
         effects = self.design.effects
@@ -123,7 +121,7 @@ class PileLoopToy:
         energy *= np.exp(0.07 * noise[1])
         share = 1 / (1 + np.exp(1.2 - 1.5 * np.log(energy) + 1.0 * mu_r + 1.6 * bond))
         share = float(np.clip(share * np.exp(0.06 * noise[2]), 0.02, 0.9))
-        count = int(round(GRAINS * (1 - 0.35 * hidden.get("fewer_grains", 0.0))))
+        count = round(GRAINS * (1 - 0.35 * hidden.get("fewer_grains", 0.0)))
         size = _SIZE * (count / GRAINS) ** (1 / 3) / slope ** (1 / 3)
         leave = generator.random(count) < share
         # Cone: uniform in its volume's projection; height of its surface.
@@ -135,9 +133,7 @@ class PileLoopToy:
         tail = size * (1 + energy * generator.gamma(1.4, 0.9, count)) * reach
         is_tail = generator.random(count) < 0.35 * (1 - 0.6 * bond)
         radius = np.where(leave, np.abs(np.where(is_tail, tail, ring)), radius)
-        grain = _DIAMETER * np.exp(
-            0.3 * psi["polydispersity"] * generator.standard_normal(count)
-        )
+        grain = _DIAMETER * np.exp(0.3 * psi["polydispersity"] * generator.standard_normal(count))
         z = np.where(leave, 0.0, z) + grain * (0.5 + 0.5 * generator.random(count))
         angle = 2 * np.pi * generator.random(count)
         x, y = radius * np.cos(angle), radius * np.sin(angle)

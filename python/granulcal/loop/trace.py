@@ -283,7 +283,7 @@ def _models(
             k = rest[int(i)]
             pair = (min(parent.effects[0], k), max(parent.effects[0], k))
             if pair not in pairs:
-                pairs[pair] = fit_pair(local, target, parent.fit, pair, rules)
+                pairs[pair] = fit_pair(local, target, base, parent.fit, pair, rules)
     return tested + [(m, _after(local, m, rules, seed)) for m in pairs.values()]
 
 

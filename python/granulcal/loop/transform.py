@@ -1,7 +1,7 @@
 r"""A monotone scale for each statistic, in which its noise is nearest to normal.
 
-Of $t(x) = x$, $\log x$ (positive statistics) and $\mathrm{asinh}((x - a) / b)$ (a the median, b half
-the interquartile range) the one with the largest profile likelihood of a quadratic regression,
+Of $t(x) = x$, $\log x$ (positive statistics) and $\mathrm{asinh}((x - a) / b)$ (a the median, b
+half the interquartile range) the one with the largest profile likelihood of a quadratic regression,
 
 $$ \ell = -\tfrac n2 \log \hat\sigma^2_t + \sum_i \log |t'(x_i)| $$
 

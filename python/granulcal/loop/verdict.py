@@ -3,7 +3,7 @@
 | word | when |
 |---|---|
 | NONE | the gate stays shut: p > `detect`; the table of detectable strengths says what could hide |
-| RESIDUAL | something is left (p <= `detect`), not sure enough to be named, or no effect beats none |
+| RESIDUAL | something is left (p <= `detect`), too unsure for a name, or none is the best |
 | EFFECT | every adequate model within `rivals` of the best is of one family |
 | SET | several families are |
 | EFFECTS | the best adequate model needs two effects |

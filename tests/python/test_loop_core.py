@@ -1,0 +1,334 @@
+"""The loop's statistics against a linear-Gaussian simulator, where everything is known."""
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from granulcal.errors import ObservationError, TrainingDataError
+from granulcal.loop import (
+    Design,
+    Discrepancy,
+    Effect,
+    Observation,
+    Surrogate,
+    Thresholds,
+    compare,
+    next_experiment,
+    power,
+    trace,
+)
+from granulcal.loop.baseline import fit_base
+from granulcal.loop.blocks import fit_blocks
+from granulcal.loop.design import cube_from_normal, normal_from_cube
+from granulcal.loop.gate import open_gate
+from granulcal.loop.misfit import noise_free_square
+from granulcal.loop.observation import Stack
+from granulcal.loop.refit import fit_single
+from granulcal.loop.score import Scores
+from granulcal.loop.transform import Transform
+
+Array = NDArray[np.float64]
+
+RULES = Thresholds(replicates=400, replicates_after=200, refits=4)
+CONDITIONS = (0.0, 0.5, 1.0)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """x = A (2 u - 1) + psi D (1 + c) + noise; the last row of D is in no library."""
+
+    design: Design
+    slopes: Array
+    directions: Array
+    root: Array
+
+    @classmethod
+    def make(cls) -> "Linear":
+        generator = np.random.default_rng(5)
+        size = 8
+        slopes = 3 * generator.standard_normal((2, size))
+        directions = generator.standard_normal((4, size))
+        # The second effect is the first parameter but for a tenth.
+        directions[1] = slopes[0] / 2 + 0.1 * directions[1]
+        mixing = np.eye(size) + 0.3 * generator.standard_normal((size, size))
+        effects = (
+            Effect("seen"),
+            Effect("mimicked"),
+            Effect("signed", is_two_sided=True),
+        )
+        design = Design(("a", "b"), ("height",), effects)
+        return cls(design, slopes, 2 * directions, 0.7 * mixing)
+
+    def simulate(
+        self, theta: Array, c: Array, psi: Array, generator: np.random.Generator, alien: float = 0.0
+    ) -> Array:
+        strengths = np.column_stack([psi, np.full(len(psi), alien)])
+        # The effects grow with the condition, which the parameters do not.
+        mean = (2 * theta - 1) @ self.slopes + strengths @ self.directions * (0.5 + c)
+        return mean + generator.standard_normal(mean.shape) @ self.root.T
+
+    def archive(self, seed: int = 0) -> tuple[Array, Array, Array, Array]:
+        generator = np.random.default_rng(seed)
+        base, each = 300, 60
+        count = base + 3 * each
+        theta, c = generator.random((count, 2)), generator.random((count, 1))
+        psi = np.zeros((count, 3))
+        for k, effect in enumerate(self.design.effects):
+            rows = slice(base + k * each, base + (k + 1) * each)
+            psi[rows, k] = generator.uniform(effect.low, 1, each)
+        return theta, c, psi, self.simulate(theta, c, psi, generator)
+
+    def observe(
+        self, theta: Array, psi: Array, seed: int, pours: int = 4, alien: float = 0.0
+    ) -> list[Observation]:
+        generator = np.random.default_rng([seed, 11])
+        found = []
+        for c in CONDITIONS:
+            rows = np.tile(theta, (pours, 1)), np.full((pours, 1), c), np.tile(psi, (pours, 1))
+            x = self.simulate(*rows, generator, alien)
+            found.append(Observation.of(f"c = {c:g}", [c], x))
+        return found
+
+
+@pytest.fixture(scope="module")
+def toy() -> Linear:
+    return Linear.make()
+
+
+@pytest.fixture(scope="module")
+def surrogate(toy: Linear) -> Surrogate:
+    return Surrogate.fit(toy.design, *toy.archive(), features=8)
+
+
+def test_z_scores_invert() -> None:
+    u = np.linspace(0.001, 0.999, 31)
+    np.testing.assert_allclose(cube_from_normal(normal_from_cube(u)), u, atol=1e-12)
+
+
+def test_left_out_residuals_are_those_of_fits_without_the_row() -> None:
+    generator = np.random.default_rng(0)
+    x, scale = generator.standard_normal((40, 3)), np.full(40, 1.0)
+    y = x @ np.array([1.0, -2.0, 0.5]) + 0.3 * generator.standard_normal(40)
+    fit = fit_blocks(x, y, scale, [slice(0, 3)], x.T @ x)
+    others = np.arange(40) != 7
+    plain = np.linalg.lstsq(x[others], y[others], rcond=None)[0]
+    # The prior is wide here, so that least squares is what it comes to.
+    assert fit.left_out[7] == pytest.approx(y[7] - x[7] @ plain, abs=0.01)
+
+
+def test_a_block_without_a_trace_shrinks_to_nothing() -> None:
+    generator = np.random.default_rng(1)
+    x = generator.standard_normal((200, 8))
+    y = x[:, :3] @ np.array([1.0, -1.0, 2.0]) + 0.5 * generator.standard_normal(200)
+    fit = fit_blocks(x, y, np.ones(200), [slice(0, 3), slice(3, 8)], x.T @ x)
+    free = np.linalg.lstsq(x, y, rcond=None)[0]
+    assert np.linalg.norm(fit.coefficients[3:]) < 0.5 * np.linalg.norm(free[3:])
+    np.testing.assert_allclose(fit.coefficients[:3], [1, -1, 2], atol=0.15)
+
+
+@pytest.mark.parametrize(("kind", "power_"), [("identity", 0), ("log", 1)])
+def test_the_transform_makes_noise_normal(kind: str, power_: int) -> None:
+    generator = np.random.default_rng(2)
+    features = np.column_stack([np.ones(400), generator.random(400)])
+    y = 1 + features[:, 1] + 0.4 * generator.standard_normal(400)
+    found = Transform.choose(np.exp(y) if power_ else y, features)
+    assert found.kind == kind
+    assert found(np.exp(y) if power_ else y).std() == pytest.approx(1)
+
+
+def test_the_surrogate_finds_mean_and_noise(toy: Linear, surrogate: Surrogate) -> None:
+    generator = np.random.default_rng(3)
+    theta, c = generator.random((50, 2)), generator.random((50, 1))
+    psi = np.zeros((50, 3))
+    psi[:, 0] = 0.8
+    many = [
+        surrogate.standardise(
+            toy.simulate(np.tile(t, (80, 1)), np.tile(h, (80, 1)), np.tile(p, (80, 1)), generator)
+        )
+        for t, h, p in zip(theta, c, psi, strict=True)
+    ]
+    means, spreads = np.mean(many, axis=1), np.std(many, axis=1)
+    error = surrogate.mean(theta, c, psi) - means
+    assert np.sqrt(np.mean(error**2)) < 0.35 * np.mean(spreads)
+    assert np.mean(surrogate.scale(theta, c, psi) / spreads) == pytest.approx(1, abs=0.08)
+    # Statistics are whitened: what one pour scatters has no correlation on the axes.
+    assert np.abs(surrogate.correlation - np.diag(np.diag(surrogate.correlation))).max() < 0.2
+    assert surrogate.lack.max() < 0.15
+
+
+def test_what_the_features_cannot_follow_counts_as_error(toy: Linear) -> None:
+    theta, c, psi, x = toy.archive()
+    x = x + 3 * np.sign(np.sin(14 * theta[:, :1])) * np.eye(8)[0]
+    rough = Surrogate.fit(toy.design, theta, c, psi, x, features=4)
+    assert rough.lack.max() > 0.2
+
+
+def test_constants_and_bad_rows_are_left_out_by_name(toy: Linear) -> None:
+    theta, c, psi, x = toy.archive()
+    x = np.column_stack([x, np.full(len(x), 3.0)])
+    x[5, 0] = np.nan
+    found = Surrogate.fit(toy.design, theta, c, psi, x, features=4, names=[*"abcdefghi"])
+    assert found.dropped == {"i": "constant"}
+    assert (found.excluded, found.size) == (1, 8)
+    seen = Observation.of("here", [0.5], np.tile(np.append(x[6, :8], 4.0), (2, 1)))
+    assert found.beyond([seen]) == ("i at here: 4, archive 3 to 3",)
+
+
+def test_bad_input_says_what_would_do(toy: Linear, surrogate: Surrogate) -> None:
+    theta, c, psi, x = toy.archive()
+    with pytest.raises(TrainingDataError, match="at least 60 usable pours without effects, got 20"):
+        Surrogate.fit(toy.design, theta[:20], c[:20], psi[:20], x[:20])
+    with pytest.raises(TrainingDataError, match="unit coordinates .0, 1., got 7"):
+        Surrogate.fit(toy.design, 7 + 0 * theta, c, psi, x)
+    with pytest.raises(ObservationError, match="8.*got .2, 3."):
+        Stack.of(surrogate, [Observation.of("here", [0.5], np.zeros((2, 3)))])
+    with pytest.raises(ObservationError, match="within the archive's range"):
+        Stack.of(surrogate, [Observation.of("here", [1.5], np.zeros((2, 8)))])
+
+
+def test_the_residual_of_a_fit_is_efficient(toy: Linear, surrogate: Surrogate) -> None:
+    stack = Stack.of(surrogate, toy.observe(np.array([0.3, 0.6]), np.zeros(3), 0))
+    local, fit = fit_base(surrogate, stack, 0)
+    scores = Scores.of(local, fit, (0, 1, 2))
+    white = scores.whiten @ fit.residual
+    # At the best fit the slopes pull as hard as the prior: J^T r = v, so M (r + J v) = r.
+    np.testing.assert_allclose(scores.slopes.T @ white, fit.v, atol=0.35)
+    again = scores.remain((white + scores.slopes @ fit.v)[:, None])[:, 0]
+    np.testing.assert_allclose(again, white, atol=0.1)
+    # Truth in prior z-scores is found to within its error.
+    truth = normal_from_cube(np.array([0.3, 0.6]))
+    np.testing.assert_allclose(fit.v, truth, atol=0.4)
+    cosines = scores.cosines
+    np.testing.assert_allclose(np.diag(cosines), 1)
+    assert scores.kappa[0] > 0.5
+    assert np.isnan(scores.kappa[1]) or scores.kappa[1] < 0.5
+
+
+def test_false_alarms_and_coverage(toy: Linear, surrogate: Surrogate) -> None:
+    generator = np.random.default_rng(9)
+    p_values, inside = [], 0
+    sets = 60
+    for seed in range(sets):
+        theta = generator.uniform(0.1, 0.9, 2)
+        stack = Stack.of(surrogate, toy.observe(theta, np.zeros(3), seed))
+        local, fit = fit_base(surrogate, stack, seed)
+        scores = Scores.of(local, fit, (0, 1, 2))
+        p_values.append(open_gate(local, fit, scores, replicates=300, refits=2, seed=seed).p)
+        strength = generator.uniform(0, 1)
+        stack = Stack.of(surrogate, toy.observe(theta, np.array([strength, 0, 0]), 500 + seed))
+        local, fit = fit_base(surrogate, stack, seed)
+        model = fit_single(local, stack.means.ravel(), fit, 0, RULES)
+        low, high = model.intervals[0]
+        inside += low <= strength <= high
+    p = np.array(p_values)
+    # Binomial(60, .05) exceeds 8 once in 600; a uniform p has its mean within .5 -+ .13.
+    assert np.sum(p <= 0.05) <= 8
+    assert abs(p.mean() - 0.5) < 0.15
+    assert inside >= 50
+
+
+@pytest.mark.parametrize(
+    ("psi", "alien", "kind", "named"),
+    [
+        ((0.0, 0.0, 0.0), 0.0, "NONE", ()),
+        ((0.7, 0.0, 0.0), 0.0, "EFFECT", ("seen",)),
+        ((0.0, 0.0, -0.7), 0.0, "EFFECT", ("signed",)),
+        ((0.0, 0.0, 0.0), 1.5, "UNEXPLAINED", ()),
+        ((0.9, 0.0, 0.9), 0.0, "EFFECTS", ("seen", "signed")),
+    ],
+)
+def test_verdicts(
+    toy: Linear,
+    surrogate: Surrogate,
+    psi: tuple[float, ...],
+    alien: float,
+    kind: str,
+    named: tuple[str, ...],
+) -> None:
+    observed = toy.observe(np.array([0.4, 0.5]), np.array(psi), 3, 5, alien)
+    found = trace(surrogate, observed, RULES, seed=1)
+    assert (found.verdict.kind, found.verdict.named) == (kind, named), found.verdict
+    for name, strength, interval in zip(
+        found.best.effects, found.best.strengths, found.best.intervals, strict=True
+    ):
+        true = psi[[e.name for e in toy.design.effects].index(name)]
+        assert interval[0] - 0.1 <= true <= interval[1] + 0.1
+        assert abs(strength - true) < 0.35
+    written = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert written["verdict"]["kind"] == kind
+    again = trace(surrogate, observed, RULES, seed=1)
+    assert again.to_dict() == found.to_dict()
+
+
+def test_power_grows_with_pours(surrogate: Surrogate) -> None:
+    few = power(surrogate, [0.5, 0.5], [[0.0], [1.0]], [2, 2])
+    many = power(surrogate, [0.5, 0.5], [[0.0], [1.0]], [20, 20])
+    assert (many.detectable < few.detectable).all()
+    # What the surrogate does not know does not average away.
+    assert (many.detectable > few.detectable / np.sqrt(10)).all()
+    json.dumps(many.to_dict(), allow_nan=False)
+
+
+def test_a_nuisance_is_never_found(toy: Linear) -> None:
+    effects = (*toy.design.effects[:2], Effect("signed", is_two_sided=True, nuisance_sd=1.0))
+    design = Design(toy.design.parameters, toy.design.conditions, effects)
+    careful = Surrogate.fit(design, *toy.archive(), features=8)
+    observed = toy.observe(np.array([0.4, 0.5]), np.array([0.0, 0.0, -0.7]), 3)
+    found = trace(careful, observed, RULES)
+    assert found.verdict.kind == "NONE"
+    assert found.power.effects == ("seen", "mimicked")
+
+
+def test_the_next_experiment_is_where_effects_are_large(toy: Linear, surrogate: Surrogate) -> None:
+    observed = toy.observe(np.array([0.4, 0.5]), np.array([0.7, 0.0, 0.0]), 3)
+    found = trace(surrogate, observed, RULES)
+    ranked = next_experiment(surrogate, found, [("low", [0.0]), ("high", [1.0])], pours=10)
+    assert all(one.theta_gain > 0 for one in ranked)
+    ten = {one.label: one.theta_gain for one in ranked}
+    forty = next_experiment(surrogate, found, [("low", [0.0])], pours=40)
+    assert forty[0].theta_gain > ten["low"]
+
+
+def test_the_correction_holds_where_pours_were(toy: Linear, surrogate: Surrogate) -> None:
+    theta = np.array([0.4, 0.5])
+    found = trace(surrogate, toy.observe(theta, np.zeros(3), 3, 8, 1.5), RULES)
+    correction = Discrepancy.of(found.local, found.base_fit)
+    at_tested = np.concatenate([correction.predict([c])[0] for c in CONDITIONS])
+    # It does nothing that the parameters could have done.
+    assert np.abs(correction.constraint.T @ at_tested).max() < 1e-6 * np.abs(at_tested).max() * (
+        np.abs(correction.constraint).sum()
+    )
+    residual = found.local.in_statistics(found.base_fit.residual)
+    assert np.linalg.norm(residual - at_tested) < 0.7 * np.linalg.norm(residual)
+    with pytest.raises(ObservationError, match="outside the tested conditions"):
+        correction.predict([2.0])
+
+
+def test_noise_free_squares_are_unbiased() -> None:
+    generator = np.random.default_rng(4)
+    shift = np.array([0.5, 0.0, -1.0])
+    found = [
+        noise_free_square(
+            shift + generator.standard_normal((4, 3)), generator.standard_normal((6, 3)), np.ones(3)
+        )
+        for _ in range(2000)
+    ]
+    assert np.mean(found) == pytest.approx(1.25, abs=0.1)
+
+
+def test_removed_share_and_its_interval() -> None:
+    generator = np.random.default_rng(5)
+    pours = [generator.standard_normal((30, 3)) + 2 for _ in range(2)]
+    before = [generator.standard_normal((30, 3)) for _ in range(2)]
+    after = [generator.standard_normal((30, 3)) + 2 for _ in range(2)]
+    found = compare(["a", "b"], pours, before, after, np.ones(3), draws=300)
+    assert found.removed == pytest.approx(1, abs=0.1)
+    assert found.is_improved and found.is_at_floor
+    assert found.removed_interval[0] < found.removed < found.removed_interval[1]
+    assert found.total_before.error > found.total_before.floor
+    json.dumps(found.to_dict(), allow_nan=False)
+    nothing = compare(["a", "b"], pours, after, after, np.ones(3), draws=300)
+    assert np.isnan(nothing.removed) and not nothing.is_improved
