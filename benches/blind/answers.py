@@ -3,6 +3,7 @@
 A salt in each answer keeps anyone from guessing it by its hash.
 """
 
+import fcntl
 import hashlib
 import json
 from pathlib import Path
@@ -34,9 +35,11 @@ def seal(answer: dict, sealed: Path, sets: Path) -> None:
     """Writes an answer to `sealed` and its hash to the list in `sets`."""
     text = json.dumps(answer, indent=1)
     write_text(sealed / f"{answer['set']}.json", text)
-    known = {**seals(sets), answer["set"]: hashlib.sha256(text.encode()).hexdigest()}
-    lines = (f"{digest}  {name}\n" for name, digest in sorted(known.items()))
-    write_text(sets / SEALS, "".join(lines))
+    with (sets / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # Several makers may share one folder.
+        known = {**seals(sets), answer["set"]: hashlib.sha256(text.encode()).hexdigest()}
+        lines = (f"{digest}  {name}\n" for name, digest in sorted(known.items()))
+        write_text(sets / SEALS, "".join(lines))
 
 
 def unseal(sealed: Path, sets: Path) -> dict[str, dict]:

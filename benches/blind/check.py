@@ -1,16 +1,24 @@
 """Holds what LAMMPS does with one or two grains against the closed form of every effect.
 
+And recordings against the images of granulcal: differences from the noise-free statistics, mean and
+standard deviation over pours, in standard deviations of a pour from seed to seed.
+
 python benches/blind/check.py
 """
 
 import math
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import effects
 import numpy as np
 from effects import air_drag, charge, cohesion
-from engine import Setup, start
+from engine import Pile, Setup, start
 from scene import Bench
+
+import granulcal as gc
+from granulcal.statistics import NAMES
 
 FALL = 0.2
 """Time of the falls [s]."""
@@ -94,7 +102,9 @@ def lines() -> list[tuple[str, float, float]]:
             for i in range(40)
         ]
     )
-    found.append(("coefficient of variation 0.25 of 20,000 grains", sizes.std() / sizes.mean(), 0.25))
+    found.append(
+        ("coefficient of variation 0.25 of 20,000 grains", sizes.std() / sizes.mean(), 0.25)
+    )
     found.append(("their mean volume over a grain's", (sizes**3).mean() / 2e-3**3, 1.0))
     pair = applied("clumps", grains([[0.0, 0.0, 0.0]]), 1.5)
     points = np.random.default_rng(0).uniform(-4e-3, 4e-3, (400_000, 3))
@@ -108,11 +118,34 @@ def lines() -> list[tuple[str, float, float]]:
     return found
 
 
+def camera(seeds: int) -> None:
+    """Prints what the sensor does to the statistics: in recordings and in granulcal's own image."""
+    bench, rows = Bench.load(), []
+    theta = np.array([0.5, 0.3, 0.3])
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        for seed in range(seeds):
+            pour = bench.pour(theta, 0.08, seed)
+            pile = Pile(pour.positions, pour.radii, 0, 0, 0.0, 0.0)
+            bench.record(pile, folder, "08cm/pour.png", seed + 1000)
+            recording = gc.Recording.open(folder / "08cm/pour.png", folder / "camera.toml")
+            clean = bench.observe(pile.centres, pile.radii).paper16
+            rows.append([clean, recording.statistics().paper16, pour.statistics().paper16])
+    clean, recorded, own = np.array(rows).transpose(1, 0, 2)
+    sd = clean.std(axis=0, ddof=1)
+    print("\n| statistic | recording | granulcal's image |\n|---|---|---|")
+    for i, name in enumerate(NAMES):
+        errors = ((seen[:, i] - clean[:, i]) / sd[i] for seen in (recorded, own))
+        cells = [f"{e.mean():+.2f} ± {e.std(ddof=1):.2f}" for e in errors]
+        print(f"| {name} | {' | '.join(cells)} |")
+
+
 def main() -> None:
-    """Prints the table."""
+    """Prints a table of forces and motions, and one of what the sensor adds."""
     print("| what | LAMMPS | closed form |\n|---|---|---|")
     for what, theirs, form in lines():
         print(f"| {what} | {theirs:.4f} | {form:.4f} |")
+    camera(seeds=20)
 
 
 if __name__ == "__main__":

@@ -160,19 +160,30 @@ def main() -> None:
     parser.add_argument("out", type=Path, help="folder of the sets")
     parser.add_argument("--sealed", type=Path, required=True, help="folder of the answers")
     parser.add_argument("--sets", type=int, default=42)
+    parser.add_argument("--first", type=int, default=0, help="sets of the plan to pass over")
     parser.add_argument("--pours", type=int, default=3, help="pours at each height")
+    parser.add_argument(
+        "--part",
+        type=int,
+        nargs=2,
+        default=(0, 1),
+        metavar=("K", "N"),
+        help="of N makers side by side this is the one number K, from 0",
+    )
     parser.add_argument("--seed", type=int, help="of the plan; the default is drawn and sealed")
     options = parser.parse_args()
     for folder in (options.out, options.sealed):
         folder.mkdir(parents=True, exist_ok=True)
     seed = seed_of(options.sealed, options.seed)
-    for planned in plan(seed, options.sets):
-        if planned.name in seals(options.out):
+    for planned in plan(seed, options.sets)[options.first :]:
+        part, parts = options.part
+        if planned.index % parts != part or planned.name in seals(options.out):
             continue
         began = time.monotonic()
         make(planned, seed, options.pours, options.out, options.sealed)
-        number, took = planned.index + 1, time.monotonic() - began
-        print(f"{number} of {options.sets}: {planned.name}, {took:.0f} s", flush=True)
+        # No name and no number of the plan: nothing that is printed may give an answer away.
+        took = time.monotonic() - began
+        print(f"{len(seals(options.out))} sets, the last in {took:.0f} s", flush=True)
 
 
 if __name__ == "__main__":

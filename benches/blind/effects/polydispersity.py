@@ -1,7 +1,7 @@
 """Lognormal diameters of coefficient of variation s, with the same count and the same mean volume.
 
-d_i = c exp(sigma xi), sigma^2 = ln(1 + s^2), cut off at both ends; c such that the mean of d_i^3 is d^3.
-The cut takes 0.006 of s at the strongest below.
+d_i = c exp(sigma xi), sigma^2 = ln(1 + s^2), cut off at both ends, which takes 0.006 of s at the
+strongest below; c such that the mean of d_i^3 is d^3.
 """
 
 import math
