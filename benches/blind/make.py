@@ -1,0 +1,190 @@
+"""Makes blind sets: recordings for `granulcal close-loop`, and sealed answers somewhere else.
+
+    python benches/blind/make.py out/sets --sealed out/sealed --sets 42
+
+A set is a folder with `loop.toml`, scene, prior and depth images. Nothing in it says what the truth
+has. Sets that are there are not made again, so it goes on where it was stopped.
+"""
+
+import argparse
+import json
+import os
+import secrets
+import shutil
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import effects
+import numpy as np
+from answers import seal, seals, write_text
+from engine import Setup, pour
+from scene import PARAMETERS, PRIOR, SCENE, Bench
+
+import granulcal as gc
+
+CONDITIONS = {"fit": (0.04, 0.08, 0.12), "sealed": (0.02, 0.06, 0.10)}
+"""Heights of the funnel's tip [m]."""
+NULLS = 10
+"""Sets without effect in a round."""
+OUTSIDE = ("clumps", "charge", "slot", "count", "vibration")
+"""Effects that are hard to name: one of each, at the medium strength, in a round."""
+TRIES = 4
+"""Pours that are tried where grains stay in the funnel."""
+MOST = 1000
+"""Names that are dealt out: more than any plan has sets."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A set to be made: its place in the plan, its name, its effect and how strong it is."""
+
+    index: int
+    name: str
+    effect: str | None
+    level: int
+
+
+def plan(seed: int, count: int) -> list[Planned]:
+    """Returns the first sets: nulls, every effect at three strengths, some odd ones; and again."""
+    known = [name for name in effects.load() if name not in OUTSIDE]
+    rounds: list[tuple[str | None, int]] = [(None, 0)] * NULLS
+    rounds += [(name, level) for name in known for level in range(3)]
+    rounds += [(name, 1) for name in OUTSIDE]
+    order = np.random.default_rng([seed, 0]).permutation(MOST)
+    what = (rounds[i % len(rounds)] for i in range(count))
+    return [Planned(i, f"set-{order[i]:03d}", *pair) for i, pair in enumerate(what)]
+
+
+def make(planned: Planned, seed: int, pours: int, sets: Path, sealed: Path) -> None:
+    """Makes one set and seals its answer."""
+    bench, random = Bench.load(), np.random.default_rng([seed, 1, planned.index])
+    theta = gc.Prior.load(PRIOR).sample(1, seed=int(random.integers(2**31)))[0]
+    effect = None if planned.effect is None else effects.load()[planned.effect]
+    strength = None if effect is None else effect.strengths[planned.level]
+    of_effect = int(random.integers(2**31))
+    draft = sets / f".{planned.name}.part"
+    shutil.rmtree(draft, ignore_errors=True)
+    draft.mkdir(parents=True)
+    answer = {
+        "set": planned.name,
+        "salt": secrets.token_hex(16),
+        "effect": planned.effect,
+        "strength": strength,
+        "unit": None if effect is None else effect.unit,
+        "level": planned.level,
+        "theta": dict(zip(PARAMETERS, map(float, theta), strict=True)),
+        "seed": [seed, planned.index],
+        "conditions": [],
+    }
+    lines = ['scene = "scene.toml"', 'prior = "prior.toml"', 'camera = "camera.toml"']
+    for use, heights in CONDITIONS.items():
+        for height in heights:
+            made = []
+            for number in range(pours):
+                seeds = random.integers(2**31, size=TRIES + 1).tolist()
+                setups = (bench.setup(theta, height, start) for start in seeds[:-1])
+                if effect is not None:
+                    # The same table, the same diameters: what is drawn belongs to the set.
+                    with_effect = partial(_apply, effect, strength, of_effect)
+                    setups = map(with_effect, setups)
+                image = f"{round(100 * height):02d}cm/pour-{number}.png"
+                made.append(_recorded(bench, setups, draft, image, seeds[-1]))
+            answer["conditions"].append({"height": height, "use": use, "pours": made})
+            images = [one["recording"] for one in made if "recording" in one]
+            if images:
+                lines += [
+                    "",
+                    "[[conditions]]",
+                    f'name = "{round(100 * height)} cm"',
+                    f'at = {{ "funnel.height" = {height} }}',
+                    f'use = "{use}"',
+                    f"recordings = {json.dumps(images)}",
+                ]
+    for file in (SCENE, PRIOR):
+        shutil.copy(file, draft / file.name)
+    (draft / "loop.toml").write_text("\n".join(lines) + "\n")
+    for path in draft.rglob("*"):
+        os.utime(path, (0, 0))  # When a set was made says where it stands in the plan.
+    os.utime(draft, (0, 0))
+    shutil.rmtree(sets / planned.name, ignore_errors=True)
+    draft.rename(sets / planned.name)
+    seal(answer, sealed, sets)
+
+
+def _apply(effect: effects.Effect, strength: float, seed: int, setup: Setup) -> Setup:
+    return effect.apply(setup, strength, np.random.default_rng(seed))
+
+
+def _recorded(bench: Bench, setups: Iterator[Setup], folder: Path, image: str, noise: int) -> dict:
+    """Records the first pour that leaves no grain in the funnel; returns what to seal of it."""
+    tries, held = 0, 0
+    for tries, setup in enumerate(setups, start=1):
+        pile = pour(setup)
+        held = pile.held
+        if held == 0:
+            bench.record(pile, folder, image, noise)
+            seen = bench.observe(pile.centres, pile.radii)
+            return {
+                "recording": image,
+                "noise_seed": noise,
+                "tries": tries,
+                "lost": pile.lost,
+                "rest_s": pile.rest_s,
+                "statistics": seen.paper16.tolist(),
+                "diagnostics": seen.diagnostics.tolist(),
+            }
+    return {"tries": tries, "held": held}
+
+
+def seed_of(sealed: Path, given: int | None) -> int:
+    """Returns the seed of the plan, drawn by the system if none is given; it is sealed, too.
+
+    Raises:
+        ValueError: the folder belongs to another seed.
+    """
+    file = sealed / "plan.json"
+    if not file.exists():
+        write_text(file, json.dumps({"seed": secrets.randbits(63) if given is None else given}))
+    seed = json.loads(file.read_text())["seed"]
+    if given is not None and seed != given:
+        raise ValueError(f"{sealed} holds answers of another seed; choose another folder")
+    return seed
+
+
+def main() -> None:
+    """Makes what is missing."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path, help="folder of the sets")
+    parser.add_argument("--sealed", type=Path, required=True, help="folder of the answers")
+    parser.add_argument("--sets", type=int, default=42)
+    parser.add_argument("--first", type=int, default=0, help="sets of the plan to pass over")
+    parser.add_argument("--pours", type=int, default=3, help="pours at each height")
+    parser.add_argument(
+        "--part",
+        type=int,
+        nargs=2,
+        default=(0, 1),
+        metavar=("K", "N"),
+        help="of N makers side by side this is the one number K, from 0",
+    )
+    parser.add_argument("--seed", type=int, help="of the plan; the default is drawn and sealed")
+    options = parser.parse_args()
+    for folder in (options.out, options.sealed):
+        folder.mkdir(parents=True, exist_ok=True)
+    seed = seed_of(options.sealed, options.seed)
+    for planned in plan(seed, options.sets)[options.first :]:
+        part, parts = options.part
+        if planned.index % parts != part or planned.name in seals(options.out):
+            continue
+        began = time.monotonic()
+        make(planned, seed, options.pours, options.out, options.sealed)
+        # No name and no number of the plan: nothing that is printed may give an answer away.
+        took = time.monotonic() - began
+        print(f"{len(seals(options.out))} sets, the last in {took:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()
