@@ -123,6 +123,7 @@ def _document(model: "BayesSim") -> dict[str, Any]:
             "leading_degrees": likelihood.leading.noise.degrees,
             "axis_count": likelihood.axis_count,
         },
+        "is_calibrated": None if model.calibration is None else model.calibration.is_calibrated,
         "summary": model.summary.as_dict(),
         "identifiability": None
         if model.identifiability is None
