@@ -13,6 +13,7 @@ from granulcal.bayessim.importance import FEWEST_EFFECTIVE
 from granulcal.bayessim.likelihood import Likelihood, joint_density
 from granulcal.bayessim.mixture import Mixture
 from granulcal.bayessim.product import LEAST_LOG_EVIDENCE_RATIO, product_density
+from granulcal.bayessim.stack import StackedDensity
 from granulcal.prior import Prior
 
 if TYPE_CHECKING:
@@ -248,6 +249,30 @@ class Posterior:
         if density.effective_sample_size < FEWEST_EFFECTIVE:
             found.append(FewEffectiveDraws(density.effective_sample_size, FEWEST_EFFECTIVE))
         return cls(prior, density, warnings=tuple(found))
+
+    @classmethod
+    def from_stack(
+        cls,
+        prior: Prior,
+        condition: tuple[Likelihood, Array],
+        mixture: Mixture,
+        emulator_weight: float,
+        *,
+        warnings: tuple[Any, ...] = (),
+    ) -> "Posterior":
+        """Returns the average of an emulator's and a network's posterior of one pour.
+
+        Args:
+            prior: the prior.
+            condition: the emulated likelihood and the pour, standardised, shape (1, s).
+            mixture: the network's, over coordinates.
+            emulator_weight: weight of the emulator's.
+            warnings: what is known beforehand.
+        """
+        emulated = cls.from_conditions(prior, [condition], warnings=warnings)
+        learnt = cls.from_mixture(prior, mixture, warnings=emulated.warnings)
+        density = StackedDensity(emulated.density, learnt.density, emulator_weight)
+        return cls(prior, density, warnings=learnt.warnings)
 
     @property
     def names(self) -> list[str]:

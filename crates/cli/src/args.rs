@@ -1,5 +1,6 @@
 //! The arguments: clap types and nothing else.
 
+mod infer;
 mod sensor;
 
 use std::path::PathBuf;
@@ -11,6 +12,7 @@ use granulcal_dataset::{ReadOptions, Shard};
 use granulcal_dem::Preset;
 
 use crate::commands::completions::CompletionsArgs;
+pub use infer::InferArgs;
 pub use sensor::{FitSensorArgs, PickColourArgs};
 
 /// Calibrates a granular simulator from depth images: pours grains, looks at them, describes them.
@@ -21,6 +23,7 @@ Start here:
   granulcal-cli simulate funnel                       one pour, its health and its 16 statistics
   granulcal-cli generate funnel default -n 100 -o d   100 pours with unknown material, as Parquet
   granulcal-cli features pile.bag                     the same statistics of a measured pile
+  granulcal-cli infer model pile.bag                  its material, by a model of `granulcal train`
 
 Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy or without
 grains in view or some frames of a recording lost, 130 stopped. Results go to stdout, progress and messages to stderr.")]
@@ -49,6 +52,7 @@ pub enum Command {
     Generate(GenerateArgs),
     Render(RenderArgs),
     Features(FeaturesArgs),
+    Infer(InferArgs),
     FitSensor(FitSensorArgs),
     PickColour(PickColourArgs),
     Inspect(InspectArgs),

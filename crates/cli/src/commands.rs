@@ -4,6 +4,7 @@ pub mod completions;
 mod features;
 mod fit_sensor;
 mod generate;
+mod infer;
 mod inspect;
 mod merge;
 mod pick_colour;
@@ -24,6 +25,7 @@ pub fn dispatch(context: &Context, command: Command) -> anyhow::Result<Outcome> 
         Command::Generate(args) => generate::run(context, &args),
         Command::Render(args) => render::run(context, &args),
         Command::Features(args) => features::run(&args),
+        Command::Infer(args) => infer::run(&args),
         Command::FitSensor(args) => fit_sensor::run(&args),
         Command::PickColour(args) => pick_colour::run(&args),
         Command::Inspect(args) => inspect::run(&args),

@@ -166,3 +166,25 @@ fn a_recording_of_the_realsense_viewer_needs_one_command() {
     let plane = |name: &str| found["plane"][name].as_f64().unwrap();
     assert!(plane("tilt_deg") < 10.0 && (0.01..0.04).contains(&plane("rms_m")), "{found}");
 }
+
+#[test]
+fn infer_evaluates_a_model_without_python() {
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../bayessim/tests/data");
+    let model = models.join("pile").display().to_string();
+    let place = Place::new();
+    copied(&place, BAG);
+    let found = json(&place.expect(0, &["infer", &model, BAG, "--json", "--samples", "50"]));
+    let described = json(&place.expect(0, &["features", BAG, "--json"]));
+    assert_eq!(found["statistics"][0], described["statistics"]);
+    assert_eq!(found["samples"].as_array().unwrap().len(), 50);
+    let friction = &found["parameters"]["material.sliding_friction"];
+    let (low, high) = (&friction["interval90"][0], &friction["interval90"][1]);
+    assert!(0.0 <= low.as_f64().unwrap() && low.as_f64() < high.as_f64());
+    assert!(high.as_f64().unwrap() <= 1.0);
+    let lines = place.expect(0, &["infer", &model, BAG, BAG]);
+    assert!(lines.contains("material.restitution") && lines.contains("90 % interval"), "{lines}");
+    let other = models.join("auto").display().to_string();
+    place.refused(&["infer", &other, BAG], &["other statistics", "statistic_0"]);
+    place.refused(&["infer", "nothing", BAG], &["nothing", "model.json"]);
+    place.refused(&["infer", &model, "nothing.bag"], &["nothing.bag"]);
+}

@@ -28,8 +28,8 @@ class Config:
 
     Attributes:
         method: `emulated`: likelihood of an emulator of the statistics. `mdrff`: network trained on
-            the pairs. `auto`, the default: both, and the one that says more about held-out pairs is
-            kept. `distilled`: network trained on synthetic pairs of the emulator. `plain`: the
+            the pairs. `auto`, the default: both, averaged with the weight that says most about held-out
+            pairs. `distilled`: network trained on synthetic pairs of the emulator. `plain`: the
             original recipe of the network. The last two only change the network's defaults.
         kernel: kernel whose spectrum the frequencies are drawn from.
         features: number of random frequencies; each gives a cosine and a sine.
@@ -68,7 +68,7 @@ class Config:
     test_share: float = 0.1
     weight_decay: float = 0.3
     synthetic: int = 20_000
-    emulator_features: int = 32
+    emulator_features: int = 100
 
     def __post_init__(self) -> None:
         """Checks every setting; the message names it, what was found and what is allowed."""

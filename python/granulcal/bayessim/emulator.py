@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from granulcal.bayessim.basis import Basis
 from granulcal.bayessim.noise import Noise, fit_log_scale
-from granulcal.bayessim.ridge import Ridge, RidgeFit
+from granulcal.bayessim.ridge import Ridge, RidgeFit, weighted_ridge
 
 __all__ = ["Emulator", "Prediction"]
 
@@ -47,6 +47,12 @@ class Prediction:
     means: Array
     scales: Array
     unknown: Array
+
+    def first(self, count: int) -> "Prediction":
+        """Returns what is expected of the first `count` statistics."""
+        return Prediction(
+            self.means[:, :count], self.scales[:, :count], self.unknown[:, :count]
+        )
 
     def row(self, i: int) -> "Prediction":
         """Returns what is expected at one of the points."""
@@ -131,7 +137,7 @@ class Emulator:
                 log_scale = scale_design @ log_scale_coefficients
                 weights = np.exp(-2 * (log_scale - log_scale.mean()))
                 weights /= weights.mean()
-                fit = Ridge(design, weights).fit(z[:, j])
+                fit = weighted_ridge(design, weights, z[:, j], fit.ratio)
                 noise = _noise(fit, z[:, j])
                 log_scale_coefficients = fit_log_scale(scale_design, noise)
             scale = np.exp(scale_design @ log_scale_coefficients)

@@ -112,6 +112,26 @@ class ImportanceDensity:
         log_normaliser = largest + math.log(float(np.mean(np.exp(log_ratio - largest))))
         return cls(log_target, prior, log_normaliser, pool, _normalised(log_ratio), mixtures)
 
+    @classmethod
+    def of_prior_draws(
+        cls,
+        prior: Prior,
+        log_target: Callable[[Array], Array],
+        draws: Array,
+        log_likelihood: Array,
+    ) -> "ImportanceDensity":
+        """Returns the density whose pool are draws of the prior.
+
+        Args:
+            prior: the prior.
+            log_target: the log density up to a constant: likelihood times prior.
+            draws: of the prior, shape (m, p).
+            log_likelihood: at the draws, shape (m,).
+        """
+        largest = float(log_likelihood.max())
+        log_normaliser = largest + math.log(float(np.mean(np.exp(log_likelihood - largest))))
+        return cls(log_target, prior, log_normaliser, draws, _normalised(log_likelihood))
+
     @property
     def effective_sample_size(self) -> float:
         """Number of independent draws that the weighted pool is worth."""

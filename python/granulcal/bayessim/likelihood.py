@@ -4,12 +4,14 @@ The statistics are rotated to their signal axes (`signal.py`); the first r of th
 k pours with the mean $\bar y$ have
 
 $$ L(u) = t_\nu(\bar y; m(u), V_k), \qquad
-   V_k = c^2 (s^2 + h^2) - (1 - 1/k) s^2 $$
+   V_k = c^2 (s^2 + h^2) - (1 - 1/k) a s^2 $$
 
-(axis by axis, with one correlation R), s the scale of a pour's noise, h that of what the pairs
-leave unknown about the mean, and $c \ge 1$ a widening. For one pour this is the widened noise. For
-many, only the noise itself averages away: the widening and h are errors of the emulator, which all
-pours share.
+(axis by axis, with one correlation R), s the scale of what the emulator leaves of a pour, h that of
+what the pairs leave unknown about the mean, and $c \ge 1$ a widening. For one pour this is the
+widened noise. Of many, only what differs between them averages away: pairs of which no two share
+their parameters cannot tell noise from errors of the emulator, but several pours of one material
+can, and a is the share of $s^2$ by which they differ. The rest, the widening and h are errors that
+all pours share.
 
 Which r and c, and whether the noise changes over the parameters, is chosen by held-out pairs: the
 parameters of pairs that an emulator has not seen are to be most probable under its posterior, among
@@ -33,6 +35,7 @@ from granulcal.bayessim.density import quasi_prior
 from granulcal.bayessim.emulator import Emulator, Prediction
 from granulcal.bayessim.importance import (
     DEFENSIVE_SHARE,
+    FEWEST_EFFECTIVE,
     Effort,
     ImportanceDensity,
     kernel_estimate,
@@ -55,8 +58,12 @@ _FOLDS = 4
 # Held-out pairs that choose, and that the fit is checked on afterwards.
 _HELD_OUT = 240
 _CELLS = 4096
+# Points of the prior that a posterior is made of, unless too few of them carry weight.
+_POOL = 16_384
 # Levels of held-out truths must be uniform with at least this Kolmogorov-Smirnov p-value.
 _LEAST_P_VALUE = 0.1
+# One axis alone does not say that all noise is the pours' own.
+_LARGEST_RATIO = 2.0
 _EFFORT = Effort(pool=3000, draws=1500, rounds=5, effective=150.0, good_share=0.25)
 
 
@@ -143,9 +150,10 @@ class Likelihood:
                 train = np.setdiff1d(everything, part)
                 held = part[: _HELD_OUT // _FOLDS]
                 grown = _Growing.fit(u[train], z[train], prior, lengths, features, varying, seed)
+                at_cells = grown.emulator.predict(quasi_prior(prior, _CELLS))
                 for count in counts:
                     found = grown.leading(count)
-                    score, level = found.held_out_scores(u[held], z[held])
+                    score, level = found.held_out_scores(u[held], z[held], at_cells.first(count))
                     key = varying, count
                     scores[key] = np.column_stack([scores[key], score]) if key in scores else score
                     levels[key] = np.column_stack([levels[key], level]) if key in levels else level
@@ -190,45 +198,80 @@ class Likelihood:
         """What the leading emulator expects there."""
         return self.leading.predict(self.cells)
 
+    @cached_property
+    def everything_at_cells(self) -> Prediction:
+        """What the emulator of all axes expects there."""
+        return self.emulator.predict(self.cells)
+
+    @cached_property
+    def pool(self) -> Array:
+        """More evenly spread draws of the prior, shape (m, p)."""
+        return quasi_prior(self.prior, _POOL)
+
+    @cached_property
+    def at_pool(self) -> Prediction:
+        """What the leading emulator expects there."""
+        return self.leading.predict(self.pool)
+
     def log_prob(self, z: Array, u: Array) -> Array:
         """Returns the log likelihood of k pours `z` (k, s) at `u` (n, p), shape (n,)."""
         return self._of_prediction(z, self.leading.predict(u))
 
     def start(self, z: Array) -> Array:
-        """Returns the log likelihood of k pours `z` (k, s) at `cells`, shape (c,)."""
-        return self._of_prediction(z, self.at_cells)
+        """Returns the log likelihood of k pours `z` (k, s) at `pool`, shape (m,)."""
+        return self._of_prediction(z, self.at_pool)
 
     def _of_prediction(self, z: Array, prediction: Prediction) -> Array:
-        mean = self.axes.apply(z)[:, : self.axis_count].mean(axis=0)
-        scales = pooled_scales(prediction, len(z), self.widening)
-        return self.leading.noise.log_density(mean - prediction.means, scales)
+        y = self.axes.apply(z)[:, : self.axis_count]
+        share = averaging_share(y, prediction.scales)
+        scales = pooled_scales(prediction, len(z), self.widening, share)
+        return self.leading.noise.log_density(y.mean(axis=0) - prediction.means, scales)
 
-    def held_out_scores(self, u: Array, z: Array) -> tuple[Array, Array]:
+    def held_out_scores(
+        self, u: Array, z: Array, at_cells: Prediction | None = None
+    ) -> tuple[Array, Array]:
         """Returns what the posteriors given `z` (n, s) say of the true `u` (n, p).
+
+        Args:
+            u: true coordinates.
+            z: standardised statistics.
+            at_cells: what is expected of the leading axes at `cells`, if known already.
 
         Returns:
             Log density and level of the smallest highest-density region that holds it, each of
             shape (widenings, n).
         """
         y = self.axes.apply(z)[:, : self.axis_count]
-        noise, here, factors = self.leading.noise, self.leading.predict(u), np.array(WIDENINGS)
-        cells = self.at_cells
-        totals = np.hypot(cells.scales, cells.unknown)
-        scores, levels = np.empty((2, len(factors), len(u)))
-        cell_prior = self.prior.coordinate_log_prob(self.cells)
-        at_truth = self.prior.coordinate_log_prob(u)
-        for i in range(len(u)):
-            fits = noise.log_densities(y[i] - cells.means, totals, factors)
-            scale = np.hypot(here.scales[i], here.unknown[i])
-            truth = noise.log_densities((y[i] - here.means[i])[None], scale[None], factors)[:, 0]
-            # The truth is one of the cells, so that none can be more probable than all.
-            fits = np.column_stack([fits, truth])
-            largest = fits.max(axis=1)
-            evidence = np.log(np.mean(np.exp(fits - largest[:, None]), axis=1)) + largest
-            scores[:, i] = truth - evidence + at_truth[i]
-            denser = fits[:, :-1] + cell_prior > truth[:, None] + at_truth[i]
-            shares = np.exp(fits - largest[:, None])
-            levels[:, i] = np.sum(shares[:, :-1] * denser, axis=1) / shares.sum(axis=1)
+        noise, here = self.leading.noise, self.leading.predict(u)
+        cells = self.at_cells if at_cells is None else at_cells
+        # The truth is one of the cells, so that none can be more probable than all.
+        squares = np.column_stack(
+            [
+                noise.squares(y, cells.means, np.hypot(cells.scales, cells.unknown)),
+                noise.square(y - here.means, np.hypot(here.scales, here.unknown)),
+            ]
+        )
+        sizes = np.log(np.hypot(cells.scales, cells.unknown)).sum(axis=1)
+        sizes_here = np.log(np.hypot(here.scales, here.unknown)).sum(axis=1)
+        offsets = np.column_stack([np.tile(sizes, (len(u), 1)), sizes_here])
+        prior_here = self.prior.coordinate_log_prob(u)
+        prior_cells = self.prior.coordinate_log_prob(self.cells)
+        prior = np.column_stack([np.tile(prior_cells, (len(u), 1)), prior_here])
+        half = np.float32(0.5 * (noise.degrees + self.axis_count))
+        # Single precision: logarithms of a thousandth of a nat are enough, and there are millions.
+        squares, offsets, prior = (a.astype(np.float32) for a in (squares, offsets, prior))
+        scores, levels = np.empty((2, len(WIDENINGS), len(u)))
+        for i, widening in enumerate(WIDENINGS):
+            scale = np.float32(1 / (widening**2 * noise.degrees))
+            fits = -half * np.log(1 + scale * squares) - offsets
+            largest = fits.max(axis=1, keepdims=True)
+            shares = np.exp(fits - largest)
+            total = shares.sum(axis=1)
+            evidence = np.log(total / shares.shape[1]) + largest[:, 0]
+            scores[i] = fits[:, -1] - evidence + prior_here
+            heights = fits + prior
+            denser = heights[:, :-1] > heights[:, -1:]
+            levels[i] = np.sum(shares[:, :-1] * denser, axis=1) / total
         return scores, levels
 
     def simulate(self, u: Array, generator: np.random.Generator) -> Array:
@@ -282,10 +325,41 @@ class _Growing:
         return Likelihood(self.prior, self.axes, self.emulator, leading, 1.0)
 
 
-def pooled_scales(prediction: Prediction, pours: int, widening: float) -> Array:
-    """Returns the square root of V_k at each predicted point, shape (n, s)."""
+def averaging_share(y: Array, scales: Array) -> Array:
+    r"""Returns the share of the noise that k pours have each for themselves, shape (n,).
+
+    $$ a = \min(1, (1 + 2 \sqrt{2 / r (k-1)}) \, \mathrm{mean}_j \min(w_j^2 / s_j^2, 2)) $$
+
+    with $w_j$ the standard deviation between the pours: what the emulator calls noise and pours of
+    one material do not differ by is an error of the emulator. The factor is two standard deviations
+    of such a mean of $r (k-1)$ squares, so that noise that is all the pours' own counts as that.
+
+    Args:
+        y: signal axes of the pours, shape (k, r).
+        scales: what the emulator calls noise, shape (n, r).
+    """
+    pours, axes = y.shape
+    if pours == 1:
+        return np.ones(len(scales))
+    ratios = np.minimum(y.var(axis=0, ddof=1) / scales**2, _LARGEST_RATIO)
+    doubt = 1 + 2 * np.sqrt(2 / (axes * (pours - 1)))
+    return np.minimum(1.0, doubt * ratios.mean(axis=1))
+
+
+def pooled_scales(
+    prediction: Prediction, pours: int, widening: float, share: Array | float = 1.0
+) -> Array:
+    """Returns the square root of V_k at each predicted point, shape (n, s).
+
+    Args:
+        prediction: what is expected there.
+        pours: k.
+        widening: c.
+        share: of the noise that averages away, shape (n,) or a number.
+    """
     noise, unknown = prediction.scales**2, prediction.unknown**2
-    return np.sqrt(widening**2 * (noise + unknown) - (1 - 1 / pours) * noise)
+    own = noise * np.reshape(share, (-1, 1))
+    return np.sqrt(widening**2 * (noise + unknown) - (1 - 1 / pours) * own)
 
 
 def joint_density(prior: Prior, conditions: list[tuple[Likelihood, Array]]) -> ImportanceDensity:
@@ -300,13 +374,15 @@ def joint_density(prior: Prior, conditions: list[tuple[Likelihood, Array]]) -> I
         likelihoods = [likelihood.log_prob(z, u) for likelihood, z in conditions]
         return np.sum(likelihoods, axis=0) + prior.coordinate_log_prob(u)
 
-    cells = conditions[0][0].cells
+    pool = conditions[0][0].pool
     log_weights = np.sum([likelihood.start(z) for likelihood, z in conditions], axis=0)
-    weights = np.exp(log_weights - log_weights.max())
-    # A few cells alone have no covariance.
-    weights = weights / weights.sum() + 1e-6
+    found = ImportanceDensity.of_prior_draws(prior, log_target, pool, log_weights)
+    if found.effective_sample_size >= FEWEST_EFFECTIVE:
+        return found
+    # A few draws alone have no covariance.
+    weights = found.pool_weights + 1e-6
     wide = prior_normal(prior)
-    first = kernel_estimate(cells, weights / weights.sum(), np.random.default_rng(0))
+    first = kernel_estimate(pool, weights / weights.sum(), np.random.default_rng(0))
     start = mix(first, wide, DEFENSIVE_SHARE)
     return ImportanceDensity.of(prior, log_target, start, wide, effort=_EFFORT)
 

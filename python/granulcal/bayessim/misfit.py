@@ -11,9 +11,9 @@ seen by either.
 
 For one pour the same is done with the held-out pairs of each fold, which no emulator has seen:
 p-values are ranks among them, so that the false alarm rate is what it says (conformal). For k pours
-the replicates are means of k such residuals around the fit; the share $1 - 1/c^2$ of their variance
-by which the emulator's noise was widened counts as its error, which pours share and which does not
-average away.
+the replicates are means of k such residuals around the fit; of their variance only the share
+$a / c^2$ (a of `likelihood.py`, c the widening) is the pours' own, and the rest an error of the
+emulator, which they share and which does not average away.
 
 Reference:
     Bayarri and Berger, P values for composite null models, JASA 95, 2000.
@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.bayessim.emulator import Prediction
-from granulcal.bayessim.likelihood import Fold, Likelihood, pooled_scales
+from granulcal.bayessim.likelihood import Fold, Likelihood, averaging_share, pooled_scales
 
 __all__ = ["Misfit", "MisfitReference", "StatisticMisfit"]
 
@@ -111,7 +111,7 @@ class MisfitReference:
             y = fold.likelihood.axes.apply(z[fold.held])
             noise.append(y - fold.likelihood.emulator.predict(u[fold.held]).means)
             back = np.linalg.inv(fold.likelihood.axes.matrix)
-            at_cells = fold.likelihood.emulator.predict(fold.likelihood.cells)
+            at_cells = fold.likelihood.everything_at_cells
             for row in y:
                 square, left = _best_fit(fold.likelihood, at_cells, row, 1)[1:]
                 squares.append(square)
@@ -122,12 +122,16 @@ class MisfitReference:
         """Returns the test of k pours `z` (k, s), standardised; `names` are the statistics."""
         pours = len(z)
         back = np.linalg.inv(likelihood.axes.matrix)
-        at_cells = likelihood.emulator.predict(likelihood.cells)
-        mean = likelihood.axes.apply(z).mean(axis=0)
-        best, square, left = _best_fit(likelihood, at_cells, mean, pours)
+        at_cells = likelihood.everything_at_cells
+        y = likelihood.axes.apply(z)
+        mean = y.mean(axis=0)
+        # Which share of the noise is the pours' own is asked once, at the best cell.
+        nearest = int(_squares(likelihood, at_cells, mean, pours, 1.0).argmin())
+        share = float(averaging_share(y, at_cells.scales[nearest : nearest + 1])[0])
+        best, square, left = _best_fit(likelihood, at_cells, mean, pours, share)
         null_squares, null_residuals = self.squares, self.residuals
         if pours > 1:
-            null_squares, null_residuals = self._replicates(likelihood, best, pours)
+            null_squares, null_residuals = self._replicates(likelihood, best, pours, share)
         spread = np.maximum(null_residuals.std(axis=0), 1e-12)
         sizes = (left @ back) / spread
         null_largest = np.abs(null_residuals / spread).max(axis=1)
@@ -146,11 +150,13 @@ class MisfitReference:
         )
         return Misfit(pours, float(p_value), joint, statistics)
 
-    def _replicates(self, likelihood: Likelihood, u: Array, pours: int) -> tuple[Array, Array]:
+    def _replicates(
+        self, likelihood: Likelihood, u: Array, pours: int, share: float
+    ) -> tuple[Array, Array]:
         """Q and residuals of sets of pours at `u` (p,)."""
         generator = np.random.default_rng(0)
         here = likelihood.emulator.predict(u[None])
-        shared = 1 - likelihood.widening**-2
+        shared = 1 - share * likelihood.widening**-2
         root = likelihood.emulator.noise.root
         back = np.linalg.inv(likelihood.axes.matrix)
         squares, residuals = [], []
@@ -160,32 +166,37 @@ class MisfitReference:
             unknown = here.unknown[0] * (root @ generator.standard_normal(len(root)))
             error = np.sqrt(1 - shared) * own + np.sqrt(shared) * common + unknown
             # A fit near u is no better than the best one: false alarms can only become fewer.
-            square, left = _improve(likelihood, u, here.means[0] + error, pours)[1:]
+            square, left = _improve(likelihood, u, here.means[0] + error, pours, share)[1:]
             squares.append(square)
             residuals.append(left @ back)
         return np.array(squares), np.array(residuals)
 
 
+def _squares(
+    likelihood: Likelihood, prediction: Prediction, mean: Array, pours: int, share: float
+) -> Array:
+    """Returns Q at each predicted point, shape (n,)."""
+    scales = pooled_scales(prediction, pours, likelihood.widening, share)
+    return likelihood.emulator.noise.square(mean - prediction.means, scales)
+
+
 def _best_fit(
-    likelihood: Likelihood, at_cells: Prediction, mean: Array, pours: int
+    likelihood: Likelihood, at_cells: Prediction, mean: Array, pours: int, share: float = 1.0
 ) -> tuple[Array, float, Array]:
     """Returns the best u (p,), Q there and the residual (s,): best cell, then Gauss-Newton."""
-    whiten = np.linalg.inv(likelihood.emulator.noise.root).T
-    scales = pooled_scales(at_cells, pours, likelihood.widening)
-    squares = np.sum(((mean - at_cells.means) / scales @ whiten) ** 2, axis=1)
-    return _improve(likelihood, likelihood.cells[int(squares.argmin())], mean, pours)
+    squares = _squares(likelihood, at_cells, mean, pours, share)
+    return _improve(likelihood, likelihood.cells[int(squares.argmin())], mean, pours, share)
 
 
 def _improve(
-    likelihood: Likelihood, u: Array, mean: Array, pours: int
+    likelihood: Likelihood, u: Array, mean: Array, pours: int, share: float
 ) -> tuple[Array, float, Array]:
     """Returns a better u (p,), Q there and the residual (s,), by Gauss-Newton from `u`."""
     emulator = likelihood.emulator
     whiten = np.linalg.inv(emulator.noise.root).T
 
     def squares(prediction: Prediction) -> Array:
-        scales = pooled_scales(prediction, pours, likelihood.widening)
-        return np.sum(((mean - prediction.means) / scales @ whiten) ** 2, axis=1)
+        return _squares(likelihood, prediction, mean, pours, share)
 
     # The emulator knows nothing beyond the prior, which may have no bounds of its own.
     low, high = likelihood.cells.min(axis=0), likelihood.cells.max(axis=0)
@@ -193,7 +204,7 @@ def _improve(
     square = float(squares(here)[0])
     for _ in range(_STEPS):
         around = emulator.predict(u + _DIFFERENCE * np.eye(len(u)))
-        scales = pooled_scales(here, pours, likelihood.widening)[0]
+        scales = pooled_scales(here, pours, likelihood.widening, share)[0]
         slopes = ((around.means - here.means) / _DIFFERENCE / scales) @ whiten
         left = ((mean - here.means[0]) / scales) @ whiten
         step = np.linalg.lstsq(slopes.T, left, rcond=None)[0]

@@ -44,7 +44,8 @@ class BayesSim:
         x_names: names of the statistics.
         standardiser: what brings statistics to spread 1.
         likelihood: the emulator of the statistics.
-        amortised: the network, or None if the posterior is that of the emulator.
+        amortised: the network, or None if the posterior is that of the emulator alone.
+        emulator_weight: share of the emulator's posterior in that of one pour.
         summary: what the training did, with every excluded pair counted.
         misfit_reference: residuals that an observation of a right model can have.
         calibration: check on pairs that were not trained on, or None if there were too few.
@@ -72,6 +73,7 @@ class BayesSim:
         standardiser: Standardiser,
         likelihood: Likelihood,
         amortised: Amortised | None,
+        emulator_weight: float,
         x_names: tuple[str, ...],
         misfit_reference: MisfitReference,
         summary: TrainingSummary,
@@ -85,6 +87,7 @@ class BayesSim:
         self.standardiser = standardiser
         self.likelihood = likelihood
         self.amortised = amortised
+        self.emulator_weight = emulator_weight
         self.x_names = x_names
         self.summary = summary
         self.misfit_reference = misfit_reference
@@ -144,6 +147,7 @@ class BayesSim:
             standardiser=made.standardiser,
             likelihood=made.likelihood,
             amortised=made.amortised,
+            emulator_weight=made.emulator_weight,
             x_names=pairs.x_names,
             misfit_reference=made.misfit,
             summary=made.summary,
@@ -176,8 +180,10 @@ class BayesSim:
         """Returns the posterior given one observation, or several of one material.
 
         Several pours share their parameters. Under the emulator they have one likelihood, in which
-        the noise averages away and the emulator's own uncertainty does not; a network's posteriors
-        are multiplied and the prior divided out k - 1 times. Neither is an average of posteriors.
+        what differs between them averages away and the emulator's own error does not; a network's
+        posteriors are multiplied and the prior divided out k - 1 times. Neither is an average of
+        posteriors. Where emulator and network are averaged for one pour, several are the emulator's
+        alone: a network's error would be counted k times.
 
         Args:
             x_obs: statistics, own units, shape (s,) for one pour or (k, s) for k pours.
@@ -188,9 +194,14 @@ class BayesSim:
         observed = self._checked(x_obs)
         warnings = self._range_warnings(observed)
         z = self.standardiser.apply(observed)
-        if self.amortised is not None:
+        if self.amortised is not None and (self.emulator_weight == 0 or len(z) == 1):
             mixtures = self.amortised.mixtures(z)
-            return Posterior.from_mixtures(self.prior, mixtures, warnings=warnings)
+            if self.emulator_weight == 0:
+                return Posterior.from_mixtures(self.prior, mixtures, warnings=warnings)
+            condition, weight = (self.likelihood, z), self.emulator_weight
+            return Posterior.from_stack(
+                self.prior, condition, mixtures[0], weight, warnings=warnings
+            )
         return Posterior.from_conditions(self.prior, [(self.likelihood, z)], warnings=warnings)
 
     def misfit(self, x_obs: ArrayLike) -> Misfit:

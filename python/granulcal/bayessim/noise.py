@@ -28,6 +28,7 @@ _EM_ROUNDS = 8
 # Ridges of the log scale, chosen by leave-one-out deviance.
 _PENALTIES = (0.3, 3.0, 30.0, 300.0)
 _NEWTON_ROUNDS = 12
+_SMALLEST_STEP = 0.01
 # A squared residual counts as this many times its expectation at most.
 _LARGEST_RATIO = 25.0
 
@@ -80,6 +81,28 @@ class Noise:
         log_scales = np.log(scales).sum(axis=1) + size * np.log(inflations)[:, None]
         return constant - log_scales - 0.5 * (nu + size) * np.log1p(squares / nu)
 
+    def square(self, deviations: Array, scales: Array) -> Array:
+        """Returns the squared length of `deviations` (n, s) in units of the noise, shape (n,)."""
+        return np.sum(((deviations / scales) @ self._whiten) ** 2, axis=1)
+
+    def squares(self, y: Array, means: Array, scales: Array) -> Array:
+        r"""Returns the squared lengths of `y` (n, s) less each of `means` (c, s), shape (n, c).
+
+        As $y^T P y - 2 (P m)^T y + m^T P m$ with one precision P for each mean, so that all pairs
+        are one product of matrices.
+        """
+        size = len(self.root)
+        whiten = self._whiten[None] / scales[:, :, None]
+        precisions = whiten @ whiten.transpose(0, 2, 1)
+        pulls = np.einsum("cij,cj->ci", precisions, means)
+        rows, columns = np.triu_indices(size)
+        twice = np.where(rows == columns, 1.0, 2.0)
+        table = np.column_stack(
+            [precisions[:, rows, columns] * twice, -2 * pulls, np.sum(pulls * means, axis=1)]
+        )
+        known = np.column_stack([y[:, rows] * y[:, columns], y, np.ones(len(y))])
+        return np.maximum(known @ table.T, 0.0)
+
     def sample(self, n: int, generator: np.random.Generator) -> Array:
         """Returns `n` draws of unit scale, shape (n, s)."""
         normal = generator.standard_normal((n, len(self.root))) @ self.root.T
@@ -112,8 +135,11 @@ def fit_log_scale(design: Array, residuals: Array, *, constant: bool = False) ->
             ratio = _ratio(squares, design @ coefficients)
             gradient = design.T @ (ratio - 1) - strength * penalty * coefficients
             step = inverse @ gradient
-            coefficients = coefficients + step * min(1.0, 1.0 / np.abs(design @ step).max())
-        leverage = np.minimum(2 * np.einsum("ij,jk,ik->i", design, inverse, design), 0.9)
+            size = np.abs(design @ step).max()
+            coefficients = coefficients + step * min(1.0, 1.0 / max(size, 1e-12))
+            if size < _SMALLEST_STEP:
+                break
+        leverage = np.minimum(2 * np.sum((design @ inverse) * design, axis=1), 0.9)
         log_scale = design @ coefficients
         pull = leverage / (1 - leverage) * 0.5 * (_ratio(squares, log_scale) - 1)
         left_out = log_scale - np.clip(pull, -1.0, 1.0)

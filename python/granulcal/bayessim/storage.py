@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["load_model", "save_model"]
 
-FORMAT, VERSION = "granulcal-bayessim", 2
+FORMAT, VERSION = "granulcal-bayessim", 3
 _JSON_NAME, _TENSORS_NAME = "model.json", "weights.safetensors"
 
 
@@ -89,6 +89,7 @@ def load_model(path: str | PathLike[str]) -> "BayesSim":
             standardiser=tensors.standardiser(),
             likelihood=tensors.likelihood(prior, config, document["emulator"]),
             amortised=tensors.amortised(config) if document["has_network"] else None,
+            emulator_weight=document["emulator_weight"],
             x_names=x_names,
             misfit_reference=tensors.misfit(),
             identifiability=None if known is None else Identifiability.from_dict(known),
@@ -115,12 +116,14 @@ def _document(model: "BayesSim") -> dict[str, Any]:
         "scene_toml": model.scene_toml,
         "scene_hash": model.scene_hash,
         "has_network": model.amortised is not None,
+        "emulator_weight": model.emulator_weight,
         "emulator": {
             "widening": likelihood.widening,
             "degrees": likelihood.emulator.noise.degrees,
             "leading_degrees": likelihood.leading.noise.degrees,
             "axis_count": likelihood.axis_count,
         },
+        "is_calibrated": None if model.calibration is None else model.calibration.is_calibrated,
         "summary": model.summary.as_dict(),
         "identifiability": None
         if model.identifiability is None

@@ -13,7 +13,7 @@ class TrainingSummary:
     """Counts and losses of one training run.
 
     Attributes:
-        method: how the posterior is made: `emulated`, `distilled`, `mdrff` or `plain`.
+        method: how the posterior is made: `stacked`, `emulated`, `distilled`, `mdrff` or `plain`.
         choice: what was chosen by held-out pairs, in words.
         pair_count: pairs given, before any was excluded.
         train_count: pairs that the emulator, or each member of the network, was trained on.

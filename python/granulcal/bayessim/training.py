@@ -1,4 +1,4 @@
-"""What `BayesSim.fit` does, step by step: emulator, network, the choice between them."""
+"""What `BayesSim.fit` does, step by step: emulator, network, the weights of both."""
 
 import time
 from collections.abc import Callable
@@ -13,6 +13,7 @@ from granulcal.bayessim.density import TruncatedMixture
 from granulcal.bayessim.likelihood import EmulatorChoice, Fold, Likelihood
 from granulcal.bayessim.misfit import MisfitReference
 from granulcal.bayessim.pairs import TrainingPairs
+from granulcal.bayessim.stack import stacking_weight
 from granulcal.bayessim.standardise import Standardiser
 from granulcal.bayessim.summary import TrainingSummary
 from granulcal.bayessim.trainer import Progress, TrainingResult
@@ -36,7 +37,8 @@ class Trained:
     Attributes:
         standardiser: of the statistics.
         likelihood: the emulator.
-        amortised: the network, or None if the posterior is that of the emulator.
+        amortised: the network, or None if the posterior is that of the emulator alone.
+        emulator_weight: share of the emulator's posterior in that of one pour.
         misfit: residuals of held-out pairs.
         summary: what was done.
         posteriors: posteriors of pairs that were not trained on.
@@ -46,6 +48,7 @@ class Trained:
     standardiser: Standardiser
     likelihood: Likelihood
     amortised: Amortised | None
+    emulator_weight: float
     misfit: MisfitReference
     summary: TrainingSummary
     posteriors: list[Posterior]
@@ -72,7 +75,7 @@ def train_model(
     started = time.process_time()
     work = _Work(pairs, config, seed, proposal, progress)
     made = {
-        "auto": work.better_one,
+        "auto": work.stacked,
         "emulated": work.emulated,
         "distilled": work.distilled,
         "mdrff": work.network,
@@ -119,23 +122,52 @@ class _Work:
         likelihood = self._likelihood(self.rest)[0]
         return self._by_network(likelihood, amortised, result, "network on the statistics")
 
-    def better_one(self) -> Trained:
-        """Emulator or network, whichever says more about held-out pairs."""
+    def stacked(self) -> Trained:
+        """Emulator and network, averaged with the weight that says most about held-out pairs."""
         order = np.concatenate([self.test, self.rest])
         likelihood, folds, choice = self._likelihood(np.arange(len(self.u)), order)
         if len(self.test) == 0:
             return self._by_emulator(likelihood, folds, choice)
         amortised, result = self._network()
-        network = float(self._scores(amortised).mean())
         # The same pairs for both: those kept aside from the network are held out by the folds too.
-        emulator = float(np.mean([s for f in folds for s in f.scores[np.isin(f.held, self.test)]]))
-        told = f"on {len(self.test)} pairs unseen by both: emulator {emulator:.2f}"
-        told += f", network {network:.2f} nat above the prior"
-        if network > emulator:
-            return self._by_network(likelihood, amortised, result, told)
-        made = self._by_emulator(likelihood, folds, choice)
-        told = f"{made.summary.choice}\n  {told}"
-        return replace(made, summary=replace(made.summary, choice=told))
+        owner = {int(row): (fold, i) for fold in folds for i, row in enumerate(fold.held)}
+        rows = np.array([row for row in self.test if int(row) in owner], dtype=np.intp)
+        emulator = np.array([owner[int(row)][0].scores[owner[int(row)][1]] for row in rows])
+        network = self._scores(amortised, rows)
+        weight = stacking_weight(emulator, network)
+        told = f"on {len(rows)} pairs unseen by both: emulator {emulator.mean():.2f}"
+        told += f", network {network.mean():.2f} nat above the prior"
+        if weight == 0:
+            return self._by_network(likelihood, amortised, result, f"network alone; {told}")
+        if weight == 1:
+            made = self._by_emulator(likelihood, folds, choice)
+            told = f"{made.summary.choice}\n  {told}: the emulator alone"
+            return replace(made, summary=replace(made.summary, choice=told))
+        chosen = rows[self._of_the_prior(rows)]
+        posteriors = [
+            Posterior.from_stack(
+                self.prior,
+                (owner[int(row)][0].likelihood, self.z[row][None]),
+                mixture,
+                weight,
+            )
+            for row, mixture in zip(chosen, amortised.mixtures(self.z[chosen]), strict=True)
+        ]
+        logs = np.log([weight, 1 - weight])
+        both = float(np.mean(np.logaddexp(logs[0] + emulator, logs[1] + network)))
+        told += f", {weight:.0%} + {1 - weight:.0%} of both {both:.2f}"
+        choice_text = f"average of an emulator and a network\n  emulator: {choice}\n  {told}"
+        summary = self._summary("stacked", choice_text, result, len(self.rest), len(rows))
+        return Trained(
+            self.standardiser,
+            likelihood,
+            amortised,
+            weight,
+            self.misfit,
+            summary,
+            posteriors,
+            self.pairs.theta[chosen],
+        )
 
     def _likelihood(
         self, rows: NDArray[np.intp], order: NDArray[np.intp] | None = None
@@ -157,10 +189,10 @@ class _Work:
             progress=self.progress,
         )
 
-    def _scores(self, amortised: Amortised) -> Array:
-        """Log posterior densities of the test pairs, coordinates."""
-        mixtures = amortised.mixtures(self.z[self.test])
-        truth = self.u[self.test]
+    def _scores(self, amortised: Amortised, rows: NDArray[np.intp]) -> Array:
+        """Log posterior densities of some pairs, coordinates."""
+        mixtures = amortised.mixtures(self.z[rows])
+        truth = self.u[rows]
         cut = [TruncatedMixture.cut(self.prior, mixture) for mixture in mixtures]
         return np.array([c.log_prob(t[None])[0] for c, t in zip(cut, truth, strict=True)])
 
@@ -180,6 +212,7 @@ class _Work:
             self.standardiser,
             likelihood,
             None,
+            1.0,
             self.misfit,
             summary,
             posteriors,
@@ -198,6 +231,7 @@ class _Work:
             self.standardiser,
             likelihood,
             amortised,
+            0.0,
             self.misfit,
             summary,
             posteriors,

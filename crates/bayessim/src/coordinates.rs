@@ -1,0 +1,172 @@
+//! The prior's coordinates: a uniform range is [0, 1], a log-uniform one too in its logarithm, a normal z-scores.
+
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+
+use granulcal_dataset::{Distribution, Prior};
+
+use crate::quasi::QuasiUniform;
+
+/// One free parameter.
+#[derive(Clone, Debug)]
+struct Coordinate {
+    distribution: Distribution,
+    origin: f64,
+    scale: f64,
+    is_log: bool,
+    /// Coordinates that are possible.
+    low: f64,
+    high: f64,
+    /// log of the share of a normal that the bounds leave.
+    log_mass: f64,
+}
+
+/// The free parameters of a prior.
+#[derive(Clone, Debug)]
+pub struct Coordinates(Vec<Coordinate>);
+
+impl Coordinates {
+    pub fn of(prior: &Prior) -> Self {
+        let free = prior.free();
+        Self(free.iter().map(|&i| coordinate(prior.parameters()[i].distribution)).collect())
+    }
+
+    pub fn dimension(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether nothing bounds any of them.
+    pub fn is_unbounded(&self) -> bool {
+        self.0.iter().all(|c| c.low == f64::NEG_INFINITY && c.high == f64::INFINITY)
+    }
+
+    pub fn is_inside(&self, u: &[f64]) -> bool {
+        self.0.iter().zip(u).all(|(c, &u)| c.low <= u && u <= c.high)
+    }
+
+    /// Log prior density of coordinates, minus infinity outside the bounds.
+    pub fn log_density(&self, u: &[f64]) -> f64 {
+        if !self.is_inside(u) {
+            return f64::NEG_INFINITY;
+        }
+        let normal = |c: &Coordinate, u: f64| match c.distribution {
+            Distribution::Normal { .. } => -0.5 * u * u - 0.5 * TAU.ln() - c.log_mass,
+            _ => 0.0,
+        };
+        self.0.iter().zip(u).map(|(c, &u)| normal(c, u)).sum()
+    }
+
+    /// Values in own units.
+    pub fn values(&self, u: &[f64]) -> Vec<f64> {
+        self.0.iter().zip(u).map(|(c, &u)| c.value(u)).collect()
+    }
+
+    /// Coordinates of values in own units.
+    pub fn of_values(&self, theta: &[f64]) -> Vec<f64> {
+        self.0.iter().zip(theta).map(|(c, &value)| c.of_value(value)).collect()
+    }
+
+    /// log |du / dtheta|.
+    pub fn log_slope(&self, theta: &[f64]) -> f64 {
+        let slope = |c: &Coordinate, value: f64| {
+            -c.scale.ln() - if c.is_log { value.ln() } else { 0.0 }
+        };
+        self.0.iter().zip(theta).map(|(c, &value)| slope(c, value)).sum()
+    }
+
+    /// Variance of the prior along each coordinate, over evenly spread draws.
+    pub fn moments(&self) -> (Vec<f64>, Vec<f64>) {
+        let draws = self.quasi_prior(1000);
+        let mean: Vec<_> = (0..self.dimension())
+            .map(|i| draws.iter().map(|u| u[i]).sum::<f64>() / draws.len() as f64)
+            .collect();
+        let variance = (0..self.dimension())
+            .map(|i| draws.iter().map(|u| (u[i] - mean[i]).powi(2)).sum::<f64>() / draws.len() as f64)
+            .collect();
+        (mean, variance)
+    }
+
+    /// Evenly spread draws of the prior.
+    pub fn quasi_prior(&self, count: usize) -> Vec<Vec<f64>> {
+        let uniform = QuasiUniform::new(self.dimension());
+        let draw = |p: &[f64]| {
+            let draws = self.0.iter().zip(p);
+            draws.map(|(c, &p)| c.of_value(c.distribution.quantile(p))).collect()
+        };
+        (0..count).map(|index| draw(&uniform.point(index))).collect()
+    }
+}
+
+impl Coordinate {
+    fn value(&self, u: f64) -> f64 {
+        let warped = self.origin + self.scale * u;
+        if self.is_log { warped.exp() } else { warped }
+    }
+
+    fn of_value(&self, value: f64) -> f64 {
+        let warped = if self.is_log { value.ln() } else { value };
+        (warped - self.origin) / self.scale
+    }
+}
+
+fn coordinate(distribution: Distribution) -> Coordinate {
+    let flat = |origin, scale, is_log| Coordinate {
+        distribution,
+        origin,
+        scale,
+        is_log,
+        low: 0.0,
+        high: 1.0,
+        log_mass: 0.0,
+    };
+    match distribution {
+        Distribution::Uniform { low, high } => flat(low, high - low, false),
+        Distribution::LogUniform { low, high } => flat(low.ln(), high.ln() - low.ln(), true),
+        Distribution::Fixed { value } => flat(value, 1.0, false),
+        Distribution::Normal { mean, sd, low, high } => {
+            let low = low.map_or(f64::NEG_INFINITY, |low| (low - mean) / sd);
+            let high = high.map_or(f64::INFINITY, |high| (high - mean) / sd);
+            let log_mass = (normal_cdf(high) - normal_cdf(low)).ln();
+            Coordinate { distribution, origin: mean, scale: sd, is_log: false, low, high, log_mass }
+        }
+    }
+}
+
+fn normal_cdf(z: f64) -> f64 {
+    0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_come_back_and_densities_integrate_to_one() {
+        let text = r#"
+            [[parameter]]
+            path = "a"
+            distribution = "log_uniform"
+            low = 0.001
+            high = 2.0
+            [[parameter]]
+            path = "b"
+            distribution = "normal"
+            mean = 1.0
+            sd = 0.5
+            low = 0.2
+        "#;
+        let coordinates = Coordinates::of(&Prior::from_toml(text).unwrap());
+        let theta = [0.05, 1.3];
+        let back = coordinates.values(&coordinates.of_values(&theta));
+        assert!(back.iter().zip(theta).all(|(a, b)| (a - b).abs() < 1e-14));
+        let n = 400;
+        let mut sum = 0.0;
+        for i in 0..n {
+            for j in 0..n {
+                let u = [(i as f64 + 0.5) / n as f64, -3.0 + 9.0 * (j as f64 + 0.5) / n as f64];
+                sum += coordinates.log_density(&u).exp();
+            }
+        }
+        let integral = sum * 9.0 / (n * n) as f64;
+        assert!((integral - 1.0).abs() < 2e-3, "{integral}");
+    }
+}

@@ -1,0 +1,78 @@
+//! The one error type of the crate.
+
+use std::io;
+use std::path::PathBuf;
+
+use granulcal_dataset::DatasetError;
+
+/// Why a model or an observation was refused.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// A file of the model cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// `model.json` is cut off, or is the document of something else.
+    #[error("{} is not the document of a model: {source}", path.display())]
+    Document {
+        /// The file.
+        path: PathBuf,
+        /// Where and why.
+        source: serde_json::Error,
+    },
+    /// A model of another version.
+    #[error("{}: version must be {allowed}, got {found} (made by {made_by}): {advice}", path.display())]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// The version that can be read.
+        allowed: u64,
+        /// What the file says.
+        found: String,
+        /// Who wrote it.
+        made_by: String,
+        /// What helps.
+        advice: &'static str,
+    },
+    /// The tensors' file is cut off or no safetensors.
+    #[error("{} is truncated or no safetensors: {reason}", path.display())]
+    Tensors {
+        /// The file.
+        path: PathBuf,
+        /// What the reader said.
+        reason: String,
+    },
+    /// A tensor or a number is missing, of another shape, or not finite.
+    #[error("{}: {what} must be {allowed}, got {found}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// The thing in the file.
+        what: String,
+        /// What is allowed.
+        allowed: String,
+        /// What was found.
+        found: String,
+    },
+    /// The prior of the model is none.
+    #[error("the prior in {}", path.display())]
+    Prior {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: DatasetError,
+    },
+    /// An observation that the model cannot take.
+    #[error("the observation must be {allowed}, got {found}")]
+    Observation {
+        /// What is allowed.
+        allowed: String,
+        /// What was found.
+        found: String,
+    },
+}

@@ -1,0 +1,37 @@
+//! Posteriors without Python: reads what `granulcal train` wrote and evaluates it.
+//!
+//! A [`Model`] is a folder of `model.json` and `weights.safetensors`. [`Model::posterior`] gives the
+//! [`Posterior`] of one pour, or of several of one material, by the equations of
+//! `docs/theory/bayessim.md`: an emulated likelihood, a mixture density network, or the average of
+//! both. Where Python integrates over evenly spread points these are the same points, so that
+//! densities agree to rounding; draws have another generator and agree in distribution.
+//!
+//! | module | what it is |
+//! |---|---|
+//! | `coordinates` | a prior's parameters mapped to where the inference lives |
+//! | `standardiser` | statistics to spread 1 |
+//! | `emulator`, `noise`, `likelihood` | density of statistics given coordinates |
+//! | `network`, `mixture` | density of coordinates given statistics |
+//! | `importance` | normaliser and draws of a density known up to a factor |
+//! | [`Model`], [`Posterior`] | the file, and what it says |
+
+mod coordinates;
+mod document;
+mod emulator;
+mod error;
+mod importance;
+mod likelihood;
+mod matrix;
+mod mixture;
+mod model;
+mod network;
+mod noise;
+mod posterior;
+mod quasi;
+mod random;
+mod standardiser;
+mod tensors;
+
+pub use error::ModelError;
+pub use model::Model;
+pub use posterior::{Marginal, Posterior, Warning};

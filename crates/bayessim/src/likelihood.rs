@@ -1,0 +1,123 @@
+//! Likelihood of the coordinates by the emulator of the leading signal axes.
+
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+
+use crate::ModelError;
+use crate::coordinates::Coordinates;
+use crate::document::Document;
+use crate::emulator::{Emulator, Prediction};
+use crate::importance::Importance;
+use crate::matrix::Matrix;
+use crate::noise::Noise;
+use crate::tensors::Tensors;
+
+/// Points of the prior that a posterior is made of, unless too few of them carry weight.
+const POOL: usize = 16_384;
+/// One axis alone does not say that all noise is the pours' own.
+const LARGEST_RATIO: f64 = 2.0;
+/// With fewer effective draws than this the proposal is adapted.
+pub const FEWEST_EFFECTIVE: f64 = 500.0;
+
+/// Density of standardised statistics given coordinates.
+#[derive(Debug)]
+pub struct Likelihood {
+    axes: Matrix,
+    emulator: Emulator,
+    noise: Noise,
+    widening: f64,
+    pool: OnceLock<Vec<(Vec<f64>, Prediction)>>,
+}
+
+/// Mean of some pours on the signal axes, and how much they differ.
+struct Observed {
+    pours: f64,
+    mean: Vec<f64>,
+    variance: Vec<f64>,
+}
+
+impl Likelihood {
+    pub fn read(tensors: &Tensors, document: &Document, p: usize) -> Result<Self, ModelError> {
+        let (s, scalars) = (document.x_names.len(), &document.emulator);
+        let count = scalars.axis_count;
+        let root = tensors.matrix("emulator_leading_root", count, count)?;
+        let features = document.config.emulator_features;
+        Ok(Self {
+            axes: tensors.matrix("emulator_axes", s, s)?,
+            emulator: Emulator::read(tensors, p, s, features, count)?,
+            noise: Noise::new(&root, scalars.leading_degrees),
+            widening: scalars.widening,
+            pool: OnceLock::new(),
+        })
+    }
+
+    /// The normalised posterior given k standardised pours.
+    pub fn posterior(&self, coordinates: &Coordinates, z: &[Vec<f64>]) -> Importance {
+        let observed = self.observe(z);
+        let pool = self.pool.get_or_init(|| {
+            let points = coordinates.quasi_prior(POOL);
+            points.into_par_iter().map(|u| (u.clone(), self.emulator.predict(&u))).collect()
+        });
+        let log_weights: Vec<_> =
+            pool.par_iter().map(|(_, at)| self.of_prediction(&observed, at)).collect();
+        let draws = pool.iter().map(|(u, _)| u.clone()).collect();
+        let found = Importance::of_prior_draws(draws, &log_weights);
+        if found.effective_sample_size() >= FEWEST_EFFECTIVE {
+            return found;
+        }
+        let log_target = |u: &[f64]| {
+            let at = self.emulator.predict(u);
+            self.of_prediction(&observed, &at) + coordinates.log_density(u)
+        };
+        found.adapted(coordinates, &log_target)
+    }
+
+    /// Log likelihood of k standardised pours.
+    pub fn log_prob(&self, z: &[Vec<f64>], u: &[f64]) -> f64 {
+        self.of_prediction(&self.observe(z), &self.emulator.predict(u))
+    }
+
+    fn observe(&self, z: &[Vec<f64>]) -> Observed {
+        let pours = z.len() as f64;
+        let rows: Vec<_> = z.iter().map(|row| self.axes.after(row)).collect();
+        let axes = 0..self.noise_size();
+        let mean: Vec<_> =
+            axes.clone().map(|j| rows.iter().map(|y| y[j]).sum::<f64>() / pours).collect();
+        let spread = |j: usize| rows.iter().map(|y| (y[j] - mean[j]).powi(2)).sum::<f64>();
+        let variance = axes.map(|j| spread(j) / (pours - 1.0).max(1.0)).collect();
+        Observed { pours, mean, variance }
+    }
+
+    fn noise_size(&self) -> usize {
+        self.emulator.axis_count()
+    }
+
+    /// `V_k = c^2 (s^2 + h^2) - (1 - 1/k) a s^2`, a the share by which the pours differ.
+    fn of_prediction(&self, observed: &Observed, at: &Prediction) -> f64 {
+        let size = at.means.len();
+        let share = observed.share(&at.noise);
+        let averaged = (1.0 - 1.0 / observed.pours) * share;
+        let widened = self.widening * self.widening;
+        let mut scaled = Vec::with_capacity(size);
+        let mut product = 1.0;
+        for j in 0..size {
+            let variance = widened * (at.noise[j] + at.unknown[j]) - averaged * at.noise[j];
+            product *= variance;
+            scaled.push((observed.mean[j] - at.means[j]) / variance.sqrt());
+        }
+        self.noise.log_density(&scaled, 0.5 * product.ln())
+    }
+}
+
+impl Observed {
+    fn share(&self, noise: &[f64]) -> f64 {
+        if self.pours == 1.0 {
+            return 1.0;
+        }
+        let size = noise.len() as f64;
+        let ratios = self.variance.iter().zip(noise).map(|(w, s)| (w / s).min(LARGEST_RATIO));
+        let doubt = 1.0 + 2.0 * (2.0 / (size * (self.pours - 1.0))).sqrt();
+        (doubt * ratios.sum::<f64>() / size).min(1.0)
+    }
+}

@@ -1,0 +1,153 @@
+//! A Gaussian mixture over coordinates, cut to the prior's bounds.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::coordinates::Coordinates;
+use crate::matrix::log_sum_exp;
+use crate::quasi::quasi_normal;
+use crate::random::{Random, cumulative};
+
+/// Quasi-random points per component for the mass inside the bounds.
+const MASS_POINTS: usize = 2048;
+/// With less mass than this inside the bounds the density is integrated over draws of the prior.
+const SMALLEST_MASS: f64 = 0.02;
+const PRIOR_POINTS: usize = 20_000;
+
+/// One component: its precision is `F F^T`.
+#[derive(Clone, Debug)]
+pub struct Component {
+    /// Log weight.
+    pub log_weight: f64,
+    pub mean: DVector<f64>,
+    /// F, lower triangular with a positive diagonal.
+    pub factor: DMatrix<f64>,
+}
+
+impl Component {
+    fn log_density(&self, u: &DVector<f64>) -> f64 {
+        let white = self.factor.tr_mul(&(u - &self.mean));
+        let log_det: f64 = self.factor.diagonal().iter().map(|d| d.ln()).sum();
+        self.log_weight + log_det - 0.5 * white.norm_squared() - 0.5 * u.len() as f64 * TAU.ln()
+    }
+}
+
+/// A density over coordinates.
+#[derive(Clone, Debug)]
+pub struct Mixture {
+    pub components: Vec<Component>,
+}
+
+impl Mixture {
+    pub fn log_prob(&self, u: &[f64]) -> f64 {
+        let u = DVector::from_column_slice(u);
+        let parts: Vec<_> = self.components.iter().map(|c| c.log_density(&u)).collect();
+        log_sum_exp(parts.iter().copied())
+    }
+
+    /// Standard normal points carried into a component: `m + F^-T n`.
+    fn placer(&self) -> Vec<DMatrix<f64>> {
+        let inverse = |c: &Component| {
+            let size = c.factor.nrows();
+            let identity = DMatrix::identity(size, size);
+            // Positive diagonals: the triangle can be solved.
+            c.factor.tr_solve_lower_triangular(&identity).unwrap_or(identity)
+        };
+        self.components.iter().map(inverse).collect()
+    }
+
+    pub fn sampler(&self) -> Sampler<'_> {
+        let weights = self.components.iter().map(|c| c.log_weight.exp());
+        Sampler { mixture: self, spreads: self.placer(), cumulative: cumulative(weights) }
+    }
+}
+
+/// Draws of a mixture.
+pub struct Sampler<'a> {
+    mixture: &'a Mixture,
+    spreads: Vec<DMatrix<f64>>,
+    cumulative: Vec<f64>,
+}
+
+impl Sampler<'_> {
+    pub fn draw(&self, random: &mut Random) -> Vec<f64> {
+        let chosen = random.index(&self.cumulative);
+        let mean = &self.mixture.components[chosen].mean;
+        let normal = DVector::from_fn(mean.len(), |_, _| random.normal());
+        (mean + &self.spreads[chosen] * normal).as_slice().to_vec()
+    }
+}
+
+/// A mixture cut to the prior's bounds.
+#[derive(Clone, Debug)]
+pub struct TruncatedMixture {
+    pub mixture: Mixture,
+    pub log_mass: f64,
+}
+
+impl TruncatedMixture {
+    pub fn cut(coordinates: &Coordinates, mixture: Mixture) -> Self {
+        if coordinates.is_unbounded() {
+            return Self { mixture, log_mass: 0.0 };
+        }
+        let points = quasi_normal(MASS_POINTS, coordinates.dimension());
+        let points: Vec<_> = points.into_iter().map(DVector::from_vec).collect();
+        let spreads = mixture.placer();
+        let mass: f64 = mixture
+            .components
+            .iter()
+            .zip(&spreads)
+            .map(|(component, spread)| {
+                let inside = points
+                    .iter()
+                    .filter(|n| coordinates.is_inside((&component.mean + spread * *n).as_slice()))
+                    .count();
+                component.log_weight.exp() * inside as f64 / MASS_POINTS as f64
+            })
+            .sum();
+        let log_mass = if mass >= SMALLEST_MASS {
+            mass.ln()
+        } else {
+            let weights: Vec<_> = coordinates
+                .quasi_prior(PRIOR_POINTS)
+                .iter()
+                .map(|u| mixture.log_prob(u) - coordinates.log_density(u))
+                .collect();
+            log_sum_exp(weights.iter().copied()) - (PRIOR_POINTS as f64).ln()
+        };
+        Self { mixture, log_mass }
+    }
+
+    pub fn is_mostly_outside(&self) -> bool {
+        self.log_mass < SMALLEST_MASS.ln()
+    }
+
+    pub fn log_prob(&self, coordinates: &Coordinates, u: &[f64]) -> f64 {
+        if coordinates.is_inside(u) {
+            self.mixture.log_prob(u) - self.log_mass
+        } else {
+            f64::NEG_INFINITY
+        }
+    }
+
+    pub fn sample(&self, coordinates: &Coordinates, n: usize, random: &mut Random) -> Vec<Vec<f64>> {
+        if self.is_mostly_outside() {
+            let draws = coordinates.quasi_prior(PRIOR_POINTS);
+            let weight = |u: &Vec<f64>| {
+                (self.mixture.log_prob(u) - coordinates.log_density(u) - self.log_mass).exp()
+            };
+            let sums = cumulative(draws.iter().map(weight));
+            return (0..n).map(|_| draws[random.index(&sums)].clone()).collect();
+        }
+        let sampler = self.mixture.sampler();
+        let mut kept = Vec::with_capacity(n);
+        while kept.len() < n {
+            let draw = sampler.draw(random);
+            if coordinates.is_inside(&draw) {
+                kept.push(draw);
+            }
+        }
+        kept
+    }
+}

@@ -1,0 +1,157 @@
+//! A trained model, as a folder.
+
+use std::fs;
+use std::path::Path;
+
+use granulcal_dataset::Prior;
+
+use crate::coordinates::Coordinates;
+use crate::document::Document;
+use crate::likelihood::{FEWEST_EFFECTIVE, Likelihood};
+use crate::mixture::TruncatedMixture;
+use crate::network::Network;
+use crate::posterior::{Emulated, Posterior, Warning};
+use crate::standardiser::Standardiser;
+use crate::tensors::Tensors;
+use crate::ModelError;
+
+const DOCUMENT: &str = "model.json";
+const TENSORS: &str = "weights.safetensors";
+
+/// What `granulcal train` made.
+#[derive(Debug)]
+pub struct Model {
+    /// Prior of the training.
+    pub prior: Prior,
+    /// Names of the statistics that an observation has, in order.
+    pub x_names: Vec<String>,
+    /// Scene of the training, TOML.
+    pub scene_toml: Option<String>,
+    /// Whether the model passed its own check; `None` if there was none.
+    pub is_calibrated: Option<bool>,
+    names: Vec<String>,
+    coordinates: Coordinates,
+    standardiser: Standardiser,
+    likelihood: Likelihood,
+    network: Option<Network>,
+    emulator_weight: f64,
+}
+
+impl Model {
+    /// Reads a folder.
+    ///
+    /// # Errors
+    /// Every [`ModelError`] but the one of observations: a file that is missing, damaged, or of another version.
+    pub fn load(folder: &Path) -> Result<Self, ModelError> {
+        let read = |name: &str| {
+            let path = folder.join(name);
+            match fs::read(&path) {
+                Ok(bytes) => Ok((path, bytes)),
+                Err(source) => Err(ModelError::Io { path, source }),
+            }
+        };
+        let (path, text) = read(DOCUMENT)?;
+        let document = Document::parse(&String::from_utf8_lossy(&text), &path)?;
+        let prior = Prior::from_toml(&document.prior_toml)
+            .map_err(|source| ModelError::Prior { path, source })?;
+        let coordinates = Coordinates::of(&prior);
+        let (p, s) = (coordinates.dimension(), document.x_names.len());
+        let (path, bytes) = read(TENSORS)?;
+        let tensors = Tensors::of(&bytes, &path)?;
+        let network = if document.has_network {
+            Some(Network::read(&tensors, &document.config, p, s)?)
+        } else {
+            None
+        };
+        let names = prior.free().iter().map(|&i| prior.names()[i].to_owned()).collect();
+        Ok(Self {
+            names,
+            coordinates,
+            standardiser: Standardiser::read(&tensors, s)?,
+            likelihood: Likelihood::read(&tensors, &document, p)?,
+            network,
+            emulator_weight: document.emulator_weight,
+            prior,
+            x_names: document.x_names,
+            scene_toml: document.scene_toml,
+            is_calibrated: document.is_calibrated,
+        })
+    }
+
+    /// The posterior given one pour, or several of one material, as statistics in own units.
+    ///
+    /// Several pours are the emulator's alone; a model that is a network only takes one.
+    ///
+    /// # Errors
+    /// [`ModelError::Observation`] for no pour, another number of statistics, one that is not finite, or
+    /// several pours where only the network can be asked.
+    pub fn posterior(&self, x: &[Vec<f64>]) -> Result<Posterior<'_>, ModelError> {
+        self.check(x)?;
+        let mut warnings = self.out_of_range(x);
+        let z: Vec<_> = x.iter().map(|row| self.standardiser.apply(row)).collect();
+        let learnt = match &self.network {
+            Some(network) if x.len() == 1 && self.emulator_weight < 1.0 => {
+                let cut = TruncatedMixture::cut(&self.coordinates, network.mixture(&z[0]));
+                if cut.is_mostly_outside() {
+                    warnings.push(Warning::MassOutsidePrior { inside: cut.log_mass.exp() });
+                }
+                Some(cut)
+            }
+            _ => None,
+        };
+        let emulator_weight = if learnt.is_some() { self.emulator_weight } else { 1.0 };
+        let emulated = (emulator_weight > 0.0).then(|| {
+            let density = self.likelihood.posterior(&self.coordinates, &z);
+            Emulated { likelihood: &self.likelihood, z, density }
+        });
+        if let Some(few) = emulated.as_ref().map(|e| e.density.effective_sample_size())
+            && few < FEWEST_EFFECTIVE
+        {
+            warnings.push(Warning::FewEffectiveDraws { effective: few });
+        }
+        Ok(Posterior {
+            coordinates: &self.coordinates,
+            names: &self.names,
+            emulated,
+            learnt,
+            emulator_weight,
+            warnings,
+        })
+    }
+
+    fn check(&self, x: &[Vec<f64>]) -> Result<(), ModelError> {
+        let wrong = |allowed: String, found: String| Err(ModelError::Observation { allowed, found });
+        let count = self.x_names.len();
+        if x.is_empty() {
+            return wrong("at least one pour".to_owned(), "none".to_owned());
+        }
+        if x.len() > 1 && self.emulator_weight == 0.0 {
+            let allowed = "one pour, for this model is a network alone".to_owned();
+            return wrong(allowed, format!("{} pours", x.len()));
+        }
+        for row in x {
+            if row.len() != count {
+                return wrong(format!("{count} statistics"), row.len().to_string());
+            }
+            if let Some(bad) = row.iter().position(|value| !value.is_finite()) {
+                let found = format!("{} = {}", self.x_names[bad], row[bad]);
+                return wrong("finite".to_owned(), found);
+            }
+        }
+        Ok(())
+    }
+
+    fn out_of_range(&self, x: &[Vec<f64>]) -> Vec<Warning> {
+        let mut found = Vec::new();
+        for (pour, row) in x.iter().enumerate() {
+            for (i, &value) in row.iter().enumerate() {
+                let (low, high) = (self.standardiser.low[i], self.standardiser.high[i]);
+                if value < low || value > high {
+                    let name = self.x_names[i].clone();
+                    found.push(Warning::OutOfRange { pour, name, value, low, high });
+                }
+            }
+        }
+        found
+    }
+}

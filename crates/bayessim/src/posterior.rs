@@ -1,0 +1,163 @@
+//! Belief about the free parameters after one or several pours.
+
+use std::fmt;
+
+use crate::coordinates::Coordinates;
+use crate::importance::Importance;
+use crate::likelihood::Likelihood;
+use crate::matrix::log_sum_exp;
+use crate::mixture::TruncatedMixture;
+use crate::random::Random;
+
+/// What a reader must know before trusting the numbers.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// A statistic lies beyond those of the training data.
+    OutOfRange {
+        /// Index of the pour.
+        pour: usize,
+        /// The statistic.
+        name: String,
+        /// What was observed, own unit.
+        value: f64,
+        /// Lowest training value.
+        low: f64,
+        /// Highest training value.
+        high: f64,
+    },
+    /// Nearly all mass of the network's mixture lies outside the prior.
+    MassOutsidePrior {
+        /// Share inside before truncation.
+        inside: f64,
+    },
+    /// The weighted draws are worth few independent ones.
+    FewEffectiveDraws {
+        /// How many.
+        effective: f64,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OutOfRange { pour, name, value, low, high } => write!(
+                f,
+                "pour {pour} is outside the training range: {name} = {value:.4e} (trained on {low:.4e} .. {high:.4e})"
+            ),
+            Self::MassOutsidePrior { inside } => {
+                write!(f, "only {inside:.2} of the network's mass is inside the prior")
+            }
+            Self::FewEffectiveDraws { effective } => {
+                write!(f, "the posterior is worth {effective:.0} draws only")
+            }
+        }
+    }
+}
+
+/// One parameter alone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Marginal {
+    /// Path of the parameter.
+    pub name: String,
+    /// Mean, own unit.
+    pub mean: f64,
+    /// Median, own unit.
+    pub median: f64,
+    /// Central 90 % interval, own unit.
+    pub interval90: (f64, f64),
+}
+
+/// The emulator's posterior of some standardised pours.
+pub(crate) struct Emulated<'a> {
+    pub likelihood: &'a Likelihood,
+    pub z: Vec<Vec<f64>>,
+    pub density: Importance,
+}
+
+impl Emulated<'_> {
+    fn log_prob(&self, coordinates: &Coordinates, u: &[f64]) -> f64 {
+        if !coordinates.is_inside(u) {
+            return f64::NEG_INFINITY;
+        }
+        self.likelihood.log_prob(&self.z, u) + coordinates.log_density(u)
+            - self.density.log_normaliser
+    }
+}
+
+/// A normalised density over the parameters, in own units, zero outside the prior's bounds.
+pub struct Posterior<'a> {
+    pub(crate) coordinates: &'a Coordinates,
+    pub(crate) names: &'a [String],
+    /// The emulator's density, the network's, and the weight of the first.
+    pub(crate) emulated: Option<Emulated<'a>>,
+    pub(crate) learnt: Option<TruncatedMixture>,
+    pub(crate) emulator_weight: f64,
+    /// What to know before trusting it.
+    pub warnings: Vec<Warning>,
+}
+
+impl Posterior<'_> {
+    /// Paths of the parameters.
+    pub fn names(&self) -> &[String] {
+        self.names
+    }
+
+    /// Log density at parameters in own units.
+    pub fn log_prob(&self, theta: &[f64]) -> f64 {
+        let u = self.coordinates.of_values(theta);
+        self.coordinate_log_prob(&u) + self.coordinates.log_slope(theta)
+    }
+
+    /// Log density of the prior's coordinates.
+    pub fn coordinate_log_prob(&self, u: &[f64]) -> f64 {
+        let weight = self.emulator_weight;
+        let emulated =
+            self.emulated.as_ref().map(|e| weight.ln() + e.log_prob(self.coordinates, u));
+        let learnt =
+            self.learnt.as_ref().map(|l| (1.0 - weight).ln() + l.log_prob(self.coordinates, u));
+        let parts: Vec<_> = emulated.into_iter().chain(learnt).collect();
+        log_sum_exp(parts.iter().copied())
+    }
+
+    /// `n` draws in own units; the same seed gives the same draws.
+    pub fn sample(&self, n: usize, seed: u64) -> Vec<Vec<f64>> {
+        let draws = self.coordinate_sample(n, seed);
+        draws.iter().map(|u| self.coordinates.values(u)).collect()
+    }
+
+    fn coordinate_sample(&self, n: usize, seed: u64) -> Vec<Vec<f64>> {
+        let mut random = Random::new(seed);
+        let count = match (&self.emulated, &self.learnt) {
+            (Some(_), None) => n,
+            (None, _) => 0,
+            _ => (0..n).filter(|_| random.uniform() < self.emulator_weight).count(),
+        };
+        let mut draws = Vec::with_capacity(n);
+        if let Some(emulated) = &self.emulated {
+            draws.extend(emulated.density.sample(count, &mut random));
+        }
+        if let Some(learnt) = &self.learnt {
+            draws.extend(learnt.sample(self.coordinates, n - count, &mut random));
+        }
+        draws
+    }
+
+    /// Mean, median and central interval of each parameter.
+    pub fn marginals(&self, draws: usize, seed: u64) -> Vec<Marginal> {
+        let sample = self.coordinate_sample(draws, seed);
+        let values: Vec<_> = sample.iter().map(|u| self.coordinates.values(u)).collect();
+        let marginal = |(i, name): (usize, &String)| {
+            let mut column: Vec<_> = values.iter().map(|row| row[i]).collect();
+            column.sort_by(f64::total_cmp);
+            let at = |share: f64| column[((column.len() - 1) as f64 * share).round() as usize];
+            Marginal {
+                name: name.clone(),
+                mean: column.iter().sum::<f64>() / column.len() as f64,
+                median: at(0.5),
+                interval90: (at(0.05), at(0.95)),
+            }
+        };
+        self.names.iter().enumerate().map(marginal).collect()
+    }
+}

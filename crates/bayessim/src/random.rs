@@ -1,0 +1,47 @@
+//! Random numbers of a seed.
+
+use std::f64::consts::TAU;
+
+use rand_core::Rng;
+use rand_pcg::Pcg64;
+
+/// Uniform and normal numbers.
+pub struct Random(Pcg64);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        let mut pcg = Pcg64::new(u128::from(seed), 0xa02b_dbf7_bb3c_0a7a);
+        // Seeds are small and near to each other: the first numbers would be, too.
+        for _ in 0..4 {
+            pcg.next_u64();
+        }
+        Self(pcg)
+    }
+
+    /// In the open interval (0, 1).
+    pub fn uniform(&mut self) -> f64 {
+        ((self.0.next_u64() >> 12) as f64 + 0.5) * (1.0 / (1u64 << 52) as f64)
+    }
+
+    pub fn normal(&mut self) -> f64 {
+        (-2.0 * self.uniform().ln()).sqrt() * (TAU * self.uniform()).cos()
+    }
+
+    /// An index with probabilities that rise to `cumulative`'s last entry.
+    pub fn index(&mut self, cumulative: &[f64]) -> usize {
+        let total = cumulative.last().copied().unwrap_or(0.0);
+        let target = self.uniform() * total;
+        cumulative.partition_point(|&sum| sum <= target).min(cumulative.len() - 1)
+    }
+}
+
+/// Running sums.
+pub fn cumulative(weights: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    weights
+        .into_iter()
+        .scan(0.0, |sum, weight| {
+            *sum += weight;
+            Some(*sum)
+        })
+        .collect()
+}

@@ -1,0 +1,165 @@
+//! What Rust says of a model is what Python and torch say; numbers by data/make_models.py.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use granulcal_bayessim::{Model, ModelError, Warning};
+use serde_json::Value;
+
+/// Agreement asked for [nat].
+const TOLERANCE: f64 = 1e-5;
+
+fn data() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data")
+}
+
+fn reference() -> Value {
+    serde_json::from_str(&fs::read_to_string(data().join("reference.json")).unwrap()).unwrap()
+}
+
+fn rows(value: &Value) -> Vec<Vec<f64>> {
+    serde_json::from_value(value.clone()).unwrap()
+}
+
+#[test]
+fn densities_are_those_of_python() {
+    let reference = reference();
+    let (theta, x) = (rows(&reference["theta"]), rows(&reference["x"]));
+    for method in ["mdrff", "auto"] {
+        let model = Model::load(&data().join(method)).unwrap();
+        for (pour, expected) in x.iter().zip(rows(&reference[method]["log_prob"])) {
+            let posterior = model.posterior(std::slice::from_ref(pour)).unwrap();
+            for (at, expected) in theta.iter().zip(expected) {
+                let found = posterior.log_prob(at);
+                assert!((found - expected).abs() < TOLERANCE, "{method}: {found} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn draws_have_the_mean_of_python() {
+    let reference = reference();
+    let x = rows(&reference["x"]);
+    for method in ["mdrff", "auto"] {
+        let model = Model::load(&data().join(method)).unwrap();
+        for (pour, expected) in x.iter().zip(rows(&reference[method]["mean"])) {
+            let posterior = model.posterior(std::slice::from_ref(pour)).unwrap();
+            for (marginal, expected) in posterior.marginals(20_000, 1).iter().zip(expected) {
+                let (low, high) = marginal.interval90;
+                let close = 0.05 * (high - low);
+                let found = marginal.mean;
+                assert!((found - expected).abs() < close, "{method}: {found} {expected}");
+                assert!(low < marginal.median && marginal.median < high);
+            }
+        }
+    }
+}
+
+#[test]
+fn several_pours_are_one_posterior() {
+    let reference = reference();
+    let (theta, x) = (rows(&reference["theta"]), rows(&reference["repeated"]));
+    let model = Model::load(&data().join("auto")).unwrap();
+    let posterior = model.posterior(&x).unwrap();
+    let expected: Vec<f64> =
+        serde_json::from_value(reference["repeated_log_prob"].clone()).unwrap();
+    let offset = posterior.log_prob(&theta[0]) - expected[0];
+    // The normaliser of so narrow a density is by random draws on both sides.
+    assert!(offset.abs() < 0.1, "{offset}");
+    for (at, expected) in theta.iter().zip(expected) {
+        assert!((posterior.log_prob(at) - expected - offset).abs() < TOLERANCE);
+    }
+    let refused = Model::load(&data().join("mdrff")).unwrap();
+    assert!(matches!(refused.posterior(&x), Err(ModelError::Observation { .. })));
+}
+
+#[test]
+fn draws_stay_inside_the_prior_and_repeat_with_their_seed() {
+    let x = rows(&reference()["x"]);
+    let model = Model::load(&data().join("auto")).unwrap();
+    let posterior = model.posterior(&x[..1]).unwrap();
+    let draws = posterior.sample(2000, 7);
+    assert_eq!(draws, posterior.sample(2000, 7));
+    assert_ne!(draws, posterior.sample(2000, 8));
+    let inside = |d: &Vec<f64>| {
+        (-1.0..=3.0).contains(&d[0]) && (0.001..=1.0).contains(&d[1]) && d[2] >= 0.0
+    };
+    assert!(draws.iter().all(inside));
+    assert_eq!(posterior.log_prob(&[5.0, 0.1, 1.0]), f64::NEG_INFINITY);
+}
+
+#[test]
+fn bad_observations_are_named() {
+    let x = rows(&reference()["x"]);
+    let model = Model::load(&data().join("auto")).unwrap();
+    let refuse = |x: &[Vec<f64>]| match model.posterior(x) {
+        Err(error) => error.to_string(),
+        Ok(_) => panic!("taken"),
+    };
+    assert!(refuse(&[vec![1.0; 4]]).contains("5 statistics, got 4"));
+    assert!(refuse(&[]).contains("at least one pour"));
+    assert!(refuse(&[vec![1.0, f64::NAN, 1.0, 1.0, 1.0]]).contains("statistic_1 = NaN"));
+    let far = model.posterior(&x[3..]).unwrap();
+    assert!(matches!(&far.warnings[0], Warning::OutOfRange { value, .. } if *value == 99.0));
+    assert!(far.warnings[0].to_string().contains("statistic_0"));
+}
+
+#[test]
+fn damaged_models_are_named() {
+    let place = tempfile::tempdir().unwrap();
+    let copy = |name: &str| {
+        fs::copy(data().join("auto").join(name), place.path().join(name)).unwrap();
+    };
+    let refuse = || Model::load(place.path()).unwrap_err().to_string();
+    assert!(refuse().contains("model.json"));
+    copy("model.json");
+    assert!(refuse().contains("weights.safetensors"));
+    copy("weights.safetensors");
+    Model::load(place.path()).unwrap();
+
+    let weights = place.path().join("weights.safetensors");
+    let whole = fs::read(&weights).unwrap();
+    fs::write(&weights, &whole[..whole.len() - 9]).unwrap();
+    assert!(refuse().contains("truncated"));
+    copy("weights.safetensors");
+
+    let document = place.path().join("model.json");
+    let text = fs::read_to_string(&document).unwrap();
+    for (from, to, expected) in [
+        ("\"version\": 3", "\"version\": 9", "update granulcal"),
+        ("\"version\": 3", "\"version\": 2", "train the model again"),
+        ("granulcal-bayessim", "something", "granulcal-bayessim"),
+        ("\"axis_count\": 5", "\"axis_count\": 4", "emulator_leading_root"),
+        ("\"axis_count\": 5", "\"axis_count\": 6", "axis_count"),
+        ("\"emulator_weight\": 0.7", "\"emulator_weight\": 1.7", "emulator_weight"),
+        ("log_uniform", "cauchy", "prior"),
+        ("\"x_names\"", "\"y_names\"", "x_names"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        fs::write(&document, text.replace(from, to)).unwrap();
+        let message = refuse();
+        assert!(message.contains(expected), "{from} -> {to}: {message}");
+    }
+    fs::write(&document, &text[..100]).unwrap();
+    assert!(refuse().contains("model.json"));
+}
+
+/// On a release build, loaded once: a posterior and 1000 draws within 50 ms.
+#[test]
+#[cfg_attr(debug_assertions, ignore = "a clock on an unoptimised build says nothing")]
+fn a_posterior_takes_less_than_50_ms() {
+    let x = rows(&reference()["x"]);
+    let model = Model::load(&data().join("auto")).unwrap();
+    model.posterior(&x[..1]).unwrap();
+    let best = (0..5)
+        .map(|seed| {
+            let started = Instant::now();
+            let posterior = model.posterior(&x[1..2]).unwrap();
+            assert_eq!(posterior.sample(1000, seed).len(), 1000);
+            started.elapsed().as_secs_f64()
+        })
+        .fold(f64::INFINITY, f64::min);
+    assert!(best < 0.05, "{best} s");
+}

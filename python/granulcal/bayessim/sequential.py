@@ -1,0 +1,237 @@
+r"""One observation, few simulations: rounds of pours where the posterior may still be.
+
+A round fits the emulator to all pours so far and asks it where the observation can come from. The
+next parameters are drawn from
+
+$$ \tilde p(u) \propto (1 - d) p(u) L(u)^{1/2} + d p(u) $$
+
+with L the emulated likelihood and a share d of the prior, and of ten times as many draws as needed
+those are poured that lie farthest from all others, in spreads of the draws. The root keeps rounds
+wider than the posterior while the emulator is poor; the prior's share finds what it missed.
+
+The posterior needs no correction for the proposal: the emulator is a regression of the statistics
+on the parameters, which does not mind where the parameters came from, and the prior enters as
+itself. Every pour counts, also those that fail.
+
+Reference:
+    Deistler, Goncalves and Macke, Truncated proposals for scalable and hassle-free simulation-based
+    inference, NeurIPS 2022 (rounds without importance weights).
+    Kennard and Stone, Computer aided design of experiments, Technometrics 11, 1969 (farthest next).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from granulcal.bayessim.arrays import as_matrix
+from granulcal.bayessim.density import quasi_uniform
+from granulcal.bayessim.likelihood import EmulatorChoice, Likelihood
+from granulcal.bayessim.misfit import Misfit, MisfitReference
+from granulcal.bayessim.standardise import Standardiser
+from granulcal.errors import ObservationError, TrainingDataError
+from granulcal.posterior import Posterior
+from granulcal.prior import Prior
+
+__all__ = ["Round", "SequentialFit", "infer_within_budget", "round_sizes"]
+
+Array = NDArray[np.float64]
+
+FEWEST_PAIRS = 20
+_FEWEST_BUDGET = 40
+_FIRST_SHARE = 0.4
+_LATER_ROUNDS = 3
+_PRIOR_SHARE = 0.1
+_TEMPER = 0.5
+_CANDIDATES = 10
+_FEATURES = 100
+
+
+@dataclass(frozen=True)
+class Round:
+    """What is known after a round.
+
+    Attributes:
+        number: from 1.
+        rounds: rounds in all.
+        pours: poured so far.
+        usable: of them, with statistics.
+        budget: pours in all.
+        spread: standard deviations of the posterior over those of the prior, shape (p,).
+    """
+
+    number: int
+    rounds: int
+    pours: int
+    usable: int
+    budget: int
+    spread: Array
+
+    def __str__(self) -> str:
+        """One line."""
+        spread = ", ".join(f"{each:.2f}" for each in self.spread)
+        return (
+            f"round {self.number} of {self.rounds}: {self.pours} of {self.budget} pours, "
+            f"{self.usable} usable; spread of the posterior over the prior's: {spread}"
+        )
+
+
+@dataclass(frozen=True)
+class SequentialFit:
+    """The posterior of one observation within a budget.
+
+    Attributes:
+        posterior: of the parameters.
+        misfit: whether the observation is inside the model.
+        choice: what held-out pours say of the emulator.
+        theta: parameters of all pours, own units, shape (n, p).
+        x: their statistics, NaN where there are none, shape (n, s).
+        rounds: what was known after each.
+    """
+
+    posterior: Posterior
+    misfit: Misfit
+    choice: EmulatorChoice
+    theta: Array
+    x: Array
+    rounds: tuple[Round, ...]
+
+
+def round_sizes(budget: int) -> list[int]:
+    """Returns the pours of each round: two fifths from the prior, then three equal rounds.
+
+    Raises:
+        ValueError: a budget below 40.
+    """
+    if isinstance(budget, bool) or not isinstance(budget, int) or budget < _FEWEST_BUDGET:
+        raise ValueError(
+            f"budget must be a whole number of at least {_FEWEST_BUDGET} pours, got {budget!r}"
+        )
+    first = round(_FIRST_SHARE * budget)
+    ends = np.linspace(first, budget, _LATER_ROUNDS + 1).round().astype(int)
+    return [first, *np.diff(ends).tolist()]
+
+
+def infer_within_budget(
+    simulate: Callable[[Array, int], Array],
+    prior: Prior,
+    x_obs: ArrayLike,
+    *,
+    budget: int = 100,
+    seed: int = 0,
+    x_names: tuple[str, ...] | None = None,
+    progress: Callable[[Round], None] | None = None,
+) -> SequentialFit:
+    """Returns the posterior given an observation, from `budget` simulations made for it.
+
+    The same arguments and simulations give the same parameters, so that a simulator which
+    remembers its rows makes a run resumable.
+
+    Args:
+        simulate: takes parameters in own units, shape (b, p), and the index of the first of them
+            among all; returns their statistics, shape (b, s), a row of NaN for a pour without.
+        prior: the prior.
+        x_obs: one pour, shape (s,), or k of one material, shape (k, s).
+        budget: simulations in all.
+        seed: seed of every random choice.
+        x_names: names of the statistics.
+        progress: called after each round.
+
+    Raises:
+        ObservationError: an observation that is not finite.
+        TrainingDataError: fewer than 20 pours of the first round can be used.
+        ValueError: a budget below 40.
+    """
+    sizes = round_sizes(budget)
+    observed = np.atleast_2d(np.asarray(x_obs, dtype=float))
+    if observed.ndim != 2 or not np.all(np.isfinite(observed)):
+        raise ObservationError(f"x_obs must be finite, shape (s,) or (k, s), got {observed.shape}")
+    names = x_names or tuple(f"statistic_{i}" for i in range(observed.shape[1]))
+    u, theta, x = np.empty((0, len(prior.names))), [], np.empty((0, observed.shape[1]))
+    rounds: list[Round] = []
+    fit: _Fit | None = None
+    for number, size in enumerate(sizes, start=1):
+        design = _first_design(prior, size, seed) if fit is None else fit.next(u, size, seed + number)
+        made = prior.from_unconstrained(design)
+        statistics = as_matrix("simulated statistics", simulate(made, len(u)))
+        if statistics.shape != (size, observed.shape[1]):
+            raise TrainingDataError(
+                f"simulate must return shape {(size, observed.shape[1])}, got {statistics.shape}"
+            )
+        u, x = np.concatenate([u, design]), np.concatenate([x, statistics])
+        theta.append(made)
+        usable = np.all(np.isfinite(x), axis=1)
+        if usable.sum() < FEWEST_PAIRS:
+            raise TrainingDataError(
+                f"at least {FEWEST_PAIRS} pours must be usable, {usable.sum()} of {len(u)} are: "
+                "a larger budget or a narrower prior is needed"
+            )
+        fit = _Fit.of(prior, u[usable], x[usable], observed, seed)
+        draws = prior.to_unconstrained(fit.posterior.sample(2000))
+        spread = draws.std(axis=0) / fit.likelihood.pool.std(axis=0)
+        rounds.append(Round(number, len(sizes), len(u), int(usable.sum()), budget, spread))
+        if progress is not None:
+            progress(rounds[-1])
+    assert fit is not None
+    z = fit.standardiser.apply(observed, clip=False)
+    misfit = fit.reference().test(fit.likelihood, z, names)
+    return SequentialFit(
+        fit.posterior, misfit, fit.choice, np.concatenate(theta), x, tuple(rounds)
+    )
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """The emulator of the pours so far, and what it says of the observation."""
+
+    prior: Prior
+    u: Array
+    z: Array
+    observed: Array
+    standardiser: Standardiser
+    likelihood: Likelihood
+    folds: list
+    choice: EmulatorChoice
+    posterior: Posterior
+
+    @classmethod
+    def of(cls, prior: Prior, u: Array, x: Array, x_obs: Array, seed: int) -> "_Fit":
+        standardiser = Standardiser.fit(x)
+        z = standardiser.apply(x)
+        likelihood, folds, choice = Likelihood.fit(u, z, prior, features=_FEATURES, seed=seed)
+        observed = standardiser.apply(x_obs)
+        posterior = Posterior.from_conditions(prior, [(likelihood, observed)])
+        return cls(prior, u, z, observed, standardiser, likelihood, folds, choice, posterior)
+
+    def reference(self) -> MisfitReference:
+        return MisfitReference.of(self.folds, self.u, self.z)
+
+    def next(self, taken: Array, count: int, seed: int) -> Array:
+        """Coordinates of the next pours, shape (count, p), away from those `taken` (n, p)."""
+        generator = np.random.default_rng(seed)
+        pool = self.likelihood.pool
+        log_weights = _TEMPER * self.likelihood.start(self.observed)
+        weights = np.exp(log_weights - log_weights.max())
+        weights = (1 - _PRIOR_SHARE) * weights / weights.sum() + _PRIOR_SHARE / len(pool)
+        chosen = generator.choice(len(pool), size=_CANDIDATES * count, replace=False, p=weights)
+        candidates = pool[chosen]
+        scale = np.maximum(candidates.std(axis=0), 1e-6)
+        nearest = np.min(
+            np.linalg.norm((candidates[:, None] - taken[None]) / scale, axis=2), axis=1
+        )
+        picked = []
+        for _ in range(count):
+            best = int(nearest.argmax())
+            picked.append(best)
+            away = np.linalg.norm((candidates - candidates[best]) / scale, axis=1)
+            nearest = np.minimum(nearest, away)
+        return candidates[picked]
+
+
+def _first_design(prior: Prior, count: int, seed: int) -> Array:
+    """Evenly spread draws of the prior, moved by the seed, coordinates (count, p)."""
+    shift = np.random.default_rng(seed).random(len(prior.free))
+    uniform = (quasi_uniform(count, len(prior.free)) + shift) % 1
+    columns = [p.quantile(uniform[:, i]) for i, p in enumerate(prior.free)]
+    return prior.to_unconstrained(np.column_stack(columns))
