@@ -105,7 +105,10 @@ pub fn start(
         .map_err(DatasetError::Simulation)?;
     match resume {
         Some(path) => resume_checkpoint(path, simulation),
-        None => Ok(simulation),
+        None => {
+            simulation.check_start().map_err(DatasetError::Simulation)?;
+            Ok(simulation)
+        }
     }
 }
 

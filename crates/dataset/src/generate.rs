@@ -276,6 +276,7 @@ fn make_row(
     let scene = header.prior.apply(&header.scene, &parameters)?;
     let seed = pour_seed(header.seed, row);
     let simulation = Simulation::new(&scene, seed).map_err(DatasetError::Simulation)?;
+    simulation.check_start().map_err(DatasetError::Simulation)?;
     let mut observer = Observer::new(&scene);
     let Some(pour) = observer.run_while(simulation, keep_going) else { return Ok(None) };
 

@@ -19,6 +19,7 @@ pub(crate) fn simulate(py: Python<'_>, scene: &Scene, seed: u64, threads: usize)
         let watch = Watch::new();
         let outcome = Simulation::new(scene, seed)
             .and_then(|simulation| simulation.with_threads(threads))
+            .and_then(|simulation| simulation.check_start().map(|()| simulation))
             .map(|simulation| {
                 let mut observer = Observer::new(scene);
                 let pour = observer.run_while(simulation, &|| watch.keep_going(|_| Ok(())))?;
