@@ -50,12 +50,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("positions", help="centres of the grains, .npy of shape (n, 3) [m]")
     parser.add_argument("--diameter", type=float, default=4e-3, help="of a grain [m]")
+    parser.add_argument("--within", type=float, default=np.inf, help="|x| and |y| drawn [m]")
     parser.add_argument("--from-above", action="store_true", help="along -z instead of +y")
     parser.add_argument("--inches", type=float, default=5.0, help="side of the picture")
     parser.add_argument("-o", "--out", default="side.png", help="the picture")
     arguments = parser.parse_args()
+    positions = np.load(arguments.positions)
     draw(
-        np.load(arguments.positions),
+        positions[(np.abs(positions[:, :2]) <= arguments.within).all(axis=1)],
         arguments.diameter,
         arguments.out,
         from_above=arguments.from_above,

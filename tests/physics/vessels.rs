@@ -118,15 +118,14 @@ fn a_column_runs_out_as_far_as_columns_do() {
 
 #[test]
 fn a_hopper_runs_out_evenly_and_a_narrow_one_jams() {
-    let scene = with(
-        &example("hopper_round.toml"),
-        &[("grains.count", 1500.0), ("observe.rate", 200.0)],
-    );
+    let scene =
+        with(&example("hopper_round.toml"), &[("grains.count", 1500.0), ("observe.rate", 200.0)]);
     let seen = Seen::of(&scene);
     assert!(!seen.is_jammed);
     // Beverloo: the rate does not depend on the filling. The share out is a straight line of time.
     let (rate, series) = (seen.value("discharge_rate"), &seen.observed.series[0]);
-    let middle: Vec<_> = series.times.iter().zip(&series.values).filter(|(_, p)| **p > 10.0 && **p < 80.0).collect();
+    let middle: Vec<_> =
+        series.times.iter().zip(&series.values).filter(|(_, p)| **p > 10.0 && **p < 80.0).collect();
     let offset = middle.iter().map(|(t, p)| *p - rate * *t).sum::<f64>() / middle.len() as f64;
     let worst = middle.iter().map(|(t, p)| (*p - rate * *t - offset).abs()).fold(0.0, f64::max);
     println!("hopper: {rate} %/s, {worst} % off a line");
@@ -156,9 +155,7 @@ fn a_funnel_that_moves_leaves_a_trail() {
     assert_eq!(seen.pour.status, Status::AtRest, "{:?}", seen.pour.health);
     // Three sides of a square of 8 cm, from the origin along x, y and back.
     let off = |x: f64, y: f64| {
-        let side = |along: f64, across: f64| {
-            across.hypot((along - along.clamp(0.0, 0.08)).abs())
-        };
+        let side = |along: f64, across: f64| across.hypot((along - along.clamp(0.0, 0.08)).abs());
         side(x, y).min(side(y, x - 0.08)).min(side(x, y - 0.08))
     };
     let near = seen.pour.positions.iter().filter(|p| off(p.x, p.y) < 0.03).count();

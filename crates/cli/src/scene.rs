@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use granulcal_dataset::{
-    DatasetError, Observer, Prior, load_prior, load_scene, load_sensor, record_pour, resume_checkpoint,
-    write_checkpoint,
+    DatasetError, Observer, Prior, load_prior, load_scene, load_sensor, record_pour,
+    resume_checkpoint, write_checkpoint,
 };
 use granulcal_dem::{Pour, Scene, Simulation};
 

@@ -4,7 +4,9 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use cpu_time::ProcessTime;
-use granulcal_dataset::{DatasetError, ObservedStatistic, Observer, RowStatus, npy, observe, observed_statistics};
+use granulcal_dataset::{
+    DatasetError, ObservedStatistic, Observer, RowStatus, npy, observe, observed_statistics,
+};
 use granulcal_dem::{Health, Pour, Scene};
 use granulcal_features::{DIAGNOSTICS, PAPER16, Statistic};
 use serde::Serialize;
@@ -122,8 +124,7 @@ fn describe(
         }
         Err(reason) => {
             tracing::warn!("{reason}");
-            let says_enough =
-                !status.is_healthy() || status.is_jammed() || !observer.is_idle();
+            let says_enough = !status.is_healthy() || status.is_jammed() || !observer.is_idle();
             let status = if says_enough { status } else { RowStatus::NoGrainsInView };
             report.status = status.name();
             Ok(status)

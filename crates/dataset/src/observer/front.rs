@@ -25,7 +25,9 @@ impl Observation for Front {
         let statistic = |at: String, when: String| ObservedStatistic {
             name: format!("front_radius[{at}]"),
             unit: "m",
-            doc: format!("radius about the axis where grains cover {percent} % of the circle, {when}"),
+            doc: format!(
+                "radius about the axis where grains cover {percent} % of the circle, {when}"
+            ),
         };
         let times = self.spec.times.iter();
         let mut all: Vec<_> =

@@ -23,7 +23,9 @@ impl Observation for Radius {
         let of = |percent: &f64| ObservedStatistic {
             name: format!("radius[{percent}]"),
             unit: "m",
-            doc: format!("radius about the axis within which {percent} % of the mass is at the end"),
+            doc: format!(
+                "radius about the axis within which {percent} % of the mass is at the end"
+            ),
         };
         self.spec.percentiles.iter().map(of).collect()
     }

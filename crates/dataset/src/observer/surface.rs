@@ -31,9 +31,8 @@ impl Surface {
     fn blank(&self) -> [Silhouette; 2] {
         let widest = self.spec.x.iter().map(|x| x.abs()).fold(self.spec.slope_within, f64::max);
         let reach = 2.0 * widest + 2.0 * self.radius;
-        [&self.spec.x, &self.slope_x].map(|x| {
-            Silhouette::new(x, (-reach, reach), self.radius).expect("a checked scene")
-        })
+        [&self.spec.x, &self.slope_x]
+            .map(|x| Silhouette::new(x, (-reach, reach), self.radius).expect("a checked scene"))
     }
 }
 
@@ -49,7 +48,9 @@ impl Observation for Surface {
         all.push(ObservedStatistic {
             name: "surface_slope".to_owned(),
             unit: "deg",
-            doc: format!("angle by which the mean surface falls towards +x where |x| <= {within} m"),
+            doc: format!(
+                "angle by which the mean surface falls towards +x where |x| <= {within} m"
+            ),
         });
         all
     }

@@ -179,7 +179,11 @@ fn rising(
             return Err(DemError::range(format!("{name}.{index}"), got, allowed));
         }
         if got <= last {
-            return Err(DemError::range(format!("{name}.{index}"), got, "more than the one before"));
+            return Err(DemError::range(
+                format!("{name}.{index}"),
+                got,
+                "more than the one before",
+            ));
         }
         last = got;
     }

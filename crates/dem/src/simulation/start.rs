@@ -70,7 +70,10 @@ mod tests {
         scene.walls.push(Wall::fixed(tube(0.07), WallMaterial::default()));
         scene.walls.push(Wall::fixed(tube(0.036), WallMaterial::default()));
         let error = check(&scene).unwrap_err();
-        assert!(matches!(&error, DemError::StartInWall { wall, .. } if wall == "walls.1"), "{error}");
+        assert!(
+            matches!(&error, DemError::StartInWall { wall, .. } if wall == "walls.1"),
+            "{error}"
+        );
         // One that has come by its motion is where it is at time 0.
         scene.walls[1].shape = tube(0.07);
         check(&scene).unwrap();

@@ -9,6 +9,7 @@
 //! an arc about the azimuth of grain i of half width arccos((ρ² + dᵢ² - aᵢ²) / (2 ρ dᵢ)), all of the circle where
 //! ρ + dᵢ ≤ aᵢ. Of a solid body whose outline is R(φ), c(ρ) is the share of azimuths with R(φ) > ρ, so that the
 //! radius where c = 1/2 is the median of the front over the azimuth; single grains that have run ahead hardly change it.
+//! c is taken as its mean over a ring one mean diameter wide, in which the gaps between single grains even out.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,11 +17,14 @@ use nalgebra::{Vector2, Vector3};
 
 /// Circles in a mean grain's radius.
 const CIRCLES: f64 = 4.0;
+/// Circles to each side of a ring's middle: a mean grain's radius.
+const HALF_RING: usize = 4;
 
 /// The largest radius about `axis` `[m]` at which grains cover `level` of the circle, seen from above; `None` if they
 /// do nowhere, or if a grain is nowhere (NaN).
 ///
-/// Between two circles, a quarter of a mean grain's radius apart, the share is taken as linear.
+/// Circles are a quarter of a mean grain's radius apart; the share is their mean over a ring one mean diameter wide,
+/// linear between two.
 pub fn front_radius(
     positions: &[Vector3<f64>],
     radii: &[f64],
@@ -45,20 +49,25 @@ pub fn front_radius(
 
     // From the outermost circle inwards: a disc is met once the circle is within its reach, and left for good once the
     // circle is nearer to the axis than any of it.
-    let mut outer = 0.0;
     let mut first = 0;
-    let circles = (discs[0].reach() / step).floor() as usize;
-    for number in (0..=circles).rev() {
+    let circles = (discs[0].reach() / step).floor() as usize + 1;
+    let mut covered = vec![0.0; circles];
+    for (number, share) in covered.iter_mut().enumerate().rev() {
         let rho = number as f64 * step;
         while first < discs.len() && discs[first].distance - 2.0 * widest > rho {
             first += 1;
         }
-        let met = discs[first..].iter().take_while(|disc| disc.reach() > rho);
-        let covered = share_covered(met, rho);
-        if covered >= level {
-            return Some(rho + step * (covered - level) / (covered - outer));
+        *share = share_covered(discs[first..].iter().take_while(|d| d.reach() > rho), rho);
+    }
+    let mut outer = 0.0;
+    for number in (0..circles + HALF_RING).rev() {
+        let ring = number.saturating_sub(HALF_RING)..=number + HALF_RING;
+        let count = ring.clone().count() as f64;
+        let mean = ring.map(|circle| covered.get(circle).unwrap_or(&0.0)).sum::<f64>() / count;
+        if mean >= level {
+            return Some(step * (number as f64 + (mean - level) / (mean - outer)));
         }
-        outer = covered;
+        outer = mean;
     }
     None
 }
@@ -152,15 +161,31 @@ mod tests {
     }
 
     #[test]
-    fn one_grain_is_covered_as_its_circle_says() {
-        // Level 1/3 of a grain at distance d: half width pi / 3 where rho^2 + d^2 - rho d = a^2, and d = a / 2
-        // gives rho = a (1 + sqrt(13)) / 4.
-        let grains = [Vector3::new(0.5 * RADIUS, 0.0, 0.0)];
-        let found = front_radius(&grains, &[RADIUS], Vector2::zeros(), 1.0 / 3.0).unwrap();
-        let expected = RADIUS * (1.0 + 13f64.sqrt()) / 4.0;
-        assert!((found - expected).abs() < 0.02 * RADIUS, "{found} {expected}");
+    fn one_grain_covers_a_circle_as_its_arc_says() {
+        // At distance d = a / 2 from the axis: all of a circle of radius up to a / 2, none from 3 a / 2 on, and a third
+        // (half width pi / 3) where rho^2 + d^2 - rho d = a^2, which is rho = a (1 + sqrt(13)) / 4.
+        let disc = Disc { distance: 0.5 * RADIUS, azimuth: 3.0, radius: RADIUS };
+        let share = |rho: f64| share_covered([&disc].into_iter(), rho * RADIUS);
+        assert_eq!((share(0.0), share(0.499), share(1.501)), (1.0, 1.0, 0.0));
+        let third = share((1.0 + 13f64.sqrt()) / 4.0);
+        assert!((third - 1.0 / 3.0).abs() < 1e-12, "{third}");
+    }
+
+    #[test]
+    fn two_grains_that_overlap_on_a_circle_count_once() {
+        let at = |azimuth: f64| Disc { distance: 10.0 * RADIUS, azimuth, radius: RADIUS };
+        let half = at(0.0).half_width(10.0 * RADIUS).unwrap();
+        let discs = [at(PI - 0.5 * half), at(-PI + 0.5 * half), at(1.0)];
+        let share = share_covered(discs.iter(), 10.0 * RADIUS);
+        assert!((share - 5.0 * half / TAU).abs() < 1e-12, "{share}");
+    }
+
+    #[test]
+    fn grains_far_from_the_axis_or_none_have_no_front() {
         assert_eq!(front_radius(&[Vector3::x()], &[RADIUS], Vector2::zeros(), 0.5), None);
         assert_eq!(front_radius(&[], &[], Vector2::zeros(), 0.5), None);
+        let nowhere = [Vector3::repeat(f64::NAN)];
+        assert_eq!(front_radius(&nowhere, &[RADIUS], Vector2::zeros(), 0.5), None);
     }
 
     #[test]

@@ -45,7 +45,10 @@ mod tests {
     fn percentiles_of_an_even_row_are_its_quantiles() {
         let grains: Vec<_> = (0..100).map(|i| Vector3::new(f64::from(i) + 0.5, 0.0, 0.0)).collect();
         let found = mass_percentiles(&grains, &[1e-3; 100], Vector2::zeros(), &[10.0, 50.0, 90.0]);
-        assert!(found.iter().zip([10.0, 50.0, 90.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+        assert!(
+            found.iter().zip([10.0, 50.0, 90.0]).all(|(a, b)| (a - b).abs() < 1e-9),
+            "{found:?}"
+        );
         assert_eq!(mass_percentiles(&grains, &[1e-3; 100], Vector2::zeros(), &[100.0]), [99.5]);
     }
 

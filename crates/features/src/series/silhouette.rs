@@ -64,7 +64,8 @@ impl Silhouette {
 
     /// Hides the cells of a column whose centres are between two heights.
     fn hide(&mut self, column: usize, from: f64, to: f64) {
-        let cell = |height: f64| ((height - self.bottom) / self.step + 0.5).floor().max(0.0) as usize;
+        let cell =
+            |height: f64| ((height - self.bottom) / self.step + 0.5).floor().max(0.0) as usize;
         let (from, to) = (cell(from).min(self.cells), cell(to).min(self.cells));
         for cell in column * self.cells + from..column * self.cells + to {
             if self.last[cell] != self.frames {
@@ -148,7 +149,8 @@ mod tests {
     #[test]
     fn an_incline_has_its_angle() {
         let x: Vec<_> = (-20..=20).map(|i| 1e-3 * f64::from(i)).collect();
-        let z: Vec<_> = x.iter().map(|x| if x.abs() <= 0.015 { 0.01 - 0.5 * x } else { 9.0 }).collect();
+        let z: Vec<_> =
+            x.iter().map(|x| if x.abs() <= 0.015 { 0.01 - 0.5 * x } else { 9.0 }).collect();
         assert!((slope_deg(&x, &z, 0.015) - 0.5f64.atan().to_degrees()).abs() < 1e-9);
         assert!(slope_deg(&x[..1], &z[..1], 0.05).is_nan());
     }

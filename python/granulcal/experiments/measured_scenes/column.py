@@ -68,7 +68,8 @@ def reproduce(out_dir: Path, data_dir: Path) -> str:
         for name, run_out in measured.items():
             front = run_out.front_radius()
             first = np.flatnonzero(np.isfinite(front))[0]
-            shift = first_passage(time, radius, front[first]) - run_out.time[first]
+            begin = float(run_out.time[first])
+            shift = first_passage(time, radius, float(front[first])) - begin
             plain = compare(time, radius, run_out.time, front, shift=0.0)
             met = compare(time, radius, run_out.time, front, shift=shift)
             end = front[np.isfinite(front)][-8:].mean()
