@@ -1,4 +1,4 @@
-"""Draws the grains of a pour from the side.
+"""Draws the grains of a pour from the side, or from above.
 
 Run: granulcal simulate examples/drum.toml --positions drum.npy
      python examples/side_view.py drum.npy --diameter 2.4e-3 -o drum.png
@@ -15,10 +15,14 @@ import matplotlib.pyplot as plt
 from matplotlib.collections import EllipseCollection
 
 
-def draw(positions: NDArray[np.float64], diameter: float, out: str) -> None:
-    """Draws centres, shape (n, 3) [m], as discs in the plane y = 0, the nearest last."""
+def draw(
+    positions: NDArray[np.float64], diameter: float, out: str, *, from_above: bool, inches: float
+) -> None:
+    """Draws centres, shape (n, 3) [m], as discs in the plane y = 0 or z = 0, the nearest last."""
+    if from_above:
+        positions = positions[:, [0, 2, 1]] * [1, -1, 1]
     x, y, z = 1e3 * positions[np.argsort(positions[:, 1])[::-1]].T
-    figure, axes = plt.subplots(figsize=(5, 5), layout="constrained")
+    figure, axes = plt.subplots(figsize=(inches, inches), layout="constrained")
     sizes = np.full(len(x), 1e3 * diameter)
     shade = plt.get_cmap("copper")(np.interp(-y, (-y.max(), -y.min() + 1e-9), (0.4, 1.0)))
     axes.add_collection(
@@ -34,10 +38,10 @@ def draw(positions: NDArray[np.float64], diameter: float, out: str) -> None:
             linewidths=0.3,
         )
     )
-    axes.set(xlabel="x [mm]", ylabel="z [mm]", aspect="equal")
+    axes.set(xlabel="x [mm]", ylabel="y [mm]" if from_above else "z [mm]", aspect="equal")
     margin = 1e3 * diameter
     axes.set_xlim(x.min() - margin, x.max() + margin)
-    axes.set_ylim(min(0.0, z.min() - margin), z.max() + margin)
+    axes.set_ylim(z.min() - margin if from_above else min(0.0, z.min() - margin), z.max() + margin)
     figure.savefig(out, dpi=80)
 
 
@@ -46,9 +50,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("positions", help="centres of the grains, .npy of shape (n, 3) [m]")
     parser.add_argument("--diameter", type=float, default=4e-3, help="of a grain [m]")
+    parser.add_argument("--within", type=float, default=np.inf, help="|x| and |y| drawn [m]")
+    parser.add_argument("--from-above", action="store_true", help="along -z instead of +y")
+    parser.add_argument("--inches", type=float, default=5.0, help="side of the picture")
     parser.add_argument("-o", "--out", default="side.png", help="the picture")
     arguments = parser.parse_args()
-    draw(np.load(arguments.positions), arguments.diameter, arguments.out)
+    positions = np.load(arguments.positions)
+    draw(
+        positions[(np.abs(positions[:, :2]) <= arguments.within).all(axis=1)],
+        arguments.diameter,
+        arguments.out,
+        from_above=arguments.from_above,
+        inches=arguments.inches,
+    )
 
 
 if __name__ == "__main__":

@@ -12,13 +12,15 @@ Torch is loaded when a model is first trained or loaded, matplotlib when somethi
 from typing import TYPE_CHECKING, Any
 
 from granulcal._native import __version__
+from granulcal.camera import Camera
 from granulcal.dataset import Dataset, generate
 from granulcal.prior import Parameter, Prior
-from granulcal.recording import Camera, Formation, Levelled, Plane, Recording
+from granulcal.recording import Formation, Levelled, Plane, Recording
 from granulcal.scene import Material, Scene
 from granulcal.simulate import Pour, simulate
 from granulcal.statistics import (
     DiagnosticStatistics,
+    ObservedStatistics,
     Statistics,
     diagnostic_statistics,
     statistics,
@@ -36,6 +38,7 @@ __all__ = [
     "Formation",
     "Levelled",
     "Material",
+    "ObservedStatistics",
     "Parameter",
     "Plane",
     "Posterior",

@@ -29,14 +29,18 @@ class Dataset:
     """Parameters and statistics of many pours, one row each.
 
     Made by `generate` or read by `load`. Columns of `theta` are in the parameters' own units,
-    columns of `x` are the statistics in SI units.
+    columns of `x` are the statistics that the scene observes, or the paper's 16 where it observes
+    none, in their units.
 
     Attributes:
         path: the folder or file it was read from.
         theta: the parameters that vary, shape (n, p).
         theta_names: their paths in the scene.
-        x: the statistics, shape (n, 16); NaN where no grains were in view.
+        x: the statistics, shape (n, s); NaN for what could not be seen.
         x_names: their names.
+        paper16: the paper's statistics, shape (n, 16); NaN where no grains were in view.
+        observed: the statistics that the scene observes, shape (n, k).
+        observed_names: their names.
         diagnostics: the diagnostic statistics, shape (n, 40); NaN where no grains were in view, and
             in data sets that were made before there were any.
         diagnostic_names: their names.
@@ -52,8 +56,12 @@ class Dataset:
         self.row = native.row
         self.theta = native.theta
         self.theta_names: tuple[str, ...] = tuple(native.theta_names)
-        self.x = native.x
-        self.x_names: tuple[str, ...] = NAMES
+        self.paper16 = native.x
+        self.observed = native.observed
+        self.observed_names: tuple[str, ...] = tuple(native.observed_names)
+        observes = len(self.observed_names) > 0
+        self.x = self.observed if observes else self.paper16
+        self.x_names: tuple[str, ...] = self.observed_names if observes else NAMES
         self.diagnostics = native.diagnostics
         self.diagnostic_names: tuple[str, ...] = DIAGNOSTIC_NAMES
         self.status: NDArray[np.str_] = np.array(native.status, dtype=np.str_)
@@ -92,7 +100,7 @@ class Dataset:
 
     @property
     def is_usable(self) -> NDArray[np.bool_]:
-        """Which pours are healthy, left the funnel and have grains in view, shape (n,)."""
+        """Which pours are healthy, left the funnel and show every statistic of `x`, shape (n,)."""
         return ~np.isin(self.status, _UNUSABLE) & np.isfinite(self.x).all(axis=1)
 
     def status_counts(self) -> dict[str, int]:
@@ -102,10 +110,13 @@ class Dataset:
     def columns(self) -> dict[str, NDArray[Any]]:
         """Returns every column by name, in the order of the Parquet file."""
         theta = {name: self.theta[:, i] for i, name in enumerate(self.theta_names)}
-        x = {name: self.x[:, i] for i, name in enumerate(self.x_names)}
-        named = zip(self.diagnostic_names, self.diagnostics.T, strict=True)
+        x = {name: self.paper16[:, i] for i, name in enumerate(NAMES)}
+        named = {
+            **dict(zip(self.diagnostic_names, self.diagnostics.T, strict=True)),
+            **dict(zip(self.observed_names, self.observed.T, strict=True)),
+        }
         keys = {"row": self.row, **theta, "seed": self.seed, "status": self.status}
-        return {**keys, **self.health, **x, **dict(named)}
+        return {**keys, **self.health, **x, **named}
 
     def to_pandas(self) -> Any:
         """Returns a pandas DataFrame of all columns.

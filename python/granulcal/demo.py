@@ -15,9 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from granulcal.calibrate import Calibrated, calibrate
+from granulcal.camera import Camera
 from granulcal.dataset import generate
 from granulcal.prior import Prior
-from granulcal.recording import Camera, Recording
+from granulcal.recording import Recording
 from granulcal.scene import Material, Scene
 from granulcal.simulate import simulate
 

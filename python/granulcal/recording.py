@@ -1,4 +1,4 @@
-"""Measured depth images and height maps, and a camera that makes such recordings of grains."""
+"""Measured depth images and height maps, and other measurements of a scene's statistics."""
 
 import warnings
 from dataclasses import dataclass
@@ -7,13 +7,16 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.camera import Camera
+from granulcal.measured import DischargeCurve, DrumImage, RunOut
+from granulcal.scene import Scene
 from granulcal.statistics import (
     DiagnosticStatistics,
+    ObservedStatistics,
     Statistics,
-    as_points,
     diagnostic_statistics,
     statistics,
 )
@@ -29,9 +32,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-
-# A tenth of a millimetre: finer than a depth camera at this range, and 16 bits reach 6.5 m.
-_DEPTH_UNIT = 1e-4
 
 # Frames that are averaged unless told otherwise: as many as Matl et al. 2020 average.
 FRAMES = 10
@@ -424,6 +424,50 @@ class Recording:
         """The ground under the recording's own segmentation."""
         return self._formation.plane
 
+    @staticmethod
+    def observed(
+        path: str | PathLike[str],
+        scene: Scene,
+        *,
+        width: float | None = None,
+        fps: float | None = None,
+        series: str | None = None,
+    ) -> ObservedStatistics:
+        """Returns what a measurement that is no depth image says of a scene's own statistics.
+
+        Time-averaged pictures of a drum (.bmp, .png) give `surface_z[x]` and `surface_slope`,
+        run-out files (.txt) `front_radius[t]`, discharge curves (.csv) `discharged[t]` and
+        `discharge_rate`. What the scene observes besides is NaN.
+
+        Args:
+            path: the file.
+            scene: the scene whose statistics are asked for.
+            width: width of a drum's picture [m]; needed there.
+            fps: frames a second of a run-out file's video; 240 unless told otherwise.
+            series: name of a discharge curve, where the file has several.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: it is not what its name says, the scene observes nothing of the kind, or an
+                argument does not go with it.
+        """
+        kind = Path(path).suffix.lower()
+        given = {"width": width, "fps": fps, "series": series}
+        takes = {".bmp": "width", ".png": "width", ".txt": "fps", ".csv": "series"}
+        if kind not in takes:
+            raise ValueError(f"{path} must be one of {', '.join(takes)}")
+        wrong = [name for name in given if given[name] is not None and name != takes[kind]]
+        if wrong:
+            raise ValueError(f"a {kind} file takes {takes[kind]}, not {', '.join(wrong)}")
+        if takes[kind] == "width":
+            if width is None:
+                raise ValueError(f"{path}: width, the drum's inner diameter [m], is needed")
+            return DrumImage.open(path, width=width).observed(scene)
+        if takes[kind] == "fps":
+            run_out = RunOut.open(path) if fps is None else RunOut.open(path, fps=fps)
+            return run_out.observed(scene)
+        return DischargeCurve.open(path, series).observed(scene)
+
     def __repr__(self) -> str:
         kind = "height map" if self.depth is None else f"depth, {self.frames} frame(s)"
         return f"Recording({str(self.path)!r}, {kind})"
@@ -443,94 +487,3 @@ def _plane(parts: tuple[tuple[float, float, float], float, float, float, int]) -
 def _refuse_two_thresholds(height_threshold: float | None, floor: float | None) -> None:
     if height_threshold is not None and floor is not None:
         raise ValueError("give height_threshold or threshold_floor, not both")
-
-
-class Camera:
-    """A pinhole camera above the ground that takes depth images of grains; made by `overhead`.
-
-    Image right is world +x, image up is world +y.
-    """
-
-    def __init__(self, native: _native.Camera) -> None:
-        self._native = native
-
-    @classmethod
-    def overhead(cls, *, height: float, field_width: float, pixels: int) -> "Camera":
-        """Returns a camera that looks straight down.
-
-        Args:
-            height: height above the ground [m].
-            field_width: side of the square of ground in view [m].
-            pixels: pixels along a side of the image.
-
-        Raises:
-            ValueError: a number is out of its range.
-        """
-        return cls(_native.Camera.overhead(height, field_width, pixels))
-
-    def tilted(self, *, x_deg: float = 0.0, y_deg: float = 0.0) -> "Camera":
-        """Returns the camera turned about its own x axis, then its own y axis [deg]."""
-        return Camera(self._native.tilted(float(np.radians(x_deg)), float(np.radians(y_deg))))
-
-    def render(
-        self,
-        positions: ArrayLike,
-        radii: ArrayLike,
-        *,
-        depth_noise: float = 0.0,
-        blur_px: float = 0.0,
-        sensor: str | PathLike[str] | None = None,
-        seed: int = 0,
-    ) -> NDArray[np.float32]:
-        """Returns the depth image of grains on the ground z = 0 [m], 0 is no data, shape (h, w).
-
-        Args:
-            positions: centres of the grains [m], shape (n, 3).
-            radii: their radii [m], shape (n,).
-            depth_noise: standard deviation of Gaussian noise of each pixel [m].
-            blur_px: standard deviation of a Gaussian blur [px].
-            sensor: TOML that `granulcal fit-sensor` wrote: noise, pattern, rounding and holes.
-            seed: seed of the noise.
-
-        Raises:
-            TypeError: an array that does not hold real numbers.
-            ValueError: another shape, or a number out of its range.
-        """
-        centres, sizes = as_points("positions", positions), as_points("radii", radii)
-        return self._native.render(centres, sizes, depth_noise, blur_px, seed, sensor)
-
-    def record(
-        self,
-        positions: ArrayLike,
-        radii: ArrayLike,
-        folder: str | PathLike[str],
-        *,
-        depth_noise: float = 0.0,
-        blur_px: float = 0.0,
-        sensor: str | PathLike[str] | None = None,
-        seed: int = 0,
-        depth_unit: float = _DEPTH_UNIT,
-    ) -> tuple[Path, Path]:
-        """Writes `depth.png` (16 bits) and `camera.toml` into `folder`, as a real camera would.
-
-        Args:
-            positions: centres of the grains [m], shape (n, 3).
-            radii: their radii [m], shape (n,).
-            folder: where to write; made if it does not exist.
-            depth_noise: standard deviation of Gaussian noise of each pixel [m].
-            blur_px: standard deviation of a Gaussian blur [px].
-            sensor: TOML that `granulcal fit-sensor` wrote: noise, pattern, rounding and holes.
-            seed: seed of the noise.
-            depth_unit: metres per count of the image.
-
-        Returns:
-            The paths of the image and of the camera, for `Recording.open`.
-        """
-        image = self.render(
-            positions, radii, depth_noise=depth_noise, blur_px=blur_px, sensor=sensor, seed=seed
-        )
-        place = Path(folder)
-        place.mkdir(parents=True, exist_ok=True)
-        paths = place / "depth.png", place / "camera.toml"
-        self._native.save_image(image, *paths, depth_unit)
-        return paths

@@ -157,6 +157,21 @@ class Scene:
         return self.native.get(path)
 
     @property
+    def observed_names(self) -> tuple[str, ...]:
+        """Names of the statistics that the scene observes, for example `front_radius[0.1]`."""
+        return tuple(name for name, _, _ in self.native.observed_statistics())
+
+    @property
+    def observed_units(self) -> dict[str, str]:
+        """Unit of each statistic that the scene observes."""
+        return {name: unit for name, unit, _ in self.native.observed_statistics()}
+
+    @property
+    def observed_docs(self) -> dict[str, str]:
+        """What each statistic that the scene observes is, in a line."""
+        return {name: doc for name, _, doc in self.native.observed_statistics()}
+
+    @property
     def ground_resolution(self) -> float:
         """Width of a pixel of the camera's down-sampled image on the ground [m]."""
         width = self.get("camera.field_width") / self.get("camera.pixels")

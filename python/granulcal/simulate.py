@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from granulcal import _native
 from granulcal.scene import Material, Scene
-from granulcal.statistics import DiagnosticStatistics, Statistics
+from granulcal.statistics import DiagnosticStatistics, ObservedStatistics, Statistics
 
 __all__ = ["Pour", "simulate"]
 
@@ -126,6 +126,25 @@ class Pour:
             ValueError: too few grains are in view.
         """
         return DiagnosticStatistics(self._observation.diagnostics())
+
+    def observed(self) -> ObservedStatistics:
+        """Returns the statistics that the scene observes; there are none if it observes nothing."""
+        return ObservedStatistics(self._native.observed, self.scene.observed_names)
+
+    def series(self, name: str) -> tuple[Array, Array]:
+        """Returns times after the begin of the observation [s] and the samples of what is observed.
+
+        Args:
+            name: `front_radius` [m] or `discharged` [%].
+
+        Raises:
+            KeyError: the scene does not observe it.
+        """
+        all_series = self._native.series
+        if name not in all_series:
+            known = ", ".join(all_series) or "nothing"
+            raise KeyError(f"this scene has no series {name!r}; it observes {known} over time")
+        return all_series[name]
 
     @cached_property
     def _observation(self) -> _native.Observation:

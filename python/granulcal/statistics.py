@@ -16,6 +16,7 @@ __all__ = [
     "REGISTRY",
     "UNITS",
     "DiagnosticStatistics",
+    "ObservedStatistics",
     "Statistic",
     "Statistics",
     "as_points",
@@ -142,6 +143,30 @@ class DiagnosticStatistics(_Named):
 
     def __post_init__(self) -> None:
         self._require_shape("values")
+
+    @property
+    def _values(self) -> Array:
+        return self.values
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ObservedStatistics(_Named):
+    """The statistics that a scene observes, of a pour or measured; NumPy takes it for its vector.
+
+    Attributes:
+        values: values in the order of the scene, shape (k,); NaN for what could not be seen.
+        of: their names, as `Scene.observed_names` tells them.
+    """
+
+    values: Array
+    of: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        self._require_shape("values")
+
+    @property
+    def _names(self) -> tuple[str, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self.of
 
     @property
     def _values(self) -> Array:

@@ -21,3 +21,4 @@ mod rolling;
 mod scenes;
 mod solvers;
 mod stack;
+mod vessels;

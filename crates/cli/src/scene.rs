@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use granulcal_dataset::{
-    DatasetError, Prior, load_prior, load_scene, load_sensor, record_pour, resume_checkpoint,
-    write_checkpoint,
+    DatasetError, Observer, Prior, load_prior, load_scene, load_sensor, record_pour,
+    resume_checkpoint, write_checkpoint,
 };
 use granulcal_dem::{Pour, Scene, Simulation};
 
@@ -105,11 +105,14 @@ pub fn start(
         .map_err(DatasetError::Simulation)?;
     match resume {
         Some(path) => resume_checkpoint(path, simulation),
-        None => Ok(simulation),
+        None => {
+            simulation.check_start().map_err(DatasetError::Simulation)?;
+            Ok(simulation)
+        }
     }
 }
 
-/// Simulates `scene` from where `simulation` is to its end; `None` when the user stopped it.
+/// Simulates `scene` from where `simulation` is to its end, before the eyes of `observer`; `None` when the user stopped it.
 ///
 /// # Errors
 /// What is wrong with the file that is kept.
@@ -119,6 +122,7 @@ pub fn pour(
     seed: u64,
     simulation: Simulation,
     keep: &Keep,
+    observer: &mut Observer,
 ) -> Result<Option<Pour>, DatasetError> {
     let progress = PourProgress::new(context);
     let horizon = scene.end.horizon;
@@ -127,11 +131,13 @@ pub fn pour(
         keeps_going()
     };
     let pour = match *keep {
-        Keep::Film { path, fps } => record_pour(simulation, scene, seed, fps, path, &mut watch)?,
-        Keep::Nothing => run(simulation, &mut watch, &mut |_, _| Ok(()))?,
+        Keep::Film { path, fps } => {
+            record_pour(simulation, scene, seed, fps, path, observer, &mut watch)?
+        }
+        Keep::Nothing => run(simulation, observer, &mut watch, &mut |_, _| Ok(()))?,
         Keep::Checkpoint { path, every } => {
             let mut last = None;
-            run(simulation, &mut watch, &mut |simulation, must| {
+            run(simulation, observer, &mut watch, &mut |simulation, must| {
                 if must || last.is_none_or(|last: Instant| last.elapsed() >= every) {
                     write_checkpoint(path, simulation)?;
                     last = Some(Instant::now());
@@ -147,6 +153,7 @@ pub fn pour(
 /// Goes on to the end, or until `watch` says no; `keep` is called at every glance, and with true at the last one.
 fn run(
     mut simulation: Simulation,
+    observer: &mut Observer,
     watch: &mut dyn FnMut(f64) -> bool,
     keep: &mut dyn FnMut(&Simulation, bool) -> Result<(), DatasetError>,
 ) -> Result<Option<Pour>, DatasetError> {
@@ -157,6 +164,6 @@ fn run(
         if !goes_on {
             return Ok(has_ended.then(|| simulation.into_pour()));
         }
-        simulation.advance(GLANCE);
+        observer.advance(&mut simulation, GLANCE);
     }
 }

@@ -9,7 +9,7 @@ use granulcal_features::{DIAGNOSTICS, PAPER16};
 use crate::header::Header;
 use crate::manifest::{self, Manifest};
 use crate::row::Row;
-use crate::{DatasetError, table};
+use crate::{DatasetError, ObservedStatistic, table};
 
 /// All rows of a data set, in order of their index.
 #[derive(Clone, Debug)]
@@ -98,6 +98,16 @@ impl Dataset {
     /// that were made without them.
     pub fn diagnostics(&self) -> Vec<f64> {
         self.rows.iter().flat_map(|row| row.diagnostics).collect()
+    }
+
+    /// The statistics that the scene observes, the columns of [`Dataset::observed`].
+    pub fn observed_statistics(&self) -> Vec<ObservedStatistic> {
+        self.header.observed()
+    }
+
+    /// The statistics that the scene observes, row by row; NaN where they could not be seen.
+    pub fn observed(&self) -> Vec<f64> {
+        self.rows.iter().flat_map(|row| row.observed.iter().copied()).collect()
     }
 
     /// How many rows ended in each status, by its word.

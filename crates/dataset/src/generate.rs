@@ -20,6 +20,7 @@ use granulcal_features::stats::DIAGNOSTIC_COUNT;
 use crate::header::Header;
 use crate::manifest;
 use crate::observe::observe;
+use crate::observer::Observer;
 use crate::random::pour_seed;
 use crate::row::{Row, RowStatus};
 use crate::{DatasetError, Prior, table};
@@ -275,9 +276,12 @@ fn make_row(
     let scene = header.prior.apply(&header.scene, &parameters)?;
     let seed = pour_seed(header.seed, row);
     let simulation = Simulation::new(&scene, seed).map_err(DatasetError::Simulation)?;
-    let Some(pour) = simulation.run_while(keep_going) else { return Ok(None) };
+    simulation.check_start().map_err(DatasetError::Simulation)?;
+    let mut observer = Observer::new(&scene);
+    let Some(pour) = observer.run_while(simulation, keep_going) else { return Ok(None) };
 
-    let mut status = RowStatus::Pour(pour.status);
+    let mut status = observer.status(&pour);
+    let observed = observer.observed(&pour).statistics;
     let (mut statistics, mut diagnostics) = ([f64::NAN; 16], [f64::NAN; DIAGNOSTIC_COUNT]);
     let seen = observe(&scene.camera, &pour, seed).and_then(|seen| {
         let Ok(values) = seen.statistics else { return Ok(None) };
@@ -287,7 +291,9 @@ fn make_row(
         Ok(Some(values)) => (statistics, diagnostics) = values,
         // The grains of an unhealthy pour can be anywhere, NaN included: the status says enough.
         _ if pour.status == Status::Unhealthy => {}
-        Ok(None) if pour.status == Status::Jammed => {}
+        Ok(None) if status.is_jammed() => {}
+        // The scene has other eyes than its camera.
+        Ok(None) if !observer.is_idle() => {}
         Ok(None) => status = RowStatus::NoGrainsInView,
         Err(error) => return Err(error),
     }
@@ -301,6 +307,7 @@ fn make_row(
         cpu_s: start.elapsed().as_secs_f64(),
         statistics,
         diagnostics,
+        observed,
     }))
 }
 

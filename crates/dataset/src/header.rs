@@ -4,7 +4,7 @@ use std::path::Path;
 
 use granulcal_dem::Scene;
 
-use crate::{DatasetError, Prior, scene_file};
+use crate::{DatasetError, ObservedStatistic, Prior, observed_statistics, scene_file};
 
 /// The version of granulcal that writes.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -40,6 +40,11 @@ impl Header {
             scene_toml: scene.to_toml().map_err(DatasetError::Simulation)?,
             prior_toml: prior.to_toml()?,
         })
+    }
+
+    /// The statistics that the scene observes.
+    pub fn observed(&self) -> Vec<ObservedStatistic> {
+        observed_statistics(&self.scene)
     }
 
     /// The header that stands in the file at `path`.

@@ -11,6 +11,7 @@
 //! |---|---|
 //! | [`Prior`], [`Distribution`] | parameters by path, drawn by seed and row |
 //! | [`observe()`] | pour to image to statistics |
+//! | [`Observer`] | what a scene observes over time and at its end |
 //! | [`generate()`] | resumable batches |
 //! | [`Dataset`], [`merge`] | Parquet back into memory |
 //! | [`Recording`] | measured height maps and depth images |
@@ -41,6 +42,7 @@ mod normal;
 pub mod npy;
 mod npz;
 mod observe;
+mod observer;
 mod pictures;
 pub mod png;
 mod prior;
@@ -67,6 +69,7 @@ pub use mcap_file::record_pour;
 pub use message_file::{Damage, MessageFormat};
 pub use npz::{Npz, write_height_map};
 pub use observe::{Observation, TooFewGrains, View, look, observe, overhead};
+pub use observer::{Observed, ObservedStatistic, Observer, Series, observed_statistics};
 pub use pictures::{Pictures, write_mask, write_pictures};
 pub use prior::{Parameter, Prior};
 pub use recording::{FRAMES, Folder, Frame, ReadOptions, Recording, Source, measured_data};

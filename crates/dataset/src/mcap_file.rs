@@ -27,7 +27,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 
 use crate::files::PendingFile;
-use crate::{DatasetError, VERSION, View, look};
+use crate::{DatasetError, Observer, VERSION, View, look};
 
 const WORLD: &str = "world";
 const CAMERA: &str = "camera";
@@ -37,6 +37,7 @@ const STRIDE: u32 = 16;
 /// Runs a simulation of `scene` with `seed` to its end and writes `rate` frames a simulated second, and one
 /// at the end.
 ///
+/// `observer` sees what the scene observes.
 /// `watch` is called with the simulated time before each frame and returns whether to go on; when it
 /// says no the result is `None` and no file is left.
 ///
@@ -48,6 +49,7 @@ pub fn record_pour(
     seed: u64,
     rate: f64,
     path: &Path,
+    observer: &mut Observer,
     watch: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Option<Pour>, DatasetError> {
     if !(rate > 0.0 && rate.is_finite()) {
@@ -67,7 +69,8 @@ pub fn record_pour(
             break;
         }
         // From the frame's own time: rounding to substeps must not add up.
-        simulation.advance(frame as f64 / rate - simulation.time());
+        let seconds = frame as f64 / rate - simulation.time();
+        observer.advance(&mut simulation, seconds);
     }
     let pour = simulation.into_pour();
     let outcome = [

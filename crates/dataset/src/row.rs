@@ -74,6 +74,8 @@ pub struct Row {
     pub statistics: [f64; 16],
     /// The diagnostic statistics, NaN where the statistics are and in files that were written without.
     pub diagnostics: [f64; DIAGNOSTIC_COUNT],
+    /// The statistics that the scene observes, NaN where they could not be seen.
+    pub observed: Vec<f64>,
 }
 
 impl Row {
@@ -88,5 +90,6 @@ impl Row {
             && bits(&self.parameters) == bits(&other.parameters)
             && bits(&self.statistics) == bits(&other.statistics)
             && bits(&self.diagnostics) == bits(&other.diagnostics)
+            && bits(&self.observed) == bits(&other.observed)
     }
 }

@@ -34,7 +34,7 @@ const SEED_KEY: &str = "granulcal.seed";
 /// # Errors
 /// [`DatasetError::Io`] or [`DatasetError::Parquet`].
 pub(crate) fn write(path: &Path, header: &Header, rows: &[Row]) -> Result<(), DatasetError> {
-    let bytes = encode(header, rows, &columns(&header.prior.names()))
+    let bytes = encode(header, rows, &columns(&header.prior.names(), &header.observed()))
         .map_err(|source| DatasetError::Parquet { path: path.to_owned(), source })?;
     files::write_file(path, &bytes)
 }
@@ -91,16 +91,17 @@ pub(crate) fn read(path: &Path) -> Result<(Header, Vec<Row>), DatasetError> {
     let parquet = |source| DatasetError::Parquet { path: path.to_owned(), source };
     let file = SerializedFileReader::new(bytes::Bytes::from(bytes)).map_err(parquet)?;
     let header = read_header(path, &file)?;
-    let mut columns = columns(&header.prior.names());
+    let observed = header.observed();
+    let mut columns = columns(&header.prior.names(), &observed);
     // Files without the diagnostic statistics end before them; they stay NaN.
     let found = file.metadata().file_metadata().schema_descr().num_columns();
-    if found + DIAGNOSTIC_COUNT == columns.len() {
+    if observed.is_empty() && found + DIAGNOSTIC_COUNT == columns.len() {
         columns.truncate(found);
     }
     check_columns(path, &file, &columns)?;
 
     let count = usize::try_from(file.metadata().file_metadata().num_rows()).unwrap_or(0);
-    let mut rows = vec![blank(header.prior.parameters().len()); count];
+    let mut rows = vec![blank(header.prior.parameters().len(), observed.len()); count];
     for (index, column) in columns.iter().enumerate() {
         match &column.access {
             Access::Count { set, .. } => {
@@ -129,7 +130,7 @@ pub(crate) fn read(path: &Path) -> Result<(Header, Vec<Row>), DatasetError> {
     Ok((header, rows))
 }
 
-fn blank(parameters: usize) -> Row {
+fn blank(parameters: usize, observed: usize) -> Row {
     Row {
         row: 0,
         parameters: vec![f64::NAN; parameters],
@@ -140,6 +141,7 @@ fn blank(parameters: usize) -> Row {
         cpu_s: f64::NAN,
         statistics: [f64::NAN; 16],
         diagnostics: [f64::NAN; DIAGNOSTIC_COUNT],
+        observed: vec![f64::NAN; observed],
     }
 }
 
@@ -239,9 +241,9 @@ mod tests {
         let written = Row {
             statistics: [0.25; 16],
             diagnostics: [0.5; DIAGNOSTIC_COUNT],
-            ..blank(parameters)
+            ..blank(parameters, 0)
         };
-        let mut listed = columns(&header.prior.names());
+        let mut listed = columns(&header.prior.names(), &[]);
         listed.truncate(listed.len() - DIAGNOSTIC_COUNT);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("old.parquet");

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use foxglove::Decode;
 use foxglove::messages::{CameraCalibration, PointCloud, RawImage};
-use granulcal_dataset::{Lost, ReadOptions, Recording, Source, Survey, View, look, record_pour};
+use granulcal_dataset::{
+    Lost, Observer, ReadOptions, Recording, Source, Survey, View, look, record_pour,
+};
 use granulcal_dem::{Scene, Simulation};
 
 fn scene() -> Scene {
@@ -29,7 +31,17 @@ fn schemas_counts_stamps_and_bytes_are_those_of_the_pour() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("pour.mcap");
     let scene = scene();
-    let pour = record_pour(simulation(), &scene, 4, 60.0, &path, &mut |_| true).unwrap().unwrap();
+    let pour = record_pour(
+        simulation(),
+        &scene,
+        4,
+        60.0,
+        &path,
+        &mut Observer::new(&scene()),
+        &mut |_| true,
+    )
+    .unwrap()
+    .unwrap();
     assert_eq!(pour, simulation().run());
 
     let bytes = std::fs::read(&path).unwrap();
@@ -112,9 +124,28 @@ fn schemas_counts_stamps_and_bytes_are_those_of_the_pour() {
 fn a_stopped_recording_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("pour.mcap");
-    let pour =
-        record_pour(simulation(), &scene(), 4, 60.0, &path, &mut |time| time < 0.05).unwrap();
+    let pour = record_pour(
+        simulation(),
+        &scene(),
+        4,
+        60.0,
+        &path,
+        &mut Observer::new(&scene()),
+        &mut |time| time < 0.05,
+    )
+    .unwrap();
     assert!(pour.is_none());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-    assert!(record_pour(simulation(), &scene(), 4, 0.0, &path, &mut |_| true).is_err());
+    assert!(
+        record_pour(
+            simulation(),
+            &scene(),
+            4,
+            0.0,
+            &path,
+            &mut Observer::new(&scene()),
+            &mut |_| true
+        )
+        .is_err()
+    );
 }

@@ -38,6 +38,20 @@ pub enum DemError {
         /// How many are asked for.
         count: usize,
     },
+    /// Grains start inside a wall.
+    #[error(
+        "{grains} grain(s) start in {wall}, the deepest by {depth:.2} of its radius; at most {allowed} is allowed"
+    )]
+    StartInWall {
+        /// The wall's path in the scene, `funnel` or the ground.
+        wall: String,
+        /// How many.
+        grains: usize,
+        /// How deep the deepest is, in its radii.
+        depth: f64,
+        /// How deep one may be.
+        allowed: f64,
+    },
     /// Arrays of a state differ in length.
     #[error("{name} has {got} entries, expected one for each of the {expected} grains")]
     Length {

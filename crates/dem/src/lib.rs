@@ -74,7 +74,8 @@ pub use preset::{Preset, SolverSettings};
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
     BoxSide, CameraSpec, EndRule, Ends, Funnel, GRAVITY, Grains, Ground, Mask, Mesh, MeshFile,
-    Motion, NoiseSpec, Projection, Scene, SensorSpec, Shape, Start, StereoSpec, TimeOfFlightSpec,
+    Motion, NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill,
+    ObserveSurface, Projection, Scene, SensorSpec, Shape, Start, StereoSpec, TimeOfFlightSpec,
     Wall,
 };
 pub use simulation::Simulation;

@@ -6,6 +6,7 @@
 mod camera;
 mod mesh;
 mod motion;
+mod observe;
 pub(crate) mod path;
 mod sensor;
 mod start;
@@ -16,6 +17,9 @@ use serde::{Deserialize, Serialize};
 pub use camera::{CameraSpec, Mask, Projection};
 pub use mesh::{Mesh, MeshFile};
 pub use motion::Motion;
+pub use observe::{
+    Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill, ObserveSurface,
+};
 pub use sensor::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 pub use start::Start;
 pub(crate) use start::unit_interval;
@@ -64,6 +68,9 @@ pub struct Scene {
     /// The depth camera above the ground.
     #[serde(default)]
     pub camera: CameraSpec,
+    /// What is observed while the pour goes on, and at its end beside the image.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observe: Option<Observe>,
 }
 
 /// What is poured: equal spheres.
@@ -121,6 +128,7 @@ impl Scene {
             effects: Effects::default(),
             end: EndRule::default(),
             camera: CameraSpec::default(),
+            observe: None,
         }
     }
 
@@ -222,6 +230,9 @@ impl Scene {
         let funnel = self.funnel.iter().map(|funnel| ("funnel".to_owned(), &funnel.motion));
         for (name, motion) in named.chain(funnel) {
             motion.check_jumps(&name, dt, diameter)?;
+        }
+        if let Some(observe) = &self.observe {
+            observe.check(self.end.horizon, self.grains.diameter)?;
         }
         self.camera.check()
     }

@@ -2,6 +2,7 @@
 //! `simulation/state.rs`.
 
 mod end;
+mod start;
 mod state;
 
 use std::sync::Arc;

@@ -51,6 +51,7 @@ pub mod register;
 mod rng;
 pub mod segment;
 pub mod sensor;
+pub mod series;
 pub mod stats;
 
 pub use camera::{Camera, Intrinsics};

@@ -68,6 +68,17 @@ impl Dataset {
     }
 
     #[getter]
+    fn observed_names(&self) -> Vec<String> {
+        self.inner.observed_statistics().into_iter().map(|statistic| statistic.name).collect()
+    }
+
+    #[getter]
+    fn observed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let columns = self.inner.observed_statistics().len();
+        array::matrix(py, self.inner.observed(), self.inner.rows.len(), columns)
+    }
+
+    #[getter]
     fn row<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u64>> {
         self.column(py, |row| row.row)
     }

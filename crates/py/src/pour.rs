@@ -1,5 +1,6 @@
 //! Class `Pour`.
 
+use granulcal_dataset::{Observed, RowStatus, Series};
 use granulcal_dem::{CameraSpec, Health};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -12,6 +13,8 @@ use crate::{array, error};
 #[pyclass(frozen, module = "granulcal._native")]
 pub(crate) struct Pour {
     pub(crate) inner: granulcal_dem::Pour,
+    pub(crate) status: RowStatus,
+    pub(crate) observed: Observed,
     pub(crate) camera: CameraSpec,
     pub(crate) seed: u64,
     pub(crate) cpu_seconds: f64,
@@ -41,7 +44,7 @@ impl Pour {
 
     #[getter]
     fn status(&self) -> &'static str {
-        self.inner.status.name()
+        self.status.name()
     }
 
     #[getter]
@@ -90,6 +93,23 @@ impl Pour {
     #[getter]
     fn cpu_seconds(&self) -> f64 {
         self.cpu_seconds
+    }
+
+    /// Values of the scene's own statistics, in its order.
+    #[getter]
+    fn observed<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.observed.statistics)
+    }
+
+    /// What was sampled over time: times and values by name.
+    #[getter]
+    fn series<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        for Series { name, times, values, .. } in &self.observed.series {
+            let pair = (PyArray1::from_slice(py, times), PyArray1::from_slice(py, values));
+            all.set_item(name, pair)?;
+        }
+        Ok(all)
     }
 
     fn observe(&self, py: Python<'_>) -> PyResult<Observation> {

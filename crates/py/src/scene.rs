@@ -68,6 +68,12 @@ impl Scene {
         self.inner.get(path).map_err(error::dem)
     }
 
+    /// Name, unit and doc of the statistics that the scene observes.
+    fn observed_statistics(&self) -> Vec<(String, &'static str, String)> {
+        let all = granulcal_dataset::observed_statistics(&self.inner);
+        all.into_iter().map(|statistic| (statistic.name, statistic.unit, statistic.doc)).collect()
+    }
+
     #[getter]
     fn name(&self) -> &str {
         &self.inner.name

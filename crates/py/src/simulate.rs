@@ -1,6 +1,7 @@
 //! Function `simulate`.
 
 use cpu_time::{ProcessTime, ThreadTime};
+use granulcal_dataset::Observer;
 use granulcal_dem::Simulation;
 use pyo3::prelude::*;
 
@@ -18,13 +19,19 @@ pub(crate) fn simulate(py: Python<'_>, scene: &Scene, seed: u64, threads: usize)
         let watch = Watch::new();
         let outcome = Simulation::new(scene, seed)
             .and_then(|simulation| simulation.with_threads(threads))
-            .map(|simulation| simulation.run_while(&|| watch.keep_going(|_| Ok(()))));
+            .and_then(|simulation| simulation.check_start().map(|()| simulation))
+            .map(|simulation| {
+                let mut observer = Observer::new(scene);
+                let pour = observer.run_while(simulation, &|| watch.keep_going(|_| Ok(())))?;
+                let (status, observed) = (observer.status(&pour), observer.observed(&pour));
+                Some((pour, status, observed))
+            });
         let elapsed = if threads == 1 { thread.elapsed() } else { process.elapsed() };
         (outcome, watch.finish(), elapsed.as_secs_f64())
     });
     interrupted?;
-    let pour = outcome.map_err(error::dem)?.ok_or_else(|| {
+    let (pour, status, observed) = outcome.map_err(error::dem)?.ok_or_else(|| {
         pyo3::exceptions::PyKeyboardInterrupt::new_err("the simulation was stopped")
     })?;
-    Ok(Pour { inner: pour, camera: scene.camera, seed, cpu_seconds })
+    Ok(Pour { inner: pour, status, observed, camera: scene.camera, seed, cpu_seconds })
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use granulcal_dataset::{CameraFile, View, look, npy, png, write_height_map};
+use granulcal_dataset::{CameraFile, Observer, View, look, npy, png, write_height_map};
 use granulcal_dem::{Projection, Scene};
 
 use crate::args::RenderArgs;
@@ -19,7 +19,14 @@ pub fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
         (positions, radii)
     } else {
         let simulation = scene::start(&scene, args.seed, 1, None)?;
-        match scene::pour(context, &scene, args.seed, simulation, &Keep::Nothing)? {
+        match scene::pour(
+            context,
+            &scene,
+            args.seed,
+            simulation,
+            &Keep::Nothing,
+            &mut Observer::new(&scene),
+        )? {
             Some(pour) => (pour.positions, pour.radii),
             None => return Ok(Outcome::Stopped),
         }

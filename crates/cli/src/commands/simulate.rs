@@ -4,11 +4,13 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use cpu_time::ProcessTime;
-use granulcal_dataset::{DatasetError, RowStatus, npy, observe};
+use granulcal_dataset::{
+    DatasetError, ObservedStatistic, Observer, RowStatus, npy, observe, observed_statistics,
+};
 use granulcal_dem::{Health, Pour, Scene};
 use granulcal_features::{DIAGNOSTICS, PAPER16, Statistic};
 use serde::Serialize;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use super::render::{check_name, write_view};
 use crate::args::SimulateArgs;
@@ -34,6 +36,12 @@ struct Report {
     /// Absent unless asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     diagnostics: Option<Map<String, Value>>,
+    /// What the scene observes; absent if nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    observed: Option<Map<String, Value>>,
+    /// Name to unit, times and values of what was sampled.
+    #[serde(skip_serializing_if = "Map::is_empty")]
+    series: Map<String, Value>,
 }
 
 pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
@@ -48,7 +56,9 @@ pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
         (None, None) => Keep::Nothing,
     };
     let simulation = scene::start(&scene, args.seed, args.threads, args.resume.as_deref())?;
-    let Some(pour) = scene::pour(context, &scene, args.seed, simulation, &keep)? else {
+    let mut observer = Observer::new(&scene);
+    let pour = scene::pour(context, &scene, args.seed, simulation, &keep, &mut observer)?;
+    let Some(pour) = pour else {
         if let Keep::Checkpoint { path, .. } = keep {
             let path = path.display();
             tracing::warn!("stopped; the same command with --resume {path} goes on");
@@ -69,14 +79,16 @@ pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
         state_hash: format!("{:032x}", pour.state_hash),
         statistics: None,
         diagnostics: None,
+        observed: None,
+        series: Map::new(),
     };
-    let status = describe(&scene, &pour, args, &mut report)?;
+    let status = describe(&scene, &pour, &observer, args, &mut report)?;
     report.cpu_s = clock.elapsed().as_secs_f64();
     report.wall_s = start.elapsed().as_secs_f64();
     if let Some(path) = &args.positions {
         npy::write_points(path, &pour.positions).context("writing --positions")?;
     }
-    print(&report, args.json)?;
+    print(&report, &scene, args.json)?;
     Ok(Outcome::healthy_if(status.is_healthy()))
 }
 
@@ -84,10 +96,13 @@ pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
 fn describe(
     scene: &Scene,
     pour: &Pour,
+    observer: &Observer,
     args: &SimulateArgs,
     report: &mut Report,
 ) -> anyhow::Result<RowStatus> {
-    let status = RowStatus::Pour(pour.status);
+    let status = observer.status(pour);
+    report.status = status.name();
+    tell_observed(scene, pour, observer, report);
     let seen = match observe(&scene.camera, pour, args.seed) {
         // The grains of an unhealthy pour can be anywhere: the status says enough.
         Err(DatasetError::Features(reason)) if !status.is_healthy() => {
@@ -109,7 +124,7 @@ fn describe(
         }
         Err(reason) => {
             tracing::warn!("{reason}");
-            let says_enough = !status.is_healthy() || status.is_jammed();
+            let says_enough = !status.is_healthy() || status.is_jammed() || !observer.is_idle();
             let status = if says_enough { status } else { RowStatus::NoGrainsInView };
             report.status = status.name();
             Ok(status)
@@ -117,11 +132,25 @@ fn describe(
     }
 }
 
+/// Fills in what the scene observes.
+fn tell_observed(scene: &Scene, pour: &Pour, observer: &Observer, report: &mut Report) {
+    if observer.is_idle() {
+        return;
+    }
+    let observed = observer.observed(pour);
+    let names = observed_statistics(scene).into_iter().map(|statistic| statistic.name);
+    report.observed = Some(names.zip(observed.statistics.into_iter().map(Value::from)).collect());
+    let entry = |s: granulcal_dataset::Series| {
+        (s.name.to_owned(), json!({ "unit": s.unit, "times": s.times, "values": s.values }))
+    };
+    report.series = observed.series.into_iter().map(entry).collect();
+}
+
 fn by_name<P>(registry: &[Statistic<P>], values: &[f64]) -> Map<String, Value> {
     registry.iter().zip(values).map(|(s, &value)| (s.name.to_owned(), value.into())).collect()
 }
 
-fn print(report: &Report, json: bool) -> anyhow::Result<()> {
+fn print(report: &Report, scene: &Scene, json: bool) -> anyhow::Result<()> {
     if json {
         return print_json(report);
     }
@@ -137,6 +166,10 @@ fn print(report: &Report, json: bool) -> anyhow::Result<()> {
         print_line(&format!("grains in funnel   {}", report.grains_in_funnel))?;
     }
     print_line(&format!("state              {}", report.state_hash))?;
+    for ObservedStatistic { name, unit, .. } in observed_statistics(scene) {
+        let value = report.observed.as_ref().and_then(|all| all.get(&name)?.as_f64());
+        print_line(&format!("{name:<18} {:<12.6} {unit}", value.unwrap_or(f64::NAN)))?;
+    }
     print_family(&PAPER16, report.statistics.as_ref())?;
     print_family(&DIAGNOSTICS, report.diagnostics.as_ref())
 }

@@ -5,6 +5,7 @@ use parquet::basic::{ConvertedType, LogicalType, Repetition, Type as Physical};
 use parquet::errors::ParquetError;
 use parquet::schema::types::Type;
 
+use crate::observer::ObservedStatistic;
 use crate::row::Row;
 
 /// Takes a number from a row.
@@ -63,8 +64,8 @@ impl Column {
     }
 }
 
-/// Every column of a data set with these parameters, in the order of the file.
-pub(super) fn columns(parameters: &[&str]) -> Vec<Column> {
+/// Every column of a data set with these parameters whose scene observes these statistics, in the order of the file.
+pub(super) fn columns(parameters: &[&str], observed: &[ObservedStatistic]) -> Vec<Column> {
     let mut columns = vec![Column::count("row", |r| r.row, |r, v| r.row = v)];
     for (i, path) in parameters.iter().enumerate() {
         columns.push(Column::number(
@@ -133,6 +134,13 @@ pub(super) fn columns(parameters: &[&str]) -> Vec<Column> {
             statistic.name,
             move |r| r.diagnostics[i],
             move |r, v| r.diagnostics[i] = v,
+        ));
+    }
+    for (i, statistic) in observed.iter().enumerate() {
+        columns.push(Column::number(
+            &statistic.name,
+            move |r| r.observed[i],
+            move |r, v| r.observed[i] = v,
         ));
     }
     columns

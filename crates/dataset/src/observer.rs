@@ -1,0 +1,244 @@
+//! What a scene observes of a pour: series over time and statistics, by name. One kind of observation is one file.
+//!
+//! The observer looks at a simulation at stated times and changes nothing of it: the pour has the same bits with and
+//! without. The names, units and meanings of its statistics follow from the scene's `observe` alone, so that every pour
+//! of a data set has the same columns.
+
+mod discharge;
+mod front;
+mod radius;
+mod spill;
+mod surface;
+
+use std::fmt::Debug;
+
+use granulcal_dem::{Pour, Scene, Simulation, Status};
+use nalgebra::Vector3;
+
+use crate::row::RowStatus;
+
+/// Simulated time between two questions whether to go on `[s]`.
+const GLANCE: f64 = 0.002;
+
+/// A statistic of a scene, as the registry tells the others.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ObservedStatistic {
+    /// Its name in every file, table and plot, with where or when it is taken in brackets: `front_radius[0.1]`.
+    pub name: String,
+    /// Its unit, "-" if dimensionless.
+    pub unit: &'static str,
+    /// What it is, in one line.
+    pub doc: String,
+}
+
+/// A number over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// The name of its statistics, without brackets.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// When each sample was taken, after the observation's begin `[s]`.
+    pub times: Vec<f64>,
+    /// The samples; NaN where there is no such thing.
+    pub values: Vec<f64>,
+}
+
+impl Series {
+    fn new(name: &'static str, unit: &'static str) -> Self {
+        Self { name, unit, times: Vec::new(), values: Vec::new() }
+    }
+
+    fn push(&mut self, time: f64, value: f64) {
+        self.times.push(time);
+        self.values.push(value);
+    }
+
+    /// Linear between samples. Before the first it is NaN, as after the last unless grains at rest hold it.
+    fn at(&self, time: f64, holds: bool) -> f64 {
+        let after = self.times.partition_point(|&t| t < time - 1e-9);
+        match (after.checked_sub(1), self.times.get(after)) {
+            (_, Some(&t)) if t <= time + 1e-9 => self.values[after],
+            (Some(before), Some(&t1)) => {
+                let (t0, y0, y1) = (self.times[before], self.values[before], self.values[after]);
+                y0 + (y1 - y0) * (time - t0) / (t1 - t0)
+            }
+            (Some(last), None) if holds => self.values[last],
+            _ => f64::NAN,
+        }
+    }
+}
+
+/// Grains at one time.
+struct Frame {
+    /// After the observation's begin `[s]`.
+    time: f64,
+    positions: Vec<Vector3<f64>>,
+    radii: Vec<f64>,
+}
+
+/// One kind of observation.
+trait Observation: Debug + Send {
+    /// The statistics that it gives.
+    fn statistics(&self) -> Vec<ObservedStatistic>;
+    /// Takes a sample.
+    fn see(&mut self, _frame: &Frame) {}
+    /// Values of the statistics once the pour has ended.
+    fn values(&self, pour: &Pour) -> Vec<f64>;
+    /// What it has seen over time.
+    fn series(&self) -> Option<&Series> {
+        None
+    }
+    /// Whether a pour that has come to rest is jammed.
+    fn is_jammed(&self, _pour: &Pour) -> bool {
+        false
+    }
+}
+
+/// What a pour has shown.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Observed {
+    /// Values of [`observed_statistics`], one each; NaN for what could not be seen.
+    pub statistics: Vec<f64>,
+    /// What was sampled over time.
+    pub series: Vec<Series>,
+}
+
+/// Looks at a simulation whenever the scene says.
+#[derive(Debug)]
+pub struct Observer {
+    observations: Vec<Box<dyn Observation>>,
+    begin: f64,
+    rate: f64,
+    /// Number of the next sample.
+    next: u64,
+}
+
+/// The statistics that a scene observes; none if it observes nothing.
+pub fn observed_statistics(scene: &Scene) -> Vec<ObservedStatistic> {
+    observations(scene).iter().flat_map(|observation| observation.statistics()).collect()
+}
+
+fn observations(scene: &Scene) -> Vec<Box<dyn Observation>> {
+    let mut all: Vec<Box<dyn Observation>> = Vec::new();
+    let Some(observe) = &scene.observe else { return all };
+    if let Some(spec) = &observe.surface {
+        all.push(Box::new(surface::Surface::new(spec, scene)));
+    }
+    if let Some(spec) = &observe.front {
+        all.push(Box::new(front::Front::new(spec)));
+    }
+    if let Some(spec) = &observe.discharge {
+        all.push(Box::new(discharge::Discharge::new(spec)));
+    }
+    if let Some(spec) = &observe.radius {
+        all.push(Box::new(radius::Radius::new(spec)));
+    }
+    if let Some(spec) = &observe.spill {
+        all.push(Box::new(spill::Spill::new(spec)));
+    }
+    all
+}
+
+impl Observer {
+    /// An observer of `scene` that has seen nothing.
+    pub fn new(scene: &Scene) -> Self {
+        let (begin, rate) = scene.observe.as_ref().map_or((0.0, 1.0), |o| (o.begin, o.rate));
+        Self { observations: observations(scene), begin, rate, next: 0 }
+    }
+
+    /// Whether there is nothing to look at.
+    pub fn is_idle(&self) -> bool {
+        self.observations.is_empty()
+    }
+
+    /// When the next sample is due, at the nearest substep `[s]`.
+    fn due(&self) -> f64 {
+        self.begin + self.next as f64 / self.rate
+    }
+
+    /// Simulates `seconds`, or less if the pour ends before, and takes the samples that fall due. Samples before the time
+    /// at which the first call begins are missed, as after a restart from a checkpoint.
+    pub fn advance(&mut self, simulation: &mut Simulation, seconds: f64) {
+        if self.is_idle() {
+            simulation.advance(seconds);
+            return;
+        }
+        let (end, half) = (simulation.time() + seconds, 0.5 * simulation.settings().dt);
+        if self.next == 0 {
+            let missed = (simulation.time() - half - self.begin) * self.rate;
+            self.next = missed.max(0.0).ceil() as u64;
+        }
+        loop {
+            self.look(simulation);
+            if simulation.ended().is_some() || simulation.time() + half >= end {
+                break;
+            }
+            let until = self.due().min(end);
+            simulation.advance((until - simulation.time()).max(2.0 * half));
+        }
+    }
+
+    /// Simulates to the end, or gives up when `keep_going` says so.
+    pub fn run_while(
+        &mut self,
+        mut simulation: Simulation,
+        keep_going: &dyn Fn() -> bool,
+    ) -> Option<Pour> {
+        if self.is_idle() {
+            return simulation.run_while(keep_going);
+        }
+        while simulation.ended().is_none() {
+            if !keep_going() {
+                return None;
+            }
+            self.advance(&mut simulation, GLANCE);
+        }
+        Some(simulation.into_pour())
+    }
+
+    /// Takes a sample if one is due, and one of the end.
+    fn look(&mut self, simulation: &Simulation) {
+        let (time, half) = (simulation.time(), 0.5 * simulation.settings().dt);
+        let is_due = time + half >= self.due();
+        let is_last = simulation.ended().is_some() && time >= self.begin;
+        if !(is_due || is_last) {
+            return;
+        }
+        self.next = ((time + half - self.begin) * self.rate).floor().max(0.0) as u64 + 1;
+        let (positions, radii) = (simulation.positions(), simulation.radii());
+        let frame = Frame { time: time - self.begin, positions, radii };
+        for observation in &mut self.observations {
+            observation.see(&frame);
+        }
+    }
+
+    /// What was seen of a pour that has ended.
+    pub fn observed(&self, pour: &Pour) -> Observed {
+        // The grains of an unhealthy pour can be anywhere, NaN included.
+        let is_sound = pour.status != Status::Unhealthy;
+        let values = |observation: &dyn Observation| match observation.values(pour) {
+            values if is_sound => values,
+            values => vec![f64::NAN; values.len()],
+        };
+        Observed {
+            statistics: self.observations.iter().flat_map(|o| values(o.as_ref())).collect(),
+            series: self.observations.iter().filter_map(|o| o.series().cloned()).collect(),
+        }
+    }
+
+    /// The status of a pour's row: `jammed` where an observation says so of a pour at rest.
+    pub fn status(&self, pour: &Pour) -> RowStatus {
+        let is_jammed = pour.status == Status::AtRest
+            && self.observations.iter().any(|observation| observation.is_jammed(pour));
+        RowStatus::Pour(if is_jammed { Status::Jammed } else { pour.status })
+    }
+}
+
+/// Whether a pour's last sample stands for all times after it.
+fn holds(pour: &Pour) -> bool {
+    matches!(pour.status, Status::AtRest | Status::OutOfView | Status::Jammed)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,54 @@
+//! The radius of the front of grains that spread, against time.
+
+use granulcal_dem::{ObserveFront, Pour};
+use granulcal_features::series::front_radius;
+use nalgebra::Vector2;
+
+use super::{Frame, Observation, ObservedStatistic, Series, holds};
+
+/// `front_radius[t]` at the stated times, and `front_radius[end]`.
+#[derive(Debug)]
+pub(super) struct Front {
+    spec: ObserveFront,
+    series: Series,
+}
+
+impl Front {
+    pub(super) fn new(spec: &ObserveFront) -> Self {
+        Self { spec: spec.clone(), series: Series::new("front_radius", "m") }
+    }
+}
+
+impl Observation for Front {
+    fn statistics(&self) -> Vec<ObservedStatistic> {
+        let percent = 100.0 * self.spec.level;
+        let statistic = |at: String, when: String| ObservedStatistic {
+            name: format!("front_radius[{at}]"),
+            unit: "m",
+            doc: format!(
+                "radius about the axis where grains cover {percent} % of the circle, {when}"
+            ),
+        };
+        let times = self.spec.times.iter();
+        let mut all: Vec<_> =
+            times.map(|t| statistic(t.to_string(), format!("{t} s after the begin"))).collect();
+        all.push(statistic("end".to_owned(), "at the end".to_owned()));
+        all
+    }
+
+    fn see(&mut self, frame: &Frame) {
+        let (axis, level) = (Vector2::from(self.spec.axis), self.spec.level);
+        let radius = front_radius(&frame.positions, &frame.radii, axis, level);
+        self.series.push(frame.time, radius.unwrap_or(f64::NAN));
+    }
+
+    fn values(&self, pour: &Pour) -> Vec<f64> {
+        let at = |&time: &f64| self.series.at(time, holds(pour));
+        let end = self.series.values.last().copied().unwrap_or(f64::NAN);
+        self.spec.times.iter().map(at).chain([end]).collect()
+    }
+
+    fn series(&self) -> Option<&Series> {
+        Some(&self.series)
+    }
+}

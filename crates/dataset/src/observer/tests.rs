@@ -1,0 +1,120 @@
+//! The observer against pours whose answers are known.
+
+use granulcal_dem::{
+    Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill, ObserveSurface, Start,
+};
+
+use super::*;
+
+/// One grain let go 5 cm above the ground, and all that can be observed of it.
+fn scene() -> Scene {
+    let mut scene = Scene::drop(0.1);
+    scene.grains.count = 1;
+    scene.start = Start::Positions { positions: vec![[0.03, 0.0, 0.052]] };
+    scene.end.horizon = 0.4;
+    scene.material.restitution = 0.0;
+    scene.observe = Some(Observe {
+        rate: 500.0,
+        begin: 0.02,
+        surface: Some(ObserveSurface {
+            centre: [0.03, 0.0],
+            x: vec![0.0],
+            slope_within: 0.01,
+            level: 0.5,
+        }),
+        front: Some(ObserveFront { axis: [0.03, 0.0], times: vec![0.05], level: 0.5 }),
+        discharge: Some(ObserveDischarge {
+            below: 0.027,
+            times: vec![0.03, 0.1, 0.3],
+            jammed_below: 0.0,
+        }),
+        radius: Some(ObserveRadius { axis: [0.0; 2], percentiles: vec![50.0] }),
+        spill: Some(ObserveSpill { axis: [0.0; 2], radius: 0.02 }),
+    });
+    scene
+}
+
+fn run(scene: &Scene) -> (Pour, Observer) {
+    let mut observer = Observer::new(scene);
+    let simulation = Simulation::new(scene, 1).unwrap();
+    let pour = observer.run_while(simulation, &|| true).unwrap();
+    (pour, observer)
+}
+
+fn value(scene: &Scene, observed: &Observed, name: &str) -> f64 {
+    let names = observed_statistics(scene);
+    assert_eq!(names.len(), observed.statistics.len());
+    observed.statistics[names.iter().position(|s| s.name == name).expect(name)]
+}
+
+#[test]
+fn a_falling_grain_is_seen_where_it_is() {
+    let scene = scene();
+    let (pour, observer) = run(&scene);
+    assert_eq!(pour.status, Status::AtRest);
+    let observed = observer.observed(&pour);
+    // It passes 27 mm after sqrt(2 25 mm / g) = 71.4 ms, 51.4 ms after the begin.
+    for (name, expected) in [
+        ("discharged[0.03]", 0.0),
+        ("discharged[0.1]", 100.0),
+        ("discharged[0.3]", 100.0), // after the end: at rest it stays out
+        ("spilled", 1.0),
+    ] {
+        assert_eq!(value(&scene, &observed, name), expected, "{name}");
+    }
+    assert!((value(&scene, &observed, "radius[50]") - 0.03).abs() < 1e-6);
+    // A grain on the axis covers every circle up to its own radius; circles are a quarter of it apart.
+    assert!((value(&scene, &observed, "front_radius[0.05]") - 0.002).abs() < 5.1e-4);
+    assert!(value(&scene, &observed, "surface_slope").is_nan());
+    let series = &observed.series[1];
+    assert_eq!((series.name, series.unit, series.times[0]), ("discharged", "%", 0.0));
+    let gaps: Vec<_> = series.times.windows(2).map(|t| t[1] - t[0]).collect();
+    let (dt, inner) = (scene.preset.settings().dt, &gaps[..gaps.len() - 1]);
+    assert!(inner.iter().all(|gap| (gap - 0.002).abs() <= dt), "{gaps:?}");
+    let fell = series.values.iter().position(|&share| share > 0.0).unwrap();
+    assert!((series.times[fell] - 0.0514).abs() < 0.0025, "{}", series.times[fell]);
+}
+
+#[test]
+fn to_be_observed_changes_no_bit() {
+    let scene = scene();
+    let blind = Scene { observe: None, ..scene.clone() };
+    assert_eq!(run(&scene).0.state_hash, run(&blind).0.state_hash);
+    assert!(Observer::new(&blind).is_idle() && observed_statistics(&blind).is_empty());
+}
+
+#[test]
+fn what_was_before_a_restart_is_not_made_up() {
+    let scene = scene();
+    let mut simulation = Simulation::new(&scene, 1).unwrap();
+    simulation.advance(0.08);
+    let mut observer = Observer::new(&scene);
+    let pour = observer.run_while(simulation, &|| true).unwrap();
+    let observed = observer.observed(&pour);
+    assert!(value(&scene, &observed, "discharged[0.03]").is_nan());
+    assert_eq!(value(&scene, &observed, "discharged[0.1]"), 100.0);
+    assert!(observed.series[0].times[0] >= 0.06 - 1e-3);
+}
+
+#[test]
+fn a_pour_at_rest_that_has_not_run_out_is_jammed() {
+    let mut scene = scene();
+    let jammed = |scene: &Scene| {
+        let (pour, observer) = run(scene);
+        observer.status(&pour).is_jammed()
+    };
+    assert!(!jammed(&scene));
+    scene.observe.as_mut().unwrap().discharge.as_mut().unwrap().below = 0.001;
+    assert!(!jammed(&scene));
+    scene.observe.as_mut().unwrap().discharge.as_mut().unwrap().jammed_below = 50.0;
+    assert!(jammed(&scene));
+}
+
+#[test]
+fn the_rate_is_that_of_a_steady_flow() {
+    let times: Vec<_> = (0..100).map(f64::from).collect();
+    // Nothing for ten seconds, then 2 %/s, then all is out.
+    let percent: Vec<_> = times.iter().map(|t| (2.0 * (t - 10.0)).clamp(0.0, 100.0)).collect();
+    assert!((discharge::rate(&times, &percent) - 2.0).abs() < 1e-12);
+    assert!(discharge::rate(&times[..3], &percent[..3]).is_nan());
+}

@@ -1,0 +1,86 @@
+"""Discharge curves: percent that has run out against time, as CSV."""
+
+import csv
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.measured.names import observed_of, value_at
+from granulcal.scene import Scene
+from granulcal.statistics import ObservedStatistics
+
+__all__ = ["DischargeCurve"]
+
+Array = NDArray[np.float64]
+
+_HEADER = ["series", "time_s", "discharged_percent"]
+# As the simulated `discharge_rate`: after the start, before the end.
+_RATE_RANGE = (5.0, 85.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DischargeCurve:
+    """One series of a file with the columns series, time_s, discharged_percent.
+
+    Attributes:
+        series: its name.
+        time: since the flow began [s], shape (n,).
+        percent: share that has run out [%], shape (n,).
+    """
+
+    series: str
+    time: Array
+    percent: Array
+
+    @classmethod
+    def open(cls, path: str | PathLike[str], series: str | None = None) -> "DischargeCurve":
+        """Returns the series of that name, or the only one.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: other columns, a line that is no numbers, or no such series; the message
+                says what there is.
+        """
+        points: dict[str, list[tuple[float, float]]] = {}
+        with Path(path).open(newline="") as file:
+            rows = csv.reader(file)
+            header = next(rows, [])
+            if header != _HEADER:
+                raise ValueError(f"{path}: the columns must be {_HEADER}, got {header}")
+            for number, row in enumerate(rows, start=2):
+                try:
+                    name, time, percent = row
+                    points.setdefault(name, []).append((float(time), float(percent)))
+                except ValueError:
+                    message = f"{path}: line {number} must be a name and two numbers, got {row}"
+                    raise ValueError(message) from None
+        if series is None and len(points) == 1:
+            series = next(iter(points))
+        if series is None or series not in points:
+            raise ValueError(f"{path}: series must be one of {sorted(points)}, got {series!r}")
+        time, percent = np.array(sorted(points[series])).T
+        return cls(series=series, time=time, percent=percent)
+
+    def rate(self) -> float:
+        """Returns the least-squares slope of the share between 5 and 85 % [%/s]."""
+        low, high = _RATE_RANGE
+        within = (self.percent >= low) & (self.percent <= high)
+        if within.sum() < 2:
+            return float("nan")
+        return float(np.polyfit(self.time[within], self.percent[within], 1)[0])
+
+    def observed(self, scene: Scene) -> ObservedStatistics:
+        """Returns the measured `discharged[t]` of the scene's times and the `discharge_rate`.
+
+        Raises:
+            ValueError: the scene observes no discharge.
+        """
+
+        def discharged(at: str | None) -> float:
+            return value_at(self.time, self.percent, float(at or "nan"))
+
+        kinds = {"discharged": discharged, "discharge_rate": lambda _: self.rate()}
+        return observed_of(scene, kinds, "a discharge curve")

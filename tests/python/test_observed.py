@@ -1,0 +1,173 @@
+"""Statistics that a scene observes: of pours, in data sets, and measured."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.measured import DischargeCurve, DrumImage, RunOut
+
+_OBSERVE = """
+[observe]
+rate = 100.0
+begin = 0.0
+
+[observe.front]
+times = [0.1, 0.2]
+
+[observe.discharge]
+below = 0.0
+times = [0.1, 0.2]
+
+[observe.surface]
+centre = [0.0, 0.0]
+x = [-0.01, 0.0, 0.01]
+slope_within = 0.008
+
+[observe.radius]
+percentiles = [50.0]
+
+[observe.spill]
+radius = 0.02
+"""
+
+
+@pytest.fixture
+def scene() -> gc.Scene:
+    """A small drop that observes everything."""
+    return gc.Scene.from_toml(gc.Scene.drop(0.02, count=60).to_toml() + _OBSERVE)
+
+
+def test_names_units_and_docs_come_from_the_scene(scene: gc.Scene) -> None:
+    assert scene.observed_names == (
+        "surface_z[-0.01]",
+        "surface_z[0]",
+        "surface_z[0.01]",
+        "surface_slope",
+        "front_radius[0.1]",
+        "front_radius[0.2]",
+        "front_radius[end]",
+        "discharged[0.1]",
+        "discharged[0.2]",
+        "discharge_rate",
+        "radius[50]",
+        "spilled",
+    )
+    assert scene.observed_units["surface_slope"] == "deg"
+    assert "0.2 s after the begin" in scene.observed_docs["front_radius[0.2]"]
+    assert gc.Scene.drop(0.02).observed_names == ()
+
+
+def test_a_pour_shows_what_its_scene_observes(scene: gc.Scene) -> None:
+    pour = gc.simulate(scene, seed=1)
+    observed = pour.observed()
+    radii = np.sort(np.hypot(*pour.positions[:, :2].T))
+    assert observed["radius[50]"] == pytest.approx(radii[29:31].mean(), rel=1e-12)
+    assert observed["spilled"] == (radii > 0.02).sum()
+    assert observed["discharged[0.2]"] == 0.0
+    time, radius = pour.series("front_radius")
+    assert time[0] == 0.0
+    assert np.all(np.diff(time) > 0)
+    assert observed["front_radius[0.1]"] == pytest.approx(np.interp(0.1, time, radius), abs=1e-4)
+    with pytest.raises(KeyError, match="front_radius"):
+        pour.series("height")
+    assert len(gc.simulate(gc.Scene.drop(0.02, count=20)).observed()) == 0
+
+
+def test_what_a_scene_observes_is_the_x_of_its_data_set(scene: gc.Scene, tmp_path: Path) -> None:
+    kept = gc.Scene.from_toml(
+        scene.to_toml().split("[observe")[0]
+        + "[observe]\nrate = 100.0\n[observe.radius]\npercentiles = [10.0, 50.0, 90.0]\n"
+    )
+    data = gc.generate(kept, gc.Prior.default(), 3, seed=2, out=tmp_path / "d", progress=False)
+    assert data.x_names == ("radius[10]", "radius[50]", "radius[90]")
+    assert data.x.shape == (3, 3)
+    assert data.paper16.shape == (3, 16)
+    assert data.is_usable.all()
+    assert (np.diff(data.x, axis=1) > 0).all()
+    data.save(tmp_path / "one.parquet")
+    again = gc.Dataset.load(tmp_path / "one.parquet")
+    np.testing.assert_array_equal(again.x, data.x)
+    assert list(again.columns())[-3:] == list(data.x_names)
+
+
+def test_a_run_out_file_gives_the_fronts_of_the_scene(scene: gc.Scene, tmp_path: Path) -> None:
+    path = tmp_path / "run.txt"
+    rows = ["Frame r_f v_f r_p v_p r_f v_f r_p v_p"]
+    for frame in range(60):
+        radius = 0.05 + 0.001 * frame
+        second = "nan" if frame < 10 else f"{radius + 0.002}"
+        rows.append(f"{frame} {radius + 0.01} 0 {radius} 0 {radius + 0.01} 0 {second} nan")
+    path.write_text("\n".join(rows) + "\n")
+    observed = gc.Recording.observed(path, scene)
+    # Frame 24 of 240 a second, mean of two cameras.
+    assert observed["front_radius[0.1]"] == pytest.approx(0.05 + 0.024 + 0.001)
+    assert observed["front_radius[end]"] == pytest.approx(0.05 + 0.059 + 0.001)
+    assert np.isnan(observed["discharged[0.1]"])
+    assert gc.Recording.observed(path, scene, fps=120.0)["front_radius[0.1]"] == pytest.approx(
+        0.05 + 0.012 + 0.001
+    )
+    assert RunOut.open(path).front_radius()[3] == pytest.approx(0.053)
+    path.write_text("Frame\n1 2 3\n")
+    with pytest.raises(ValueError, match="line 2 must have 9 numbers, got 3"):
+        gc.Recording.observed(path, scene)
+    with pytest.raises(ValueError, match="takes fps, not width"):
+        gc.Recording.observed(path, scene, width=0.1)
+
+
+def test_a_discharge_curve_gives_shares_and_rate(scene: gc.Scene, tmp_path: Path) -> None:
+    path = tmp_path / "curves.csv"
+    rows = ["series,time_s,discharged_percent"]
+    rows += [f"a,{0.05 * i},{min(100.0, 12.0 * i)}" for i in range(12)]
+    rows += ["b,0,0", "b,1,10"]
+    path.write_text("\n".join(rows) + "\n")
+    observed = gc.Recording.observed(path, scene, series="a")
+    assert observed["discharged[0.1]"] == pytest.approx(24.0)
+    assert observed["discharge_rate"] == pytest.approx(240.0)
+    with pytest.raises(ValueError, match=r"\['a', 'b'\], got None"):
+        DischargeCurve.open(path)
+    path.write_text("time,percent\n0,0\n")
+    with pytest.raises(ValueError, match="the columns must be"):
+        DischargeCurve.open(path)
+
+
+def test_a_drum_picture_gives_its_surface(scene: gc.Scene, tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    pixels, width, slope = 200, 0.04, 0.6
+    centre = (np.arange(pixels) + 0.5) * width / pixels - 0.5 * width
+    x, z = np.meshgrid(centre, -centre)
+    grains = z < 0.002 - slope * x
+    grey = np.where(grains & (np.hypot(x, z) < 0.5 * width), 20, 250).astype(np.uint8)
+    path = tmp_path / "drum.bmp"
+    image.fromarray(grey).save(path)
+    observed = gc.Recording.observed(path, scene, width=width)
+    pixel = width / pixels
+    for at in (-0.01, 0.0, 0.01):
+        name = f"surface_z[{at:g}]"
+        assert observed[name] == pytest.approx(0.002 - slope * at, abs=pixel)
+    assert observed["surface_slope"] == pytest.approx(np.degrees(np.arctan(slope)), abs=0.5)
+    assert np.isnan(observed["spilled"])
+    with pytest.raises(ValueError, match="width"):
+        gc.Recording.observed(path, scene)
+    image.fromarray(np.full((50, 50), 9, np.uint8)).save(path)
+    with pytest.raises(ValueError, match="shows no grains"):
+        DrumImage.open(path, width=width)
+    with pytest.raises(ValueError, match="observes nothing"):
+        RunOut(time=np.zeros(1), particles=np.zeros((1, 2)), fluid=np.zeros((1, 2))).observed(
+            gc.Scene.drop(0.02)
+        )
+
+
+def test_measured_kinds_that_nobody_knows_are_refused(scene: gc.Scene, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"\.bmp, \.png, \.txt, \.csv"):
+        gc.Recording.observed(tmp_path / "x.mp4", scene)
+
+
+def test_a_start_in_a_wall_is_refused(scene: gc.Scene) -> None:
+    wall = (
+        "[[walls]]\nshape = { kind = 'plane', point = [0.0, 0.0, 0.03], normal = [0.0, 0.0, 1.0] }"
+    )
+    bad = gc.Scene.from_toml(gc.Scene.drop(0.02, count=60).to_toml() + wall)
+    with pytest.raises(ValueError, match=r"start in walls\.0"):
+        gc.simulate(bad)
