@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 import granulcal as gc
 from granulcal.loop import Observation, Surrogate, Thresholds, compare, trace
-from granulcal.loop.archive import Archive, Plan, from_cube, statistics_of_the_loop
+from granulcal.loop.archive import Archive, Plan, from_cube
 from granulcal.loop.baseline import fit_base
 from granulcal.loop.forward import Forward
 from granulcal.loop.library import FUNNEL
@@ -77,7 +77,6 @@ class Study:
             self.plan.design, rows.theta, rows.condition, rows.psi, rows.x, names=rows.names
         )
         self.forward = Forward(kept, threads)
-        self.columns = statistics_of_the_loop()
 
     def pours(self, theta: Array, height: float, psi: dict[str, float], seeds: range) -> Array:
         """Pours of a material (unit coordinates) with effects."""
@@ -90,17 +89,15 @@ class Study:
         )
         for name, strength in psi.items():
             effect = next(e for e in FUNNEL if e.name == name).at(self.plan.scene)
-            if not effect.camera:
-                values[effect.path] = effect.value(strength)
+            values |= effect.numbers(strength)
+            height += effect.full * strength if effect.shift else 0.0
         scene = self.plan.scene.with_({**values, "funnel.height": height})
         return self.forward.pours(scene, seeds)
 
     def observe(self, height: float, rows: Array) -> Observation:
         """The pours as the loop sees them."""
         low, high = HEIGHTS
-        return Observation.of(
-            f"{100 * height:g} cm", [(height - low) / (high - low)], rows[:, self.columns]
-        )
+        return Observation.of(f"{100 * height:g} cm", [(height - low) / (high - low)], rows)
 
     def row(self, index: int, nulls: int) -> dict[str, Any] | None:
         """Returns the row of one set; None if its pours jam."""

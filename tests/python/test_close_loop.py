@@ -100,7 +100,8 @@ def test_a_tilted_table_is_found_named_and_removed(
     assert verdict["verdict"] == "EFFECT" and verdict["named"] == ["tilt.y"]
     low, middle, high = verdict["strength"]["tilt.y"]
     assert low < 0.07 < high and abs(middle - 0.07) < 0.03
-    assert verdict["misfit"]["sealed"]["after"] < 0.5 * verdict["misfit"]["sealed"]["before"]
+    assert verdict["misfit"]["fit"]["after"] < 0.5 * verdict["misfit"]["fit"]["before"]
+    assert verdict["fit"]["is_improved"] and verdict["sealed"]["is_at_floor"]
     page = (out / "report.html").read_text()
     assert "tilt.y" in page and "data:image/png" in page
     # Again: nothing is run twice, and the same comes out.
@@ -175,7 +176,7 @@ def test_an_archive_of_something_else_is_refused(tmp_path: Path) -> None:
 def test_effects_turn_strengths_into_numbers_and_back() -> None:
     scene = gc.Scene.from_toml(SCENE)
     for entry in FUNNEL:
-        if entry.camera:
+        if entry.is_free:
             continue
         effect = entry.at(scene)
         for psi in (0.25, 0.5, 1.0):

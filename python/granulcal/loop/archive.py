@@ -10,7 +10,7 @@ Each part is a data set of `generate`: it is stopped and continued anywhere and 
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,9 +22,10 @@ from granulcal.dataset import Dataset, generate
 from granulcal.errors import TrainingDataError
 from granulcal.loop.design import Design
 from granulcal.loop.library import LibraryEffect, fingerprint
+from granulcal.loop.measures import Measures
+from granulcal.loop.tolerance import Tolerances
 from granulcal.prior import Parameter, Prior
 from granulcal.scene import Scene
-from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES, REGISTRY
 
 __all__ = ["Archive", "Plan", "Pours"]
 
@@ -35,8 +36,8 @@ _RECORD = "archive.json"
 _WHOLE_STRENGTHS = (0.25, 0.5, 0.75, 1.0)
 # Seeds of the parts, so that no two share a pour.
 _SEED_STEP = 1009
-# Scaled copies of base pours for an effect of the camera, which needs no pour of its own.
-_CAMERA_COPIES = 400
+# Base pours that are read anew for an effect that needs none of its own.
+_FREE_COPIES = 400
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +52,7 @@ class Plan:
         base: pours of the plain model.
         each: pours of each effect.
         seed: of all of them.
+        tolerances: of the statistics; they need no pours.
     """
 
     scene: Scene
@@ -60,6 +62,7 @@ class Plan:
     base: int
     each: int
     seed: int = 0
+    tolerances: Tolerances | None = None
 
     def record(self) -> dict[str, object]:
         """Returns what another run must agree with to use the same archive; sizes may grow."""
@@ -79,13 +82,16 @@ class Plan:
         return Design(
             parameters=tuple(self.prior.names),
             conditions=tuple(path for path, _, _ in self.conditions),
-            effects=tuple(effect.design() for effect in self.library),
+            effects=(
+                *(effect.design() for effect in self.library),
+                *(self.tolerances.effects() if self.tolerances else ()),
+            ),
         )
 
     @property
     def pours(self) -> int:
         """Pours of the whole archive."""
-        own = [e for e in self.library if not e.camera]
+        own = [e for e in self.library if not e.is_free]
         return self.base + self.each * len(own)
 
     def cube(self, theta: Array) -> Array:
@@ -179,7 +185,7 @@ class Archive:
         Raises:
             TrainingDataError: a part is missing.
         """
-        plan, chosen = self.plan, statistics_of_the_loop()
+        plan, measures = self.plan, Measures.of(self.plan.scene)
         rows: list[tuple[Array, Array, Array, Array]] = []
         left_out = 0
         for name, scene, _, count, _ in self._parts():
@@ -187,13 +193,10 @@ class Archive:
             if not folder.exists():
                 raise TrainingDataError(f"{folder} is missing: fill the archive first")
             data = Dataset.load(folder)
-            usable = data.is_usable & np.isfinite(data.diagnostics[:, _finite_diagnostics()]).all(
-                axis=1
-            )
+            values, usable = measures.of_dataset(data)
             usable[count:] = False
             left_out += int((~usable[:count]).sum())
             columns = {path: data.theta[usable, i] for i, path in enumerate(data.theta_names)}
-            values = np.column_stack([data.x, data.diagnostics])[usable]
             n = int(usable.sum())
             theta = np.column_stack([columns[path] for path in plan.prior.names])
             inputs = [columns[path] for path, _, _ in plan.conditions]
@@ -203,33 +206,67 @@ class Archive:
                 own = effect.at(plan.scene)
                 if effect.whole and name.startswith(f"effect-{effect.name}"):
                     psi[:, k] = own.strength(np.full(n, scene.get(effect.path)))
-                elif effect.path in columns:
+                elif effect.path in columns and not effect.shift:
                     psi[:, k] = own.strength(columns[effect.path])
-            rows.append((plan.cube(theta), plan.unit_condition(condition), psi, values[:, chosen]))
-        names = tuple(np.array([*NAMES, *DIAGNOSTIC_NAMES])[chosen])
-        rows.extend(self._camera_rows(rows[0], names))
+            rows.append((plan.cube(theta), plan.unit_condition(condition), psi, values[usable]))
+        names = measures.names
+        rows.extend(self._free_rows(rows[0], measures.powers))
+        rows = self._with_tolerances(rows, names)
         theta, condition, psi, x = (np.concatenate(part) for part in zip(*rows, strict=True))
         return Pours(theta, condition, psi, x, names, left_out)
 
-    def _camera_rows(
-        self, base: tuple[Array, Array, Array, Array], names: Sequence[str]
+    def _free_rows(
+        self, base: tuple[Array, Array, Array, Array], powers: Array | None
     ) -> list[tuple[Array, Array, Array, Array]]:
-        """Base pours seen with other lengths, for each effect that is one of the camera."""
-        power = {s.name: s.length_power for s in REGISTRY}
-        powers = np.array([power[name] for name in names])
+        """Base pours read anew, for each effect that needs none of its own.
+
+        With other lengths, for an effect of the camera; as pours of another condition than theirs, for
+        one that is stated wrongly.
+        """
+        paths = [path for path, _, _ in self.plan.conditions]
         found = []
         for k, effect in enumerate(self.plan.library):
-            if not effect.camera:
+            if not effect.is_free or (effect.shift and effect.path not in paths):
                 continue
             random = np.random.default_rng(self.plan.seed + k)
-            rows = random.permutation(len(base[0]))[:_CAMERA_COPIES]
+            rows = random.permutation(len(base[0]))[:_FREE_COPIES]
             strength = random.uniform(-1.0 if effect.is_two_sided else 0.0, 1.0, len(rows))
             theta, condition, psi, x = (part[rows].copy() for part in base)
             psi[:, k] = strength
-            found.append(
-                (theta, condition, psi, x * (1.0 + effect.full * strength[:, None]) ** powers)
-            )
+            if effect.camera:
+                if powers is None:
+                    continue
+                x *= (1.0 + effect.full * strength[:, None]) ** powers
+            else:
+                column = paths.index(effect.path)
+                _, low, high = self.plan.conditions[column]
+                condition[:, column] -= effect.full * strength / (high - low)
+            inside = ((condition >= 0.0) & (condition <= 1.0)).all(axis=1)
+            found.append((theta[inside], condition[inside], psi[inside], x[inside]))
         return found
+
+    def _with_tolerances(
+        self, rows: list[tuple[Array, Array, Array, Array]], names: tuple[str, ...]
+    ) -> list[tuple[Array, Array, Array, Array]]:
+        """The rows with a column of strengths for each tolerance, and base pours that are off."""
+        tolerances = self.plan.tolerances
+        if tolerances is None:
+            return rows
+        many = len(tolerances.directions)
+        padded = [(t, c, np.pad(p, ((0, 0), (0, many))), x) for t, c, p, x in rows]
+        column = [path for path, _, _ in self.plan.conditions].index(tolerances.path)
+        _, low, high = self.plan.conditions[column]
+        for number in range(many):
+            random = np.random.default_rng([self.plan.seed, number])
+            chosen = random.permutation(len(rows[0][0]))[:_FREE_COPIES]
+            theta, condition, psi, x = (part[chosen].copy() for part in padded[0])
+            psi[:, len(self.plan.library) + number] = random.uniform(-1.0, 1.0, len(chosen))
+            at = low + condition[:, column] * (high - low)
+            strength = psi[:, [len(self.plan.library) + number]]
+            padded.append(
+                (theta, condition, psi, x + strength * tolerances.shift(number, at, names))
+            )
+        return padded
 
     def _parts(self) -> list[tuple[str, Scene, Prior, int, int]]:
         """Name, scene, prior, pours and seed of each data set."""
@@ -241,10 +278,11 @@ class Archive:
         common = [*plan.prior.parameters, *inputs]
         parts = [("base", plan.scene, Prior(common), plan.base, plan.seed)]
         for k, entry in enumerate(plan.library, start=1):
-            if entry.camera:
+            if entry.is_free:
                 continue
             effect, seed = entry.at(plan.scene), plan.seed + _SEED_STEP * k
             name = f"effect-{effect.name}"
+            there = plan.scene.with_(dict(effect.also)) if effect.also else plan.scene
             if effect.whole:
                 share = -(-plan.each // len(_WHOLE_STRENGTHS))
                 for number, psi in enumerate(_WHOLE_STRENGTHS):
@@ -253,26 +291,8 @@ class Archive:
                         (f"{name}-{number}", scene, Prior(common), share, seed + number + 1)
                     )
                 continue
-            parts.append((name, plan.scene, Prior([*common, effect.parameter()]), plan.each, seed))
+            parts.append((name, there, Prior([*common, effect.parameter()]), plan.each, seed))
         return parts
-
-
-def statistics_of_the_loop() -> NDArray[np.intp]:
-    """Returns which of the 16 and the diagnostic statistics the loop looks at.
-
-    All of the paper's, and of the diagnostics slope, modes, tail and counts.
-    """
-    return np.concatenate([np.arange(len(NAMES)), len(NAMES) + _finite_diagnostics()])
-
-
-def _finite_diagnostics() -> NDArray[np.intp]:
-    wanted = [i for i, name in enumerate(DIAGNOSTIC_NAMES) if not name.startswith(_LEFT_OUT)]
-    return np.array(wanted, dtype=np.intp)
-
-
-# A slope that few formations have, and rings of which the 16 statistics hold the sum: twenty more numbers to a pour
-# blunt every test of the others.
-_LEFT_OUT = ("tail_index", "height_ring")
 
 
 def cube(prior: Prior, theta: Array) -> Array:

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
-from granulcal.loop.archive import Archive, Plan, from_cube, statistics_of_the_loop
+from granulcal.loop.archive import Archive, Plan, from_cube
 from granulcal.loop.experiment import Experiment, next_experiment
 from granulcal.loop.forward import Forward
+from granulcal.loop.measures import Measures
 from granulcal.loop.misfit import Improvement, compare
 from granulcal.loop.observation import Observation
 from granulcal.loop.preregistration import register, write_beside
@@ -27,7 +28,6 @@ from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.thresholds import Thresholds
 from granulcal.loop.trace import Explanation, Power, Trace, power, trace
 from granulcal.scene import Scene
-from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES
 
 __all__ = ["Closed", "close_loop"]
 
@@ -151,9 +151,7 @@ def close_loop(
     folder, rules = Path(out), thresholds or Thresholds()
     workers = threads or os.cpu_count() or 1
     plan = _plan(task, budget, seed)
-    chosen = statistics_of_the_loop()
-    names = tuple(np.array([*NAMES, *DIAGNOSTIC_NAMES])[chosen])
-    registration = register(folder, task, plan, rules, seed, names)
+    registration = register(folder, task, plan, rules, seed, Measures.of(plan.scene).names)
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
 
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
@@ -170,20 +168,20 @@ def close_loop(
     say(_power_table(sights))
 
     measured = {c.name: c.statistics(task.scene) for c in fitted}
-    observed = [Observation.of(c.name, task.unit(c), measured[c.name][:, chosen]) for c in fitted]
+    observed = [Observation.of(c.name, task.unit(c), measured[c.name]) for c in fitted]
     found = trace(surrogate, observed, rules, seed=seed)
     say(f"verdict {found.verdict.kind}: {found.verdict.reason}")
 
     forward = Forward(folder / "pours", workers)
     simulated = {c.name: _both(forward, task, c, found, seed) for c in task.conditions}
-    fit = _compare(fitted, measured, simulated, surrogate, seed)
+    fit = _compare(task, fitted, measured, simulated, surrogate, seed)
     hidden = task.of(SEALED)
     # Opened here, once, after everything that could be chosen has been.
     measured |= {c.name: c.statistics(task.scene) for c in hidden}
-    sealed = _compare(hidden, measured, simulated, surrogate, seed) if hidden else None
+    sealed = _compare(task, hidden, measured, simulated, surrogate, seed) if hidden else None
 
     blank = [
-        Observation.of(c.name, task.unit(c), _placebo(forward, task, c, found, seed)[:, chosen])
+        Observation.of(c.name, task.unit(c), _placebo(forward, task, c, found, seed))
         for c in fitted
     ]
     placebo = trace(surrogate, blank, rules, seed=seed + 1)
@@ -212,7 +210,7 @@ def _plan(task: Task, budget: int, seed: int) -> Plan:
     Raises:
         ObservationError: it affords too little, with what would be enough.
     """
-    own = sum(not effect.camera for effect in task.library)
+    own = sum(not effect.is_free for effect in task.library)
     spare = budget - _needed(task)
     base = int(_BASE_SHARE * spare)
     each = (spare - base) // max(own, 1)
@@ -232,6 +230,7 @@ def _plan(task: Task, budget: int, seed: int) -> Plan:
         base=base,
         each=each,
         seed=seed,
+        tolerances=task.tolerances,
     )
 
 
@@ -249,11 +248,19 @@ def _scene(task: Task, condition: Condition, one: Explanation) -> Scene:
     """The scene of a model at its best fit under a condition."""
     theta = from_cube(task.prior, one.theta[None])[0]
     values = {**task.prior.fixed, **dict(zip(task.prior.names, theta.tolist(), strict=True))}
+    at = dict(condition.at)
     for name, psi in zip(one.effects, one.best_strengths, strict=True):
         effect = _effect(task, name)
-        if not effect.camera:
-            values[effect.path] = effect.value(float(psi))
-    return task.scene.with_({**values, **condition.at})
+        values |= effect.numbers(float(psi))
+        values |= {p: v for p, v in condition.known.items() if p in values or _kin(p, effect.path)}
+        if effect.shift:
+            at[effect.path] += effect.full * float(psi)
+    return task.scene.with_({**values, **at})
+
+
+def _kin(path: str, other: str) -> bool:
+    """Whether two numbers belong to one table of effects."""
+    return path.rpartition(".")[0] == other.rpartition(".")[0]
 
 
 def _both(
@@ -273,14 +280,15 @@ def _placebo(forward: Forward, task: Task, condition: Condition, found: Trace, s
 
 
 def _compare(
+    task: Task,
     conditions: tuple[Condition, ...],
     measured: dict[str, Array],
     simulated: dict[str, tuple[Array, Array]],
     surrogate: Surrogate,
     seed: int,
 ) -> Improvement:
-    """The paper's 16 statistics, over their spread in the archive."""
-    size = len(NAMES)
+    """The paper's 16 statistics, or all that the scene observes, over their spread in the archive."""
+    size = Measures.of(task.scene).head
     spread = surrogate.raw_spread[:size]
     return compare(
         [c.name for c in conditions],

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.loop.measures import Measures
 from granulcal.scene import Scene
 from granulcal.simulate import simulate
 
@@ -35,8 +36,9 @@ class Forward:
         folder.mkdir(parents=True, exist_ok=True)
 
     def pours(self, scene: Scene, seeds: Sequence[int]) -> Array:
-        """Returns the 16 and the diagnostic statistics of usable pours, shape (n <= len(seeds), 56)."""
-        text = json.dumps([_native.__version__, scene.to_toml(), list(seeds)])
+        """Returns the statistics of usable pours, shape (n <= len(seeds), s)."""
+        names = Measures.of(scene).names
+        text = json.dumps([_native.__version__, names, scene.to_toml(), list(seeds)])
         path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.npy"
         if path.exists():
             return np.load(path)
@@ -57,7 +59,8 @@ def _row(scene: Scene, seed: int) -> Array | None:
     if pour.status in _UNUSABLE:
         return None
     try:
-        return np.concatenate([pour.statistics(), pour.diagnostic_statistics()])
+        found = Measures.of(scene).of_pour(pour)
     except ValueError:
         # Too few grains in view.
         return None
+    return found if np.isfinite(found).all() else None

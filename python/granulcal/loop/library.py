@@ -39,7 +39,9 @@ class LibraryEffect:
         is_ratio: psi scales the logarithm: value = off (full / off)^psi.
         whole: the number is whole: strengths are tried at a few values.
         relative: `off` is the scene's own number, `full` a multiple of it.
+        also: other numbers of the scene wherever the effect is on, by path.
         camera: power p of `(1 + full psi)^(p length)` by which lengths scale: costs no pour.
+        shift: the condition input `path` is not what was stated, by `full`: base pours, read anew.
         nuisance_sd: of a declared tolerance, in psi; None for a candidate.
         is_shared: of a tolerance: one value for all conditions.
     """
@@ -55,7 +57,9 @@ class LibraryEffect:
     is_ratio: bool = False
     whole: bool = False
     relative: bool = False
+    also: tuple[tuple[str, float], ...] = ()
     camera: bool = False
+    shift: bool = False
     nuisance_sd: float | None = None
     is_shared: bool = True
 
@@ -86,6 +90,17 @@ class LibraryEffect:
         kind = "log_uniform" if self.is_ratio else "uniform"
         return Parameter(path=self.path, distribution=kind, low=ends[0], high=ends[1])
 
+    @property
+    def is_free(self) -> bool:
+        """Whether base pours show the effect, without pours of its own."""
+        return self.camera or self.shift
+
+    def numbers(self, psi: float) -> dict[str, float]:
+        """Returns the numbers of the scene at strength `psi`, by path; none of an image's effect."""
+        if self.is_free:
+            return {}
+        return {self.path: self.value(psi), **dict(self.also)}
+
     def design(self) -> Effect:
         """Returns the effect as the statistics of the loop know it."""
         return Effect(
@@ -102,15 +117,17 @@ FUNNEL: tuple[LibraryEffect, ...] = (
         name="cohesion.capillary",
         family="cohesion",
         path="effects.capillary.bond",
-        full=0.6,
-        doc="liquid bridges; pull of touching grains over a grain's weight",
+        full=3.0,
+        also=(("effects.capillary.walls", 0.0),),
+        doc="liquid bridges between grains; pull at touch over a grain's weight",
     ),
     LibraryEffect(
         name="cohesion.dry",
         family="cohesion",
         path="effects.adhesion.bond",
-        full=0.6,
-        doc="adhesion of touching grains over a grain's weight",
+        full=3.0,
+        also=(("effects.adhesion.walls", 0.0),),
+        doc="adhesion of touching grains; pull over a grain's weight",
     ),
     LibraryEffect(
         name="ground.restitution",
@@ -205,6 +222,15 @@ FUNNEL: tuple[LibraryEffect, ...] = (
         path="material.tangential_restitution",
         full=0.6,
         doc="part of the sliding velocity that a sticking impact turns back",
+    ),
+    LibraryEffect(
+        name="height",
+        path="funnel.height",
+        shift=True,
+        full=0.02,
+        unit="m",
+        is_two_sided=True,
+        doc="the funnel hangs higher than stated",
     ),
     LibraryEffect(
         name="camera.scale",

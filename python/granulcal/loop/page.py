@@ -11,7 +11,8 @@ from granulcal import _native
 from granulcal.formation_image import formation_figure
 from granulcal.loop.close import Closed
 from granulcal.loop.preregistration import write_beside
-from granulcal.loop.task import Condition, camera_beside
+from granulcal.loop.measures import Measures, camera_beside
+from granulcal.loop.task import Condition
 from granulcal.recording import Recording
 from granulcal.report import data_uri, template
 from granulcal.simulate import simulate
@@ -122,6 +123,8 @@ def _hidden(closed: Closed) -> list[dict[str, str]]:
 def _pictures(closed: Closed) -> str:
     """A measured pour, the base model and the augmented one, of the first condition."""
     condition = closed.task.conditions[0]
+    if Measures.of(closed.task.scene).observes:
+        return ""
     clouds = {"measured": _measured_points(closed, condition)}
     models = {"base model": closed.trace.base}
     if closed.trace.best is not closed.trace.base:

@@ -10,6 +10,7 @@
     use = "fit"                     # or "sealed": opened once, after the verdict
     recordings = ["04cm/pour-0.png", "04cm/pour-1.png"]   # a pour each
 
+`tolerances = "tolerances.json"` declares in which directions the statistics may be off (see Tolerances).
 `camera = "camera.toml"` of a condition, or once for all, is the camera of PNGs; where it is left out it is
 looked for beside the recording.
 """
@@ -25,19 +26,18 @@ from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
 from granulcal.loop.library import FUNNEL, LibraryEffect, by_name
+from granulcal.loop.measures import Measures
+from granulcal.loop.tolerance import Tolerances
 from granulcal.prior import Prior
-from granulcal.recording import Recording
 from granulcal.scene import Scene
 
-__all__ = ["FIT", "SEALED", "Condition", "Task", "camera_beside"]
+__all__ = ["FIT", "SEALED", "Condition", "Task"]
 
 Array = NDArray[np.float64]
 
 FIT, SEALED = "fit", "sealed"
 # Fewest pours over all fit conditions from which something may be said.
 _FEWEST_POURS = 3
-# Volume under the measured surface over that of the scene's grains: beyond this a unit is wrong.
-_VOLUME_RANGE = (0.1, 10.0)
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,7 @@ class Condition:
         use: `fit` or `sealed`.
         recordings: a pour each.
         camera: of PNGs.
+        known: numbers that an effect has here, should it be the one: `{"effects.fluid.density" = 1260}`.
     """
 
     name: str
@@ -58,30 +59,17 @@ class Condition:
     recordings: tuple[Path, ...]
     camera: Path | None
 
+    known: dict[str, float]
+
     def statistics(self, scene: Scene) -> Array:
-        """Returns the 16 and the diagnostic statistics of each pour, shape (n, 56).
+        """Returns the statistics of each pour, shape (n, s).
 
         Raises:
-            ObservationError: a recording that cannot be one of the scene: its units, most likely.
+            ObservationError: a recording that cannot be one of the scene.
         """
         there = scene.with_(self.at)
-        diameter = there.get("grains.diameter")
-        grains = there.get("grains.count") * np.pi / 6 * diameter**3
-        rows = []
-        for path in self.recordings:
-            recording = Recording.open(path, camera=self.camera or camera_beside(path))
-            formation = recording.formation(ground_resolution=there.ground_resolution)
-            share = formation.volume / grains
-            if not _VOLUME_RANGE[0] <= share <= _VOLUME_RANGE[1]:
-                raise ObservationError(
-                    f"{path}: the formation holds {formation.volume:.3g} m3, the scene's grains "
-                    f"{grains:.3g} m3; allowed are {_VOLUME_RANGE[0]:g} to {_VOLUME_RANGE[1]:g} "
-                    "times that: is the recording of this scene, and in its units?"
-                )
-            diagnostics = formation.diagnostic_statistics(
-                grain_diameter=diameter, pour_axis=_axis_of(recording, formation)
-            )
-            rows.append(np.concatenate([formation.statistics(), diagnostics]))
+        measures = Measures.of(there)
+        rows = [measures.of_recording(path, there, self.camera) for path in self.recordings]
         return np.array(rows)
 
 
@@ -95,6 +83,7 @@ class Task:
         conditions: at least one to fit.
         library: effects to look for.
         path: the file that it was read from.
+        tolerances: of the statistics.
     """
 
     scene: Scene
@@ -102,6 +91,7 @@ class Task:
     conditions: tuple[Condition, ...]
     library: tuple[LibraryEffect, ...]
     path: Path | None = None
+    tolerances: Tolerances | None = None
 
     def __post_init__(self) -> None:
         """Checks that the conditions can be asked about.
@@ -109,6 +99,10 @@ class Task:
         Raises:
             ObservationError: too few pours, conditions without the same paths, a name twice.
         """
+        given = set(self.conditions[0].at) if self.conditions else set()
+        meant = tuple(e for e in self.library if not e.shift or e.path in given)
+        # An effect on a condition that this task does not have.
+        object.__setattr__(self, "library", meant)
         names = [condition.name for condition in self.conditions]
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
@@ -138,7 +132,9 @@ class Task:
             document = tomllib.loads(file.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ObservationError(f"{file}: not valid TOML: {error}") from None
-        _require(file, document, {"scene", "prior", "conditions"}, {"effects", "camera"})
+        _require(
+            file, document, {"scene", "prior", "conditions"}, {"effects", "camera", "tolerances"}
+        )
         folder = file.parent
         shared = {"camera": document["camera"]} if "camera" in document else {}
         library = by_name(document["effects"]) if "effects" in document else FUNNEL
@@ -150,6 +146,9 @@ class Task:
             ),
             library=library,
             path=file,
+            tolerances=Tolerances.load(folder / document["tolerances"])
+            if "tolerances" in document
+            else None,
         )
 
     def of(self, use: str) -> tuple[Condition, ...]:
@@ -184,7 +183,7 @@ class Task:
 
 def _condition(file: Path, table: dict[str, Any]) -> Condition:
     needed = {"name", "at", "use", "recordings"}
-    _require(file, table, needed, {"camera"})
+    _require(file, table, needed, {"camera", "known"})
     if table["use"] not in (FIT, SEALED):
         raise ObservationError(
             f'{file}: use of {table["name"]} must be "{FIT}" or "{SEALED}", got "{table["use"]}"'
@@ -197,7 +196,8 @@ def _condition(file: Path, table: dict[str, Any]) -> Condition:
             raise FileNotFoundError(f"{recording} of {file} is not there")
     camera = file.parent / table["camera"] if "camera" in table else None
     at = {path: float(value) for path, value in table["at"].items()}
-    return Condition(str(table["name"]), at, table["use"], recordings, camera)
+    known = {path: float(value) for path, value in table.get("known", {}).items()}
+    return Condition(str(table["name"]), at, table["use"], recordings, camera, known)
 
 
 def _require(file: Path, table: dict[str, Any], needed: set[str], optional: set[str]) -> None:
@@ -208,20 +208,3 @@ def _require(file: Path, table: dict[str, Any], needed: set[str], optional: set[
             f"{file}: a table {what}; it has {', '.join(sorted(needed))} "
             f"and may have {', '.join(sorted(optional))}"
         )
-
-
-def camera_beside(path: Path) -> Path | None:
-    """Returns the camera of a PNG: its own TOML, or `camera.toml` in its folder or the one above."""
-    if path.suffix != ".png":
-        return None
-    near = [
-        path.with_suffix(".toml"),
-        path.parent / "camera.toml",
-        path.parent.parent / "camera.toml",
-    ]
-    return next((file for file in near if file.exists()), None)
-
-
-def _axis_of(recording: Recording, formation: Any) -> tuple[float, float] | None:
-    """Where the pour's axis meets the ground: below the camera, which stands on it in our scenes."""
-    return (0.0, 0.0) if recording.depth is not None else None

@@ -1,0 +1,66 @@
+"""What the two engines differ by without any effect, as tolerances of the loop.
+
+    python benches/blind/tolerances.py OUT.json
+
+Reads code_difference.json and code_difference.csv: the mean difference is one direction, and the
+leading differences from material to material are others, less what the seeds of the pours put in.
+"""
+
+import argparse
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).parent
+DIRECTIONS = 4
+"""Of the scatter between materials."""
+LEFT_OUT = ("tail_index", "ring_depth")
+"""Statistics that are not finite or constant in some pours."""
+
+
+def main() -> None:
+    """Writes the tolerances."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path)
+    out: Path = parser.parse_args().out
+    numbers = json.loads((HERE / "code_difference.json").read_text())
+    heights = sorted(numbers["heights"], key=float)
+    every = [*numbers["names"], *numbers["diagnostic_names"]]
+    names = [name for name in every if name not in LEFT_OUT]
+    keep = [every.index(name) for name in names]
+    sd = np.array(
+        [[*numbers["heights"][h]["sd"], *numbers["heights"][h]["diagnostic_sd"]] for h in heights]
+    )[:, keep]
+    with (HERE / "code_difference.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    materials = sorted({row["material"] for row in rows}, key=int)
+    values = np.full((len(materials), len(heights), len(names)), np.nan)
+    for row in rows:
+        place = materials.index(row["material"]), heights.index(row["height"])
+        values[place] = [float(row[name]) for name in names]
+    whole = np.isfinite(values).all(axis=(1, 2))
+    flat = values[whole].reshape(whole.sum(), -1)
+    mean = flat.mean(axis=0)
+    # In units of the scatter between seeds: a difference of a pour and a mean of six has 7/6 of its variance.
+    _, singular, axes = np.linalg.svd(flat - mean, full_matrices=False)
+    variances = singular**2 / (len(flat) - 1)
+    noise = 7 / 6 * flat.shape[1] / max(len(flat) - 1, 1)
+    found = [mean]
+    for variance, axis in zip(variances[:DIRECTIONS], axes, strict=False):
+        if variance > noise:
+            found.append(np.sqrt(variance - noise) * axis)
+    directions = [(d.reshape(len(heights), -1) * sd).tolist() for d in found]
+    document = {
+        "names": names,
+        "path": "funnel.height",
+        "at": [float(h) for h in heights],
+        "directions": directions,
+    }
+    out.write_text(json.dumps(document) + "\n", encoding="utf-8")
+    print(f"{len(found)} directions of {whole.sum()} materials written to {out}")
+
+
+if __name__ == "__main__":
+    main()

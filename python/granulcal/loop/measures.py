@@ -1,0 +1,101 @@
+"""What the loop looks at: the image's statistics, or those that a scene itself observes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.dataset import Dataset
+from granulcal.errors import ObservationError
+from granulcal.recording import Recording
+from granulcal.scene import Scene
+from granulcal.simulate import Pour
+from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES, REGISTRY
+
+__all__ = ["Measures", "camera_beside"]
+
+Array = NDArray[np.float64]
+
+# Of the diagnostics: a slope that few formations have, and rings of which the 16 statistics hold the
+# sum: twenty more numbers to a pour blunt every test of the others.
+_LEFT_OUT = ("tail_index", "height_ring")
+# Volume under the measured surface over that of the scene's grains: beyond this a unit is wrong.
+_VOLUME_RANGE = (0.1, 10.0)
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Statistics of a kind of scene.
+
+    Attributes:
+        names: of the statistics, s of them.
+        powers: of lengths in each, shape (s,); None where a scale is no effect of the camera.
+        head: the first so many are the error's: the paper's 16, or all.
+        observes: whether the scene observes them itself.
+    """
+
+    names: tuple[str, ...]
+    powers: Array | None
+    head: int
+    observes: bool
+
+    @classmethod
+    def of(cls, scene: Scene) -> "Measures":
+        """Returns the statistics of a scene."""
+        if scene.observed_names:
+            names = tuple(scene.observed_names)
+            return cls(names, None, len(names), True)
+        kept = [name for name in DIAGNOSTIC_NAMES if not name.startswith(_LEFT_OUT)]
+        names = (*NAMES, *kept)
+        power = {s.name: s.length_power for s in REGISTRY}
+        return cls(names, np.array([power[name] for name in names]), len(NAMES), False)
+
+    def of_dataset(self, data: Dataset) -> tuple[Array, NDArray[np.bool_]]:
+        """Returns the statistics of all rows (n, s), and which rows are usable."""
+        columns = data.columns()
+        values = np.column_stack([columns[name] for name in self.names])
+        return values, data.is_usable & np.isfinite(values).all(axis=1)
+
+    def of_pour(self, pour: Pour) -> Array:
+        """Returns the statistics of a pour, shape (s,).
+
+        Raises:
+            ValueError: too few grains are in view.
+        """
+        if self.observes:
+            return np.asarray(pour.observed())
+        both = {**pour.statistics().to_dict(), **pour.diagnostic_statistics().to_dict()}
+        return np.array([both[name] for name in self.names])
+
+    def of_recording(self, path: Path, scene: Scene, camera: Path | None) -> Array:
+        """Returns the statistics of a recording, shape (s,); NaN for what it does not show.
+
+        Raises:
+            ObservationError: a recording that cannot be one of the scene: its units, most likely.
+        """
+        if self.observes:
+            return np.asarray(Recording.observed(path, scene))
+        recording = Recording.open(path, camera=camera or camera_beside(path))
+        formation = recording.formation(ground_resolution=scene.ground_resolution)
+        diameter = scene.get("grains.diameter")
+        grains = scene.get("grains.count") * np.pi / 6 * diameter**3
+        if not _VOLUME_RANGE[0] <= formation.volume / grains <= _VOLUME_RANGE[1]:
+            raise ObservationError(
+                f"{path}: the formation holds {formation.volume:.3g} m3, the scene's grains "
+                f"{grains:.3g} m3; allowed are {_VOLUME_RANGE[0]:g} to {_VOLUME_RANGE[1]:g} "
+                "times that: is the recording of this scene, and in its units?"
+            )
+        # Our cameras stand on the pour's axis; a height map has no camera.
+        axis = (0.0, 0.0) if recording.depth is not None else None
+        found = formation.diagnostic_statistics(grain_diameter=diameter, pour_axis=axis)
+        both = {**formation.statistics().to_dict(), **found.to_dict()}
+        return np.array([both[name] for name in self.names])
+
+
+def camera_beside(path: Path) -> Path | None:
+    """Returns the camera of a PNG: its own TOML, or `camera.toml` in its folder or the one above."""
+    if path.suffix != ".png":
+        return None
+    near = [path.with_suffix(".toml"), *(p / "camera.toml" for p in path.parents[:2])]
+    return next((file for file in near if file.exists()), None)
