@@ -18,7 +18,7 @@ from granulcal.loop.design import Effect
 from granulcal.prior import Parameter
 from granulcal.scene import Scene
 
-__all__ = ["FUNNEL", "LibraryEffect", "by_name", "fingerprint"]
+__all__ = ["FUNNEL", "LIBRARY", "LibraryEffect", "by_name", "fingerprint"]
 
 Array = NDArray[np.float64]
 
@@ -243,9 +243,32 @@ FUNNEL: tuple[LibraryEffect, ...] = (
 )
 """What a pour through a funnel may lack."""
 
+LIBRARY: tuple[LibraryEffect, ...] = (
+    *FUNNEL,
+    LibraryEffect(
+        name="fluid.density",
+        family="fluid",
+        path="effects.fluid.density",
+        full=1500.0,
+        unit="kg/m3",
+        also=(("effects.fluid.viscosity", 1e-3),),
+        doc="grains stand in a thin fluid: buoyancy, added mass, drag",
+    ),
+    LibraryEffect(
+        name="fluid.viscosity",
+        family="fluid",
+        path="effects.fluid.viscosity",
+        full=0.2,
+        unit="Pa s",
+        also=(("effects.fluid.density", 1000.0),),
+        doc="grains stand in a thick fluid of the density of water",
+    ),
+)
+"""All that tasks may name."""
+
 
 def by_name(
-    names: Iterable[str], library: Sequence[LibraryEffect] = FUNNEL
+    names: Iterable[str], library: Sequence[LibraryEffect] = LIBRARY
 ) -> tuple[LibraryEffect, ...]:
     """Returns the named entries in the library's order.
 
