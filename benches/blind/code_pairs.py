@@ -91,33 +91,40 @@ def summary(pairs: list[dict]) -> dict:
         "covariance": np.cov(good[:, head], rowvar=False) - noise[head, head],
         "materials": len(good),
         "differences": np.array(rows),
+        "noise": noise[head, head],
         "ours": np.array([p["ours"].mean(axis=0) / scale for p in pairs]),
     }
 
 
-def left_by_material(
-    theta: np.ndarray, found: dict[float, dict]
-) -> tuple[float, float, np.ndarray]:
-    """Returns how much of the mean difference no other material of granulcal would mimic.
+def left_by_material(theta: np.ndarray, found: dict[float, dict]) -> dict[str, float | np.ndarray]:
+    """Returns how much of the difference no other material of granulcal would mimic.
 
     Least squares over the 16 statistics at all heights, the derivatives by mu_s, ln mu_r and e from
-    a linear regression over the materials, in sds.
-
-    Returns:
-        rms of the mean difference and of what is left of it [-], the material's shift (3,).
+    a linear regression over the materials. `mean`: rms of the mean difference, `mean_left` of what
+    is left of it, `shift` of the material that takes the rest (3,). `each_left`: rms of what is
+    left of each material's own difference, `seeds_left` what the seeds of the pours leave of it.
+    All but the shift in sds.
     """
     coordinates = np.column_stack([theta[:, 0], np.log(theta[:, 1]), theta[:, 2]])
-    design = np.column_stack([np.ones(len(theta)), coordinates - coordinates.mean(axis=0)])
-    slopes, means = [], []
-    for s in found.values():
-        good = np.isfinite(s["differences"]).all(axis=1)
-        head = s["ours"][good, : len(NAMES)]
-        slopes.append(np.linalg.lstsq(design[good], head, rcond=None)[0][1:])
-        means.append(s["mean"][: len(NAMES)])
-    slope, mean = np.concatenate(slopes, axis=1).T, np.concatenate(means)
-    shift = np.linalg.lstsq(slope, mean, rcond=None)[0]
-    rms = [float(np.sqrt((v**2).mean())) for v in (mean, mean - slope @ shift)]
-    return rms[0], rms[1], shift
+    head = slice(0, len(NAMES))
+    differences = np.concatenate([s["differences"][:, head] for s in found.values()], axis=1)
+    ours = np.concatenate([s["ours"][:, head] for s in found.values()], axis=1)
+    good = np.isfinite(differences).all(axis=1)
+    design = np.column_stack([np.ones(good.sum()), coordinates[good] - coordinates[good].mean(0)])
+    slope = np.linalg.lstsq(design, ours[good], rcond=None)[0][1:].T
+    keep = np.eye(len(slope)) - slope @ np.linalg.pinv(slope)
+    noise = np.zeros_like(keep)
+    for i, s in enumerate(found.values()):
+        block = slice(i * len(NAMES), (i + 1) * len(NAMES))
+        noise[block, block] = s["noise"]
+    mean = differences[good].mean(axis=0)
+    return {
+        "mean": float(np.sqrt((mean**2).mean())),
+        "mean_left": float(np.sqrt(((keep @ mean) ** 2).mean())),
+        "shift": np.linalg.pinv(slope) @ mean,
+        "each_left": float(np.sqrt(((differences[good] @ keep) ** 2).mean())),
+        "seeds_left": float(np.sqrt(np.trace(keep @ noise @ keep) / len(keep))),
+    }
 
 
 def write(theta: np.ndarray, found: dict[float, dict]) -> None:
@@ -175,9 +182,13 @@ def main() -> None:
         ("materials", lambda s: s["materials"]),
     ):
         print(f"| {label} | " + " | ".join(f"{of(s):.2f}" for s in found.values()) + " |")
-    whole, left, shift = left_by_material(theta, found)
-    moved = ", ".join(f"{v:+.2f}" for v in shift)
-    print(f"\nrms {whole:.2f}; {left:.2f} is left by other mu_s, ln mu_r, e: {moved}")
+    left = left_by_material(theta, found)
+    moved = ", ".join(f"{v:+.2f}" for v in left["shift"])
+    print(f"\nrms of the mean {left['mean']:.2f}, {left['mean_left']:.2f} of it is left by another")
+    print(f"material (mu_s, ln mu_r, e: {moved}); of each material's own difference")
+    print(
+        f"{left['each_left']:.2f} is left, {left['seeds_left']:.2f} by the seeds of the pours alone"
+    )
 
 
 if __name__ == "__main__":
