@@ -43,7 +43,7 @@ def main() -> None:
     whole = np.isfinite(values).all(axis=(1, 2))
     flat = values[whole].reshape(whole.sum(), -1)
     mean = flat.mean(axis=0)
-    # In units of the scatter between seeds: a difference of a pour and a mean of six has 7/6 of its variance.
+    # In units of the scatter between seeds, of which a pour less a mean of six has 7/6.
     _, singular, axes = np.linalg.svd(flat - mean, full_matrices=False)
     variances = singular**2 / (len(flat) - 1)
     noise = 7 / 6 * flat.shape[1] / max(len(flat) - 1, 1)

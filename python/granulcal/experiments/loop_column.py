@@ -1,7 +1,7 @@
 """The loop on collapsing columns of beads that stand in a fluid; the base model is dry.
 
-Fitted are the three tests of 8 mm beads at 1 g in water or 7 % glycerol; sealed are the thick glycerol at 1 g
-and 4.6 g. Thin fluids at 4.6 g were not tracked to their end and are left out.
+Fitted are the three tests of 8 mm beads at 1 g in water or 7 % glycerol; sealed are the thick
+glycerol at 1 g and 4.6 g. Thin fluids at 4.6 g were not tracked to their end and are left out.
 """
 
 from pathlib import Path
@@ -64,7 +64,8 @@ def task(data: Path) -> Task:
             use=use,
             recordings=tuple(data / _RUNOUT / f"{test}.txt" for test in tests),
             camera=None,
-            # What the fluid is known to be, should a fluid be what is missing; those fitted say it themselves.
+            # What the fluid is known to be, should a fluid be what is missing; those that are
+            # fitted say it themselves.
             known={}
             if use == FIT
             else {"effects.fluid.density": density, "effects.fluid.viscosity": viscosity},

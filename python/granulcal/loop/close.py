@@ -29,7 +29,7 @@ from granulcal.loop.thresholds import Thresholds
 from granulcal.loop.trace import Explanation, Power, Trace, power, trace
 from granulcal.scene import Scene
 
-__all__ = ["Closed", "close_loop"]
+__all__ = ["Closed", "close_loop", "fit_surrogate", "planned"]
 
 Array = NDArray[np.float64]
 
@@ -130,6 +130,7 @@ def close_loop(
     threads: int | None = None,
     seed: int = 0,
     thresholds: Thresholds | None = None,
+    surrogate: Surrogate | None = None,
     say: Callable[[str], None] = print,
 ) -> Closed:
     """Finds what a model lacks, adds it, and tells the error before and after.
@@ -142,6 +143,7 @@ def close_loop(
         threads: pours at once; one for each core if None.
         seed: of everything.
         thresholds: of the verdict.
+        surrogate: of the same archive, where it has been fitted for another task.
         say: is told each step.
 
     Raises:
@@ -150,17 +152,13 @@ def close_loop(
     """
     folder, rules = Path(out), thresholds or Thresholds()
     workers = threads or os.cpu_count() or 1
-    plan = _plan(task, budget, seed)
+    plan = planned(task, budget, seed)
     registration = register(folder, task, plan, rules, seed, Measures.of(plan.scene).names)
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
 
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
     store.fill(threads=threads, say=say)
-    rows = store.pours()
-    say(f"surrogate of {len(rows.x)} pours ({rows.left_out} left out: jammed, unhealthy, unseen)")
-    surrogate = Surrogate.fit(
-        plan.design, rows.theta, rows.condition, rows.psi, rows.x, names=rows.names, seed=seed
-    )
+    surrogate = surrogate or fit_surrogate(store, seed=seed, say=say)
     fitted = task.of(FIT)
     counts = [len(condition.recordings) for condition in fitted]
     middle = np.full(len(task.prior.names), 0.5)
@@ -204,8 +202,17 @@ def close_loop(
     return closed
 
 
-def _plan(task: Task, budget: int, seed: int) -> Plan:
-    """Sizes of the archive that a budget affords.
+def fit_surrogate(store: Archive, *, seed: int, say: Callable[[str], None] = print) -> Surrogate:
+    """Returns the surrogate of all pours of an archive."""
+    rows, design = store.pours(), store.plan.design
+    say(f"surrogate of {len(rows.x)} pours ({rows.left_out} left out: jammed, unhealthy, unseen)")
+    return Surrogate.fit(
+        design, rows.theta, rows.condition, rows.psi, rows.x, names=rows.names, seed=seed
+    )
+
+
+def planned(task: Task, budget: int, seed: int) -> Plan:
+    """Returns the archive that a budget affords.
 
     Raises:
         ObservationError: it affords too little, with what would be enough.

@@ -1,6 +1,7 @@
 """The word `close-loop` of the command line."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,9 @@ def add(commands: Any) -> None:
     parser.add_argument("task", type=Path, help="TOML file, or the folder with its loop.toml")
     parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the report")
     parser.add_argument("--archive", type=Path, help="folder of the pours (default: OUT/archive)")
+    parser.add_argument(
+        "--tolerances", type=Path, help="JSON of directions in which the statistics may be off"
+    )
     parser.add_argument("--budget", type=int, default=4000, help="pours, all told (default: 4000)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
@@ -49,9 +53,12 @@ def _run(options: argparse.Namespace) -> int:
     from granulcal.loop.close import close_loop
     from granulcal.loop.page import write_page
     from granulcal.loop.task import Task
+    from granulcal.loop.tolerance import Tolerances
 
     path = options.task / "loop.toml" if options.task.is_dir() else options.task
     task = Task.load(path)
+    if options.tolerances is not None:
+        task = replace(task, tolerances=Tolerances.load(options.tolerances))
     closed = close_loop(
         task,
         options.out,
@@ -62,6 +69,8 @@ def _run(options: argparse.Namespace) -> int:
     )
     page = options.out / "report.html"
     archive = "" if options.archive is None else f" --archive {options.archive}"
+    if options.tolerances is not None:
+        archive += f" --tolerances {options.tolerances}"
     write_page(
         closed,
         page,

@@ -44,6 +44,7 @@ def register(
         "library_sha256": fingerprint(task.library),
         "statistics": list(statistics),
         "archive": {"base": plan.base, "each": plan.each, "seed": plan.seed},
+        "tolerances_sha256": None if task.tolerances is None else task.tolerances.fingerprint(),
         "thresholds": thresholds.to_dict(),
         "seed": seed,
     }

@@ -8,6 +8,7 @@ and can never be a finding. The file:
      "directions": [[[...], [...]], ...]}       # one sd of each: direction, place, statistic
 """
 
+import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,6 +60,11 @@ class Tolerances:
                 f"got {directions.shape}"
             )
         return cls(names, str(document["path"]), at, directions)
+
+    def fingerprint(self) -> str:
+        """Returns a hash of all numbers."""
+        text = json.dumps([self.names, self.path, self.at.tolist(), self.directions.tolist()])
+        return hashlib.sha256(text.encode()).hexdigest()
 
     def effects(self) -> tuple[Effect, ...]:
         """Returns the random effects."""

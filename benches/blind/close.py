@@ -1,0 +1,63 @@
+"""Closes the loop on every blind set that has no verdict yet; reports stay beside the sets.
+
+    python benches/blind/close.py out/sets --archive out/archive
+
+All sets share one archive and its surrogate, and declare what the engines differ by
+(tolerances.json, of code_pairs.py) as a tolerance; `--undeclared` leaves it out.
+"""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from granulcal.loop.archive import Archive
+from granulcal.loop.close import close_loop, fit_surrogate, planned
+from granulcal.loop.page import write_page
+from granulcal.loop.task import Task
+from granulcal.loop.tolerance import Tolerances
+
+TOLERANCES = Path(__file__).with_name("tolerances.json")
+BUDGET, SEED = 3629, 1
+
+
+def main() -> None:
+    """Runs the sets in the order of their names."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sets", type=Path)
+    parser.add_argument("--archive", type=Path, required=True)
+    parser.add_argument("--undeclared", action="store_true")
+    parser.add_argument("--report", default="report", help="folder in a set's (default: report)")
+    options = parser.parse_args()
+    surrogate = None
+    for file in sorted(options.sets.glob("set-*/loop.toml")):
+        out = file.parent / options.report
+        if (out / "report.html").exists():
+            continue
+        task = Task.load(file)
+        if not options.undeclared:
+            task = replace(task, tolerances=Tolerances.load(TOLERANCES))
+        if surrogate is None:
+            store = Archive(options.archive, planned(task, BUDGET, SEED))
+            store.fill()
+            surrogate = fit_surrogate(store, seed=SEED)
+        closed = close_loop(
+            task,
+            out,
+            archive=options.archive,
+            budget=BUDGET,
+            seed=SEED,
+            surrogate=surrogate,
+            say=lambda line: None,
+        )
+        write_page(
+            closed,
+            out / "report.html",
+            command=f"granulcal close-loop {file}",
+            title=file.parent.name,
+        )
+        verdict = closed.trace.verdict
+        print(f"{file.parent.name}: {verdict.kind} {', '.join(verdict.named)} (p {verdict.p:.3g})")
+
+
+if __name__ == "__main__":
+    main()
