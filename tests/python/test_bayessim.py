@@ -16,10 +16,7 @@ from granulcal.bayessim.standardise import Standardiser  # noqa: E402
 from granulcal.bayessim.trainer import Progress  # noqa: E402
 from granulcal.diagnostics import binomial_band  # noqa: E402
 from granulcal.errors import ModelFormatError, ObservationError, TrainingDataError  # noqa: E402
-from granulcal.posterior import (
-    OutOfRange,
-    Posterior,
-)
+from granulcal.posterior import OutOfRange, Posterior  # noqa: E402
 from granulcal.prior import Prior  # noqa: E402
 from granulcal.toys import LinearGaussian, PileStandIn  # noqa: E402
 
@@ -126,7 +123,7 @@ def test_emulator_beats_the_network_and_the_network_the_plain_recipe():
 
 
 def test_a_distilled_network_imitates_the_emulator(toy, trained):
-    """The mixture trained on the emulator's draws: near the exact posterior, and near its teacher."""
+    """A mixture trained on an emulator's draws: near the exact posterior and near its teacher."""
     theta, x = toy.simulate(300, seed=20)
     model = BayesSim.fit(theta, x, toy.prior, quiet=True, method="distilled", synthetic=5000)
     assert model.summary.method == "distilled" and model.amortised is not None
