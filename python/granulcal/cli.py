@@ -127,7 +127,7 @@ def _add_check(commands: Any) -> None:
     parser.add_argument(
         "--data", type=Path, help="pours that the model was not trained on, to check it with"
     )
-    parser.add_argument("--plots", type=Path, help="write coverage.png and sbc.png to this folder")
+    parser.add_argument("--plots", type=Path, help="write coverage.png, sbc.png and training.png to this folder")
     parser.set_defaults(run=_check)
 
 
@@ -240,6 +240,7 @@ def _check(options: argparse.Namespace) -> int:
         print(model.identifiability)
     if options.plots is not None:
         calibration.plot(options.plots)
+        model.summary.plot(options.plots / "training.png")
         print(f"plots written to {options.plots}")
     return _DONE if calibration.is_calibrated else _UNHEALTHY
 
