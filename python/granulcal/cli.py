@@ -127,7 +127,11 @@ def _add_check(commands: Any) -> None:
     parser.add_argument(
         "--data", type=Path, help="pours that the model was not trained on, to check it with"
     )
-    parser.add_argument("--plots", type=Path, help="write coverage.png, sbc.png and training.png to this folder")
+    parser.add_argument(
+        "--plots",
+        type=Path,
+        help="write coverage.png, sbc.png and training.png to this folder",
+    )
     parser.set_defaults(run=_check)
 
 
