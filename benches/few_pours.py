@@ -1,11 +1,12 @@
-"""One recording, few pours: rounds of 150 beside 1000 and 150 pours of the prior, and 5 x 16 of an iterative filter.
+"""One recording, few pours: 150 in rounds beside pours of the prior and an iterative filter.
 
     python benches/few_pours.py --recordings 10
 
 On `granulcal.toys.PileStandIn`, whose posterior is known exactly. The filter is the scheme of
-Cheng et al., written anew from the paper: rounds of 16 simulations, weights by a normal likelihood whose
-covariance is a share of the squared data, the share so large that a fifth of the simulations
-carry weight, and the next round from a normal mixture (here: one normal) of the weighted ones.
+Cheng et al., written anew from the paper: rounds of 16 simulations, weights by a normal likelihood
+whose covariance is a multiple of the statistics' variances (there: of their squares, which here may
+be zero), the multiple so large that a fifth of the simulations carry weight, and the next round
+from a normal mixture (here: one normal) of the weighted ones.
 
 Reference:
     Cheng, Shuku, Thoeni, Tempone, Luding and Magnanimo, An iterative Bayesian filtering framework
@@ -53,11 +54,12 @@ def filtered(toy: PileStandIn, x_obs: np.ndarray, seed: int) -> Posterior:
     """Returns the posterior of the iterative filter."""
     generator = np.random.default_rng(seed)
     u = generator.random((SIZE, 3))
-    mixture = None
+    mixture, spread = None, np.ones(16)
     for number in range(ROUNDS):
         theta = toy.prior.from_unconstrained(u)
         x = toy.simulate_at(theta, seed=seed * 100 + number)
-        squares = np.sum(((x - x_obs) / x_obs) ** 2, axis=1)
+        spread = x.std(axis=0) if mixture is None else spread
+        squares = np.sum(((x - x_obs) / spread) ** 2, axis=1)
         log_proposal = 0.0 if mixture is None else mixture.log_prob(u)
         for share in np.geomspace(1e-3, 1e4, 200):
             log_weights = -0.5 * squares / share - log_proposal
@@ -97,7 +99,9 @@ def main() -> None:
 
     print("| pours | log density | median | less than exact | truths in 90 % intervals |")
     filters = [filtered(toy, row, i) for i, row in enumerate(x)]
-    show("5 x 16, iterative filter", [judged(toy, p, t) for p, t in zip(filters, theta, strict=True)])
+    show(
+        "5 x 16, iterative filter", [judged(toy, p, t) for p, t in zip(filters, theta, strict=True)]
+    )
     for count in (150, 1000):
         show(f"{count} of the prior", of_the_prior(toy, count, x, theta))
     for budget in options.budgets:

@@ -118,6 +118,7 @@ def calibrate(
         prior_pours=prior_pours,
         data=data,
         calibration=model.calibration,
+        misfit=model.misfit(observed),
         truth=truth,
         title=title,
         summary=summary,

@@ -26,6 +26,8 @@ Calibrates a granular simulator from depth images.
   granulcal check model                                       may its intervals be trusted?
   granulcal infer model couscous.png --camera camera.toml     posterior of the material
   granulcal report model couscous.png --camera camera.toml -o report.html
+  granulcal calibrate scene.toml prior.toml couscous.png --camera camera.toml --budget 100 -o run
+                                                              one recording, few pours
   granulcal close-loop loop.toml -o loop                      what does the model lack?
 
 Commands of the simulator (granulcal COMMAND --help tells more):
@@ -77,7 +79,7 @@ def _guarded(command: Callable[[], int]) -> int:
 
 
 def _commands() -> tuple[str, ...]:
-    return ("train", "check", "infer", "report", "close-loop", "reproduce", "demo")
+    return ("train", "check", "infer", "calibrate", "report", "close-loop", "reproduce", "demo")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -93,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_train(commands)
     _add_check(commands)
     _add_infer(commands)
+    _add_calibrate(commands)
     _add_report(commands)
     command.add(commands)
     _add_reproduce(commands)
@@ -124,12 +127,21 @@ def _add_check(commands: Any) -> None:
     parser.add_argument(
         "--data", type=Path, help="pours that the model was not trained on, to check it with"
     )
-    parser.add_argument("--plots", type=Path, help="write coverage.png and sbc.png to this folder")
+    parser.add_argument(
+        "--plots",
+        type=Path,
+        help="write coverage.png, sbc.png and training.png to this folder",
+    )
     parser.set_defaults(run=_check)
 
 
 def _add_recordings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, help="folder of `train`")
+    _add_reading(parser)
+    parser.add_argument("--scene", type=Path, help="refuse a model of another scene than this TOML")
+
+
+def _add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "recording",
         type=Path,
@@ -148,7 +160,6 @@ def _add_recordings(parser: argparse.ArgumentParser) -> None:
         help="frames to average, or all (default: the last 10)",
     )
     parser.add_argument("--first-frame", type=int, help="index of the first of them, from 0")
-    parser.add_argument("--scene", type=Path, help="refuse a model of another scene than this TOML")
 
 
 def _add_infer(commands: Any) -> None:
@@ -159,6 +170,20 @@ def _add_infer(commands: Any) -> None:
     parser.add_argument("-o", "--out", type=Path, help="write JSON with samples to this file")
     parser.add_argument("--plot", type=Path, help="write the pair plot to this file")
     parser.set_defaults(run=_infer)
+
+
+def _add_calibrate(commands: Any) -> None:
+    text = "infer the parameters from recordings with few pours, made in rounds for them alone"
+    parser = commands.add_parser("calibrate", help=text, description=text)
+    parser.add_argument("scene", type=Path, help="scene as TOML, or the word funnel")
+    parser.add_argument("prior", type=Path, help="prior as TOML, or the word default")
+    _add_reading(parser)
+    parser.add_argument("--budget", type=int, default=100, help="pours in all (default: 100)")
+    parser.add_argument("-o", "--out", type=Path, required=True, help="folder; holds the pours")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the run (default: 0)")
+    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.set_defaults(run=_calibrate)
 
 
 def _add_report(commands: Any) -> None:
@@ -219,6 +244,7 @@ def _check(options: argparse.Namespace) -> int:
         print(model.identifiability)
     if options.plots is not None:
         calibration.plot(options.plots)
+        model.summary.plot(options.plots / "training.png")
         print(f"plots written to {options.plots}")
     return _DONE if calibration.is_calibrated else _UNHEALTHY
 
@@ -269,16 +295,76 @@ def _infer(options: argparse.Namespace) -> int:
         print(json.dumps(document, indent=1))
         return _outcome(recordings)
     print(misfit)
-    print(f"{'parameter':<30}{'mode':>10}{'mean':>10}   90 % interval")
-    for name, values in document["parameters"].items():
-        low, high = values["interval90"]
-        print(f"{name:<30}{values['mode']:>10.4g}{values['mean']:>10.4g}   {low:.4g} to {high:.4g}")
+    _print_parameters(document["parameters"])
     print(known)
     if model.calibration is None or not model.calibration.is_calibrated:
         print("note: the model's own check failed: see `granulcal check`", file=sys.stderr)
     for warning in document["warnings"]:
         print(f"note: {warning}", file=sys.stderr)
     return _outcome(recordings)
+
+
+def _calibrate(options: argparse.Namespace) -> int:
+    from granulcal.prior import Prior
+    from granulcal.scene import Scene
+    from granulcal.within_budget import calibrate_within
+
+    scene = Scene.funnel() if str(options.scene) == "funnel" else Scene.load(options.scene)
+    prior = Prior.default() if str(options.prior) == "default" else Prior.load(options.prior)
+    recordings = _recordings(options)
+    found = calibrate_within(
+        scene,
+        prior,
+        recordings,
+        budget=options.budget,
+        out=options.out,
+        seed=options.seed,
+        threads=options.threads,
+        progress=lambda each: print(each, file=sys.stderr, flush=True),
+        poured=lambda n: (
+            print(f"\r{n} of {options.budget} pours", end="", file=sys.stderr, flush=True)
+            if sys.stderr.isatty()
+            else None
+        ),
+    )
+    posterior, region = found.posterior, found.posterior.credible_region(0.9)
+    mode, mean = posterior.mode(), posterior.mean()
+    document = {
+        "recordings": [str(path) for path in options.recording],
+        "parameters": {
+            name: {
+                "mode": float(mode[i]),
+                "mean": float(mean[i]),
+                "interval90": list(region[name]),
+            }
+            for i, name in enumerate(posterior.names)
+        },
+        "inside_model": {"is_inside": found.misfit.is_inside, "p_value": found.misfit.p_value},
+        "pours": len(found.x),
+        "usable": found.rounds[-1].usable,
+        "warnings": [str(warning) for warning in posterior.warnings],
+        "samples": posterior.sample(_SAMPLES).tolist(),
+    }
+    (options.out / "posterior.json").write_text(
+        json.dumps(document, indent=1) + "\n", encoding="utf-8"
+    )
+    if options.json:
+        del document["samples"]
+        print(json.dumps(document, indent=1))
+        return _outcome(recordings)
+    print(found.misfit)
+    _print_parameters(document["parameters"])
+    print(f"{found.rounds[-1]}; {found.choice}")
+    for warning in document["warnings"]:
+        print(f"note: {warning}", file=sys.stderr)
+    return _outcome(recordings)
+
+
+def _print_parameters(parameters: dict[str, Any]) -> None:
+    print(f"{'parameter':<30}{'mode':>10}{'mean':>10}   90 % interval")
+    for name, values in parameters.items():
+        low, high = values["interval90"]
+        print(f"{name:<30}{values['mode']:>10.4g}{values['mean']:>10.4g}   {low:.4g} to {high:.4g}")
 
 
 def _report(options: argparse.Namespace) -> int:

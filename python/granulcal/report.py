@@ -24,6 +24,7 @@ from granulcal.statistics import DOCS
 
 if TYPE_CHECKING:
     from granulcal.bayessim import Calibration
+    from granulcal.bayessim.misfit import Misfit
     from granulcal.posterior import Posterior
 
 __all__ = ["HealthRow", "write_report"]
@@ -91,6 +92,7 @@ def write_report(
     data: Dataset,
     prior_pours: Sequence[Pour] = (),
     calibration: "Calibration | None" = None,
+    misfit: "Misfit | None" = None,
     truth: ArrayLike | None = None,
     title: str = "Calibration report",
     summary: str = "",
@@ -108,6 +110,7 @@ def write_report(
         data: the pours that the model was trained on.
         prior_pours: pours at the prior's mean, for comparison.
         calibration: the model's check on pairs that it has not seen.
+        misfit: whether any parameters explain the measurement.
         truth: the true parameters, where they are known, shape (p,).
         title: heading of the page.
         summary: one paragraph that says what was done.
@@ -137,6 +140,7 @@ def write_report(
         distances=_distances(measured, simulated, prior_pours, data, scale),
         health=_health(data, pours, prior_pours),
         calibration=calibration,
+        misfit=misfit,
         data=data,
         scene_toml=data.scene_toml,
         versions=_versions(),

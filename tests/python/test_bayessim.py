@@ -16,7 +16,7 @@ from granulcal.bayessim.standardise import Standardiser  # noqa: E402
 from granulcal.bayessim.trainer import Progress  # noqa: E402
 from granulcal.diagnostics import binomial_band  # noqa: E402
 from granulcal.errors import ModelFormatError, ObservationError, TrainingDataError  # noqa: E402
-from granulcal.posterior import OutOfRange  # noqa: E402
+from granulcal.posterior import OutOfRange, Posterior  # noqa: E402
 from granulcal.prior import Prior  # noqa: E402
 from granulcal.toys import LinearGaussian, PileStandIn  # noqa: E402
 
@@ -122,6 +122,28 @@ def test_emulator_beats_the_network_and_the_network_the_plain_recipe():
     assert exact < losses["emulated"] < losses["mdrff"] - 0.1 < losses["plain"] - 0.3
 
 
+def test_a_distilled_network_imitates_the_emulator(toy, trained):
+    """A mixture trained on an emulator's draws: near the exact posterior and near its teacher."""
+    theta, x = toy.simulate(300, seed=20)
+    model = BayesSim.fit(theta, x, toy.prior, quiet=True, method="distilled", synthetic=5000)
+    assert model.summary.method == "distilled" and model.amortised is not None
+    found = []
+    for row in toy.simulate(40, seed=400)[1]:
+        exact, ours = toy.posterior(row), model.posterior(row)
+        teacher = Posterior.from_conditions(
+            toy.prior, [(model.likelihood, model.standardiser.apply(row[None]))]
+        )
+        draws, taught = exact.sample(200, seed=1), teacher.sample(200, seed=1)
+        found.append(
+            (
+                np.mean(exact.log_prob(draws) - ours.log_prob(draws)),
+                np.mean(teacher.log_prob(taught) - ours.log_prob(taught)),
+            )
+        )
+    # The prior's own divergence is about 4 nat.
+    assert np.all(np.mean(found, axis=0) < 0.4), np.mean(found, axis=0)
+
+
 def test_same_seed_same_model_on_any_thread_count(toy):
     theta, x = toy.simulate(120, seed=1)
     state, threads = torch.random.get_rng_state(), torch.get_num_threads()
@@ -183,9 +205,9 @@ def _drop_entry(folder):
     [
         (
             lambda f: _edit_json(f, version=99, made_by="granulcal 9.9"),
-            r"version must be 2 \(granulcal .*got 99 \(made by granulcal 9.9\): update granulcal",
+            r"version must be 3 \(granulcal .*got 99 \(made by granulcal 9.9\): update granulcal",
         ),
-        (lambda f: _edit_json(f, version=1), "got 1 .*train the model again"),
+        (lambda f: _edit_json(f, version=2), "got 2 .*train the model again"),
         (lambda f: _edit_json(f, format="other"), "is not a granulcal-bayessim file"),
         (lambda f: _edit_json(f, x_names=["one"]), "must have shape"),
         (lambda f: _edit_json(f, config={"colour": 3}), "colour"),

@@ -118,6 +118,28 @@ def test_report_writes_one_page(model, recording, tmp_path, capsys):
     assert "mean of 2 pours" in page.read_text()
 
 
+def test_calibrate_needs_no_model_and_goes_on_where_it_stopped(
+    recording, small_scene, tmp_path, capsys
+):
+    scene, prior, out = tmp_path / "scene.toml", tmp_path / "prior.toml", tmp_path / "run"
+    scene.write_text(small_scene.to_toml())
+    prior.write_text(gc.Prior.default().to_toml())
+    words = ["calibrate", str(scene), str(prior), recording[0], "--camera", recording[1]]
+    words += ["-o", str(out)]
+    assert main([*words, "--budget", "10"]) == 2
+    assert "at least 40" in capsys.readouterr().err and not out.exists()
+    assert main([*words, "--budget", "40", "--json"]) == 0
+    told = capsys.readouterr()
+    found = json.loads(told.out)
+    assert found["pours"] == 40 and "round 4 of 4: 40 of 40 pours" in told.err
+    low, high = found["parameters"]["material.sliding_friction"]["interval90"]
+    assert 0 <= low < high <= 1
+    kept = (out / "pours.json").read_bytes()
+    assert main([*words, "--budget", "40", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == found
+    assert (out / "pours.json").read_bytes() == kept
+
+
 def test_bad_input_is_exit_code_2(model, recording, tmp_path, capsys):
     for words, message in (
         (["train", str(tmp_path / "none"), "-o", str(tmp_path / "m")], "none"),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal.bayessim.misfit import Misfit, StatisticMisfit
 from granulcal.formation_image import common_field, height_grid
 from granulcal.report import HealthRow, write_report
 from granulcal.toys import LinearGaussian
@@ -40,6 +41,15 @@ def page(
         posterior=posterior,
         pours=[small_pour, other],
         prior_pours=[other],
+        misfit=Misfit(
+            pours=2,
+            p_value=0.004,
+            joint_p_value=0.2,
+            statistics=(
+                StatisticMisfit("max_z", 4.56, 0.004),
+                StatisticMisfit("mean_r", -0.5, 0.9),
+            ),
+        ),
         data=small_data,
         truth=gc.Prior.default().mean(),
         title="A <test> & more",
@@ -92,6 +102,12 @@ def test_the_page_shows_every_number(page, small_data):
 def test_large_differences_are_marked(page):
     text = page.read_text(encoding="utf-8")
     assert text.count('<tr class="far">') == text.count("beyond 2</td>") > 8
+
+
+def test_the_page_says_whether_the_measurement_is_inside_the_model(page):
+    text = page.read_text()
+    assert "Outside the model:" in text and "explain these 2 pours" in text and "+4.56" in text
+    assert text.count("too large") == 1
 
 
 def test_a_report_without_pours_is_refused(posterior, small_data, tmp_path):

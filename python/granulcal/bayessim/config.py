@@ -28,9 +28,10 @@ class Config:
 
     Attributes:
         method: `emulated`: likelihood of an emulator of the statistics. `mdrff`: network trained on
-            the pairs. `auto`, the default: both, averaged with the weight that says most about held-out
-            pairs. `distilled`: network trained on synthetic pairs of the emulator. `plain`: the
-            original recipe of the network. The last two only change the network's defaults.
+            the pairs. `auto`, the default: both, averaged with the weight that says most about
+            held-out pairs. `distilled`: network trained on synthetic pairs of the emulator.
+            `plain`: the original recipe of the network. The last two only change the network's
+            defaults.
         kernel: kernel whose spectrum the frequencies are drawn from.
         features: number of random frequencies; each gives a cosine and a sine.
         components: Gaussians in the mixture of one member.

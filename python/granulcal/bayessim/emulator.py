@@ -50,9 +50,7 @@ class Prediction:
 
     def first(self, count: int) -> "Prediction":
         """Returns what is expected of the first `count` statistics."""
-        return Prediction(
-            self.means[:, :count], self.scales[:, :count], self.unknown[:, :count]
-        )
+        return Prediction(self.means[:, :count], self.scales[:, :count], self.unknown[:, :count])
 
     def row(self, i: int) -> "Prediction":
         """Returns what is expected at one of the points."""

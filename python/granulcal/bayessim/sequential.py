@@ -152,7 +152,9 @@ def infer_within_budget(
     rounds: list[Round] = []
     fit: _Fit | None = None
     for number, size in enumerate(sizes, start=1):
-        design = _first_design(prior, size, seed) if fit is None else fit.next(u, size, seed + number)
+        design = (
+            _first_design(prior, size, seed) if fit is None else fit.next(u, size, seed + number)
+        )
         made = prior.from_unconstrained(design)
         statistics = as_matrix("simulated statistics", simulate(made, len(u)))
         if statistics.shape != (size, observed.shape[1]):
@@ -176,9 +178,7 @@ def infer_within_budget(
     assert fit is not None
     z = fit.standardiser.apply(observed, clip=False)
     misfit = fit.reference().test(fit.likelihood, z, names)
-    return SequentialFit(
-        fit.posterior, misfit, fit.choice, np.concatenate(theta), x, tuple(rounds)
-    )
+    return SequentialFit(fit.posterior, misfit, fit.choice, np.concatenate(theta), x, tuple(rounds))
 
 
 @dataclass(frozen=True)

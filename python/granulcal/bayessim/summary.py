@@ -1,9 +1,13 @@
 """What a training run did, as numbers and in plain words."""
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from os import PathLike
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["TrainingSummary"]
 
@@ -75,6 +79,27 @@ class TrainingSummary:
         )
         rest = {"best_epochs": tuple(values["best_epochs"]), "notes": tuple(values["notes"])}
         return cls(**{**values, **losses, **rest, "curve": curve})
+
+    def plot(self, path: str | PathLike[str]) -> "Figure | None":
+        """Writes the losses of each pass of the network to `path`; nothing without a network."""
+        if not self.curve:
+            return None
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(5, 3.2), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots()
+        training, validation = np.array(self.curve, dtype=float).T
+        axes.plot(training, label="training")
+        axes.plot(validation, label="validation, decides when to stop")
+        for number, best in enumerate(self.best_epochs):
+            label = "weights kept, by member" if number == 0 else None
+            axes.axvline(best, color="0.6", linewidth=0.8, zorder=0, label=label)
+        axes.set(xlabel="pass over the pairs", ylabel="mean negative log density [nat]")
+        axes.legend(frameon=False)
+        figure.savefig(path, dpi=120)
+        return figure
 
     def __str__(self) -> str:
         """The counts in a few lines."""

@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+
 from granulcal.bayessim import BayesSim
 from granulcal.parameter import Parameter
 from granulcal.prior import Prior

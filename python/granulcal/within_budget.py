@@ -1,0 +1,161 @@
+"""A material from recordings with a given number of pours, made for these recordings alone."""
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.forward import scene_at
+from granulcal.prior import Prior
+from granulcal.recording import Recording
+from granulcal.scene import Scene
+from granulcal.simulate import simulate
+from granulcal.statistics import NAMES
+
+if TYPE_CHECKING:
+    from granulcal.bayessim.sequential import Round, SequentialFit
+
+__all__ = ["KeptPours", "calibrate_within"]
+
+Array = NDArray[np.float64]
+
+_EXCLUDED = ("unhealthy", "jammed")
+# Seeds of pours of one run; data sets' are hashes, and reports' begin at 9000.
+_FIRST_SEED = 40_000_000
+
+
+class KeptPours:
+    """Simulator of a scene that keeps every pour in a file, and never makes one twice.
+
+    Args:
+        scene: the scene before the prior's parameters are set.
+        prior: names the parameters.
+        path: the file; rewritten as a whole after each pour.
+        seed: seed of the run.
+        threads: pours at once; the default is one for each core.
+        progress: called with the number of pours that are kept, after each.
+
+    Raises:
+        ValueError: the file is that of another scene, prior or seed, or is damaged.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        prior: Prior,
+        path: Path,
+        *,
+        seed: int = 0,
+        threads: int | None = None,
+        progress: Callable[[int], None] | None = None,
+    ) -> None:
+        """Reads what is kept already."""
+        self.scene, self.prior, self.path, self.seed = scene, prior, path, seed
+        self.threads, self.progress = threads or os.cpu_count() or 1, progress
+        text = f"{scene.to_toml()}\n{prior.to_toml()}\n{seed}"
+        self.key = hashlib.sha256(text.encode()).hexdigest()
+        self.rows: dict[str, dict] = self._read() if path.exists() else {}
+
+    def __call__(self, theta: Array, first: int) -> Array:
+        """Returns the statistics of pours at `theta` (b, p), NaN where there are none, (b, 16)."""
+        missing = [i for i in range(len(theta)) if not self._is_kept(first + i, theta[i])]
+        with ThreadPoolExecutor(self.threads) as workers:
+            jobs = {workers.submit(self._pour, theta[i], first + i): i for i in missing}
+            try:
+                for job in as_completed(jobs):
+                    self.rows[str(first + jobs[job])] = job.result()
+                    self._write()
+                    if self.progress is not None:
+                        self.progress(len(self.rows))
+            except BaseException:
+                workers.shutdown(wait=False, cancel_futures=True)
+                raise
+        kept = [self.rows[str(first + i)]["x"] for i in range(len(theta))]
+        return np.array([[np.nan] * len(NAMES) if x is None else x for x in kept], dtype=float)
+
+    def _is_kept(self, index: int, theta: Array) -> bool:
+        row = self.rows.get(str(index))
+        return row is not None and np.allclose(row["theta"], theta, rtol=1e-12, atol=0)
+
+    def _pour(self, theta: Array, index: int) -> dict:
+        pour = simulate(
+            scene_at(self.scene, self.prior, theta),
+            seed=_FIRST_SEED + 100_000 * self.seed + index,
+        )
+        status, x = pour.status, None
+        if status not in _EXCLUDED:
+            try:
+                x = np.asarray(pour.statistics()).tolist()
+            except ValueError:
+                status = "no_grains_in_view"
+        return {"theta": theta.tolist(), "status": status, "x": x}
+
+    def _read(self) -> dict[str, dict]:
+        try:
+            document = json.loads(self.path.read_text(encoding="utf-8"))
+            key, rows = document["key"], document["pours"]
+        except (ValueError, KeyError, TypeError):
+            raise ValueError(f"{self.path} is damaged or not a file of pours") from None
+        if key != self.key:
+            raise ValueError(f"{self.path} has the pours of another scene, prior or seed")
+        return rows
+
+    def _write(self) -> None:
+        text = json.dumps({"key": self.key, "names": self.prior.names, "pours": self.rows})
+        handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=".pours-")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.replace(name, self.path)
+
+
+def calibrate_within(
+    scene: Scene,
+    prior: Prior,
+    recordings: Sequence[Recording],
+    *,
+    budget: int = 100,
+    out: str | PathLike[str],
+    seed: int = 0,
+    threads: int | None = None,
+    progress: "Callable[[Round], None] | None" = None,
+    poured: Callable[[int], None] | None = None,
+) -> "SequentialFit":
+    """Returns the posterior of recordings of one material from `budget` pours.
+
+    Stop it anywhere: the same call goes on after the last pour that is kept in `out`.
+
+    Args:
+        scene: what was poured, with the camera that looked.
+        prior: of the parameters.
+        recordings: one or several of one material.
+        budget: pours in all, at least 40.
+        out: folder of pours.json.
+        seed: seed of every random choice.
+        threads: pours at once; the default is one for each core.
+        progress: called after each round.
+        poured: called with the number of kept pours after each.
+    """
+    from granulcal.bayessim.sequential import infer_within_budget, round_sizes
+
+    if not recordings:
+        raise ValueError("calibrate_within needs at least one recording, got none")
+    round_sizes(budget)
+    resolution = scene.ground_resolution
+    formations = [each.formation(ground_resolution=resolution) for each in recordings]
+    observed = np.array([np.asarray(formation.statistics()) for formation in formations])
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    pours = KeptPours(
+        scene, prior, folder / "pours.json", seed=seed, threads=threads, progress=poured
+    )
+    return infer_within_budget(
+        pours, prior, observed, budget=budget, seed=seed, x_names=NAMES, progress=progress
+    )

@@ -1,0 +1,76 @@
+"""Rounds of simulations for one observation."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+
+from granulcal.bayessim.sequential import infer_within_budget, round_sizes
+from granulcal.errors import ObservationError, TrainingDataError
+from granulcal.parameter import Parameter
+from granulcal.prior import Prior
+from granulcal.scene import Scene
+from granulcal.toys import LinearGaussian
+from granulcal.within_budget import KeptPours
+
+
+@pytest.fixture(scope="module")
+def toy():
+    return LinearGaussian.random(seed=1, noise=1.0, bounded=True)
+
+
+def test_a_budget_is_spent_where_the_posterior_is(toy):
+    theta, x = toy.simulate(1, seed=3)
+    asked = []
+
+    def simulate(at, first):
+        asked.append((first, at))
+        made = toy.simulate_at(at, seed=first)
+        # Some pours fail; they count.
+        made[::10] = np.nan
+        return made
+
+    seen = []
+    found = infer_within_budget(simulate, toy.prior, x[0], budget=100, progress=seen.append)
+    assert [first for first, _ in asked] == [0, 40, 60, 80] and len(found.x) == 100
+    assert seen == list(found.rounds) and seen[-1].usable == 90
+    distance = [np.linalg.norm(at - theta, axis=1).mean() for _, at in asked]
+    assert distance[-1] < 0.7 * distance[0]
+    exact = toy.posterior(x[0])
+    draws = exact.sample(500, seed=1)
+    divergence = np.mean(exact.log_prob(draws) - found.posterior.log_prob(draws))
+    prior = np.mean(exact.log_prob(draws)) - toy.prior.log_prob(draws).mean()
+    assert divergence < 0.2 * prior
+    assert "100 of 100 pours" in str(seen[-1])
+
+
+def test_budgets_and_observations_are_checked(toy):
+    assert sum(round_sizes(101)) == 101
+    with pytest.raises(ValueError, match="at least 40"):
+        round_sizes(39)
+    x = toy.simulate(1)[1][0]
+    with pytest.raises(ObservationError, match="finite"):
+        infer_within_budget(lambda at, first: at, toy.prior, x * np.nan)
+    with pytest.raises(TrainingDataError, match="0 of 40"):
+        infer_within_budget(lambda at, first: np.full((len(at), 16), np.nan), toy.prior, x)
+
+
+def test_pours_are_kept_and_never_made_twice(tmp_path):
+    scene = Scene.drop(0.02, count=20)
+    prior = Prior(
+        [
+            Parameter(path="material.sliding_friction", distribution="uniform", low=0.1, high=0.9),
+            Parameter(path="material.restitution", distribution="fixed", value=0.3),
+        ]
+    )
+    theta, counted = np.array([[0.2], [0.5], [0.8]]), []
+    file = tmp_path / "pours.json"
+    first = KeptPours(scene, prior, file, threads=1, progress=counted.append)(theta[:2], 0)
+    again = KeptPours(scene, prior, file, threads=1, progress=counted.append)
+    np.testing.assert_array_equal(again(theta, 0)[:2], first)
+    assert counted == [1, 2, 3] and [p.name for p in tmp_path.iterdir()] == ["pours.json"]
+    with pytest.raises(ValueError, match="another scene, prior or seed"):
+        KeptPours(scene, prior, file, seed=1)
+    file.write_text("{")
+    with pytest.raises(ValueError, match="damaged"):
+        KeptPours(scene, prior, file)
