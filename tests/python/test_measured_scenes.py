@@ -28,7 +28,8 @@ def test_fronts_are_compared_at_the_measured_frames():
 
 def test_profiles_are_compared_without_their_slope():
     measured = np.array([0.01, 0.0, -0.01, 40.0])
-    assert drum.rms_mm(measured + [0.003, 0.0, 0.0, 9.0], measured) == pytest.approx(np.sqrt(3.0))
+    off = np.array([0.003, 0.0, 0.0, 9.0])
+    assert drum.rms_mm(measured + off, measured) == pytest.approx(np.sqrt(3.0))
 
 
 @pytest.mark.parametrize("name", ["drum", "column", "hopper"])
