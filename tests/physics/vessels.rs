@@ -78,11 +78,11 @@ fn drum(friction: f64, end_walls: f64) -> Seen {
 
 #[test]
 fn a_drum_has_a_free_surface_that_friction_steepens() {
-    let [smooth, rough] = [drum(0.15, 0.15), drum(0.6, 0.15)];
+    let [smooth, rough] = [drum(0.1, 0.1), drum(0.6, 0.1)];
     let slopes = [&smooth, &rough].map(|seen| seen.value("surface_slope"));
     println!("drum: slopes {slopes:?} deg");
-    // Grains that slide on each other stand at no less than their angle of friction, 8.5 degrees.
-    assert!(slopes[0] > 8.5 && slopes[1] > slopes[0] + 5.0 && slopes[1] < 60.0, "{slopes:?}");
+    // Grains that slide on each other stand at no less than their angle of friction, 5.7 degrees.
+    assert!(slopes[0] > 5.7 && slopes[1] > slopes[0] + 3.0 && slopes[1] < 60.0, "{slopes:?}");
     // End walls hold the bed up: a rough one steepens it (Taberlet et al. 2003, doi:10.1103/PhysRevLett.91.264301).
     let held = drum(0.6, 0.6).value("surface_slope");
     println!("drum: {held} deg between rough end walls");
@@ -97,7 +97,7 @@ fn a_drum_has_a_free_surface_that_friction_steepens() {
 fn a_column_runs_out_as_far_as_columns_do() {
     let scene = with(
         &example("column.toml"),
-        &[("grains.diameter", 8e-3), ("grains.count", 1040.0), ("start.spacing", 8.2e-3)],
+        &[("grains.diameter", 8e-3), ("grains.count", 1040.0), ("start.spacing", 9.0e-3)],
     );
     let seen = Seen::of(&scene);
     let front = &seen.observed.series[0];
@@ -129,7 +129,7 @@ fn a_hopper_runs_out_evenly_and_a_narrow_one_jams() {
     let offset = middle.iter().map(|(t, p)| *p - rate * *t).sum::<f64>() / middle.len() as f64;
     let worst = middle.iter().map(|(t, p)| (*p - rate * *t - offset).abs()).fold(0.0, f64::max);
     println!("hopper: {rate} %/s, {worst} % off a line");
-    assert!(worst < 4.0, "{worst} {rate}");
+    assert!(worst < 2.0, "{worst} {rate}");
     // An outlet of two and a half grains: below the five at which holes begin to jam.
     let narrow = with(&scene, &[("walls.1.shape.radius_from", 5e-3), ("end.horizon", 2.0)]);
     let seen = Seen::of(&narrow);

@@ -37,7 +37,7 @@ fn schemas_counts_stamps_and_bytes_are_those_of_the_pour() {
         4,
         60.0,
         &path,
-        &mut Observer::new(&scene()),
+        &mut Observer::new(&scene),
         &mut |_| true,
     )
     .unwrap()
