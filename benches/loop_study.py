@@ -3,9 +3,10 @@
     python benches/loop_study.py run OUT.jsonl --archive DIR --nulls 100 --rounds 4   # resumable
     python benches/loop_study.py table OUT.jsonl
 
-The scene and prior are those of benches/blind. Every set has a material of its own and three pours at each
-of 4, 8 and 12 cm. First the nulls, then rounds of every candidate effect at three strengths. Sealed heights
-are 2, 6 and 10 cm. The pours of a set are kept in OUT.pours, so that the loop can be run on them again.
+The scene and prior are those of benches/blind. Every set has a material of its own and three pours
+at each of 4, 8 and 12 cm. First the nulls, then rounds of every candidate effect at three
+strengths. Sealed heights are 2, 6 and 10 cm. The pours of a set are kept in OUT.pours, so that the
+loop can be run on them again.
 """
 
 import argparse

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).parent
-DIRECTIONS = 4
-"""Of the scatter between materials."""
-LEFT_OUT = ("tail_index", "ring_depth")
-"""Statistics that are not finite or constant in some pours."""
+DIRECTIONS = 10
+"""Of the scatter between materials, at most."""
+LEFT_OUT = ("tail_index", "ring_depth", "height_ring")
+"""Statistics that the loop does not look at."""
 
 
 def main() -> None:
@@ -28,7 +28,7 @@ def main() -> None:
     numbers = json.loads((HERE / "code_difference.json").read_text())
     heights = sorted(numbers["heights"], key=float)
     every = [*numbers["names"], *numbers["diagnostic_names"]]
-    names = [name for name in every if name not in LEFT_OUT]
+    names = [name for name in every if not name.startswith(LEFT_OUT)]
     keep = [every.index(name) for name in names]
     sd = np.array(
         [[*numbers["heights"][h]["sd"], *numbers["heights"][h]["diagnostic_sd"]] for h in heights]
@@ -48,6 +48,7 @@ def main() -> None:
     variances = singular**2 / (len(flat) - 1)
     noise = 7 / 6 * flat.shape[1] / max(len(flat) - 1, 1)
     found = [mean]
+    print("variance between materials over that of seeds:", (variances / noise).round(2))
     for variance, axis in zip(variances[:DIRECTIONS], axes, strict=False):
         if variance > noise:
             found.append(np.sqrt(variance - noise) * axis)

@@ -118,15 +118,15 @@ def weighted_ridge(features: Array, weights: Array, y: Array, ratio: float) -> R
     best: tuple[float, Array, Array, float] | None = None
     for factor in _NEAR:
         tried = ratio * factor
-        lower = np.linalg.cholesky(gram + tried * identity)
-        half = np.linalg.solve(lower, along)
+        lower = np.asarray(np.linalg.cholesky(gram + tried * identity), dtype=np.float64)
+        half = np.asarray(np.linalg.solve(lower, along), dtype=np.float64)
         left = max(total - float(half @ half), 1e-12 * max(total, 1e-300))
         log_det = 2 * np.log(np.diag(lower)).sum() - len(gram) * np.log(tried)
         evidence = float(-0.5 * (len(y) * np.log(left / len(y)) + log_det))
         if best is None or evidence > best[0]:
             best = evidence, lower, half, tried
     assert best is not None
-    root = np.linalg.inv(best[1]).T
+    root = np.asarray(np.linalg.inv(best[1]).T, dtype=np.float64)
     coefficients = root @ best[2]
     return RidgeFit(
         coefficients,

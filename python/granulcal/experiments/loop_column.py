@@ -31,15 +31,17 @@ _EFFECTS = (
     "fluid.density",
     "fluid.viscosity",
 )
-# Name, gravity, use, tests, density and viscosity of the fluid: of Experimental_Conditions.txt.
-_CONDITIONS = (
-    ("water, 1 g", _STANDARD, FIT, ("20210420_08g_010w_050_050_001", "20210816_08g_010w_050_050_001"), 1000.0, 1.03e-3),
-    ("7 % glycerol, 1 g", _STANDARD, FIT, ("20210824_08g_012g_050_050_001",), 1018.2, 1.215e-3),
-    ("73 % glycerol, 1 g", _STANDARD, SEALED, ("20220608_08g_310g_050_050_001",), 1190.84, 3.236e-2),
-    ("78 % glycerol, 4.6 g", _CENTRIFUGE, SEALED, ("20220411_08g_500g_050_050_005",), 1203.84, 5.246e-2),
-    ("85 % glycerol, 4.6 g", _CENTRIFUGE, SEALED, ("20220411_08g_1000g_050_050_005",), 1219.7, 0.1053),
-    ("88 % glycerol, 4.6 g", _CENTRIFUGE, SEALED, ("20220411_08g_1500g_050_050_005",), 1227.5, 0.1568),
-)  # fmt: skip
+# Name, gravity, tests, density and viscosity of the fluid: of Experimental_Conditions.txt.
+_FITTED = (
+    ("water, 1 g", _STANDARD, ("20210420_08g_010w", "20210816_08g_010w")),
+    ("7 % glycerol, 1 g", _STANDARD, ("20210824_08g_012g",)),
+)
+_SEALED = (
+    ("73 % glycerol, 1 g", _STANDARD, "20220608_08g_310g_050_050_001", 1190.84, 3.236e-2),
+    ("78 % glycerol, 4.6 g", _CENTRIFUGE, "20220411_08g_500g_050_050_005", 1203.84, 5.246e-2),
+    ("85 % glycerol, 4.6 g", _CENTRIFUGE, "20220411_08g_1000g_050_050_005", 1219.7, 0.1053),
+    ("88 % glycerol, 4.6 g", _CENTRIFUGE, "20220411_08g_1500g_050_050_005", 1227.5, 0.1568),
+)
 
 
 def task(data: Path) -> Task:
@@ -57,22 +59,28 @@ def task(data: Path) -> Task:
             ),
         ]
     )
-    conditions = tuple(
+    fitted = [
+        Condition(name, {"gravity.2": g}, FIT, _files(data, [f"{t}_050_050_001" for t in tests]))
+        for name, g, tests in _FITTED
+    ]
+    # What the fluid is known to be, should a fluid be what is missing; those that are fitted say it
+    # themselves.
+    sealed = [
         Condition(
-            name=name,
-            at={"gravity.2": gravity},
-            use=use,
-            recordings=tuple(data / _RUNOUT / f"{test}.txt" for test in tests),
-            camera=None,
-            # What the fluid is known to be, should a fluid be what is missing; those that are
-            # fitted say it themselves.
-            known={}
-            if use == FIT
-            else {"effects.fluid.density": density, "effects.fluid.viscosity": viscosity},
+            name,
+            {"gravity.2": g},
+            SEALED,
+            _files(data, [test]),
+            known={"effects.fluid.density": density, "effects.fluid.viscosity": viscosity},
         )
-        for name, gravity, use, tests, density, viscosity in _CONDITIONS
-    )
+        for name, g, test, density, viscosity in _SEALED
+    ]
+    conditions = (*fitted, *sealed)
     return Task(Scene.load(_SCENE), prior, conditions, by_name(_EFFECTS))
+
+
+def _files(data: Path, tests: list[str]) -> tuple[Path, ...]:
+    return tuple(data / _RUNOUT / f"{test}.txt" for test in tests)
 
 
 def reproduce(out: Path, data: Path) -> None:

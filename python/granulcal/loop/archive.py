@@ -1,7 +1,7 @@
 """The archive: every pour that the loop has ever run, as data sets in one folder.
 
     archive/
-      archive.json        scene, prior, conditions, library, sizes; written first, refused if another
+      archive.json        scene, prior, conditions, library; written first, refused if another
       base/               pours of the plain model, conditions and parameters from their priors
       effect-NAME/        the same with one effect at a strength from its prior
 
@@ -220,8 +220,8 @@ class Archive:
     ) -> list[tuple[Array, Array, Array, Array]]:
         """Base pours read anew, for each effect that needs none of its own.
 
-        With other lengths, for an effect of the camera; as pours of another condition than theirs, for
-        one that is stated wrongly.
+        With other lengths, for an effect of the camera; as pours of another condition than theirs,
+        for one that is stated wrongly.
         """
         paths = [path for path, _, _ in self.plan.conditions]
         found = []

@@ -99,7 +99,7 @@ def improve(
     pull = np.concatenate([np.ones(p), np.full(len(active), 1e-6)])
     for _ in range(steps):
         if not held:
-            root = np.linalg.cholesky(local.covariance(v, psi))
+            root = np.asarray(np.linalg.cholesky(local.covariance(v, psi)), dtype=np.float64)
         assert root is not None
         mean, slopes = local.slopes(v, psi, active)
         solved = np.linalg.solve(root, np.column_stack([slopes, target - mean]))
@@ -148,7 +148,7 @@ def summarise(
 ) -> Fit:
     """Returns the fit at (v, psi) as it is."""
     if root is None:
-        root = np.linalg.cholesky(local.covariance(v, psi))
+        root = np.asarray(np.linalg.cholesky(local.covariance(v, psi)), dtype=np.float64)
     mean, slopes = local.slopes(v, psi, active)
     white = np.linalg.solve(root, target - mean)
     square = float(white @ white + v @ v)

@@ -79,7 +79,7 @@ def fit_blocks(x: Array, y: Array, scale: Array, blocks: list[slice], gram: Arra
             found = float(c[block] @ c[block]) / known[i]
             widths[i] = min(max(found, _SMALLEST), _LARGEST)
         variance = float(np.sum(weights * left**2)) / max(len(y) - known.sum(), 1.0)
-    root = np.linalg.cholesky(inverse)
+    root = np.asarray(np.linalg.cholesky(inverse), dtype=np.float64)
     leverage = np.sum((x @ root) ** 2, axis=1) * weights / variance
     leverage = np.minimum(leverage, _LARGEST_LEVERAGE)
     left = y - x @ c

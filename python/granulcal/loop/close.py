@@ -1,8 +1,8 @@
 """`close_loop`: from recordings to a verdict, with the error before and after.
 
-The steps are those of docs/theory/loop.md: register what is fixed; fill the archive; say what could be
-seen; fit and test; refit the library; decide; simulate the base and the augmented model; open the
-sealed conditions once; run the placebo; write the report.
+The steps are those of docs/theory/loop.md: register what is fixed; fill the archive; say what could
+be seen; fit and test; refit the library; decide; simulate the base and the augmented model; open
+the sealed conditions once; run the placebo; write the report.
 """
 
 import json
@@ -294,7 +294,7 @@ def _compare(
     surrogate: Surrogate,
     seed: int,
 ) -> Improvement:
-    """The paper's 16 statistics, or all that the scene observes, over their spread in the archive."""
+    """The paper's 16 statistics, or all that the scene observes, over the archive's spread."""
     size = Measures.of(task.scene).head
     spread = surrogate.raw_spread[:size]
     return compare(
@@ -308,7 +308,7 @@ def _compare(
 
 
 def _candidates(task: Task) -> list[tuple[str, Array]]:
-    """Conditions that further pours might have: each input over its range, the others in the middle."""
+    """Conditions that further pours might have: each input over its range, others in the middle."""
     found = []
     for i, (path, low, high) in enumerate(task.inputs):
         for share in (0.0, 0.25, 0.5, 0.75, 1.0):

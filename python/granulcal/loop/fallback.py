@@ -56,14 +56,14 @@ class Discrepancy:
         root, slopes = local.in_statistics(fit.root), local.in_statistics(fit.slopes)
         residual = local.in_statistics(fit.residual)
         covariance = root @ root.T
-        constraint = np.linalg.solve(covariance, slopes)
+        constraint = np.asarray(np.linalg.solve(covariance, slopes), dtype=np.float64)
         normal = slopes.T @ constraint + np.eye(len(fit.v))
         expected = covariance - slopes @ np.linalg.solve(normal, slopes.T)
         excess = residual**2 - np.diag(expected)
         variances = np.maximum(excess.reshape(count, size).mean(axis=0), 0.0)
         bare = cls(local.conditions, variances, constraint, np.empty(0), np.empty((0, 0)))
         kernel = bare._kernel(local.conditions, local.conditions)
-        precision = np.linalg.inv(kernel + covariance)
+        precision = np.asarray(np.linalg.inv(kernel + covariance), dtype=np.float64)
         return cls(local.conditions, variances, constraint, precision @ residual, precision)
 
     def predict(self, condition: ArrayLike) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Pours of one model under every condition: what a verdict is held against. Kept, never run twice."""
+"""Pours of one model under every condition: what a verdict is held against. None is run twice."""
 
 import hashlib
 import json

@@ -164,7 +164,7 @@ def _step_down(null: Array, observed: Array) -> Array:
     order = np.argsort(-observed)
     adjusted, highest = np.empty(len(observed)), 0.0
     for i, k in enumerate(order):
-        p = _p(null[order[i:]].max(axis=0), observed[k])
+        p = _p(null[order[i:]].max(axis=0), float(observed[k]))
         highest = max(highest, p)
         adjusted[k] = highest
     return adjusted

@@ -1,7 +1,7 @@
-"""The library of effects that the loop looks for: each a number of a scene that the base model lacks.
+"""The library of effects that the loop looks for: each a number that the base model lacks.
 
-An effect is a path of the scene, its value when off and its value at full strength, psi = 1. What the
-simulator does with it, with equation and source, is in docs/theory/effects.md.
+An effect is a path of the scene, its value when off and its value at full strength, psi = 1. What
+the simulator does with it, with equation and source, is in docs/theory/effects.md.
 """
 
 import hashlib
@@ -96,7 +96,7 @@ class LibraryEffect:
         return self.camera or self.shift
 
     def numbers(self, psi: float) -> dict[str, float]:
-        """Returns the numbers of the scene at strength `psi`, by path; none of an image's effect."""
+        """Returns the numbers of the scene at strength `psi`, by path; none of a free effect."""
         if self.is_free:
             return {}
         return {self.path: self.value(psi), **dict(self.also)}

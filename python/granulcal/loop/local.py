@@ -71,7 +71,7 @@ class Local:
         for k in surrogate.design.nuisances:
             effect = surrogate.design.effects[k]
             linear = surrogate.effect_features(rows, conditions, k)[0]
-            along = effect.nuisance_sd * (linear @ surrogate.coefficients.T)
+            along = (effect.nuisance_sd or 0.0) * (linear @ surrogate.coefficients.T)
             if effect.is_shared:
                 nuisance += np.outer(along.ravel(), along.ravel())
             else:

@@ -17,8 +17,8 @@ __all__ = ["Measures", "camera_beside"]
 
 Array = NDArray[np.float64]
 
-# Of the diagnostics: a slope that few formations have, and rings of which the 16 statistics hold the
-# sum: twenty more numbers to a pour blunt every test of the others.
+# Of the diagnostics: a slope that few formations have, and rings of which the 16 statistics hold
+# the sum: twenty more numbers to a pour blunt every test of the others.
 _LEFT_OUT = ("tail_index", "height_ring")
 # Volume under the measured surface over that of the scene's grains: beyond this a unit is wrong.
 _VOLUME_RANGE = (0.1, 10.0)
@@ -94,7 +94,7 @@ class Measures:
 
 
 def camera_beside(path: Path) -> Path | None:
-    """Returns the camera of a PNG: its own TOML, or `camera.toml` in its folder or the one above."""
+    """Returns the camera of a PNG: its own TOML, or `camera.toml` in its folder or one above."""
     if path.suffix != ".png":
         return None
     near = [path.with_suffix(".toml"), *(p / "camera.toml" for p in path.parents[:2])]

@@ -10,8 +10,8 @@ import numpy as np
 from granulcal import _native
 from granulcal.formation_image import formation_figure
 from granulcal.loop.close import Closed
-from granulcal.loop.preregistration import write_beside
 from granulcal.loop.measures import Measures, camera_beside
+from granulcal.loop.preregistration import write_beside
 from granulcal.loop.task import Condition
 from granulcal.recording import Recording
 from granulcal.report import data_uri, template
@@ -25,7 +25,7 @@ _SENTENCES = {
     "EFFECT": "The grains do something that this model lacks, and one effect accounts for it.",
     "SET": "The grains do something that this model lacks; several effects would account for it.",
     "EFFECTS": "The grains do something that this model lacks; it takes two effects.",
-    "UNEXPLAINED": "The grains do something that neither this model nor any effect of the library does.",
+    "UNEXPLAINED": "The grains do something that neither this model nor any known effect does.",
 }
 # Statistics that the picture of residuals shows, the largest ones.
 _SHOWN = 24

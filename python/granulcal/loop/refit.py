@@ -173,7 +173,8 @@ def _root(local: Local, base: Fit, best: Fit) -> Array:
     """Root of V: pours of the base fit, the surrogate's error at the best strengths."""
     none = np.zeros_like(best.psi)
     total = local.pour_covariance(base.v, none) + local.nuisance
-    return np.linalg.cholesky(total + local.error_covariance(base.v, best.psi))
+    covariance = total + local.error_covariance(base.v, best.psi)
+    return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
 
 
 def _laplace(fit: Fit) -> float:

@@ -71,7 +71,7 @@ class Scores:
     def of(cls, local: Local, fit: Fit, effects: tuple[int, ...]) -> "Scores":
         """Returns the scores of `effects` beyond a fit."""
         design = local.surrogate.design
-        whiten = np.linalg.inv(fit.root)
+        whiten = np.asarray(np.linalg.inv(fit.root), dtype=np.float64)
         directions = np.column_stack(
             [local.direction(fit.v, k, fit.psi) for k in effects] or [np.zeros(local.size)]
         )[:, : len(effects)]

@@ -249,7 +249,7 @@ class Surrogate:
     @property
     def from_axes(self) -> Array:
         """C^1/2: y times it is z, shape (m, m)."""
-        return np.linalg.inv(self.axes)
+        return np.asarray(np.linalg.inv(self.axes), dtype=np.float64)
 
     def beyond(self, observations: Sequence["Observation"]) -> tuple[str, ...]:
         """Returns which observed statistics lie outside the range of all archive pours.

@@ -10,13 +10,13 @@
     use = "fit"                     # or "sealed": opened once, after the verdict
     recordings = ["04cm/pour-0.png", "04cm/pour-1.png"]   # a pour each
 
-`tolerances = "tolerances.json"` declares in which directions the statistics may be off (see Tolerances).
-`camera = "camera.toml"` of a condition, or once for all, is the camera of PNGs; where it is left out it is
-looked for beside the recording.
+`tolerances = "tolerances.json"` declares in which directions the statistics may be off.
+`camera = "camera.toml"` of a condition, or once for all, is the camera of PNGs; where it is left
+out it is looked for beside the recording.
 """
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -50,16 +50,16 @@ class Condition:
         use: `fit` or `sealed`.
         recordings: a pour each.
         camera: of PNGs.
-        known: numbers that an effect has here, should it be the one: `{"effects.fluid.density" = 1260}`.
+        known: numbers that an effect has here, should it be the one, for example
+            `{"effects.fluid.density": 1260.0}`.
     """
 
     name: str
     at: dict[str, float]
     use: str
     recordings: tuple[Path, ...]
-    camera: Path | None
-
-    known: dict[str, float]
+    camera: Path | None = None
+    known: dict[str, float] = field(default_factory=dict)
 
     def statistics(self, scene: Scene) -> Array:
         """Returns the statistics of each pour, shape (n, s).

@@ -1,8 +1,8 @@
-"""Declared tolerances of the statistics themselves: ways in which the simulator may be off, known beforehand.
+"""Declared tolerances of the statistics themselves: ways in which a simulator is known to be off.
 
-For truths of another simulator, or a camera whose error was measured: directions in the statistics, as
-functions of one condition input, each with a standard deviation. They are random effects of every fit
-and can never be a finding. The file:
+For truths of another simulator, or a camera whose error was measured: directions in the statistics,
+as functions of one condition input, each with a standard deviation. They are random effects of
+every fit and can never be a finding. The file:
 
     {"names": ["max_z", ...], "path": "funnel.height", "at": [0.02, 0.12],
      "directions": [[[...], [...]], ...]}       # one sd of each: direction, place, statistic
