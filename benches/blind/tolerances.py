@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).parent
-DIRECTIONS = 10
+DIRECTIONS = 6
 """Of the scatter between materials, at most."""
 LEFT_OUT = ("tail_index", "ring_depth", "height_ring")
 """Statistics that the loop does not look at."""
