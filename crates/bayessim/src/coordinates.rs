@@ -67,9 +67,8 @@ impl Coordinates {
 
     /// log |du / dtheta|.
     pub fn log_slope(&self, theta: &[f64]) -> f64 {
-        let slope = |c: &Coordinate, value: f64| {
-            -c.scale.ln() - if c.is_log { value.ln() } else { 0.0 }
-        };
+        let slope =
+            |c: &Coordinate, value: f64| -c.scale.ln() - if c.is_log { value.ln() } else { 0.0 };
         self.0.iter().zip(theta).map(|(c, &value)| slope(c, value)).sum()
     }
 
@@ -80,7 +79,9 @@ impl Coordinates {
             .map(|i| draws.iter().map(|u| u[i]).sum::<f64>() / draws.len() as f64)
             .collect();
         let variance = (0..self.dimension())
-            .map(|i| draws.iter().map(|u| (u[i] - mean[i]).powi(2)).sum::<f64>() / draws.len() as f64)
+            .map(|i| {
+                draws.iter().map(|u| (u[i] - mean[i]).powi(2)).sum::<f64>() / draws.len() as f64
+            })
             .collect();
         (mean, variance)
     }

@@ -114,7 +114,8 @@ impl Emulator {
         let mut features = Vec::with_capacity(self.basis.size());
         self.basis.fill(u, &mut features);
         let axes = 0..self.shift.len();
-        let mean = |j: usize| self.shift[j] + self.spread[j] * dot(self.coefficients.row(j), &features);
+        let mean =
+            |j: usize| self.shift[j] + self.spread[j] * dot(self.coefficients.row(j), &features);
         let means = axes.clone().map(mean).collect();
         self.scale_basis.fill(u, &mut features);
         let variance = |coefficients: &Matrix, j: usize| {

@@ -131,7 +131,12 @@ impl TruncatedMixture {
         }
     }
 
-    pub fn sample(&self, coordinates: &Coordinates, n: usize, random: &mut Random) -> Vec<Vec<f64>> {
+    pub fn sample(
+        &self,
+        coordinates: &Coordinates,
+        n: usize,
+        random: &mut Random,
+    ) -> Vec<Vec<f64>> {
         if self.is_mostly_outside() {
             let draws = coordinates.quasi_prior(PRIOR_POINTS);
             let weight = |u: &Vec<f64>| {

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use granulcal_dataset::Prior;
 
+use crate::ModelError;
 use crate::coordinates::Coordinates;
 use crate::document::Document;
 use crate::likelihood::{FEWEST_EFFECTIVE, Likelihood};
@@ -13,7 +14,6 @@ use crate::network::Network;
 use crate::posterior::{Emulated, Posterior, Warning};
 use crate::standardiser::Standardiser;
 use crate::tensors::Tensors;
-use crate::ModelError;
 
 const DOCUMENT: &str = "model.json";
 const TENSORS: &str = "weights.safetensors";
@@ -120,7 +120,8 @@ impl Model {
     }
 
     fn check(&self, x: &[Vec<f64>]) -> Result<(), ModelError> {
-        let wrong = |allowed: String, found: String| Err(ModelError::Observation { allowed, found });
+        let wrong =
+            |allowed: String, found: String| Err(ModelError::Observation { allowed, found });
         let count = self.x_names.len();
         if x.is_empty() {
             return wrong("at least one pour".to_owned(), "none".to_owned());

@@ -30,7 +30,12 @@ pub struct Network {
 }
 
 impl Network {
-    pub fn read(tensors: &Tensors, config: &Config, p: usize, s: usize) -> Result<Self, ModelError> {
+    pub fn read(
+        tensors: &Tensors,
+        config: &Config,
+        p: usize,
+        s: usize,
+    ) -> Result<Self, ModelError> {
         let axes = tensors.rows("axes_matrix", Some(s), None)?;
         let (d, m, e) = (axes.columns, config.features, config.ensemble);
         let size = config.components * (1 + p + p * (p + 1) / 2);

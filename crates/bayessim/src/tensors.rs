@@ -44,7 +44,11 @@ impl<'a> Tensors<'a> {
         Ok(Matrix { data, columns: shape[1] })
     }
 
-    fn any(&self, name: &str, shape: &[Option<usize>]) -> Result<(Vec<f64>, Vec<usize>), ModelError> {
+    fn any(
+        &self,
+        name: &str,
+        shape: &[Option<usize>],
+    ) -> Result<(Vec<f64>, Vec<usize>), ModelError> {
         let wrong = |allowed: String, found: String| ModelError::Content {
             path: self.path.clone(),
             what: name.to_owned(),
@@ -66,12 +70,9 @@ impl<'a> Tensors<'a> {
         }
         let bytes = tensor.data();
         let numbers: Vec<f64> = match tensor.dtype() {
-            Dtype::F64 => bytes
-                .as_chunks::<8>()
-                .0
-                .iter()
-                .map(|&word| f64::from_le_bytes(word))
-                .collect(),
+            Dtype::F64 => {
+                bytes.as_chunks::<8>().0.iter().map(|&word| f64::from_le_bytes(word)).collect()
+            }
             Dtype::F32 => bytes
                 .as_chunks::<4>()
                 .0

@@ -83,9 +83,8 @@ fn draws_stay_inside_the_prior_and_repeat_with_their_seed() {
     let draws = posterior.sample(2000, 7);
     assert_eq!(draws, posterior.sample(2000, 7));
     assert_ne!(draws, posterior.sample(2000, 8));
-    let inside = |d: &Vec<f64>| {
-        (-1.0..=3.0).contains(&d[0]) && (0.001..=1.0).contains(&d[1]) && d[2] >= 0.0
-    };
+    let inside =
+        |d: &Vec<f64>| (-1.0..=3.0).contains(&d[0]) && (0.001..=1.0).contains(&d[1]) && d[2] >= 0.0;
     assert!(draws.iter().all(inside));
     assert_eq!(posterior.log_prob(&[5.0, 0.1, 1.0]), f64::NEG_INFINITY);
 }

@@ -60,7 +60,11 @@ pub fn exit_code_of(error: &anyhow::Error) -> u8 {
         if let Some(cause) = cause.downcast_ref::<DatasetError>() {
             return if cause.is_bad_input() { 2 } else { 1 };
         }
-        if cause.is::<BadArgument>() || cause.is::<ModelError>() || cause.is::<DemError>() || cause.is::<FeatureError>() {
+        if cause.is::<BadArgument>()
+            || cause.is::<ModelError>()
+            || cause.is::<DemError>()
+            || cause.is::<FeatureError>()
+        {
             return 2;
         }
         if cause.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe)

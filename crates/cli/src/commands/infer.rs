@@ -24,9 +24,9 @@ pub fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
     }
     let ground_resolution = match &model.scene_toml {
         // The scene may name meshes that are not here; the camera does not need them.
-        Some(text) => scene_from_text(text, Path::new(""))
-            .ok()
-            .map(|scene| scene.camera.ground_resolution()),
+        Some(text) => {
+            scene_from_text(text, Path::new("")).ok().map(|scene| scene.camera.ground_resolution())
+        }
         None => None,
     };
     let mut is_whole = true;
