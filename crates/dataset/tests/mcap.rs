@@ -31,17 +31,12 @@ fn schemas_counts_stamps_and_bytes_are_those_of_the_pour() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("pour.mcap");
     let scene = scene();
-    let pour = record_pour(
-        simulation(),
-        &scene,
-        4,
-        60.0,
-        &path,
-        &mut Observer::new(&scene),
-        &mut |_| true,
-    )
-    .unwrap()
-    .unwrap();
+    let pour =
+        record_pour(simulation(), &scene, 4, 60.0, &path, &mut Observer::new(&scene), &mut |_| {
+            true
+        })
+        .unwrap()
+        .unwrap();
     assert_eq!(pour, simulation().run());
 
     let bytes = std::fs::read(&path).unwrap();

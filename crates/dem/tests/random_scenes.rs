@@ -183,6 +183,8 @@ fn scene() -> impl Strategy<Value = Scene> {
                 walls: walls.into_iter().map(|wall| scaled_wall(wall, radius)).collect(),
                 end: EndRule { horizon: substeps * preset.settings().dt, kinetic_energy: energy },
                 camera: granulcal_dem::CameraSpec::default(),
+                effects: granulcal_dem::Effects::default(),
+                observe: None,
             },
         )
 }

@@ -197,6 +197,8 @@ mod tests {
             let (sin, cos) = (0.2 * f64::from(k)).sin_cos();
             grains.push(Vector3::new(0.1 * cos, 0.1 * sin, RADIUS));
         }
-        assert_eq!(front(&grains, axis), before);
+        // They share the mean radius, and with it the circles, but for rounding.
+        let after = front(&grains, axis);
+        assert!((after - before).abs() < 1e-12, "{after} {before}");
     }
 }
