@@ -65,7 +65,7 @@ pub enum ModelError {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: DatasetError,
+        source: Box<DatasetError>,
     },
     /// An observation that the model cannot take.
     #[error("the observation must be {allowed}, got {found}")]

@@ -119,7 +119,7 @@ fn kernel_estimate(
     let factor = covariance
         .try_inverse()
         .and_then(DMatrix::cholesky)
-        .map_or_else(|| wide.factor.clone(), |root| root.unpack());
+        .map_or_else(|| wide.factor.clone(), nalgebra::Cholesky::unpack);
     let sums = cumulative(weights.iter().copied());
     let log_weight = ((1.0 - DEFENSIVE_SHARE) / CENTRES as f64).ln();
     let centre = |random: &mut Random| Component {

@@ -53,7 +53,7 @@ impl Model {
         let (path, text) = read(DOCUMENT)?;
         let document = Document::parse(&String::from_utf8_lossy(&text), &path)?;
         let prior = Prior::from_toml(&document.prior_toml)
-            .map_err(|source| ModelError::Prior { path, source })?;
+            .map_err(|e| ModelError::Prior { path, source: Box::new(e) })?;
         let coordinates = Coordinates::of(&prior);
         let (p, s) = (coordinates.dimension(), document.x_names.len());
         let (path, bytes) = read(TENSORS)?;

@@ -103,12 +103,11 @@ pub fn start(
     let simulation = Simulation::new(scene, seed)
         .and_then(|simulation| simulation.with_threads(threads))
         .map_err(DatasetError::Simulation)?;
-    match resume {
-        Some(path) => resume_checkpoint(path, simulation),
-        None => {
-            simulation.check_start().map_err(DatasetError::Simulation)?;
-            Ok(simulation)
-        }
+    if let Some(path) = resume {
+        resume_checkpoint(path, simulation)
+    } else {
+        simulation.check_start().map_err(DatasetError::Simulation)?;
+        Ok(simulation)
     }
 }
 
