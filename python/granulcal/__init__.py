@@ -28,6 +28,8 @@ from granulcal.statistics import (
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
+    from granulcal.loop.close import close_loop
+    from granulcal.loop.task import Task
     from granulcal.posterior import Posterior
 
 __all__ = [
@@ -47,14 +49,21 @@ __all__ = [
     "Recording",
     "Scene",
     "Statistics",
+    "Task",
     "__version__",
+    "close_loop",
     "diagnostic_statistics",
     "generate",
     "simulate",
     "statistics",
 ]
 
-_LAZY = {"BayesSim": "granulcal.bayessim", "Posterior": "granulcal.posterior"}
+_LAZY = {
+    "BayesSim": "granulcal.bayessim",
+    "Posterior": "granulcal.posterior",
+    "Task": "granulcal.loop.task",
+    "close_loop": "granulcal.loop.close",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -8,8 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from granulcal import _native
-from granulcal.loop import command
+from granulcal import _native, loop_command
 
 __all__ = ["main"]
 
@@ -97,7 +96,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_infer(commands)
     _add_calibrate(commands)
     _add_report(commands)
-    command.add(commands)
+    loop_command.add(commands)
     _add_reproduce(commands)
     commands.add_parser("demo", help="the whole job on a recording with a known truth")
     return parser

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal.camera import Camera
 from granulcal.cli import main
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.archive import Archive, Plan
 from granulcal.loop.library import FUNNEL, by_name, fingerprint
 from granulcal.loop.task import Task
-from granulcal.recording import Camera
 
 SCENE = """
 name = "small"

@@ -1,4 +1,4 @@
-"""The word `close-loop` of the command line."""
+"""The word `close-loop` of the command line; the loop itself, which needs torch, is imported when it runs."""
 
 import argparse
 from dataclasses import replace
