@@ -1,4 +1,4 @@
-"""The word `close-loop` of the command line; the loop itself, which needs torch, is imported when it runs."""
+"""The word `close-loop` of the command line; the loop itself needs torch and is imported late."""
 
 import argparse
 from dataclasses import replace
