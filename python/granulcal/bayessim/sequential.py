@@ -6,8 +6,9 @@ next parameters are drawn from
 $$ \tilde p(u) \propto (1 - d) p(u) L(u)^{1/2} + d p(u) $$
 
 with L the emulated likelihood and a share d of the prior; of twice as many draws of the first part
-as needed those are poured that lie farthest from all others, in spreads of the draws. The root keeps rounds
-wider than the posterior while the emulator is poor; the prior's share finds what it missed.
+as needed those are poured that lie farthest from all others, in spreads of the draws. The root
+keeps rounds wider than the posterior while the emulator is poor; the prior's share finds what it
+missed.
 
 The posterior needs no correction for the proposal: the emulator is a regression of the statistics
 on the parameters, which does not mind where the parameters came from, and the prior enters as
@@ -214,7 +215,7 @@ class _Fit:
         log_weights = _TEMPER * self.likelihood.start(self.observed)
         weights = np.exp(log_weights - log_weights.max()) + 1e-12
         blind = max(1, round(_PRIOR_SHARE * count))
-        # Farthest of few: of many, and with the prior's among them, all would be the farthest tails.
+        # Farthest of few: of many, and with the prior's among them, all would be of the tails.
         near = generator.choice(
             len(pool), size=_CANDIDATES * (count - blind), replace=False, p=weights / weights.sum()
         )
