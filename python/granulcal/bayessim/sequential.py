@@ -5,9 +5,10 @@ next parameters are drawn from
 
 $$ \tilde p(u) \propto (1 - d) p(u) L(u)^{1/2} + d p(u) $$
 
-with L the emulated likelihood and a share d of the prior, and of ten times as many draws as needed
-those are poured that lie farthest from all others, in spreads of the draws. The root keeps rounds
-wider than the posterior while the emulator is poor; the prior's share finds what it missed.
+with L the emulated likelihood and a share d of the prior; of twice as many draws of the first part
+as needed those are poured that lie farthest from all others, in spreads of the draws. The root
+keeps rounds wider than the posterior while the emulator is poor; the prior's share finds what it
+missed.
 
 The posterior needs no correction for the proposal: the emulator is a regression of the statistics
 on the parameters, which does not mind where the parameters came from, and the prior enters as
@@ -44,7 +45,7 @@ _FIRST_SHARE = 0.4
 _LATER_ROUNDS = 3
 _PRIOR_SHARE = 0.1
 _TEMPER = 0.5
-_CANDIDATES = 10
+_CANDIDATES = 2
 _FEATURES = 100
 
 
@@ -212,21 +213,25 @@ class _Fit:
         generator = np.random.default_rng(seed)
         pool = self.likelihood.pool
         log_weights = _TEMPER * self.likelihood.start(self.observed)
-        weights = np.exp(log_weights - log_weights.max())
-        weights = (1 - _PRIOR_SHARE) * weights / weights.sum() + _PRIOR_SHARE / len(pool)
-        chosen = generator.choice(len(pool), size=_CANDIDATES * count, replace=False, p=weights)
-        candidates = pool[chosen]
+        weights = np.exp(log_weights - log_weights.max()) + 1e-12
+        blind = max(1, round(_PRIOR_SHARE * count))
+        # Farthest of few: of many, and with the prior's among them, all would be of the tails.
+        near = generator.choice(
+            len(pool), size=_CANDIDATES * (count - blind), replace=False, p=weights / weights.sum()
+        )
+        candidates = pool[near]
         scale = np.maximum(candidates.std(axis=0), 1e-6)
         nearest = np.min(
             np.linalg.norm((candidates[:, None] - taken[None]) / scale, axis=2), axis=1
         )
         picked = []
-        for _ in range(count):
+        for _ in range(count - blind):
             best = int(nearest.argmax())
             picked.append(best)
             away = np.linalg.norm((candidates - candidates[best]) / scale, axis=1)
             nearest = np.minimum(nearest, away)
-        return candidates[picked]
+        anywhere = pool[generator.choice(len(pool), size=blind, replace=False)]
+        return np.concatenate([candidates[picked], anywhere])
 
 
 def _first_design(prior: Prior, count: int, seed: int) -> Array:
