@@ -136,7 +136,7 @@ def calibrate_within(
         scene: what was poured, with the camera that looked.
         prior: of the parameters.
         recordings: one or several of one material.
-        budget: pours in all, at least 40.
+        budget: pours in all, at least 60.
         out: folder of pours.json.
         seed: seed of every random choice.
         threads: pours at once; the default is one for each core.

@@ -48,9 +48,9 @@ def measured(place):
 
 def test_every_line_counts_the_sets_it_is_about(place):
     place.put("null-0", None, "NONE", delta=0.1, pours=50)
-    place.put("null-1", None, "EFFECT", ["ground.tilt"], delta=0.4)  # False alarm, spurious name.
-    place.put("right", "tilt", "EFFECT", ["ground.tilt"], truth=2.0, before=10.0, after=1.0,
-          strength={"ground.tilt": [1.5, 2.1, 2.4]})  # fmt: skip
+    place.put("null-1", None, "EFFECT", ["tilt.x"], delta=0.4)  # False alarm, spurious name.
+    place.put("right", "polydispersity", "EFFECT", ["polydispersity"], truth=0.2, before=10.0,
+          after=1.0, strength={"polydispersity": [0.15, 0.21, 0.24]})  # fmt: skip
     place.put("wrong", "tilt", "EFFECT", ["polydispersity"], truth=2.0)
     place.put("set", "cohesion", "SET", ["polydispersity", "cohesion.capillary"], truth=2.0)
     place.put("missed", "height", "NONE", delta=0.7)
@@ -89,7 +89,7 @@ def test_a_strength_is_read_in_the_loops_unit(place, low, high, covered):
 
 
 def test_one_right_name_of_two_that_act_together_is_false(place):
-    place.put("a", "tilt", "EFFECTS", ["ground.tilt", "polydispersity"])
+    place.put("a", "tilt", "EFFECTS", ["tilt.x", "polydispersity"])
     found, _ = measured(place)
     assert "1/1" in found["false naming among library verdicts that name"]
     assert "1/1" in found["truth inside what is named"]
@@ -98,7 +98,7 @@ def test_one_right_name_of_two_that_act_together_is_false(place):
 
 def test_removed_misfit_has_an_interval_of_sets(place):
     for number, after in enumerate((0.0, 4.0)):
-        place.put(f"s{number}", "tilt", "EFFECT", ["ground.tilt"], before=4.0, after=after)
+        place.put(f"s{number}", "tilt", "EFFECT", ["tilt.x"], before=4.0, after=after)
     text = measured(place)[0]["removed misfit at sealed heights, right effect"]
     assert text == "50 % (0-100), n = 2"
 
@@ -130,7 +130,7 @@ def test_a_changed_answer_is_refused(place):
     [
         ("MAYBE", [], "allowed: NONE, RESIDUAL, EFFECT"),
         ("EFFECT", [], "EFFECT with effects named"),
-        ("NONE", ["ground.tilt"], "NONE with effects named"),
+        ("NONE", ["tilt.x"], "NONE with effects named"),
     ],
 )
 def test_a_verdict_that_is_none_is_named(place, verdict, named, message):

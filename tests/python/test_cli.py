@@ -127,15 +127,15 @@ def test_calibrate_needs_no_model_and_goes_on_where_it_stopped(
     words = ["calibrate", str(scene), str(prior), recording[0], "--camera", recording[1]]
     words += ["-o", str(out)]
     assert main([*words, "--budget", "10"]) == 2
-    assert "at least 40" in capsys.readouterr().err and not out.exists()
-    assert main([*words, "--budget", "40", "--json"]) == 0
+    assert "at least 60" in capsys.readouterr().err and not out.exists()
+    assert main([*words, "--budget", "60", "--json"]) == 0
     told = capsys.readouterr()
     found = json.loads(told.out)
-    assert found["pours"] == 40 and "round 4 of 4: 40 of 40 pours" in told.err
+    assert found["pours"] == 60 and "round 4 of 4: 60 of 60 pours" in told.err
     low, high = found["parameters"]["material.sliding_friction"]["interval90"]
     assert 0 <= low < high <= 1
     kept = (out / "pours.json").read_bytes()
-    assert main([*words, "--budget", "40", "--json"]) == 0
+    assert main([*words, "--budget", "60", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == found
     assert (out / "pours.json").read_bytes() == kept
 

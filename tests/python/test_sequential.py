@@ -46,7 +46,7 @@ def test_a_budget_is_spent_where_the_posterior_is(toy):
 
 def test_budgets_and_observations_are_checked(toy):
     assert sum(round_sizes(101)) == 101
-    with pytest.raises(ValueError, match="at least 40"):
+    with pytest.raises(ValueError, match="at least 60"):
         round_sizes(39)
     x = toy.simulate(1)[1][0]
     with pytest.raises(ObservationError, match="finite"):

@@ -196,7 +196,7 @@ mod tests {
         let mut bytes = simulation().checkpoint();
         bytes[MAGIC.len() + LENGTH] = 9;
         let error = simulation().resume(&sealed(bytes)).unwrap_err().to_string();
-        let expected = format!("must have format 1, got 9, written by granulcal {VERSION}");
+        let expected = format!("must have format {FORMAT}, got 9, written by granulcal {VERSION}");
         assert!(error.contains(&expected), "{error}");
     }
 

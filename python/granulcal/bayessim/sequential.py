@@ -40,7 +40,7 @@ __all__ = ["Round", "SequentialFit", "infer_within_budget", "round_sizes"]
 Array = NDArray[np.float64]
 
 FEWEST_PAIRS = 20
-_FEWEST_BUDGET = 40
+_FEWEST_BUDGET = 60
 _FIRST_SHARE = 0.4
 _LATER_ROUNDS = 3
 _PRIOR_SHARE = 0.1
@@ -103,7 +103,7 @@ def round_sizes(budget: int) -> list[int]:
     """Returns the pours of each round: two fifths from the prior, then three equal rounds.
 
     Raises:
-        ValueError: a budget below 40.
+        ValueError: a budget below 60.
     """
     if isinstance(budget, bool) or not isinstance(budget, int) or budget < _FEWEST_BUDGET:
         raise ValueError(
@@ -142,7 +142,7 @@ def infer_within_budget(
     Raises:
         ObservationError: an observation that is not finite.
         TrainingDataError: fewer than 20 pours of the first round can be used.
-        ValueError: a budget below 40.
+        ValueError: a budget below 60.
     """
     sizes = round_sizes(budget)
     observed = np.atleast_2d(np.asarray(x_obs, dtype=float))

@@ -13,7 +13,9 @@ impl Simulation {
     /// # Errors
     /// [`DemError::StartInWall`] names the wall that most grains are in, how many they are and how deep the deepest is.
     pub fn check_start(&self) -> Result<(), DemError> {
-        let walls = &self.around.walls;
+        let mut around = self.around.clone();
+        around.move_walls(self.time());
+        let walls = &around.walls;
         let mut found: Vec<(usize, f64)> = vec![(0, 0.0); walls.count()];
         for grain in 0..self.bed.count() {
             let (centre, radius) = (self.bed.position(grain), self.bed.radius(grain));
@@ -77,7 +79,7 @@ mod tests {
         // One that has come by its motion is where it is at time 0.
         scene.walls[1].shape = tube(0.07);
         check(&scene).unwrap();
-        let knots = vec![[0.5, 0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]];
+        let knots = vec![[0.5, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]];
         scene.walls[1].motion = Motion::Trajectory { file: None, knots };
         assert!(check(&scene).is_err());
     }
