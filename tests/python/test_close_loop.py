@@ -169,6 +169,12 @@ def test_an_archive_of_something_else_is_refused(tmp_path: Path) -> None:
     assert len(pours.x) == 8 and pours.left_out == 0
     assert np.all(pours.psi[:4] == 0) and np.all(np.abs(pours.psi[4:]) <= 1)
     other = Plan(**{**plan.__dict__, "scene": scene.with_({"grains.count": 80})})
+    # Conditions within its range are its own; beyond it they are another archive's.
+    narrow = Plan(**{**plan.__dict__, "conditions": (("start.base", 0.03, 0.06),)})
+    assert Archive(folder, narrow).plan.unit({"start.base": 0.03}) == pytest.approx([0.25])
+    wide = Plan(**{**plan.__dict__, "conditions": (("start.base", 0.01, 0.06),)})
+    with pytest.raises(TrainingDataError, match="is of another conditions"):
+        Archive(folder, wide)
     with pytest.raises(TrainingDataError, match="is of another scene"):
         Archive(folder, other)
 

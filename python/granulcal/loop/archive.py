@@ -11,8 +11,9 @@ Each part is a data set of `generate`: it is stopped and continued anywhere and 
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +99,10 @@ class Plan:
         """Returns parameters (n, p) as unit coordinates."""
         return cube(self.prior, theta)
 
+    def unit(self, at: dict[str, float]) -> Array:
+        """Returns the inputs of a condition that states the numbers `at` in [0, 1], shape (q,)."""
+        return self.unit_condition(np.array([at[path] for path, _, _ in self.conditions]))
+
     def unit_condition(self, values: Array) -> Array:
         """Returns condition inputs (n, q) as unit coordinates."""
         low = np.array([low for _, low, _ in self.conditions])
@@ -144,6 +149,11 @@ class Archive:
         mine = plan.record()
         if path.exists():
             theirs = json.loads(path.read_text(encoding="utf-8"))
+            if _covers(theirs.get("conditions"), mine["conditions"]):
+                # A wider archive serves as well.
+                wider = tuple((p, float(low), float(high)) for p, low, high in theirs["conditions"])
+                self.plan = replace(plan, conditions=wider)
+                mine = self.plan.record()
             for key, value in mine.items():
                 if theirs.get(key) != value:
                     raise TrainingDataError(
@@ -309,6 +319,14 @@ def cube(prior: Prior, theta: Array) -> Array:
 def from_cube(prior: Prior, u: Array) -> Array:
     """Returns parameters in own units of unit coordinates (n, p)."""
     return np.column_stack([p.quantile(u[:, i]) for i, p in enumerate(prior.free)])
+
+
+def _covers(theirs: Any, mine: Any) -> bool:
+    """Whether an archive over the ranges `theirs` holds every condition within `mine`."""
+    if not isinstance(theirs, list) or [t[0] for t in theirs] != [m[0] for m in mine]:
+        return False
+    pairs = zip(theirs, mine, strict=True)
+    return all(low <= m_low and m_high <= high for (_, low, high), (_, m_low, m_high) in pairs)
 
 
 def _short(value: object) -> str:

@@ -162,11 +162,11 @@ def close_loop(
     fitted = task.of(FIT)
     counts = [len(condition.recordings) for condition in fitted]
     middle = np.full(len(task.prior.names), 0.5)
-    sights = power(surrogate, middle, [task.unit(c) for c in fitted], counts)
+    sights = power(surrogate, middle, [store.plan.unit(c.at) for c in fitted], counts)
     say(_power_table(sights))
 
     measured = {c.name: c.statistics(task.scene) for c in fitted}
-    observed = [Observation.of(c.name, task.unit(c), measured[c.name]) for c in fitted]
+    observed = [Observation.of(c.name, store.plan.unit(c.at), measured[c.name]) for c in fitted]
     found = trace(surrogate, observed, rules, seed=seed)
     say(f"verdict {found.verdict.kind}: {found.verdict.reason}")
 
@@ -179,12 +179,12 @@ def close_loop(
     sealed = _compare(task, hidden, measured, simulated, surrogate, seed) if hidden else None
 
     blank = [
-        Observation.of(c.name, task.unit(c), _placebo(forward, task, c, found, seed))
+        Observation.of(c.name, store.plan.unit(c.at), _placebo(forward, task, c, found, seed))
         for c in fitted
     ]
     placebo = trace(surrogate, blank, rules, seed=seed + 1)
     say(f"placebo {placebo.verdict.kind}: {placebo.verdict.reason}")
-    experiments = next_experiment(surrogate, found, _candidates(task))
+    experiments = next_experiment(surrogate, found, _candidates(store.plan))
     closed = Closed(
         task=task,
         trace=found,
@@ -307,12 +307,12 @@ def _compare(
     )
 
 
-def _candidates(task: Task) -> list[tuple[str, Array]]:
+def _candidates(plan: Plan) -> list[tuple[str, Array]]:
     """Conditions that further pours might have: each input over its range, others in the middle."""
     found = []
-    for i, (path, low, high) in enumerate(task.inputs):
+    for i, (path, low, high) in enumerate(plan.conditions):
         for share in (0.0, 0.25, 0.5, 0.75, 1.0):
-            at = np.full(len(task.inputs), 0.5)
+            at = np.full(len(plan.conditions), 0.5)
             at[i] = share
             found.append((f"{path} = {low + share * (high - low):.4g}", at))
     return found

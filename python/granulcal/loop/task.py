@@ -170,10 +170,6 @@ class Task:
                 found.append((path, min(values), max(values)))
         return tuple(found)
 
-    def unit(self, condition: Condition) -> Array:
-        """Returns a condition's inputs in [0, 1], shape (q,)."""
-        return np.array([(condition.at[p] - low) / (high - low) for p, low, high in self.inputs])
-
     def at_first(self) -> Scene:
         """Returns the scene with the numbers that all conditions share."""
         differing = {path for path, _, _ in self.inputs}
