@@ -187,7 +187,7 @@ def run(path: Path, archive: int, sets: int) -> None:
 
 def table(paths: list[Path]) -> None:
     """Prints the rates with 95 % Wilson intervals."""
-    rows = _read(paths)
+    rows = [row for row in _read(paths) if row["kind"] != "jammed"]
     null = [r for r in rows if r["kind"] == "null"]
     single = [r for r in rows if r["kind"] == "single"]
     pair = [r for r in rows if r["kind"] == "pair"]
@@ -236,7 +236,7 @@ def table(paths: list[Path]) -> None:
     right = [r for r in single if r["verdict"] == "EFFECT" and r["effects"][0] in r["named"]]
     _median("R at sealed heights, right effect", [r["removed"] for r in right])
     _median("R, hidden that was named", [r["removed"] for r in hidden if r["verdict"] in say])
-    unexplained = [r["fallback"] for r in rows if r["verdict"] == "UNEXPLAINED"]
+    unexplained = [r.get("fallback") for r in rows if r["verdict"] == "UNEXPLAINED"]
     _median("R of the correction, UNEXPLAINED", unexplained)
 
 
