@@ -27,6 +27,8 @@ _SENTENCES = {
     "EFFECTS": "The grains do something that this model lacks; it takes two effects.",
     "UNEXPLAINED": "The grains do something that neither this model nor any known effect does.",
 }
+# Share of an effect that the parameters must not mimic for its interval to hold what it says.
+_QUOTABLE = 0.5
 # Statistics that the picture of residuals shows, the largest ones.
 _SHOWN = 24
 
@@ -77,7 +79,7 @@ def _residuals(closed: Closed) -> str:
 
     values = closed.trace.residuals
     order = np.sort(np.argsort(-np.abs(values).max(axis=0))[:_SHOWN])
-    figure = Figure(figsize=(9.5, 1.6 + 0.35 * len(values)), layout="constrained")
+    figure = Figure(figsize=(9.5, 2.4 + 0.35 * len(values)), layout="constrained")
     axes = figure.subplots()
     image = axes.imshow(values[:, order], cmap="RdBu_r", vmin=-5, vmax=5, aspect="auto")
     axes.set_yticks(range(len(values)), closed.trace.labels)
@@ -91,12 +93,17 @@ def _residuals(closed: Closed) -> str:
 
 def _strengths(closed: Closed) -> list[dict[str, Any]]:
     first = closed.task.at_first()
+    sights = closed.trace.power
+    known = zip(sights.effects, sights.kappa, strict=True)
+    # NaN, an effect too weak to say, is mimicked as well.
+    mimicked = [name for name, kappa in known if not kappa >= _QUOTABLE]
     rows = []
     for name, (low, middle, high) in closed.strengths().items():
         effect = next(e for e in closed.task.library if e.name == name).at(first)
         rows.append(
             dict(name=name, path=effect.path, unit=effect.unit if effect.unit != "-" else "")
             | dict(low=low, middle=middle, high=high, doc=effect.doc)
+            | dict(is_mimicked=name in mimicked)
         )
     return rows
 
