@@ -47,7 +47,7 @@ class Forward:
                 row for row in pool.map(lambda seed: _row(scene, seed), seeds) if row is not None
             ]
         self.ran += len(seeds)
-        found = np.array(rows).reshape(len(rows), -1)
+        found = np.array(rows).reshape(len(rows), len(names))
         beside = path.with_suffix(".part.npy")
         np.save(beside, found)
         beside.replace(path)
