@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 
 # Simulated pours of each model under each condition.
 _REPLICATES = 10
+# Fewest of them that say something of an error.
+_FEWEST = 2
 # Fewest pours of the base and of each effect from which a surrogate is any use.
 _LEAST_BASE, _LEAST_EACH = 300, 40
 # Shares of a budget: the base model has more directions than any one effect.
@@ -178,9 +180,9 @@ def close_loop(
     measured |= {c.name: c.statistics(task.scene) for c in hidden}
     sealed = _compare(task, hidden, measured, simulated, surrogate, seed) if hidden else None
 
+    pretended = [(c, _placebo(forward, task, c, found, seed)) for c in fitted]
     blank = [
-        Observation.of(c.name, store.plan.unit(c.at), _placebo(forward, task, c, found, seed))
-        for c in fitted
+        Observation.of(c.name, store.plan.unit(c.at), rows) for c, rows in pretended if len(rows)
     ]
     placebo = trace(surrogate, blank, rules, seed=seed + 1)
     say(f"placebo {placebo.verdict.kind}: {placebo.verdict.reason}")
@@ -294,14 +296,26 @@ def _compare(
     surrogate: Surrogate,
     seed: int,
 ) -> Improvement:
-    """The paper's 16 statistics, or all that the scene observes, over the archive's spread."""
+    """The paper's 16 statistics, or all that the scene observes, over the archive's spread.
+
+    Conditions under which a model's pours jam or leave the view have no error to tell: left out.
+
+    Raises:
+        ObservationError: no condition is left.
+    """
     size = Measures.of(task.scene).head
     spread = surrogate.raw_spread[:size]
+    told = [c for c in conditions if min(len(rows) for rows in simulated[c.name]) >= _FEWEST]
+    if not told:
+        raise ObservationError(
+            f"fewer than {_FEWEST} of {_REPLICATES} pours at the fit are usable under every one of "
+            f"{', '.join(c.name for c in conditions)}: grains jam, leave the view or are unhealthy"
+        )
     return compare(
-        [c.name for c in conditions],
-        [measured[c.name][:, :size] for c in conditions],
-        [simulated[c.name][0][:, :size] for c in conditions],
-        [simulated[c.name][1][:, :size] for c in conditions],
+        [c.name for c in told],
+        [measured[c.name][:, :size] for c in told],
+        [simulated[c.name][0][:, :size] for c in told],
+        [simulated[c.name][1][:, :size] for c in told],
         spread,
         seed=seed,
     )

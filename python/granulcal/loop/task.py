@@ -65,12 +65,20 @@ class Condition:
         """Returns the statistics of each pour, shape (n, s).
 
         Raises:
-            ObservationError: a recording that cannot be one of the scene.
+            ObservationError: a recording that cannot be one of the scene, or that does not show all
+                that the scene observes.
         """
         there = scene.with_(self.at)
         measures = Measures.of(there)
-        rows = [measures.of_recording(path, there, self.camera) for path in self.recordings]
-        return np.array(rows)
+        rows = np.array([measures.of_recording(p, there, self.camera) for p in self.recordings])
+        for path, row in zip(self.recordings, rows, strict=True):
+            unseen = [n for n, v in zip(measures.names, row, strict=True) if not np.isfinite(v)]
+            if unseen:
+                raise ObservationError(
+                    f"{path} does not show {', '.join(unseen)}, which the scene observes: let the "
+                    "scene observe what every recording shows, or leave this one out"
+                )
+        return rows
 
 
 @dataclass(frozen=True)
