@@ -26,6 +26,7 @@ def main() -> None:
     parser.add_argument("sets", type=Path)
     parser.add_argument("--archive", type=Path, required=True)
     parser.add_argument("--undeclared", action="store_true")
+    parser.add_argument("--tolerances", type=Path, default=TOLERANCES)
     parser.add_argument("--report", default="report", help="folder in a set's (default: report)")
     options = parser.parse_args()
     surrogate = None
@@ -35,7 +36,7 @@ def main() -> None:
             continue
         task = Task.load(file)
         if not options.undeclared:
-            task = replace(task, tolerances=Tolerances.load(TOLERANCES))
+            task = replace(task, tolerances=Tolerances.load(options.tolerances))
         if surrogate is None:
             store = Archive(options.archive, planned(task, BUDGET, SEED))
             store.fill()

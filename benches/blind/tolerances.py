@@ -14,8 +14,6 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).parent
-DIRECTIONS = 6
-"""Of the scatter between materials, at most."""
 LEFT_OUT = ("tail_index", "ring_depth", "height_ring")
 """Statistics that the loop does not look at."""
 
@@ -24,7 +22,14 @@ def main() -> None:
     """Writes the tolerances."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
-    out: Path = parser.parse_args().out
+    parser.add_argument(
+        "--directions", type=int, default=6, help="of the scatter between materials, at most"
+    )
+    parser.add_argument(
+        "--with-seeds", action="store_true", help="leave in what the seeds of the pours put in"
+    )
+    options = parser.parse_args()
+    out: Path = options.out
     numbers = json.loads((HERE / "code_difference.json").read_text())
     heights = sorted(numbers["heights"], key=float)
     every = [*numbers["names"], *numbers["diagnostic_names"]]
@@ -49,9 +54,10 @@ def main() -> None:
     noise = 7 / 6 * flat.shape[1] / max(len(flat) - 1, 1)
     found = [mean]
     print("variance between materials over that of seeds:", (variances / noise).round(2))
-    for variance, axis in zip(variances[:DIRECTIONS], axes, strict=False):
-        if variance > noise:
-            found.append(np.sqrt(variance - noise) * axis)
+    for variance, axis in zip(variances[: options.directions], axes, strict=False):
+        left = variance if options.with_seeds else variance - noise
+        if left > 0:
+            found.append(np.sqrt(left) * axis)
     directions = [(d.reshape(len(heights), -1) * sd).tolist() for d in found]
     document = {
         "names": names,
