@@ -262,17 +262,9 @@ def _infer(options: argparse.Namespace) -> int:
     known = Identifiability.of(posterior)
     if options.plot is not None:
         posterior.pair_plot(options.plot)
-    mode, mean, region = posterior.mode(), posterior.mean(), posterior.credible_region(0.9)
     document = {
         "recordings": [str(path) for path in options.recording],
-        "parameters": {
-            name: {
-                "mode": float(mode[i]),
-                "mean": float(mean[i]),
-                "interval90": list(region[name]),
-            }
-            for i, name in enumerate(posterior.names)
-        },
+        "parameters": _parameters(posterior),
         "inside_model": {
             "is_inside": misfit.is_inside,
             "p_value": misfit.p_value,
@@ -326,18 +318,10 @@ def _calibrate(options: argparse.Namespace) -> int:
             else None
         ),
     )
-    posterior, region = found.posterior, found.posterior.credible_region(0.9)
-    mode, mean = posterior.mode(), posterior.mean()
+    posterior = found.posterior
     document = {
         "recordings": [str(path) for path in options.recording],
-        "parameters": {
-            name: {
-                "mode": float(mode[i]),
-                "mean": float(mean[i]),
-                "interval90": list(region[name]),
-            }
-            for i, name in enumerate(posterior.names)
-        },
+        "parameters": _parameters(posterior),
         "inside_model": {"is_inside": found.misfit.is_inside, "p_value": found.misfit.p_value},
         "pours": len(found.x),
         "usable": found.rounds[-1].usable,
@@ -357,6 +341,14 @@ def _calibrate(options: argparse.Namespace) -> int:
     for warning in document["warnings"]:
         print(f"note: {warning}", file=sys.stderr)
     return _outcome(recordings)
+
+
+def _parameters(posterior: Any) -> dict[str, dict[str, Any]]:
+    mode, mean, region = posterior.mode(), posterior.mean(), posterior.credible_region(0.9)
+    return {
+        name: {"mode": float(mode[i]), "mean": float(mean[i]), "interval90": list(region[name])}
+        for i, name in enumerate(posterior.names)
+    }
 
 
 def _print_parameters(parameters: dict[str, Any]) -> None:

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import os
-import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from os import PathLike
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.files import write_beside
 from granulcal.forward import scene_at
 from granulcal.prior import Prior
 from granulcal.recording import Recording
@@ -110,10 +110,7 @@ class KeptPours:
 
     def _write(self) -> None:
         text = json.dumps({"key": self.key, "names": self.prior.names, "pours": self.rows})
-        handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=".pours-")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        os.replace(name, self.path)
+        write_beside(self.path, text)
 
 
 def calibrate_within(

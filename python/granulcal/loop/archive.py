@@ -9,7 +9,6 @@ Each part is a data set of `generate`: it is stopped and continued anywhere and 
 """
 
 import json
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 from granulcal import _native
 from granulcal.dataset import Dataset, generate
 from granulcal.errors import TrainingDataError
+from granulcal.files import write_beside
 from granulcal.loop.design import Design
 from granulcal.loop.library import LibraryEffect, fingerprint
 from granulcal.loop.measures import Measures
@@ -95,10 +95,6 @@ class Plan:
         own = [e for e in self.library if not e.is_free]
         return self.base + self.each * len(own)
 
-    def cube(self, theta: Array) -> Array:
-        """Returns parameters (n, p) as unit coordinates."""
-        return cube(self.prior, theta)
-
     def unit(self, at: dict[str, float]) -> Array:
         """Returns the inputs of a condition that states the numbers `at` in [0, 1], shape (q,)."""
         return self.unit_condition(np.array([at[path] for path, _, _ in self.conditions]))
@@ -163,10 +159,7 @@ class Archive:
             return
         if folder.exists() and any(folder.iterdir()):
             raise TrainingDataError(f"{folder} is not empty and has no {_RECORD}")
-        folder.mkdir(parents=True, exist_ok=True)
-        beside = path.with_suffix(".part")
-        beside.write_text(json.dumps(mine, indent=1), encoding="utf-8")
-        os.replace(beside, path)
+        write_beside(path, json.dumps(mine, indent=1))
 
     def fill(
         self,
@@ -218,7 +211,9 @@ class Archive:
                     psi[:, k] = own.strength(np.full(n, scene.get(effect.path)))
                 elif effect.path in columns and not effect.shift:
                     psi[:, k] = own.strength(columns[effect.path])
-            rows.append((plan.cube(theta), plan.unit_condition(condition), psi, values[usable]))
+            rows.append(
+                (cube(plan.prior, theta), plan.unit_condition(condition), psi, values[usable])
+            )
         names = measures.names
         rows.extend(self._free_rows(rows[0], measures.powers))
         rows = self._with_tolerances(rows, names)

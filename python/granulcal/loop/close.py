@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
+from granulcal.files import write_beside
 from granulcal.loop.archive import Archive, Plan, from_cube
 from granulcal.loop.experiment import Experiment, next_experiment
 from granulcal.loop.forward import Forward
 from granulcal.loop.measures import Measures
 from granulcal.loop.misfit import Improvement, compare
 from granulcal.loop.observation import Observation
-from granulcal.loop.preregistration import register, write_beside
+from granulcal.loop.preregistration import register
 from granulcal.loop.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.thresholds import Thresholds
@@ -79,6 +80,19 @@ class Closed:
         """Returns the scene of a model at its best fit under a condition."""
         return _scene(self.task, condition, one)
 
+    def parameters(self) -> dict[str, dict[str, float]]:
+        """Returns the parameters before and after, in their own units.
+
+        How far the missing effect had bent them.
+        """
+        prior = self.task.prior
+        before = from_cube(prior, self.trace.base.theta[None])[0]
+        after = from_cube(prior, self.trace.best.theta[None])[0]
+        return {
+            name: {"before": float(b), "after": float(a)}
+            for name, b, a in zip(prior.names, before, after, strict=True)
+        }
+
     def strengths(self) -> dict[str, tuple[float, float, float]]:
         """Low, middle and high of each named effect's number, in the scene's unit."""
         found: dict[str, tuple[float, float, float]] = {}
@@ -87,7 +101,7 @@ class Closed:
                 one.effects, one.strengths, one.intervals, strict=True
             ):
                 if name in self.trace.verdict.named and name not in found:
-                    effect = _effect(self.task, name)
+                    effect = self.task.effect(name)
                     if not effect.camera:
                         ends = sorted((effect.value(low), effect.value(high)))
                         found[name] = (ends[0], effect.value(middle), ends[1])
@@ -116,7 +130,7 @@ class Closed:
             "registration_sha256": self.registration,
             "fit": self.fit.to_dict(),
             "sealed": None if self.sealed is None else self.sealed.to_dict(),
-            "parameters": _parameters(self.task, self.trace),
+            "parameters": self.parameters(),
             "next_experiments": [one.to_dict() for one in self.experiments],
             "power_before_data": self.power.to_dict(),
             "trace": self.trace.to_dict(),
@@ -249,17 +263,13 @@ def _needed(task: Task) -> int:
     return 2 * _REPLICATES * len(task.conditions) + placebo
 
 
-def _effect(task: Task, name: str) -> Any:
-    return next(e for e in task.library if e.name == name).at(task.at_first())
-
-
 def _scene(task: Task, condition: Condition, one: Explanation) -> Scene:
     """The scene of a model at its best fit under a condition."""
     theta = from_cube(task.prior, one.theta[None])[0]
     values = {**task.prior.fixed, **dict(zip(task.prior.names, theta.tolist(), strict=True))}
     at = dict(condition.at)
     for name, psi in zip(one.effects, one.best_strengths, strict=True):
-        effect = _effect(task, name)
+        effect = task.effect(name)
         values |= effect.numbers(float(psi))
         values |= {p: v for p, v in condition.known.items() if p in values or _kin(p, effect.path)}
         if effect.shift:
@@ -330,16 +340,6 @@ def _candidates(plan: Plan) -> list[tuple[str, Array]]:
             at[i] = share
             found.append((f"{path} = {low + share * (high - low):.4g}", at))
     return found
-
-
-def _parameters(task: Task, found: Trace) -> dict[str, dict[str, float]]:
-    """Parameters before and after, in their own units: how far the missing effect had bent them."""
-    before = from_cube(task.prior, found.base.theta[None])[0]
-    after = from_cube(task.prior, found.best.theta[None])[0]
-    return {
-        name: {"before": float(b), "after": float(a)}
-        for name, b, a in zip(task.prior.names, before, after, strict=True)
-    }
 
 
 def _power_table(sights: Power) -> str:

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from granulcal.dataset import Dataset
 from granulcal.errors import ObservationError
-from granulcal.recording import Recording
+from granulcal.recording import Formation, Recording
 from granulcal.scene import Scene
 from granulcal.simulate import Pour
 from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES, REGISTRY
 
-__all__ = ["Measures", "camera_beside"]
+__all__ = ["Measures", "formation_of"]
 
 Array = NDArray[np.float64]
 
@@ -76,8 +76,7 @@ class Measures:
         """
         if self.observes:
             return np.asarray(Recording.observed(path, scene))
-        recording = Recording.open(path, camera=camera or camera_beside(path))
-        formation = recording.formation(ground_resolution=scene.ground_resolution)
+        recording, formation = formation_of(path, scene, camera)
         diameter = scene.get("grains.diameter")
         grains = scene.get("grains.count") * np.pi / 6 * diameter**3
         if not _VOLUME_RANGE[0] <= formation.volume / grains <= _VOLUME_RANGE[1]:
@@ -93,8 +92,14 @@ class Measures:
         return np.array([both[name] for name in self.names])
 
 
-def camera_beside(path: Path) -> Path | None:
-    """Returns the camera of a PNG: its own TOML, or `camera.toml` in its folder or one above."""
+def formation_of(path: Path, scene: Scene, camera: Path | None) -> tuple[Recording, Formation]:
+    """Returns a recording and its formation, its pixels as wide as those of the scene's images."""
+    recording = Recording.open(path, camera=camera or _camera_beside(path))
+    return recording, recording.formation(ground_resolution=scene.ground_resolution)
+
+
+def _camera_beside(path: Path) -> Path | None:
+    """The camera of a PNG: its own TOML, or `camera.toml` in its folder or one above."""
     if path.suffix != ".png":
         return None
     near = [path.with_suffix(".toml"), *(p / "camera.toml" for p in path.parents[:2])]

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from granulcal import _native
+from granulcal.files import write_beside
 from granulcal.formation_image import formation_figure
 from granulcal.loop.close import Closed
-from granulcal.loop.measures import Measures, camera_beside
-from granulcal.loop.preregistration import write_beside
+from granulcal.loop.measures import Measures, formation_of
 from granulcal.loop.task import Condition
-from granulcal.recording import Recording
 from granulcal.report import data_uri, template
 from granulcal.simulate import simulate
 
@@ -51,7 +50,7 @@ def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
         errors=_errors(closed),
         residuals=_residuals(closed),
         strengths=_strengths(closed),
-        parameters=closed.to_dict()["parameters"],
+        parameters=closed.parameters(),
         pictures=_pictures(closed),
         picture_of=f"A pour at {closed.task.conditions[0].name}",
         rivals=closed.trace.explanations[:8],
@@ -92,14 +91,13 @@ def _residuals(closed: Closed) -> str:
 
 
 def _strengths(closed: Closed) -> list[dict[str, Any]]:
-    first = closed.task.at_first()
     sights = closed.trace.power
     known = zip(sights.effects, sights.kappa, strict=True)
     # NaN, an effect too weak to say, is mimicked as well.
     mimicked = [name for name, kappa in known if not kappa >= _QUOTABLE]
     rows = []
     for name, (low, middle, high) in closed.strengths().items():
-        effect = next(e for e in closed.task.library if e.name == name).at(first)
+        effect = closed.task.effect(name)
         rows.append(
             dict(name=name, path=effect.path, unit=effect.unit if effect.unit != "-" else "")
             | dict(low=low, middle=middle, high=high, doc=effect.doc)
@@ -109,10 +107,9 @@ def _strengths(closed: Closed) -> list[dict[str, Any]]:
 
 
 def _hidden(closed: Closed) -> list[dict[str, str]]:
-    first, rows = closed.task.at_first(), []
-    sights = closed.power
+    rows, sights = [], closed.power
     for name, kappa, least in zip(sights.effects, sights.kappa, sights.detectable, strict=True):
-        effect = next(e for e in closed.task.library if e.name == name).at(first)
+        effect = closed.task.effect(name)
         is_seen = least <= 1
         value = f"{_number(effect.value(float(least)))} {effect.unit}".removesuffix(" -")
         rows.append(
@@ -144,10 +141,8 @@ def _pictures(closed: Closed) -> str:
 
 
 def _measured_points(closed: Closed, condition: Condition) -> Any:
-    path = condition.recordings[0]
-    recording = Recording.open(path, camera=condition.camera or camera_beside(path))
     there = closed.task.scene.with_(condition.at)
-    return recording.formation(ground_resolution=there.ground_resolution).points
+    return formation_of(condition.recordings[0], there, condition.camera)[1].points
 
 
 def _number(value: float) -> str:

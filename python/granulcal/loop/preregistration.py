@@ -2,19 +2,19 @@
 
 import hashlib
 import json
-import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from granulcal import _native
 from granulcal.errors import ObservationError
+from granulcal.files import write_beside
 from granulcal.loop.archive import Plan
 from granulcal.loop.library import fingerprint
 from granulcal.loop.task import Task
 from granulcal.loop.thresholds import Thresholds
 
-__all__ = ["register", "write_beside"]
+__all__ = ["register"]
 
 _NAME = "preregistration.json"
 
@@ -62,14 +62,6 @@ def register(
     else:
         write_beside(path, text)
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def write_beside(path: Path, text: str) -> None:
-    """Writes a whole file or none."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(text, encoding="utf-8")
-    os.replace(beside, path)
 
 
 def _digests(recordings: tuple[Path, ...]) -> list[str]:

@@ -178,6 +178,10 @@ class Task:
                 found.append((path, min(values), max(values)))
         return tuple(found)
 
+    def effect(self, name: str) -> LibraryEffect:
+        """Returns an effect of the library with the scene's own numbers put in."""
+        return next(e for e in self.library if e.name == name).at(self.at_first())
+
     def at_first(self) -> Scene:
         """Returns the scene with the numbers that all conditions share."""
         differing = {path for path, _, _ in self.inputs}

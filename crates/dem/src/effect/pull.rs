@@ -10,6 +10,7 @@ use super::{Adhesion, Capillary};
 use crate::bed::Bed;
 use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
+use crate::lanes::Row;
 use crate::scene::Scene;
 use crate::wall::Walls;
 
@@ -73,7 +74,11 @@ impl Pull {
         dt: f64,
     ) {
         bridges.next.clear();
-        for near in pairs(&contacts.pairs, bed).chain(at_walls(&contacts.at_walls, bed, walls)) {
+        // Velocities change while the pull acts, places do not.
+        let places = bed.places.clone();
+        let between = pairs(&contacts.pairs, &places);
+        let count = bed.count() as u32;
+        for near in between.chain(at_walls(&contacts.at_walls, &places, count, walls)) {
             let force = self.force(&near, bridges);
             if force > 0.0 {
                 let impulse = force * dt * near.normal;
@@ -112,9 +117,7 @@ impl Pull {
 /// Gap below which surfaces touch and a bridge forms, in radii `[-]`: what the solver leaves between resting grains.
 const TOUCH: f64 = 1e-3;
 
-fn pairs<'a>(set: &'a ContactSet, bed: &Bed) -> impl Iterator<Item = Near> + use<'a> {
-    // Velocities change while the pull acts, places do not.
-    let places = bed.places.clone();
+fn pairs(set: &ContactSet, places: &[Row]) -> impl Iterator<Item = Near> {
     set.lanes().map(move |(number, lane)| {
         let batch = &set.batches[number];
         let (i, j) = (batch.i[lane], batch.j[lane]);
@@ -131,13 +134,12 @@ fn pairs<'a>(set: &'a ContactSet, bed: &Bed) -> impl Iterator<Item = Near> + use
     })
 }
 
-fn at_walls<'a>(
-    set: &'a ContactSet,
-    bed: &Bed,
-    walls: &'a Walls,
-) -> impl Iterator<Item = Near> + use<'a> {
-    let places = bed.places.clone();
-    let count = bed.count() as u32;
+fn at_walls(
+    set: &ContactSet,
+    places: &[Row],
+    count: u32,
+    walls: &Walls,
+) -> impl Iterator<Item = Near> {
     set.lanes().map(move |(number, lane)| {
         let (grain, surface) = (set.batches[number].i[lane], set.at_walls[number].wall[lane]);
         let place = places[grain as usize];
