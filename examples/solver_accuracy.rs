@@ -1,8 +1,10 @@
-//! The 16 statistics of every preset against `accurate` at points spread over the prior, with what they cost.
+//! The 16 statistics of every scheme against `accurate` at points spread over the prior, with what they cost.
 //!
 //!     cargo run --release --example solver_accuracy -- out.csv            # pours what is missing, then the tables
+//!     cargo run --release --example solver_accuracy -- out.csv paper      # of these schemes only
 //!     cargo run --release --example solver_accuracy -- out.csv --only-tables
 //!
+//! Schemes are the presets and `reference`: the step of `default`, each substep solved to a residual of 1e-3, in 200 sweeps at most.
 //! One line of the file is one pour; a run that was stopped goes on where it was.
 
 use std::collections::HashMap;
@@ -13,7 +15,9 @@ use std::io::Write as _;
 use cpu_time::ThreadTime;
 
 use granulcal::dataset::observe;
-use granulcal::dem::{Material, Preset, Scene, Simulation};
+use granulcal::dem::{
+    Material, Method, Preset, ReferenceSettings, Scene, Simulation, SolverSettings,
+};
 use granulcal::features::PAPER16;
 
 const SEEDS: u64 = 4;
@@ -43,7 +47,24 @@ const POINTS: [[f64; 3]; 22] = [
     [0.5, 0.1, 0.95],
 ];
 
-type Key = (usize, Preset, u64);
+/// What the others are compared with.
+const EXACT: &str = "accurate";
+
+type Key = (usize, &'static str, u64);
+
+/// Every scheme, from cheap to dear.
+fn schemes() -> Vec<(&'static str, SolverSettings)> {
+    let reference = SolverSettings {
+        method: Method::Reference,
+        reference: ReferenceSettings { residual: 1e-3, max_sweeps: 200 },
+        ..Preset::Default.settings()
+    };
+    let presets = [Preset::Fast, Preset::Default, Preset::Accurate, Preset::Paper];
+    let mut schemes: Vec<_> =
+        presets.into_iter().map(|preset| (preset.name(), preset.settings())).collect();
+    schemes.push(("reference", reference));
+    schemes
+}
 
 /// One pour: its statistics, if enough grains are in view, how it ended and what it took.
 struct Row {
@@ -53,16 +74,17 @@ struct Row {
     statistics: Vec<f64>,
 }
 
-fn scene(point: usize, preset: Preset) -> Scene {
+fn scene(point: usize) -> Scene {
     let [mu_s, mu_r, e] = POINTS[point];
     let material = Material::new(mu_s, mu_r, e).expect("a valid material");
-    Scene { preset, material, ..Scene::funnel(0.12) }
+    Scene { material, ..Scene::funnel(0.12) }
 }
 
-fn pour((point, preset, seed): Key) -> Row {
-    let scene = scene(point, preset);
+fn pour(point: usize, settings: SolverSettings, seed: u64) -> Row {
+    let scene = scene(point);
     let begin = ThreadTime::now();
-    let pour = Simulation::new(&scene, seed).expect("a valid scene").run();
+    let simulation = Simulation::new(&scene, seed).expect("a valid scene");
+    let pour = simulation.with_settings(settings).expect("valid settings").run();
     let cpu = begin.elapsed().as_secs_f64();
     let seen = observe(&scene.camera, &pour, seed).expect("a camera");
     Row {
@@ -79,7 +101,8 @@ fn read(path: &str) -> HashMap<Key, Row> {
         let fields: Vec<_> = line.split(',').collect();
         let statistics =
             fields.get(6..)?.iter().map(|field| field.parse().ok()).collect::<Option<_>>()?;
-        let key = (fields[0].parse().ok()?, fields[1].parse().ok()?, fields[2].parse().ok()?);
+        let (scheme, _) = schemes().into_iter().find(|(name, _)| *name == fields[1])?;
+        let key = (fields[0].parse().ok()?, scheme, fields[2].parse().ok()?);
         let (cpu, penetration) = (fields[4].parse().ok()?, fields[5].parse().ok()?);
         Some((key, Row { status: fields[3].to_owned(), cpu, penetration, statistics }))
     };
@@ -97,16 +120,16 @@ fn sd(values: &[f64]) -> f64 {
 }
 
 /// Differences of the means over seeds from those of `accurate`, over its seed-to-seed standard deviation, pooled with
-/// the preset's own; one number for each of the 16.
-fn differences(rows: &HashMap<Key, Row>, point: usize, preset: Preset) -> Option<Vec<f64>> {
-    let values = |preset, statistic: usize| -> Option<Vec<f64>> {
+/// the scheme's own; one number for each of the 16.
+fn differences(rows: &HashMap<Key, Row>, point: usize, scheme: &'static str) -> Option<Vec<f64>> {
+    let values = |scheme, statistic: usize| -> Option<Vec<f64>> {
         (1..=SEEDS)
-            .map(|seed| rows.get(&(point, preset, seed))?.statistics.get(statistic).copied())
+            .map(|seed| rows.get(&(point, scheme, seed))?.statistics.get(statistic).copied())
             .collect()
     };
     (0..PAPER16.len())
         .map(|statistic| {
-            let (ours, exact) = (values(preset, statistic)?, values(Preset::Accurate, statistic)?);
+            let (ours, exact) = (values(scheme, statistic)?, values(EXACT, statistic)?);
             let pooled = (0.5 * (sd(&ours).powi(2) + sd(&exact).powi(2))).sqrt();
             let difference = mean(&ours) - mean(&exact);
             Some(if difference == 0.0 { 0.0 } else { difference / pooled })
@@ -114,17 +137,17 @@ fn differences(rows: &HashMap<Key, Row>, point: usize, preset: Preset) -> Option
         .collect()
 }
 
-fn tables(rows: &HashMap<Key, Row>, presets: &[Preset]) -> String {
+fn tables(rows: &HashMap<Key, Row>) -> String {
     let mut text = String::new();
-    for &preset in presets {
+    for (scheme, _) in schemes() {
         let _ = writeln!(
             text,
-            "\n`{preset}`\n\n| mu_s | mu_r | e | s a pour | penetration | ended | rms of 16 | worst | which | above 1 sd |\n|---|---|---|---|---|---|---|---|---|---|"
+            "\n`{scheme}`\n\n| mu_s | mu_r | e | s a pour | penetration | ended | rms of 16 | worst | which | above 1 sd |\n|---|---|---|---|---|---|---|---|---|---|"
         );
         let (mut all, mut seconds) = (Vec::new(), Vec::new());
         for (point, [mu_s, mu_r, e]) in POINTS.into_iter().enumerate() {
             let mine: Vec<_> =
-                (1..=SEEDS).filter_map(|seed| rows.get(&(point, preset, seed))).collect();
+                (1..=SEEDS).filter_map(|seed| rows.get(&(point, scheme, seed))).collect();
             if mine.len() < SEEDS as usize {
                 continue;
             }
@@ -139,7 +162,7 @@ fn tables(rows: &HashMap<Key, Row>, presets: &[Preset]) -> String {
                 "| {mu_s} | {mu_r} | {e} | {cpu:.2} | {deepest:.3} | {} ",
                 ended.join(", ")
             );
-            match differences(rows, point, preset) {
+            match differences(rows, point, scheme) {
                 Some(found) => {
                     let rms = (found.iter().map(|d| d * d).sum::<f64>() / 16.0).sqrt();
                     let worst = (0..16).max_by(|&a, &b| found[a].abs().total_cmp(&found[b].abs()));
@@ -170,21 +193,24 @@ fn tables(rows: &HashMap<Key, Row>, presets: &[Preset]) -> String {
 fn main() {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     let path = arguments.first().expect("the CSV file to go on with");
-    // `paper` takes ten times as long, and is no choice for data sets.
-    let presets = [Preset::Fast, Preset::Default, Preset::Accurate];
+    let chosen: Vec<_> = arguments[1..].iter().filter(|word| !word.starts_with("--")).collect();
     let mut rows = read(path);
     if !arguments.iter().any(|argument| argument == "--only-tables") {
         let mut file = OpenOptions::new().create(true).append(true).open(path).expect("the file");
-        for &preset in &presets {
-            for point in 0..POINTS.len() {
-                for seed in 1..=SEEDS {
-                    let key = (point, preset, seed);
+        for (scheme, settings) in schemes() {
+            if !chosen.is_empty() && !chosen.iter().any(|word| *word == scheme) {
+                continue;
+            }
+            // Seeds outside, so that a run cut off has every point.
+            for seed in 1..=SEEDS {
+                for point in 0..POINTS.len() {
+                    let key = (point, scheme, seed);
                     if rows.contains_key(&key) {
                         continue;
                     }
-                    let row = pour(key);
+                    let row = pour(point, settings, seed);
                     let mut line = format!(
-                        "{point},{preset},{seed},{},{:.3},{:.4}",
+                        "{point},{scheme},{seed},{},{:.3},{:.4}",
                         row.status, row.cpu, row.penetration
                     );
                     row.statistics.iter().for_each(|value| {
@@ -192,7 +218,7 @@ fn main() {
                     });
                     writeln!(file, "{line}").expect("written");
                     eprintln!(
-                        "{preset} point {} of {} seed {seed}: {} in {:.1} s",
+                        "{scheme} point {} of {} seed {seed}: {} in {:.1} s",
                         point + 1,
                         POINTS.len(),
                         row.status,
@@ -203,5 +229,5 @@ fn main() {
             }
         }
     }
-    println!("{}", tables(&rows, &presets));
+    println!("{}", tables(&rows));
 }
