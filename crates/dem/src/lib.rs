@@ -76,7 +76,7 @@ pub use scene::{
     BoxSide, CameraSpec, EndRule, Ends, Funnel, GRAVITY, Grains, Ground, Mask, Mesh, MeshFile,
     Motion, NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill,
     ObserveSurface, Projection, Scene, SensorSpec, Shape, Start, StereoSpec, TimeOfFlightSpec,
-    Wall,
+    ViewSpec, Wall,
 };
 pub use simulation::Simulation;
 pub use solver::Method;

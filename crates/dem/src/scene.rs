@@ -10,6 +10,7 @@ mod observe;
 pub(crate) mod path;
 mod sensor;
 mod start;
+mod view;
 mod walls;
 
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,7 @@ pub use observe::{
 pub use sensor::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 pub use start::Start;
 pub(crate) use start::unit_interval;
+pub use view::ViewSpec;
 pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
 
 use crate::effect::Effects;
@@ -68,6 +70,9 @@ pub struct Scene {
     /// The depth camera above the ground.
     #[serde(default)]
     pub camera: CameraSpec,
+    /// Further cameras, whose images are looked at and not inferred from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub views: Vec<ViewSpec>,
     /// What is observed while the pour goes on, and at its end beside the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observe: Option<Observe>,
@@ -128,6 +133,7 @@ impl Scene {
             effects: Effects::default(),
             end: EndRule::default(),
             camera: CameraSpec::default(),
+            views: Vec::new(),
             observe: None,
         }
     }
@@ -234,6 +240,7 @@ impl Scene {
         if let Some(observe) = &self.observe {
             observe.check(self.end.horizon, self.grains.diameter)?;
         }
+        view::check_views(&self.views)?;
         self.camera.check()
     }
 }
