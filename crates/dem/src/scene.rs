@@ -8,6 +8,7 @@ mod mesh;
 mod motion;
 mod observe;
 pub(crate) mod path;
+mod periodic;
 mod sensor;
 mod start;
 mod view;
@@ -21,6 +22,7 @@ pub use motion::Motion;
 pub use observe::{
     Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill, ObserveSurface,
 };
+pub use periodic::{Periodic, PeriodicAxis};
 pub use sensor::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 pub use start::Start;
 pub(crate) use start::unit_interval;
@@ -61,6 +63,9 @@ pub struct Scene {
     /// Further walls.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub walls: Vec<Wall>,
+    /// Space that repeats along an axis, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub periodic: Option<Periodic>,
     /// What the plain model lacks, each off unless stated.
     #[serde(default, skip_serializing_if = "Effects::is_plain")]
     pub effects: Effects,
@@ -130,6 +135,7 @@ impl Scene {
             ground: Ground::default(),
             funnel: Some(Funnel { height, ..Funnel::default() }),
             walls: Vec::new(),
+            periodic: None,
             effects: Effects::default(),
             end: EndRule::default(),
             camera: CameraSpec::default(),
@@ -236,6 +242,9 @@ impl Scene {
         let funnel = self.funnel.iter().map(|funnel| ("funnel".to_owned(), &funnel.motion));
         for (name, motion) in named.chain(funnel) {
             motion.check_jumps(&name, dt, diameter)?;
+        }
+        if let Some(periodic) = &self.periodic {
+            periodic.check(self.grains.diameter)?;
         }
         if let Some(observe) = &self.observe {
             observe.check(self.end.horizon, self.grains.diameter)?;

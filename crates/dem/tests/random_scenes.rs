@@ -184,6 +184,7 @@ fn scene() -> impl Strategy<Value = Scene> {
                 end: EndRule { horizon: substeps * preset.settings().dt, kinetic_energy: energy },
                 camera: granulcal_dem::CameraSpec::default(),
                 effects: granulcal_dem::Effects::default(),
+                periodic: None,
                 views: Vec::new(),
                 observe: None,
             },

@@ -288,7 +288,10 @@ mod tests {
         let camera = Camera::looking_at(eye, Vector3::zeros(), 0.58, (64, 64)).unwrap();
         for point in [[0.1, -0.05, 0.02], [-0.2, 0.1, 0.0], [0.0, 0.0, 0.1]].map(Vector3::from) {
             let (a, b) = (overhead.project(&point).unwrap(), camera.project(&point).unwrap());
-            assert!((a.0 - b.0).abs() + (a.1 - b.1).abs() + (a.2 - b.2).abs() < 1e-9, "{a:?} {b:?}");
+            assert!(
+                (a.0 - b.0).abs() + (a.1 - b.1).abs() + (a.2 - b.2).abs() < 1e-9,
+                "{a:?} {b:?}"
+            );
         }
     }
 

@@ -39,7 +39,9 @@ impl ViewSpec {
 
     fn check(&self, path: &str) -> Result<(), DemError> {
         let coordinates = self.eye.iter().chain(&self.target);
-        coordinates.into_iter().try_for_each(|&value| finite(&format!("{path}.eye, target"), value))?;
+        coordinates
+            .into_iter()
+            .try_for_each(|&value| finite(&format!("{path}.eye, target"), value))?;
         positive(&format!("{path}.field_width"), self.field_width)?;
         let distance = self.eye.iter().zip(self.target).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         positive(&format!("{path}: way from eye to target"), distance.sqrt())?;
