@@ -2,8 +2,8 @@
 //! happened. A scene that was ever found to break something has a test of its own in `tests/physics/robustness.rs`.
 
 use granulcal_dem::{
-    BoxSide, EndRule, Ends, Funnel, Grains, Ground, MAX_ENERGY_CREATED, Material, Motion, Preset,
-    Scene, Shape, Simulation, Start, Status, Wall, WallMaterial,
+    BoxSide, EndRule, Ends, Funnel, Grains, Ground, MAX_ENERGY_CREATED, Material, Motion, Periodic,
+    PeriodicAxis, Preset, Scene, Shape, Simulation, Start, Status, Wall, WallMaterial,
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
