@@ -91,6 +91,20 @@ class Pour:
             raise ValueError("the scene's camera is orthographic: ask for height_map()")
         return image
 
+    def look_from(self, view: str) -> NDArray[np.float32]:
+        """Returns what one of the scene's further views sees: depth [m], 0 is no data, shape (h, w).
+
+        Args:
+            view: its name in the scene (table `views`). Its image is without noise.
+
+        Raises:
+            KeyError: the scene has no view of this name.
+        """
+        image = self._native.look_from(view)
+        if image is None:
+            raise KeyError(f"this scene has no view {view!r}; views stand in its table `views`")
+        return image
+
     def height_map(self) -> Array:
         """Returns what the scene's orthographic camera sees: heights [m], shape (h, w).
 

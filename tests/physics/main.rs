@@ -14,6 +14,7 @@ mod incline;
 mod meshes;
 mod moving_walls;
 mod packing;
+mod periodic;
 mod rebound;
 mod restitution;
 mod robustness;

@@ -218,6 +218,9 @@ pub struct RenderArgs {
     /// Image to write: .png for a pinhole camera, .npz for an orthographic one
     #[arg(long = "out", short = 'o')]
     pub out: PathBuf,
+    /// What this one of the scene's views sees, a depth image without noise, instead of the scene's camera
+    #[arg(long, value_name = "NAME")]
+    pub view: Option<String>,
     /// Render these centres [m], an array (n, 3), with the scene's grain diameter, instead of a pour
     #[arg(long, value_name = "IN.npy")]
     pub positions: Option<PathBuf>,

@@ -140,6 +140,29 @@ fn a_rendered_image_is_described_like_its_pour() {
 }
 
 #[test]
+fn a_view_shows_the_pour_from_where_it_stands() {
+    let place = Place::new();
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+    let scene = fs::read_to_string(examples.join("drop.toml")).unwrap();
+    let view = "\n[[views]]\nname = \"side\"\neye = [0.0, -0.5, 0.02]\ntarget = [0.0, 0.0, 0.02]\n\
+                field_width = 0.2\npixels = [100, 60]\n";
+    place.write("side.toml", scene + view);
+    // One grain, 40 mm to the right of the middle and 10 mm above it.
+    granulcal_dataset::npy::write_points(&place.at("g.npy"), &[[0.04, 0.0, 0.03].into()]).unwrap();
+    let render = ["render", "side.toml", "--positions", "g.npy", "-o", "s.png", "--view"];
+    place.expect(0, &[&render[..], &["side"]].concat());
+    let counts = image::open(place.at("s.png")).unwrap().into_luma16();
+    assert_eq!(counts.dimensions(), (100, 60));
+    // 2 mm a pixel: column 70, row 25; the front of the grain is one radius nearer than 0.5 m.
+    let depth = f64::from(counts[(70, 25)].0[0]) * 1e-4;
+    assert!((depth - 0.498).abs() < 1.1e-3, "{depth}");
+    assert!(f64::from(counts[(30, 25)].0[0]) * 1e-4 > 0.6 || counts[(30, 25)].0[0] == 0);
+    place.refused(&[&render[..], &["top"]].concat(), &["--view", "side", "top"]);
+    let named = ["render", "side.toml", "-o", "s.npz", "--view", "side"];
+    place.refused(&named, &["s.npz", "a view", ".png"]);
+}
+
+#[test]
 fn diagnostic_statistics_are_printed_when_asked_for() {
     let place = Place::new();
     let more = ["--diagnostics", "--depth", "pile.png", "--set", "camera.downsample=4"];

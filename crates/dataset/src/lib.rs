@@ -68,7 +68,7 @@ pub use input::ReadSeek;
 pub use mcap_file::record_pour;
 pub use message_file::{Damage, MessageFormat};
 pub use npz::{Npz, write_height_map};
-pub use observe::{Observation, TooFewGrains, View, look, observe, overhead};
+pub use observe::{Observation, TooFewGrains, View, look, look_from, observe, overhead};
 pub use observer::{Observed, ObservedStatistic, Observer, Series, observed_statistics};
 pub use pictures::{Pictures, write_mask, write_pictures};
 pub use prior::{Parameter, Prior};

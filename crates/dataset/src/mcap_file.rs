@@ -6,7 +6,8 @@
 //! | `/depth` | foxglove.RawImage, 32FC1 | what the scene's camera delivers `[m]`, frame `camera`; 0 is no data |
 //! | `/heights` | foxglove.RawImage, 32FC1 | the same for an orthographic camera, instead of `/depth` |
 //! | `/camera` | foxglove.CameraCalibration | the pinhole camera of `/depth` |
-//! | `/tf` | foxglove.FrameTransform | where the frame `camera` is in `world` |
+//! | `/views/NAME/depth`, `/views/NAME/camera` | as `/depth` and `/camera` | the same of each of the scene's further views, frame `views/NAME` |
+//! | `/tf` | foxglove.FrameTransform | where the frames `camera` and `views/NAME` are in `world` |
 //!
 //! Time 0 is the start of the pour. The scene's TOML, the seed and the outcome stand in the metadata
 //! record `granulcal`, the TOML also as the attachment `scene.toml`.
@@ -22,12 +23,12 @@ use foxglove::messages::{
     Timestamp, Vector3,
 };
 use granulcal_dem::{Pour, Scene, Simulation};
-use granulcal_features::{Camera, Intrinsics};
+use granulcal_features::{Camera, DepthImage, Intrinsics};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 
 use crate::files::PendingFile;
-use crate::{DatasetError, Observer, VERSION, View, look};
+use crate::{DatasetError, Observer, VERSION, View, look, look_from};
 
 const WORLD: &str = "world";
 const CAMERA: &str = "camera";
@@ -120,25 +121,51 @@ impl<'a> Recorder<'a> {
         let time = simulation.time();
         let failed = |source| DatasetError::Mcap { path: self.path.to_owned(), source };
         let view = look(&scene.camera, &simulation.positions(), &simulation.radii(), seed);
+        let further: Vec<_> = scene
+            .views
+            .iter()
+            .map(|view| {
+                let seen = look_from(view, &simulation.positions(), &simulation.radii());
+                (format!("views/{}", view.name), seen)
+            })
+            .collect();
         let messages = |recorder: &mut Self| -> McapResult<()> {
             recorder.send("/grains", time, &grains(time, simulation))?;
             match view {
                 Ok(View::Depth(camera, image)) => {
-                    recorder.send("/tf", time, &pose_of(time, &camera))?;
-                    recorder.send("/camera", time, &calibration(time, &camera.intrinsics))?;
-                    let image = raw_image(time, CAMERA, image.width, image.height, &image.depth);
-                    recorder.send("/depth", time, &image)
+                    recorder.depth_image(time, CAMERA, ["/depth", "/camera"], &camera, &image)?;
                 }
                 Ok(View::Heights(map)) => {
                     let heights: Vec<_> = map.z.iter().map(|&z| z as f32).collect();
                     let image = raw_image(time, WORLD, map.width, map.height, &heights);
-                    recorder.send("/heights", time, &image)
+                    recorder.send("/heights", time, &image)?;
                 }
                 // Grains of an unhealthy pour can be anywhere, NaN included; the cloud shows it.
-                Err(_) => Ok(()),
+                Err(_) => return Ok(()),
             }
+            for (frame, view) in &further {
+                if let Ok(View::Depth(camera, image)) = view {
+                    let topics = [&*format!("/{frame}/depth"), &*format!("/{frame}/camera")];
+                    recorder.depth_image(time, frame, topics, camera, image)?;
+                }
+            }
+            Ok(())
         };
         messages(self).map_err(failed)
+    }
+
+    /// A depth image on the first topic, its camera on the second and where it stands.
+    fn depth_image(
+        &mut self,
+        time: f64,
+        frame: &str,
+        [depth, calibrated]: [&str; 2],
+        camera: &Camera,
+        image: &DepthImage,
+    ) -> McapResult<()> {
+        self.send("/tf", time, &pose_of(time, frame, camera))?;
+        self.send(calibrated, time, &calibration(time, frame, &camera.intrinsics))?;
+        self.send(depth, time, &raw_image(time, frame, image.width, image.height, &image.depth))
     }
 
     fn send<T: Encode>(&mut self, topic: &str, time: f64, message: &T) -> McapResult<()> {
@@ -221,13 +248,13 @@ fn raw_image(time: f64, frame: &str, width: usize, height: usize, values: &[f32]
     }
 }
 
-fn calibration(time: f64, lens: &Intrinsics) -> CameraCalibration {
+fn calibration(time: f64, frame: &str, lens: &Intrinsics) -> CameraCalibration {
     // Foxglove follows OpenCV: the centre of the first pixel is (0, 0).
     let (cx, cy) = (lens.cx - 0.5, lens.cy - 0.5);
     let (fx, fy) = (lens.fx, lens.fy);
     CameraCalibration {
         timestamp: timestamp(time),
-        frame_id: CAMERA.to_owned(),
+        frame_id: frame.to_owned(),
         width: lens.width as u32,
         height: lens.height as u32,
         distortion_model: String::new(),
@@ -238,13 +265,13 @@ fn calibration(time: f64, lens: &Intrinsics) -> CameraCalibration {
     }
 }
 
-fn pose_of(time: f64, camera: &Camera) -> FrameTransform {
+fn pose_of(time: f64, frame: &str, camera: &Camera) -> FrameTransform {
     let world_from_camera = camera.camera_from_world.inverse();
     let (at, turn) = (world_from_camera.translation.vector, world_from_camera.rotation);
     FrameTransform {
         timestamp: timestamp(time),
         parent_frame_id: WORLD.to_owned(),
-        child_frame_id: CAMERA.to_owned(),
+        child_frame_id: frame.to_owned(),
         translation: Some(Vector3 { x: at.x, y: at.y, z: at.z }),
         rotation: Some(Quaternion { x: turn.i, y: turn.j, z: turn.k, w: turn.w }),
     }

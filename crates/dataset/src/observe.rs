@@ -2,11 +2,11 @@
 
 use std::fmt;
 
-use granulcal_dem::{CameraSpec, Mask, Pour, Projection};
+use granulcal_dem::{CameraSpec, Mask, Pour, Projection, ViewSpec};
 use granulcal_features::stats::DIAGNOSTIC_COUNT;
 use granulcal_features::{
     Camera, DepthImage, DiagnosticSettings, FeatureError, HeightMap, SensorNoise, diagnostics,
-    height_map, paper16, render_grid,
+    height_map, paper16, render, render_grid,
 };
 use nalgebra::{Vector2, Vector3};
 
@@ -155,6 +155,21 @@ pub fn look(
     pour_seed: u64,
 ) -> Result<View, DatasetError> {
     views(camera, positions, radii, pour_seed).map(|(_, view)| view)
+}
+
+/// What one of the scene's further cameras sees of grains over the ground; without noise.
+///
+/// # Errors
+/// [`DatasetError::Features`] as [`observe`].
+pub fn look_from(
+    view: &ViewSpec,
+    positions: &[Vector3<f64>],
+    radii: &[f64],
+) -> Result<View, DatasetError> {
+    let [width, height] = view.pixels;
+    Camera::looking_at(view.eye.into(), view.target.into(), view.field_width, (width, height))
+        .and_then(|camera| Ok(View::Depth(camera, render(&camera, positions, radii)?)))
+        .map_err(DatasetError::Features)
 }
 
 /// The noise-free image and the one that the camera delivers.

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use foxglove::Decode;
-use foxglove::messages::{CameraCalibration, PointCloud, RawImage};
+use foxglove::messages::{CameraCalibration, FrameTransform, PointCloud, RawImage};
 use granulcal_dataset::{
-    Lost, Observer, ReadOptions, Recording, Source, Survey, View, look, record_pour,
+    Lost, Observer, ReadOptions, Recording, Source, Survey, View, look, look_from, record_pour,
 };
-use granulcal_dem::{Scene, Simulation};
+use granulcal_dem::{Scene, Simulation, ViewSpec};
 
 fn scene() -> Scene {
     let mut scene = Scene::drop(0.02);
@@ -113,6 +113,48 @@ fn schemas_counts_stamps_and_bytes_are_those_of_the_pour() {
     let half = Recording::open(&path, &last_frame).unwrap();
     assert!(matches!(half.lost, Some(Lost::AtLeast(_))), "{:?}", half.lost);
     assert!(half.whole_frames < recording.whole_frames && half.whole_frames > 0);
+}
+
+#[test]
+fn further_views_have_topics_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pour.mcap");
+    let mut scene = scene();
+    scene.views.push(ViewSpec {
+        name: "side".to_owned(),
+        eye: [0.0, -0.4, 0.02],
+        target: [0.0, 0.0, 0.02],
+        field_width: 0.1,
+        pixels: [40, 20],
+    });
+    let simulation = Simulation::new(&scene, 4).unwrap();
+    let watch = &mut |_| true;
+    let pour = record_pour(simulation, &scene, 4, 60.0, &path, &mut Observer::new(&scene), watch)
+        .unwrap()
+        .unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let mut last = BTreeMap::new();
+    let mut frames = std::collections::BTreeSet::new();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        if message.channel.topic == "/tf" {
+            let pose = FrameTransform::decode(&message.data[..]).unwrap();
+            frames.insert(pose.child_frame_id);
+        }
+        last.insert(message.channel.topic.clone(), message.data.to_vec());
+    }
+    assert_eq!(frames.into_iter().collect::<Vec<_>>(), ["camera", "views/side"]);
+    let depth = RawImage::decode(last["/views/side/depth"].as_slice()).unwrap();
+    assert_eq!((depth.width, depth.height, &*depth.frame_id), (40, 20, "views/side"));
+    let seen = look_from(&scene.views[0], &pour.positions, &pour.radii).unwrap();
+    let View::Depth(_, image) = seen else { panic!("a view is a depth image") };
+    let values: Vec<_> =
+        depth.data.as_chunks::<4>().0.iter().map(|&raw| f32::from_le_bytes(raw)).collect();
+    assert_eq!(values, image.depth);
+    let lens = CameraCalibration::decode(last["/views/side/camera"].as_slice()).unwrap();
+    assert_eq!(lens.frame_id, "views/side");
+    // Grains near the middle of the picture, 0.4 m away.
+    assert!(image.depth.iter().any(|&depth| (0.3..0.42).contains(&depth)));
 }
 
 #[test]

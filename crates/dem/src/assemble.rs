@@ -7,6 +7,7 @@ use crate::contact::Batch;
 use crate::contact_set::ContactSet;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, widest};
 use crate::law;
+use crate::period::Period;
 use crate::wall::Walls;
 
 /// Distance below which two centres are one point and the normal is the vertical `[m]`.
@@ -48,7 +49,7 @@ widest! {
         for batch in batches {
             let place = |body: u32| W::load_row(&bed.places[body as usize]);
             let (i, j) = (each(&batch.i, place), each(&batch.j, place));
-            let (gap, distance) = pair_geometry::<W>(batch, i, j, &mut overlap);
+            let (gap, distance) = pair_geometry::<W>(batch, i, j, bed.period.as_ref(), &mut overlap);
             let gap = empty_lanes_open(batch, gap);
             let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
             let v_i = vectors::<W>(each(&batch.i, velocity));
@@ -119,7 +120,7 @@ widest! {
             let (i, j) = (at(&batch.i), at(&batch.j));
             let place = |rows: &[Row; LANES]| each(&LANE_NUMBERS, |lane| W::load_row(&rows[lane as usize]));
             let mut unseen = Reg::splat(0.0);
-            let (gap, distance) = pair_geometry::<W>(batch, place(&i), place(&j), &mut unseen);
+            let (gap, distance) = pair_geometry::<W>(batch, place(&i), place(&j), bed.period.as_ref(), &mut unseen);
             let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
             let dv = vectors::<W>(each(&batch.i, velocity)) - vectors(each(&batch.j, velocity));
             let w_n = Reg3::load(&batch.normal).dot(dv);
@@ -193,11 +194,15 @@ fn pair_geometry<W: Width>(
     batch: &mut Batch,
     i: [W::Quad; LANES],
     j: [W::Quad; LANES],
+    period: Option<&Period>,
     overlap: &mut Reg<W>,
 ) -> (Reg<W>, Reg<W>) {
     let ([x_i, y_i, z_i, r_i], [x_j, y_j, z_j, r_j]) = (W::columns(i), W::columns(j));
-    let apart = Reg3::<W> { x: Reg(x_i), y: Reg(y_i), z: Reg(z_i) }
+    let mut apart = Reg3::<W> { x: Reg(x_i), y: Reg(y_i), z: Reg(z_i) }
         - Reg3 { x: Reg(x_j), y: Reg(y_j), z: Reg(z_j) };
+    if let Some(period) = period {
+        period.nearest_lanes(&mut apart);
+    }
     let (r_i, r_j) = (Reg::<W>(r_i), Reg(r_j));
     let (zero, one) = (Reg::splat(0.0), Reg::splat(1.0));
     let distance = apart.norm();

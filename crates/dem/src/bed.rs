@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::lanes::{Row, Width};
 use crate::parallel::Threads;
+use crate::period::Period;
 use crate::scene::Scene;
 
 /// Grains that a thread takes at once.
@@ -84,6 +85,9 @@ pub(crate) struct Bed {
     pub clocks: Vec<f64>,
     /// Mass of a typical grain over the grain's mass `[-]`; impulses are in units of that mass.
     pub inverse_mass: Vec<f64>,
+    /// Along which axis space repeats; the scene says it, not the state.
+    #[serde(skip)]
+    pub period: Option<Period>,
 }
 
 /// Inverse moment of inertia of a sphere times its mass and squared radius, 5/2.
@@ -108,6 +112,7 @@ impl Bed {
             bodies: vec![Body::default(); count + 1],
             clocks: vec![0.0; count],
             inverse_mass,
+            period: scene.periodic.as_ref().map(Period::of),
         }
     }
 
@@ -135,6 +140,15 @@ impl Bed {
     #[inline]
     pub fn position(&self, grain: usize) -> Vector3<f64> {
         self.places[grain].vector()
+    }
+
+    /// The way between two places, or to the image of one that is nearer where space repeats `[m]`.
+    #[inline(always)]
+    pub fn nearest(&self, apart: Vector3<f64>) -> Vector3<f64> {
+        match &self.period {
+            None => apart,
+            Some(period) => period.nearest(apart),
+        }
     }
 
     /// Radius of a grain `[m]`.

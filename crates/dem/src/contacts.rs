@@ -153,6 +153,23 @@ impl Contacts {
         self.age = usize::MAX;
     }
 
+    /// Puts the grains that have left the period in at its other end; returns by how much that changes their energy in
+    /// `gravity`, per typical mass `[m^2/s^2]`.
+    pub fn wrap(&mut self, bed: &mut Bed, gravity: &Vector3<f64>) -> f64 {
+        let Some(period) = bed.period else { return 0.0 };
+        let mut gained = 0.0;
+        for grain in 0..bed.count() {
+            if let Some(shift) = period.shift(&bed.position(grain)) {
+                bed.places[grain].add(&shift);
+                if let Some(path) = self.paths.get_mut(grain) {
+                    path.from += shift;
+                }
+                gained -= gravity.dot(&shift) / bed.inverse_mass[grain];
+            }
+        }
+        gained
+    }
+
     /// Lists what may touch in the coming substep.
     pub fn follow(&mut self, bed: &Bed, around: &Surroundings) {
         if self.paths.is_empty() || self.age >= around.settings.list_period {
@@ -282,7 +299,9 @@ impl Contacts {
         let interval = reach.interval;
 
         self.search.pairs(bed, &self.paths, reach, &around.threads, &mut self.found);
-        self.blocks.place(self.search.middles(), self.search.longest(), around.radius);
+        // Where space repeats the first and the last block are neighbours, which phases do not know: one block.
+        let middles = if bed.period.is_some() { &[] } else { self.search.middles() };
+        self.blocks.place(middles, self.search.longest(), around.radius);
         // Contacts that will act come first: their batches are full of them, the others are passed over whole.
         self.listed.clear();
         self.far.clear();
@@ -346,6 +365,12 @@ impl Contacts {
         let ball = Ball::swept(&path, bed.radius(grain), left, around.margin);
         self.around_path.clear();
         self.search.around(&ball, |other| self.around_path.push(other));
+        if let Some(period) = &bed.period {
+            for step in [period.step(), -period.step()] {
+                let image = Ball { middle: ball.middle + step, ..ball };
+                self.search.around(&image, |other| self.around_path.push(other));
+            }
+        }
         self.search.add(grain as u32, &ball);
         for number in 0..self.around_path.len() {
             let other = self.around_path[number] as usize;
@@ -355,7 +380,7 @@ impl Contacts {
             let theirs = &self.paths[other];
             let theirs = Path { from: theirs.at(now), velocity: theirs.velocity };
             let limit = bed.radius(grain) + bed.radius(other) + around.margin;
-            if path.comes_within(&theirs, limit, left) {
+            if path.comes_within(&theirs, bed, limit, left) {
                 let (i, j) = (grain.min(other), grain.max(other));
                 self.partners.add(i, j as u32);
                 self.partners.add(j, i as u32);

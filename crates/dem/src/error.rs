@@ -135,6 +135,14 @@ pub enum DemError {
         /// The name found.
         got: String,
     },
+    /// A view without a name of its own.
+    #[error("{path} must be of letters, digits, - and _, and no other view's, got {got:?}")]
+    ViewName {
+        /// Where it stands in the scene.
+        path: String,
+        /// The name found.
+        got: String,
+    },
     /// A preset that does not exist.
     #[error("preset must be one of fast, default, accurate, paper, got {got:?}")]
     UnknownPreset {

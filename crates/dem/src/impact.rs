@@ -170,7 +170,7 @@ fn other_grain(pair: Candidate, bed: &Bed) -> Option<usize> {
 /// When two grains on their straight ways touch fast enough: the root of `|d + w tau| = r_i + r_j`.
 fn time_of_pair(i: usize, j: usize, now: f64, bed: &Bed) -> Option<f64> {
     let (a, b) = (bed.place_at(i, now), bed.place_at(j, now));
-    let apart = a.vector() - b.vector();
+    let apart = bed.nearest(a.vector() - b.vector());
     let relative = bed.velocity(i) - bed.velocity(j);
     let touching = a.0[3] + b.0[3];
     let closing = -apart.dot(&relative);
@@ -231,7 +231,8 @@ struct Meeting {
 
 impl Meeting {
     fn with_grain(i: usize, j: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
-        let apart = bed.place_at(i, time).vector() - bed.place_at(j, time).vector();
+        let (a, b) = (bed.place_at(i, time), bed.place_at(j, time));
+        let apart = bed.nearest(a.vector() - b.vector());
         let distance = apart.norm();
         Self {
             law: around.pair_law(bed, i, j),

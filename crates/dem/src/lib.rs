@@ -48,6 +48,7 @@ mod neighbor;
 mod parallel;
 mod partners;
 mod path;
+mod period;
 mod placement;
 mod pour;
 mod preset;
@@ -75,8 +76,8 @@ pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
     BoxSide, CameraSpec, EndRule, Ends, Funnel, GRAVITY, Grains, Ground, Mask, Mesh, MeshFile,
     Motion, NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill,
-    ObserveSurface, Projection, Scene, SensorSpec, Shape, Start, StereoSpec, TimeOfFlightSpec,
-    Wall,
+    ObserveSurface, Periodic, PeriodicAxis, Projection, Scene, SensorSpec, Shape, Start,
+    StereoSpec, TimeOfFlightSpec, ViewSpec, Wall,
 };
 pub use simulation::Simulation;
 pub use solver::Method;

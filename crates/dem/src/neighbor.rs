@@ -16,6 +16,7 @@ use crate::bed::Bed;
 use crate::lanes::widest;
 use crate::parallel::Threads;
 use crate::path::{Ball, Path, Reach};
+use crate::period::Period;
 
 /// Upper bound of the number of cells: clearing them must stay cheaper than the search itself.
 const MAX_CELLS: f64 = 65_536.0;
@@ -81,8 +82,38 @@ impl PairSearch {
         threads.gather_ranges(self.cells[1] * self.cells[2], ROWS, found, |rows, found| {
             let first = found.len();
             overlapping(search, rows, found);
-            keep_from(found, first, |pair| pair.follow(bed, paths, reach));
+            keep_from(found, first, |pair| {
+                pair.is_direct(bed, paths) && pair.follow(bed, paths, reach)
+            });
         });
+        if let Some(period) = &bed.period {
+            self.across(bed, paths, reach, period, found);
+        }
+    }
+
+    /// Adds the pairs that come within reach across the end of the period: those whose nearest images are not direct.
+    fn across(
+        &self,
+        bed: &Bed,
+        paths: &[Path],
+        reach: Reach,
+        period: &Period,
+        found: &mut Vec<Neighbours>,
+    ) {
+        for (grain, path) in paths.iter().enumerate() {
+            let (i, middle) = (grain as u32, self.middles[grain] + period.step());
+            self.around(&Ball { middle, reach: self.reaches[grain] }, |j| {
+                // The lower of the two is the one that is shifted.
+                let apart = paths[j as usize].from - path.from;
+                let mut pair = Neighbours { i: i.min(j), j: i.max(j), come_near: false };
+                if !period.is_direct(&apart)
+                    && period.is_ahead(&apart)
+                    && pair.follow(bed, paths, reach)
+                {
+                    found.push(pair);
+                }
+            });
+        }
     }
 
     /// Centres of the swept balls at the last search for at least two grains.
@@ -317,11 +348,19 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
+    /// Whether neither is nearer to the other's image.
+    #[inline]
+    fn is_direct(&self, bed: &Bed, paths: &[Path]) -> bool {
+        bed.period.is_none_or(|period| {
+            period.is_direct(&(paths[self.i as usize].from - paths[self.j as usize].from))
+        })
+    }
+
     /// Whether they are within reach on their paths; notes whether they come near.
     #[inline]
     fn follow(&mut self, bed: &Bed, paths: &[Path], reach: Reach) -> bool {
         let (i, j) = (self.i as usize, self.j as usize);
-        let nearest = paths[i].nearest_squared(&paths[j], reach.interval);
+        let nearest = paths[i].nearest_squared(&paths[j], bed, reach.interval);
         let touching = bed.radius(i) + bed.radius(j);
         self.come_near = nearest < (touching + reach.near).powi(2);
         nearest < (touching + reach.far).powi(2)
@@ -352,7 +391,7 @@ mod tests {
         let path = |grain| Path { from: bed.position(grain), velocity: bed.velocity(grain) };
         let within = |i, j, gap| {
             let limit = bed.radius(i) + bed.radius(j) + gap;
-            path(i).comes_within(&path(j), limit, reach.interval)
+            path(i).comes_within(&path(j), bed, limit, reach.interval)
         };
         pairs
             .filter(|&(i, j)| within(i, j, reach.far))
@@ -368,9 +407,12 @@ mod tests {
         #[test]
         fn finds_every_pair_once(points in proptest::collection::vec(
             (prop::array::uniform3(-0.03f64..0.03), prop::array::uniform3(-3f64..3.0), 0.0005f64..0.004), 0..120),
-            interval in 0f64..0.004, far in 0f64..3.0) {
+            interval in 0f64..0.004, far in 0f64..3.0, is_periodic: bool) {
             let mut bed = bed(&points);
             bed.places[0].0[0] += far; // one grain far out stretches the grid
+            bed.period = is_periodic.then(|| Period::of(&crate::scene::Periodic {
+                axis: crate::scene::PeriodicAxis::Y, from: -0.03, to: 0.03,
+            }));
             let mut pairs = Vec::new();
             let paths: Vec<Path> = (0..bed.count())
                 .map(|i| Path { from: bed.position(i), velocity: bed.velocity(i) })

@@ -40,10 +40,10 @@ impl Path {
         self.from + time * self.velocity
     }
 
-    /// Square of the least distance of two ways in the next `interval` `[s]`, `[m^2]`.
+    /// Square of the least distance of two grains' ways in the next `interval` `[s]`, `[m^2]`.
     #[inline]
-    pub fn nearest_squared(&self, other: &Self, interval: f64) -> f64 {
-        let apart = self.from - other.from;
+    pub fn nearest_squared(&self, other: &Self, bed: &Bed, interval: f64) -> f64 {
+        let apart = bed.nearest(self.from - other.from);
         let relative = self.velocity - other.velocity;
         let closing = -apart.dot(&relative);
         if closing <= 0.0 {
@@ -55,8 +55,8 @@ impl Path {
 
     /// Whether the way comes within `limit` `[m]` of another in the next `interval` `[s]`.
     #[inline]
-    pub fn comes_within(&self, other: &Self, limit: f64, interval: f64) -> bool {
-        self.nearest_squared(other, interval) < limit * limit
+    pub fn comes_within(&self, other: &Self, bed: &Bed, limit: f64, interval: f64) -> bool {
+        self.nearest_squared(other, bed, interval) < limit * limit
     }
 }
 

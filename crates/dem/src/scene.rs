@@ -8,8 +8,10 @@ mod mesh;
 mod motion;
 mod observe;
 pub(crate) mod path;
+mod periodic;
 mod sensor;
 mod start;
+mod view;
 mod walls;
 
 use serde::{Deserialize, Serialize};
@@ -20,9 +22,11 @@ pub use motion::Motion;
 pub use observe::{
     Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill, ObserveSurface,
 };
+pub use periodic::{Periodic, PeriodicAxis};
 pub use sensor::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 pub use start::Start;
 pub(crate) use start::unit_interval;
+pub use view::ViewSpec;
 pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
 
 use crate::effect::Effects;
@@ -59,6 +63,9 @@ pub struct Scene {
     /// Further walls.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub walls: Vec<Wall>,
+    /// Space that repeats along an axis, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub periodic: Option<Periodic>,
     /// What the plain model lacks, each off unless stated.
     #[serde(default, skip_serializing_if = "Effects::is_plain")]
     pub effects: Effects,
@@ -68,6 +75,9 @@ pub struct Scene {
     /// The depth camera above the ground.
     #[serde(default)]
     pub camera: CameraSpec,
+    /// Further cameras, whose images are looked at and not inferred from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub views: Vec<ViewSpec>,
     /// What is observed while the pour goes on, and at its end beside the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observe: Option<Observe>,
@@ -125,9 +135,11 @@ impl Scene {
             ground: Ground::default(),
             funnel: Some(Funnel { height, ..Funnel::default() }),
             walls: Vec::new(),
+            periodic: None,
             effects: Effects::default(),
             end: EndRule::default(),
             camera: CameraSpec::default(),
+            views: Vec::new(),
             observe: None,
         }
     }
@@ -231,9 +243,13 @@ impl Scene {
         for (name, motion) in named.chain(funnel) {
             motion.check_jumps(&name, dt, diameter)?;
         }
+        if let Some(periodic) = &self.periodic {
+            periodic.check(self.grains.diameter)?;
+        }
         if let Some(observe) = &self.observe {
             observe.check(self.end.horizon, self.grains.diameter)?;
         }
+        view::check_views(&self.views)?;
         self.camera.check()
     }
 }

@@ -242,6 +242,8 @@ impl Simulation {
     /// Lists and assembles the contacts of a substep, lets gravity act and resolves the impacts.
     fn assemble(&mut self) -> Seen {
         self.around.move_walls(self.substep as f64 * self.around.settings.dt);
+        let gained = self.contacts.wrap(&mut self.bed, &self.around.effects.gravity);
+        self.watch.see_work(gained);
         self.contacts.follow(&self.bed, &self.around);
         self.accelerate();
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);

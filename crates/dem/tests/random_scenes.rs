@@ -2,8 +2,8 @@
 //! happened. A scene that was ever found to break something has a test of its own in `tests/physics/robustness.rs`.
 
 use granulcal_dem::{
-    BoxSide, EndRule, Ends, Funnel, Grains, Ground, MAX_ENERGY_CREATED, Material, Motion, Preset,
-    Scene, Shape, Simulation, Start, Status, Wall, WallMaterial,
+    BoxSide, EndRule, Ends, Funnel, Grains, Ground, MAX_ENERGY_CREATED, Material, Motion, Periodic,
+    PeriodicAxis, Preset, Scene, Shape, Simulation, Start, Status, Wall, WallMaterial,
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -160,7 +160,8 @@ fn scene() -> impl Strategy<Value = Scene> {
     let walls = prop::collection::vec(wall(), 0..4);
     let end = (1.0..SUBSTEPS, log(1e-14, 1e-2));
     let preset = prop::sample::select(&Preset::ALL[..]);
-    (radius, begin(), prop::option::of(funnel()), walls, gravity(), material(), preset, end)
+    let period = prop::option::weighted(0.2, (any::<bool>(), -20.0..20.0, 8.0..60.0));
+    (radius, begin(), prop::option::of(funnel()), walls, gravity(), material(), preset, end, period)
         .prop_map(
             |(
                 radius,
@@ -171,6 +172,7 @@ fn scene() -> impl Strategy<Value = Scene> {
                 material,
                 preset,
                 (substeps, energy),
+                period,
             )| Scene {
                 name: "random".to_owned(),
                 preset,
@@ -184,6 +186,13 @@ fn scene() -> impl Strategy<Value = Scene> {
                 end: EndRule { horizon: substeps * preset.settings().dt, kinetic_energy: energy },
                 camera: granulcal_dem::CameraSpec::default(),
                 effects: granulcal_dem::Effects::default(),
+                periodic: period.map(|(is_x, from, length)| Periodic {
+                    axis: if is_x { PeriodicAxis::X } else { PeriodicAxis::Y },
+                    from: radius * from,
+                    // Rounding must not make the shortest too short.
+                    to: radius * (from + (1.0 + 1e-9) * length),
+                }),
+                views: Vec::new(),
                 observe: None,
             },
         )
@@ -310,8 +319,10 @@ proptest! {
             && health.worst_penetration <= settings.max_penetration
             && health.energy_created <= MAX_ENERGY_CREATED;
         prop_assert_eq!(is_sound, pour.status != Status::Unhealthy, "{:?} {:?}", pour.status, health);
-        // Walls that move put energy in.
-        if is_sound && scene.walls.iter().all(|wall| wall.motion.is_still()) {
+        // Walls that move put energy in, and so does a slope without end.
+        let is_closed = scene.walls.iter().all(|wall| wall.motion.is_still())
+            && scene.periodic.is_none();
+        if is_sound && is_closed {
             prop_assert!(created <= MAX_ENERGY_CREATED * scale * (1.0 + 1e-9), "{created} {health:?}");
         }
         let held = scene.funnel.map_or(0, |funnel| {

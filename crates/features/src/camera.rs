@@ -176,6 +176,40 @@ impl Camera {
         })
     }
 
+    /// A camera at `eye` that looks at `target`, its image upright: world +z is up in it, or +y where it looks
+    /// straight down or up. `field_width_m` is the width in view at the distance of the target.
+    ///
+    /// # Errors
+    /// `OutOfRange` when the field width or the way from eye to target is not positive and below 1 km, `pixels` (columns,
+    /// rows) are 0 or too many, or a coordinate is not finite.
+    pub fn looking_at(
+        eye: Vector3<f64>,
+        target: Vector3<f64>,
+        field_width_m: f64,
+        pixels: (usize, usize),
+    ) -> Result<Self, FeatureError> {
+        require_in("field width [m]", field_width_m, 1e-6, 1e3)?;
+        let forward = target - eye;
+        let distance = forward.norm();
+        require_in("way from eye to target [m]", distance, 1e-6, 1e3)?;
+        require_finite("eye of a camera [m]", eye.iter().copied())?;
+        let forward = forward / distance;
+        let across = forward.cross(&Vector3::z());
+        // Within a thousandth of a degree of the vertical the horizon gives no direction.
+        let right = if across.norm() > 1e-5 { across } else { forward.cross(&Vector3::y()) };
+        let right = right.normalize();
+        let world_from_camera =
+            Rotation3::from_basis_unchecked(&[right, forward.cross(&right), forward]);
+        let turn = UnitQuaternion::from_rotation_matrix(&world_from_camera.inverse());
+        let (width, height) = pixels;
+        let focal = width as f64 * distance / field_width_m;
+        let centre = (0.5 * width as f64, 0.5 * height as f64);
+        Ok(Self {
+            intrinsics: Intrinsics::new(width, height, focal, focal, centre.0, centre.1)?,
+            camera_from_world: Isometry3::from_parts((-(turn * eye)).into(), turn),
+        })
+    }
+
     /// The camera turned about its own centre: by `tilt_x_rad` about its x axis, then by
     /// `tilt_y_rad` about its new y axis.
     #[must_use]
@@ -240,5 +274,43 @@ impl Camera {
         Intrinsics::new(k.width, k.height, k.fx, k.fy, k.cx, k.cy)?;
         let pose = self.camera_from_world.to_homogeneous();
         require_finite("camera pose", pose.iter().copied())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn looking_straight_down_is_overhead() {
+        let overhead = Camera::overhead(0.29, 0.58, 64).unwrap();
+        let eye = Vector3::new(0.0, 0.0, 0.29);
+        let camera = Camera::looking_at(eye, Vector3::zeros(), 0.58, (64, 64)).unwrap();
+        for point in [[0.1, -0.05, 0.02], [-0.2, 0.1, 0.0], [0.0, 0.0, 0.1]].map(Vector3::from) {
+            let (a, b) = (overhead.project(&point).unwrap(), camera.project(&point).unwrap());
+            assert!(
+                (a.0 - b.0).abs() + (a.1 - b.1).abs() + (a.2 - b.2).abs() < 1e-9,
+                "{a:?} {b:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn from_the_side_x_is_right_and_z_is_up() {
+        let (eye, target) = (Vector3::new(0.0, -0.5, 0.1), Vector3::new(0.0, 0.0, 0.1));
+        let camera = Camera::looking_at(eye, target, 0.2, (200, 100)).unwrap();
+        // 1 px is 1 mm at the distance of the target.
+        let (u, v, depth) = camera.project(&Vector3::new(0.03, 0.0, 0.12)).unwrap();
+        assert!((u - 130.0).abs() < 1e-9 && (v - 30.0).abs() < 1e-9, "{u} {v}");
+        assert!((depth - 0.5).abs() < 1e-12, "{depth}");
+        assert!(camera.project(&Vector3::new(0.0, -0.6, 0.1)).is_none());
+    }
+
+    #[test]
+    fn a_camera_that_looks_at_itself_is_refused() {
+        let here = Vector3::new(0.1, 0.2, 0.3);
+        assert!(Camera::looking_at(here, here, 0.2, (8, 8)).is_err());
+        assert!(Camera::looking_at(here, Vector3::zeros(), -1.0, (8, 8)).is_err());
+        assert!(Camera::looking_at(here, Vector3::zeros(), 0.1, (0, 8)).is_err());
     }
 }

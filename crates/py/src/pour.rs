@@ -1,7 +1,7 @@
 //! Class `Pour`.
 
-use granulcal_dataset::{Observed, RowStatus, Series};
-use granulcal_dem::{CameraSpec, Health};
+use granulcal_dataset::{Observed, RowStatus, Series, View};
+use granulcal_dem::{CameraSpec, Health, ViewSpec};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -16,6 +16,7 @@ pub(crate) struct Pour {
     pub(crate) status: RowStatus,
     pub(crate) observed: Observed,
     pub(crate) camera: CameraSpec,
+    pub(crate) views: Vec<ViewSpec>,
     pub(crate) seed: u64,
     pub(crate) cpu_seconds: f64,
 }
@@ -110,6 +111,23 @@ impl Pour {
             all.set_item(name, pair)?;
         }
         Ok(all)
+    }
+
+    /// Depth image of the view of this name, `None` if the scene has none of it.
+    fn look_from<'py>(
+        &self,
+        py: Python<'py>,
+        name: &str,
+    ) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
+        let Some(view) = self.views.iter().find(|view| view.name == name) else { return Ok(None) };
+        let (positions, radii) = (&self.inner.positions, &self.inner.radii);
+        let seen = py.detach(|| granulcal_dataset::look_from(view, positions, radii));
+        match seen.map_err(error::dataset)? {
+            View::Depth(_, image) => {
+                array::matrix(py, image.depth, image.height, image.width).map(Some)
+            }
+            View::Heights(_) => unreachable!("a view is a pinhole camera"),
+        }
     }
 
     fn observe(&self, py: Python<'_>) -> PyResult<Observation> {

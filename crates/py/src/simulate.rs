@@ -33,5 +33,6 @@ pub(crate) fn simulate(py: Python<'_>, scene: &Scene, seed: u64, threads: usize)
     let (pour, status, observed) = outcome.map_err(error::dem)?.ok_or_else(|| {
         pyo3::exceptions::PyKeyboardInterrupt::new_err("the simulation was stopped")
     })?;
-    Ok(Pour { inner: pour, status, observed, camera: scene.camera, seed, cpu_seconds })
+    let (camera, views) = (scene.camera, scene.views.clone());
+    Ok(Pour { inner: pour, status, observed, camera, views, seed, cpu_seconds })
 }

@@ -31,6 +31,8 @@ pub fn scene(positions: &[Vector3<f64>], material: Material, walls: Vec<Wall>) -
         effects: Effects::default(),
         end: EndRule { horizon: 1e3, kinetic_energy: f64::MIN_POSITIVE },
         camera: CameraSpec { field_width: 1e3, ..CameraSpec::default() },
+        periodic: None,
+        views: Vec::new(),
         observe: None,
     }
 }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use granulcal_dataset::{CameraFile, Observer, View, look, npy, png, write_height_map};
-use granulcal_dem::{Projection, Scene};
+use granulcal_dataset::{CameraFile, Observer, View, look, look_from, npy, png, write_height_map};
+use granulcal_dem::{Projection, Scene, ViewSpec};
 
 use crate::args::RenderArgs;
 use crate::context::{Context, print_line};
@@ -12,7 +12,11 @@ use crate::scene::{self, Keep};
 
 pub fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
     let scene = scene::load(&args.scene)?;
-    check_name(&args.out, &scene)?;
+    let further = args.view.as_deref().map(|name| find_view(&scene, name)).transpose()?;
+    match further {
+        Some(_) => check_ending(&args.out, "a view", "png")?,
+        None => check_name(&args.out, &scene)?,
+    }
     let (positions, radii) = if let Some(path) = &args.positions {
         let positions = npy::read_points(path)?;
         let radii = vec![scene.grains.radius(); positions.len()];
@@ -31,7 +35,10 @@ pub fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
             None => return Ok(Outcome::Stopped),
         }
     };
-    let view = look(&scene.camera, &positions, &radii, args.seed)?;
+    let view = match further {
+        Some(further) => look_from(further, &positions, &radii)?,
+        None => look(&scene.camera, &positions, &radii, args.seed)?,
+    };
     write_view(&args.out, &view, args.depth_unit)?;
     print_line(&match &view {
         View::Depth(_, image) => {
@@ -55,10 +62,21 @@ pub fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
 /// # Errors
 /// [`BadArgument`].
 pub fn check_name(path: &Path, scene: &Scene) -> Result<(), BadArgument> {
-    let (kind, ending) = match scene.camera.projection {
-        Projection::Pinhole => ("a pinhole camera", "png"),
-        Projection::Orthographic => ("an orthographic camera", "npz"),
-    };
+    match scene.camera.projection {
+        Projection::Pinhole => check_ending(path, "a pinhole camera", "png"),
+        Projection::Orthographic => check_ending(path, "an orthographic camera", "npz"),
+    }
+}
+
+fn find_view<'a>(scene: &'a Scene, name: &str) -> Result<&'a ViewSpec, BadArgument> {
+    scene.views.iter().find(|view| view.name == name).ok_or_else(|| {
+        let names: Vec<_> = scene.views.iter().map(|view| view.name.as_str()).collect();
+        let known = if names.is_empty() { "it has none".to_owned() } else { names.join(", ") };
+        BadArgument(format!("--view must be one of the scene's views ({known}), got {name:?}"))
+    })
+}
+
+fn check_ending(path: &Path, kind: &str, ending: &str) -> Result<(), BadArgument> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
         return Ok(());
     }

@@ -11,6 +11,7 @@ use crate::bed::Bed;
 use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
 use crate::lanes::Row;
+use crate::period::Period;
 use crate::scene::Scene;
 use crate::wall::Walls;
 
@@ -76,7 +77,7 @@ impl Pull {
         bridges.next.clear();
         // Velocities change while the pull acts, places do not.
         let places = bed.places.clone();
-        let between = pairs(&contacts.pairs, &places);
+        let between = pairs(&contacts.pairs, &places, bed.period);
         let count = bed.count() as u32;
         for near in between.chain(at_walls(&contacts.at_walls, &places, count, walls)) {
             let force = self.force(&near, bridges);
@@ -117,12 +118,13 @@ impl Pull {
 /// Gap below which surfaces touch and a bridge forms, in radii `[-]`: what the solver leaves between resting grains.
 const TOUCH: f64 = 1e-3;
 
-fn pairs(set: &ContactSet, places: &[Row]) -> impl Iterator<Item = Near> {
+fn pairs(set: &ContactSet, places: &[Row], period: Option<Period>) -> impl Iterator<Item = Near> {
     set.lanes().map(move |(number, lane)| {
         let batch = &set.batches[number];
         let (i, j) = (batch.i[lane], batch.j[lane]);
         let (a, b) = (places[i as usize], places[j as usize]);
-        let (apart, [r_i, r_j]) = (a.vector() - b.vector(), [a.0[3], b.0[3]]);
+        let (direct, [r_i, r_j]) = (a.vector() - b.vector(), [a.0[3], b.0[3]]);
+        let apart = period.map_or(direct, |period| period.nearest(direct));
         let distance = apart.norm();
         Near {
             pair: (i, j),

@@ -76,7 +76,8 @@ impl Simulation {
             return Err(strange("substeps that do not fit"));
         }
         (self.substep, self.seemed_ended, self.ended) = (substep, seemed_ended, ended);
-        (self.bed, self.contacts, self.watch) = (bed, contacts, watch);
+        let period = self.bed.period;
+        (self.bed, self.contacts, self.watch) = (Bed { period, ..bed }, contacts, watch);
         self.bridges = bridges.into_owned();
         self.impacts = Impacts::default();
         Ok(self)
