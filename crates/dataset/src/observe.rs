@@ -18,6 +18,9 @@ use crate::sensor_file::sensor_of;
 /// of an f32 depth.
 const BARE: f64 = 1e-6;
 
+/// Depth beyond which a view has no data, in distances of its target: the ground goes on to the horizon.
+const FARTHEST: f64 = 3.0;
+
 /// What the scene's camera delivers.
 #[derive(Clone, Debug, PartialEq)]
 pub enum View {
@@ -157,7 +160,8 @@ pub fn look(
     views(camera, positions, radii, pour_seed).map(|(_, view)| view)
 }
 
-/// What one of the scene's further cameras sees of grains over the ground; without noise.
+/// What one of the scene's further cameras sees of grains over the ground; without noise, and without data
+/// beyond three times the distance of its target.
 ///
 /// # Errors
 /// [`DatasetError::Features`] as [`observe`].
@@ -167,8 +171,14 @@ pub fn look_from(
     radii: &[f64],
 ) -> Result<View, DatasetError> {
     let [width, height] = view.pixels;
+    let farthest = FARTHEST * view.distance();
     Camera::looking_at(view.eye.into(), view.target.into(), view.field_width, (width, height))
-        .and_then(|camera| Ok(View::Depth(camera, render(&camera, positions, radii)?)))
+        .and_then(|camera| {
+            let mut image = render(&camera, positions, radii)?;
+            let beyond = |depth: &&mut f32| f64::from(**depth) > farthest;
+            image.depth.iter_mut().filter(beyond).for_each(|depth| *depth = 0.0);
+            Ok(View::Depth(camera, image))
+        })
         .map_err(DatasetError::Features)
 }
 

@@ -37,14 +37,18 @@ impl ViewSpec {
         !self.name.is_empty() && self.name.chars().all(fits)
     }
 
+    /// From the eye to the target `[m]`.
+    pub fn distance(&self) -> f64 {
+        self.eye.iter().zip(self.target).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    }
+
     fn check(&self, path: &str) -> Result<(), DemError> {
         let coordinates = self.eye.iter().chain(&self.target);
         coordinates
             .into_iter()
             .try_for_each(|&value| finite(&format!("{path}.eye, target"), value))?;
         positive(&format!("{path}.field_width"), self.field_width)?;
-        let distance = self.eye.iter().zip(self.target).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-        positive(&format!("{path}: way from eye to target"), distance.sqrt())?;
+        positive(&format!("{path}: way from eye to target"), self.distance())?;
         for pixels in self.pixels {
             if pixels == 0 || pixels > 16_384 {
                 let name = format!("{path}.pixels");
