@@ -73,7 +73,7 @@ FUZZ_SECONDS ?= 600
 FUZZ_TARGETS ?= bag mcap png_toml npz
 
 fuzz: ## fuzz the readers of recordings, FUZZ_SECONDS (600) on each of FUZZ_TARGETS; installs nightly Rust and cargo-fuzz
-	rustup toolchain install nightly --profile minimal
+	rustup run nightly rustc --version >/dev/null 2>&1 || rustup toolchain install nightly --profile minimal
 	cargo fuzz --version >/dev/null 2>&1 || cargo install cargo-fuzz --locked
 	for target in $(FUZZ_TARGETS); do \
 		mkdir -p fuzz/found/$$target; \

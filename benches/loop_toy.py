@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binomtest
 
 from granulcal.loop import Observation, Surrogate, Thresholds, compare, trace
 from granulcal.loop.baseline import fit_base
@@ -245,10 +246,8 @@ def _rate(name: str, hits: list[bool]) -> None:
     if n == 0:
         print(f"| {name} | 0 of 0 | |")
         return
-    z, share = 1.96, k / n
-    centre = (share + z * z / 2 / n) / (1 + z * z / n)
-    half = z * sqrt(share * (1 - share) / n + z * z / 4 / n / n) / (1 + z * z / n)
-    print(f"| {name} | {k} of {n} = {share:.0%} | {centre - half:.0%} to {centre + half:.0%} |")
+    low, high = binomtest(k, n).proportion_ci(method="wilson")
+    print(f"| {name} | {k} of {n} = {k / n:.0%} | {low:.0%} to {high:.0%} |")
 
 
 def _median(name: str, values: list[float]) -> None:

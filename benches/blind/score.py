@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from answers import unseal
+from scipy.stats import binomtest
 
 FAMILIES = Path(__file__).parent / "families.toml"
 VERDICTS = ("NONE", "RESIDUAL", "EFFECT", "SET", "EFFECTS", "UNEXPLAINED")
@@ -199,10 +200,8 @@ def judge(sets: Path, sealed: Path, known: dict[str, Family]) -> tuple[list[Judg
 
 def wilson(hits: int, total: int) -> tuple[float, float]:
     """Returns the 95 % interval of a share (Wilson 1927)."""
-    z, share = 1.959964, hits / total
-    middle = (share + z * z / (2 * total)) / (1 + z * z / total)
-    half = z * math.sqrt(share * (1 - share) / total + z * z / (4 * total**2)) / (1 + z * z / total)
-    return middle - half, middle + half
+    interval = binomtest(hits, total).proportion_ci(method="wilson")
+    return interval.low, interval.high
 
 
 def share(hits: Sequence[bool]) -> str:

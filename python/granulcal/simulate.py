@@ -92,10 +92,12 @@ class Pour:
         return image
 
     def look_from(self, view: str) -> NDArray[np.float32]:
-        """Returns what one of the scene's further views sees: depth [m], 0 is no data, shape (h, w).
+        """Returns what one of the scene's further views sees: depth [m], shape (h, w).
+
+        0 is no data, and the image is without noise.
 
         Args:
-            view: its name in the scene (table `views`). Its image is without noise.
+            view: its name in the scene (table `views`).
 
         Raises:
             KeyError: the scene has no view of this name.

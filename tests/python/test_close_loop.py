@@ -141,6 +141,15 @@ def test_what_a_task_file_lacks_is_named(tilted: Path, tmp_path: Path) -> None:
         load(text.replace('"fit"', '"sealed"'))
     with pytest.raises(FileNotFoundError, match="nowhere"):
         load(text.replace("low-0", "nowhere"))
+    tolerances = {
+        "names": ["max_z"],
+        "path": "funnel.slope",
+        "at": [0, 1],
+        "directions": [[[1e-3]] * 2],
+    }
+    (tilted.parent / "off.json").write_text(json.dumps(tolerances))
+    with pytest.raises(ObservationError, match=r"tolerances .* got 'funnel.slope'"):
+        load('tolerances = "off.json"\n' + text)
     with pytest.raises(TrainingDataError, match="no effect magnetism; there are cohesion"):
         load(text.replace("tilt.y", "magnetism"))
 

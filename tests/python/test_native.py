@@ -227,3 +227,18 @@ def test_stubs_have_the_arguments_that_are_there():
             real = inspect.signature(getattr(getattr(_native, node.name), method.name))
             arguments = [a.arg for a in method.args.args + method.args.kwonlyargs]
             assert arguments == list(real.parameters), f"{node.name}.{method.name}"
+
+
+def test_a_view_looks_from_where_it_stands() -> None:
+    scene = gc.Scene.from_toml(
+        gc.Scene.drop(0.02, count=20).to_toml()
+        + '\n[[views]]\nname = "side"\neye = [0, -0.5, 0.02]\ntarget = [0, 0, 0.02]\n'
+        "field_width = 0.1\npixels = [50, 30]\n"
+    )
+    pour = gc.simulate(scene, seed=1)
+    seen = pour.look_from("side")
+    assert seen.shape == (30, 50) and seen.dtype == np.float32
+    nearest = pour.positions[:, 1].min() + 0.5 - 2e-3
+    assert abs(seen[seen > 0].min() - nearest) < 2e-3
+    with pytest.raises(KeyError, match="no view 'top'"):
+        pour.look_from("top")

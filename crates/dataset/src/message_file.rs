@@ -5,6 +5,7 @@
 
 mod bag;
 mod mcap;
+mod mcap_record;
 mod unpack;
 
 use std::collections::BTreeMap;

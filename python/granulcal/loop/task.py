@@ -105,7 +105,8 @@ class Task:
         """Checks that the conditions can be asked about.
 
         Raises:
-            ObservationError: too few pours, conditions without the same paths, a name twice.
+            ObservationError: too few pours, conditions without the same paths, a name twice,
+                tolerances over a number that does not differ between conditions.
         """
         given = set(self.conditions[0].at) if self.conditions else set()
         meant = tuple(e for e in self.library if not e.shift or e.path in given)
@@ -126,6 +127,12 @@ class Task:
                     f"{condition.name}: conditions must state the same numbers, "
                     f"{sorted(self.paths)}; got {sorted(condition.at)}"
                 )
+        known = [path for path, _, _ in self.inputs]
+        if self.tolerances is not None and self.tolerances.path not in known:
+            raise ObservationError(
+                "tolerances must be over a number that differs between conditions, "
+                f"{known or 'none'}; got {self.tolerances.path!r}"
+            )
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> "Task":

@@ -9,9 +9,10 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
+use mcap::MAGIC;
 use mcap::records::{Record, op};
-use mcap::{MAGIC, parse_record};
 
+use super::mcap_record::parse;
 use super::unpack::unpack;
 use super::{Channel, Message, Visit, Walk};
 use crate::DatasetError;
@@ -87,7 +88,7 @@ impl Mcap<'_, '_> {
         let tail = self.input.read(footer, FOOTER + magic)?;
         let is_closed = tail.ends_with(MAGIC) && tail.starts_with(&[op::FOOTER]);
         let start = match tail.get(HEAD as usize..) {
-            Some(content) if is_closed => match parse_record(op::FOOTER, content) {
+            Some(content) if is_closed => match parse(op::FOOTER, content) {
                 Ok(Record::Footer(footer)) => footer.summary_start,
                 _ => 0,
             },
@@ -115,7 +116,7 @@ impl Mcap<'_, '_> {
                 return Ok(false);
             }
             let content = self.input.read(at + HEAD, length)?;
-            match parse_record(op, &content) {
+            match parse(op, &content) {
                 Ok(Record::Statistics(statistics)) => {
                     let mut expected = BTreeMap::new();
                     for (channel, count) in statistics.channel_message_counts {
@@ -183,7 +184,7 @@ impl Mcap<'_, '_> {
 
     /// A schema or a channel.
     fn learn(&mut self, at: u64, op: u8, content: &[u8]) {
-        match parse_record(op, content) {
+        match parse(op, content) {
             Ok(record) => self.names.learn(record),
             Err(error) => self.walk.note(at, error),
         }
@@ -197,7 +198,7 @@ impl Mcap<'_, '_> {
         is_cut: bool,
         visit: &mut Visit<'_>,
     ) -> Result<ControlFlow<()>, DatasetError> {
-        let (header, data) = match parse_record(op::MESSAGE, content) {
+        let (header, data) = match parse(op::MESSAGE, content) {
             Ok(Record::Message { header, data }) => (header, data),
             Err(error) if !is_cut => {
                 self.walk.note(at, error);

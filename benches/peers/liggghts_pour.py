@@ -1,0 +1,205 @@
+"""Pours rows of rows.py in LIGGGHTS and appends the piles to liggghts.csv; what is there is kept.
+
+    python benches/peers/liggghts_pour.py --rows P B --seeds 4
+
+LIGGGHTS' contact is Hertz and Mindlin with a dashpot each: the normal one realises e whatever the
+speed, the tangential one cannot be chosen. Rolling is `epsd`: a spring of stiffness
+2.25 k_n mu_r^2 R_eff^2 up to mu_r R_eff F_n, damped by 0.7 of the critical; no torsion. The funnel
+is a mesh of 64 sides, for LIGGGHTS has no cone.
+"""
+
+import argparse
+import csv
+import resource
+import subprocess
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from lammps_contact import DENSITY, POISSON, RADIUS, Elastic, Law
+from pile import HALF_WIDTH, TIP, measure
+from rows import rows
+
+RESULTS = Path(__file__).parent / "liggghts.csv"
+KEY = ("row", "settings", "young", "seed")
+PILE = ("rest_s", "cpu_s", "max_z", "mean_z", "mean_r", "r95", "worst_overlap", "held", "lost")
+SETTINGS = "epsd"
+
+LOOK = 0.02
+"""Time between two looks at rest and overlap [s]."""
+SLOW = 0.01
+"""Speed below which a grain counts as resting [m/s]."""
+RESTING = 0.995
+"""Share of the grains that must be slow at the end of a pour [-]."""
+HORIZON = 2.0
+"""When a pour ends at the latest [s]."""
+RINGS = ((0.016, TIP), (0.016, 0.13), (0.06, 0.2))
+"""Radius and height of the funnel's tip, neck and rim [m]."""
+SIDES = 64
+
+
+def start(seed: int) -> np.ndarray:
+    """Returns the centres of the 2000 grains at the start, those of lammps_pour.py [m]."""
+    jitter = np.random.default_rng(seed).uniform(-1e-4, 1e-4, (2000, 3))
+    z, y, x = np.indices((20, 10, 10)).reshape(3, -1)
+    corner = np.array([-0.036, -0.036, RINGS[-1][1] - 4e-3])
+    return 8e-3 * np.stack([x, y, z], axis=1) + corner + jitter
+
+
+def funnel() -> str:
+    """Returns the funnel as text of an STL file [m]."""
+    angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    rings = np.array(
+        [np.stack([r * np.cos(angle), r * np.sin(angle), 0 * angle + z], 1) for r, z in RINGS]
+    )
+    low, high = rings[:-1], rings[1:]
+    next_low, next_high = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
+    both = [np.stack([low, next_low, next_high], 2), np.stack([low, next_high, high], 2)]
+    lines = ["solid funnel"]
+    for a, b, c in np.concatenate(both).reshape(-1, 3, 3):
+        normal = np.cross(b - a, c - a)
+        lines += ["facet normal {} {} {}".format(*normal / np.linalg.norm(normal)), "outer loop"]
+        lines += ["vertex {:.9g} {:.9g} {:.9g}".format(*corner) for corner in (a, b, c)]
+        lines += ["endloop", "endfacet"]
+    return "\n".join([*lines, "endsolid funnel", ""])
+
+
+def script(law: Law, elastic: Elastic, seed: int) -> str:
+    """Returns the input: type 1 are grains, type 2 is every wall."""
+    pairs = "peratomtypepair 2"
+    e = max(law.restitution, 0.05)
+    rolling = " ".join(f"{mu:g}" for mu in (law.rolling_friction, *[law.wall_rolling_friction] * 3))
+    grains = "\n".join(
+        "create_atoms 1 single {:.9g} {:.9g} {:.9g} units box".format(*x) for x in start(seed)
+    )
+    look = round(LOOK / elastic.dt)
+    law_words = "model hertz tangential history rolling_friction epsd"
+    return f"""
+atom_style granular
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+units si
+region box block {-HALF_WIDTH} {HALF_WIDTH} {-HALF_WIDTH} {HALF_WIDTH} -0.01 0.45 units box
+create_box 2 box
+neighbor 0.001 bin
+neigh_modify delay 0
+fix m1 all property/global youngsModulus peratomtype {elastic.young} {elastic.young}
+fix m2 all property/global poissonsRatio peratomtype {POISSON} {POISSON}
+fix m3 all property/global coefficientRestitution {pairs} {e} {e} {e} {e}
+fix m4 all property/global coefficientFriction {pairs} {" ".join([f"{law.sliding_friction}"] * 4)}
+fix m5 all property/global coefficientRollingFriction {pairs} {rolling}
+fix m6 all property/global coefficientRollingViscousDamping {pairs} 0.7 0.7 0.7 0.7
+pair_style gran {law_words}
+pair_coeff * *
+timestep {elastic.dt}
+fix gravity all gravity 9.81 vector 0.0 0.0 -1.0
+fix funnel all mesh/surface file funnel.stl type 2
+fix walls all wall/gran {law_words} mesh n_meshes 1 meshes funnel
+fix ground all wall/gran {law_words} primitive type 2 zplane 0.0
+{grains}
+set group all density {DENSITY} diameter {2 * RADIUS}
+fix motion all nve/sphere
+thermo_modify lost ignore norm no
+dump looks all custom {look} looks.txt id x y z vx vy vz
+run {round(HORIZON / elastic.dt)}
+"""
+
+
+def frames(path: Path) -> list[np.ndarray]:
+    """Returns positions and velocities of every look, each of shape (n, 6) [m, m/s]."""
+    found, lines = [], iter(path.read_text().splitlines())
+    for line in lines:
+        if line.startswith("ITEM: NUMBER OF ATOMS"):
+            count = int(next(lines))
+            while not next(lines).startswith("ITEM: ATOMS"):
+                pass
+            found.append(np.array([next(lines).split()[1:] for _ in range(count)], dtype=float))
+    return found
+
+
+def worst_overlap(looks: list[np.ndarray]) -> float:
+    """Returns the deepest overlap of two grains at a look, over the diameter [-]."""
+    from scipy.spatial import cKDTree
+
+    nearest = 2 * RADIUS
+    for look in looks:
+        pairs = cKDTree(look[:, :3]).query_pairs(2 * RADIUS, output_type="ndarray")
+        apart = np.linalg.norm(look[pairs[:, 0], :3] - look[pairs[:, 1], :3], axis=1)
+        nearest = min(nearest, apart.min(initial=nearest))
+    return 1.0 - nearest / (2 * RADIUS)
+
+
+def pour(law: Law, elastic: Elastic, seed: int) -> dict[str, float]:
+    """Returns what a pour ends with: lengths in mm over centres (max z: the top), times in s.
+
+    The processor time is the share of the whole run up to the time of rest.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        (place / "funnel.stl").write_text(funnel())
+        (place / "in.pour").write_text(script(law, elastic, seed))
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(
+            ["liggghts", "-in", "in.pour"],
+            cwd=place,
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        looks = frames(place / "looks.txt")
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    rest = next(
+        (
+            k
+            for k, look in enumerate(looks)
+            # Nothing rests before the last grain has fallen.
+            if k * LOOK > 0.6 and (np.linalg.norm(look[:, 3:], axis=1) < SLOW).mean() > RESTING
+        ),
+        len(looks) - 1,
+    )
+    end = looks[rest][:, :3]
+    return {
+        "rest_s": rest * LOOK,
+        "cpu_s": cpu * rest / (len(looks) - 1),
+        **measure(end),
+        "worst_overlap": worst_overlap(looks[: rest + 1]),
+        "lost": 2000 - len(end),
+    }
+
+
+def done() -> set[tuple[str, ...]]:
+    """Returns the keys of the pours in liggghts.csv."""
+    if not RESULTS.exists():
+        return set()
+    with RESULTS.open() as file:
+        return {tuple(row[name] for name in KEY) for row in csv.DictReader(file)}
+
+
+def main() -> None:
+    """Pours what was asked for and is not there yet."""
+    laws = rows()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rows", nargs="+", choices=laws, default=["P", "B"])
+    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--young", type=float, default=1e7, help="Young's modulus [Pa]")
+    options = parser.parse_args()
+    elastic = Elastic(young=options.young)
+    for seed in range(1, options.seeds + 1):
+        for name in options.rows:
+            key = (name, SETTINGS, f"{options.young:g}", str(seed))
+            if key in done():
+                continue
+            result = pour(laws[name], elastic, seed)
+            fresh = not RESULTS.exists()
+            with RESULTS.open("a", newline="") as file:
+                writer = csv.writer(file, lineterminator="\n")
+                if fresh:
+                    writer.writerow(KEY + PILE)
+                writer.writerow([*key, *(f"{result[field]:.4g}" for field in PILE)])
+            print(*key, *(f"{field} {result[field]:.4g}" for field in PILE), flush=True)
+
+
+if __name__ == "__main__":
+    main()
