@@ -77,7 +77,8 @@ fuzz: ## fuzz the readers of recordings, FUZZ_SECONDS (600) on each of FUZZ_TARG
 	cargo fuzz --version >/dev/null 2>&1 || cargo install cargo-fuzz --locked
 	for target in $(FUZZ_TARGETS); do \
 		mkdir -p fuzz/found/$$target; \
-		cargo +nightly fuzz run $$target fuzz/found/$$target fuzz/corpus/$$target -- \
+		cargo +nightly fuzz run $$target fuzz/found/$$target fuzz/corpus/$$target \
+			$$(ls -d fuzz/regressions/$$target 2>/dev/null) -- \
 			-max_total_time=$(FUZZ_SECONDS) -max_len=65536 -timeout=30 -rss_limit_mb=1024; \
 	done
 
