@@ -177,6 +177,8 @@ def _rings(options: argparse.Namespace) -> int:
         print(plan)
         print(pattern)
         print(f"written to {options.out}: plan.csv, plan.json, plan.png")
+    for note in pattern.notes:
+        print(f"note: {note}", file=sys.stderr)
     return 0 if pattern.is_whole else _UNHEALTHY
 
 

@@ -148,7 +148,7 @@ def log_gamma(x: Array) -> Array:
 
 def _rows(heights: Array, material: Array, low: float, high: float, degree: int) -> Array:
     t = 2 * (heights - low) / (high - low) - 1
-    polynomials = np.polynomial.chebyshev.chebvander(t, degree)
+    polynomials = np.asarray(np.polynomial.chebyshev.chebvander(t, degree), float)
     return np.column_stack([polynomials, material, t[:, None] * material])
 
 

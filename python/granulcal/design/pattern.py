@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 # Long enough for one substep, too short to fall.
 _AN_INSTANT = 1e-9
+_UNUSABLE = ("jammed", "unhealthy")
 
 
 @dataclass(frozen=True)
@@ -41,9 +42,21 @@ class Pattern:
     scene: Scene
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What went wrong, a sentence for each pour that cannot be used."""
+        return tuple(
+            f"pour {i} jams: its grains, held together by those around them, reach the funnel's "
+            "tip; pour it from higher"
+            if status == "jammed"
+            else f"pour {i} is unhealthy: the simulation lost its accuracy, try another seed"
+            for i, status in enumerate(self.statuses, start=1)
+            if status in _UNUSABLE
+        )
+
+    @property
     def is_whole(self) -> bool:
         """Whether every pour left the funnel and can be trusted."""
-        return not any(status in ("jammed", "unhealthy") for status in self.statuses)
+        return not self.notes
 
     def __str__(self) -> str:
         """One line a pour, centimetres."""
