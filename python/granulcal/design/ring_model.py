@@ -79,12 +79,6 @@ class RingModel:
         reach: what heights give, from the usable pours.
         scene: the scene of the pours; its material is that of the plan.
         pour_count: pours simulated, the unusable ones too.
-
-    Example:
-        >>> scene = Scene.funnel(count=200, preset="fast")
-        >>> model = RingModel.train(scene, heights=(0.05, 0.13), pours=60, progress=False)
-        >>> 0.05 <= model.reach.low < model.reach.high <= 0.13
-        True
     """
 
     def __init__(self, bayes: "BayesSim", data: Dataset) -> None:

@@ -41,10 +41,11 @@ def design_rings(
             closest.
 
     Example:
-        >>> scene = Scene.funnel(count=200, preset="fast")
-        >>> model = RingModel.train(scene, heights=(0.05, 0.13), pours=60, progress=False)
+        >>> import granulcal as gc
+        >>> scene = gc.Scene.funnel(count=100, preset="fast")
+        >>> model = gc.RingModel.train(scene, heights=(0.05, 0.13), pours=60, progress=False)
         >>> wanted = model.reach.at(0.1).radii[1]
-        >>> 0.08 < design_rings(model, [Ring(outer=wanted)]).pours[0].height < 0.12
+        >>> 0.08 < gc.design_rings(model, [gc.Ring(outer=wanted)]).pours[0].height < 0.12
         True
     """
     if not rings:
