@@ -159,6 +159,7 @@ def _rings(options: argparse.Namespace) -> int:
     if not rings and options.held_out is None:
         raise ValueError("nothing is wanted: give --ring INNER OUTER, --pile OUTER or --held-out N")
     model = _ring_model(options)
+    print(model, file=sys.stderr if options.json else sys.stdout)
     if options.held_out is not None:
         # Seeds of the training and of its check must differ.
         held_out = model.held_out(

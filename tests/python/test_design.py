@@ -275,6 +275,10 @@ def test_spill_command_resumes_and_writes(tmp_path):
     assert _run(*words).returncode == 0
     assert json.loads((out / "pours.json").read_text())["pours"] == json.loads(kept)["pours"]
     assert (out / "spill.csv").read_text() == before
+    assert _run(*words, "--pours", "26").returncode == 0
+    more = json.loads((out / "pours.json").read_text())["pours"]
+    assert len(more) == 26
+    assert {i: more[i] for i in json.loads(kept)["pours"]} == json.loads(kept)["pours"]
     rows = list(csv.DictReader(before.splitlines()))
     assert all(0 <= float(row["low"]) <= float(row["high"]) <= 1 for row in rows)
     assert json.loads((out / "spill.json").read_text())["drawn"] == names

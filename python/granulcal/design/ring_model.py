@@ -96,6 +96,14 @@ class RingModel:
         usable = data.is_usable
         self.reach = Reach(data.theta[usable, 0], data.x[usable])
 
+    def __str__(self) -> str:
+        """What it was trained on."""
+        low, high = 100 * self.reach.low, 100 * self.reach.high
+        return (
+            f"model of {self.pour_count} pours, {len(self.reach.heights)} of them usable, from "
+            f"heights of {low:.2f} to {high:.2f} cm"
+        )
+
     @classmethod
     def train(
         cls,

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 SPILLED = "spilled"
 _FEWEST_POURS = 20
 _GRID = 61
+_GOLDEN = (np.sqrt(5) - 1) / 2
 _DRAWS = 400
 # Positive parameters that span more than this are standardised by their logarithm.
 _WIDE = 10.0
@@ -49,7 +50,7 @@ def design_spill(
         scene: a funnel, a vessel, and an `observe.spill` table.
         heights: lowest and highest height of the funnel's tip [m].
         grains: numbers k.
-        pours: how many; their heights are evenly spread.
+        pours: how many; their heights are evenly spread, and more can be added later.
         posterior: draws of the material, one for each pour; None: the scene's is known.
         out: folder of pours.json.
         seed: seed of every random choice.
@@ -62,16 +63,15 @@ def design_spill(
     """
     _check(scene, heights, grains, pours)
     draws = None if posterior is None else posterior.without(HEIGHT)
-    generator = np.random.default_rng(seed)
-    where = heights[0] + (heights[1] - heights[0]) * (generator.permutation(pours) + 0.5) / pours
-    names = () if draws is None else draws.names
+    # Evenly spread however many there are, so that more pours can be added to those on disk.
+    where = heights[0] + (heights[1] - heights[0]) * (_GOLDEN * np.arange(1, pours + 1) % 1)
     chosen = np.empty((pours, 0))
     if draws is not None:
-        rows = generator.permutation(len(draws.samples))
+        rows = np.random.default_rng(seed).permutation(len(draws.samples))
         chosen = draws.samples[np.resize(rows, pours)]
     kept = KeptPours(
         scene,
-        _named(names, chosen, heights),
+        _named(draws, heights),
         Path(out) / "pours.json",
         seed=seed,
         threads=threads,
@@ -89,6 +89,7 @@ def design_spill(
             line.close()
     counts = observed[:, kept.x_names.index(SPILLED)]
     total = int(scene.get("grains.count"))
+    names = () if draws is None else draws.names
     return forecast_of(where, chosen, counts, total, grains=grains, names=names, seed=seed)
 
 
@@ -160,14 +161,13 @@ def _check(scene: Scene, heights: tuple[float, float], grains: Sequence[int], po
         raise ValueError(f"pours must be at least {_FEWEST_POURS}, got {pours}")
 
 
-def _named(names: Sequence[str], chosen: Array, heights: tuple[float, float]) -> Prior:
+def _named(draws: PosteriorDraws | None, heights: tuple[float, float]) -> Prior:
     """Names and ranges of what differs between the pours; nothing is drawn from it."""
-    parameters = [Parameter(path=HEIGHT, distribution="uniform", low=heights[0], high=heights[1])]
-    for name, values in zip(names, chosen.T, strict=True):
-        low, high = float(values.min()), float(values.max())
-        parameters.append(
-            Parameter(path=name, distribution="uniform", low=low, high=np.nextafter(high, np.inf))
-        )
+    low, high = heights
+    parameters = [Parameter(path=HEIGHT, distribution="uniform", low=low, high=high)]
+    for name, values in () if draws is None else zip(draws.names, draws.samples.T, strict=True):
+        low, high = float(values.min()), float(np.nextafter(values.max(), np.inf))
+        parameters.append(Parameter(path=name, distribution="uniform", low=low, high=high))
     return Prior(parameters)
 
 
