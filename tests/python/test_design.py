@@ -10,7 +10,7 @@ from scipy import stats
 
 import granulcal as gc
 from granulcal.design.count_model import CountModel, beta_binomial_tail, log_gamma
-from granulcal.design.pattern import simulate_plan
+from granulcal.design.pattern import Pattern, simulate_plan
 from granulcal.design.posterior_file import PosteriorDraws
 from granulcal.design.reach import Reach
 from granulcal.design.ring import STATISTICS
@@ -164,6 +164,13 @@ def test_later_pours_keep_the_grains_of_earlier_ones(line):
     # The second pour moves some of the first's grains, and none far.
     assert pattern.rings[0, 1] == pytest.approx(outer, rel=0.25)
     assert pattern.is_whole
+
+
+def test_a_pour_that_jams_is_told():
+    grains = np.zeros((2, 3)), np.full(2, 1e-3), np.array([0, 1])
+    pattern = Pattern(*grains, ("at_rest", "jammed"), np.zeros((2, 2)), gc.Scene.funnel())
+    assert not pattern.is_whole
+    assert [note.split(":")[0] for note in pattern.notes] == ["pour 2 jams"]
 
 
 def test_command_trains_plans_and_resumes(tmp_path):
