@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 # Widths of the kernel, as shares of the range of heights, among which leaving one out chooses.
 _WIDTHS = (0.03, 0.05, 0.08, 0.12, 0.2)
+# Share of it over which the tangent at an end is fitted.
+_END_WIDTH = 0.12
 _FEWEST_POURS = 20
 _GRID = 241
 
@@ -91,10 +93,18 @@ class Reach:
     def at(self, height: float) -> Expected:
         """Returns what a height gives; outside the pours' range along the tangent at its end."""
         inside = float(np.clip(height, self.low, self.high))
-        weights = np.exp(-0.5 * ((self.heights - inside) / self.width) ** 2)
-        (mean, slope, _), _ = _quadratic(self.heights - inside, self.radii, weights)
+        weights = self._weights(inside, self.width)
+        (mean, slope, _), _ = _polynomial(self.heights - inside, self.radii, weights)
+        if height != inside:
+            # A slope at an end is noisy, and an extrapolation leans on it alone.
+            wide = self._weights(inside, _END_WIDTH * float(np.ptp(self.heights)))
+            slope = _polynomial(self.heights - inside, self.radii, wide, degree=1)[0][1]
         covariance = np.einsum("i,ij,ik->jk", weights, self._errors, self._errors) / weights.sum()
         return Expected(height, mean + slope * (height - inside), slope, covariance)
+
+    def beside(self, end: float) -> Expected:
+        """Returns what just outside one end of the pours' range gives, with the tangent there."""
+        return self.at(float(np.nextafter(end, np.inf if end == self.high else -np.inf)))
 
     def curve(self, count: int = _GRID) -> list[Expected]:
         """Returns what evenly spaced heights give."""
@@ -113,27 +123,32 @@ class Reach:
             radii: inner and outer radius [m], shape (2,).
         """
         nearest = min((self.low, self.high), key=lambda h: np.linalg.norm(self.at(h).radii - radii))
-        end = self.at(nearest)
+        end = self.beside(nearest)
         weight = np.linalg.solve(end.covariance, end.slope)
         return nearest + float(weight @ (radii - end.radii) / (weight @ end.slope))
+
+    def _weights(self, height: float, width: float) -> Array:
+        return np.exp(-0.5 * ((self.heights - height) / width) ** 2)
 
     def _left_out(self, width: float) -> Array:
         """Errors of each pour's radii predicted by all others [m], shape (n, 2)."""
         errors = np.empty_like(self.radii)
         for i, height in enumerate(self.heights):
-            weights = np.exp(-0.5 * ((self.heights - height) / width) ** 2)
-            coefficients, leverage = _quadratic(self.heights - height, self.radii, weights)
+            weights = self._weights(height, width)
+            coefficients, leverage = _polynomial(self.heights - height, self.radii, weights)
             # Of a linear smoother, the error without a row is that with it over 1 - leverage.
             errors[i] = (self.radii[i] - coefficients[0]) / max(1 - leverage, 1e-3)
         return errors
 
 
-def _quadratic(offsets: Array, values: Array, weights: Array) -> tuple[Array, float]:
-    """Coefficients (3, 2) of the weighted quadratic, and the leverage of a row at offset 0."""
+def _polynomial(
+    offsets: Array, values: Array, weights: Array, *, degree: int = 2
+) -> tuple[Array, float]:
+    """Coefficients (degree + 1, 2) of a weighted fit, and the leverage of a row at offset 0."""
     # In units of the offsets' spread, so that the small ridge means the same for each power.
     scale = float(np.sqrt(np.average(offsets**2, weights=weights))) or 1.0
-    rows = (offsets[:, None] / scale) ** np.arange(3)
-    gram = (rows * weights[:, None]).T @ rows + 1e-9 * weights.sum() * np.eye(3)
+    rows = (offsets[:, None] / scale) ** np.arange(degree + 1)
+    gram = (rows * weights[:, None]).T @ rows + 1e-9 * weights.sum() * np.eye(degree + 1)
     coefficients = np.linalg.solve(gram, (rows * weights[:, None]).T @ values)
     leverage = float(np.linalg.inv(gram)[0, 0])
-    return coefficients / scale ** np.arange(3)[:, None], leverage
+    return coefficients / scale ** np.arange(degree + 1)[:, None], leverage

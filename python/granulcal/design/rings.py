@@ -96,7 +96,8 @@ def _inferred(model: RingModel, ring: Ring, order: int, tolerance: float) -> Pla
 
 def _extrapolated(reach: Reach, ring: Ring, order: int, allowed: bool) -> PlannedPour:
     end = min(
-        (reach.at(reach.low), reach.at(reach.high)), key=lambda e: abs(e.radii[1] - ring.outer)
+        (reach.beside(reach.low), reach.beside(reach.high)),
+        key=lambda e: abs(e.radii[1] - ring.outer),
     )
     if ring.inner is None:
         height = end.height + (ring.outer - end.radii[1]) / end.slope[1]
