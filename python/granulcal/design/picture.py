@@ -11,7 +11,7 @@ from granulcal.design.plan import Plan
 
 __all__ = ["plan_picture"]
 
-_PIXELS = 700
+_PIXELS = 500
 _CAMERA_HEIGHT = 1.0
 _COLOURS = ("#1f5f8b", "#c8742b", "#4a8c4a", "#8b4a8b", "#8b1f3d", "#5b5b5b")
 _CM, _MM = 1e2, 1e3
@@ -36,10 +36,12 @@ def plan_picture(plan: Plan, pattern: Pattern, path: str | PathLike[str]) -> Non
     seen, far = figure.subplots(1, 2)
     _draw_heights(seen, plan, pattern, field, figure)
     _draw_distances(far, plan, pattern, field)
-    figure.savefig(path, dpi=90, format="png")
+    figure.savefig(path, dpi=80, format="png")
 
 
 def _draw_heights(axis: Any, plan: Plan, pattern: Pattern, field: float, figure: Any) -> None:
+    from matplotlib.colors import PowerNorm
+
     # From far above the picture is nearly that of parallel rays.
     camera = Camera.overhead(height=_CAMERA_HEIGHT, field_width=field, pixels=_PIXELS)
     depth = camera.render(pattern.positions, pattern.radii)
@@ -49,7 +51,8 @@ def _draw_heights(axis: Any, plan: Plan, pattern: Pattern, field: float, figure:
         np.where(heights > 0.1, heights, np.nan),
         extent=(-half, half, -half, half),
         cmap="viridis",
-        vmin=0,
+        # A square root, so that a single layer is seen beside a pile.
+        norm=PowerNorm(0.5, vmin=0),
     )
     axis.set_facecolor("#20262b")
     for p in plan.pours:
@@ -76,5 +79,5 @@ def _draw_distances(axis: Any, plan: Plan, pattern: Pattern, field: float) -> No
             axis.axvline(_CM * p.wanted_inner, color=colour, linestyle=":")
         axis.axvline(_CM * p.wanted_outer, color=colour, linestyle="--")
     axis.set(xlabel="distance from the axis [cm]", ylabel="grains")
-    axis.set_title("dotted: wanted 5th percentile, dashed: wanted median")
+    axis.set_title("dotted: wanted inner radius, dashed: outer")
     axis.legend()

@@ -59,8 +59,9 @@ def design_rings(
             pour = _extrapolated(reach, ring, order, extrapolate)
             notes.append(
                 f"pour {order} is extrapolated: {100 * pour.height:.1f} cm is outside the heights "
-                f"of the training, {_centimetres(reach.low, reach.high)}; its interval leaves out "
-                "that the trend may not go on"
+                f"of the training, {_centimetres(reach.low, reach.high)}, where the trend gives "
+                f"{100 * pour.expected_inner:.2f} / {100 * pour.expected_outer:.2f} cm; its "
+                "interval leaves out that the trend may not go on"
             )
         else:
             pour = _inferred(model, ring, order, tolerance)
