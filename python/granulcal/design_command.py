@@ -17,6 +17,7 @@ half. A pile is its outer radius alone. SCENE holds the grains and their materia
   granulcal design rings couscous.toml --ring 0.136 0.223 --ring 0.040 0.073 --pile 0.034 -o plan
   granulcal design rings funnel --posterior couscous.json --ring 0.040 0.073 -o plan
 
+--posterior takes the most probable material of that file, made by `infer -o` or `calibrate`.
 The first call simulates --pours pours from heights drawn between --heights and trains a model; it
 goes on after an interruption, and later calls with the same scene, heights, pours and seed use
 what is there. Or give the folder of `granulcal train`, of pours that vary funnel.height alone and
