@@ -14,6 +14,11 @@ from typing import TYPE_CHECKING, Any
 from granulcal._native import __version__
 from granulcal.camera import Camera
 from granulcal.dataset import Dataset, generate
+from granulcal.design.plan import Plan
+from granulcal.design.ring import Ring
+from granulcal.design.ring_model import RingModel
+from granulcal.design.rings import design_rings
+from granulcal.design.spill import design_spill
 from granulcal.prior import Parameter, Prior
 from granulcal.recording import Formation, Levelled, Plane, Recording
 from granulcal.scene import Material, Scene
@@ -42,16 +47,21 @@ __all__ = [
     "Material",
     "ObservedStatistics",
     "Parameter",
+    "Plan",
     "Plane",
     "Posterior",
     "Pour",
     "Prior",
     "Recording",
+    "Ring",
+    "RingModel",
     "Scene",
     "Statistics",
     "Task",
     "__version__",
     "close_loop",
+    "design_rings",
+    "design_spill",
     "diagnostic_statistics",
     "generate",
     "simulate",

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from granulcal import _native, loop_command
+from granulcal import _native, design_command, loop_command
 
 __all__ = ["main"]
 
@@ -28,6 +28,8 @@ Calibrates a granular simulator from depth images.
   granulcal calibrate scene.toml prior.toml couscous.png --camera camera.toml --budget 100 -o run
                                                               one recording, few pours
   granulcal close-loop loop.toml -o loop                      what does the model lack?
+  granulcal design rings scene.toml --ring 0.04 0.073 -o plan  from which height to pour a ring
+  granulcal design spill bowl.toml --grains 10 -o spill       how probably a height spills 10 grains
 
 Commands of the simulator (granulcal COMMAND --help tells more):
   simulate, generate, render, features, fit-sensor, pick-colour, inspect, merge, completions
@@ -78,7 +80,8 @@ def _guarded(command: Callable[[], int]) -> int:
 
 
 def _commands() -> tuple[str, ...]:
-    return ("train", "check", "infer", "calibrate", "report", "close-loop", "reproduce", "demo")
+    words = "train check infer calibrate report close-loop design reproduce demo"
+    return tuple(words.split())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -97,6 +100,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_calibrate(commands)
     _add_report(commands)
     loop_command.add(commands)
+    design_command.add(commands)
     _add_reproduce(commands)
     commands.add_parser("demo", help="the whole job on a recording with a known truth")
     return parser

@@ -1,6 +1,13 @@
 """Exceptions of the Python side: each says what was found and what is allowed."""
 
-__all__ = ["ModelFormatError", "ObservationError", "PriorError", "TrainingDataError"]
+__all__ = [
+    "ExtrapolationError",
+    "ModelFormatError",
+    "ObservationError",
+    "PriorError",
+    "TrainingDataError",
+    "UnreachableRingError",
+]
 
 
 class PriorError(ValueError):
@@ -17,3 +24,11 @@ class ObservationError(ValueError):
 
 class ModelFormatError(ValueError):
     """A saved model that is present but cannot be read: truncated, wrong version, wrong shape."""
+
+
+class ExtrapolationError(ValueError):
+    """A wanted ring whose height lies outside the heights that a model was trained on."""
+
+
+class UnreachableRingError(ValueError):
+    """A wanted ring whose two radii no height gives together."""

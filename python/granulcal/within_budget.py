@@ -42,6 +42,7 @@ class KeptPours:
         seed: seed of the run.
         threads: pours at once; the default is one for each core.
         progress: called with the number of pours that are kept, after each.
+        observed: keep the statistics that the scene observes in place of the paper's 16.
 
     Raises:
         ValueError: the file is that of another scene, prior or seed, or is damaged.
@@ -56,16 +57,19 @@ class KeptPours:
         seed: int = 0,
         threads: int | None = None,
         progress: Callable[[int], None] | None = None,
+        observed: bool = False,
     ) -> None:
         """Reads what is kept already."""
+        self.observed = observed
+        self.x_names: tuple[str, ...] = scene.observed_names if observed else NAMES
         self.scene, self.prior, self.path, self.seed = scene, prior, path, seed
         self.threads, self.progress = threads or os.cpu_count() or 1, progress
-        text = f"{scene.to_toml()}\n{prior.to_toml()}\n{seed}"
+        text = f"{scene.to_toml()}\n{prior.to_toml()}\n{seed}" + ("\nobserved" if observed else "")
         self.key = hashlib.sha256(text.encode()).hexdigest()
         self.rows: dict[str, dict] = self._read() if path.exists() else {}
 
     def __call__(self, theta: Array, first: int) -> Array:
-        """Returns the statistics of pours at `theta` (b, p), NaN where there are none, (b, 16)."""
+        """Returns the statistics of pours at `theta` (b, p), NaN where there are none, (b, s)."""
         missing = [i for i in range(len(theta)) if not self._is_kept(first + i, theta[i])]
         with ThreadPoolExecutor(self.threads) as workers:
             jobs = {workers.submit(self._pour, theta[i], first + i): i for i in missing}
@@ -79,7 +83,7 @@ class KeptPours:
                 workers.shutdown(wait=False, cancel_futures=True)
                 raise
         kept = [self.rows[str(first + i)]["x"] for i in range(len(theta))]
-        return np.array([[np.nan] * len(NAMES) if x is None else x for x in kept], dtype=float)
+        return np.array([[np.nan] * len(self.x_names) if x is None else x for x in kept], float)
 
     def _is_kept(self, index: int, theta: Array) -> bool:
         row = self.rows.get(str(index))
@@ -93,7 +97,7 @@ class KeptPours:
         status, x = pour.status, None
         if status not in _EXCLUDED:
             try:
-                x = np.asarray(pour.statistics()).tolist()
+                x = np.asarray(pour.observed() if self.observed else pour.statistics()).tolist()
             except ValueError:
                 status = "no_grains_in_view"
         return {"theta": theta.tolist(), "status": status, "x": x}

@@ -68,6 +68,7 @@ def test_calibrate(tmp_path, capsys):
     "name",
     [
         "granulcal",
+        "granulcal.design.ring",
         "granulcal.prior",
         "granulcal.scene",
         "granulcal.simulate",
@@ -82,7 +83,7 @@ def test_docstrings(name):
 
 def test_docstrings_that_write(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
-    for name in ("granulcal.dataset", "granulcal.recording"):
+    for name in ("granulcal.dataset", "granulcal.recording", "granulcal.design.rings"):
         found = doctest.testmod(importlib.import_module(name))
         assert (found.attempted > 0, found.failed) == (True, 0), capsys.readouterr().out
 

@@ -1,0 +1,1 @@
+"""Pours that are planned: which height gives a wanted ring, how much a height spills."""

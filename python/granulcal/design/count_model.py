@@ -1,0 +1,203 @@
+r"""Counts out of n that vary more than chance: a beta-binomial regression.
+
+A pour of n grains at height t (scaled to [-1, 1]) with material z (standardised) spills
+
+$$ y \sim \mathrm{BetaBinomial}(n, p, \rho), \qquad
+   \mathrm{logit}\, p = \sum_j a_j T_j(t) + \sum_i (b_i + c_i t) z_i, $$
+
+with Chebyshev polynomials T_j and rho the correlation of two grains of one pour: the variance is
+$n p (1 - p) (1 + (n - 1) \rho)$, so that rho = 0 is a binomial. The coefficients are those of
+iterated weighted least squares under a weak normal prior, rho has the largest likelihood, and the
+coefficients' uncertainty is the normal one at their place.
+
+Reference:
+    Williams, Extra-binomial variation in logistic linear models, Applied Statistics 31, 1982.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["CountModel", "beta_binomial_tail", "log_gamma"]
+
+Array = NDArray[np.float64]
+
+_DEGREE = 3
+# Standard deviations of the coefficients' prior: of the level, of the height, of the material.
+_LEVEL_SD, _HEIGHT_SD, _MATERIAL_SD = 20.0, 5.0, 1.0
+_ROUNDS = 60
+_RHO = (1e-7, 0.5)
+_RHO_ROUNDS = 40
+_GOLDEN = (np.sqrt(5) - 1) / 2
+# Logits beyond this are no different from 0 or n grains.
+_LARGEST_LOGIT = 30.0
+_HALF_LOG_TWO_PI = 0.5 * float(np.log(2 * np.pi))
+
+
+@dataclass(frozen=True)
+class CountModel:
+    """The fitted regression.
+
+    Attributes:
+        total: n, grains of a pour.
+        low: lowest height [m].
+        high: highest height [m].
+        coefficients: a, b, c, shape (d,).
+        covariance: of their uncertainty, shape (d, d).
+        rho: correlation of two grains of one pour [-].
+    """
+
+    total: int
+    low: float
+    high: float
+    coefficients: Array
+    covariance: Array
+    rho: float
+
+    @classmethod
+    def fit(
+        cls, heights: Array, material: Array, counts: Array, total: int, *, degree: int = _DEGREE
+    ) -> "CountModel":
+        """Returns the regression of `counts` (m,) out of `total`.
+
+        Args:
+            heights: of the pours [m], shape (m,).
+            material: standardised parameters, shape (m, q); q may be 0.
+            counts: grains, shape (m,).
+            total: grains of a pour.
+            degree: of the polynomial in the height.
+        """
+        low, high = float(heights.min()), float(heights.max())
+        rows = _rows(heights, material, low, high, degree)
+        spreads = [_LEVEL_SD] + [_HEIGHT_SD] * degree + [_MATERIAL_SD] * (2 * material.shape[1])
+        precision = np.diag(1 / np.square(spreads))
+
+        def at(log_rho: float) -> tuple[float, Array, Array]:
+            rho = float(np.exp(log_rho))
+            coefficients, covariance = _weighted(rows, counts, total, rho, precision)
+            share = _logistic(rows @ coefficients)
+            return _log_likelihood(counts, total, share, rho), coefficients, covariance
+
+        log_rho = _maximise(lambda x: at(x)[0], *np.log(_RHO))
+        _, coefficients, covariance = at(log_rho)
+        return cls(total, low, high, coefficients, covariance, float(np.exp(log_rho)))
+
+    def shares(self, heights: Array, material: Array, coefficients: Array) -> Array:
+        """Returns p at heights (h,) for m draws, shape (h, m).
+
+        Args:
+            heights: [m], shape (h,).
+            material: standardised parameters of each draw, shape (m, q).
+            coefficients: of each draw, shape (m, d).
+        """
+        degree = coefficients.shape[1] - 2 * material.shape[1] - 1
+        found = np.empty((len(heights), len(coefficients)))
+        for i, height in enumerate(heights):
+            rows = _rows(np.full(len(material), height), material, self.low, self.high, degree)
+            found[i] = _logistic(np.sum(rows * coefficients, axis=1))
+        return found
+
+    def draw(self, count: int, generator: np.random.Generator) -> Array:
+        """Returns draws of the coefficients, shape (count, d)."""
+        return generator.multivariate_normal(self.coefficients, self.covariance, count)
+
+
+def beta_binomial_tail(least: int, total: int, share: Array, rho: float) -> Array:
+    r"""Returns P(y >= least) of a beta-binomial, shape of `share`.
+
+    With $s = 1/\rho - 1$, $\alpha = p s$, $\beta = (1 - p) s$ the probabilities of 0, 1, ... follow
+    from $P(y + 1) / P(y) = (n - y)(y + \alpha) / ((y + 1)(n - y - 1 + \beta))$.
+
+    Args:
+        least: number of grains.
+        total: n.
+        share: p.
+        rho: correlation of two grains of one pour.
+    """
+    if least <= 0:
+        return np.ones_like(share)
+    if least > total:
+        return np.zeros_like(share)
+    size = 1 / rho - 1
+    alpha, beta = share * size, (1 - share) * size
+    log_term = log_gamma(total + beta) - log_gamma(beta)
+    log_term += log_gamma(np.array(size)) - log_gamma(np.array(total + size))
+    log_below = log_term.copy()
+    for y in range(least - 1):
+        log_term = (
+            log_term + np.log((total - y) * (y + alpha)) - np.log((y + 1) * (total - y - 1 + beta))
+        )
+        log_below = np.logaddexp(log_below, log_term)
+    return np.abs(np.expm1(np.minimum(log_below, 0)))
+
+
+def log_gamma(x: Array) -> Array:
+    """Returns log Gamma of positive numbers by Stirling's series above 10."""
+    x = np.asarray(x, float)
+    shift: Array = np.zeros_like(x)
+    up: Array = x.copy()
+    for _ in range(10):
+        small = (up < 10).astype(float)
+        shift = shift + small * np.log(up)
+        up = up + small
+    series = 1 / (12 * up) - 1 / (360 * up**3) + 1 / (1260 * up**5) - 1 / (1680 * up**7)
+    return (up - 0.5) * np.log(up) - up + _HALF_LOG_TWO_PI + series - shift
+
+
+def _rows(heights: Array, material: Array, low: float, high: float, degree: int) -> Array:
+    t = 2 * (heights - low) / (high - low) - 1
+    polynomials = np.asarray(np.polynomial.chebyshev.chebvander(t, degree), float)
+    return np.column_stack([polynomials, material, t[:, None] * material])
+
+
+def _weighted(
+    rows: Array, counts: Array, total: int, rho: float, precision: Array
+) -> tuple[Array, Array]:
+    """Coefficients by iterated weighted least squares, and their covariance."""
+    coefficients = np.zeros(rows.shape[1])
+    mean = (counts.sum() + 0.5) / (total * len(counts) + 1)
+    coefficients[0] = np.log(mean / (1 - mean))
+    spread, hessian = 1 + (total - 1) * rho, precision
+    for _ in range(_ROUNDS):
+        share = _logistic(rows @ coefficients)
+        weight = total * share * (1 - share) / spread
+        hessian = (rows * weight[:, None]).T @ rows + precision
+        gradient = rows.T @ ((counts - total * share) / spread) - precision @ coefficients
+        step = np.linalg.solve(hessian, gradient)
+        # A long step from a poor start overshoots.
+        step *= min(1.0, 2.0 / max(float(np.abs(step).max()), 1e-12))
+        coefficients = coefficients + step
+        if np.abs(step).max() < 1e-9:
+            break
+    return coefficients, np.asarray(np.linalg.inv(hessian), float)
+
+
+def _log_likelihood(counts: Array, total: int, share: Array, rho: float) -> float:
+    size = 1 / rho - 1
+    alpha, beta = share * size, (1 - share) * size
+    terms = log_gamma(counts + alpha) - log_gamma(alpha)
+    terms += log_gamma(total - counts + beta) - log_gamma(beta)
+    terms += log_gamma(np.array(size)) - log_gamma(np.array(total + size))
+    return float(terms.sum())
+
+
+def _maximise(function: Callable[[float], float], low: float, high: float) -> float:
+    """Place of the maximum of a function of one peak, by golden section."""
+    a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    fa, fb = function(a), function(b)
+    for _ in range(_RHO_ROUNDS):
+        if fa >= fb:
+            high, b, fb = b, a, fa
+            a = high - _GOLDEN * (high - low)
+            fa = function(a)
+        else:
+            low, a, fa = a, b, fb
+            b = low + _GOLDEN * (high - low)
+            fb = function(b)
+    return (low + high) / 2
+
+
+def _logistic(x: Array) -> Array:
+    return 1 / (1 + np.exp(-np.clip(x, -_LARGEST_LOGIT, _LARGEST_LOGIT)))

@@ -1,0 +1,157 @@
+"""What a height spills: probabilities with their band, as table, JSON and picture."""
+
+import csv
+import io
+import json
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal import _native
+from granulcal.files import write_beside
+
+__all__ = ["SpillForecast"]
+
+Array = NDArray[np.float64]
+
+_CM = 1e2
+_COLOURS = ("#1f5f8b", "#c8742b", "#4a8c4a", "#8b4a8b", "#8b1f3d", "#5b5b5b")
+_ROWS = 9
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpillForecast:
+    """P(spilled >= k | height).
+
+    Attributes:
+        heights: of the funnel's tip [m], shape (h,).
+        grains: numbers k.
+        probability: mean over what is believed of material and model, shape (k, h).
+        low: lower end of the 90 % band, shape (k, h).
+        high: upper end of it, shape (k, h).
+        expected: mean number of spilled grains, shape (h,).
+        poured_heights: of the pours [m], shape (m,).
+        spilled: grains that they spilled, shape (m,).
+        total: grains of a pour.
+        rho: correlation of two grains of one pour [-]; 0 is a binomial count.
+        names: paths of the parameters that were drawn from a posterior.
+        unusable: pours that jammed or were unhealthy, besides.
+    """
+
+    heights: Array
+    grains: tuple[int, ...]
+    probability: Array
+    low: Array
+    high: Array
+    expected: Array
+    poured_heights: Array
+    spilled: Array
+    total: int
+    rho: float
+    names: tuple[str, ...]
+    unusable: int
+
+    def highest(self, k: int, at_most: float) -> float | None:
+        """Returns the height up to which P(spilled >= k) stays within `at_most` [m], or None.
+
+        Upper ends of the band count, so that what is not known makes the height lower.
+        """
+        within = self.high[self.grains.index(k)] <= at_most
+        last = len(within) if within.all() else int(np.argmin(within))
+        return float(self.heights[last - 1]) if last else None
+
+    def advice(self, k: int, at_most: float) -> str:
+        """Returns in a sentence up to which height k grains are spilled at most that often."""
+        top = self.highest(k, at_most)
+        wanted = f"P(spilled >= {k}) <= {at_most:g}, at the upper end of the band"
+        if top is None:
+            return f"{wanted}: at no height from {_CM * self.heights[0]:.1f} cm on"
+        if top == self.heights[-1]:
+            return f"{wanted}: at all heights up to {_CM * top:.1f} cm"
+        return f"{wanted}: up to {_CM * top:.1f} cm"
+
+    def save(self, folder: str | PathLike[str]) -> None:
+        """Writes spill.csv (one row for each k and height), spill.json and spill.png."""
+        rows = [
+            {
+                "height": float(height),
+                "grains": k,
+                "probability": float(self.probability[i, j]),
+                "low": float(self.low[i, j]),
+                "high": float(self.high[i, j]),
+            }
+            for i, k in enumerate(self.grains)
+            for j, height in enumerate(self.heights)
+        ]
+        text = io.StringIO()
+        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        write_beside(Path(folder) / "spill.csv", text.getvalue())
+        document = {
+            "granulcal": _native.__version__,
+            "unit": "m",
+            "total": self.total,
+            "pours": len(self.spilled),
+            "unusable": self.unusable,
+            "correlation": self.rho,
+            "drawn": list(self.names),
+            "heights": self.heights.tolist(),
+            "expected": self.expected.tolist(),
+            "probabilities": [
+                {
+                    "grains": k,
+                    "probability": self.probability[i].tolist(),
+                    "interval90": [self.low[i].tolist(), self.high[i].tolist()],
+                }
+                for i, k in enumerate(self.grains)
+            ],
+        }
+        write_beside(Path(folder) / "spill.json", json.dumps(document, indent=1) + "\n")
+        self.plot(Path(folder) / "spill.png")
+
+    def plot(self, path: str | PathLike[str]) -> None:
+        """Writes a PNG: the pours with the expected number, and the probabilities."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(11, 4.5), layout="constrained")
+        FigureCanvasAgg(figure)
+        counts, chances = figure.subplots(1, 2)
+        counts.plot(_CM * self.poured_heights, self.spilled, ".", color="#5b5b5b", label="pours")
+        counts.plot(_CM * self.heights, self.expected, color="#b3202a", label="expected")
+        counts.set(xlabel="height of the funnel [cm]", ylabel=f"spilled grains of {self.total}")
+        counts.legend()
+        for i, k in enumerate(self.grains):
+            colour = _COLOURS[i % len(_COLOURS)]
+            heights = _CM * self.heights
+            chances.fill_between(heights, self.low[i], self.high[i], color=colour, alpha=0.25)
+            chances.plot(heights, self.probability[i], color=colour, label=f"at least {k}")
+        chances.set(xlabel="height of the funnel [cm]", ylabel="probability", ylim=(-0.02, 1.02))
+        chances.legend(title="spilled grains; 90 % band")
+        figure.savefig(path, dpi=90, format="png")
+
+    def __str__(self) -> str:
+        """A table of some heights."""
+        known = (
+            f"{', '.join(self.names)} drawn from a posterior" if self.names else "material known"
+        )
+        lines = [
+            f"{len(self.spilled)} pours of {self.total} grains ({self.unusable} more unusable), "
+            f"{known}; correlation of two grains {self.rho:.2g}",
+            f"{'height [cm]':>12}{'expected':>10}"
+            + "".join(f"{f'P(>= {k})':>24}" for k in self.grains),
+        ]
+        for j in np.linspace(0, len(self.heights) - 1, _ROWS).astype(int):
+            cells = [
+                f"{p[j]:.3f} ({low[j]:.3f} to {high[j]:.3f})"
+                for p, low, high in zip(self.probability, self.low, self.high, strict=True)
+            ]
+            lines.append(
+                f"{_CM * self.heights[j]:>12.1f}{self.expected[j]:>10.1f}"
+                + "".join(f"{cell:>24}" for cell in cells)
+            )
+        return "\n".join(lines)

@@ -1,0 +1,63 @@
+"""Materials from the JSON that `granulcal infer -o` and `granulcal calibrate` write."""
+
+import json
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.scene import Scene
+
+__all__ = ["PosteriorDraws"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PosteriorDraws:
+    """Draws of a posterior.
+
+    Attributes:
+        names: paths of the parameters.
+        samples: own units, shape (n, p).
+        mode: most probable parameters, own units, shape (p,).
+    """
+
+    names: tuple[str, ...]
+    samples: Array
+    mode: Array
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> "PosteriorDraws":
+        """Returns the draws in a file.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: it is not such a file.
+        """
+        try:
+            document = json.loads(Path(path).read_text(encoding="utf-8"))
+            names = tuple(document["parameters"])
+            samples = np.array(document["samples"], dtype=float)
+            mode = np.array([document["parameters"][name]["mode"] for name in names], dtype=float)
+        except (KeyError, TypeError, ValueError):
+            raise ValueError(
+                f"{path} is not a posterior of `granulcal infer -o` or `granulcal calibrate`"
+            ) from None
+        if samples.ndim != 2 or samples.shape[1] != len(names) or len(samples) == 0:
+            raise ValueError(
+                f"{path} must have samples of shape (n, {len(names)}), got {samples.shape}"
+            )
+        return cls(names, samples, mode)
+
+    def without(self, name: str) -> "PosteriorDraws":
+        """Returns the draws of all other parameters."""
+        kept = [i for i, each in enumerate(self.names) if each != name]
+        names = tuple(self.names[i] for i in kept)
+        return PosteriorDraws(names, self.samples[:, kept], self.mode[kept])
+
+    def at_mode(self, scene: Scene) -> Scene:
+        """Returns the scene with the most probable parameters."""
+        return scene.with_(dict(zip(self.names, self.mode.tolist(), strict=True)))

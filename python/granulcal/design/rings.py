@@ -1,0 +1,158 @@
+"""From wanted rings to the heights to pour from."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from granulcal.design.plan import Plan, PlannedPour
+from granulcal.design.reach import Reach
+from granulcal.design.ring import Ring
+from granulcal.design.ring_model import HEIGHT, RingModel
+from granulcal.errors import ExtrapolationError, UnreachableRingError
+
+__all__ = ["design_rings"]
+
+# Pours of the height at an end of the range that are wider or narrower are still pours of it.
+_NOISE_SPREADS = 2.0
+# Half width of a central 90 % interval of a normal in standard deviations.
+_HALF_90 = 1.645
+
+
+def design_rings(
+    model: RingModel,
+    rings: Sequence[Ring],
+    *,
+    tolerance: float = 0.1,
+    extrapolate: bool = False,
+) -> Plan:
+    """Returns the plan that pours these rings about one axis.
+
+    Args:
+        model: trained with the material of the grains.
+        rings: what is wanted, in any order.
+        tolerance: how far a radius may be from the wanted one, over the wanted outer radius [-].
+        extrapolate: go beyond the heights of the training along the tangent, flagged, in place of
+            refusing.
+
+    Raises:
+        ValueError: no ring, or a tolerance that is not positive.
+        ExtrapolationError: a ring that is wider or narrower than any training height gives.
+        UnreachableRingError: radii that no height gives together; the message says which come
+            closest.
+
+    Example:
+        >>> import granulcal as gc
+        >>> scene = gc.Scene.funnel(count=100, preset="fast")
+        >>> model = gc.RingModel.train(scene, heights=(0.05, 0.13), pours=60, progress=False)
+        >>> wanted = model.reach.at(0.1).radii[1]
+        >>> 0.08 < gc.design_rings(model, [gc.Ring(outer=wanted)]).pours[0].height < 0.12
+        True
+    """
+    if not rings:
+        raise ValueError("design_rings needs at least one ring, got none")
+    if not (np.isfinite(tolerance) and tolerance > 0):
+        raise ValueError(f"tolerance must be positive, got {tolerance}")
+    reach = model.reach
+    pours, notes = [], []
+    for order, ring in enumerate(sorted(rings, key=lambda r: -r.outer), start=1):
+        if _is_outside(reach, ring):
+            pour = _extrapolated(reach, ring, order, extrapolate)
+            notes.append(
+                f"pour {order} is extrapolated: {100 * pour.height:.1f} cm is outside the heights "
+                f"of the training, {_centimetres(reach.low, reach.high)}, where the trend gives "
+                f"{100 * pour.expected_inner:.2f} / {100 * pour.expected_outer:.2f} cm; its "
+                "interval leaves out that the trend may not go on"
+            )
+        else:
+            pour = _inferred(model, ring, order, tolerance)
+        pours.append(pour)
+    return Plan(
+        pours=tuple(pours),
+        trained_low=reach.low,
+        trained_high=reach.high,
+        pour_count=model.pour_count,
+        scene_toml=model.scene.to_toml(),
+        notes=tuple(notes),
+    )
+
+
+def _inferred(model: RingModel, ring: Ring, order: int, tolerance: float) -> PlannedPour:
+    inner = model.reach.inner_with(ring.outer) if ring.inner is None else ring.inner
+    posterior = model.bayes.posterior([inner, ring.outer])
+    height = float(np.clip(posterior.mean()[0], model.reach.low, model.reach.high))
+    pour = _planned(model.reach, ring, order, height, posterior.credible_region(0.9)[HEIGHT])
+    missed = max(abs(pour.expected_inner - inner), abs(pour.expected_outer - ring.outer))
+    if missed > tolerance * ring.outer:
+        low, high = model.reach.at(model.reach.low), model.reach.at(model.reach.high)
+        raise UnreachableRingError(
+            f"no height gives a {ring} to within {tolerance:g} of the outer radius; the nearest, "
+            f"{100 * height:.1f} cm, gives {100 * pour.expected_inner:.2f} / "
+            f"{100 * pour.expected_outer:.2f} cm; heights of "
+            f"{_centimetres(model.reach.low, model.reach.high)} give from "
+            f"{100 * low.radii[0]:.2f} / {100 * low.radii[1]:.2f} to "
+            f"{100 * high.radii[0]:.2f} / {100 * high.radii[1]:.2f} cm"
+        )
+    return pour
+
+
+def _extrapolated(reach: Reach, ring: Ring, order: int, allowed: bool) -> PlannedPour:
+    end = min(
+        (reach.beside(reach.low), reach.beside(reach.high)),
+        key=lambda e: abs(e.radii[1] - ring.outer),
+    )
+    if ring.inner is None:
+        height = end.height + (ring.outer - end.radii[1]) / end.slope[1]
+    else:
+        height = reach.beyond(np.array([ring.inner, ring.outer]))
+    outer = sorted(each.radii[1] for each in reach.curve())
+    told = (
+        f"a {ring} lies outside the training: heights of {_centimetres(reach.low, reach.high)} "
+        f"give outer radii of {_centimetres(outer[0], outer[-1])}"
+    )
+    if not allowed:
+        raise ExtrapolationError(
+            f"{told}; the trend at its end would reach it at {100 * height:.1f} cm: train on "
+            "heights that include it, or allow extrapolation"
+        )
+    if not height > 0:
+        raise ExtrapolationError(f"{told}; the trend at its end reaches it at no height")
+    half = _HALF_90 * end.floor
+    return _planned(reach, ring, order, height, (height - half, height + half), outside=True)
+
+
+def _planned(
+    reach: Reach,
+    ring: Ring,
+    order: int,
+    height: float,
+    interval: tuple[float, float],
+    *,
+    outside: bool = False,
+) -> PlannedPour:
+    expected = reach.at(height)
+    spread = np.sqrt(np.diag(expected.covariance))
+    return PlannedPour(
+        order=order,
+        height=height,
+        height_low=float(interval[0]),
+        height_high=float(interval[1]),
+        wanted_inner=ring.inner,
+        wanted_outer=ring.outer,
+        expected_inner=float(expected.radii[0]),
+        expected_outer=float(expected.radii[1]),
+        inner_sd=float(spread[0]),
+        outer_sd=float(spread[1]),
+        is_extrapolated=outside,
+    )
+
+
+def _is_outside(reach: Reach, ring: Ring) -> bool:
+    curve = reach.curve()
+    ends = [(each.radii[1], each.covariance[1, 1] ** 0.5) for each in curve]
+    least = min(radius - _NOISE_SPREADS * spread for radius, spread in ends)
+    most = max(radius + _NOISE_SPREADS * spread for radius, spread in ends)
+    return not least <= ring.outer <= most
+
+
+def _centimetres(low: float, high: float) -> str:
+    return f"{100 * low:.1f} to {100 * high:.1f} cm"

@@ -1,0 +1,307 @@
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import granulcal as gc
+from granulcal.design.count_model import CountModel, beta_binomial_tail, log_gamma
+from granulcal.design.pattern import Pattern, simulate_plan
+from granulcal.design.posterior_file import PosteriorDraws
+from granulcal.design.reach import Reach
+from granulcal.design.ring import STATISTICS
+from granulcal.design.ring_model import HEIGHT, RingModel, height_prior, observing_radii
+from granulcal.design.spill import forecast_of
+from granulcal.errors import ExtrapolationError, TrainingDataError, UnreachableRingError
+
+pytest.importorskip("torch")
+
+_EXAMPLES = Path(__file__).parents[2] / "examples"
+_NOISE = 5e-4
+
+
+class _Line:
+    """A data set in which radius = a + b height, with noise."""
+
+    def __init__(self, count: int = 200) -> None:
+        generator = np.random.default_rng(3)
+        self.scene = observing_radii(gc.Scene.funnel(count=100))
+        self.scene_toml = self.scene.to_toml()
+        self.prior = height_prior((0.01, 0.13))
+        self.theta_names, self.x_names = (HEIGHT,), STATISTICS
+        self.theta = generator.uniform(0.01, 0.13, (count, 1))
+        noise = generator.normal(scale=_NOISE, size=(count, 2))
+        self.x = self.radii(self.theta) + noise
+        self.status = np.full(count, "at_rest")
+        self.is_usable = np.ones(count, bool)
+
+    @staticmethod
+    def radii(heights):
+        return np.column_stack([0.01 + 0.3 * heights, 0.03 + 0.5 * heights])
+
+    def __len__(self) -> int:
+        return len(self.theta)
+
+
+@pytest.fixture(scope="module")
+def line() -> RingModel:
+    data = _Line()
+    return RingModel(gc.BayesSim.fit(data, quiet=True, method="emulated"), data)  # pyright: ignore
+
+
+def _at(height: float) -> gc.Ring:
+    inner, outer = _Line.radii(np.array([height]))[0]
+    return gc.Ring(outer=outer, inner=inner)
+
+
+def _run(*words: str) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "granulcal.cli", "design", *words]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_height_of_a_closed_form_is_returned(line):
+    for height in (0.02, 0.07, 0.12):
+        (pour,) = gc.design_rings(line, [_at(height)]).pours
+        assert pour.height == pytest.approx(height, abs=3e-3)
+        assert pour.height_low < height < pour.height_high
+        assert pour.expected_outer == pytest.approx(0.03 + 0.5 * height, abs=1e-3)
+        assert pour.outer_sd == pytest.approx(_NOISE, rel=0.5)
+        assert not pour.is_extrapolated
+
+
+def test_least_error_of_a_height_is_that_of_the_noise(line):
+    expected = _NOISE / np.hypot(0.3, 0.5)
+    assert line.reach.at(0.07).floor == pytest.approx(expected, rel=0.25)
+    checked = line.check(_Line(100))
+    assert checked.errors.std() < 1.5 * expected
+    assert checked.coverage > 0.7
+    assert "100 pours" in str(checked)
+
+
+def test_a_pile_needs_no_inner_radius(line):
+    (pour,) = gc.design_rings(line, [gc.Ring(outer=0.05)]).pours
+    assert pour.wanted_inner is None
+    assert pour.height == pytest.approx(0.04, abs=3e-3)
+
+
+def test_the_widest_is_poured_first(line):
+    plan = gc.design_rings(line, [_at(0.02), _at(0.12), _at(0.07)])
+    assert [p.order for p in plan.pours] == [1, 2, 3]
+    heights = [p.height for p in plan.pours]
+    assert heights == sorted(heights, reverse=True)
+
+
+def test_extrapolation_is_refused_or_flagged(line):
+    with pytest.raises(ExtrapolationError, match=r"heights of 1\.\d to 1[23]\.\d cm .* 27\.\d cm"):
+        gc.design_rings(line, [_at(0.271)])
+    plan = gc.design_rings(line, [_at(0.271), _at(0.05)], extrapolate=True)
+    assert [p.is_extrapolated for p in plan.pours] == [True, False]
+    assert plan.pours[0].height == pytest.approx(0.271, abs=0.02)
+    assert plan.is_extrapolated
+    assert "pour 1 is extrapolated" in plan.notes[0]
+    with pytest.raises(ExtrapolationError, match="at no height"):
+        gc.design_rings(line, [gc.Ring(outer=0.005)], extrapolate=True)
+
+
+def test_radii_that_no_height_gives_are_refused(line):
+    with pytest.raises(UnreachableRingError, match=r"the nearest, .* give from 1\.\d+ / 3\.\d+ to"):
+        gc.design_rings(line, [gc.Ring(outer=0.08, inner=0.07)])
+    with pytest.raises(ValueError, match="at least one ring"):
+        gc.design_rings(line, [])
+    with pytest.raises(ValueError, match="tolerance must be positive, got 0"):
+        gc.design_rings(line, [_at(0.05)], tolerance=0)
+
+
+@pytest.mark.parametrize(("outer", "inner"), [(-0.1, None), (0.05, 0.06), (0.05, 0.0)])
+def test_a_ring_that_cannot_be(outer, inner):
+    with pytest.raises(ValueError, match=r"must (be a positive radius|lie between)"):
+        gc.Ring(outer=outer, inner=inner)
+
+
+def test_plan_files_are_read_back(line, tmp_path):
+    plan = gc.design_rings(line, [_at(0.1), gc.Ring(outer=0.05)])
+    plan.save(tmp_path)
+    assert gc.Plan.load(tmp_path) == plan
+    rows = list(csv.DictReader((tmp_path / "plan.csv").read_text().splitlines()))
+    assert [float(row["height"]) for row in rows] == [p.height for p in plan.pours]
+    assert rows[1]["wanted_inner"] == ""
+    (tmp_path / "plan.json").write_text('{"format": 1}')
+    with pytest.raises(ValueError, match="damaged or not a pour plan"):
+        gc.Plan.load(tmp_path)
+
+
+def test_reach_follows_a_curve():
+    heights = np.linspace(0.01, 0.13, 120)
+    noise = np.random.default_rng(0).normal(scale=1e-4, size=(120, 2))
+    radii = np.column_stack([heights**2, np.sin(10 * heights)]) + noise
+    reach = Reach(heights, radii)
+    found = reach.at(0.08)
+    np.testing.assert_allclose(found.radii, [0.0064, np.sin(0.8)], atol=3e-4)
+    np.testing.assert_allclose(found.slope, [0.16, 10 * np.cos(0.8)], rtol=0.1)
+    with pytest.raises(TrainingDataError, match="at least 20 usable pours"):
+        Reach(heights[:5], radii[:5])
+
+
+def test_scenes_that_do_not_fit_are_refused():
+    assert observing_radii(gc.Scene.funnel()).observed_names == STATISTICS
+    with pytest.raises(ValueError, match=r"observes radius\[10\]"):
+        observing_radii(gc.Scene.load(_EXAMPLES / "bowl.toml"))
+    with pytest.raises(ValueError, match=r"funnel\.height"):
+        observing_radii(gc.Scene.drop(0.02))
+
+
+def test_later_pours_keep_the_grains_of_earlier_ones(line):
+    plan = gc.design_rings(line, [_at(0.12), _at(0.05)])
+    pattern = simulate_plan(plan, seed=1)
+    assert pattern.positions.shape == (200, 3)
+    assert np.bincount(pattern.pour).tolist() == [100, 100]
+    alone = gc.simulate(line.scene.with_({HEIGHT: plan.pours[0].height}), seed=1)
+    outer = np.percentile(np.hypot(*alone.positions[:, :2].T), 50)
+    # The second pour moves some of the first's grains, and none far.
+    assert pattern.rings[0, 1] == pytest.approx(outer, rel=0.25)
+    assert pattern.is_whole
+
+
+def test_a_pour_that_jams_is_told():
+    grains = np.zeros((2, 3)), np.full(2, 1e-3), np.array([0, 1])
+    pattern = Pattern(*grains, ("at_rest", "jammed"), np.zeros((2, 2)), gc.Scene.funnel())
+    assert not pattern.is_whole
+    assert [note.split(":")[0] for note in pattern.notes] == ["pour 2 jams"]
+
+
+def test_command_trains_plans_and_resumes(tmp_path):
+    out = tmp_path / "plan"
+    words = ["rings", "funnel", "--set", "grains.count=60", "--heights", "0.05", "0.13"]
+    words += ["--pours", "60", "-o", str(out)]
+    done = _run(*words, "--held-out", "5")
+    assert done.returncode == 0, done.stderr
+    assert "height of 5 pours" in done.stdout
+    model = RingModel.load(out)
+    outer = float(model.reach.at(0.09).radii[1])
+    done = _run(*words, "--pile", str(outer), "--json")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert 0.05 < document["pours"][0]["height"] < 0.13
+    assert document["trained"]["pours"] == 60
+    assert (out / "plan.png").read_bytes().startswith(b"\x89PNG")
+    assert gc.Plan.load(out).pours[0].height == document["pours"][0]["height"]
+    refused = _run(*words, "--pile", "2.0")
+    assert refused.returncode == 2
+    assert "lies outside the training" in refused.stderr
+    refused = _run("rings", str(out), "--set", "grains.count=60", "--pile", "0.1", "-o", str(out))
+    assert "a trained model has its material" in refused.stderr
+    assert _run(*words).returncode == 2
+
+
+def test_tail_of_a_beta_binomial_is_scipys():
+    share = np.array([1e-4, 0.01, 0.3, 0.9])
+    x = np.array([1e-5, 0.5, 3.0, 50.0, 1e6])
+    from scipy.special import gammaln
+
+    np.testing.assert_allclose(log_gamma(x), gammaln(x), rtol=1e-12, atol=1e-12)
+    for rho in (1e-5, 0.01, 0.2):
+        size = 1 / rho - 1
+        for least in (1, 7, 60):
+            expected = stats.betabinom.sf(least - 1, 200, share * size, (1 - share) * size)
+            found = beta_binomial_tail(least, 200, share, rho)
+            np.testing.assert_allclose(found, expected, atol=1e-8)
+    assert beta_binomial_tail(0, 10, share, 0.1).tolist() == [1.0] * 4
+    assert beta_binomial_tail(11, 10, share, 0.1).tolist() == [0.0] * 4
+
+
+def test_curve_of_a_known_binomial_is_found():
+    generator = np.random.default_rng(1)
+    heights = generator.uniform(0.05, 0.3, 300)
+    share = 1 / (1 + np.exp(6 - 12 * heights))
+    counts = generator.binomial(500, share).astype(float)
+    forecast = forecast_of(heights, np.empty((300, 0)), counts, 500, grains=(1, 5, 20))
+    assert forecast.rho < 1e-3
+    truth = 1 / (1 + np.exp(6 - 12 * forecast.heights))
+    np.testing.assert_allclose(forecast.expected, 500 * truth, rtol=0.25)
+    for i, k in enumerate(forecast.grains):
+        expected = stats.binom.sf(k - 1, 500, truth)
+        np.testing.assert_allclose(forecast.probability[i], expected, atol=0.06)
+        assert np.all(forecast.low[i] <= forecast.high[i])
+        inside = (forecast.low[i] - 0.01 <= expected) & (expected <= forecast.high[i] + 0.01)
+        assert inside.mean() > 0.8
+
+
+def test_more_spread_than_chance_is_seen():
+    generator = np.random.default_rng(2)
+    heights, rho = generator.uniform(0.05, 0.3, 300), 0.01
+    size = 1 / rho - 1
+    share = 1 / (1 + np.exp(5 - 12 * heights))
+    counts = generator.binomial(500, generator.beta(share * size, (1 - share) * size))
+    model = CountModel.fit(heights, np.empty((300, 0)), counts.astype(float), 500)
+    assert 0.6 * rho < model.rho < 1.6 * rho
+
+
+def test_unknown_material_widens_the_band():
+    generator = np.random.default_rng(4)
+    heights, material = generator.uniform(0.05, 0.3, 300), generator.normal(size=(300, 1))
+    share = 1 / (1 + np.exp(5.5 - 8 * heights - material[:, 0]))
+    counts = generator.binomial(500, share).astype(float)
+    known = np.empty((300, 0))
+    drawn = forecast_of(heights, material, counts, 500, grains=(10,), names=("material.friction",))
+    blind = forecast_of(heights, known, counts, 500, grains=(10,))
+    assert np.mean(drawn.high - drawn.low) > 3 * np.mean(blind.high - blind.low)
+    # Both see the same pours: what the one calls material is pour-to-pour noise to the other.
+    assert drawn.rho < 0.3 * blind.rho
+    top = drawn.highest(10, 0.05)
+    assert top is None or top < 0.2
+
+
+def _small_bowl(path: Path) -> Path:
+    scene = gc.Scene.load(_EXAMPLES / "bowl.toml").with_({"grains.count": 60, "preset": "fast"})
+    path.write_text(scene.to_toml())
+    return path
+
+
+def test_spill_command_resumes_and_writes(tmp_path):
+    bowl, out = _small_bowl(tmp_path / "bowl.toml"), tmp_path / "spill"
+    posterior = tmp_path / "posterior.json"
+    names = ["material.sliding_friction", "material.restitution"]
+    draws = np.random.default_rng(0).uniform([0.3, 0.6], [0.7, 0.9], (50, 2))
+    parameters = {name: {"mode": 0.65} for name in names}
+    posterior.write_text(json.dumps({"parameters": parameters, "samples": draws.tolist()}))
+    words = ["spill", str(bowl), "--heights", "0.1", "0.4", "--pours", "24", "--grains", "1", "5"]
+    words += ["--posterior", str(posterior), "-o", str(out)]
+    done = _run(*words)
+    assert done.returncode == 0, done.stderr
+    assert "24 pours of 60 grains" in done.stdout
+    assert "P(spilled >= 1)" in done.stdout
+    kept = (out / "pours.json").read_text()
+    document = json.loads(kept)
+    del document["pours"]["7"]
+    (out / "pours.json").write_text(json.dumps(document))
+    before = (out / "spill.csv").read_text()
+    assert _run(*words).returncode == 0
+    assert json.loads((out / "pours.json").read_text())["pours"] == json.loads(kept)["pours"]
+    assert (out / "spill.csv").read_text() == before
+    assert _run(*words, "--pours", "26").returncode == 0
+    more = json.loads((out / "pours.json").read_text())["pours"]
+    assert len(more) == 26
+    assert {i: more[i] for i in json.loads(kept)["pours"]} == json.loads(kept)["pours"]
+    rows = list(csv.DictReader(before.splitlines()))
+    assert all(0 <= float(row["low"]) <= float(row["high"]) <= 1 for row in rows)
+    assert json.loads((out / "spill.json").read_text())["drawn"] == names
+    assert (out / "spill.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_spill_refuses_what_it_cannot_answer(tmp_path):
+    bowl = gc.Scene.load(_EXAMPLES / "bowl.toml")
+    with pytest.raises(ValueError, match=r"no \[observe\.spill\] table"):
+        gc.design_spill(gc.Scene.funnel(), out=tmp_path)
+    with pytest.raises(ValueError, match=r"grains must be from 1 to 2000, got \[0\]"):
+        gc.design_spill(bowl, grains=[0], out=tmp_path)
+    with pytest.raises(ValueError, match="heights must be positive and rising"):
+        gc.design_spill(bowl, heights=(0.2, 0.1), out=tmp_path)
+    with pytest.raises(ValueError, match="pours must be at least 20, got 3"):
+        gc.design_spill(bowl, pours=3, out=tmp_path)
+    (tmp_path / "none.json").write_text("{}")
+    with pytest.raises(ValueError, match="is not a posterior"):
+        PosteriorDraws.load(tmp_path / "none.json")
