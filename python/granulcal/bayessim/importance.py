@@ -16,6 +16,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.bayessim.density import is_inside
 from granulcal.bayessim.mixture import Mixture
 from granulcal.prior import Prior
 
@@ -79,6 +80,7 @@ class ImportanceDensity:
         *,
         seed: int = 0,
         effort: Effort | None = None,
+        weigh: Callable[[Array], Array] | None = None,
         mixtures: tuple[Mixture, ...] = (),
     ) -> "ImportanceDensity":
         """Returns the normalised density.
@@ -90,24 +92,29 @@ class ImportanceDensity:
             wide: what a share of every later proposal stays as wide as.
             seed: seed of the draws.
             effort: number of draws.
+            weigh: a quicker `log_target`, exact enough for the weights of draws.
             mixtures: kept with the result.
         """
-        effort = effort or Effort()
+        effort, weigh = effort or Effort(), weigh or log_target
         generator = np.random.default_rng(seed)
         proposal = start
 
         def log_ratios(draws: Array) -> Array:
-            return _inside(prior, log_target, draws) - proposal.log_prob(draws)
+            return _inside(prior, weigh, draws) - proposal.log_prob(draws)
 
+        pool, log_ratio = np.empty((0, start.dimension)), np.empty(0)
         for _ in range(effort.rounds):
             draws = proposal.sample(effort.draws, generator)
-            log_ratio = log_ratios(draws)
-            if _effective(_normalised(log_ratio)) > effort.good_share * len(draws):
+            found = log_ratios(draws)
+            if _effective(_normalised(found)) > effort.good_share * len(draws):
+                # A round whose proposal is kept is the beginning of the pool.
+                pool, log_ratio = draws, found
                 break
-            weights = _tempered_weights(log_ratio, effort.effective)
+            weights = _tempered_weights(found, effort.effective)
             proposal = mix(kernel_estimate(draws, weights, generator), wide, DEFENSIVE_SHARE)
-        pool = proposal.sample(effort.pool, generator)
-        log_ratio = log_ratios(pool)
+        rest = proposal.sample(effort.pool - len(pool), generator)
+        pool = np.concatenate([pool, rest])
+        log_ratio = np.concatenate([log_ratio, log_ratios(rest)])
         largest = float(log_ratio.max())
         log_normaliser = largest + math.log(float(np.mean(np.exp(log_ratio - largest))))
         return cls(log_target, prior, log_normaliser, pool, _normalised(log_ratio), mixtures)
@@ -179,8 +186,7 @@ def kernel_estimate(draws: Array, weights: Array, generator: np.random.Generator
 
 
 def _inside(prior: Prior, log_target: Callable[[Array], Array], u: Array) -> Array:
-    low, high = prior.unconstrained_bounds.T
-    inside = np.all((u >= low) & (u <= high), axis=1)
+    inside = is_inside(prior, u)
     result = np.full(len(u), -np.inf)
     if inside.any():
         result[inside] = log_target(u[inside])

@@ -25,7 +25,7 @@ Reference:
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,16 +213,31 @@ class Likelihood:
         """What the leading emulator expects there."""
         return self.leading.predict(self.pool)
 
-    def log_prob(self, z: Array, u: Array) -> Array:
-        """Returns the log likelihood of k pours `z` (k, s) at `u` (n, p), shape (n,)."""
-        return self._of_prediction(z, self.leading.predict(u))
+    def log_prob(self, z: Array, u: Array, *, quick: bool = False) -> Array:
+        """Returns the log likelihood of k pours `z` (k, s) at `u` (n, p), shape (n,).
+
+        Args:
+            z: standardised statistics.
+            u: coordinates.
+            quick: as in `Basis`.
+        """
+        return self._of_prediction(z, self.leading.predict(u, quick=quick))
+
+    @cached_property
+    def scales_at_pool(self) -> Array:
+        """Square root of V_1 there, shape (m, r)."""
+        return pooled_scales(self.at_pool, 1, self.widening)
 
     def start(self, z: Array) -> Array:
         """Returns the log likelihood of k pours `z` (k, s) at `pool`, shape (m,)."""
-        return self._of_prediction(z, self.at_pool)
+        return self._of_prediction(z, self.at_pool, self.scales_at_pool if len(z) == 1 else None)
 
-    def _of_prediction(self, z: Array, prediction: Prediction) -> Array:
+    def _of_prediction(
+        self, z: Array, prediction: Prediction, scales: Array | None = None
+    ) -> Array:
         y = self.axes.apply(z)[:, : self.axis_count]
+        if scales is not None:
+            return self.leading.noise.log_density(y[0] - prediction.means, scales)
         share = averaging_share(y, prediction.scales)
         scales = pooled_scales(prediction, len(z), self.widening, share)
         return self.leading.noise.log_density(y.mean(axis=0) - prediction.means, scales)
@@ -370,8 +385,8 @@ def joint_density(prior: Prior, conditions: list[tuple[Likelihood, Array]]) -> I
         conditions: for each the likelihood and its pours, standardised, shape (k, s).
     """
 
-    def log_target(u: Array) -> Array:
-        likelihoods = [likelihood.log_prob(z, u) for likelihood, z in conditions]
+    def log_target(u: Array, *, quick: bool = False) -> Array:
+        likelihoods = [likelihood.log_prob(z, u, quick=quick) for likelihood, z in conditions]
         return np.sum(likelihoods, axis=0) + prior.coordinate_log_prob(u)
 
     pool = conditions[0][0].pool
@@ -384,7 +399,9 @@ def joint_density(prior: Prior, conditions: list[tuple[Likelihood, Array]]) -> I
     wide = prior_normal(prior)
     first = kernel_estimate(pool, weights / weights.sum(), np.random.default_rng(0))
     start = mix(first, wide, DEFENSIVE_SHARE)
-    return ImportanceDensity.of(prior, log_target, start, wide, effort=_EFFORT)
+    return ImportanceDensity.of(
+        prior, log_target, start, wide, effort=_EFFORT, weigh=partial(log_target, quick=True)
+    )
 
 
 def linear_scores(u: Array, z: Array, train: NDArray[np.intp], held: NDArray[np.intp]) -> Array:

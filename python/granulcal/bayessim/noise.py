@@ -75,7 +75,7 @@ class Noise:
         """Returns the same with all scales times each of `inflations` (f,), shape (f, n)."""
         size, nu = len(self.root), self.degrees
         white = (deviations / scales) @ self._whiten
-        squares = np.sum(white**2, axis=1) / inflations[:, None] ** 2
+        squares = np.einsum("ij,ij->i", white, white) / inflations[:, None] ** 2
         constant = math.lgamma((nu + size) / 2) - math.lgamma(nu / 2)
         constant -= 0.5 * size * math.log(nu * math.pi) + np.log(np.diag(self.root)).sum()
         log_scales = np.log(scales).sum(axis=1) + size * np.log(inflations)[:, None]
@@ -83,7 +83,8 @@ class Noise:
 
     def square(self, deviations: Array, scales: Array) -> Array:
         """Returns the squared length of `deviations` (n, s) in units of the noise, shape (n,)."""
-        return np.sum(((deviations / scales) @ self._whiten) ** 2, axis=1)
+        white = (deviations / scales) @ self._whiten
+        return np.einsum("ij,ij->i", white, white)
 
     def squares(self, y: Array, means: Array, scales: Array) -> Array:
         r"""Returns the squared lengths of `y` (n, s) less each of `means` (c, s), shape (n, c).
