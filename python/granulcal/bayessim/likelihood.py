@@ -64,7 +64,7 @@ _POOL = 16_384
 _LEAST_P_VALUE = 0.1
 # One axis alone does not say that all noise is the pours' own.
 _LARGEST_RATIO = 2.0
-_EFFORT = Effort(pool=3000, draws=1500, rounds=5, effective=150.0, good_share=0.25)
+_EFFORT = Effort(pool=2000, draws=1000, rounds=6, effective=150.0, good_share=0.25)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 # Share of the correlation that is replaced by none.
 _SHRINKAGE = 0.03
-_DEGREES = (3.0, 5.0, 8.0, 15.0, 40.0, 200.0)
+_DEGREES = (1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 15.0, 40.0, 200.0)
 _EM_ROUNDS = 8
 # Ridges of the log scale, chosen by leave-one-out deviance.
 _PENALTIES = (0.3, 3.0, 30.0, 300.0)
