@@ -26,6 +26,8 @@ Reference:
 
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +97,14 @@ class EmulatorChoice:
         )
 
 
+class _Form(NamedTuple):
+    """One choice of the emulator's form; among equals the first is taken."""
+
+    varying_scale: bool
+    axis_count: int
+    heavy_tails: bool
+
+
 @dataclass(frozen=True)
 class Likelihood:
     """Density of standardised statistics given coordinates.
@@ -142,19 +152,19 @@ class Likelihood:
             order = np.random.default_rng((seed, 2)).permutation(len(u))
         parts = [order[start::_FOLDS] for start in range(_FOLDS)]
         counts = sorted({min(count, z.shape[1]) for count in AXIS_COUNTS})
-        scores: dict[tuple[bool, int], Array] = {}
-        levels: dict[tuple[bool, int], Array] = {}
-        fits: dict[tuple[bool, int], list[Likelihood]] = {}
+        scores: dict[_Form, Array] = {}
+        levels: dict[_Form, Array] = {}
+        fits: dict[_Form, list[Likelihood]] = {}
         for varying in (False, True):
             for part in parts:
                 train = np.setdiff1d(everything, part)
                 held = part[: _HELD_OUT // _FOLDS]
                 grown = _Growing.fit(u[train], z[train], prior, lengths, features, varying, seed)
                 at_cells = grown.emulator.predict(quasi_prior(prior, _CELLS))
-                for count in counts:
-                    found = grown.leading(count)
+                for heavy, count in product((False, True), counts):
+                    found = grown.leading(count, heavy=heavy)
                     score, level = found.held_out_scores(u[held], z[held], at_cells.first(count))
-                    key = varying, count
+                    key = _Form(varying, count, heavy)
                     scores[key] = np.column_stack([scores[key], score]) if key in scores else score
                     levels[key] = np.column_stack([levels[key], level]) if key in levels else level
                     fits.setdefault(key, []).append(found)
@@ -165,9 +175,9 @@ class Likelihood:
             for part in parts
         ]
         choice = EmulatorChoice(
-            best[1],
+            best.axis_count,
             widening,
-            best[0],
+            best.varying_scale,
             float(scores[best][chosen].mean()),
             float(np.concatenate(linear).mean()),
         )
@@ -176,7 +186,8 @@ class Likelihood:
             Fold(fit.widened(widening), part[: _HELD_OUT // _FOLDS], score)
             for fit, part, score in zip(fits[best], parts, held_scores, strict=True)
         ]
-        whole = _Growing.fit(u, z, prior, lengths, features, best[0], seed).leading(best[1])
+        grown = _Growing.fit(u, z, prior, lengths, features, best.varying_scale, seed)
+        whole = grown.leading(best.axis_count, heavy=best.heavy_tails)
         return whole.widened(widening), folds, choice
 
     def widened(self, widening: float) -> "Likelihood":
@@ -335,8 +346,8 @@ class _Growing:
         )
         return cls(prior, axes, emulator, white)
 
-    def leading(self, count: int) -> Likelihood:
-        leading = self.emulator.first(count, Noise.fit(self.white[:, :count]))
+    def leading(self, count: int, *, heavy: bool) -> Likelihood:
+        leading = self.emulator.first(count, Noise.fit(self.white[:, :count], heavy=heavy))
         return Likelihood(self.prior, self.axes, self.emulator, leading, 1.0)
 
 
@@ -415,8 +426,8 @@ def linear_scores(u: Array, z: Array, train: NDArray[np.intp], held: NDArray[np.
 
 
 def _most_probable_of_the_honest(
-    scores: dict[tuple[bool, int], Array], levels: dict[tuple[bool, int], Array]
-) -> tuple[tuple[bool, int], int]:
+    scores: dict[_Form, Array], levels: dict[_Form, Array]
+) -> tuple[_Form, int]:
     """Key and index of the highest mean score among those whose levels may be uniform."""
     ranked = sorted(
         ((float(row.mean()), key, i) for key, rows in scores.items() for i, row in enumerate(rows)),

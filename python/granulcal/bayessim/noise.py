@@ -23,7 +23,9 @@ Array = NDArray[np.float64]
 
 # Share of the correlation that is replaced by none.
 _SHRINKAGE = 0.03
-_DEGREES = (1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 15.0, 40.0, 200.0)
+_DEGREES = (3.0, 5.0, 8.0, 15.0, 40.0, 200.0)
+# Where most residuals are small and some are large: hardly a variance, or none.
+_HEAVY_DEGREES = (1.0, 1.5, 2.0)
 _EM_ROUNDS = 8
 # Ridges of the log scale, chosen by leave-one-out deviance.
 _PENALTIES = (0.3, 3.0, 30.0, 300.0)
@@ -46,12 +48,17 @@ class Noise:
     degrees: float
 
     @classmethod
-    def fit(cls, white: Array) -> "Noise":
-        """Returns the noise of standardised residuals, shape (n, s)."""
+    def fit(cls, white: Array, *, heavy: bool = False) -> "Noise":
+        """Returns the noise of standardised residuals, shape (n, s).
+
+        Args:
+            white: the residuals.
+            heavy: whether the degrees of freedom may be 2 and fewer.
+        """
         count, size = white.shape
         best: tuple[float, Array, float] | None = None
         scatter = white.T @ white / count + 1e-9 * np.eye(size)
-        for degrees in _DEGREES[::-1]:
+        for degrees in (_HEAVY_DEGREES * heavy + _DEGREES)[::-1]:
             for _ in range(_EM_ROUNDS):
                 pull = (degrees + size) / (degrees + _squared_length(white, scatter))
                 scatter = (white * pull[:, None]).T @ white / count + 1e-9 * np.eye(size)
