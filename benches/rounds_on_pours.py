@@ -73,12 +73,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the pours")
     parser.add_argument("--model", type=Path, help="model of pours of the prior")
     parser.add_argument("--budget", type=int, default=150)
+    parser.add_argument("--recordings", type=int, default=RECORDINGS, help="the first of the four")
     parser.add_argument("--seed", type=int, default=303)
     parser.add_argument("--threads", type=int, default=1)
     options = parser.parse_args()
     torch.set_num_threads(1)
     prior = gc.Prior.default()
-    recordings = recorded(prior, options.out, options.seed)
+    recordings = recorded(prior, options.out, options.seed)[: options.recordings]
     rounds, misfits = [], []
     for number, (truth, x) in enumerate(recordings):
         pours = KeptPours(
