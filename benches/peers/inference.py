@@ -1,6 +1,7 @@
 """Posteriors of granulcal beside sbi's, in one run: sbibm tasks, and held-out pours of a data set.
 
     pip install -r benches/peers/inference-requirements.txt
+    pip install --no-deps sbibm==1.1.0
     python benches/peers/inference.py sbibm --simulations 1000 --out build/sbibm.csv
     python benches/peers/inference.py pours DATA --train 500 1000 --test 300 --out build/pours.csv
 
@@ -156,8 +157,9 @@ def run_pours(options: argparse.Namespace, add: Callable[..., None], done: set[t
     pairs = TrainingPairs.gather(Dataset.load(options.data))
     prior, count = pairs.prior, len(pairs.theta)
     print(f"{pairs.pair_count} pours, {count} usable, left out: {pairs.excluded}")
-    order = np.random.default_rng(0).permutation(count)
-    test, rest = order[: options.test], order[options.test :]
+    # The last pours of a data set test, so that choices made on its first ones never saw them.
+    order = np.arange(count)
+    test, rest = order[count - options.test :], order[: count - options.test]
     u, x = prior.to_unconstrained(pairs.theta), pairs.x
     cube = torch.distributions.Uniform(torch.zeros(u.shape[1]), torch.ones(u.shape[1]))
     torch_prior = torch.distributions.Independent(cube, 1)

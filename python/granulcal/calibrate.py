@@ -15,12 +15,13 @@ from granulcal.recording import Recording
 from granulcal.report import write_report
 from granulcal.scene import Scene
 from granulcal.simulate import Pour
+from granulcal.statistics import NAMES
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
     from granulcal.posterior import Posterior
 
-__all__ = ["Calibrated", "calibrate", "require_same_scene"]
+__all__ = ["Calibrated", "calibrate", "require_own_statistics", "require_same_scene"]
 
 # Seeds of forward pours: far from those of data sets, which are hashes, and of demo recordings.
 _FIRST_SEED = 9000
@@ -57,6 +58,19 @@ def require_same_scene(model: "BayesSim", scene: Scene) -> None:
     if trained != scene:
         raise ValueError(
             f"the model was trained on another scene: {_first_difference(trained, scene)}"
+        )
+
+
+def require_own_statistics(model: "BayesSim") -> None:
+    """Refuses a model of other statistics than a recording gives, or of these in another order.
+
+    Raises:
+        ValueError: the statistics differ.
+    """
+    if tuple(model.x_names) != tuple(NAMES):
+        raise ValueError(
+            f"the model must be of the statistics {', '.join(NAMES)}, in this order; it is of "
+            f"{', '.join(model.x_names)}"
         )
 
 

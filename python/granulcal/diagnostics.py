@@ -272,12 +272,17 @@ def plot_sbc(
     figure, axes = _new_figure(dimension)
     low, high = binomial_band(count, 1 / bins)
     for i, axis in enumerate(np.atleast_1d(axes)):
-        axis.axhspan(low, high, color=_BAND_COLOUR, linewidth=0)
+        axis.axhspan(low, high, color=_BAND_COLOUR, linewidth=0, label="95 % of chance, each bar")
         edges = np.linspace(0, test.draw_count + 1, bins + 1) - 0.5
-        axis.hist(test.ranks[:, i], bins=edges, color=_COLOUR, alpha=0.85)
+        # Outlines, so that the band can be seen behind low bars too.
+        axis.hist(test.ranks[:, i], bins=edges, histtype="step", color=_COLOUR, linewidth=1.5)
         label = names[i] if names is not None else f"parameter {i}"
-        axis.set(xlabel=f"rank of {label}", yticks=[], xlim=(edges[0], edges[-1]))
-        axis.set_title(f"p = {test.p_values[i]:.2g}", fontsize=9)
+        axis.set(xlabel=f"draws below the truth, {label}", xlim=(edges[0], edges[-1]))
+        axis.set_ylim(0, max(axis.get_ylim()[1], 1.6 * high))
+        axis.set_title(f"flat if calibrated: p = {test.p_values[i]:.2g}", fontsize=9)
+        if i == 0:
+            axis.set(ylabel=f"truths, of {count}")
+            axis.legend(frameon=False, loc="upper left", fontsize=8)
     if path is not None:
         figure.savefig(path, dpi=160)
     return figure

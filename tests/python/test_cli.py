@@ -1,4 +1,5 @@
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -106,6 +107,19 @@ def test_a_model_of_another_scene_is_refused(model, recording, small_scene, tmp_
     assert main([*words, str(other)]) == 2
     said = capsys.readouterr()
     assert "another scene: 'count = 60' there, 'count = 61' asked for" in said.err
+    assert said.out == ""
+
+
+def test_a_model_of_statistics_in_another_order_is_refused(model, recording, tmp_path, capsys):
+    swapped = tmp_path / "swapped"
+    shutil.copytree(model, swapped)
+    document = json.loads((swapped / "model.json").read_text())
+    names = document["x_names"]
+    names[0], names[1] = names[1], names[0]
+    (swapped / "model.json").write_text(json.dumps(document))
+    assert main(["infer", str(swapped), recording[0], "--camera", recording[1], "--json"]) == 2
+    said = capsys.readouterr()
+    assert "in this order; it is of mean_z, max_z, sd_z" in said.err
     assert said.out == ""
 
 

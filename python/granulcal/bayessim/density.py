@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from granulcal.bayessim.mixture import Mixture
 from granulcal.prior import Prior
 
-__all__ = ["Density", "TruncatedMixture", "quasi_normal", "quasi_prior"]
+__all__ = ["Density", "TruncatedMixture", "is_inside", "quasi_normal", "quasi_prior"]
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ class TruncatedMixture:
         points = quasi_normal(_MASS_POINTS, mixture.dimension)
         spreads = np.linalg.inv(mixture.factors)
         placed = mixture.means[:, None] + points @ spreads
-        mass = float(mixture.weights @ _is_inside(prior, placed).mean(axis=1))
+        mass = float(mixture.weights @ is_inside(prior, placed).mean(axis=1))
         if mass >= _SMALLEST_MASS:
             return cls(prior, mixture, math.log(mass))
         log_weights = _prior_draws(prior, mixture)[1]
@@ -83,7 +83,7 @@ class TruncatedMixture:
 
     def log_prob(self, u: Array) -> Array:
         """Returns the log density at `u` (n, p), shape (n,); -inf outside the bounds."""
-        inside = _is_inside(self.prior, u)
+        inside = is_inside(self.prior, u)
         return np.where(inside, self.mixture.log_prob(u) - self.log_mass, -np.inf)
 
     def sample(self, n: int, generator: np.random.Generator) -> Array:
@@ -98,7 +98,7 @@ class TruncatedMixture:
             # A tenth more than expected, so that one round is nearly always enough.
             tries = int(1.1 * missing / math.exp(self.log_mass)) + 16
             draws = self.mixture.sample(tries, generator)
-            kept.append(draws[_is_inside(self.prior, draws)][:missing])
+            kept.append(draws[is_inside(self.prior, draws)][:missing])
             missing -= len(kept[-1])
         return np.concatenate(kept) if kept else np.empty((0, self.mixture.dimension))
 
@@ -141,9 +141,12 @@ def quasi_prior(prior: Prior, count: int) -> Array:
     return prior.to_unconstrained(np.column_stack(columns))
 
 
-def _is_inside(prior: Prior, u: Array) -> NDArray[np.bool_]:
-    low, high = prior.unconstrained_bounds.T
-    return np.all((u >= low) & (u <= high), axis=-1)
+def is_inside(prior: Prior, u: Array) -> NDArray[np.bool_]:
+    """Returns which points `u` (..., p) lie within the prior's bounds, shape (...)."""
+    inside = np.ones(u.shape[:-1], dtype=bool)
+    for i, (low, high) in enumerate(prior.unconstrained_bounds):
+        inside &= (u[..., i] >= low) & (u[..., i] <= high)
+    return inside
 
 
 def _prior_draws(prior: Prior, mixture: Mixture) -> tuple[Array, Array]:

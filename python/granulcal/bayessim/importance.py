@@ -2,10 +2,16 @@ r"""A density known up to a factor, by importance sampling with an adapted propo
 
 The density is evaluated point by point; its normaliser and its draws come from weighted draws of a
 mixture that is adapted to it: kernel estimates of the weighted draws, tempered while too few carry
-weight, always with a share as wide as what is known beforehand.
+weight, always with a share as wide as what is known beforehand. A draw of the density is a weighted
+draw that then walks a few steps of Metropolis, along differences of other draws: without them a
+thousand draws are some hundred points, each several times.
 
 Reference:
     Cappe, Guillin, Marin and Robert, Population Monte Carlo, JCGS 13, 2004.
+    Gilks and Berzuini, Following a moving target: Monte Carlo inference for dynamic Bayesian
+    models, JRSS B 63, 2001 (resample, then move).
+    Ter Braak, A Markov chain Monte Carlo version of the genetic algorithm differential evolution,
+    Statistics and Computing 16, 2006 (steps along differences).
 """
 
 import math
@@ -16,6 +22,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.bayessim.density import is_inside
 from granulcal.bayessim.mixture import Mixture
 from granulcal.prior import Prior
 
@@ -28,6 +35,10 @@ _CENTRES = 60
 DEFENSIVE_SHARE = 0.1
 # Fewer effective draws than this are reported as a warning by the posterior.
 FEWEST_EFFECTIVE = 500.0
+# Steps of each draw: to part equal draws, and to mend a pool that is worth few draws.
+_STEPS, _MENDING_STEPS = 3, 20
+# Factors on the length of a step that is best for a normal.
+_STEP_FACTORS = (0.3, 0.7, 1.0)
 
 
 @dataclass(frozen=True)
@@ -59,6 +70,8 @@ class ImportanceDensity:
         log_normaliser: log of the integral of the target.
         pool: draws of the proposal, shape (m, p).
         pool_weights: importance weights of the draws, sum 1, shape (m,).
+        pool_heights: log target of the draws, shape (m,).
+        weigh: a quicker `log_target`, exact enough for the weights of draws.
         mixtures: the mixtures that the target is made of, if it is made of some.
     """
 
@@ -67,6 +80,8 @@ class ImportanceDensity:
     log_normaliser: float
     pool: Array
     pool_weights: Array
+    pool_heights: Array
+    weigh: Callable[[Array], Array]
     mixtures: tuple[Mixture, ...] = ()
 
     @classmethod
@@ -79,6 +94,7 @@ class ImportanceDensity:
         *,
         seed: int = 0,
         effort: Effort | None = None,
+        weigh: Callable[[Array], Array] | None = None,
         mixtures: tuple[Mixture, ...] = (),
     ) -> "ImportanceDensity":
         """Returns the normalised density.
@@ -90,27 +106,40 @@ class ImportanceDensity:
             wide: what a share of every later proposal stays as wide as.
             seed: seed of the draws.
             effort: number of draws.
+            weigh: a quicker `log_target`; None: the same.
             mixtures: kept with the result.
         """
-        effort = effort or Effort()
+        effort, weigh = effort or Effort(), weigh or log_target
         generator = np.random.default_rng(seed)
         proposal = start
 
-        def log_ratios(draws: Array) -> Array:
-            return _inside(prior, log_target, draws) - proposal.log_prob(draws)
-
+        pool, heights = np.empty((0, start.dimension)), np.empty(0)
         for _ in range(effort.rounds):
             draws = proposal.sample(effort.draws, generator)
-            log_ratio = log_ratios(draws)
+            found = _inside(prior, weigh, draws)
+            log_ratio = found - proposal.log_prob(draws)
             if _effective(_normalised(log_ratio)) > effort.good_share * len(draws):
+                # A round whose proposal is kept is the beginning of the pool.
+                pool, heights = draws, found
                 break
             weights = _tempered_weights(log_ratio, effort.effective)
             proposal = mix(kernel_estimate(draws, weights, generator), wide, DEFENSIVE_SHARE)
-        pool = proposal.sample(effort.pool, generator)
-        log_ratio = log_ratios(pool)
+        rest = proposal.sample(effort.pool - len(pool), generator)
+        pool = np.concatenate([pool, rest])
+        heights = np.concatenate([heights, _inside(prior, weigh, rest)])
+        log_ratio = heights - proposal.log_prob(pool)
         largest = float(log_ratio.max())
         log_normaliser = largest + math.log(float(np.mean(np.exp(log_ratio - largest))))
-        return cls(log_target, prior, log_normaliser, pool, _normalised(log_ratio), mixtures)
+        return cls(
+            log_target,
+            prior,
+            log_normaliser,
+            pool,
+            _normalised(log_ratio),
+            heights,
+            weigh,
+            mixtures,
+        )
 
     @classmethod
     def of_prior_draws(
@@ -119,6 +148,8 @@ class ImportanceDensity:
         log_target: Callable[[Array], Array],
         draws: Array,
         log_likelihood: Array,
+        *,
+        weigh: Callable[[Array], Array] | None = None,
     ) -> "ImportanceDensity":
         """Returns the density whose pool are draws of the prior.
 
@@ -127,10 +158,14 @@ class ImportanceDensity:
             log_target: the log density up to a constant: likelihood times prior.
             draws: of the prior, shape (m, p).
             log_likelihood: at the draws, shape (m,).
+            weigh: a quicker `log_target`; None: the same.
         """
         largest = float(log_likelihood.max())
         log_normaliser = largest + math.log(float(np.mean(np.exp(log_likelihood - largest))))
-        return cls(log_target, prior, log_normaliser, draws, _normalised(log_likelihood))
+        heights = log_likelihood + prior.coordinate_log_prob(draws)
+        weights = _normalised(log_likelihood)
+        weigh = weigh or log_target
+        return cls(log_target, prior, log_normaliser, draws, weights, heights, weigh)
 
     @property
     def effective_sample_size(self) -> float:
@@ -142,8 +177,22 @@ class ImportanceDensity:
         return _inside(self.prior, self.log_target, u) - self.log_normaliser
 
     def sample(self, n: int, generator: np.random.Generator) -> Array:
-        """Returns `n` draws by importance resampling, shape (n, p); a draw may repeat."""
-        return self.pool[generator.choice(len(self.pool), size=n, p=self.pool_weights)]
+        """Returns `n` draws by importance resampling and Metropolis steps, shape (n, p)."""
+        size, dimension = self.pool.shape
+        few = self.effective_sample_size < FEWEST_EFFECTIVE
+        steps = _MENDING_STEPS if few else _STEPS
+        # The first of each are the draws; between pairs of the others go the steps.
+        chosen = generator.choice(size, size=(2 * steps + 1, n), p=self.pool_weights)
+        draws, heights = self.pool[chosen[0]], self.pool_heights[chosen[0]]
+        best = 2.38 / math.sqrt(2 * dimension)
+        for first, second in zip(chosen[1::2], chosen[2::2], strict=True):
+            length = best * generator.choice(_STEP_FACTORS, size=(n, 1))
+            tried = draws + length * (self.pool[first] - self.pool[second])
+            height = _inside(self.prior, self.weigh, tried)
+            taken = np.log(generator.random(n)) < height - heights
+            draws = np.where(taken[:, None], tried, draws)
+            heights = np.where(taken, height, heights)
+        return draws
 
 
 def mix(narrow: Mixture, wide: Mixture, wide_share: float) -> Mixture:
@@ -179,8 +228,7 @@ def kernel_estimate(draws: Array, weights: Array, generator: np.random.Generator
 
 
 def _inside(prior: Prior, log_target: Callable[[Array], Array], u: Array) -> Array:
-    low, high = prior.unconstrained_bounds.T
-    inside = np.all((u >= low) & (u <= high), axis=1)
+    inside = is_inside(prior, u)
     result = np.full(len(u), -np.inf)
     if inside.any():
         result[inside] = log_target(u[inside])

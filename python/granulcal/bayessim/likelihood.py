@@ -25,7 +25,9 @@ Reference:
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +66,7 @@ _POOL = 16_384
 _LEAST_P_VALUE = 0.1
 # One axis alone does not say that all noise is the pours' own.
 _LARGEST_RATIO = 2.0
-_EFFORT = Effort(pool=3000, draws=1500, rounds=5, effective=150.0, good_share=0.25)
+_EFFORT = Effort(pool=2000, draws=1000, rounds=6, effective=150.0, good_share=0.25)
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,14 @@ class EmulatorChoice:
             f"log density of held-out pairs {self.score:.2f} (linear regression "
             f"{self.linear_score:.2f})"
         )
+
+
+class _Form(NamedTuple):
+    """One choice of the emulator's form; among equals the first is taken."""
+
+    varying_scale: bool
+    axis_count: int
+    heavy_tails: bool
 
 
 @dataclass(frozen=True)
@@ -142,19 +152,19 @@ class Likelihood:
             order = np.random.default_rng((seed, 2)).permutation(len(u))
         parts = [order[start::_FOLDS] for start in range(_FOLDS)]
         counts = sorted({min(count, z.shape[1]) for count in AXIS_COUNTS})
-        scores: dict[tuple[bool, int], Array] = {}
-        levels: dict[tuple[bool, int], Array] = {}
-        fits: dict[tuple[bool, int], list[Likelihood]] = {}
+        scores: dict[_Form, Array] = {}
+        levels: dict[_Form, Array] = {}
+        fits: dict[_Form, list[Likelihood]] = {}
         for varying in (False, True):
             for part in parts:
                 train = np.setdiff1d(everything, part)
                 held = part[: _HELD_OUT // _FOLDS]
                 grown = _Growing.fit(u[train], z[train], prior, lengths, features, varying, seed)
                 at_cells = grown.emulator.predict(quasi_prior(prior, _CELLS))
-                for count in counts:
-                    found = grown.leading(count)
+                for heavy, count in product((False, True), counts):
+                    found = grown.leading(count, heavy=heavy)
                     score, level = found.held_out_scores(u[held], z[held], at_cells.first(count))
-                    key = varying, count
+                    key = _Form(varying, count, heavy)
                     scores[key] = np.column_stack([scores[key], score]) if key in scores else score
                     levels[key] = np.column_stack([levels[key], level]) if key in levels else level
                     fits.setdefault(key, []).append(found)
@@ -165,9 +175,9 @@ class Likelihood:
             for part in parts
         ]
         choice = EmulatorChoice(
-            best[1],
+            best.axis_count,
             widening,
-            best[0],
+            best.varying_scale,
             float(scores[best][chosen].mean()),
             float(np.concatenate(linear).mean()),
         )
@@ -176,7 +186,8 @@ class Likelihood:
             Fold(fit.widened(widening), part[: _HELD_OUT // _FOLDS], score)
             for fit, part, score in zip(fits[best], parts, held_scores, strict=True)
         ]
-        whole = _Growing.fit(u, z, prior, lengths, features, best[0], seed).leading(best[1])
+        grown = _Growing.fit(u, z, prior, lengths, features, best.varying_scale, seed)
+        whole = grown.leading(best.axis_count, heavy=best.heavy_tails)
         return whole.widened(widening), folds, choice
 
     def widened(self, widening: float) -> "Likelihood":
@@ -213,16 +224,31 @@ class Likelihood:
         """What the leading emulator expects there."""
         return self.leading.predict(self.pool)
 
-    def log_prob(self, z: Array, u: Array) -> Array:
-        """Returns the log likelihood of k pours `z` (k, s) at `u` (n, p), shape (n,)."""
-        return self._of_prediction(z, self.leading.predict(u))
+    def log_prob(self, z: Array, u: Array, *, quick: bool = False) -> Array:
+        """Returns the log likelihood of k pours `z` (k, s) at `u` (n, p), shape (n,).
+
+        Args:
+            z: standardised statistics.
+            u: coordinates.
+            quick: as in `Basis`.
+        """
+        return self._of_prediction(z, self.leading.predict(u, quick=quick))
+
+    @cached_property
+    def scales_at_pool(self) -> Array:
+        """Square root of V_1 there, shape (m, r)."""
+        return pooled_scales(self.at_pool, 1, self.widening)
 
     def start(self, z: Array) -> Array:
         """Returns the log likelihood of k pours `z` (k, s) at `pool`, shape (m,)."""
-        return self._of_prediction(z, self.at_pool)
+        return self._of_prediction(z, self.at_pool, self.scales_at_pool if len(z) == 1 else None)
 
-    def _of_prediction(self, z: Array, prediction: Prediction) -> Array:
+    def _of_prediction(
+        self, z: Array, prediction: Prediction, scales: Array | None = None
+    ) -> Array:
         y = self.axes.apply(z)[:, : self.axis_count]
+        if scales is not None:
+            return self.leading.noise.log_density(y[0] - prediction.means, scales)
         share = averaging_share(y, prediction.scales)
         scales = pooled_scales(prediction, len(z), self.widening, share)
         return self.leading.noise.log_density(y.mean(axis=0) - prediction.means, scales)
@@ -320,8 +346,8 @@ class _Growing:
         )
         return cls(prior, axes, emulator, white)
 
-    def leading(self, count: int) -> Likelihood:
-        leading = self.emulator.first(count, Noise.fit(self.white[:, :count]))
+    def leading(self, count: int, *, heavy: bool) -> Likelihood:
+        leading = self.emulator.first(count, Noise.fit(self.white[:, :count], heavy=heavy))
         return Likelihood(self.prior, self.axes, self.emulator, leading, 1.0)
 
 
@@ -370,8 +396,8 @@ def joint_density(prior: Prior, conditions: list[tuple[Likelihood, Array]]) -> I
         conditions: for each the likelihood and its pours, standardised, shape (k, s).
     """
 
-    def log_target(u: Array) -> Array:
-        likelihoods = [likelihood.log_prob(z, u) for likelihood, z in conditions]
+    def log_target(u: Array, *, quick: bool = False) -> Array:
+        likelihoods = [likelihood.log_prob(z, u, quick=quick) for likelihood, z in conditions]
         return np.sum(likelihoods, axis=0) + prior.coordinate_log_prob(u)
 
     pool = conditions[0][0].pool
@@ -384,7 +410,9 @@ def joint_density(prior: Prior, conditions: list[tuple[Likelihood, Array]]) -> I
     wide = prior_normal(prior)
     first = kernel_estimate(pool, weights / weights.sum(), np.random.default_rng(0))
     start = mix(first, wide, DEFENSIVE_SHARE)
-    return ImportanceDensity.of(prior, log_target, start, wide, effort=_EFFORT)
+    return ImportanceDensity.of(
+        prior, log_target, start, wide, effort=_EFFORT, weigh=partial(log_target, quick=True)
+    )
 
 
 def linear_scores(u: Array, z: Array, train: NDArray[np.intp], held: NDArray[np.intp]) -> Array:
@@ -398,8 +426,8 @@ def linear_scores(u: Array, z: Array, train: NDArray[np.intp], held: NDArray[np.
 
 
 def _most_probable_of_the_honest(
-    scores: dict[tuple[bool, int], Array], levels: dict[tuple[bool, int], Array]
-) -> tuple[tuple[bool, int], int]:
+    scores: dict[_Form, Array], levels: dict[_Form, Array]
+) -> tuple[_Form, int]:
     """Key and index of the highest mean score among those whose levels may be uniform."""
     ranked = sorted(
         ((float(row.mean()), key, i) for key, rows in scores.items() for i, row in enumerate(rows)),

@@ -55,13 +55,16 @@ class Mixture:
 
     def component_log_prob(self, u: Array) -> Array:
         """Returns log(weight * density) of every component at `u` (n, p), shape (k, n)."""
-        # Whitened deviations F^T (u - m): the squared length is the Mahalanobis distance.
-        shifts = np.einsum("kij,ki->kj", self.factors, self.means)
-        whitened = u @ self.factors - shifts[:, None, :]
+        # Whitened deviations F^T (u - m): the squared length is the Mahalanobis distance. One
+        # product of matrices for each coordinate of all components.
+        shifts = np.einsum("kij,ki->jk", self.factors, self.means)
+        squares = np.zeros((len(u), len(self.weights)))
+        for factors, shift in zip(self.factors.transpose(2, 1, 0), shifts, strict=True):
+            squares += (u @ factors - shift) ** 2
         log_det = np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
         with np.errstate(divide="ignore"):
             constant = np.log(self.weights) + log_det - 0.5 * self.dimension * np.log(2 * np.pi)
-        return constant[:, None] - 0.5 * np.sum(whitened**2, axis=-1)
+        return (constant - 0.5 * squares).T
 
     def log_prob(self, u: Array) -> Array:
         """Returns the log density at `u` (n, p), shape (n,)."""

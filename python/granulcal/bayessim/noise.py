@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 # Share of the correlation that is replaced by none.
 _SHRINKAGE = 0.03
 _DEGREES = (3.0, 5.0, 8.0, 15.0, 40.0, 200.0)
+# Where most residuals are small and some are large: hardly a variance, or none.
+_HEAVY_DEGREES = (1.0, 1.5, 2.0)
 _EM_ROUNDS = 8
 # Ridges of the log scale, chosen by leave-one-out deviance.
 _PENALTIES = (0.3, 3.0, 30.0, 300.0)
@@ -46,12 +48,17 @@ class Noise:
     degrees: float
 
     @classmethod
-    def fit(cls, white: Array) -> "Noise":
-        """Returns the noise of standardised residuals, shape (n, s)."""
+    def fit(cls, white: Array, *, heavy: bool = False) -> "Noise":
+        """Returns the noise of standardised residuals, shape (n, s).
+
+        Args:
+            white: the residuals.
+            heavy: whether the degrees of freedom may be 2 and fewer.
+        """
         count, size = white.shape
         best: tuple[float, Array, float] | None = None
         scatter = white.T @ white / count + 1e-9 * np.eye(size)
-        for degrees in _DEGREES[::-1]:
+        for degrees in (_HEAVY_DEGREES * heavy + _DEGREES)[::-1]:
             for _ in range(_EM_ROUNDS):
                 pull = (degrees + size) / (degrees + _squared_length(white, scatter))
                 scatter = (white * pull[:, None]).T @ white / count + 1e-9 * np.eye(size)
@@ -75,7 +82,7 @@ class Noise:
         """Returns the same with all scales times each of `inflations` (f,), shape (f, n)."""
         size, nu = len(self.root), self.degrees
         white = (deviations / scales) @ self._whiten
-        squares = np.sum(white**2, axis=1) / inflations[:, None] ** 2
+        squares = np.einsum("ij,ij->i", white, white) / inflations[:, None] ** 2
         constant = math.lgamma((nu + size) / 2) - math.lgamma(nu / 2)
         constant -= 0.5 * size * math.log(nu * math.pi) + np.log(np.diag(self.root)).sum()
         log_scales = np.log(scales).sum(axis=1) + size * np.log(inflations)[:, None]
@@ -83,7 +90,8 @@ class Noise:
 
     def square(self, deviations: Array, scales: Array) -> Array:
         """Returns the squared length of `deviations` (n, s) in units of the noise, shape (n,)."""
-        return np.sum(((deviations / scales) @ self._whiten) ** 2, axis=1)
+        white = (deviations / scales) @ self._whiten
+        return np.einsum("ij,ij->i", white, white)
 
     def squares(self, y: Array, means: Array, scales: Array) -> Array:
         r"""Returns the squared lengths of `y` (n, s) less each of `means` (c, s), shape (n, c).

@@ -1,5 +1,6 @@
 """Trains the members of an ensemble side by side and keeps each at its best validation loss."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -7,6 +8,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from granulcal.bayessim.adam import Adam
 from granulcal.bayessim.config import Config
 from granulcal.bayessim.features import draw_frequencies
 from granulcal.bayessim.network import HeadLayout, Network
@@ -123,23 +125,16 @@ class _Training:
         parameters = self.network.parameters()
         for tensor in parameters:
             tensor.requires_grad_(True)
-        linear, fourier, bias = parameters
-        optimizer = torch.optim.AdamW(
-            [
-                {"params": [linear, bias], "weight_decay": 0.0},
-                {"params": [fourier], "weight_decay": config.weight_decay},
-            ],
-            lr=config.learning_rate,
-        )
-        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, config.max_epochs)
+        # Only the Fourier weights decay.
+        adam = Adam([t.detach() for t in parameters], [0.0, config.weight_decay, 0.0])
         best_loss = torch.full((members,), torch.inf)
         best_epoch = torch.zeros(members, dtype=torch.long)
         train_loss = torch.zeros(members)
         epoch, status = 0, "epoch_limit"
         curve = []
         for epoch in range(1, config.max_epochs + 1):
-            train_loss = self._one_pass(optimizer)
-            schedule.step()
+            turn = math.pi * (epoch - 1) / config.max_epochs
+            train_loss = self._one_pass(adam, 0.5 * config.learning_rate * (1 + math.cos(turn)))
             with torch.no_grad():
                 loss = self._loss(self.validation, jitter=0.0)
             is_better = loss < best_loss
@@ -169,15 +164,13 @@ class _Training:
             curve=tuple(curve),
         )
 
-    def _one_pass(self, optimizer: torch.optim.Optimizer) -> torch.Tensor:
+    def _one_pass(self, adam: Adam, rate: float) -> torch.Tensor:
         count = self.training.shape[1]
         order = torch.stack([row[self._permutation(count)] for row in self.training])
-        total = torch.zeros(len(order))
+        total, parameters = torch.zeros(len(order)), self.network.parameters()
         for batch in order.split(self.config.batch_size, dim=1):
             loss = self._loss(batch, jitter=self.config.jitter)
-            optimizer.zero_grad(set_to_none=True)
-            loss.sum().backward()
-            optimizer.step()
+            adam.step(torch.autograd.grad(loss.sum(), parameters), rate)
             total += loss.detach() * batch.shape[1]
         return total / count
 
