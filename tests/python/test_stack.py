@@ -38,6 +38,14 @@ def test_weights_are_those_that_say_most():
     assert stacking_weight(first, second) == pytest.approx(0.7, abs=0.05)
 
 
+def test_an_average_has_to_earn_its_place():
+    # Both know as much, with errors of their own: half of the pairs gain by the average, few say so.
+    generator = np.random.default_rng(2)
+    first, second = generator.normal(2.0, 0.5, (2, 400))
+    assert stacking_weight(first[:9], second[:9]) in (0, 1)
+    assert 0 < stacking_weight(first, second) < 1
+
+
 def test_pours_share_what_they_do_not_differ_by():
     generator = np.random.default_rng(1)
     scales = np.ones((1, 16))

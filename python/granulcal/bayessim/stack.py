@@ -5,9 +5,13 @@ $$ p(u \mid x) = \sum_i w_i p_i(u \mid x), \qquad
 
 over pairs that neither way has seen: where one is wrong with confidence the other holds the truth,
 and the mean log density of the average is never below that of the better one by more than
-$-\log w$. Emulator and network err for different reasons, so that the average gains on both.
+$-\log w$. Emulator and network err for different reasons, so that the average may gain on both.
+An average of two honest densities is too wide (Gneiting and Ranjan), so it has to earn its place:
+it is kept only where its gain on the better one is beyond twice the error of that gain.
 
 Reference:
+    Gneiting and Ranjan, Combining predictive distributions, Electronic Journal of Statistics 7,
+    2013.
     Yao, Vehtari, Simpson and Gelman, Using stacking to average Bayesian predictive distributions,
     Bayesian Analysis 13, 2018.
 """
@@ -25,8 +29,8 @@ __all__ = ["StackedDensity", "stacking_weight"]
 Array = NDArray[np.float64]
 
 _WEIGHTS = np.linspace(0, 1, 21)
-# An average of both is kept only if it gains so much on the better one [nat].
-_WORTHWHILE = 0.01
+# An average of both is kept only if it gains so many standard errors on the better one.
+_WORTHWHILE = 2.0
 
 
 @dataclass(frozen=True)
@@ -69,11 +73,10 @@ def stacking_weight(first: Array, second: Array) -> float:
         second: those of the other, shape (n,).
     """
     with np.errstate(divide="ignore"):
-        scores = [
-            float(np.mean(np.logaddexp(np.log(w) + first, np.log(1 - w) + second)))
-            for w in _WEIGHTS
-        ]
-    best = int(np.argmax(scores))
-    if scores[best] < max(scores[0], scores[-1]) + _WORTHWHILE:
-        return 1.0 if scores[-1] >= scores[0] else 0.0
+        averages = [np.logaddexp(np.log(w) + first, np.log(1 - w) + second) for w in _WEIGHTS]
+    best = int(np.argmax([np.mean(average) for average in averages]))
+    better, alone = (first, 1.0) if np.mean(first) >= np.mean(second) else (second, 0.0)
+    gains = averages[best] - better
+    if np.mean(gains) <= _WORTHWHILE * np.std(gains) / np.sqrt(len(gains)):
+        return alone
     return float(_WEIGHTS[best])
