@@ -7,9 +7,11 @@ over pairs that neither way has seen: where one is wrong with confidence the oth
 and the mean log density of the average is never below that of the better one by more than
 $-\log w$. Emulator and network err for different reasons, so that the average may gain on both.
 An average of two honest densities is too wide (Gneiting and Ranjan), so it has to earn its place:
-it is kept only where its gain on the better one is beyond twice the error of that gain.
+it is kept only where its gain on the better one is beyond the error of that gain (the
+one-standard-error rule of Breiman et al.).
 
 Reference:
+    Breiman, Friedman, Olshen and Stone, Classification and regression trees, 1984, section 3.4.3.
     Gneiting and Ranjan, Combining predictive distributions, Electronic Journal of Statistics 7,
     2013.
     Yao, Vehtari, Simpson and Gelman, Using stacking to average Bayesian predictive distributions,
@@ -30,7 +32,7 @@ Array = NDArray[np.float64]
 
 _WEIGHTS = np.linspace(0, 1, 21)
 # An average of both is kept only if it gains so many standard errors on the better one.
-_WORTHWHILE = 2.0
+_WORTHWHILE = 1.0
 
 
 @dataclass(frozen=True)
