@@ -120,10 +120,15 @@ fn sd(values: &[f64]) -> f64 {
 }
 
 /// Differences of the means over seeds from those of `accurate`, over its seed-to-seed standard deviation, pooled with
-/// the scheme's own; one number for each of the 16.
-fn differences(rows: &HashMap<Key, Row>, point: usize, scheme: &'static str) -> Option<Vec<f64>> {
+/// the scheme's own, over the first so many seeds; one number for each of the 16.
+fn differences(
+    rows: &HashMap<Key, Row>,
+    point: usize,
+    scheme: &'static str,
+    seeds: usize,
+) -> Option<Vec<f64>> {
     let values = |scheme, statistic: usize| -> Option<Vec<f64>> {
-        (1..=SEEDS)
+        (1..=seeds as u64)
             .map(|seed| rows.get(&(point, scheme, seed))?.statistics.get(statistic).copied())
             .collect()
     };
@@ -144,13 +149,15 @@ fn tables(rows: &HashMap<Key, Row>) -> String {
             text,
             "\n`{scheme}`\n\n| mu_s | mu_r | e | s a pour | penetration | ended | rms of 16 | worst | which | above 1 sd |\n|---|---|---|---|---|---|---|---|---|---|"
         );
-        let (mut all, mut seconds) = (Vec::new(), Vec::new());
+        let (mut all, mut seconds, mut pours) = (Vec::new(), Vec::new(), 0);
         for (point, [mu_s, mu_r, e]) in POINTS.into_iter().enumerate() {
             let mine: Vec<_> =
                 (1..=SEEDS).filter_map(|seed| rows.get(&(point, scheme, seed))).collect();
-            if mine.len() < SEEDS as usize {
+            // A spread takes two.
+            if mine.len() < 2 {
                 continue;
             }
+            pours += mine.len();
             let cpu = mean(&mine.iter().map(|row| row.cpu).collect::<Vec<_>>());
             let deepest = mine.iter().map(|row| row.penetration).fold(0.0, f64::max);
             let mut ended: Vec<_> = mine.iter().map(|row| row.status.as_str()).collect();
@@ -162,7 +169,7 @@ fn tables(rows: &HashMap<Key, Row>) -> String {
                 "| {mu_s} | {mu_r} | {e} | {cpu:.2} | {deepest:.3} | {} ",
                 ended.join(", ")
             );
-            match differences(rows, point, scheme) {
+            match differences(rows, point, scheme, mine.len()) {
                 Some(found) => {
                     let rms = (found.iter().map(|d| d * d).sum::<f64>() / 16.0).sqrt();
                     let worst = (0..16).max_by(|&a, &b| found[a].abs().total_cmp(&found[b].abs()));
@@ -181,7 +188,7 @@ fn tables(rows: &HashMap<Key, Row>) -> String {
             let above = all.iter().filter(|d| d.abs() > 1.0).count();
             let _ = writeln!(
                 text,
-                "\nmean {:.2} s a pour; rms {rms:.2} sd; {above} of {} differences above 1 sd",
+                "\n{pours} pours, mean {:.2} s; rms {rms:.2} sd; {above} of {} differences above 1 sd",
                 mean(&seconds),
                 all.len()
             );

@@ -39,7 +39,7 @@ def test_weights_are_those_that_say_most():
 
 
 def test_an_average_has_to_earn_its_place():
-    # Both know as much, with errors of their own: half of the pairs gain by the average, few say so.
+    # Both know as much, with errors of their own: many pairs say that the average gains.
     generator = np.random.default_rng(2)
     first, second = generator.normal(2.0, 0.5, (2, 400))
     assert stacking_weight(first[:9], second[:9]) in (0, 1)
