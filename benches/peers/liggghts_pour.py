@@ -9,7 +9,6 @@ is a mesh of 64 sides, for LIGGGHTS has no cone.
 """
 
 import argparse
-import csv
 import resource
 import subprocess
 import tempfile
@@ -17,46 +16,27 @@ from pathlib import Path
 
 import numpy as np
 from lammps_contact import DENSITY, POISSON, RADIUS, Elastic, Law
-from pile import HALF_WIDTH, TIP, measure
+from pile import HALF_WIDTH, measure
+from pile_file import append, done, is_at_rest, start
 from rows import rows
 
 RESULTS = Path(__file__).parent / "liggghts.csv"
-KEY = ("row", "settings", "young", "seed")
-PILE = ("rest_s", "cpu_s", "max_z", "mean_z", "mean_r", "r95", "worst_overlap", "held", "lost")
 SETTINGS = "epsd"
 
 LOOK = 0.02
 """Time between two looks at rest and overlap [s]."""
-SLOW = 0.01
-"""Speed below which a grain counts as resting [m/s]."""
-RESTING = 0.995
-"""Share of the grains that must be slow at the end of a pour [-]."""
 HORIZON = 2.0
 """When a pour ends at the latest [s]."""
-RINGS = ((0.016, TIP), (0.016, 0.13), (0.06, 0.2))
-"""Radius and height of the funnel's tip, neck and rim [m]."""
-SIDES = 64
-
-
-def start(seed: int) -> np.ndarray:
-    """Returns the centres of the 2000 grains at the start, those of lammps_pour.py [m]."""
-    jitter = np.random.default_rng(seed).uniform(-1e-4, 1e-4, (2000, 3))
-    z, y, x = np.indices((20, 10, 10)).reshape(3, -1)
-    corner = np.array([-0.036, -0.036, RINGS[-1][1] - 4e-3])
-    return 8e-3 * np.stack([x, y, z], axis=1) + corner + jitter
+MESH = Path(__file__).parents[2] / "examples/funnel.stl"
+"""The funnel [mm], binary: 80 bytes of text, the number of triangles, the triangles."""
+TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def funnel() -> str:
-    """Returns the funnel as text of an STL file [m]."""
-    angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
-    rings = np.array(
-        [np.stack([r * np.cos(angle), r * np.sin(angle), 0 * angle + z], 1) for r, z in RINGS]
-    )
-    low, high = rings[:-1], rings[1:]
-    next_low, next_high = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
-    both = [np.stack([low, next_low, next_high], 2), np.stack([low, next_high, high], 2)]
+    """Returns the funnel as text of an STL file [m], which is what LIGGGHTS reads."""
+    corners = 1e-3 * np.fromfile(MESH, TRIANGLE, offset=84)["corners"].astype(float)
     lines = ["solid funnel"]
-    for a, b, c in np.concatenate(both).reshape(-1, 3, 3):
+    for a, b, c in corners:
         normal = np.cross(b - a, c - a)
         lines += ["facet normal {} {} {}".format(*normal / np.linalg.norm(normal)), "outer loop"]
         lines += ["vertex {:.9g} {:.9g} {:.9g}".format(*corner) for corner in (a, b, c)]
@@ -151,12 +131,7 @@ def pour(law: Law, elastic: Elastic, seed: int) -> dict[str, float]:
         looks = frames(place / "looks.txt")
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     rest = next(
-        (
-            k
-            for k, look in enumerate(looks)
-            # Nothing rests before the last grain has fallen.
-            if k * LOOK > 0.6 and (np.linalg.norm(look[:, 3:], axis=1) < SLOW).mean() > RESTING
-        ),
+        (k for k, look in enumerate(looks) if is_at_rest(k * LOOK, look[:, 3:])),
         len(looks) - 1,
     )
     end = looks[rest][:, :3]
@@ -167,14 +142,6 @@ def pour(law: Law, elastic: Elastic, seed: int) -> dict[str, float]:
         "worst_overlap": worst_overlap(looks[: rest + 1]),
         "lost": 2000 - len(end),
     }
-
-
-def done() -> set[tuple[str, ...]]:
-    """Returns the keys of the pours in liggghts.csv."""
-    if not RESULTS.exists():
-        return set()
-    with RESULTS.open() as file:
-        return {tuple(row[name] for name in KEY) for row in csv.DictReader(file)}
 
 
 def main() -> None:
@@ -189,16 +156,10 @@ def main() -> None:
     for seed in range(1, options.seeds + 1):
         for name in options.rows:
             key = (name, SETTINGS, f"{options.young:g}", str(seed))
-            if key in done():
+            if key in done(RESULTS):
                 continue
             result = pour(laws[name], elastic, seed)
-            fresh = not RESULTS.exists()
-            with RESULTS.open("a", newline="") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                if fresh:
-                    writer.writerow(KEY + PILE)
-                writer.writerow([*key, *(f"{result[field]:.4g}" for field in PILE)])
-            print(*key, *(f"{field} {result[field]:.4g}" for field in PILE), flush=True)
+            append(RESULTS, key, result)
 
 
 if __name__ == "__main__":

@@ -120,14 +120,12 @@ impl<'a> Recorder<'a> {
     ) -> Result<(), DatasetError> {
         let time = simulation.time();
         let failed = |source| DatasetError::Mcap { path: self.path.to_owned(), source };
-        let view = look(&scene.camera, &simulation.positions(), &simulation.radii(), seed);
+        let (positions, radii) = (simulation.positions(), simulation.radii());
+        let view = look(&scene.camera, &positions, &radii, seed);
         let further: Vec<_> = scene
             .views
             .iter()
-            .map(|view| {
-                let seen = look_from(view, &simulation.positions(), &simulation.radii());
-                (format!("views/{}", view.name), seen)
-            })
+            .map(|view| (format!("views/{}", view.name), look_from(view, &positions, &radii)))
             .collect();
         let messages = |recorder: &mut Self| -> McapResult<()> {
             recorder.send("/grains", time, &grains(time, simulation))?;

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from granulcal.design.count_model import CountModel, beta_binomial_tail
 from granulcal.design.forecast import SpillForecast
 from granulcal.design.posterior_file import PosteriorDraws
-from granulcal.design.ring_model import HEIGHT
+from granulcal.design.ring_model import HEIGHT, height_prior
 from granulcal.errors import TrainingDataError
 from granulcal.prior import Parameter, Prior
 from granulcal.progress import ProgressLine
@@ -163,8 +163,7 @@ def _check(scene: Scene, heights: tuple[float, float], grains: Sequence[int], po
 
 def _named(draws: PosteriorDraws | None, heights: tuple[float, float]) -> Prior:
     """Names and ranges of what differs between the pours; nothing is drawn from it."""
-    low, high = heights
-    parameters = [Parameter(path=HEIGHT, distribution="uniform", low=low, high=high)]
+    parameters = list(height_prior(heights).parameters)
     for name, values in () if draws is None else zip(draws.names, draws.samples.T, strict=True):
         low, high = float(values.min()), float(np.nextafter(values.max(), np.inf))
         parameters.append(Parameter(path=name, distribution="uniform", low=low, high=high))

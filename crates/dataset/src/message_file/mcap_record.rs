@@ -13,11 +13,9 @@ pub(super) fn parse(op: u8, content: &[u8]) -> McapResult<Record<'_>> {
         // Number; name, encoding.
         op::SCHEMA => skip(content, 2).and_then(string).and_then(string).is_some(),
         // Number, schema; topic, encoding; a map of strings.
-        op::CHANNEL => skip(content, 4)
-            .and_then(string)
-            .and_then(string)
-            .and_then(string_ref)
-            .is_some_and(strings),
+        op::CHANNEL => {
+            skip(content, 4).and_then(string).and_then(string).and_then(map).is_some_and(strings)
+        }
         // Two times, place and length of the chunk; indices of messages; their length; compression.
         op::CHUNK_INDEX => skip(content, 32)
             .and_then(string)
@@ -34,16 +32,20 @@ fn skip(content: &[u8], bytes: usize) -> Option<&[u8]> {
     content.get(bytes..)
 }
 
-/// What comes after a string, or a map, that begins here: its length, its bytes.
-fn string(content: &[u8]) -> Option<&[u8]> {
+/// The bytes that stand here behind their length, and what comes after them.
+fn sized(content: &[u8]) -> Option<(&[u8], &[u8])> {
     let (length, rest) = content.split_first_chunk()?;
-    rest.get(u32::from_le_bytes(*length) as usize..)
+    rest.split_at_checked(u32::from_le_bytes(*length) as usize)
+}
+
+/// What comes after a string, or a map, that begins here.
+fn string(content: &[u8]) -> Option<&[u8]> {
+    sized(content).map(|(_, after)| after)
 }
 
 /// The bytes of a map that begins here.
-fn string_ref(content: &[u8]) -> Option<&[u8]> {
-    let (length, rest) = content.split_first_chunk()?;
-    rest.get(..u32::from_le_bytes(*length) as usize)
+fn map(content: &[u8]) -> Option<&[u8]> {
+    sized(content).map(|(bytes, _)| bytes)
 }
 
 /// Whether there is one whole string after the other.

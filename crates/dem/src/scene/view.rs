@@ -43,10 +43,9 @@ impl ViewSpec {
     }
 
     fn check(&self, path: &str) -> Result<(), DemError> {
-        let coordinates = self.eye.iter().chain(&self.target);
-        coordinates
-            .into_iter()
-            .try_for_each(|&value| finite(&format!("{path}.eye, target"), value))?;
+        for &value in self.eye.iter().chain(&self.target) {
+            finite(&format!("{path}.eye, target"), value)?;
+        }
         positive(&format!("{path}.field_width"), self.field_width)?;
         positive(&format!("{path}: way from eye to target"), self.distance())?;
         for pixels in self.pixels {
