@@ -203,13 +203,18 @@ fn measure_collapse(progress: &Progress) -> Vec<Check> {
 fn measure_repose(progress: &Progress) -> Vec<Check> {
     const RADIUS: f64 = 16.0;
     const SEEDS: u64 = 4;
-    let mut worst_sd = 0.0_f64;
+    let (mut worst_sd, mut trembling) = (0.0_f64, 0);
     let mut series = |name: &str, values: [f64; 4], of: fn(f64) -> Material| {
         let means: Vec<f64> = values
             .iter()
             .map(|&value| {
-                let angles: Vec<f64> =
+                let heaps: Vec<_> =
                     (1..=SEEDS).map(|seed| repose::measure(RADIUS, of(value), seed)).collect();
+                for speed in heaps.iter().filter_map(|heap| heap.trembles) {
+                    progress.line(&format!("repose {name} {value}: trembles at {speed:.1e} m/s"));
+                    trembling += 1;
+                }
+                let angles: Vec<f64> = heaps.iter().map(|heap| heap.angle).collect();
                 let mean = angles.iter().sum::<f64>() / SEEDS as f64;
                 let square: f64 = angles.iter().map(|a| (a - mean) * (a - mean)).sum();
                 let sd = (square / (SEEDS - 1) as f64).sqrt();
@@ -243,6 +248,12 @@ fn measure_repose(progress: &Progress) -> Vec<Check> {
             measured: rolling.1,
             bar: "rises",
             met: rolling.0,
+        },
+        Check {
+            quantity: "Angle of repose: heaps that do not come to rest within 20 s",
+            measured: format!("{trembling} of 32"),
+            bar: "0",
+            met: trembling == 0,
         },
         Check {
             quantity: "Angle of repose: worst sd of four repeats",

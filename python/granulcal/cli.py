@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from granulcal import _native, design_command, loop_command
+from granulcal.files import write_beside
 
 __all__ = ["main"]
 
@@ -286,7 +287,7 @@ def _infer(options: argparse.Namespace) -> int:
     if options.out is not None:
         samples = posterior.sample(_SAMPLES).tolist()
         text = json.dumps({**document, "samples": samples}, indent=1)
-        options.out.write_text(text + "\n", encoding="utf-8")
+        write_beside(options.out, text + "\n")
     if options.json:
         print(json.dumps(document, indent=1))
         return _outcome(recordings)
@@ -305,7 +306,7 @@ def _calibrate(options: argparse.Namespace) -> int:
     from granulcal.scene import Scene
     from granulcal.within_budget import calibrate_within
 
-    scene = Scene.funnel() if str(options.scene) == "funnel" else Scene.load(options.scene)
+    scene = Scene.named(options.scene)
     prior = Prior.default() if str(options.prior) == "default" else Prior.load(options.prior)
     recordings = _recordings(options)
     found = calibrate_within(
@@ -333,9 +334,7 @@ def _calibrate(options: argparse.Namespace) -> int:
         "warnings": [str(warning) for warning in posterior.warnings],
         "samples": posterior.sample(_SAMPLES).tolist(),
     }
-    (options.out / "posterior.json").write_text(
-        json.dumps(document, indent=1) + "\n", encoding="utf-8"
-    )
+    write_beside(options.out / "posterior.json", json.dumps(document, indent=1) + "\n")
     if options.json:
         del document["samples"]
         print(json.dumps(document, indent=1))

@@ -234,7 +234,7 @@ def _spill(options: argparse.Namespace) -> int:
 def _scene(options: argparse.Namespace) -> Any:
     from granulcal.scene import Scene
 
-    scene = Scene.funnel() if str(options.scene) == "funnel" else Scene.load(options.scene)
+    scene = Scene.named(options.scene)
     return scene.with_(dict(options.set))
 
 

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from granulcal import _native
 from granulcal.compare import Scale, comparison_table, nearest_row, standardised_distance
 from granulcal.dataset import Dataset
+from granulcal.files import write_beside
 from granulcal.formation_image import formation_figure
 from granulcal.simulate import Pour
 from granulcal.statistics import DOCS
@@ -148,8 +149,7 @@ def write_report(
         number=_number,
     )
     target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(page, encoding="utf-8")
+    write_beside(target, page)
     return target
 
 

@@ -110,6 +110,16 @@ class Scene:
         return cls(_native.Scene.load(path))
 
     @classmethod
+    def named(cls, name: str | PathLike[str]) -> "Scene":
+        """Returns the scene that a command line names: the word `funnel`, or a TOML file.
+
+        Raises:
+            FileNotFoundError: neither the word nor a file.
+            ValueError: the file is not a scene; the message names the key.
+        """
+        return cls.funnel() if str(name) == "funnel" else cls.load(name)
+
+    @classmethod
     def from_toml(cls, text: str) -> "Scene":
         """Returns the scene written in `text`.
 

@@ -32,7 +32,7 @@ class Pour:
 
     @cached_property
     def positions(self) -> Array:
-        """Centres of the grains [m], ground at z = 0, shape (n, 3)."""
+        """Centres of the grains [m], ground at z = 0, shape (n, 3): of those in the scene."""
         return self._native.positions
 
     @cached_property
@@ -50,9 +50,14 @@ class Pour:
         """Radii of the grains [m], shape (n,)."""
         return self._native.radii
 
+    @cached_property
+    def radii_out(self) -> Array:
+        """Radii of the grains that have left through the scene's outflow [m], shape (m,)."""
+        return self._native.radii_out
+
     @property
     def status(self) -> str:
-        """How the pour ended: `at_rest`, `out_of_view`, `jammed`, `horizon` or `unhealthy`."""
+        """How it ended: `at_rest`, `out_of_view`, `ran_out`, `jammed`, `horizon`, `unhealthy`."""
         return self._native.status
 
     @property
@@ -151,7 +156,8 @@ class Pour:
         """Returns times after the begin of the observation [s] and the samples of what is observed.
 
         Args:
-            name: `front_radius` [m] or `discharged` [%].
+            name: `front_radius` [m], `discharged` [%], `surface_slope` [deg] or the height of the
+                surface at a stated x, `surface_z[0.01]` [m].
 
         Raises:
             KeyError: the scene does not observe it.

@@ -63,9 +63,10 @@ fn a_higher_column_runs_out_farther() {
 fn a_rougher_heap_is_steeper() {
     let slope = |sliding_friction: f64, rolling_friction: f64| {
         let material = Material { sliding_friction, rolling_friction, ..Material::default() };
-        let angle = repose::measure(8.0, material, 1);
-        println!("repose: mu_s {sliding_friction}, mu_r {rolling_friction}: {angle:.1} deg");
-        angle
+        let heap = repose::measure(8.0, material, 1);
+        println!("repose: mu_s {sliding_friction}, mu_r {rolling_friction}: {heap:?}");
+        assert_eq!(heap.trembles, None);
+        heap.angle
     };
     // Measured 9.7, 19.0, 22.8 deg and 20.9, 25, 42.6 deg, give or take two.
     let sliding = [0.1, 0.3, 0.8].map(|friction| slope(friction, 0.1));

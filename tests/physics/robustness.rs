@@ -1,7 +1,7 @@
 //! Scenes that break solvers: nothing, too much, too tight, without loss.
 
 use granulcal::dem::{
-    Funnel, Material, Pour, Scene, Shape, Simulation, SolverSettings, Start, Status, Wall,
+    Funnel, Material, Motion, Pour, Scene, Shape, Simulation, SolverSettings, Start, Status, Wall,
     WallMaterial,
 };
 
@@ -149,4 +149,35 @@ fn only_grains_in_view_must_come_to_rest() {
     scene.camera.field_width = 0.02;
     let pour = Simulation::new(&scene, 2).expect("a valid scene").run();
     assert_eq!(pour.status, Status::OutOfView);
+}
+
+#[test]
+fn a_flat_box_that_sweeps_through_elastic_grains_ends_in_a_status() {
+    // The sides of a box that is thinner than the grains are triangles, of which a grain at an edge touches one and then
+    // another: an impact was foreseen with one that was not there to be met.
+    let mut scene = drop_of(20, 0.0, material(0.0, 0.0, 1.0));
+    scene.gravity = [0.0; 3];
+    let (from, to) = (
+        [0.03742328749565504, 0.01908861407194601, -0.02038328485676038],
+        [0.03742328749565504, 0.01908861407194601, 0.012136265938003224],
+    );
+    scene.start = Start::Cylinder {
+        from,
+        to,
+        radius: 0.013414273659252504,
+        spacing: 0.00760951577150167,
+        jitter: 0.0,
+    };
+    let (min, max) = (
+        [0.0, 0.005683350498119819, 0.007969450686702],
+        [0.035978068084414325, 0.02333280970890467, 0.008169450686701999],
+    );
+    let mut flat = wall(Shape::Box { min, max, open: Vec::new() });
+    let velocity = [0.058548191498042745, 0.0550007629921266, -0.04225288039384166];
+    flat.motion = Motion::Lift { velocity, begin: 0.007736541223090756, end: 0.07592316538059123 };
+    scene.walls.push(flat);
+    scene.end.horizon = 0.13595710978984502;
+    let pour = start(&scene).run();
+    assert_finite(&pour);
+    assert_eq!(pour.status, Status::Unhealthy);
 }

@@ -26,6 +26,7 @@ pub fn block(counts: [usize; 3], spacing: f64, base: f64, material: Material) ->
         end: EndRule { horizon: 100.0, kinetic_energy: f64::MIN_POSITIVE },
         camera: CameraSpec { field_width: 1e3, ..CameraSpec::default() },
         periodic: None,
+        outflow: None,
         views: Vec::new(),
         observe: None,
     }

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use granulcal::dataset::{Observed, Observer, load_scene, observed_statistics};
-use granulcal::dem::{Pour, Scene, Shape, Simulation, Start, Status};
+use granulcal::dem::{Outflow, Pour, Scene, Shape, Simulation, Start, Status};
 
 fn example(name: &str) -> Scene {
     let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "examples", name].iter().collect();
@@ -130,6 +130,15 @@ fn a_hopper_runs_out_evenly_and_a_narrow_one_jams() {
     let worst = middle.iter().map(|(t, p)| (*p - rate * *t - offset).abs()).fold(0.0, f64::max);
     println!("hopper: {rate} %/s, {worst} % off a line");
     assert!(worst < 2.0, "{worst} {rate}");
+    // Grains that are taken away below the outlet change nothing above it, and cost nothing any more.
+    let outflow = Some(Outflow { below: 0.12, until: Some(95.0) });
+    let out = Seen::of(&Scene { outflow, ..scene.clone() });
+    assert_eq!(out.pour.status, Status::RanOut);
+    assert!((out.value("discharge_rate") / rate - 1.0).abs() < 0.05, "{rate}");
+    let (left, here) = (out.pour.radii_out.len(), out.pour.positions.len());
+    assert!(left + here == scene.grains.count && left as f64 >= 0.95 * scene.grains.count as f64);
+    let work = |seen: &Seen| seen.pour.health.mean_contacts * seen.pour.health.substeps as f64;
+    assert!(work(&out) < 0.8 * work(&seen), "{} {}", work(&out), work(&seen));
     // An outlet of two and a half grains: below the five at which holes begin to jam.
     let narrow = with(&scene, &[("walls.1.shape.radius_from", 5e-3), ("end.horizon", 2.0)]);
     let seen = Seen::of(&narrow);

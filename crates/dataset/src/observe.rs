@@ -254,6 +254,7 @@ mod tests {
             velocities: vec![Vector3::zeros(); 81],
             angular_velocities: vec![Vector3::zeros(); 81],
             radii: vec![radius; 81],
+            radii_out: Vec::new(),
             positions,
             status: Status::AtRest,
             health: Health::default(),

@@ -34,8 +34,8 @@ pub struct ObservedStatistic {
 /// A number over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// The name of its statistics, without brackets.
-    pub name: &'static str,
+    /// The name of its statistics, without the time in brackets.
+    pub name: String,
     /// Its unit.
     pub unit: &'static str,
     /// When each sample was taken, after the observation's begin `[s]`.
@@ -45,8 +45,8 @@ pub struct Series {
 }
 
 impl Series {
-    fn new(name: &'static str, unit: &'static str) -> Self {
-        Self { name, unit, times: Vec::new(), values: Vec::new() }
+    fn new(name: impl Into<String>, unit: &'static str) -> Self {
+        Self { name: name.into(), unit, times: Vec::new(), values: Vec::new() }
     }
 
     fn push(&mut self, time: f64, value: f64) {
@@ -75,6 +75,8 @@ struct Frame {
     time: f64,
     positions: Vec<Vector3<f64>>,
     radii: Vec<f64>,
+    /// Of the grains that have left the scene.
+    radii_out: Vec<f64>,
 }
 
 /// One kind of observation.
@@ -86,8 +88,8 @@ trait Observation: Debug + Send {
     /// Values of the statistics once the pour has ended.
     fn values(&self, pour: &Pour) -> Vec<f64>;
     /// What it has seen over time.
-    fn series(&self) -> Option<&Series> {
-        None
+    fn series(&self) -> &[Series] {
+        &[]
     }
     /// Whether a pour that has come to rest is jammed.
     fn is_jammed(&self, _pour: &Pour) -> bool {
@@ -207,7 +209,8 @@ impl Observer {
         }
         self.next = ((time + half - self.begin) * self.rate).floor().max(0.0) as u64 + 1;
         let (positions, radii) = (simulation.positions(), simulation.radii());
-        let frame = Frame { time: time - self.begin, positions, radii };
+        let radii_out = simulation.radii_out();
+        let frame = Frame { time: time - self.begin, positions, radii, radii_out };
         for observation in &mut self.observations {
             observation.see(&frame);
         }
@@ -223,7 +226,7 @@ impl Observer {
         };
         Observed {
             statistics: self.observations.iter().flat_map(|o| values(o.as_ref())).collect(),
-            series: self.observations.iter().filter_map(|o| o.series().cloned()).collect(),
+            series: self.observations.iter().flat_map(|o| o.series().to_vec()).collect(),
         }
     }
 

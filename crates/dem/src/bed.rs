@@ -85,6 +85,8 @@ pub(crate) struct Bed {
     pub clocks: Vec<f64>,
     /// Mass of a typical grain over the grain's mass `[-]`; impulses are in units of that mass.
     pub inverse_mass: Vec<f64>,
+    /// Whether each grain has left the scene; empty as long as none has.
+    left: Vec<bool>,
     /// Along which axis space repeats; the scene says it, not the state.
     #[serde(skip)]
     pub period: Option<Period>,
@@ -112,6 +114,7 @@ impl Bed {
             bodies: vec![Body::default(); count + 1],
             clocks: vec![0.0; count],
             inverse_mass,
+            left: Vec::new(),
             period: scene.periodic.as_ref().map(Period::of),
         }
     }
@@ -126,6 +129,7 @@ impl Bed {
             && self.bodies.len() > count
             && self.clocks == start.clocks
             && self.inverse_mass == start.inverse_mass
+            && (self.left.is_empty() || self.left.len() == count)
             && self.places.iter().zip(&start.places).all(|(a, b)| a.0[3] == b.0[3])
             && self.places[count] == start.places[count]
             && self.bodies[count] == start.bodies[count];
@@ -134,6 +138,44 @@ impl Bed {
 
     pub fn count(&self) -> usize {
         self.inverse_mass.len()
+    }
+
+    /// Whether a grain has left the scene. It stays where it left, at rest, and touches nothing.
+    #[inline]
+    pub fn has_left(&self, grain: usize) -> bool {
+        self.left.get(grain).is_some_and(|&left| left)
+    }
+
+    /// The grains that are in the scene.
+    pub fn present(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.count()).filter(|&grain| !self.has_left(grain))
+    }
+
+    /// Takes the grains with their centre below `height` `[m]` out of the scene; whether there were any.
+    pub fn let_out(&mut self, height: f64) -> bool {
+        let out: Vec<usize> = self.present().filter(|&i| self.position(i).z < height).collect();
+        if !out.is_empty() {
+            self.left.resize(self.count(), false);
+        }
+        for &grain in &out {
+            self.left[grain] = true;
+            self.bodies[grain] = Body::default();
+        }
+        !out.is_empty()
+    }
+
+    /// Share of the grains' mass that has left `[-]`.
+    pub fn share_out(&self) -> f64 {
+        let mass = |grain: usize| 1.0 / self.inverse_mass[grain];
+        let out: f64 = (0..self.count()).filter(|&i| self.has_left(i)).map(mass).sum();
+        out / (0..self.count()).map(mass).sum::<f64>().max(f64::MIN_POSITIVE)
+    }
+
+    /// Keeps the grains that have left at rest, whatever has acted on all.
+    pub fn hold_those_out(&mut self) {
+        for (body, _) in self.bodies.iter_mut().zip(&self.left).filter(|(_, left)| **left) {
+            *body = Body::default();
+        }
     }
 
     /// Centre of a grain `[m]`.
@@ -197,7 +239,7 @@ impl Bed {
     pub fn work_of(&self, acceleration: &Vector3<f64>, dt: f64) -> f64 {
         let step = dt * acceleration;
         let work = |i| (self.velocity(i) + 0.5 * step).dot(&step) / self.inverse_mass[i];
-        (0..self.count()).map(work).sum()
+        self.present().map(work).sum()
     }
 
     /// Makes room for so many bodies that stand for moving walls, after the resting one.

@@ -330,7 +330,7 @@ impl Contacts {
         self.near_walls.clear();
         let (paths, walls) = (&self.paths, &around.walls);
         let list = |grains: Range<usize>, found: &mut Vec<(Listed, bool)>| {
-            for grain in grains {
+            for grain in grains.filter(|&grain| !bed.has_left(grain)) {
                 let Path { from, velocity } = &paths[grain];
                 let near = bed.radius(grain) + NEAR * around.radius + interval * velocity.norm();
                 let range = near + around.margin - NEAR * around.radius;

@@ -244,15 +244,25 @@ impl Meeting {
         }
     }
 
-    fn with_wall(i: usize, surface: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
+    /// `None` where the wall is not at hand: the grain's place at the foreseen time may be, by a rounding, past its edge.
+    fn with_wall(
+        i: usize,
+        surface: usize,
+        time: f64,
+        bed: &Bed,
+        around: &Surroundings,
+    ) -> Option<Self> {
         let place = bed.place_at(i, time).vector();
         let law = around.wall_law(bed, i, surface);
         let (wall, near) =
             (around.walls.wall(surface), around.walls.nearest(surface, &place, time));
+        if near.distance.is_infinite() {
+            return None;
+        }
         let normal = near.normal;
         let (velocity, omega) = wall.motion_at(&(place - near.distance * normal));
         let spin = bed.radius(i) * omega;
-        Self {
+        Some(Self {
             law,
             material: wall.material,
             normal,
@@ -260,7 +270,7 @@ impl Meeting {
             velocity: velocity + normal.cross(&spin),
             spin,
             falling: normal.dot(&around.gravity) * (time - 0.5 * around.settings.dt),
-        }
+        })
     }
 }
 
@@ -272,7 +282,7 @@ fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> 
     let meeting = if let Some(j) = other {
         Meeting::with_grain(i, j, time, bed, around)
     } else {
-        Meeting::with_wall(i, pair.partner as usize - bed.count(), time, bed, around)
+        Meeting::with_wall(i, pair.partner as usize - bed.count(), time, bed, around)?
     };
     let Meeting { law, material, normal, velocity, spin: spin_j, falling } = meeting;
     let ([c_i, c_j], [l_i, l_j]) = (law.inverse_mass, law.lever);
@@ -301,7 +311,8 @@ fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> 
     let a_r = INVERSE_INERTIA * (l_i * l_i * c_i + l_j * l_j * c_j);
     let (about, limit) = (normal.dot(&rho), law.torsional_friction * lambda_n);
     let rolling = shorten((about * normal - rho) / a_r, law.rolling_friction * lambda_n);
-    let lambda_r = rolling + (-about / a_r).clamp(-limit, limit) * normal;
+    // Not `clamp`, which panics at a NaN: what is not finite is for the health to see.
+    let lambda_r = rolling + (-about / a_r).max(-limit).min(limit) * normal;
     let roll = INVERSE_INERTIA * lambda_r;
 
     let body = &mut bed.bodies[i];

@@ -76,7 +76,7 @@ pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
     BoxSide, CameraSpec, EndRule, Ends, Funnel, GRAVITY, Grains, Ground, Mask, Mesh, MeshFile,
     Motion, NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill,
-    ObserveSurface, Periodic, PeriodicAxis, Projection, Scene, SensorSpec, Shape, Start,
+    ObserveSurface, Outflow, Periodic, PeriodicAxis, Projection, Scene, SensorSpec, Shape, Start,
     StereoSpec, TimeOfFlightSpec, ViewSpec, Wall,
 };
 pub use simulation::Simulation;

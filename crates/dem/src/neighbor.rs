@@ -73,11 +73,11 @@ impl PairSearch {
         self.starts.clear();
         self.added.clear();
         self.outside.clear();
-        if bed.count() < 2 {
+        if bed.present().count() < 2 {
             return;
         }
         self.sweep_balls(bed, paths, reach);
-        self.sort_into_cells();
+        self.sort_into_cells(bed);
         let search = &*self;
         threads.gather_ranges(self.cells[1] * self.cells[2], ROWS, found, |rows, found| {
             let first = found.len();
@@ -100,7 +100,8 @@ impl PairSearch {
         period: &Period,
         found: &mut Vec<Neighbours>,
     ) {
-        for (grain, path) in paths.iter().enumerate() {
+        for grain in bed.present() {
+            let path = &paths[grain];
             let (i, middle) = (grain as u32, self.middles[grain] + period.step());
             self.around(&Ball { middle, reach: self.reaches[grain] }, |j| {
                 // The lower of the two is the one that is shifted.
@@ -186,8 +187,7 @@ impl PairSearch {
     }
 
     /// Counting sort by cell. A cell is as wide as the two widest balls reach, so that partners are neighbours.
-    fn sort_into_cells(&mut self) {
-        let count = self.middles.len();
+    fn sort_into_cells(&mut self, bed: &Bed) {
         let (mut low, mut high) = (self.middles[0], self.middles[0]);
         for middle in &self.middles {
             low = low.inf(middle);
@@ -210,7 +210,13 @@ impl PairSearch {
         self.latest.clear();
         self.latest.resize(total, 0);
         self.cell_of.clear();
-        for middle in &self.middles {
+        let mut count = 0;
+        for (grain, middle) in self.middles.iter().enumerate() {
+            if bed.has_left(grain) {
+                self.cell_of.push(u32::MAX);
+                continue;
+            }
+            count += 1;
             let [x, y, z] = [0, 1, 2].map(|axis| ((middle[axis] - low[axis]) / edge) as usize);
             let cell = (z * self.cells[1] + y) * self.cells[0] + x;
             self.cell_of.push(cell as u32);
@@ -227,8 +233,9 @@ impl PairSearch {
             buffer.resize(count + CHUNK, 0.0);
         }
         // Backwards, so that each start ends up at the first slot of its cell.
-        for grain in (0..count).rev() {
-            let start = &mut self.starts[self.cell_of[grain] as usize];
+        let cells = self.cell_of.iter().enumerate().rev();
+        for (grain, &cell) in cells.filter(|(_, cell)| **cell != u32::MAX) {
+            let start = &mut self.starts[cell as usize];
             *start -= 1;
             let slot = *start as usize;
             self.order[slot] = grain as u32;

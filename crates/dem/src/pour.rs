@@ -15,6 +15,8 @@ pub enum Status {
     AtRest,
     /// Every grain that still moves is out of the camera's view.
     OutOfView,
+    /// As much of the grains as the scene's outflow waits for has left.
+    RanOut,
     /// The flow has stopped, but grains remain in the funnel.
     Jammed,
     /// The end rule's horizon was reached first.
@@ -25,14 +27,15 @@ pub enum Status {
 
 impl Status {
     /// Every status.
-    pub const ALL: [Self; 5] =
-        [Self::AtRest, Self::OutOfView, Self::Jammed, Self::Horizon, Self::Unhealthy];
+    pub const ALL: [Self; 6] =
+        [Self::AtRest, Self::OutOfView, Self::RanOut, Self::Jammed, Self::Horizon, Self::Unhealthy];
 
     /// The word used in Parquet, on the command line and in Python.
     pub fn name(self) -> &'static str {
         match self {
             Self::AtRest => "at_rest",
             Self::OutOfView => "out_of_view",
+            Self::RanOut => "ran_out",
             Self::Jammed => "jammed",
             Self::Horizon => "horizon",
             Self::Unhealthy => "unhealthy",
@@ -46,7 +49,7 @@ impl fmt::Display for Status {
     }
 }
 
-/// Grains at the end of a pour.
+/// Grains at the end of a pour: those that have not left the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pour {
     /// Centres `[m]`, ground at z = 0.
@@ -57,6 +60,8 @@ pub struct Pour {
     pub angular_velocities: Vec<Vector3<f64>>,
     /// Radii `[m]`.
     pub radii: Vec<f64>,
+    /// Radii of the grains that have left through the scene's outflow `[m]`.
+    pub radii_out: Vec<f64>,
     /// How it ended.
     pub status: Status,
     /// Whether it can be trusted, in numbers.

@@ -7,6 +7,7 @@ mod camera;
 mod mesh;
 mod motion;
 mod observe;
+mod outflow;
 pub(crate) mod path;
 mod periodic;
 mod sensor;
@@ -22,6 +23,7 @@ pub use motion::Motion;
 pub use observe::{
     Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill, ObserveSurface,
 };
+pub use outflow::Outflow;
 pub use periodic::{Periodic, PeriodicAxis};
 pub use sensor::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 pub use start::Start;
@@ -66,6 +68,9 @@ pub struct Scene {
     /// Space that repeats along an axis, if it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub periodic: Option<Periodic>,
+    /// Where grains leave the scene, if they do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outflow: Option<Outflow>,
     /// What the plain model lacks, each off unless stated.
     #[serde(default, skip_serializing_if = "Effects::is_plain")]
     pub effects: Effects,
@@ -102,7 +107,7 @@ impl Grains {
     }
 }
 
-/// When a pour ends: at rest, with every moving grain out of view, or at the horizon.
+/// When a pour ends: at rest, with every moving grain out of view, or at the horizon. [`Outflow::until`] may end it before.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EndRule {
@@ -136,6 +141,7 @@ impl Scene {
             funnel: Some(Funnel { height, ..Funnel::default() }),
             walls: Vec::new(),
             periodic: None,
+            outflow: None,
             effects: Effects::default(),
             end: EndRule::default(),
             camera: CameraSpec::default(),
@@ -245,6 +251,9 @@ impl Scene {
         }
         if let Some(periodic) = &self.periodic {
             periodic.check(self.grains.diameter)?;
+        }
+        if let Some(outflow) = &self.outflow {
+            outflow.check()?;
         }
         if let Some(observe) = &self.observe {
             observe.check(self.end.horizon, self.grains.diameter)?;

@@ -112,42 +112,48 @@ impl Simulation {
         self.substep as f64 * self.around.settings.dt
     }
 
-    /// Centres of the grains `[m]`.
+    /// Centres of the grains `[m]`; as velocities and radii, of those that have not left the scene.
     pub fn positions(&self) -> Vec<Vector3<f64>> {
-        (0..self.bed.count()).map(|grain| self.bed.position(grain)).collect()
+        self.bed.present().map(|grain| self.bed.position(grain)).collect()
     }
 
     /// Velocities of the grains `[m/s]`.
     pub fn velocities(&self) -> Vec<Vector3<f64>> {
-        (0..self.bed.count()).map(|grain| self.bed.velocity(grain)).collect()
+        self.bed.present().map(|grain| self.bed.velocity(grain)).collect()
     }
 
     /// Angular velocities of the grains `[rad/s]`.
     pub fn angular_velocities(&self) -> Vec<Vector3<f64>> {
-        (0..self.bed.count()).map(|grain| self.bed.angular_velocity(grain)).collect()
+        self.bed.present().map(|grain| self.bed.angular_velocity(grain)).collect()
     }
 
     /// Radii of the grains `[m]`.
     pub fn radii(&self) -> Vec<f64> {
-        (0..self.bed.count()).map(|grain| self.bed.radius(grain)).collect()
+        self.bed.present().map(|grain| self.bed.radius(grain)).collect()
     }
 
-    /// Sets a grain in motion: velocity `[m/s]` and angular velocity `[rad/s]` at its centre. A pour that had
+    /// Radii of the grains that have left through the scene's outflow `[m]`.
+    pub fn radii_out(&self) -> Vec<f64> {
+        let grains = 0..self.bed.count();
+        grains.filter(|&i| self.bed.has_left(i)).map(|i| self.bed.radius(i)).collect()
+    }
+
+    /// Sets a grain, by its number at the start, in motion: velocity `[m/s]` and angular velocity `[rad/s]` at its centre. A pour that had
     /// ended goes on, and the energy put in does not count as created.
     ///
     /// Velocities live at the middle of substeps (x += dt v after v += dt g): for a motion v at the present
     /// time set v - dt g / 2.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`] for a grain that is not there or a number that is not finite.
+    /// [`DemError::OutOfRange`] for a grain that is not there, or no longer, or a number that is not finite.
     pub fn set_motion(
         &mut self,
         grain: usize,
         velocity: Vector3<f64>,
         angular_velocity: Vector3<f64>,
     ) -> Result<(), DemError> {
-        if grain >= self.bed.count() {
-            let allowed = "less than the number of grains";
+        if grain >= self.bed.count() || self.bed.has_left(grain) {
+            let allowed = "less than the number of grains, and in the scene";
             return Err(DemError::range("grain", grain as f64, allowed));
         }
         for (name, vector) in [("velocity", velocity), ("angular_velocity", angular_velocity)] {
@@ -236,6 +242,7 @@ impl Simulation {
             state_hash: self.state_hash(),
             positions: self.positions(),
             radii: self.radii(),
+            radii_out: self.radii_out(),
         }
     }
 
@@ -271,6 +278,7 @@ impl Simulation {
         if let Some(drag) = &around.effects.drag {
             drag.act(bed, &around.gravity, dt);
         }
+        bed.hold_those_out();
     }
 
     /// Lets pulls act, after the impacts: what a pull adds in a substep to a closed contact is not an impact.
@@ -330,8 +338,13 @@ impl Simulation {
         self.watch.see_solve(&work);
     }
 
-    /// Looks at the state between two searches: health and the end rule.
+    /// Looks at the state between two searches: outflow, health and the end rule.
     fn examine(&mut self) {
+        if let Some(outflow) = &self.origin.scene.outflow
+            && self.bed.let_out(outflow.below)
+        {
+            self.contacts.forget_list();
+        }
         if self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period) {
             let Contacts { pairs, at_walls, .. } = &mut self.contacts;
             let residual = nsgs::ResidualSums::of(&[pairs, at_walls], &mut self.bed.bodies);

@@ -2,8 +2,8 @@
 //! happened. A scene that was ever found to break something has a test of its own in `tests/physics/robustness.rs`.
 
 use granulcal_dem::{
-    BoxSide, EndRule, Ends, Funnel, Grains, Ground, MAX_ENERGY_CREATED, Material, Motion, Periodic,
-    PeriodicAxis, Preset, Scene, Shape, Simulation, Start, Status, Wall, WallMaterial,
+    BoxSide, EndRule, Ends, Funnel, Grains, Ground, MAX_ENERGY_CREATED, Material, Motion, Outflow,
+    Periodic, PeriodicAxis, Preset, Scene, Shape, Simulation, Start, Status, Wall, WallMaterial,
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -161,7 +161,10 @@ fn scene() -> impl Strategy<Value = Scene> {
     let end = (1.0..SUBSTEPS, log(1e-14, 1e-2));
     let preset = prop::sample::select(&Preset::ALL[..]);
     let period = prop::option::weighted(0.2, (any::<bool>(), -20.0..20.0, 8.0..60.0));
-    (radius, begin(), prop::option::of(funnel()), walls, gravity(), material(), preset, end, period)
+    let until = prop::option::of(prop_oneof![Just(100.0), 1.0..100.0]);
+    let outflow = prop::option::weighted(0.2, (-5.0..30.0, until));
+    let rules = (end, period, outflow);
+    (radius, begin(), prop::option::of(funnel()), walls, gravity(), material(), preset, rules)
         .prop_map(
             |(
                 radius,
@@ -171,8 +174,7 @@ fn scene() -> impl Strategy<Value = Scene> {
                 gravity,
                 material,
                 preset,
-                (substeps, energy),
-                period,
+                ((substeps, energy), period, outflow),
             )| Scene {
                 name: "random".to_owned(),
                 preset,
@@ -192,6 +194,8 @@ fn scene() -> impl Strategy<Value = Scene> {
                     // Rounding must not make the shortest too short.
                     to: radius * (from + (1.0 + 1e-9) * length),
                 }),
+                outflow: outflow
+                    .map(|(below, until): (f64, _)| Outflow { below: radius * below, until }),
                 views: Vec::new(),
                 observe: None,
             },
@@ -319,9 +323,10 @@ proptest! {
             && health.worst_penetration <= settings.max_penetration
             && health.energy_created <= MAX_ENERGY_CREATED;
         prop_assert_eq!(is_sound, pour.status != Status::Unhealthy, "{:?} {:?}", pour.status, health);
-        // Walls that move put energy in, and so does a slope without end.
+        // Walls that move put energy in, and so does a slope without end; what leaves takes its own with it.
         let is_closed = scene.walls.iter().all(|wall| wall.motion.is_still())
-            && scene.periodic.is_none();
+            && scene.periodic.is_none()
+            && scene.outflow.is_none();
         if is_sound && is_closed {
             prop_assert!(created <= MAX_ENERGY_CREATED * scale * (1.0 + 1e-9), "{created} {health:?}");
         }
@@ -329,10 +334,11 @@ proptest! {
             pour.positions.iter().filter(|centre| funnel.holds(centre, 0.0)).count()
         });
         prop_assert_eq!(held, pour.grains_in_funnel);
+        prop_assert_eq!(pour.positions.len() + pour.radii_out.len(), scene.grains.count);
         match pour.status {
             Status::Jammed => prop_assert!(held > 0),
             Status::AtRest | Status::OutOfView => prop_assert_eq!(held, 0),
-            Status::Horizon | Status::Unhealthy => {}
+            Status::RanOut | Status::Horizon | Status::Unhealthy => {}
         }
     }
 }

@@ -44,6 +44,11 @@ impl Pour {
     }
 
     #[getter]
+    fn radii_out<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.radii_out)
+    }
+
+    #[getter]
     fn status(&self) -> &'static str {
         self.status.name()
     }

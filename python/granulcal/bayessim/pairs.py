@@ -15,7 +15,7 @@ __all__ = ["TrainingPairs"]
 
 Array = NDArray[np.float64]
 
-KEPT_STATUSES = ("at_rest", "out_of_view", "horizon")
+KEPT_STATUSES = ("at_rest", "out_of_view", "ran_out", "horizon")
 # A jammed pour is healthy, but no formation: what is learned is p(theta | x, the funnel emptied).
 EXCLUDED_STATUSES = ("unhealthy", "jammed", "no_grains_in_view")
 # Fewer pairs than this cannot be split into training, validation and test.

@@ -32,6 +32,7 @@ pub fn scene(positions: &[Vector3<f64>], material: Material, walls: Vec<Wall>) -
         end: EndRule { horizon: 1e3, kinetic_energy: f64::MIN_POSITIVE },
         camera: CameraSpec { field_width: 1e3, ..CameraSpec::default() },
         periodic: None,
+        outflow: None,
         views: Vec::new(),
         observe: None,
     }
@@ -99,11 +100,13 @@ pub fn settle(scene: &Scene) -> Vec<Vector3<f64>> {
 
 /// Advances until the grains are at rest in the mean.
 pub fn wait_for_rest(simulation: &mut Simulation) {
-    wait_for_rest_above(simulation, f64::NEG_INFINITY);
+    let speed = wait_for_rest_above(simulation, f64::NEG_INFINITY);
+    assert!(speed.is_none(), "the grains do not come to rest: {speed:?} m/s");
 }
 
-/// Advances until the grains above `level` `[m]` are at rest in the mean; the others may go on.
-pub fn wait_for_rest_above(simulation: &mut Simulation, level: f64) {
+/// Advances until the grains above `level` `[m]` are at rest in the mean; the others may go on. If they do not come to
+/// rest, their root mean square speed `[m/s]`.
+pub fn wait_for_rest_above(simulation: &mut Simulation, level: f64) -> Option<f64> {
     let until = simulation.time() + PATIENCE;
     loop {
         simulation.advance(0.02);
@@ -116,9 +119,11 @@ pub fn wait_for_rest_above(simulation: &mut Simulation, level: f64) {
             }
         }
         if energy <= SETTLED * f64::from(count) {
-            return;
+            return None;
         }
-        assert!(simulation.time() < until, "the grains do not come to rest: {energy}");
+        if simulation.time() >= until {
+            return Some((2.0 * energy / f64::from(count)).sqrt());
+        }
     }
 }
 

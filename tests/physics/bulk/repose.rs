@@ -32,8 +32,17 @@ pub fn grains(radius: f64) -> usize {
     (POURED * 2.0 * 0.58 * radius.powi(3) * 30f64.to_radians().tan()).round() as usize
 }
 
-/// The slope `[deg]` of a heap on a plate of `radius` diameters.
-pub fn measure(radius: f64, material: Material, seed: u64) -> f64 {
+/// A heap on a plate.
+#[derive(Debug, Clone, Copy)]
+pub struct Heap {
+    /// Its slope `[deg]`.
+    pub angle: f64,
+    /// The root mean square speed of its grains, if they do not come to rest `[m/s]`.
+    pub trembles: Option<f64>,
+}
+
+/// A heap on a plate of `radius` diameters.
+pub fn measure(radius: f64, material: Material, seed: u64) -> Heap {
     let plate_height = PLATE * DIAMETER;
     let plate_radius = radius * DIAMETER;
     let tip = plate_height + TIP * plate_radius;
@@ -65,7 +74,7 @@ pub fn measure(radius: f64, material: Material, seed: u64) -> f64 {
     let mut simulation = start(&poured);
     // Only the heap must come to rest.
     simulation.advance(0.1);
-    wait_for_rest_above(&mut simulation, plate_height);
+    let trembles = wait_for_rest_above(&mut simulation, plate_height);
     let run_over = simulation.positions().iter().filter(|p| p.z < plate_height).count();
     assert!(run_over > 0, "{material:?}: the plate of {radius} d is not full");
     let heap: Vec<Vector3<f64>> = simulation
@@ -74,7 +83,7 @@ pub fn measure(radius: f64, material: Material, seed: u64) -> f64 {
         .filter(|p| p.z > plate_height && p.z < tip && p.x.hypot(p.y) < plate_radius)
         .copied()
         .collect();
-    slope(&heap, plate_radius, plate_height).to_degrees()
+    Heap { angle: slope(&heap, plate_radius, plate_height).to_degrees(), trembles }
 }
 
 /// Angle of the line through the surface over the distance from the axis.

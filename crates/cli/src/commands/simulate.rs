@@ -29,6 +29,9 @@ struct Report {
     wall_s: f64,
     simulated_s: f64,
     grains_in_funnel: usize,
+    /// Grains that have left through the scene's outflow; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    grains_out: Option<usize>,
     /// Hash of every bit of the final state, in hexadecimal digits.
     state_hash: String,
     /// Null with too few grains in view.
@@ -76,6 +79,7 @@ pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
         wall_s: 0.0,
         simulated_s: pour.simulated_s,
         grains_in_funnel: pour.grains_in_funnel,
+        grains_out: scene.outflow.map(|_| pour.radii_out.len()),
         state_hash: format!("{:032x}", pour.state_hash),
         statistics: None,
         diagnostics: None,
@@ -141,7 +145,7 @@ fn tell_observed(scene: &Scene, pour: &Pour, observer: &Observer, report: &mut R
     let names = observed_statistics(scene).into_iter().map(|statistic| statistic.name);
     report.observed = Some(names.zip(observed.statistics.into_iter().map(Value::from)).collect());
     let entry = |s: granulcal_dataset::Series| {
-        (s.name.to_owned(), json!({ "unit": s.unit, "times": s.times, "values": s.values }))
+        (s.name, json!({ "unit": s.unit, "times": s.times, "values": s.values }))
     };
     report.series = observed.series.into_iter().map(entry).collect();
 }
@@ -162,6 +166,9 @@ fn print(report: &Report, scene: &Scene, json: bool) -> anyhow::Result<()> {
     print_line(&format!("worst penetration  {:.4} radii", health.worst_penetration))?;
     print_line(&format!("energy created     {:.2e}", health.energy_created))?;
     print_line(&format!("grains lost        {}", health.grains_lost))?;
+    if let Some(out) = report.grains_out {
+        print_line(&format!("grains out         {out}"))?;
+    }
     if report.grains_in_funnel > 0 {
         print_line(&format!("grains in funnel   {}", report.grains_in_funnel))?;
     }

@@ -20,9 +20,11 @@ impl Discharge {
         Self { spec: spec.clone(), series: Series::new("discharged", "%") }
     }
 
-    /// Share of the mass below the height `[%]`; masses go with the cube of the radius.
-    fn percent(&self, positions: &[Vector3<f64>], radii: &[f64]) -> f64 {
-        let (mut out, mut all) = (0.0, 0.0);
+    /// Share of the mass below the height or out of the scene `[%]`; masses go with the cube of the radius.
+    fn percent(&self, positions: &[Vector3<f64>], radii: &[f64], radii_out: &[f64]) -> f64 {
+        // Those that have left the scene have run out.
+        let mut out = radii_out.iter().map(|radius| radius.powi(3)).sum::<f64>();
+        let mut all = out;
         for (position, radius) in positions.iter().zip(radii) {
             let mass = radius.powi(3);
             all += mass;
@@ -51,7 +53,8 @@ impl Observation for Discharge {
     }
 
     fn see(&mut self, frame: &Frame) {
-        self.series.push(frame.time, self.percent(&frame.positions, &frame.radii));
+        let percent = self.percent(&frame.positions, &frame.radii, &frame.radii_out);
+        self.series.push(frame.time, percent);
     }
 
     fn values(&self, pour: &Pour) -> Vec<f64> {
@@ -60,12 +63,12 @@ impl Observation for Discharge {
         self.spec.times.iter().map(at).chain([rate(times, values)]).collect()
     }
 
-    fn series(&self) -> Option<&Series> {
-        Some(&self.series)
+    fn series(&self) -> &[Series] {
+        std::slice::from_ref(&self.series)
     }
 
     fn is_jammed(&self, pour: &Pour) -> bool {
-        self.percent(&pour.positions, &pour.radii) < self.spec.jammed_below
+        self.percent(&pour.positions, &pour.radii, &pour.radii_out) < self.spec.jammed_below
     }
 }
 

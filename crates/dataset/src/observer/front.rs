@@ -48,7 +48,7 @@ impl Observation for Front {
         self.spec.times.iter().map(at).chain([end]).collect()
     }
 
-    fn series(&self) -> Option<&Series> {
-        Some(&self.series)
+    fn series(&self) -> &[Series] {
+        std::slice::from_ref(&self.series)
     }
 }

@@ -1,7 +1,8 @@
 //! The observer against pours whose answers are known.
 
 use granulcal_dem::{
-    Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill, ObserveSurface, Start,
+    Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill, ObserveSurface, Outflow,
+    Start,
 };
 
 use super::*;
@@ -66,8 +67,13 @@ fn a_falling_grain_is_seen_where_it_is() {
     // A grain on the axis covers every circle up to its own radius; circles are a quarter of it apart.
     assert!((value(&scene, &observed, "front_radius[0.05]") - 0.002).abs() < 5.1e-4);
     assert!(value(&scene, &observed, "surface_slope").is_nan());
-    let series = &observed.series[1];
-    assert_eq!((series.name, series.unit, series.times[0]), ("discharged", "%", 0.0));
+    let series = |name: &str| observed.series.iter().find(|s| s.name == name).expect(name);
+    let surface = series("surface_z[0]");
+    // It falls into the picture, and at the end its top is seen to a sixteenth of its radius.
+    assert!(surface.values[0].is_nan());
+    assert!((surface.values.last().unwrap() - 4e-3).abs() < 2e-4, "{:?}", surface.values.last());
+    let series = series("discharged");
+    assert_eq!((series.unit, series.times[0]), ("%", 0.0));
     let gaps: Vec<_> = series.times.windows(2).map(|t| t[1] - t[0]).collect();
     let (dt, inner) = (scene.preset.settings().dt, &gaps[..gaps.len() - 1]);
     assert!(inner.iter().all(|gap| (gap - 0.002).abs() <= dt), "{gaps:?}");
@@ -93,7 +99,7 @@ fn what_was_before_a_restart_is_not_made_up() {
     let observed = observer.observed(&pour);
     assert!(value(&scene, &observed, "discharged[0.03]").is_nan());
     assert_eq!(value(&scene, &observed, "discharged[0.1]"), 100.0);
-    assert!(observed.series[0].times[0] >= 0.06 - 1e-3);
+    assert!(observed.series.iter().all(|series| series.times[0] >= 0.06 - 1e-3));
 }
 
 #[test]
@@ -108,6 +114,28 @@ fn a_pour_at_rest_that_has_not_run_out_is_jammed() {
     assert!(!jammed(&scene));
     scene.observe.as_mut().unwrap().discharge.as_mut().unwrap().jammed_below = 50.0;
     assert!(jammed(&scene));
+}
+
+#[test]
+fn what_has_left_the_scene_has_run_out_and_ends_the_pour() {
+    let mut scene = scene();
+    scene.outflow = Some(Outflow { below: 0.02, until: Some(100.0) });
+    let (pour, observer) = run(&scene);
+    assert_eq!((pour.status, pour.positions.len(), pour.radii_out.len()), (Status::RanOut, 0, 1));
+    // It passes 20 mm after sqrt(2 32 mm / g) = 80.8 ms.
+    let look = scene.preset.settings().list_period as f64 * scene.preset.settings().dt;
+    assert!((0.0..=look).contains(&(pour.simulated_s - 0.0807)), "{}", pour.simulated_s);
+    let observed = observer.observed(&pour);
+    let (_, share) = observed
+        .series
+        .iter()
+        .find(|s| s.name == "discharged")
+        .map(|s| (&s.times, &s.values))
+        .unwrap();
+    assert_eq!((share[0], *share.last().unwrap()), (0.0, 100.0));
+    assert_eq!(value(&scene, &observed, "spilled"), 0.0);
+    scene.outflow = Some(Outflow { below: -1.0, until: Some(100.0) });
+    assert_eq!(run(&scene).0.status, Status::AtRest);
 }
 
 #[test]

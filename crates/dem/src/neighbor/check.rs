@@ -16,8 +16,9 @@ impl PairSearch {
         let cells = x.checked_mul(y).and_then(|cells| cells.checked_mul(z));
         let fits = cells.and_then(|cells| cells.checked_add(1)) == Some(self.starts.len())
             && self.starts.is_sorted()
-            && self.starts.last().is_some_and(|&end| end as usize == grains)
-            && self.order.len() == grains
+            && self.starts.last().is_some_and(|&end| end as usize == self.order.len())
+            // Those that have left are in no cell.
+            && self.order.len() <= grains
             && self.order.iter().all(|&grain| (grain as usize) < grains)
             && self.edge > 0.0
             && self.latest.len() + 1 == self.starts.len()

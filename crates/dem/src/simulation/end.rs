@@ -10,6 +10,10 @@ impl Simulation {
     /// How the pour has ended, if it has. It must have looked so twice within [`REST_LOOKS`]: a grain at the
     /// top of its bounce is slow, too, but once, while a pile whose last grain trembles is slow now and then.
     pub(super) fn end_reached(&mut self) -> Option<Status> {
+        let until = self.origin.scene.outflow.and_then(|outflow| outflow.until);
+        if until.is_some_and(|percent| 100.0 * self.bed.share_out() >= percent) {
+            return Some(Status::RanOut);
+        }
         if self.time() < self.origin.scene.moves_until() {
             return None;
         }
@@ -33,7 +37,7 @@ impl Simulation {
             let is_jammed = self.in_funnel().next().is_some();
             Some(if is_jammed { Status::Jammed } else { status })
         };
-        if energies.iter().sum::<f64>() <= threshold * energies.len() as f64 {
+        if energies.iter().sum::<f64>() <= threshold * self.bed.present().count() as f64 {
             return jammed_or(Status::AtRest);
         }
         let still = |(grain, energy): (usize, &f64)| {
@@ -58,6 +62,6 @@ impl Simulation {
         let funnel = self.origin.scene.funnel.as_ref();
         let time = self.time();
         let is_held = move |grain| funnel.is_some_and(|f| f.holds(&self.bed.position(grain), time));
-        (0..self.bed.count()).filter(move |&grain| is_held(grain))
+        self.bed.present().filter(move |&grain| is_held(grain))
     }
 }

@@ -66,7 +66,8 @@ impl Simulation {
             return Err(strange("more bytes than a state has"));
         }
         let State { substep, seemed_ended, ended, bed, contacts, bridges, watch } = state;
-        let (bed, contacts, watch) = (bed.into_owned(), contacts.into_owned(), watch.into_owned());
+        let (mut bed, contacts, watch) =
+            (bed.into_owned(), contacts.into_owned(), watch.into_owned());
         bed.check_like(&self.bed).map_err(strange)?;
         contacts.check(self.bed.count(), self.around.walls.surfaces()).map_err(strange)?;
         if !watch.is_of(self.bed.count()) {
@@ -76,8 +77,8 @@ impl Simulation {
             return Err(strange("substeps that do not fit"));
         }
         (self.substep, self.seemed_ended, self.ended) = (substep, seemed_ended, ended);
-        let period = self.bed.period;
-        (self.bed, self.contacts, self.watch) = (Bed { period, ..bed }, contacts, watch);
+        bed.period = self.bed.period;
+        (self.bed, self.contacts, self.watch) = (bed, contacts, watch);
         self.bridges = bridges.into_owned();
         self.impacts = Impacts::default();
         Ok(self)
