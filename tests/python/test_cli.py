@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from safetensors.numpy import load_file, save_file
 
 import granulcal as gc
 from granulcal.cli import main
@@ -72,6 +73,29 @@ def test_infer_prints_json_and_writes_files(model, recording, tmp_path, capsys):
     assert written["parameters"] == printed["parameters"]
     assert np.shape(written["samples"]) == (1000, 3)
     assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def _without_python(model: Path, recording: tuple[str, str]) -> dict:
+    words = ["granulcal-cli", "infer", str(model), recording[0], "--camera", recording[1], "--json"]
+    code = f"from granulcal import _native; raise SystemExit(_native.run_cli({words}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 3), done.stderr
+    return json.loads(done.stdout)
+
+
+def test_the_table_of_a_model_says_what_its_emulator_does(model, recording, tmp_path):
+    said = _without_python(model, recording)
+    tensors = load_file(model / "weights.safetensors")
+    table = [name for name in tensors if name.startswith("pool_")]
+    assert len(table) == 3
+    kept = {name: array for name, array in tensors.items() if name not in table}
+    shifted = {**tensors, "pool_means": tensors["pool_means"] + 1}
+    for changed, is_same in ((kept, True), (shifted, False)):
+        other = shutil.copytree(model, tmp_path / str(is_same))
+        save_file(changed, other / "weights.safetensors")
+        again = _without_python(other, recording)
+        means = [[p["mean"] for p in each["parameters"].values()] for each in (said, again)]
+        assert np.allclose(*means, rtol=1e-3) == is_same, means
 
 
 def test_infer_prints_a_table(model, recording, capsys):

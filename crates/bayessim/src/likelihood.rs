@@ -27,7 +27,34 @@ pub struct Likelihood {
     emulator: Emulator,
     noise: Noise,
     widening: f64,
-    pool: OnceLock<Vec<(Vec<f64>, Prediction)>>,
+    pool: OnceLock<Pool>,
+}
+
+/// Evenly spread points of the prior and what the emulator expects there.
+#[derive(Debug)]
+struct Pool {
+    points: Vec<Vec<f64>>,
+    at: Vec<Prediction>,
+}
+
+/// What a model's file says that its emulator of so many axes expects at the pool, if it does.
+fn expected_at_pool(
+    tensors: &Tensors,
+    axes: usize,
+) -> Result<Option<Vec<Prediction>>, ModelError> {
+    let read = |name| tensors.matrix_if_there(name, POOL, axes);
+    let (Some(means), Some(scales), Some(unknown)) =
+        (read("pool_means")?, read("pool_scales")?, read("pool_unknown")?)
+    else {
+        return Ok(None);
+    };
+    let squares = |row: &[f64]| row.iter().map(|sd| sd * sd).collect();
+    let at = |i| Prediction {
+        means: means.row(i).to_vec(),
+        noise: squares(scales.row(i)),
+        unknown: squares(unknown.row(i)),
+    };
+    Ok(Some((0..POOL).map(at).collect()))
 }
 
 /// Mean of some pours on the signal axes, and how much they differ.
@@ -38,17 +65,27 @@ struct Observed {
 }
 
 impl Likelihood {
-    pub fn read(tensors: &Tensors, document: &Document, p: usize) -> Result<Self, ModelError> {
+    pub fn read(
+        tensors: &Tensors,
+        document: &Document,
+        coordinates: &Coordinates,
+        p: usize,
+    ) -> Result<Self, ModelError> {
         let (s, scalars) = (document.x_names.len(), &document.emulator);
         let count = scalars.axis_count;
         let root = tensors.matrix("emulator_leading_root", count, count)?;
         let features = document.config.emulator_features;
+        let pool = OnceLock::new();
+        if let Some(at) = expected_at_pool(tensors, count)? {
+            let points = coordinates.quasi_prior(POOL);
+            pool.set(Pool { points, at }).expect("a lock that is still empty");
+        }
         Ok(Self {
             axes: tensors.matrix("emulator_axes", s, s)?,
             emulator: Emulator::read(tensors, p, s, features, count)?,
             noise: Noise::new(&root, scalars.leading_degrees),
             widening: scalars.widening,
-            pool: OnceLock::new(),
+            pool,
         })
     }
 
@@ -57,11 +94,12 @@ impl Likelihood {
         let observed = self.observe(z);
         let pool = self.pool.get_or_init(|| {
             let points = coordinates.quasi_prior(POOL);
-            points.into_par_iter().map(|u| (u.clone(), self.emulator.predict(&u))).collect()
+            let at = points.par_iter().map(|u| self.emulator.predict(u)).collect();
+            Pool { points, at }
         });
         let log_weights: Vec<_> =
-            pool.par_iter().map(|(_, at)| self.of_prediction(&observed, at)).collect();
-        let draws = pool.iter().map(|(u, _)| u.clone()).collect();
+            pool.at.par_iter().map(|at| self.of_prediction(&observed, at)).collect();
+        let draws = pool.points.clone();
         let found = Importance::of_prior_draws(draws, &log_weights);
         if found.effective_sample_size() >= FEWEST_EFFECTIVE {
             return found;

@@ -66,9 +66,9 @@ impl Model {
         let names = prior.free().iter().map(|&i| prior.names()[i].to_owned()).collect();
         Ok(Self {
             names,
-            coordinates,
             standardiser: Standardiser::read(&tensors, s)?,
-            likelihood: Likelihood::read(&tensors, &document, p)?,
+            likelihood: Likelihood::read(&tensors, &document, &coordinates, p)?,
+            coordinates,
             network,
             emulator_weight: document.emulator_weight,
             prior,

@@ -28,6 +28,19 @@ impl<'a> Tensors<'a> {
         Ok(self.any(name, &shape)?.0)
     }
 
+    /// A matrix of this shape, or `None` where there is no such tensor.
+    pub fn matrix_if_there(
+        &self,
+        name: &str,
+        rows: usize,
+        columns: usize,
+    ) -> Result<Option<Matrix>, ModelError> {
+        if self.arrays.tensor(name).is_err() {
+            return Ok(None);
+        }
+        self.matrix(name, rows, columns).map(Some)
+    }
+
     /// A matrix of this shape.
     pub fn matrix(&self, name: &str, rows: usize, columns: usize) -> Result<Matrix, ModelError> {
         Ok(Matrix { data: self.take(name, &[rows, columns])?, columns })
