@@ -38,10 +38,7 @@ struct Pool {
 }
 
 /// What a model's file says that its emulator of so many axes expects at the pool, if it does.
-fn expected_at_pool(
-    tensors: &Tensors,
-    axes: usize,
-) -> Result<Option<Vec<Prediction>>, ModelError> {
+fn expected_at_pool(tensors: &Tensors, axes: usize) -> Result<Option<Vec<Prediction>>, ModelError> {
     let read = |name| tensors.matrix_if_there(name, POOL, axes);
     let (Some(means), Some(scales), Some(unknown)) =
         (read("pool_means")?, read("pool_scales")?, read("pool_unknown")?)
