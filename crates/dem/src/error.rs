@@ -52,6 +52,16 @@ pub enum DemError {
         /// How deep one may be.
         allowed: f64,
     },
+    /// Grains would leave the scene before they have moved.
+    #[error(
+        "{grains} grain(s) start below outflow.below = {below} m, where they would leave at once; at most 0 is allowed"
+    )]
+    StartBelowOutflow {
+        /// How many.
+        grains: usize,
+        /// The outflow's height `[m]`.
+        below: f64,
+    },
     /// Arrays of a state differ in length.
     #[error("{name} has {got} entries, expected one for each of the {expected} grains")]
     Length {

@@ -1,4 +1,4 @@
-//! Whether the grains of a start are clear of the walls.
+//! Whether the grains of a start are clear of the walls and of the outflow.
 
 use super::Simulation;
 use crate::DemError;
@@ -7,12 +7,20 @@ use crate::DemError;
 const MAX_DEPTH: f64 = 0.25;
 
 impl Simulation {
-    /// Refuses grains that are deep in a wall now, which a pour could only answer by throwing them out of it. To ask
+    /// Refuses grains that have left the scene before they move, and those that are deep in a wall now, which a pour could only answer by throwing them out of it. To ask
     /// before the first substep, of a start that somebody has written.
     ///
     /// # Errors
-    /// [`DemError::StartInWall`] names the wall that most grains are in, how many they are and how deep the deepest is.
+    /// [`DemError::StartBelowOutflow`]; [`DemError::StartInWall`] names the wall that most grains are in, how many they are and how deep the deepest is.
     pub fn check_start(&self) -> Result<(), DemError> {
+        if let Some(outflow) = &self.origin.scene.outflow {
+            let below = outflow.below;
+            let is_out = |grain: &usize| self.bed.position(*grain).z < below;
+            let grains = self.bed.present().filter(is_out).count();
+            if grains > 0 {
+                return Err(DemError::StartBelowOutflow { grains, below });
+            }
+        }
         let mut around = self.around.clone();
         around.move_walls(self.time());
         let walls = &around.walls;
@@ -55,7 +63,7 @@ impl Simulation {
 
 #[cfg(test)]
 mod tests {
-    use crate::scene::{Ends, Shape, Start, Wall};
+    use crate::scene::{Ends, Outflow, Shape, Start, Wall};
     use crate::{DemError, Motion, Scene, Simulation, WallMaterial};
 
     fn check(scene: &Scene) -> Result<(), DemError> {
@@ -82,6 +90,16 @@ mod tests {
         let knots = vec![[0.5, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]];
         scene.walls[1].motion = Motion::Trajectory { file: None, knots };
         assert!(check(&scene).is_err());
+    }
+
+    #[test]
+    fn a_start_below_the_outflow_is_refused() {
+        let mut scene = Scene::drop(0.1);
+        scene.outflow = Some(Outflow { below: 0.09, until: None });
+        check(&scene).unwrap();
+        scene.outflow = Some(Outflow { below: 1.0, until: None });
+        let error = check(&scene).unwrap_err();
+        assert!(matches!(error, DemError::StartBelowOutflow { grains: 2000, .. }), "{error}");
     }
 
     #[test]
