@@ -228,6 +228,16 @@ impl Bed {
         0.5 * self.velocity(grain).norm_squared() / self.inverse_mass[grain]
     }
 
+    /// The mean of that over the grains in the scene; 0 without any.
+    pub fn mean_translation(&self) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for grain in self.present() {
+            sum += self.translation(grain);
+            count += 1.0;
+        }
+        sum / f64::max(count, 1.0)
+    }
+
     /// Kinetic and potential energy of all grains per typical mass `[m^2/s^2]`.
     pub fn energy(&self, gravity: &Vector3<f64>) -> f64 {
         (0..self.count())

@@ -70,6 +70,9 @@ pub struct SolverSettings {
     pub relaxation: f64,
     /// Change of a contact's impulses in a sweep below which they have settled, in radii a substep `[-]`.
     pub settled: f64,
+    /// Sweeps in a substep, at least, while the grains hardly move, unless the impulses settle before: a heap whose
+    /// weight has not reached its foot creeps.
+    pub quiet_sweeps: usize,
     /// Sweeps in a substep, at most: hard impacts on dense packings need more than quiet flow.
     pub max_sweeps: usize,
     /// Way by which a contact may still close against its constraint in a substep, in radii `[-]`;
@@ -100,6 +103,7 @@ impl SolverSettings {
             return Err(DemError::range("settings.relaxation", self.relaxation, "in [1, 2)"));
         }
         positive("settings.settled", self.settled)?;
+        positive("settings.quiet_sweeps", self.quiet_sweeps as f64)?;
         positive("settings.max_sweeps", self.max_sweeps as f64)?;
         positive("settings.closing", self.closing)?;
         positive("settings.list_period", self.list_period as f64)?;
@@ -123,6 +127,7 @@ impl Preset {
                 sweeps: 4,
                 relaxation: 1.4,
                 settled: 1e-11,
+                quiet_sweeps: 24,
                 max_sweeps: 30,
                 closing: 0.04,
                 list_period: 2,
@@ -137,6 +142,7 @@ impl Preset {
                 sweeps: 4,
                 relaxation: 1.4,
                 settled: 1e-11,
+                quiet_sweeps: 24,
                 max_sweeps: 40,
                 closing: 0.02,
                 list_period: 5,
@@ -151,6 +157,7 @@ impl Preset {
                 sweeps: 12,
                 relaxation: 1.4,
                 settled: 1e-11,
+                quiet_sweeps: 24,
                 max_sweeps: 120,
                 closing: 0.002,
                 list_period: 8,
@@ -166,6 +173,7 @@ impl Preset {
                 sweeps: 6,
                 relaxation: 1.4,
                 settled: 1e-11,
+                quiet_sweeps: 24,
                 max_sweeps: 60,
                 closing: 0.06,
                 list_period: 1,

@@ -26,6 +26,10 @@ use crate::solver::frozen::FrozenSolve;
 use crate::solver::{self, nsgs};
 use crate::wall_load::{self, WallLoad};
 
+/// Mean energy of a grain's translation over that of a fall by its radius below which grains hardly move `[-]`.
+const QUIET: f64 = 0.0025;
+/// Change of an impulse in a sweep over that by gravity in a substep below which it has settled in a quiet state `[-]`.
+const QUIET_SETTLED: f64 = 1e-2;
 /// Examinations between two looks at the residual, which costs about a sweep.
 const RESIDUAL_PERIOD: usize = 4;
 /// A scene in motion.
@@ -43,6 +47,8 @@ pub struct Simulation {
     bridges: Bridges,
     origin: Arc<Origin>,
     substep: usize,
+    /// Whether the grains hardly moved at the last examination.
+    is_quiet: bool,
     watch: HealthWatch,
     /// The last end that the end rule saw, and at which substep.
     seemed_ended: Option<(Status, usize)>,
@@ -77,6 +83,7 @@ impl Simulation {
             bridges: Bridges::default(),
             origin: Arc::new(Origin { scene: scene.clone(), seed }),
             substep: 0,
+            is_quiet: false,
             seemed_ended: None,
             ended: None,
         })
@@ -334,7 +341,9 @@ impl Simulation {
         let Contacts { pairs, at_walls, .. } = &mut self.contacts;
         let (bodies, around) = (&mut self.bed.bodies, &self.around);
         let sets = &mut [pairs, at_walls];
-        let work = solver::solve(sets, bodies, &around.settings, around.radius, &around.threads);
+        let settings = &around.settings;
+        let still = self.is_quiet.then(|| QUIET_SETTLED * around.gravity.norm() * settings.dt);
+        let work = solver::solve(sets, bodies, settings, still, around.radius, &around.threads);
         self.watch.see_solve(&work);
     }
 
@@ -350,6 +359,8 @@ impl Simulation {
             let residual = nsgs::ResidualSums::of(&[pairs, at_walls], &mut self.bed.bodies);
             self.watch.see_residual(residual.relative());
         }
+        let fall = self.around.effects.gravity.norm() * self.around.radius;
+        self.is_quiet = self.bed.mean_translation() <= QUIET * fall;
         self.watch.see_contacts(self.contacts.count());
         self.watch.see_energy(self.bed.energy(&self.around.effects.gravity));
         self.ended = self.end_reached().map(|status| {

@@ -80,11 +80,13 @@ pub(crate) struct Work {
 }
 
 /// Solves the contacts of `sets` together, from the impulses that they carry and velocities without them;
-/// `radius` is that of a typical grain `[m]`.
+/// `still` is the change of an impulse that counts as none in a quiet state, if this is one `[m/s]`, `radius` that of a
+/// typical grain `[m]`.
 pub(crate) fn solve(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
     settings: &SolverSettings,
+    still: Option<f64>,
     radius: f64,
     threads: &Threads,
 ) -> Work {
@@ -93,7 +95,7 @@ pub(crate) fn solve(
     }
     let too_fast = settings.closing * radius / settings.dt;
     match settings.method {
-        Method::Nsgs => nsgs::solve(sets, bodies, settings, radius, threads),
+        Method::Nsgs => nsgs::solve(sets, bodies, settings, still, radius, threads),
         Method::NewtonPcr => newton_pcr::solve(sets, bodies, &settings.newton, too_fast, threads),
         Method::Reference => reference::solve(sets, bodies, &settings.reference, threads),
     }

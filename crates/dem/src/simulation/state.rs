@@ -23,6 +23,7 @@ use crate::pour::Status;
 #[derive(Serialize, Deserialize)]
 struct State<'a> {
     substep: usize,
+    is_quiet: bool,
     seemed_ended: Option<(Status, usize)>,
     ended: Option<Status>,
     bed: Cow<'a, Bed>,
@@ -65,7 +66,7 @@ impl Simulation {
         if !rest.is_empty() {
             return Err(strange("more bytes than a state has"));
         }
-        let State { substep, seemed_ended, ended, bed, contacts, bridges, watch } = state;
+        let State { substep, is_quiet, seemed_ended, ended, bed, contacts, bridges, watch } = state;
         let (mut bed, contacts, watch) =
             (bed.into_owned(), contacts.into_owned(), watch.into_owned());
         bed.check_like(&self.bed).map_err(strange)?;
@@ -76,6 +77,7 @@ impl Simulation {
         if substep != header.substep || seemed_ended.is_some_and(|(_, at)| at > substep) {
             return Err(strange("substeps that do not fit"));
         }
+        self.is_quiet = is_quiet;
         (self.substep, self.seemed_ended, self.ended) = (substep, seemed_ended, ended);
         bed.period = self.bed.period;
         (self.bed, self.contacts, self.watch) = (bed, contacts, watch);
@@ -98,6 +100,7 @@ impl Simulation {
     fn state(&self) -> Vec<u8> {
         let state = State {
             substep: self.substep,
+            is_quiet: self.is_quiet,
             seemed_ended: self.seemed_ended,
             ended: self.ended,
             bed: Cow::Borrowed(&self.bed),

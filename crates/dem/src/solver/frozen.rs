@@ -57,7 +57,8 @@ impl FrozenSolve {
         settings.check()?;
         let Self { mut sets, mut bed, radius } = self.clone();
         let mut both = sets.each_mut();
-        let work = solver::solve(&mut both, &mut bed.bodies, settings, radius, &Threads::default());
+        let work =
+            solver::solve(&mut both, &mut bed.bodies, settings, None, radius, &Threads::default());
         let residual = ResidualSums::of(&both, &mut bed.bodies).relative();
         let batches = sets.iter().flat_map(|set| &set.batches);
         let grains = &bed.bodies[..bed.count()];
@@ -85,7 +86,7 @@ impl FrozenSolve {
         let before = ResidualSums::of(&warm_sets, &mut warm.bed.bodies).squares();
         let Self { mut sets, mut bed, radius } = self.clone();
         let mut both = sets.each_mut();
-        solver::solve(&mut both, &mut bed.bodies, settings, radius, &Threads::default());
+        solver::solve(&mut both, &mut bed.bodies, settings, None, radius, &Threads::default());
         [before, ResidualSums::of(&both, &mut bed.bodies).squares()]
     }
 }

@@ -40,21 +40,24 @@ impl Progress {
 }
 
 /// Sweeps over all contacts: at least `settings.sweeps` times unless the impulses have settled, and until none
-/// closes too fast, but no more than `settings.max_sweeps` times.
+/// closes too fast, but no more than `settings.max_sweeps` times. In a quiet state at least `settings.quiet_sweeps` times
+/// unless the impulses change by less than `still` `[m/s]`.
 pub(super) fn solve(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
     settings: &SolverSettings,
+    still: Option<f64>,
     radius: f64,
     threads: &Threads,
 ) -> Work {
     let too_fast = settings.closing * radius / settings.dt;
     let settled = settings.settled * radius / settings.dt;
     let mut work = Work::default();
-    let mut has_settled = false;
+    let (mut has_settled, mut is_still) = (false, false);
     for sweeps in 1..=settings.max_sweeps {
         // The last sweeps are plain ones: they leave a contact by itself exactly solved.
-        let is_enough = has_settled || sweeps >= settings.sweeps;
+        let asked = if still.is_none() || is_still { 0 } else { settings.quiet_sweeps };
+        let is_enough = has_settled || sweeps >= settings.sweeps.max(asked);
         let relaxation = if is_enough { 1.0 } else { settings.relaxation };
         let Progress { closing, change } =
             sweep(sets, bodies, Manner::relaxed(relaxation), threads);
@@ -63,6 +66,7 @@ pub(super) fn solve(
             return work;
         }
         has_settled = change <= settled;
+        is_still = still.is_some_and(|still| change <= still);
     }
     Work { unconverged: work.closing > too_fast, ..work }
 }

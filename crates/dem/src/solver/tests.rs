@@ -69,7 +69,7 @@ fn solved(
     settings: &SolverSettings,
 ) -> (ContactSet, Vec<Body>, Work) {
     let (mut set, mut bodies) = (set.clone(), bodies.to_vec());
-    let work = solve(&mut [&mut set], &mut bodies, settings, 2e-3, &Threads::default());
+    let work = solve(&mut [&mut set], &mut bodies, settings, None, 2e-3, &Threads::default());
     (set, bodies, work)
 }
 
