@@ -1,0 +1,155 @@
+"""Conditions whose numbers hang together, recordings that are means, how they are read."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.errors import ObservationError, TrainingDataError
+from granulcal.experiments import loop_drum
+from granulcal.loop.archive import Archive, Plan
+from granulcal.loop.close import planned
+from granulcal.loop.library import by_name
+from granulcal.loop.task import FIT, SEALED, Condition, Task
+
+SCENE = """
+name = "small"
+[grains]
+count = 60
+diameter = 4e-3
+density = 1300.0
+[start]
+kind = "ball"
+height = 0.02
+solid_fraction = 0.6
+jitter = 5e-5
+[end]
+horizon = 1.0
+[camera]
+projection = "orthographic"
+field_width = 0.2
+pixels = 60
+downsample = 1
+height_threshold = 1e-3
+"""
+PRIOR = """
+[[parameter]]
+path = "material.sliding_friction"
+distribution = "uniform"
+low = 0.3
+high = 0.8
+"""
+# Two numbers that move together.
+LOW = {"start.height": 0.02, "end.horizon": 1.0, "grains.density": 1300.0}
+HIGH = {"start.height": 0.05, "end.horizon": 1.2, "grains.density": 1300.0}
+
+
+def task(between: bool, *, averaged: bool = False, effects: tuple[str, ...] = ("tilt.y",)) -> Task:
+    recordings = (Path("a.npz"),)
+    return Task(
+        gc.Scene.from_toml(SCENE),
+        gc.Prior.from_toml(PRIOR),
+        (
+            Condition("low", LOW, FIT, recordings, averaged=averaged),
+            Condition("high", HIGH, FIT, recordings, averaged=averaged),
+        ),
+        by_name(effects),
+        between=between,
+    )
+
+
+def test_fewer_than_three_pours_are_refused_unless_each_is_a_mean_over_time() -> None:
+    with pytest.raises(ObservationError, match="at least 3 pours .* got 2 .*averaged = true"):
+        task(True)
+    assert len(task(True, averaged=True).conditions) == 2
+    sealed = Condition("low", LOW, SEALED, (Path("a.npz"),), averaged=True)
+    with pytest.raises(ObservationError, match="got 0"):
+        Task(gc.Scene.from_toml(SCENE), gc.Prior.from_toml(PRIOR), (sealed,), by_name([]))
+
+
+def test_pours_at_the_conditions_alone_have_all_their_numbers() -> None:
+    between, places = task(True, averaged=True), task(False, averaged=True)
+    assert [path for path, _, _ in between.inputs] == ["start.height", "end.horizon"]
+    assert between.places == ()
+    # One number tells two conditions apart; the other goes with it.
+    assert places.inputs == (("start.height", 0.02, 0.05),)
+    assert places.places == tuple(
+        {path: at[path] for path in ("start.height", "end.horizon")} for at in (LOW, HIGH)
+    )
+    plan = planned(places, 420, 0)
+    assert plan.places == places.places and plan.conditions == places.inputs
+    assert (plan.base, plan.each) == (300, 78)
+
+
+def test_an_archive_at_the_conditions_alone(tmp_path: Path) -> None:
+    asked = task(False, averaged=True, effects=("tilt.y", "count"))
+    plan = Plan(
+        scene=asked.at_first(),
+        prior=asked.prior,
+        conditions=asked.inputs,
+        library=asked.library,
+        base=6,
+        each=8,
+        places=asked.places,
+    )
+    archive = Archive(tmp_path / "archive", plan)
+    archive.fill(threads=1, say=lambda _: None, progress=False)
+    folders = sorted(p.name for p in (tmp_path / "archive").iterdir() if p.is_dir())
+    assert folders[:2] == ["base-at-0", "base-at-1"] and "effect-count-3-at-1" in folders
+    for number, at in enumerate((LOW, HIGH)):
+        there = gc.Dataset.load(tmp_path / "archive" / f"base-at-{number}").scene
+        assert all(there.get(path) == value for path, value in at.items())
+    pours = archive.pours()
+    assert len(pours.x) + pours.left_out == 6 + 8 + 8
+    # Base pours first, those of both places.
+    assert np.all(pours.psi[:6] == 0)
+    assert sorted(pours.condition[:6, 0].tolist()) == [0, 0, 0, 1, 1, 1]
+    assert set(pours.condition[:, 0].tolist()) == {0.0, 1.0}
+    # No pour of one place is one of the other.
+    assert len(np.unique(pours.theta[:6])) == 6
+    strengths = np.unique(pours.psi[:, 1])
+    assert strengths == pytest.approx([0, 0.25, 0.5, 0.75, 1.0], abs=0.04)
+    # The same conditions with pours between them are another archive, and the other way round.
+    with pytest.raises(TrainingDataError, match="is of another places"):
+        Archive(tmp_path / "archive", Plan(**{**plan.__dict__, "places": ()}))
+
+
+def test_how_a_recording_is_read_is_the_tasks_to_say(tmp_path: Path) -> None:
+    # A mound of 12 mm on a flat bed, and a frame of 5 pixels that is a fault.
+    edge = np.linspace(-1, 1, 60)
+    mound = 0.012 * np.maximum(0.0, 1 - 9 * (edge[:, None] ** 2 + edge[None] ** 2))
+    mound[:5], mound[-5:], mound[:, :5], mound[:, -5:] = 0.02, 0.02, 0.02, 0.02
+    path = tmp_path / "map.npz"
+    np.savez(path, depthmap=1e3 * mound, xres=3.4, yres=3.4, zres=1.0, scale="mm")
+    scene = gc.Scene.from_toml(SCENE).with_({"grains.count": 400})
+
+    def largest(**reading: float) -> float:
+        one = Condition("map", {}, FIT, (path,), reading=reading)
+        return float(one.statistics(scene)[0, 0])
+
+    assert largest(border_px=6, height_threshold=1e-3) == pytest.approx(0.012, rel=0.05)
+    # The faults are no grains of this scene.
+    with pytest.raises(ObservationError, match="times that: is the recording of this scene"):
+        largest()
+
+
+def test_the_drums_walls_turn_together_and_its_effects_fit_the_scene(tmp_path: Path) -> None:
+    # Pictures stand where the measured ones would; what they show does not matter here.
+    folder = tmp_path / "granudrum-mcc"
+    folder.mkdir()
+    for rpm in (15, 45):
+        (folder / f"gd_nature_{rpm}rpm_averaged.bmp").write_bytes(struct.pack("<2s", b"BM"))
+    asked = loop_drum.task(tmp_path, (15,))
+    assert [c.use for c in asked.conditions] == [FIT, SEALED]
+    assert [path for path, _, _ in asked.inputs] == ["walls.0.motion.rate"]
+    slow, fast = asked.places
+    assert slow["walls.0.motion.rate"] == slow["walls.1.motion.rate"] == pytest.approx(np.pi / 2)
+    assert fast["walls.1.motion.rate"] == pytest.approx(3 * np.pi / 2)
+    scene = asked.at_first()
+    for entry in asked.library:
+        effect = entry.at(scene)
+        changed = scene.with_(effect.numbers(1.0))
+        assert changed.get(effect.path) == effect.value(1.0)
+        assert effect.strength(np.array([effect.value(0.5)]))[0] == pytest.approx(0.5, abs=1e-3)
