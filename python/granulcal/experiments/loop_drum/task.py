@@ -1,33 +1,24 @@
-"""The loop on a rotating drum of MCC spheres: one time-averaged picture at each of two speeds.
-
-Fitted are both speeds; as a cross-check each is fitted alone with the other sealed, from the same
-pours. What the model predicts at speeds that were not measured here is written down, too.
-"""
+"""What is asked of the drum: scene, prior, conditions and candidates."""
 
 from pathlib import Path
 
 import numpy as np
 
-from granulcal.loop.close import Closed, close_loop
 from granulcal.loop.library import LibraryEffect, by_name
-from granulcal.loop.page import write_page
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.prior import Parameter, Prior
 from granulcal.scene import Scene
 
-__all__ = ["ASKED", "EFFECTS", "at_speed", "reproduce", "task"]
+__all__ = ["EFFECTS", "SPEEDS", "at_speed", "task"]
 
-_SCENE = Path(__file__).with_suffix(".toml")
+_SCENE = Path(__file__).with_name("drum.toml")
 _FOLDER = Path("granudrum-mcc")
 # Width of the picture, which is the drum's inner diameter [m].
 _WIDTH = 0.084
-_BUDGET = 702
 # Rounds a minute of the two pictures, and when the simulated mean begins and ends [s].
-_SPEEDS = {15: (0.8, 1.1), 45: (0.5, 0.8)}
+SPEEDS = {15: (0.8, 1.1), 45: (0.5, 0.8)}
 # Of solidsizer_mcc.csv above 0.6 mm; below are 7 % of the grains and 0.05 % of the volume.
 _SPREAD = 0.078
-# Which speeds are fitted; the others are sealed.
-ASKED = {"both": (15, 45), "fit-15": (15,), "fit-45": (45,)}
 
 EFFECTS: tuple[LibraryEffect, ...] = (
     LibraryEffect(
@@ -120,23 +111,6 @@ def task(data: Path, fitted: tuple[int, ...] = (15, 45)) -> Task:
             reading={"width": _WIDTH},
             averaged=True,
         )
-        for rpm, (begin, end) in _SPEEDS.items()
+        for rpm, (begin, end) in SPEEDS.items()
     )
     return Task(Scene.load(_SCENE), prior, conditions, EFFECTS, between=False)
-
-
-def reproduce(out: Path, data: Path) -> None:
-    """Runs the loop on both speeds and on each alone; a report of each in `out`/loop_drum."""
-    folder = out / "loop_drum"
-    closed: dict[str, Closed] = {}
-    for name, fitted in ASKED.items():
-        closed[name] = close_loop(
-            task(data, fitted), folder / name, archive=folder / "archive", budget=_BUDGET
-        )
-        write_page(
-            closed[name],
-            folder / name / "report.html",
-            command=f"granulcal reproduce loop_drum --out {out}",
-            title=f"MCC spheres in a drum, fitted at {' and '.join(map(str, fitted))} rpm",
-        )
-        print(folder / name / "report.html")
