@@ -10,8 +10,11 @@ import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.experiments import loop_drum
 from granulcal.loop.archive import Archive, Plan
+from granulcal.loop.baseline import Fit
 from granulcal.loop.close import planned
+from granulcal.loop.design import Design, Effect, normal_from_cube
 from granulcal.loop.library import by_name
+from granulcal.loop.predict import draw
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 
 SCENE = """
@@ -153,3 +156,17 @@ def test_the_drums_walls_turn_together_and_its_effects_fit_the_scene(tmp_path: P
         changed = scene.with_(effect.numbers(1.0))
         assert changed.get(effect.path) == effect.value(1.0)
         assert effect.strength(np.array([effect.value(0.5)]))[0] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_draws_around_a_fit_have_its_spread_and_stay_in_the_prior() -> None:
+    design = Design(("a", "b"), (), (Effect("up"), Effect("both", is_two_sided=True)))
+    # Two parameters and one strength: slopes 3 and 0 in theta, and 4 in the strength.
+    slopes = np.array([[3.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 4.0]])
+    fit = Fit(np.zeros(2), np.array([0.9, 0.0]), (0,), np.zeros(3), slopes, np.eye(3), 0.0, 0.0)
+    theta, psi = draw(fit, design, 4000, seed=1)
+    assert theta.shape == (4000, 2) and psi.shape == (4000, 1)
+    # With the prior's one: 1 / sqrt(10); what says nothing keeps the prior, uniform here.
+    assert normal_from_cube(theta[:, 0]).std() == pytest.approx(10**-0.5, rel=0.05)
+    assert theta[:, 1].std() == pytest.approx(12**-0.5, rel=0.05)
+    assert psi.max() == 1.0 and psi.min() >= 0.0
+    assert np.quantile(psi, 0.16) == pytest.approx(0.9 - 0.25, abs=0.02)

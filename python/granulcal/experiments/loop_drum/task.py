@@ -43,13 +43,6 @@ EFFECTS: tuple[LibraryEffect, ...] = (
         doc="drag of air at rest; grains twice as large fall as those of 1.2 mm at 7e-5",
     ),
     LibraryEffect(
-        name="restitution",
-        path="material.restitution",
-        off=0.3,
-        full=0.9,
-        doc="impacts that are less damped than the authors state",
-    ),
-    LibraryEffect(
         name="sizes",
         path="effects.polydispersity.cv",
         full=_SPREAD,
@@ -69,14 +62,6 @@ EFFECTS: tuple[LibraryEffect, ...] = (
         relative=True,
         whole=True,
         doc="more grains in the drum than the authors simulate",
-    ),
-    LibraryEffect(
-        name="mantle.sliding",
-        path="walls.0.material.sliding_friction",
-        off=1.0,
-        full=0.1,
-        is_ratio=True,
-        doc="a mantle on which grains slip",
     ),
 )
 """What the base model may lack; friction of the end walls is one of its unknowns."""
