@@ -8,7 +8,7 @@ import pytest
 
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
-from granulcal.experiments import loop_drum
+from granulcal.experiments import loop_drum, loop_rings
 from granulcal.loop.archive import Archive, Plan
 from granulcal.loop.baseline import Fit
 from granulcal.loop.close import planned
@@ -170,3 +170,17 @@ def test_draws_around_a_fit_have_its_spread_and_stay_in_the_prior() -> None:
     assert theta[:, 1].std() == pytest.approx(12**-0.5, rel=0.05)
     assert psi.max() == 1.0 and psi.min() >= 0.0
     assert np.quantile(psi, 0.16) == pytest.approx(0.9 - 0.25, abs=0.02)
+
+
+def test_the_rings_effects_fit_their_scene_and_no_map_is_fitted_and_sealed(tmp_path: Path) -> None:
+    used = [n for fitted, sealed in loop_rings.GROUPS.values() for n in (*fitted, *sealed)]
+    assert len(used) == len(set(used))
+    # Rings that leave the picture are not among them.
+    assert not {28, 29, 31, 35} & set(used)
+    asked = loop_rings.task(tmp_path, "middle")
+    assert asked.inputs == () and [len(c.recordings) for c in asked.conditions] == [4, 1, 1]
+    scene = asked.at_first()
+    for entry in asked.library:
+        effect = entry.at(scene)
+        for path, value in effect.numbers(1.0).items():
+            assert scene.with_({path: value}).get(path) == value

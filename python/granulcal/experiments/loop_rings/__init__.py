@@ -11,7 +11,7 @@ from granulcal.files import write_beside
 from granulcal.loop.close import Closed, close_loop
 from granulcal.loop.page import write_page
 
-__all__ = ["reproduce", "task"]
+__all__ = ["GROUPS", "reproduce", "task"]
 
 _BUDGET = 870
 
