@@ -131,9 +131,8 @@ def _picture(path: Path, closed: Closed, speeds: list[Speed]) -> None:
     models = [("base model", "before", "spread_before", "C0")]
     if best is not closed.trace.base:
         models.append((f"with {' + '.join(best.effects)}", "after", "spread_after", "C1"))
-    figure, axes = plt.subplots(
-        1, len(speeds), figsize=(3.4 * len(speeds), 3.6), sharey=True, layout="constrained"
-    )
+    figure, grid = plt.subplots(2, 2, figsize=(8.2, 8.4), sharex=True, sharey=True)
+    axes = list(grid.flat)
     turn = np.linspace(0.0, 2 * np.pi, 200)
     for axis, one in zip(axes, speeds, strict=True):
         axis.plot(42 * np.cos(turn), 42 * np.sin(turn), color="0.7", lw=1)
@@ -145,10 +144,13 @@ def _picture(path: Path, closed: Closed, speeds: list[Speed]) -> None:
         if one.measured is not None:
             axis.plot(x, 1e3 * one.measured[:-1], "k.-", label="measured")
         title = f"{one.rpm} rpm" if one.measured is not None else f"{one.rpm} rpm, predicted"
-        axis.set(title=title, xlabel="x [mm]", aspect="equal")
-        axis.set(xlim=(-43, 43), ylim=(-43, 43))
-    axes[0].set_ylabel("height of the free surface [mm]")
+        axis.set(title=title, aspect="equal", xlim=(-43, 43), ylim=(-43, 43))
+    for axis in grid[-1]:
+        axis.set_xlabel("x [mm]")
+    for axis in grid[:, 0]:
+        axis.set_ylabel("height of the free surface [mm]")
+    figure.tight_layout()
     shown = next(a for a, s in zip(axes, speeds, strict=True) if s.measured is not None)
     shown.legend(fontsize=8, loc="upper right")
-    figure.savefig(path, dpi=75)
+    figure.savefig(path, dpi=80)
     plt.close(figure)

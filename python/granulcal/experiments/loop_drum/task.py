@@ -29,18 +29,18 @@ EFFECTS: tuple[LibraryEffect, ...] = (
         doc="liquid bridges between grains; pull at touch over a grain's weight",
     ),
     LibraryEffect(
+        name="fill",
+        path="grains.count",
+        full=1.2,
+        relative=True,
+        whole=True,
+        doc="more grains in the drum than the authors simulate",
+    ),
+    LibraryEffect(
         name="cohesion.dry",
         family="cohesion",
         path="effects.adhesion.bond",
         doc="adhesion of touching grains, and of grains to walls; pull over a grain's weight",
-    ),
-    *by_name(["restitution.speed", "restitution.tangential"]),
-    LibraryEffect(
-        name="drag",
-        path="effects.fluid.viscosity",
-        full=1e-3,
-        unit="Pa s",
-        doc="drag of air at rest; grains twice as large fall as those of 1.2 mm at 7e-5",
     ),
     LibraryEffect(
         name="sizes",
@@ -55,13 +55,13 @@ EFFECTS: tuple[LibraryEffect, ...] = (
         ),
         doc="standard deviation over mean of the diameters, 1: as measured without the fines",
     ),
+    *by_name(["restitution.speed", "restitution.tangential"]),
     LibraryEffect(
-        name="fill",
-        path="grains.count",
-        full=1.2,
-        relative=True,
-        whole=True,
-        doc="more grains in the drum than the authors simulate",
+        name="drag",
+        path="effects.fluid.viscosity",
+        full=1e-3,
+        unit="Pa s",
+        doc="drag of air at rest; grains twice as large fall as those of 1.2 mm at 7e-5",
     ),
 )
 """What the base model may lack; friction of the end walls is one of its unknowns."""
