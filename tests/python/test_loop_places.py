@@ -9,11 +9,12 @@ import pytest
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.experiments import loop_drum, loop_rings
+from granulcal.experiments.loop_drum.task import FURTHER
 from granulcal.loop.archive import Archive, Plan
 from granulcal.loop.baseline import Fit
 from granulcal.loop.close import planned
 from granulcal.loop.design import Design, Effect, normal_from_cube
-from granulcal.loop.library import by_name
+from granulcal.loop.library import LibraryEffect, by_name
 from granulcal.loop.predict import draw
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 
@@ -89,7 +90,8 @@ def test_pours_at_the_conditions_alone_have_all_their_numbers() -> None:
 def test_an_archive_at_the_conditions_alone(tmp_path: Path) -> None:
     asked = task(False, averaged=True, effects=("tilt.y", "count"))
     plan = Plan(
-        scene=asked.at_first(),
+        # Three quarters of 62 grains are 46.5, and 46 are more than the whole effect.
+        scene=asked.at_first().with_({"grains.count": 62}),
         prior=asked.prior,
         conditions=asked.inputs,
         library=asked.library,
@@ -112,6 +114,8 @@ def test_an_archive_at_the_conditions_alone(tmp_path: Path) -> None:
     assert set(pours.condition[:, 0].tolist()) == {0.0, 1.0}
     # No pour of one place is one of the other.
     assert len(np.unique(pours.theta[:6])) == 6
+    design = plan.design
+    design.check(pours.theta, pours.condition, pours.psi)
     strengths = np.unique(pours.psi[:, 1])
     assert strengths == pytest.approx([0, 0.25, 0.5, 0.75, 1.0], abs=0.04)
     # The same conditions with pours between them are another archive, and the other way round.
@@ -151,7 +155,7 @@ def test_the_drums_walls_turn_together_and_its_effects_fit_the_scene(tmp_path: P
     assert slow["walls.0.motion.rate"] == slow["walls.1.motion.rate"] == pytest.approx(np.pi / 2)
     assert fast["walls.1.motion.rate"] == pytest.approx(3 * np.pi / 2)
     scene = asked.at_first()
-    for entry in asked.library:
+    for entry in (*asked.library, *FURTHER):
         effect = entry.at(scene)
         changed = scene.with_(effect.numbers(1.0))
         assert changed.get(effect.path) == effect.value(1.0)
@@ -184,3 +188,34 @@ def test_the_rings_effects_fit_their_scene_and_no_map_is_fitted_and_sealed(tmp_p
         effect = entry.at(scene)
         for path, value in effect.numbers(1.0).items():
             assert scene.with_({path: value}).get(path) == value
+
+
+def test_an_archive_takes_further_effects_and_keeps_its_pours(tmp_path: Path) -> None:
+    asked = task(False, averaged=True, effects=("tilt.y", "count"))
+    tilt, count = sorted(asked.library, key=lambda effect: effect.name, reverse=True)
+
+    def archive(*library: LibraryEffect) -> Archive:
+        plan = Plan(
+            scene=asked.at_first(),
+            prior=asked.prior,
+            conditions=asked.inputs,
+            library=library,
+            base=4,
+            each=4,
+            places=asked.places,
+        )
+        return Archive(tmp_path / "archive", plan)
+
+    first = archive(tilt)
+    first.fill(threads=1, say=lambda _: None, progress=False)
+    before = first.pours()
+    both = archive(tilt, count)
+    both.fill(threads=1, say=lambda _: None, progress=False)
+    after = both.pours()
+    # A pour for each of four strengths at each of two places.
+    assert len(after.x) + after.left_out == len(before.x) + before.left_out + 8
+    assert np.array_equal(after.x[: len(before.x)], before.x)
+    # The first still has its own; another order has other seeds, and is refused.
+    assert np.array_equal(archive(tilt).pours().x, before.x)
+    with pytest.raises(TrainingDataError, match="is of another library"):
+        archive(count, tilt)

@@ -34,6 +34,8 @@ __all__ = ["Archive", "Plan", "Pours"]
 Array = NDArray[np.float64]
 
 _RECORD = "archive.json"
+# What the record says of the library.
+_OF_LIBRARY = ("library", "effects", "each_effect")
 # Strengths at which an effect of a whole number is tried.
 _WHOLE_STRENGTHS = (0.25, 0.5, 0.75, 1.0)
 # Seeds of the parts, so that no two share a pour.
@@ -77,6 +79,7 @@ class Plan:
             "conditions": [list(condition) for condition in self.conditions],
             "library": fingerprint(self.library),
             "effects": [effect.name for effect in self.library],
+            "each_effect": [fingerprint((effect,)) for effect in self.library],
             "seed": self.seed,
             "places": list(self.places),
         }
@@ -154,7 +157,12 @@ class Archive:
                 wider = tuple((p, float(low), float(high)) for p, low, high in theirs["conditions"])
                 self.plan = replace(plan, conditions=wider)
                 mine = self.plan.record()
+            longer = _continued(theirs, mine)
+            if longer is mine:
+                write_beside(path, json.dumps(mine, indent=1))
             for key, value in mine.items():
+                if longer is not None and key in _OF_LIBRARY:
+                    continue
                 if theirs.get(key) != value:
                     raise TrainingDataError(
                         f"{path} is of another {key}: it has {_short(theirs.get(key))}, this run "
@@ -215,7 +223,9 @@ class Archive:
             for k, effect in enumerate(plan.library):
                 own = effect.at(plan.scene)
                 if effect.whole and part.name.startswith(f"effect-{effect.name}"):
-                    psi[:, k] = own.strength(np.full(n, scene.get(effect.path)))
+                    # A whole number may lie half a grain beyond full strength.
+                    strength = own.strength(np.full(n, scene.get(effect.path)))
+                    psi[:, k] = np.clip(strength, -1.0, 1.0)
                 elif effect.path in columns and not effect.shift:
                     psi[:, k] = own.strength(columns[effect.path])
             rows.append(
@@ -357,6 +367,20 @@ def cube(prior: Prior, theta: Array) -> Array:
 def from_cube(prior: Prior, u: Array) -> Array:
     """Returns parameters in own units of unit coordinates (n, p)."""
     return np.column_stack([p.quantile(u[:, i]) for i, p in enumerate(prior.free)])
+
+
+def _continued(theirs: dict[str, Any], mine: dict[str, Any]) -> dict[str, Any] | None:
+    """Returns the record with the longer library, if it begins with all of the shorter one's.
+
+    Seeds of an effect's pours go by its place in the library, so the shorter one's pours are those
+    of the longer. None if neither begins with the other.
+    """
+    a, b = theirs.get("each_effect"), mine["each_effect"]
+    if a is None or any(theirs.get(k) != v for k, v in mine.items() if k not in _OF_LIBRARY):
+        return None
+    if b[: len(a)] == a:
+        return mine
+    return theirs if a[: len(b)] == b else None
 
 
 def _covers(theirs: Any, mine: Any) -> bool:
