@@ -71,7 +71,10 @@ class Plan:
     places: tuple[dict[str, float], ...] = ()
 
     def record(self) -> dict[str, object]:
-        """Returns what another run must agree with to use the same archive; sizes may grow."""
+        """Returns what another run must agree with to use the same archive.
+
+        Sizes may grow, and the library at its end.
+        """
         return {
             "version": _native.__version__,
             "scene": self.scene.to_toml(),

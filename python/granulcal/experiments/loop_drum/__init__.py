@@ -22,7 +22,6 @@ _ASKED = {"both": (15, 45), "fit-15": (15,), "fit-45": (45,)}
 def reproduce(out: Path, data: Path) -> None:
     """Runs the loop on both speeds and on each alone; results.md and pages in `out`/loop_drum."""
     folder = out / "loop_drum"
-    lines: list[str] = []
     surrogate = None
     for name, fitted in _ASKED.items():
         asked = task(data, fitted)
@@ -43,7 +42,7 @@ def reproduce(out: Path, data: Path) -> None:
             title=f"MCC spheres in a drum, fitted at {' and '.join(map(str, fitted))} rpm",
         )
         if name == "both":
-            lines += table(closed, compare_speeds(closed, folder))
+            text = "\n".join(table(closed, compare_speeds(closed, folder))) + "\n"
+            write_beside(folder / "results.md", text)
+            print(folder / "results.md")
         print(folder / name / "report.html")
-    write_beside(folder / "results.md", "\n".join(lines) + "\n")
-    print(folder / "results.md")
