@@ -4,13 +4,14 @@
       archive.json        scene, prior, conditions, library; written first, refused if another
       base/               pours of the plain model, conditions and parameters from their priors
       effect-NAME/        the same with one effect at a strength from its prior
+      base-at-0/, ...     instead of base/ where pours are at the conditions alone, a part for each
 
 Each part is a data set of `generate`: it is stopped and continued anywhere and has the same rows.
 """
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,10 +34,12 @@ __all__ = ["Archive", "Plan", "Pours"]
 Array = NDArray[np.float64]
 
 _RECORD = "archive.json"
+# What the record says of the library.
+_OF_LIBRARY = ("library", "effects", "each_effect")
 # Strengths at which an effect of a whole number is tried.
 _WHOLE_STRENGTHS = (0.25, 0.5, 0.75, 1.0)
 # Seeds of the parts, so that no two share a pour.
-_SEED_STEP = 1009
+_SEED_STEP, _PLACE_STEP = 1009, 101
 # Base pours that are read anew for an effect that needs none of its own.
 _FREE_COPIES = 400
 
@@ -54,6 +57,7 @@ class Plan:
         each: pours of each effect.
         seed: of all of them.
         tolerances: of the statistics; they need no pours.
+        places: numbers of each condition, where pours are at these alone; else empty.
     """
 
     scene: Scene
@@ -64,9 +68,13 @@ class Plan:
     each: int
     seed: int = 0
     tolerances: Tolerances | None = None
+    places: tuple[dict[str, float], ...] = ()
 
     def record(self) -> dict[str, object]:
-        """Returns what another run must agree with to use the same archive; sizes may grow."""
+        """Returns what another run must agree with to use the same archive.
+
+        Sizes may grow, and the library at its end.
+        """
         return {
             "version": _native.__version__,
             "scene": self.scene.to_toml(),
@@ -74,7 +82,9 @@ class Plan:
             "conditions": [list(condition) for condition in self.conditions],
             "library": fingerprint(self.library),
             "effects": [effect.name for effect in self.library],
+            "each_effect": [fingerprint((effect,)) for effect in self.library],
             "seed": self.seed,
+            "places": list(self.places),
         }
 
     @property
@@ -144,13 +154,18 @@ class Archive:
         path = folder / _RECORD
         mine = plan.record()
         if path.exists():
-            theirs = json.loads(path.read_text(encoding="utf-8"))
+            theirs = {"places": [], **json.loads(path.read_text(encoding="utf-8"))}
             if _covers(theirs.get("conditions"), mine["conditions"]):
                 # A wider archive serves as well.
                 wider = tuple((p, float(low), float(high)) for p, low, high in theirs["conditions"])
                 self.plan = replace(plan, conditions=wider)
                 mine = self.plan.record()
+            longer = _continued(theirs, mine)
+            if longer is mine:
+                write_beside(path, json.dumps(mine, indent=1))
             for key, value in mine.items():
+                if longer is not None and key in _OF_LIBRARY:
+                    continue
                 if theirs.get(key) != value:
                     raise TrainingDataError(
                         f"{path} is of another {key}: it has {_short(theirs.get(key))}, this run "
@@ -170,14 +185,14 @@ class Archive:
     ) -> None:
         """Runs every pour that is planned and missing; stops and resumes anywhere."""
         parts = self._parts()
-        for number, (name, scene, prior, count, seed) in enumerate(parts, start=1):
-            say(f"archive {number}/{len(parts)}: {name}, {count} pours")
+        for number, part in enumerate(parts, start=1):
+            say(f"archive {number}/{len(parts)}: {part.name}, {part.count} pours")
             generate(
-                scene,
-                prior,
-                count,
-                seed=seed,
-                out=self.folder / name,
+                part.scene,
+                part.prior,
+                part.count,
+                seed=part.seed,
+                out=self.folder / part.name,
                 threads=threads,
                 progress=progress,
             )
@@ -191,8 +206,8 @@ class Archive:
         plan, measures = self.plan, Measures.of(self.plan.scene)
         rows: list[tuple[Array, Array, Array, Array]] = []
         left_out = 0
-        for name, scene, _, count, _ in self._parts():
-            folder = self.folder / name
+        for part in self._parts():
+            scene, count, folder = part.scene, part.count, self.folder / part.name
             if not folder.exists():
                 raise TrainingDataError(f"{folder} is missing: fill the archive first")
             data = Dataset.load(folder)
@@ -202,19 +217,28 @@ class Archive:
             columns = {path: data.theta[usable, i] for i, path in enumerate(data.theta_names)}
             n = int(usable.sum())
             theta = np.column_stack([columns[path] for path in plan.prior.names])
-            inputs = [columns[path] for path, _, _ in plan.conditions]
+            inputs = [
+                np.full(n, part.place[path]) if path in part.place else columns[path]
+                for path, _, _ in plan.conditions
+            ]
             condition = np.column_stack(inputs) if inputs else np.zeros((n, 0))
             psi = np.zeros((n, len(plan.library)))
             for k, effect in enumerate(plan.library):
                 own = effect.at(plan.scene)
-                if effect.whole and name.startswith(f"effect-{effect.name}"):
-                    psi[:, k] = own.strength(np.full(n, scene.get(effect.path)))
+                if effect.whole and part.name.startswith(f"effect-{effect.name}"):
+                    # A whole number may lie half a grain beyond full strength.
+                    strength = own.strength(np.full(n, scene.get(effect.path)))
+                    psi[:, k] = np.clip(strength, -1.0, 1.0)
                 elif effect.path in columns and not effect.shift:
                     psi[:, k] = own.strength(columns[effect.path])
             rows.append(
                 (cube(plan.prior, theta), plan.unit_condition(condition), psi, values[usable])
             )
         names = measures.names
+        # The first parts are the base model's, one for each place.
+        many = max(len(plan.places), 1)
+        theta, condition, psi, x = (np.concatenate(c) for c in zip(*rows[:many], strict=True))
+        rows = [(theta, condition, psi, x), *rows[many:]]
         rows.extend(self._free_rows(rows[0], measures.powers))
         rows = self._with_tolerances(rows, names)
         theta, condition, psi, x = (np.concatenate(part) for part in zip(*rows, strict=True))
@@ -231,7 +255,9 @@ class Archive:
         paths = [path for path, _, _ in self.plan.conditions]
         found = []
         for k, effect in enumerate(self.plan.library):
-            if not effect.is_free or (effect.shift and effect.path not in paths):
+            if not effect.is_free or (
+                effect.shift and (effect.path not in paths or self.plan.places)
+            ):
                 continue
             random = np.random.default_rng(self.plan.seed + k)
             rows = random.permutation(len(base[0]))[:_FREE_COPIES]
@@ -273,15 +299,16 @@ class Archive:
             )
         return padded
 
-    def _parts(self) -> list[tuple[str, Scene, Prior, int, int]]:
-        """Name, scene, prior, pours and seed of each data set."""
+    def _parts(self) -> list["_Part"]:
+        """The data sets, the base model's first."""
         plan = self.plan
+        drawn = [] if plan.places else plan.conditions
         inputs = [
             Parameter(path=path, distribution="uniform", low=low, high=high)
-            for path, low, high in plan.conditions
+            for path, low, high in drawn
         ]
         common = [*plan.prior.parameters, *inputs]
-        parts = [("base", plan.scene, Prior(common), plan.base, plan.seed)]
+        parts = [_Part("base", plan.scene, Prior(common), plan.base, plan.seed)]
         for k, entry in enumerate(plan.library, start=1):
             if entry.is_free:
                 continue
@@ -293,11 +320,40 @@ class Archive:
                 for number, psi in enumerate(_WHOLE_STRENGTHS):
                     scene = plan.scene.with_({effect.path: effect.value(psi)})
                     parts.append(
-                        (f"{name}-{number}", scene, Prior(common), share, seed + number + 1)
+                        _Part(f"{name}-{number}", scene, Prior(common), share, seed + number + 1)
                     )
                 continue
-            parts.append((name, there, Prior([*common, effect.parameter()]), plan.each, seed))
-        return parts
+            parts.append(_Part(name, there, Prior([*common, effect.parameter()]), plan.each, seed))
+        return [piece for part in parts for piece in part.at(plan.places)]
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One data set: its folder's name, what is poured, and the condition it is under, if one."""
+
+    name: str
+    scene: Scene
+    prior: Prior
+    count: int
+    seed: int
+    place: dict[str, float] = field(default_factory=dict)
+
+    def at(self, places: tuple[dict[str, float], ...]) -> list["_Part"]:
+        """Returns the part at each of `places`, its pours dealt out; itself if there are none."""
+        if not places:
+            return [self]
+        share = -(-self.count // len(places))
+        return [
+            _Part(
+                f"{self.name}-at-{i}",
+                self.scene.with_(place),
+                self.prior,
+                share,
+                self.seed + _PLACE_STEP * i,
+                place,
+            )
+            for i, place in enumerate(places)
+        ]
 
 
 def cube(prior: Prior, theta: Array) -> Array:
@@ -314,6 +370,20 @@ def cube(prior: Prior, theta: Array) -> Array:
 def from_cube(prior: Prior, u: Array) -> Array:
     """Returns parameters in own units of unit coordinates (n, p)."""
     return np.column_stack([p.quantile(u[:, i]) for i, p in enumerate(prior.free)])
+
+
+def _continued(theirs: dict[str, Any], mine: dict[str, Any]) -> dict[str, Any] | None:
+    """Returns the record with the longer library, if it begins with all of the shorter one's.
+
+    Seeds of an effect's pours go by its place in the library, so the shorter one's pours are those
+    of the longer. None if neither begins with the other.
+    """
+    a, b = theirs.get("each_effect"), mine["each_effect"]
+    if a is None or any(theirs.get(k) != v for k, v in mine.items() if k not in _OF_LIBRARY):
+        return None
+    if b[: len(a)] == a:
+        return mine
+    return theirs if a[: len(b)] == b else None
 
 
 def _covers(theirs: Any, mine: Any) -> bool:

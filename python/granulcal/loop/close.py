@@ -7,7 +7,7 @@ the sealed conditions once; run the placebo; write the report.
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from granulcal.loop.thresholds import Thresholds
 from granulcal.loop.trace import Explanation, Power, Trace, power, trace
 from granulcal.scene import Scene
 
-__all__ = ["Closed", "close_loop", "fit_surrogate", "planned"]
+__all__ = ["Closed", "close_loop", "fit_surrogate", "planned", "scene_of"]
 
 Array = NDArray[np.float64]
 
@@ -235,11 +235,12 @@ def planned(task: Task, budget: int, seed: int) -> Plan:
     """
     own = sum(not effect.is_free for effect in task.library)
     spare = budget - _needed(task)
-    base = int(_BASE_SHARE * spare)
+    # A small budget has fewer pours to share than the base model needs.
+    base = max(int(_BASE_SHARE * spare), min(_LEAST_BASE, spare - _LEAST_EACH * own))
     each = (spare - base) // max(own, 1)
     if base < _LEAST_BASE or each < _LEAST_EACH:
-        enough = _needed(task) + int(
-            max(_LEAST_BASE / _BASE_SHARE, _LEAST_EACH * own / (1 - _BASE_SHARE)) + 1
+        enough = _needed(task) + max(
+            _LEAST_BASE + _LEAST_EACH * own, int(_LEAST_EACH * own / (1 - _BASE_SHARE)) + 1
         )
         raise ObservationError(
             f"a budget of {budget} pours is too small for {own} effects and "
@@ -254,6 +255,7 @@ def planned(task: Task, budget: int, seed: int) -> Plan:
         each=each,
         seed=seed,
         tolerances=task.tolerances,
+        places=task.places,
     )
 
 
@@ -263,18 +265,33 @@ def _needed(task: Task) -> int:
     return 2 * _REPLICATES * len(task.conditions) + placebo
 
 
-def _scene(task: Task, condition: Condition, one: Explanation) -> Scene:
-    """The scene of a model at its best fit under a condition."""
-    theta = from_cube(task.prior, one.theta[None])[0]
-    values = {**task.prior.fixed, **dict(zip(task.prior.names, theta.tolist(), strict=True))}
+def scene_of(
+    task: Task, condition: Condition, theta: Array, strengths: Mapping[str, float]
+) -> Scene:
+    """Returns the scene of a model under a condition.
+
+    Args:
+        task: scene and prior.
+        condition: the numbers that it states.
+        theta: parameters in unit coordinates, shape (p,).
+        strengths: psi of each effect of the model, by name.
+    """
+    own = from_cube(task.prior, theta[None])[0]
+    values = {**task.prior.fixed, **dict(zip(task.prior.names, own.tolist(), strict=True))}
     at = dict(condition.at)
-    for name, psi in zip(one.effects, one.best_strengths, strict=True):
+    for name, psi in strengths.items():
         effect = task.effect(name)
         values |= effect.numbers(float(psi))
         values |= {p: v for p, v in condition.known.items() if p in values or _kin(p, effect.path)}
         if effect.shift:
             at[effect.path] += effect.full * float(psi)
     return task.scene.with_({**values, **at})
+
+
+def _scene(task: Task, condition: Condition, one: Explanation) -> Scene:
+    """The scene of a model at its best fit under a condition."""
+    strengths = dict(zip(one.effects, one.best_strengths.tolist(), strict=True))
+    return scene_of(task, condition, one.theta, strengths)
 
 
 def _kin(path: str, other: str) -> bool:
@@ -332,8 +349,16 @@ def _compare(
 
 
 def _candidates(plan: Plan) -> list[tuple[str, Array]]:
-    """Conditions that further pours might have: each input over its range, others in the middle."""
+    """Conditions that further pours might have: each input over its range, others in the middle.
+
+    Or those of the archive, where it has pours there alone.
+    """
     found = []
+    for place in plan.places:
+        label = ", ".join(f"{path} = {place[path]:.4g}" for path, _, _ in plan.conditions)
+        found.append((label, plan.unit(place)))
+    if found:
+        return found
     for i, (path, low, high) in enumerate(plan.conditions):
         for share in (0.0, 0.25, 0.5, 0.75, 1.0):
             at = np.full(len(plan.conditions), 0.5)

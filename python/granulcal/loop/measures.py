@@ -1,7 +1,9 @@
 """What the loop looks at: the image's statistics, or those that a scene itself observes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,15 +70,23 @@ class Measures:
         both = {**pour.statistics().to_dict(), **pour.diagnostic_statistics().to_dict()}
         return np.array([both[name] for name in self.names])
 
-    def of_recording(self, path: Path, scene: Scene, camera: Path | None) -> Array:
+    def of_recording(
+        self,
+        path: Path,
+        scene: Scene,
+        camera: Path | None,
+        reading: Mapping[str, Any] | None = None,
+    ) -> Array:
         """Returns the statistics of a recording, shape (s,); NaN for what it does not show.
+
+        `reading` are arguments of `Recording.observed` or `Recording.formation`.
 
         Raises:
             ObservationError: a recording that cannot be one of the scene: its units, most likely.
         """
         if self.observes:
-            return np.asarray(Recording.observed(path, scene))
-        recording, formation = formation_of(path, scene, camera)
+            return np.asarray(Recording.observed(path, scene, **(reading or {})))
+        recording, formation = formation_of(path, scene, camera, reading)
         diameter = scene.get("grains.diameter")
         grains = scene.get("grains.count") * np.pi / 6 * diameter**3
         if not _VOLUME_RANGE[0] <= formation.volume / grains <= _VOLUME_RANGE[1]:
@@ -92,10 +102,13 @@ class Measures:
         return np.array([both[name] for name in self.names])
 
 
-def formation_of(path: Path, scene: Scene, camera: Path | None) -> tuple[Recording, Formation]:
+def formation_of(
+    path: Path, scene: Scene, camera: Path | None, reading: Mapping[str, Any] | None = None
+) -> tuple[Recording, Formation]:
     """Returns a recording and its formation, its pixels as wide as those of the scene's images."""
     recording = Recording.open(path, camera=camera or _camera_beside(path))
-    return recording, recording.formation(ground_resolution=scene.ground_resolution)
+    settings = {"ground_resolution": scene.ground_resolution, **(reading or {})}
+    return recording, recording.formation(**settings)
 
 
 def _camera_beside(path: Path) -> Path | None:

@@ -142,7 +142,9 @@ def _pictures(closed: Closed) -> str:
 
 def _measured_points(closed: Closed, condition: Condition) -> Any:
     there = closed.task.scene.with_(condition.at)
-    return formation_of(condition.recordings[0], there, condition.camera)[1].points
+    return formation_of(condition.recordings[0], there, condition.camera, condition.reading)[
+        1
+    ].points
 
 
 def _number(value: float) -> str:

@@ -38,6 +38,8 @@ def register(
         "prior": plan.prior.to_toml(),
         "conditions": [
             {"name": c.name, "at": c.at, "use": c.use, "recordings": _digests(c.recordings)}
+            | ({"reading": c.reading} if c.reading else {})
+            | ({"averaged": True} if c.averaged else {})
             for c in task.conditions
         ],
         "library": [asdict(effect) for effect in task.library],

@@ -12,7 +12,14 @@
 
 `tolerances = "tolerances.json"` declares in which directions the statistics may be off.
 `camera = "camera.toml"` of a condition, or once for all, is the camera of PNGs; where it is left
-out it is looked for beside the recording.
+out it is looked for beside the recording. `reading = { width = 0.084 }`, likewise, are arguments of
+`Recording.observed`, or of `Recording.formation` where the scene observes nothing.
+
+`averaged = true` of a condition: each recording is a mean over a time in which the grains forgot
+themselves many times (a drum's picture), so that one is enough.
+
+`between = false`: the archive has pours at the conditions alone and not between them. Numbers of a
+condition may then depend on each other (two walls that turn together).
 """
 
 import tomllib
@@ -52,6 +59,9 @@ class Condition:
         camera: of PNGs.
         known: numbers that an effect has here, should it be the one, for example
             `{"effects.fluid.density": 1260.0}`.
+        reading: arguments with which the recordings are read.
+        averaged: each recording is a mean over time of what a pour shows, at least as steady as the
+            simulated mean of one pour; it is taken to be as noisy as that.
     """
 
     name: str
@@ -60,6 +70,8 @@ class Condition:
     recordings: tuple[Path, ...]
     camera: Path | None = None
     known: dict[str, float] = field(default_factory=dict)
+    reading: dict[str, Any] = field(default_factory=dict)
+    averaged: bool = False
 
     def statistics(self, scene: Scene) -> Array:
         """Returns the statistics of each pour, shape (n, s).
@@ -70,7 +82,9 @@ class Condition:
         """
         there = scene.with_(self.at)
         measures = Measures.of(there)
-        rows = np.array([measures.of_recording(p, there, self.camera) for p in self.recordings])
+        rows = np.array(
+            [measures.of_recording(p, there, self.camera, self.reading) for p in self.recordings]
+        )
         for path, row in zip(self.recordings, rows, strict=True):
             unseen = [n for n, v in zip(measures.names, row, strict=True) if not np.isfinite(v)]
             if unseen:
@@ -92,6 +106,8 @@ class Task:
         library: effects to look for.
         path: the file that it was read from.
         tolerances: of the statistics.
+        between: whether the archive's pours lie between the conditions, their numbers drawn
+            independently; if not, they are at the conditions alone.
     """
 
     scene: Scene
@@ -100,6 +116,7 @@ class Task:
     library: tuple[LibraryEffect, ...]
     path: Path | None = None
     tolerances: Tolerances | None = None
+    between: bool = True
 
     def __post_init__(self) -> None:
         """Checks that the conditions can be asked about.
@@ -117,9 +134,12 @@ class Task:
         if repeated:
             raise ObservationError(f"conditions need names of their own, twice: {repeated}")
         pours = sum(len(c.recordings) for c in self.of(FIT))
-        if pours < _FEWEST_POURS:
+        # One odd pour of one or two passes for an effect; a mean over time cannot be odd.
+        is_steady = pours > 0 and all(c.averaged for c in self.of(FIT))
+        if pours < _FEWEST_POURS and not is_steady:
             raise ObservationError(
-                f"a verdict needs at least {_FEWEST_POURS} pours in conditions to fit, got {pours}"
+                f"a verdict needs at least {_FEWEST_POURS} pours in conditions to fit, got {pours} "
+                "(fewer are enough where each recording is a mean over time: averaged = true)"
             )
         for condition in self.conditions:
             if set(condition.at) != set(self.paths):
@@ -148,10 +168,13 @@ class Task:
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ObservationError(f"{file}: not valid TOML: {error}") from None
         _require(
-            file, document, {"scene", "prior", "conditions"}, {"effects", "camera", "tolerances"}
+            file,
+            document,
+            {"scene", "prior", "conditions"},
+            {"effects", "camera", "tolerances", "reading", "between"},
         )
         folder = file.parent
-        shared = {"camera": document["camera"]} if "camera" in document else {}
+        shared = {key: document[key] for key in ("camera", "reading") if key in document}
         library = by_name(document["effects"]) if "effects" in document else FUNNEL
         return cls(
             scene=Scene.load(folder / document["scene"]),
@@ -164,6 +187,7 @@ class Task:
             tolerances=Tolerances.load(folder / document["tolerances"])
             if "tolerances" in document
             else None,
+            between=bool(document.get("between", True)),
         )
 
     def of(self, use: str) -> tuple[Condition, ...]:
@@ -177,13 +201,39 @@ class Task:
 
     @property
     def inputs(self) -> tuple[tuple[str, float, float], ...]:
-        """Path, least and largest value of each number that differs between conditions."""
-        found = []
-        for path in self.paths:
+        """Path, least and largest value of each number that differs between conditions.
+
+        Where pours are at the conditions alone: of as many as tell the conditions apart.
+        """
+        found: list[tuple[str, float, float]] = []
+        for path in self._differing:
             values = [condition.at[path] for condition in self.conditions]
-            if min(values) < max(values):
+            if self.between or self._told_apart([p for p, _, _ in found]) < self._told_apart(
+                [*(p for p, _, _ in found), path]
+            ):
                 found.append((path, min(values), max(values)))
         return tuple(found)
+
+    @property
+    def places(self) -> tuple[dict[str, float], ...]:
+        """Numbers of each condition once, where the archive has pours there alone; else none."""
+        if self.between:
+            return ()
+        found: list[dict[str, float]] = []
+        for condition in self.conditions:
+            there = {path: condition.at[path] for path in self._differing}
+            if there not in found:
+                found.append(there)
+        return tuple(found)
+
+    @property
+    def _differing(self) -> list[str]:
+        """Paths whose numbers are not the same under all conditions."""
+        return [p for p in self.paths if len({c.at[p] for c in self.conditions}) > 1]
+
+    def _told_apart(self, paths: list[str]) -> int:
+        """Number of conditions that the numbers `paths` tell apart."""
+        return len({tuple(c.at[path] for path in paths) for c in self.conditions})
 
     def effect(self, name: str) -> LibraryEffect:
         """Returns an effect of the library with the scene's own numbers put in."""
@@ -191,14 +241,14 @@ class Task:
 
     def at_first(self) -> Scene:
         """Returns the scene with the numbers that all conditions share."""
-        differing = {path for path, _, _ in self.inputs}
+        differing = set(self._differing)
         shared = {p: v for p, v in self.conditions[0].at.items() if p not in differing}
         return self.scene.with_(shared) if shared else self.scene
 
 
 def _condition(file: Path, table: dict[str, Any]) -> Condition:
     needed = {"name", "at", "use", "recordings"}
-    _require(file, table, needed, {"camera", "known"})
+    _require(file, table, needed, {"camera", "known", "reading", "averaged"})
     if table["use"] not in (FIT, SEALED):
         raise ObservationError(
             f'{file}: use of {table["name"]} must be "{FIT}" or "{SEALED}", got "{table["use"]}"'
@@ -212,7 +262,16 @@ def _condition(file: Path, table: dict[str, Any]) -> Condition:
     camera = file.parent / table["camera"] if "camera" in table else None
     at = {path: float(value) for path, value in table["at"].items()}
     known = {path: float(value) for path, value in table.get("known", {}).items()}
-    return Condition(str(table["name"]), at, table["use"], recordings, camera, known)
+    return Condition(
+        str(table["name"]),
+        at,
+        table["use"],
+        recordings,
+        camera,
+        known,
+        reading=dict(table.get("reading", {})),
+        averaged=bool(table.get("averaged", False)),
+    )
 
 
 def _require(file: Path, table: dict[str, Any], needed: set[str], optional: set[str]) -> None:

@@ -1,0 +1,48 @@
+"""The loop on a rotating drum of MCC spheres: one time-averaged picture at each of two speeds.
+
+Fitted are both speeds; as a cross-check each is fitted alone with the other sealed, from the same
+pours. What the model predicts at speeds that were not measured here is written down, too.
+"""
+
+from pathlib import Path
+
+from granulcal.experiments.loop_drum.report import compare_speeds, table
+from granulcal.experiments.loop_drum.task import task
+from granulcal.files import write_beside
+from granulcal.loop.close import close_loop
+from granulcal.loop.page import write_page
+
+__all__ = ["reproduce", "task"]
+
+_BUDGET = 422
+# Which speeds are fitted; the others are sealed.
+_ASKED = {"both": (15, 45), "fit-15": (15,), "fit-45": (45,)}
+
+
+def reproduce(out: Path, data: Path) -> None:
+    """Runs the loop on both speeds and on each alone; results.md and pages in `out`/loop_drum."""
+    folder = out / "loop_drum"
+    surrogate = None
+    for name, fitted in _ASKED.items():
+        asked = task(data, fitted)
+        closed = close_loop(
+            asked,
+            folder / name,
+            archive=folder / "archive",
+            budget=_BUDGET,
+            surrogate=surrogate,
+        )
+        if surrogate is None:
+            # The pours are the same whatever is fitted, and so is what they say.
+            surrogate = closed.trace.local.surrogate
+        write_page(
+            closed,
+            folder / name / "report.html",
+            command=f"granulcal reproduce loop_drum --out {out}",
+            title=f"MCC spheres in a drum, fitted at {' and '.join(map(str, fitted))} rpm",
+        )
+        if name == "both":
+            text = "\n".join(table(closed, compare_speeds(closed, folder))) + "\n"
+            write_beside(folder / "results.md", text)
+            print(folder / "results.md")
+        print(folder / name / "report.html")

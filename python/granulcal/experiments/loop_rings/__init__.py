@@ -1,0 +1,55 @@
+"""The loop on rings: a ball of sand dropped on a loose bed, modelled on a rigid plane.
+
+The base model has no bed that a ball could dig into and cannot be right; the loop has to say so.
+"""
+
+from pathlib import Path
+
+from granulcal.experiments.loop_rings.picture import picture
+from granulcal.experiments.loop_rings.task import GROUPS, task
+from granulcal.files import write_beside
+from granulcal.loop.close import Closed, close_loop
+from granulcal.loop.page import write_page
+
+__all__ = ["GROUPS", "reproduce", "task"]
+
+_BUDGET = 870
+
+
+def reproduce(out: Path, data: Path) -> None:
+    """Runs the loop on every group of rings; results.md and pages in `out`/loop_rings."""
+    folder = out / "loop_rings"
+    closed: dict[str, Closed] = {}
+    surrogate = None
+    for group in GROUPS:
+        closed[group] = close_loop(
+            task(data, group),
+            folder / group,
+            archive=folder / "archive",
+            budget=_BUDGET,
+            surrogate=surrogate,
+        )
+        # Every group has the same pours.
+        surrogate = closed[group].trace.local.surrogate
+        write_page(
+            closed[group],
+            folder / group / "report.html",
+            command=f"granulcal reproduce loop_rings --out {out}",
+            title=f"Rings on a loose bed, modelled on a rigid plane: {group}",
+        )
+        print(folder / group / "report.html")
+    picture(folder / "rings.png", closed)
+    lines = [line for group, one in closed.items() for line in _table(group, one)]
+    write_beside(folder / "results.md", "\n".join(lines) + "\n")
+    print(folder / "results.md")
+
+
+def _table(group: str, closed: Closed) -> list[str]:
+    verdict = closed.trace.verdict
+    lines = [f"## {group}", "", f"{verdict.kind} {', '.join(verdict.named)}: {verdict.reason}", ""]
+    lines += ["| model | log probability over none [nat] | p of what it leaves |", "|---|---|---|"]
+    for one in closed.trace.explanations[:6]:
+        names = " + ".join(one.effects)
+        lines.append(f"| {names} | {one.log_probability:.1f} | {one.p_after:.3g} |")
+    lines += ["", *(f"- {text}" for text in closed.trace.beyond), ""]
+    return lines

@@ -1,0 +1,59 @@
+r"""What a fitted model says of a condition that was not measured, with what the fit leaves open.
+
+Parameters and strengths are drawn from the normal of the fit,
+$w \sim N(\hat w, (J^T V^{-1} J + \Lambda)^{-1})$, strengths held within their priors; one pour of
+each draw, so that the spread is that of parameters and of pours together.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.loop.baseline import Fit
+from granulcal.loop.close import Closed, scene_of
+from granulcal.loop.design import LARGEST_Z, Design, cube_from_normal
+from granulcal.loop.forward import Forward
+from granulcal.loop.task import Condition
+from granulcal.loop.trace import Explanation
+
+__all__ = ["draw", "predict"]
+
+Array = NDArray[np.float64]
+
+# Seeds of pours, apart from those of the archive and of the replicates.
+_SEED = 8_000_009
+
+
+def draw(fit: Fit, design: Design, count: int, *, seed: int = 0) -> tuple[Array, Array]:
+    """Returns theta in unit coordinates (count, p) and the active strengths (count, |A|)."""
+    p, low = len(fit.v), np.array([design.effects[k].low for k in fit.active])
+    white = np.linalg.solve(fit.root, fit.slopes)
+    precision = np.concatenate([np.ones(p), np.full(len(low), 1e-6)])
+    root = np.linalg.cholesky(np.linalg.inv(white.T @ white + np.diag(precision)))
+    at = np.concatenate([fit.v, fit.psi[list(fit.active)]])
+    drawn = at + np.random.default_rng(seed).standard_normal((count, len(at))) @ root.T
+    theta = cube_from_normal(np.clip(drawn[:, :p], -LARGEST_Z, LARGEST_Z))
+    return theta, np.clip(drawn[:, p:], low, 1.0)
+
+
+def predict(
+    closed: Closed, condition: Condition, one: Explanation, forward: Forward, *, draws: int = 10
+) -> tuple[Array, Array]:
+    """Returns statistics under a condition, each (n, s): at the fit, and of draws around it.
+
+    Args:
+        closed: the closed loop.
+        condition: the numbers of the scene; its recordings are not looked at.
+        one: the base model or an explanation of `closed.trace`.
+        forward: runs and keeps the pours.
+        draws: pours of each kind.
+    """
+    trace = closed.trace
+    fit = trace.base_fit if one is trace.base else trace.models[trace.explanations.index(one)].fit
+    design = trace.local.surrogate.design
+    seeds = [_SEED + i for i in range(draws)]
+    at_fit = forward.pours(closed.scene(condition, one), seeds)
+    rows = []
+    for seed, theta, psi in zip(seeds, *draw(fit, design, draws, seed=_SEED), strict=True):
+        scene = scene_of(closed.task, condition, theta, dict(zip(one.effects, psi, strict=True)))
+        rows.append(forward.pours(scene, [seed]))
+    return at_fit, np.concatenate(rows)

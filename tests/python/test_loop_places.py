@@ -1,0 +1,221 @@
+"""Conditions whose numbers hang together, recordings that are means, how they are read."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.errors import ObservationError, TrainingDataError
+from granulcal.experiments import loop_drum, loop_rings
+from granulcal.experiments.loop_drum.task import FURTHER
+from granulcal.loop.archive import Archive, Plan
+from granulcal.loop.baseline import Fit
+from granulcal.loop.close import planned
+from granulcal.loop.design import Design, Effect, normal_from_cube
+from granulcal.loop.library import LibraryEffect, by_name
+from granulcal.loop.predict import draw
+from granulcal.loop.task import FIT, SEALED, Condition, Task
+
+SCENE = """
+name = "small"
+[grains]
+count = 60
+diameter = 4e-3
+density = 1300.0
+[start]
+kind = "ball"
+height = 0.02
+solid_fraction = 0.6
+jitter = 5e-5
+[end]
+horizon = 1.0
+[camera]
+projection = "orthographic"
+field_width = 0.2
+pixels = 60
+downsample = 1
+height_threshold = 1e-3
+"""
+PRIOR = """
+[[parameter]]
+path = "material.sliding_friction"
+distribution = "uniform"
+low = 0.3
+high = 0.8
+"""
+# Two numbers that move together.
+LOW = {"start.height": 0.02, "end.horizon": 1.0, "grains.density": 1300.0}
+HIGH = {"start.height": 0.05, "end.horizon": 1.2, "grains.density": 1300.0}
+
+
+def task(between: bool, *, averaged: bool = False, effects: tuple[str, ...] = ("tilt.y",)) -> Task:
+    recordings = (Path("a.npz"),)
+    return Task(
+        gc.Scene.from_toml(SCENE),
+        gc.Prior.from_toml(PRIOR),
+        (
+            Condition("low", LOW, FIT, recordings, averaged=averaged),
+            Condition("high", HIGH, FIT, recordings, averaged=averaged),
+        ),
+        by_name(effects),
+        between=between,
+    )
+
+
+def test_fewer_than_three_pours_are_refused_unless_each_is_a_mean_over_time() -> None:
+    with pytest.raises(ObservationError, match="at least 3 pours .* got 2 .*averaged = true"):
+        task(True)
+    assert len(task(True, averaged=True).conditions) == 2
+    sealed = Condition("low", LOW, SEALED, (Path("a.npz"),), averaged=True)
+    with pytest.raises(ObservationError, match="got 0"):
+        Task(gc.Scene.from_toml(SCENE), gc.Prior.from_toml(PRIOR), (sealed,), by_name([]))
+
+
+def test_pours_at_the_conditions_alone_have_all_their_numbers() -> None:
+    between, places = task(True, averaged=True), task(False, averaged=True)
+    assert [path for path, _, _ in between.inputs] == ["start.height", "end.horizon"]
+    assert between.places == ()
+    # One number tells two conditions apart; the other goes with it.
+    assert places.inputs == (("start.height", 0.02, 0.05),)
+    assert places.places == tuple(
+        {path: at[path] for path in ("start.height", "end.horizon")} for at in (LOW, HIGH)
+    )
+    plan = planned(places, 420, 0)
+    assert plan.places == places.places and plan.conditions == places.inputs
+    assert (plan.base, plan.each) == (300, 78)
+
+
+def test_an_archive_at_the_conditions_alone(tmp_path: Path) -> None:
+    asked = task(False, averaged=True, effects=("tilt.y", "count"))
+    plan = Plan(
+        # Three quarters of 62 grains are 46.5, and 46 are more than the whole effect.
+        scene=asked.at_first().with_({"grains.count": 62}),
+        prior=asked.prior,
+        conditions=asked.inputs,
+        library=asked.library,
+        base=6,
+        each=8,
+        places=asked.places,
+    )
+    archive = Archive(tmp_path / "archive", plan)
+    archive.fill(threads=1, say=lambda _: None, progress=False)
+    folders = sorted(p.name for p in (tmp_path / "archive").iterdir() if p.is_dir())
+    assert folders[:2] == ["base-at-0", "base-at-1"] and "effect-count-3-at-1" in folders
+    for number, at in enumerate((LOW, HIGH)):
+        there = gc.Dataset.load(tmp_path / "archive" / f"base-at-{number}").scene
+        assert all(there.get(path) == value for path, value in at.items())
+    pours = archive.pours()
+    assert len(pours.x) + pours.left_out == 6 + 8 + 8
+    # Base pours first, those of both places.
+    assert np.all(pours.psi[:6] == 0)
+    assert sorted(pours.condition[:6, 0].tolist()) == [0, 0, 0, 1, 1, 1]
+    assert set(pours.condition[:, 0].tolist()) == {0.0, 1.0}
+    # No pour of one place is one of the other.
+    assert len(np.unique(pours.theta[:6])) == 6
+    design = plan.design
+    design.check(pours.theta, pours.condition, pours.psi)
+    strengths = np.unique(pours.psi[:, 1])
+    assert strengths == pytest.approx([0, 0.25, 0.5, 0.75, 1.0], abs=0.04)
+    # The same conditions with pours between them are another archive, and the other way round.
+    with pytest.raises(TrainingDataError, match="is of another places"):
+        Archive(tmp_path / "archive", Plan(**{**plan.__dict__, "places": ()}))
+
+
+def test_how_a_recording_is_read_is_the_tasks_to_say(tmp_path: Path) -> None:
+    # A mound of 12 mm on a flat bed, and a frame of 5 pixels that is a fault.
+    edge = np.linspace(-1, 1, 60)
+    mound = 0.012 * np.maximum(0.0, 1 - 9 * (edge[:, None] ** 2 + edge[None] ** 2))
+    mound[:5], mound[-5:], mound[:, :5], mound[:, -5:] = 0.02, 0.02, 0.02, 0.02
+    path = tmp_path / "map.npz"
+    np.savez(path, depthmap=1e3 * mound, xres=3.4, yres=3.4, zres=1.0, scale="mm")
+    scene = gc.Scene.from_toml(SCENE).with_({"grains.count": 400})
+
+    def largest(**reading: float) -> float:
+        one = Condition("map", {}, FIT, (path,), reading=reading)
+        return float(one.statistics(scene)[0, 0])
+
+    assert largest(border_px=6, height_threshold=1e-3) == pytest.approx(0.012, rel=0.05)
+    # The faults are no grains of this scene.
+    with pytest.raises(ObservationError, match="times that: is the recording of this scene"):
+        largest()
+
+
+def test_the_drums_walls_turn_together_and_its_effects_fit_the_scene(tmp_path: Path) -> None:
+    # Pictures stand where the measured ones would; what they show does not matter here.
+    folder = tmp_path / "granudrum-mcc"
+    folder.mkdir()
+    for rpm in (15, 45):
+        (folder / f"gd_nature_{rpm}rpm_averaged.bmp").write_bytes(struct.pack("<2s", b"BM"))
+    asked = loop_drum.task(tmp_path, (15,))
+    assert [c.use for c in asked.conditions] == [FIT, SEALED]
+    assert [path for path, _, _ in asked.inputs] == ["walls.0.motion.rate"]
+    slow, fast = asked.places
+    assert slow["walls.0.motion.rate"] == slow["walls.1.motion.rate"] == pytest.approx(np.pi / 2)
+    assert fast["walls.1.motion.rate"] == pytest.approx(3 * np.pi / 2)
+    scene = asked.at_first()
+    for entry in (*asked.library, *FURTHER):
+        effect = entry.at(scene)
+        changed = scene.with_(effect.numbers(1.0))
+        assert changed.get(effect.path) == effect.value(1.0)
+        assert effect.strength(np.array([effect.value(0.5)]))[0] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_draws_around_a_fit_have_its_spread_and_stay_in_the_prior() -> None:
+    design = Design(("a", "b"), (), (Effect("up"), Effect("both", is_two_sided=True)))
+    # Two parameters and one strength: slopes 3 and 0 in theta, and 4 in the strength.
+    slopes = np.array([[3.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 4.0]])
+    fit = Fit(np.zeros(2), np.array([0.9, 0.0]), (0,), np.zeros(3), slopes, np.eye(3), 0.0, 0.0)
+    theta, psi = draw(fit, design, 4000, seed=1)
+    assert theta.shape == (4000, 2) and psi.shape == (4000, 1)
+    # With the prior's one: 1 / sqrt(10); what says nothing keeps the prior, uniform here.
+    assert normal_from_cube(theta[:, 0]).std() == pytest.approx(10**-0.5, rel=0.05)
+    assert theta[:, 1].std() == pytest.approx(12**-0.5, rel=0.05)
+    assert psi.max() == 1.0 and psi.min() >= 0.0
+    assert np.quantile(psi, 0.16) == pytest.approx(0.9 - 0.25, abs=0.02)
+
+
+def test_the_rings_effects_fit_their_scene_and_no_map_is_fitted_and_sealed(tmp_path: Path) -> None:
+    used = [n for fitted, sealed in loop_rings.GROUPS.values() for n in (*fitted, *sealed)]
+    assert len(used) == len(set(used))
+    # Rings that leave the picture are not among them.
+    assert not {28, 29, 31, 35} & set(used)
+    asked = loop_rings.task(tmp_path, "middle")
+    assert asked.inputs == () and [len(c.recordings) for c in asked.conditions] == [4, 1, 1]
+    scene = asked.at_first()
+    for entry in asked.library:
+        effect = entry.at(scene)
+        for path, value in effect.numbers(1.0).items():
+            assert scene.with_({path: value}).get(path) == value
+
+
+def test_an_archive_takes_further_effects_and_keeps_its_pours(tmp_path: Path) -> None:
+    asked = task(False, averaged=True, effects=("tilt.y", "count"))
+    tilt, count = sorted(asked.library, key=lambda effect: effect.name, reverse=True)
+
+    def archive(*library: LibraryEffect) -> Archive:
+        plan = Plan(
+            scene=asked.at_first(),
+            prior=asked.prior,
+            conditions=asked.inputs,
+            library=library,
+            base=4,
+            each=4,
+            places=asked.places,
+        )
+        return Archive(tmp_path / "archive", plan)
+
+    first = archive(tilt)
+    first.fill(threads=1, say=lambda _: None, progress=False)
+    before = first.pours()
+    both = archive(tilt, count)
+    both.fill(threads=1, say=lambda _: None, progress=False)
+    after = both.pours()
+    # A pour for each of four strengths at each of two places.
+    assert len(after.x) + after.left_out == len(before.x) + before.left_out + 8
+    assert np.array_equal(after.x[: len(before.x)], before.x)
+    # The first still has its own; another order has other seeds, and is refused.
+    assert np.array_equal(archive(tilt).pours().x, before.x)
+    with pytest.raises(TrainingDataError, match="is of another library"):
+        archive(count, tilt)
