@@ -1,7 +1,7 @@
 """Where rounds pour, beside pours of the prior, where one pour tells as little as a funnel's.
 
     python benches/rounds_design.py --recordings 16 --designs even
-    python benches/rounds_design.py --recordings 8 --designs even sharp
+    python benches/rounds_design.py --recordings 16 --designs even sharp
 
 On `granulcal.toys.PileStandIn` with its noise doubled, whose posterior is known exactly; recordings
 are the same for all rows, so that differences are surer than levels. The form of each emulator is
