@@ -98,8 +98,8 @@ class PileStandIn:
     causes, as the noise of statistics of one pile does.
     """
 
-    def __init__(self, *, seed: int = 0) -> None:
-        """Draws the map and the noise from `seed`."""
+    def __init__(self, *, seed: int = 0, noise: float = 1.0) -> None:
+        """Draws the map and the noise from `seed`; `noise` is a factor on the latter."""
         generator = np.random.default_rng(seed)
         self.prior = Prior.default()
         self._hidden = generator.standard_normal((3, 24)) * np.array([[1.6], [1.3], [0.7]])
@@ -111,7 +111,7 @@ class PileStandIn:
         share = np.geomspace(0.3, 3.0, 16)
         scale = generator.permutation(share) * self._clean(generator.random((4000, 3))).std(axis=0)
         spread = scale / np.sqrt(np.diag(covariance))
-        self._noise_root = np.linalg.cholesky(covariance * np.outer(spread, spread))
+        self._noise_root = noise * np.linalg.cholesky(covariance * np.outer(spread, spread))
 
     def simulate(self, n: int, *, seed: int = 0) -> tuple[Array, Array]:
         """Returns `n` prior draws (n, 3) and their statistics (n, 16)."""

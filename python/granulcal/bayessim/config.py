@@ -40,10 +40,11 @@ class Config:
         snr: whether each statistic's frequency is scaled by its explained share of variance.
         linear_start: whether training starts from the linear regression of the parameters on the
             statistics instead of from nothing.
-        jitter: standard deviation of the noise added to the standardised inputs in training.
+        jitter: standard deviation of the noise added to the standardised inputs in training; in
+            inverse proportion less where there are more than 1500 pairs.
         learning_rate: first step of Adam; it falls to zero along a cosine.
-        batch_size: pairs per step.
-        max_epochs: passes over the pairs at most.
+        batch_size: pairs per step; a hundredth of the pairs, if that is more.
+        max_epochs: passes over the pairs at most; fewer from 1500 pairs on.
         patience: passes without a better validation loss before a member stops.
         validation_share: share of the pairs that only decide when to stop.
         test_share: share of the pairs kept for the calibration check, never trained on.

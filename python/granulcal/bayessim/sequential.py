@@ -27,26 +27,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.arrays import as_matrix
-from granulcal.bayessim.density import quasi_uniform
-from granulcal.bayessim.likelihood import EmulatorChoice, Likelihood
-from granulcal.bayessim.misfit import Misfit, MisfitReference
-from granulcal.bayessim.standardise import Standardiser
+from granulcal.bayessim.likelihood import EmulatorChoice
+from granulcal.bayessim.misfit import Misfit
+from granulcal.bayessim.round_fit import RoundFit, first_design
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.posterior import Posterior
 from granulcal.prior import Prior
 
-__all__ = ["Round", "SequentialFit", "infer_within_budget", "round_sizes"]
+__all__ = ["Round", "SequentialFit", "infer_within_budget", "round_sizes", "rounds_of"]
 
 Array = NDArray[np.float64]
 
 FEWEST_PAIRS = 20
 _FEWEST_BUDGET = 60
 _FIRST_SHARE = 0.4
-_LATER_ROUNDS = 3
-_PRIOR_SHARE = 0.1
-_TEMPER = 0.5
-_CANDIDATES = 2
-_FEATURES = 100
+# Power of the likelihood that each later round is drawn by.
+_POWERS = (0.5, 0.5, 0.5)
 
 
 @dataclass(frozen=True)
@@ -110,7 +106,7 @@ def round_sizes(budget: int) -> list[int]:
             f"budget must be a whole number of at least {_FEWEST_BUDGET} pours, got {budget!r}"
         )
     first = round(_FIRST_SHARE * budget)
-    ends = np.linspace(first, budget, _LATER_ROUNDS + 1).round().astype(int)
+    ends = np.linspace(first, budget, len(_POWERS) + 1).round().astype(int)
     return [first, *np.diff(ends).tolist()]
 
 
@@ -144,33 +140,66 @@ def infer_within_budget(
         TrainingDataError: fewer than 20 pours of the first round can be used.
         ValueError: a budget below 60.
     """
+
+    def pour(design: Array, first: int) -> tuple[Array, Array]:
+        return design, as_matrix(
+            "simulated statistics", simulate(prior.from_unconstrained(design), first)
+        )
+
+    return rounds_of(
+        pour, prior, x_obs, budget=budget, seed=seed, x_names=x_names, progress=progress
+    )
+
+
+def rounds_of(
+    pour: Callable[[Array, int], tuple[Array, Array]],
+    prior: Prior,
+    x_obs: ArrayLike,
+    *,
+    budget: int,
+    seed: int = 0,
+    x_names: tuple[str, ...] | None = None,
+    progress: Callable[[Round], None] | None = None,
+) -> SequentialFit:
+    """Returns the same from pours that need not be where they were asked for.
+
+    Args:
+        pour: takes coordinates, shape (b, p), and the index of the first of them among all;
+            returns the coordinates that were poured, shape (b, p), and their statistics, (b, s).
+        prior: the prior.
+        x_obs: as in `infer_within_budget`, like the rest.
+        budget: pours in all.
+        seed: seed of every random choice.
+        x_names: names of the statistics.
+        progress: called after each round.
+    """
     sizes = round_sizes(budget)
     observed = np.atleast_2d(np.asarray(x_obs, dtype=float))
     if observed.ndim != 2 or not np.all(np.isfinite(observed)):
         raise ObservationError(f"x_obs must be finite, shape (s,) or (k, s), got {observed.shape}")
     names = x_names or tuple(f"statistic_{i}" for i in range(observed.shape[1]))
-    u, theta, x = np.empty((0, len(prior.names))), [], np.empty((0, observed.shape[1]))
+    u, x = np.empty((0, len(prior.names))), np.empty((0, observed.shape[1]))
     rounds: list[Round] = []
-    fit: _Fit | None = None
+    fit: RoundFit | None = None
     for number, size in enumerate(sizes, start=1):
         design = (
-            _first_design(prior, size, seed) if fit is None else fit.next(u, size, seed + number)
+            first_design(prior, size, seed)
+            if fit is None
+            else fit.next(u, size, seed + number, _POWERS[number - 2])
         )
-        made = prior.from_unconstrained(design)
-        statistics = as_matrix("simulated statistics", simulate(made, len(u)))
+        poured, statistics = pour(design, len(u))
         if statistics.shape != (size, observed.shape[1]):
             raise TrainingDataError(
                 f"simulate must return shape {(size, observed.shape[1])}, got {statistics.shape}"
             )
-        u, x = np.concatenate([u, design]), np.concatenate([x, statistics])
-        theta.append(made)
+        u, x = np.concatenate([u, poured]), np.concatenate([x, statistics])
         usable = np.all(np.isfinite(x), axis=1)
         if usable.sum() < FEWEST_PAIRS:
             raise TrainingDataError(
                 f"at least {FEWEST_PAIRS} pours must be usable, {usable.sum()} of {len(u)} are: "
                 "a larger budget or a narrower prior is needed"
             )
-        fit = _Fit.of(prior, u[usable], x[usable], observed, seed)
+        fit = RoundFit.of(prior, u[usable], x[usable], observed, seed)
         draws = prior.to_unconstrained(fit.posterior.sample(2000))
         spread = draws.std(axis=0) / fit.likelihood.pool.std(axis=0)
         rounds.append(Round(number, len(sizes), len(u), int(usable.sum()), budget, spread))
@@ -179,64 +208,5 @@ def infer_within_budget(
     assert fit is not None
     z = fit.standardiser.apply(observed, clip=False)
     misfit = fit.reference().test(fit.likelihood, z, names)
-    return SequentialFit(fit.posterior, misfit, fit.choice, np.concatenate(theta), x, tuple(rounds))
-
-
-@dataclass(frozen=True)
-class _Fit:
-    """The emulator of the pours so far, and what it says of the observation."""
-
-    prior: Prior
-    u: Array
-    z: Array
-    observed: Array
-    standardiser: Standardiser
-    likelihood: Likelihood
-    folds: list
-    choice: EmulatorChoice
-    posterior: Posterior
-
-    @classmethod
-    def of(cls, prior: Prior, u: Array, x: Array, x_obs: Array, seed: int) -> "_Fit":
-        standardiser = Standardiser.fit(x)
-        z = standardiser.apply(x)
-        likelihood, folds, choice = Likelihood.fit(u, z, prior, features=_FEATURES, seed=seed)
-        observed = standardiser.apply(x_obs)
-        posterior = Posterior.from_conditions(prior, [(likelihood, observed)])
-        return cls(prior, u, z, observed, standardiser, likelihood, folds, choice, posterior)
-
-    def reference(self) -> MisfitReference:
-        return MisfitReference.of(self.folds, self.u, self.z)
-
-    def next(self, taken: Array, count: int, seed: int) -> Array:
-        """Coordinates of the next pours, shape (count, p), away from those `taken` (n, p)."""
-        generator = np.random.default_rng(seed)
-        pool = self.likelihood.pool
-        log_weights = _TEMPER * self.likelihood.start(self.observed)
-        weights = np.exp(log_weights - log_weights.max()) + 1e-12
-        blind = max(1, round(_PRIOR_SHARE * count))
-        # Farthest of few: of many, and with the prior's among them, all would be of the tails.
-        near = generator.choice(
-            len(pool), size=_CANDIDATES * (count - blind), replace=False, p=weights / weights.sum()
-        )
-        candidates = pool[near]
-        scale = np.maximum(candidates.std(axis=0), 1e-6)
-        nearest = np.min(
-            np.linalg.norm((candidates[:, None] - taken[None]) / scale, axis=2), axis=1
-        )
-        picked = []
-        for _ in range(count - blind):
-            best = int(nearest.argmax())
-            picked.append(best)
-            away = np.linalg.norm((candidates - candidates[best]) / scale, axis=1)
-            nearest = np.minimum(nearest, away)
-        anywhere = pool[generator.choice(len(pool), size=blind, replace=False)]
-        return np.concatenate([candidates[picked], anywhere])
-
-
-def _first_design(prior: Prior, count: int, seed: int) -> Array:
-    """Evenly spread draws of the prior, moved by the seed, coordinates (count, p)."""
-    shift = np.random.default_rng(seed).random(len(prior.free))
-    uniform = (quasi_uniform(count, len(prior.free)) + shift) % 1
-    columns = [p.quantile(uniform[:, i]) for i, p in enumerate(prior.free)]
-    return prior.to_unconstrained(np.column_stack(columns))
+    theta = prior.from_unconstrained(u)
+    return SequentialFit(fit.posterior, misfit, fit.choice, theta, x, tuple(rounds))

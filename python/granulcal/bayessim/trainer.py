@@ -17,6 +17,13 @@ __all__ = ["Progress", "TrainingResult", "train"]
 
 Array = NDArray[np.float64]
 
+# Steps of one pass at most: more pairs make larger batches, not longer training.
+_STEPS = 100
+# More pairs than this lie closer together, and need less smoothing between them.
+_PAIRS_OF_JITTER = 1500
+# Pairs shown in all at most, and the fewest passes that are made of them.
+_SHOWN, _FEWEST_PASSES = 600_000, 40
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -93,6 +100,9 @@ class _Training:
         weights: Array | None,
     ) -> None:
         self.config = config
+        self.jitter = config.jitter * min(1.0, _PAIRS_OF_JITTER / len(u))
+        passes = max(_FEWEST_PASSES, _SHOWN // len(u))
+        self.passes = min(config.max_epochs, passes)
         self.generator = torch.Generator().manual_seed(seed)
         self.u = torch.from_numpy(u).float()
         self.x = torch.from_numpy(x).float()
@@ -132,8 +142,8 @@ class _Training:
         train_loss = torch.zeros(members)
         epoch, status = 0, "epoch_limit"
         curve = []
-        for epoch in range(1, config.max_epochs + 1):
-            turn = math.pi * (epoch - 1) / config.max_epochs
+        for epoch in range(1, self.passes + 1):
+            turn = math.pi * (epoch - 1) / self.passes
             train_loss = self._one_pass(adam, 0.5 * config.learning_rate * (1 + math.cos(turn)))
             with torch.no_grad():
                 loss = self._loss(self.validation, jitter=0.0)
@@ -145,7 +155,7 @@ class _Training:
             curve.append((float(train_loss.mean()), float(loss.mean())))
             if progress is not None:
                 means = (float(train_loss.mean()), float(best_loss.mean()))
-                progress(Progress(epoch, config.max_epochs, *means))
+                progress(Progress(epoch, self.passes, *means))
             if bool((epoch - best_epoch >= config.patience).all()):
                 status = "stopped_early"
                 break
@@ -168,8 +178,8 @@ class _Training:
         count = self.training.shape[1]
         order = torch.stack([row[self._permutation(count)] for row in self.training])
         total, parameters = torch.zeros(len(order)), self.network.parameters()
-        for batch in order.split(self.config.batch_size, dim=1):
-            loss = self._loss(batch, jitter=self.config.jitter)
+        for batch in order.split(max(self.config.batch_size, count // _STEPS), dim=1):
+            loss = self._loss(batch, jitter=self.jitter)
             adam.step(torch.autograd.grad(loss.sum(), parameters), rate)
             total += loss.detach() * batch.shape[1]
         return total / count
