@@ -9,7 +9,7 @@ from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.prior import Parameter, Prior
 from granulcal.scene import Scene
 
-__all__ = ["EFFECTS", "FURTHER", "SPEEDS", "at_speed", "task"]
+__all__ = ["EFFECTS", "SPEEDS", "at_speed", "task"]
 
 _SCENE = Path(__file__).with_name("drum.toml")
 _FOLDER = Path("granudrum-mcc")
@@ -36,10 +36,6 @@ EFFECTS: tuple[LibraryEffect, ...] = (
         whole=True,
         doc="more grains in the drum than the authors simulate",
     ),
-)
-"""What the base model may lack; friction of the end walls is one of its unknowns."""
-
-FURTHER: tuple[LibraryEffect, ...] = (
     LibraryEffect(
         name="cohesion.dry",
         family="cohesion",
@@ -68,7 +64,7 @@ FURTHER: tuple[LibraryEffect, ...] = (
         doc="drag of air at rest; grains twice as large fall as those of 1.2 mm at 7e-5",
     ),
 )
-"""Candidates that have not been run; `EFFECTS + FURTHER` goes on with the same archive."""
+"""What the base model may lack; friction of the end walls is one of its unknowns."""
 
 
 def at_speed(rpm: float, begin: float, end: float) -> dict[str, float]:
