@@ -33,7 +33,6 @@ _X_NAMES = ("shift", "scale", "low", "high")
 def model_tensors(model: "BayesSim") -> dict[str, NDArray[Any]]:
     """Returns every array of a model by name."""
     standardiser, likelihood = model.standardiser, model.likelihood
-    at_pool = likelihood.at_pool
     emulator = likelihood.emulator
     tensors: dict[str, NDArray[Any]] = {
         "x_is_log": standardiser.is_log.astype(np.uint8),
@@ -51,15 +50,19 @@ def model_tensors(model: "BayesSim") -> dict[str, NDArray[Any]]:
         "emulator_leading_root": likelihood.leading.noise.root,
         "emulator_y_shift": emulator.shift,
         "emulator_y_spread": emulator.spread,
-        # What the Rust side would have to work out before its first posterior; single precision
-        # is enough for the weights of draws.
-        "pool_means": at_pool.means.astype(np.float32),
-        "pool_scales": at_pool.scales.astype(np.float32),
-        "pool_unknown": at_pool.unknown.astype(np.float32),
         "misfit_squares": model.misfit_reference.squares,
         "misfit_residuals": model.misfit_reference.residuals,
         "misfit_noise": model.misfit_reference.noise,
     }
+    if model.emulator_weight > 0:
+        # What the Rust side would have to work out before its first posterior; single precision
+        # is enough for the weights of draws.
+        at_pool = likelihood.at_pool
+        tensors |= {
+            "pool_means": at_pool.means.astype(np.float32),
+            "pool_scales": at_pool.scales.astype(np.float32),
+            "pool_unknown": at_pool.unknown.astype(np.float32),
+        }
     if model.amortised is not None:
         network = model.amortised.network
         tensors |= {
