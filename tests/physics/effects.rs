@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use granulcal::dem::{
-    Adhesion, Capillary, Fluid, GRAVITY, Grains, GroundUnlike, Motion, Polydispersity,
+    Adhesion, Capillary, Fluid, FunnelPose, GRAVITY, Grains, GroundUnlike, Motion, Polydispersity,
     RestitutionSpeed, Scene, Shape, Start, Status, Tilt, Vibration, Wall, WallMaterial,
 };
 use nalgebra::Vector3;
@@ -43,6 +43,8 @@ fn an_effect_that_is_off_changes_no_bit() {
     said.effects.fluid.added_mass = 0.0;
     said.effects.vibration.frequency = 10.0;
     said.effects.restitution_speed.reference = 3.0;
+    said.effects.layer.stiffness = 5.0;
+    said.effects.fluid.entrained = 1.0;
     assert!(!said.effects.is_plain());
     assert_eq!(bits(&after(&plain, 0.3)), bits(&after(&said, 0.3)));
 }
@@ -122,7 +124,7 @@ fn terminal_speed_is_schillers_and_naumanns() {
     for (density, viscosity) in [(1260.0, 1.4), (1000.0, 1e-3), (1000.0, 1e-2)] {
         let mut scene = one_grain(5.0, material(0.5, 0.1, 0.5));
         scene.grains = Grains { count: 1, diameter: 2.0 * RADIUS, density: 2500.0 };
-        scene.effects.fluid = Fluid { density, viscosity, added_mass: 0.5 };
+        scene.effects.fluid = Fluid { density, viscosity, ..Fluid::default() };
         let speed = -after(&scene, 2.0).velocities()[0].z;
         let reynolds = density * speed * 2.0 * RADIUS / viscosity;
         let coefficient = if reynolds < 1000.0 {
@@ -140,7 +142,7 @@ fn terminal_speed_is_schillers_and_naumanns() {
 fn a_grain_in_a_perfect_fluid_falls_with_buoyancy_and_added_mass() {
     let mut scene = one_grain(1.0, material(0.5, 0.1, 0.5));
     scene.grains.density = 2000.0;
-    scene.effects.fluid = Fluid { density: 1000.0, viscosity: 0.0, added_mass: 0.5 };
+    scene.effects.fluid = Fluid { density: 1000.0, viscosity: 0.0, ..Fluid::default() };
     let simulation = after(&scene, 20.0 * DT);
     let begun = -simulation.velocities()[0].z / 0.01;
     // (rho - rho_f) / (rho + rho_f / 2) g, before drag has grown.
@@ -227,6 +229,96 @@ fn grains_of_all_sizes_come_to_rest_and_hold_together_when_wet() {
     first.advance(0.2);
     let second = start(&scene).resume(&first.checkpoint()).unwrap();
     assert!(first.run() == second.run());
+}
+
+#[test]
+fn fluid_inside_a_cluster_goes_with_it() {
+    // A grain and its twelve neighbours of a face-centred cubic lattice, too far apart to touch, in something very thick.
+    let spacing = 2.1 * RADIUS / 2f64.sqrt();
+    let mut positions = vec![[0.0, 0.0, 1.0]];
+    for [a, b] in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
+        let (a, b) = (a * spacing, b * spacing);
+        positions.extend([[a, b, 1.0], [a, 0.0, 1.0 + b], [0.0, a, 1.0 + b]]);
+    }
+    let mut scene = one_grain(1.0, material(0.5, 0.1, 0.5));
+    scene.grains = Grains { count: 13, diameter: 2.0 * RADIUS, density: 2500.0 };
+    scene.start = Start::Positions { positions };
+    let viscosity = 14.0;
+    scene.effects.fluid = Fluid { density: 1260.0, viscosity, entrained: 1.0, ..Fluid::default() };
+    let speeds = after(&scene, 0.01).velocities();
+    let lone = (2500.0 - 1260.0) * GRAVITY * 2.0 / 9.0 * RADIUS * RADIUS / viscosity;
+    // The middle one goes lone faster than its neighbours; one of those, with five neighbours of the eight that a packing
+    // has, lone faster than (4 v + v_middle) / 8: v = 3 lone, v_middle = 4 lone. The mean over all outer grains:
+    let outer = -speeds[1..].iter().map(|v| v.z).sum::<f64>() / 12.0;
+    assert!((-speeds[0].z / (4.0 * lone) - 1.0).abs() < 0.01, "{} {lone}", speeds[0].z);
+    assert!((outer / (3.0 * lone) - 1.0).abs() < 0.01, "{outer} {lone}");
+}
+
+#[test]
+fn rolling_that_is_resisted_by_its_speed_dies_away_exponentially() {
+    let (speed, mu_r, v_0) = (0.1, 0.2, 0.5);
+    let mut scene = one_grain(RADIUS, material(1.0, mu_r, 0.0));
+    scene.effects.rolling_form.speed = v_0;
+    let rolled = |scene: &Scene, seconds| {
+        let mut simulation = start(scene);
+        let (v, w) = (Vector3::new(speed, 0.0, 0.0), Vector3::new(0.0, speed / RADIUS, 0.0));
+        simulation.set_motion(0, v, w).unwrap();
+        simulation.advance(seconds);
+        simulation.velocities()[0].x / speed
+    };
+    // 7/5 m dv/dt = -mu_r m g v / v_0.
+    let expected = (-5.0 / 7.0 * mu_r * GRAVITY / v_0 * 0.2).exp();
+    assert!((rolled(&scene, 0.2) / expected - 1.0).abs() < 0.01, "{}", rolled(&scene, 0.2));
+    // A speed of nearly nothing is Coulomb's form: 7/5 m dv/dt = -mu_r m g.
+    scene.effects.rolling_form.speed = 1e-9;
+    let expected = 1.0 - 5.0 / 7.0 * mu_r * GRAVITY * 0.04 / speed;
+    assert!((rolled(&scene, 0.04) / expected - 1.0).abs() < 0.01, "{}", rolled(&scene, 0.04));
+}
+
+#[test]
+fn a_funnel_that_hangs_aside_pours_aside() {
+    let mut scene = Scene::funnel(0.05);
+    scene.grains.count = 120;
+    let middle = |scene: &Scene| {
+        let pour = start(scene).run();
+        assert_eq!((pour.status, pour.grains_in_funnel), (Status::AtRest, 0));
+        pour.positions.iter().sum::<Vector3<f64>>() / 120.0
+    };
+    // The mean of 120 grains scatters by 5 mm from pour to pour.
+    let mean = middle(&scene);
+    scene.effects.funnel.x = 0.05;
+    assert!((middle(&scene).x - mean.x - 0.05).abs() < 0.02, "{}", middle(&scene).x);
+    // One whose rim leans to positive x pours to negative x.
+    scene.effects.funnel = FunnelPose { lean_y: 0.3, ..FunnelPose::default() };
+    assert!(middle(&scene).x < mean.x - 0.02, "{}", middle(&scene).x);
+}
+
+#[test]
+fn an_oval_outlet_pours_an_oval() {
+    let spreads = |aspect: f64| {
+        let mut scene = Scene::funnel(0.03);
+        scene.grains.count = 400;
+        scene.effects.outlet.aspect = aspect;
+        let mut simulation = start(&scene);
+        // Half axes of what is below the outlet, while it flows.
+        let mut square = [0.0; 2];
+        let mut seen = 0.0;
+        while simulation.time() < 0.5 {
+            simulation.advance(0.005);
+            for place in simulation.positions() {
+                if (0.01..0.03).contains(&place.z) && place.xy().norm() < 0.04 {
+                    square[0] += place.x.powi(2);
+                    square[1] += place.y.powi(2);
+                    seen += 1.0;
+                }
+            }
+        }
+        assert!(seen > 1000.0, "{seen}");
+        (square[0] / square[1]).sqrt()
+    };
+    let (round, facets, oval) = (spreads(1.0), spreads(1.0 + 1e-9), spreads(2.0));
+    assert!((round - 1.0).abs() < 0.1 && (facets - 1.0).abs() < 0.1, "{round} {facets}");
+    assert!(oval > 1.3, "{oval}");
 }
 
 #[test]

@@ -5,12 +5,14 @@
 
 mod bulk;
 mod bulk_laws;
+mod clump;
 mod collision;
 mod counters;
 mod determinism;
 mod effects;
 mod impact;
 mod incline;
+mod layer;
 mod meshes;
 mod moving_walls;
 mod packing;

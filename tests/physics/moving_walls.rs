@@ -172,7 +172,7 @@ fn the_contact_problem_knows_the_walls_motion() {
         scene.preset = method;
         let mut simulation: Simulation = start(&scene);
         simulation.advance(0.05);
-        let problem = simulation.contact_problem();
+        let problem = simulation.contact_problem().unwrap();
         let velocity = problem.velocities()[0];
         // 0.3 m/s to the right at most, lifted at 0.02.
         assert!((velocity[2] - 0.02).abs() < 1e-5, "{velocity}");

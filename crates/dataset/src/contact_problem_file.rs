@@ -83,7 +83,7 @@ mod tests {
         scene.grains.count = 30;
         let mut simulation = Simulation::new(&scene, 1).unwrap();
         simulation.advance(0.04);
-        let problem = simulation.contact_problem();
+        let problem = simulation.contact_problem().unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("frozen.npz");
         write_contact_problem(&path, &problem).unwrap();

@@ -5,6 +5,7 @@ use std::marker::PhantomData;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use crate::clumps::Clumps;
 use crate::lanes::{Row, Width};
 use crate::parallel::Threads;
 use crate::period::Period;
@@ -102,6 +103,11 @@ impl Bed {
         let mut places: Vec<Row> =
             scene.start.positions(scene, seed).iter().map(|at| Row::new(at, radius)).collect();
         let mut inverse_mass = vec![1.0; count];
+        if let Some(clumps) = Clumps::of(scene, seed) {
+            places = clumps.places();
+            inverse_mass = vec![clumps.members() as f64; places.len()];
+        }
+        let count = inverse_mass.len();
         if let Some(radii) = scene.effects.polydispersity.radii(count, radius, seed) {
             for ((place, inverse), own) in places.iter_mut().zip(&mut inverse_mass).zip(radii) {
                 place.0[3] = own;

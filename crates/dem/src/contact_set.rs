@@ -29,6 +29,8 @@ pub(crate) enum Second {
     RestingWall,
     /// A wall that may move, and a body of the contact's own that stands for it.
     MovingWall,
+    /// A soft layer on a wall that rests, and the resting body.
+    SoftLayer,
 }
 
 /// All contacts of a kind (pairs of grains, or grains at walls), block after block and in it colour after colour.
@@ -85,6 +87,11 @@ impl ContactSet {
     /// Whether each contact has a body of its own that stands for a moving wall.
     pub fn has_wall_bodies(&self) -> bool {
         self.second == Second::MovingWall
+    }
+
+    /// Whether its contacts give way.
+    pub fn is_soft(&self) -> bool {
+        self.second == Second::SoftLayer
     }
 
     /// Bodies that stand for moving walls.
@@ -346,6 +353,8 @@ mod tests {
             sliding_friction: number,
             rolling_friction: 0.1,
             torsional_friction: 0.05,
+            give: 0.0,
+            rolling_speed: 0.0,
         }
     }
 

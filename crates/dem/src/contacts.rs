@@ -49,6 +49,8 @@ pub(crate) struct Surroundings {
     pub threads: Threads,
     /// Radius of a typical grain `[m]`, the length that the settings are relative to.
     pub radius: f64,
+    /// Spheres that a grain is made of: those of one grain do not touch each other.
+    pub members: usize,
     /// Gap below which a pair is listed in any case `[m]`.
     pub margin: f64,
 }
@@ -63,6 +65,7 @@ impl Surroundings {
             walls,
             material: scene.material,
             gravity: effects.gravity,
+            members: scene.effects.clump.members(),
             settings,
             threads: Threads::default(),
             radius,
@@ -96,24 +99,26 @@ impl Surroundings {
     pub fn pair_law(&self, bed: &Bed, i: usize, j: usize) -> ContactLaw {
         let (r_i, r_j) = (bed.radius(i), bed.radius(j));
         let lever = [r_j / (r_i + r_j), r_i / (r_i + r_j)];
-        contact_law(&self.material, [bed.inverse_mass[i], bed.inverse_mass[j]], lever)
+        self.law(&self.material, [bed.inverse_mass[i], bed.inverse_mass[j]], lever)
     }
 
     /// The coefficients of a contact between a grain and a wall.
     pub fn wall_law(&self, bed: &Bed, i: usize, wall: usize) -> ContactLaw {
         // The spin of a moving wall is in units of the grain's radius, so that its lever is the grain's.
         let lever = if self.has_moving_walls { [1.0, 1.0] } else { [1.0, 0.0] };
-        contact_law(&self.walls.wall(wall).material, [bed.inverse_mass[i], 0.0], lever)
+        self.law(&self.walls.wall(wall).material, [bed.inverse_mass[i], 0.0], lever)
     }
-}
 
-fn contact_law(material: &Material, inverse_mass: [f64; 2], lever: [f64; 2]) -> ContactLaw {
-    ContactLaw {
-        inverse_mass,
-        lever,
-        sliding_friction: material.sliding_friction,
-        rolling_friction: material.rolling_friction,
-        torsional_friction: material.torsional_friction,
+    fn law(&self, material: &Material, inverse_mass: [f64; 2], lever: [f64; 2]) -> ContactLaw {
+        ContactLaw {
+            inverse_mass,
+            lever,
+            sliding_friction: material.sliding_friction,
+            rolling_friction: material.rolling_friction,
+            torsional_friction: material.torsional_friction,
+            give: 0.0,
+            rolling_speed: self.effects.rolling_speed,
+        }
     }
 }
 
@@ -303,6 +308,10 @@ impl Contacts {
         let middles = if bed.period.is_some() { &[] } else { self.search.middles() };
         self.blocks.place(middles, self.search.longest(), around.radius);
         // Contacts that will act come first: their batches are full of them, the others are passed over whole.
+        let members = around.members as u32;
+        if members > 1 {
+            self.found.retain(|pair| pair.i / members != pair.j / members);
+        }
         self.listed.clear();
         self.far.clear();
         for &Neighbours { i, j: partner, come_near } in &self.found {
@@ -374,7 +383,8 @@ impl Contacts {
         self.search.add(grain as u32, &ball);
         for number in 0..self.around_path.len() {
             let other = self.around_path[number] as usize;
-            if other == grain || self.partners.has(grain, other as u32) {
+            let is_own = other / around.members == grain / around.members;
+            if is_own || self.partners.has(grain, other as u32) {
                 continue;
             }
             let theirs = &self.paths[other];

@@ -145,6 +145,28 @@ pub enum DemError {
         /// The name found.
         got: String,
     },
+    /// Two things that cannot be in one scene.
+    #[error("{one} and {other} cannot be in one scene")]
+    Exclude {
+        /// Table of the one.
+        one: &'static str,
+        /// Table of the other.
+        other: &'static str,
+    },
+    /// An effect that a contact problem cannot say when it is written by itself.
+    #[error("a contact problem cannot be written of a scene with {effect}")]
+    NotInContactProblem {
+        /// The table of the effect in the scene.
+        effect: &'static str,
+    },
+    /// An effect that the solver's method does not know.
+    #[error("{effect} needs the method nsgs (every preset but paper), got {got}")]
+    EffectNeedsMethod {
+        /// The table of the effect in the scene.
+        effect: &'static str,
+        /// The method found.
+        got: crate::solver::Method,
+    },
     /// A view without a name of its own.
     #[error("{path} must be of letters, digits, - and _, and no other view's, got {got:?}")]
     ViewName {

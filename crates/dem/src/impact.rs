@@ -310,7 +310,12 @@ fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> 
     let rho = l_i * (spin_i - c_i * twist) - l_j * (spin_j - c_j * twist);
     let a_r = INVERSE_INERTIA * (l_i * l_i * c_i + l_j * l_j * c_j);
     let (about, limit) = (normal.dot(&rho), law.torsional_friction * lambda_n);
-    let rolling = shorten((about * normal - rho) / a_r, law.rolling_friction * lambda_n);
+    let most = law.rolling_friction * lambda_n;
+    let mut stopping = (about * normal - rho) / a_r;
+    if law.rolling_speed > 0.0 {
+        stopping *= most / (most + law.rolling_speed / a_r);
+    }
+    let rolling = shorten(stopping, most);
     // Not `clamp`, which panics at a NaN: what is not finite is for the health to see.
     let lambda_r = rolling + (-about / a_r).max(-limit).min(limit) * normal;
     let roll = INVERSE_INERTIA * lambda_r;

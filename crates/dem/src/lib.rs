@@ -33,6 +33,7 @@ mod assemble;
 mod bed;
 mod blocks;
 mod checkpoint;
+mod clumps;
 mod contact;
 mod contact_set;
 mod contacts;
@@ -61,8 +62,8 @@ mod wall_load;
 
 pub use checkpoint::CheckpointHeader;
 pub use effect::{
-    Adhesion, Capillary, Effects, Fluid, GroundUnlike, Polydispersity, RestitutionSpeed, Tilt,
-    Vibration,
+    Adhesion, Capillary, Clump, Effects, Fluid, FunnelPose, GroundUnlike, Layer, Polydispersity,
+    RestitutionSpeed, RollingForm, Tilt, Vibration,
 };
 pub use error::DemError;
 pub use frozen_search::FrozenSearch;

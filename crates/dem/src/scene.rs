@@ -31,7 +31,7 @@ pub(crate) use start::unit_interval;
 pub use view::ViewSpec;
 pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
 
-use crate::effect::Effects;
+use crate::effect::{Effects, Polydispersity};
 use crate::{DemError, Material, Preset};
 
 /// Standard gravity as the peers' scenes use it `[m/s^2]`.
@@ -220,6 +220,24 @@ impl Scene {
         last.min(self.end.horizon)
     }
 
+    /// The balls that hold the grains, whichever way they are turned: the grains themselves if they are round.
+    pub(crate) fn held_grains(&self) -> Grains {
+        Grains { diameter: self.effects.clump.envelope(&self.grains), ..self.grains }
+    }
+
+    /// What grains that are not round cannot be with.
+    fn check_clump(&self) -> Result<(), DemError> {
+        let others = [
+            ("effects.polydispersity", self.effects.polydispersity != Polydispersity::default()),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+        ];
+        match others.into_iter().find(|(_, is_there)| *is_there && self.effects.clump.is_on()) {
+            Some((other, _)) => Err(DemError::Exclude { one: "effects.clump", other }),
+            None => Ok(()),
+        }
+    }
+
     /// Checks every number of the scene.
     ///
     /// # Errors
@@ -233,9 +251,11 @@ impl Scene {
         for (axis, value) in ["x", "y", "z"].iter().zip(self.gravity) {
             finite(&format!("gravity.{axis}"), value)?;
         }
-        self.start.check(&self.grains)?;
         self.ground.check(&self.material)?;
         self.effects.check()?;
+        self.check_clump()?;
+        self.start.check(&self.held_grains())?;
+        self.effects.check_method(self.preset.settings().method)?;
         if let Some(funnel) = &self.funnel {
             funnel.check(&self.material, self.grains.radius())?;
         }

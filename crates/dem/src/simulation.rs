@@ -12,6 +12,8 @@ use nalgebra::Vector3;
 use crate::DemError;
 use crate::assemble::Seen;
 use crate::bed::Bed;
+use crate::clumps::{self, Clumps};
+use crate::contact_set::ContactSet;
 use crate::contacts::{Contacts, Surroundings};
 use crate::effect::Bridges;
 use crate::frozen_search::FrozenSearch;
@@ -45,6 +47,10 @@ pub struct Simulation {
     impacts: Impacts,
     /// Liquid bridges between grains.
     bridges: Bridges,
+    /// Contacts with a soft layer.
+    on_layer: ContactSet,
+    /// The bodies that the grains are, if they are not round.
+    clumps: Option<Clumps>,
     origin: Arc<Origin>,
     substep: usize,
     /// Whether the grains hardly moved at the last examination.
@@ -75,12 +81,14 @@ impl Simulation {
         let lift = gravity.norm() * scene.grains.radius();
         let least_scale = (lift + scene.end.kinetic_energy) * bed.count() as f64;
         Ok(Self {
-            watch: HealthWatch::new(bed.count(), bed.energy(&gravity), least_scale),
+            watch: HealthWatch::new(bed.count(), energy(&bed, None, &around), least_scale),
             contacts: Contacts::default(),
             around,
             bed,
             impacts: Impacts::default(),
             bridges: Bridges::default(),
+            on_layer: ContactSet::default(),
+            clumps: Clumps::of(scene, seed),
             origin: Arc::new(Origin { scene: scene.clone(), seed }),
             substep: 0,
             is_quiet: false,
@@ -95,6 +103,7 @@ impl Simulation {
     /// [`DemError::OutOfRange`] for a step, margin or bound that is not positive, or a count of 0.
     pub fn with_settings(mut self, settings: SolverSettings) -> Result<Self, DemError> {
         settings.check()?;
+        self.origin.scene.effects.check_method(settings.method)?;
         self.around.set_settings(settings);
         Ok(self)
     }
@@ -145,7 +154,7 @@ impl Simulation {
         grains.filter(|&i| self.bed.has_left(i)).map(|i| self.bed.radius(i)).collect()
     }
 
-    /// Sets a grain, by its number at the start, in motion: velocity `[m/s]` and angular velocity `[rad/s]` at its centre. A pour that had
+    /// Sets a grain (one that is not round, as a whole), by its number at the start, in motion: velocity `[m/s]` and angular velocity `[rad/s]` at its centre. A pour that had
     /// ended goes on, and the energy put in does not count as created.
     ///
     /// Velocities live at the middle of substeps (x += dt v after v += dt g): for a motion v at the present
@@ -159,7 +168,8 @@ impl Simulation {
         velocity: Vector3<f64>,
         angular_velocity: Vector3<f64>,
     ) -> Result<(), DemError> {
-        if grain >= self.bed.count() || self.bed.has_left(grain) {
+        let count = self.clumps.as_ref().map_or(self.bed.count(), Clumps::count);
+        if grain >= count || self.bed.has_left(grain) {
             let allowed = "less than the number of grains, and in the scene";
             return Err(DemError::range("grain", grain as f64, allowed));
         }
@@ -168,9 +178,14 @@ impl Simulation {
                 return Err(DemError::range(name, got, "finite"));
             }
         }
-        let before = self.bed.kinetic_energy(grain);
-        self.bed.set_motion(grain, &velocity, &angular_velocity);
-        self.watch.see_work(self.bed.kinetic_energy(grain) - before);
+        let work = if let Some(clumps) = &mut self.clumps {
+            clumps.set_motion(&mut self.bed, grain, &velocity, &angular_velocity)
+        } else {
+            let before = self.bed.kinetic_energy(grain);
+            self.bed.set_motion(grain, &velocity, &angular_velocity);
+            self.bed.kinetic_energy(grain) - before
+        };
+        self.watch.see_work(work);
         self.contacts.forget_list();
         (self.seemed_ended, self.ended) = (None, None);
         Ok(())
@@ -180,7 +195,14 @@ impl Simulation {
     /// and stem if there is one, then the scene's walls in their order. See [`WallLoad`].
     pub fn wall_loads(&self) -> Vec<WallLoad> {
         let dt = self.around.settings.dt;
-        wall_load::of(&self.contacts.at_walls, &self.around.walls, dt)
+        let walls = &self.around.walls;
+        let mut loads = wall_load::of(&self.contacts.at_walls, walls, dt);
+        for (load, through_layer) in loads.iter_mut().zip(wall_load::of(&self.on_layer, walls, dt))
+        {
+            load.force += through_layer.force;
+            load.normal_force += through_layer.normal_force;
+        }
+        loads
     }
 
     /// How the pour ended, once it has.
@@ -195,7 +217,13 @@ impl Simulation {
 
     /// The contact problem of the next substep, frozen as it is assembled, with its solution after
     /// as many sweeps as its residual needs to be rounding. The simulation itself stays as it is.
-    pub fn contact_problem(&self) -> ContactProblem {
+    ///
+    /// # Errors
+    /// [`DemError::NotInContactProblem`] for a scene with an effect that changes what a contact is.
+    pub fn contact_problem(&self) -> Result<ContactProblem, DemError> {
+        if let Some(effect) = self.origin.scene.effects.of_contacts() {
+            return Err(DemError::NotInContactProblem { effect });
+        }
         let mut twin = self.clone();
         let dt = twin.around.settings.dt;
         twin.assemble();
@@ -207,7 +235,7 @@ impl Simulation {
             nsgs::sweep_plainly(&mut [pairs, at_walls], &mut bed.bodies, SWEEPS_A_LOOK);
             problem.take_impulses(contacts, &bed.bodies, SWEEPS_A_LOOK);
         }
-        problem
+        Ok(problem)
     }
 
     /// Simulates `seconds`, or less if the pour ends before.
@@ -262,12 +290,23 @@ impl Simulation {
         self.accelerate();
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
         let seen = contacts.assemble(bed, around, self.watch.lost_mut(), &mut self.impacts);
+        if self.clumps.is_some() {
+            // Impacts of bodies that turn are a matter of the contact solve.
+            self.impacts.candidates.clear();
+        }
         if self.impacts.resolve(bed, contacts, around) > 0 {
             contacts.assemble_again(bed, around);
             bed.rewind();
         }
         contacts.move_walls(bed, around);
+        if self.clumps.is_some() {
+            clumps::rebound(&mut contacts.pairs, bed, around);
+            clumps::rebound(&mut contacts.at_walls, bed, around);
+        }
         self.pull();
+        if let Some(pad) = &self.around.effects.pad {
+            pad.assemble(&mut self.on_layer, &self.bed, &self.around);
+        }
         seen
     }
 
@@ -283,7 +322,9 @@ impl Simulation {
         let (bed, around) = (&mut self.bed, &self.around);
         bed.accelerate(&around.gravity, dt, &around.threads);
         if let Some(drag) = &around.effects.drag {
-            drag.act(bed, &around.gravity, dt);
+            let pairs = &self.contacts.pairs;
+            let given = drag.act(bed, pairs, &around.gravity, around.radius, dt);
+            self.watch.see_work(given);
         }
         bed.hold_those_out();
     }
@@ -320,7 +361,10 @@ impl Simulation {
         let seen = self.assemble();
         self.solve();
         self.count_work_of_walls();
-        self.bed.move_on(self.around.settings.dt);
+        match &mut self.clumps {
+            None => self.bed.move_on(self.around.settings.dt),
+            Some(clumps) => clumps.move_on(&mut self.bed, self.around.settings.dt),
+        }
         self.watch.see_penetration(seen.penetration);
         self.substep += 1;
         if self.substep.is_multiple_of(self.around.settings.list_period) {
@@ -340,10 +384,13 @@ impl Simulation {
     fn solve(&mut self) {
         let Contacts { pairs, at_walls, .. } = &mut self.contacts;
         let (bodies, around) = (&mut self.bed.bodies, &self.around);
-        let sets = &mut [pairs, at_walls];
+        let sets = &mut [pairs, at_walls, &mut self.on_layer];
+        let sets = if around.effects.pad.is_some() { &mut sets[..] } else { &mut sets[..2] };
         let settings = &around.settings;
         let still = self.is_quiet.then(|| QUIET_SETTLED * around.gravity.norm() * settings.dt);
-        let work = solver::solve(sets, bodies, settings, still, around.radius, &around.threads);
+        let clumps = self.clumps.as_mut();
+        let (radius, threads) = (around.radius, &around.threads);
+        let work = solver::solve(sets, bodies, settings, still, radius, clumps, threads);
         self.watch.see_solve(&work);
     }
 
@@ -356,13 +403,14 @@ impl Simulation {
         }
         if self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period) {
             let Contacts { pairs, at_walls, .. } = &mut self.contacts;
-            let residual = nsgs::ResidualSums::of(&[pairs, at_walls], &mut self.bed.bodies);
+            let sets = [pairs, at_walls, &mut self.on_layer];
+            let residual = nsgs::ResidualSums::of(&sets, &mut self.bed.bodies);
             self.watch.see_residual(residual.relative());
         }
         let fall = self.around.effects.gravity.norm() * self.around.radius;
         self.is_quiet = self.bed.mean_translation() <= QUIET * fall;
         self.watch.see_contacts(self.contacts.count());
-        self.watch.see_energy(self.bed.energy(&self.around.effects.gravity));
+        self.watch.see_energy(energy(&self.bed, self.clumps.as_ref(), &self.around));
         self.ended = self.end_reached().map(|status| {
             let trusted = self.watch.is_healthy(self.around.settings.max_penetration);
             if trusted { status } else { Status::Unhealthy }
@@ -371,6 +419,13 @@ impl Simulation {
             self.ended = Some(Status::Unhealthy);
         }
     }
+}
+
+/// Energy of the grains and of what they press in, per typical mass `[m^2/s^2]`.
+fn energy(bed: &Bed, clumps: Option<&Clumps>, around: &Surroundings) -> f64 {
+    let gravity = &around.effects.gravity;
+    let energy = clumps.map_or_else(|| bed.energy(gravity), |clumps| clumps.energy(gravity));
+    around.effects.pad.as_ref().map_or(energy, |pad| energy + pad.energy(bed))
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::DemError;
 use crate::bed::Body;
+use crate::clumps::Clumps;
 use crate::contact_set::ContactSet;
 use crate::preset::SolverSettings;
 
@@ -81,13 +82,14 @@ pub(crate) struct Work {
 
 /// Solves the contacts of `sets` together, from the impulses that they carry and velocities without them;
 /// `still` is the change of an impulse that counts as none in a quiet state, if this is one `[m/s]`, `radius` that of a
-/// typical grain `[m]`.
+/// typical grain `[m]`. The spheres of `clumps` move as one.
 pub(crate) fn solve(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
     settings: &SolverSettings,
     still: Option<f64>,
     radius: f64,
+    clumps: Option<&mut Clumps>,
     threads: &Threads,
 ) -> Work {
     for set in sets.iter_mut() {
@@ -95,7 +97,7 @@ pub(crate) fn solve(
     }
     let too_fast = settings.closing * radius / settings.dt;
     match settings.method {
-        Method::Nsgs => nsgs::solve(sets, bodies, settings, still, radius, threads),
+        Method::Nsgs => nsgs::solve(sets, bodies, settings, still, radius, clumps, threads),
         Method::NewtonPcr => newton_pcr::solve(sets, bodies, &settings.newton, too_fast, threads),
         Method::Reference => reference::solve(sets, bodies, &settings.reference, threads),
     }

@@ -102,7 +102,9 @@ pub(crate) struct Walls {
 
 impl Walls {
     pub fn of(scene: &Scene) -> Self {
-        let ground = Shape::Plane { point: [0.0; 3], normal: [0.0, 0.0, 1.0] };
+        // A soft layer lies on the hard ground.
+        let point = [0.0, 0.0, 0.0 - scene.effects.layer.thickness];
+        let ground = Shape::Plane { point, normal: [0.0, 0.0, 1.0] };
         let resolve = |shape: &Shape, material: &WallMaterial, motion: &Motion| Wall {
             surfaces: surfaces(shape),
             facets: facets(shape).map(Arc::new),
@@ -112,7 +114,18 @@ impl Walls {
         let of = |wall: &scene::Wall| resolve(&wall.shape, &wall.material, &wall.motion);
         let mut all = vec![resolve(&ground, &scene.ground.material, &Motion::Still)];
         all[0].material = scene.effects.ground.of(all[0].material);
-        all.extend(scene.funnel.iter().flat_map(scene::Funnel::walls).map(|wall| of(&wall)));
+        if let Some(funnel) = &scene.funnel {
+            let mut walls = scene.effects.funnel.walls(funnel).map(|wall| of(&wall));
+            let pose = scene.effects.funnel.of(funnel);
+            if let Some(mesh) = scene.effects.outlet.mesh(funnel, pose.as_ref()) {
+                // One mesh, so that its parts share their edges: the first wall has all of it, the second nothing.
+                for wall in &mut walls {
+                    wall.surfaces.clear();
+                }
+                walls[0].facets = Some(Arc::new(Facets::new(&mesh.vertices, &mesh.triangles)));
+            }
+            all.extend(walls);
+        }
         all.extend(scene.walls.iter().map(of));
         let (mut first, mut owner) = (Vec::new(), Vec::new());
         for (number, wall) in all.iter().enumerate() {

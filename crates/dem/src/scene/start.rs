@@ -1,6 +1,6 @@
 //! Where the grains are when a pour begins.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,7 @@ pub enum Start {
     Ball {
         /// Height of the lowest grain's lowest point `[m]`.
         height: f64,
-        /// Share of the lattice's volume that is grain `[-]`.
+        /// Share of the lattice's volume that is grain `[-]`, or ball that holds a grain that is not round.
         solid_fraction: f64,
         /// Half width of a uniform seeded displacement along each axis `[m]`.
         jitter: f64,
@@ -112,17 +112,25 @@ impl Start {
 
     /// Centres of the grains `[m]`, one each.
     pub(crate) fn positions(&self, scene: &Scene, seed: u64) -> Vec<Vector3<f64>> {
+        let grains = &scene.held_grains();
         let (mut positions, jitter) = match self {
             &Self::Grid { counts, spacing, jitter, base } => {
                 let floor = scene.funnel.as_ref().map_or(0.0, Funnel::rim_height);
-                (grid(scene.grains.count, counts, spacing, floor + base), jitter)
+                let mut points = grid(scene.grains.count, counts, spacing, floor + base);
+                let pose = scene.funnel.as_ref().and_then(|f| scene.effects.funnel.of(f));
+                if let Some(pose) = pose {
+                    for point in &mut points {
+                        *point = (pose * Point3::from(*point)).coords;
+                    }
+                }
+                (points, jitter)
             }
             &Self::Ball { height, solid_fraction, jitter } => {
-                let spacing = lattice_spacing(scene.grains.diameter, solid_fraction);
-                (ball(&scene.grains, spacing, height + jitter), jitter)
+                let spacing = lattice_spacing(grains.diameter, solid_fraction);
+                (ball(grains, spacing, height + jitter), jitter)
             }
             &Self::Cylinder { from, to, radius, spacing, jitter } => {
-                let mut points = cylinder(&scene.grains, from, to, radius, spacing, jitter);
+                let mut points = cylinder(grains, from, to, radius, spacing, jitter);
                 points.sort_by(|a, b| a.z.total_cmp(&b.z));
                 points.truncate(scene.grains.count);
                 (points, jitter)

@@ -1,5 +1,7 @@
 //! When a pour ends, and how: docs/theory/contact.md, "End and health".
 
+use nalgebra::Vector3;
+
 use super::Simulation;
 use crate::pour::Status;
 
@@ -59,9 +61,14 @@ impl Simulation {
 
     /// The grains that are in the funnel, if the scene has one.
     pub(super) fn in_funnel(&self) -> impl Iterator<Item = usize> {
-        let funnel = self.origin.scene.funnel.as_ref();
-        let time = self.time();
-        let is_held = move |grain| funnel.is_some_and(|f| f.holds(&self.bed.position(grain), time));
+        let scene = &self.origin.scene;
+        let (funnel, time) = (scene.funnel.as_ref(), self.time());
+        let pose = funnel.and_then(|funnel| scene.effects.funnel.of(funnel));
+        let seen = move |place: Vector3<f64>| {
+            pose.map_or(place, |pose| pose.inverse_transform_point(&place.into()).coords)
+        };
+        let is_held =
+            move |grain| funnel.is_some_and(|f| f.holds(&seen(self.bed.position(grain)), time));
         self.bed.present().filter(move |&grain| is_held(grain))
     }
 }

@@ -13,6 +13,8 @@ use super::Simulation;
 use crate::DemError;
 use crate::bed::Bed;
 use crate::checkpoint::{self, CheckpointHeader};
+use crate::clumps::{ClumpState, Clumps};
+use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
 use crate::effect::Bridges;
 use crate::health::HealthWatch;
@@ -29,6 +31,8 @@ struct State<'a> {
     bed: Cow<'a, Bed>,
     contacts: Cow<'a, Contacts>,
     bridges: Cow<'a, Bridges>,
+    on_layer: Cow<'a, ContactSet>,
+    clumps: Option<ClumpState>,
     watch: Cow<'a, HealthWatch>,
 }
 
@@ -66,11 +70,18 @@ impl Simulation {
         if !rest.is_empty() {
             return Err(strange("more bytes than a state has"));
         }
-        let State { substep, is_quiet, seemed_ended, ended, bed, contacts, bridges, watch } = state;
+        let State { substep, is_quiet, seemed_ended, ended, watch, .. } = state;
         let (mut bed, contacts, watch) =
-            (bed.into_owned(), contacts.into_owned(), watch.into_owned());
+            (state.bed.into_owned(), state.contacts.into_owned(), watch.into_owned());
+        match (&mut self.clumps, &state.clumps) {
+            (Some(clumps), Some(state)) => clumps.take(state).map_err(strange)?,
+            (None, None) => {}
+            _ => return Err(strange("grains of another shape")),
+        }
+        let (bridges, on_layer) = (state.bridges.into_owned(), state.on_layer.into_owned());
         bed.check_like(&self.bed).map_err(strange)?;
         contacts.check(self.bed.count(), self.around.walls.surfaces()).map_err(strange)?;
+        on_layer.check(self.bed.count(), Some(1)).map_err(strange)?;
         if !watch.is_of(self.bed.count()) {
             return Err(strange("health of another number of grains"));
         }
@@ -81,7 +92,7 @@ impl Simulation {
         (self.substep, self.seemed_ended, self.ended) = (substep, seemed_ended, ended);
         bed.period = self.bed.period;
         (self.bed, self.contacts, self.watch) = (bed, contacts, watch);
-        self.bridges = bridges.into_owned();
+        (self.bridges, self.on_layer) = (bridges, on_layer);
         self.impacts = Impacts::default();
         Ok(self)
     }
@@ -106,6 +117,8 @@ impl Simulation {
             bed: Cow::Borrowed(&self.bed),
             contacts: Cow::Borrowed(&self.contacts),
             bridges: Cow::Borrowed(&self.bridges),
+            on_layer: Cow::Borrowed(&self.on_layer),
+            clumps: self.clumps.as_ref().map(Clumps::state),
             watch: Cow::Borrowed(&self.watch),
         };
         postcard::to_stdvec(&state).expect("a state in memory")

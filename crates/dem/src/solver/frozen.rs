@@ -57,8 +57,15 @@ impl FrozenSolve {
         settings.check()?;
         let Self { mut sets, mut bed, radius } = self.clone();
         let mut both = sets.each_mut();
-        let work =
-            solver::solve(&mut both, &mut bed.bodies, settings, None, radius, &Threads::default());
+        let work = solver::solve(
+            &mut both,
+            &mut bed.bodies,
+            settings,
+            None,
+            radius,
+            None,
+            &Threads::default(),
+        );
         let residual = ResidualSums::of(&both, &mut bed.bodies).relative();
         let batches = sets.iter().flat_map(|set| &set.batches);
         let grains = &bed.bodies[..bed.count()];
@@ -86,7 +93,15 @@ impl FrozenSolve {
         let before = ResidualSums::of(&warm_sets, &mut warm.bed.bodies).squares();
         let Self { mut sets, mut bed, radius } = self.clone();
         let mut both = sets.each_mut();
-        solver::solve(&mut both, &mut bed.bodies, settings, None, radius, &Threads::default());
+        solver::solve(
+            &mut both,
+            &mut bed.bodies,
+            settings,
+            None,
+            radius,
+            None,
+            &Threads::default(),
+        );
         [before, ResidualSums::of(&both, &mut bed.bodies).squares()]
     }
 }

@@ -17,6 +17,7 @@ use crate::parallel::Threads;
 
 use crate::assemble::vectors;
 use crate::bed::{Body, INVERSE_INERTIA, SharedBodies};
+use crate::clumps::Clumps;
 use crate::contact::{Batch, LawLanes};
 use crate::contact_set::ContactSet;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Width, each, widest};
@@ -48,12 +49,19 @@ pub(super) fn solve(
     settings: &SolverSettings,
     still: Option<f64>,
     radius: f64,
+    mut clumps: Option<&mut Clumps>,
     threads: &Threads,
 ) -> Work {
     let too_fast = settings.closing * radius / settings.dt;
     let settled = settings.settled * radius / settings.dt;
     let mut work = Work::default();
     let (mut has_settled, mut is_still) = (false, false);
+    let mut join = |bodies: &mut [Body]| {
+        if let Some(clumps) = &mut clumps {
+            clumps.join(bodies);
+        }
+    };
+    join(bodies);
     for sweeps in 1..=settings.max_sweeps {
         // The last sweeps are plain ones: they leave a contact by itself exactly solved.
         let asked = if still.is_none() || is_still { 0 } else { settings.quiet_sweeps };
@@ -61,6 +69,7 @@ pub(super) fn solve(
         let relaxation = if is_enough { 1.0 } else { settings.relaxation };
         let Progress { closing, change } =
             sweep(sets, bodies, Manner::relaxed(relaxation), threads);
+        join(bodies);
         work = Work { sweeps, closing, ..work };
         if is_enough && closing <= too_fast {
             return work;
@@ -111,7 +120,11 @@ pub(super) fn sweep(
 ) -> Progress {
     let mut worst = Progress::default();
     for set in sets {
-        let kernel = if is_at_rest(set) { sweep_walls } else { sweep_pairs };
+        let kernel = match (set.is_soft(), is_at_rest(set)) {
+            (true, _) => sweep_soft,
+            (_, true) => sweep_walls,
+            _ => sweep_pairs,
+        };
         let sweep = |batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>| {
             kernel(batches, laws, bodies, manner)
         };
@@ -153,7 +166,7 @@ widest! {
         bodies: &SharedBodies<'_>,
         manner: Manner,
     ) -> Progress {
-        sweep_batches::<W, false>(batches, laws, bodies, manner)
+        sweep_batches::<W, false, false>(batches, laws, bodies, manner)
     }
 }
 
@@ -164,13 +177,24 @@ widest! {
         bodies: &SharedBodies<'_>,
         manner: Manner,
     ) -> Progress {
-        sweep_batches::<W, true>(batches, laws, bodies, manner)
+        sweep_batches::<W, true, false>(batches, laws, bodies, manner)
     }
 }
 
-/// Solves batch after batch. `AT_WALLS`: the second body is the resting one, and stays so.
+widest! {
+    fn sweep_soft<W>(
+        batches: &mut [Batch],
+        laws: &[LawLanes],
+        bodies: &SharedBodies<'_>,
+        manner: Manner,
+    ) -> Progress {
+        sweep_batches::<W, true, true>(batches, laws, bodies, manner)
+    }
+}
+
+/// Solves batch after batch. `AT_WALLS`: the second body is the resting one, and stays so. `SOFT`: the contacts give way.
 #[inline(always)]
-fn sweep_batches<W: Width, const AT_WALLS: bool>(
+fn sweep_batches<W: Width, const AT_WALLS: bool, const SOFT: bool>(
     batches: &mut [Batch],
     laws: &[LawLanes],
     bodies: &SharedBodies<'_>,
@@ -179,7 +203,7 @@ fn sweep_batches<W: Width, const AT_WALLS: bool>(
     let (mut closing, mut square) = (Reg::<W>::splat(0.0), Reg::<W>::splat(0.0));
     for batch in batches {
         let law = &laws[batch.law as usize];
-        solve_batch::<W, AT_WALLS>(batch, law, bodies, manner, &mut closing, &mut square);
+        solve_batch::<W, AT_WALLS, SOFT>(batch, law, bodies, manner, &mut closing, &mut square);
     }
     Progress { closing: largest(closing), change: largest(square).sqrt() }
 }
@@ -312,7 +336,7 @@ impl<W: Width> Impulses<W> {
 
 /// Solves each contact of a batch against the present velocities and puts the new ones back.
 #[inline(always)]
-fn solve_batch<W: Width, const AT_WALLS: bool>(
+fn solve_batch<W: Width, const AT_WALLS: bool, const SOFT: bool>(
     batch: &mut Batch,
     law: &LawLanes,
     bodies: &SharedBodies<'_>,
@@ -322,7 +346,7 @@ fn solve_batch<W: Width, const AT_WALLS: bool>(
 ) {
     let mut velocities = Velocities::<W>::gather::<AT_WALLS>(batch, bodies);
     let old = Impulses::load(batch);
-    let closing = closing(batch, &velocities);
+    let closing = closing::<W, SOFT>(batch, law, &velocities);
     // A batch without impulses that stays open is left as it is.
     let zero = Reg::<W>::splat(0.0);
     let acting = W::less_bits(zero.0, old.n.0) | W::less_bits(zero.0, closing.0);
@@ -330,24 +354,31 @@ fn solve_batch<W: Width, const AT_WALLS: bool>(
         return;
     }
     let relaxation = Reg::splat(manner.relaxation);
-    let new = local_solution(batch, law, closing, relaxation, old, &mut velocities);
+    let new = local_solution::<W, SOFT>(batch, law, closing, relaxation, old, &mut velocities);
     *fastest = fastest.max(closing);
     *largest_square = largest_square.max(new.square_of_change(&old));
     new.store(batch);
     velocities.scatter::<AT_WALLS>(batch, bodies);
 }
 
-/// How fast each contact closes against its constraint, `-(w_n + b)`.
+/// How fast each contact closes against its constraint, `-(w_n + b)`; a soft one, `-(w_n + b + give lambda_n)`.
 #[inline(always)]
-fn closing<W: Width>(batch: &Batch, velocities: &Velocities<W>) -> Reg<W> {
+fn closing<W: Width, const SOFT: bool>(
+    batch: &Batch,
+    law: &LawLanes,
+    velocities: &Velocities<W>,
+) -> Reg<W> {
     let w_n = Reg3::load(&batch.normal).dot(velocities.v_i - velocities.v_j);
-    Reg::splat(0.0) - (w_n + Reg::load(&batch.bias))
+    let opening = w_n + Reg::load(&batch.bias);
+    let opening =
+        if SOFT { opening + Reg::load(&law.give) * Reg::load(&batch.lambda_n) } else { opening };
+    Reg::splat(0.0) - opening
 }
 
 /// The exact solution of each contact of a batch by itself, or as much beyond it as `relaxation` exceeds 1,
 /// on the cones; updates the velocities to match.
 #[inline(always)]
-fn local_solution<W: Width>(
+fn local_solution<W: Width, const SOFT: bool>(
     batch: &Batch,
     law: &LawLanes,
     closing: Reg<W>,
@@ -357,7 +388,12 @@ fn local_solution<W: Width>(
 ) -> Impulses<W> {
     let n = Reg3::load(&batch.normal);
     let compliance_n = relaxation * Reg::load(&law.compliance_n);
-    let compliance_t = compliance_n * Reg::splat(1.0 / TANGENTIAL_INERTIA);
+    // Of a soft contact only the normal gives way.
+    let compliance_t = if SOFT {
+        relaxation.over(Reg::splat(TANGENTIAL_INERTIA) * Reg::load(&law.inverse_mass_i))
+    } else {
+        compliance_n * Reg::splat(1.0 / TANGENTIAL_INERTIA)
+    };
     let lambda_n = closing.times_plus(compliance_n, old.n).max(Reg::splat(0.0));
 
     let Velocities { v_i, w_i, v_j, w_j } = *velocities;
@@ -373,11 +409,26 @@ fn local_solution<W: Width>(
     let wanted = old.r.minus(relaxation * Reg::load(&law.compliance_r), rho);
     let about = n.dot(wanted);
     let limit = Reg::load(&law.rolling_friction) * lambda_n;
-    let rolling = project_ball(wanted.minus(about, n), limit);
+    let mut across = wanted.minus(about, n);
+    if law.rolling_speed > 0.0 {
+        let plain = old.r.minus(Reg::load(&law.compliance_r), rho);
+        across = slow_rolling(law, limit, plain.minus(n.dot(plain), n));
+    }
+    let rolling = project_ball(across, limit);
     let limit = Reg::load(&law.torsional_friction) * lambda_n;
     let lambda_r = rolling.plus(about.min(limit).max(Reg::splat(0.0) - limit), n);
     velocities.roll(law, lambda_r - old.r);
     Impulses { n: lambda_n, t: lambda_t, r: lambda_r }
+}
+
+/// The rolling impulse that is `limit |rho| / v_0` where rolling would go on with `rho`, of the one that would stop it:
+/// `lambda = -(limit / v_0) (rho + A_r (lambda - old))` has the solution `s (old - rho / A_r)`,
+/// `s = limit / (limit + v_0 / A_r)`.
+#[inline(always)]
+fn slow_rolling<W: Width>(law: &LawLanes, limit: Reg<W>, stopping: Reg3<W>) -> Reg3<W> {
+    let soft = Reg::splat(law.rolling_speed) * Reg::load(&law.compliance_r);
+    // An empty lane has neither.
+    stopping.scale(limit.over((limit + soft).max(Reg::splat(f64::MIN_POSITIVE))))
 }
 
 #[inline(always)]
@@ -430,7 +481,8 @@ impl ResidualSums {
     pub fn of(sets: &[&mut ContactSet], bodies: &mut [Body]) -> Self {
         let mut sums = Self::default();
         for set in sets {
-            residual_lanes(set, bodies, &mut sums.squares, &mut sums.impulses);
+            let lanes = if set.is_soft() { residual_of_soft } else { residual_of_rigid };
+            lanes(set, bodies, &mut sums.squares, &mut sums.impulses);
         }
         sums
     }
@@ -453,29 +505,40 @@ impl ResidualSums {
 }
 
 widest! {
-    fn residual_lanes<W>(
-        set: &ContactSet,
-        bodies: &mut [Body],
-        squares: &mut f64,
-        impulses: &mut f64,
-    ) {
-        assert!(set.fits(bodies));
-        let bodies = SharedBodies::new(bodies);
-        for batch in &set.batches {
-            let law = &set.laws[batch.law as usize];
-            let old = Impulses::<W>::load(batch);
-            let mut velocities = Velocities::gather::<false>(batch, &bodies);
-            let closing = closing(batch, &velocities);
-            let one = Reg::splat(1.0);
-            let new = local_solution(batch, law, closing, one, old, &mut velocities);
-            let (mut square, mut impulse) = (Lanes::ZERO, Lanes::ZERO);
-            new.square_of_change(&old).store(&mut square);
-            (old.n * old.n).store(&mut impulse);
-            // Lane after lane, so that every width sums in the same order; empty lanes hold zeros.
-            for lane in batch.lanes() {
-                *squares += square.0[lane];
-                *impulses += impulse.0[lane];
-            }
+    fn residual_of_rigid<W>(set: &ContactSet, bodies: &mut [Body], squares: &mut f64, impulses: &mut f64) {
+        residual_lanes::<W, false>(set, bodies, squares, impulses);
+    }
+}
+
+widest! {
+    fn residual_of_soft<W>(set: &ContactSet, bodies: &mut [Body], squares: &mut f64, impulses: &mut f64) {
+        residual_lanes::<W, true>(set, bodies, squares, impulses);
+    }
+}
+
+#[inline(always)]
+fn residual_lanes<W: Width, const SOFT: bool>(
+    set: &ContactSet,
+    bodies: &mut [Body],
+    squares: &mut f64,
+    impulses: &mut f64,
+) {
+    assert!(set.fits(bodies));
+    let bodies = SharedBodies::new(bodies);
+    for batch in &set.batches {
+        let law = &set.laws[batch.law as usize];
+        let old = Impulses::<W>::load(batch);
+        let mut velocities = Velocities::gather::<false>(batch, &bodies);
+        let closing = closing::<W, SOFT>(batch, law, &velocities);
+        let one = Reg::splat(1.0);
+        let new = local_solution::<W, SOFT>(batch, law, closing, one, old, &mut velocities);
+        let (mut square, mut impulse) = (Lanes::ZERO, Lanes::ZERO);
+        new.square_of_change(&old).store(&mut square);
+        (old.n * old.n).store(&mut impulse);
+        // Lane after lane, so that every width sums in the same order; empty lanes hold zeros.
+        for lane in batch.lanes() {
+            *squares += square.0[lane];
+            *impulses += impulse.0[lane];
         }
     }
 }

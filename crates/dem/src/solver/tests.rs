@@ -31,6 +31,8 @@ fn law(sliding_friction: f64, rolling_friction: f64) -> ContactLaw {
         sliding_friction,
         rolling_friction,
         torsional_friction: 0.0,
+        give: 0.0,
+        rolling_speed: 0.0,
     }
 }
 
@@ -69,7 +71,7 @@ fn solved(
     settings: &SolverSettings,
 ) -> (ContactSet, Vec<Body>, Work) {
     let (mut set, mut bodies) = (set.clone(), bodies.to_vec());
-    let work = solve(&mut [&mut set], &mut bodies, settings, None, 2e-3, &Threads::default());
+    let work = solve(&mut [&mut set], &mut bodies, settings, None, 2e-3, None, &Threads::default());
     (set, bodies, work)
 }
 

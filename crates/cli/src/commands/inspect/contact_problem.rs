@@ -49,7 +49,7 @@ pub fn write(name: &Path, out: &Path, args: &SubstepArgs) -> anyhow::Result<Valu
             "--time must be before the pour's end, {end} s ({status}), got {time}"
         )));
     }
-    let problem = simulation.contact_problem();
+    let problem = simulation.contact_problem()?;
     write_contact_problem(out, &problem).context("writing --contact-problem")?;
     Ok(json!({
         "kind": "contact problem",

@@ -1,0 +1,252 @@
+//! Rigid bodies of several spheres, by splitting their mass.
+//!
+//! Every sphere of a clump is a body of its own to the contact solver, with an equal share of the mass. After each sweep the
+//! impulses that the spheres have got are the clump's, and its spheres get the velocities of a rigid motion:
+//!
+//! ```text
+//! P <- P + sum m_i dv_i,   L <- L + sum (r_i x m_i dv_i + 2/5 m_i rho^2 d(omega_i)),   V = P / m,   omega = I^-1 L
+//! v_i = V + omega x r_i,   omega_i = omega
+//! ```
+//!
+//! A sphere by itself is easier to move than its clump, so that a sweep goes less far than it might, never too far, and what
+//! does not change any more is the solution for rigid bodies. Source: mass splitting, Tonge et al., ACM Trans. Graph. 31 (2012)
+//! 105, doi:10.1145/2185520.2185601. Angular momentum is what is kept in flight, in a frame that does not turn.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::{Deserialize, Serialize};
+
+use crate::bed::{Bed, Body, INVERSE_INERTIA};
+use crate::contact_set::ContactSet;
+use crate::contacts::Surroundings;
+use crate::effect::ClumpShape;
+use crate::lanes::Row;
+use crate::law::IMPACT_SPEED;
+use crate::scene::{Scene, unit_interval};
+
+/// Keeps the orientations of a seed apart from its places.
+const STREAM: u64 = 0x6a09_e667_f3bc_c909;
+
+/// A clump in motion; its mass is 1, that of a typical grain.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Rigid {
+    /// `[m]`
+    centre: [f64; 3],
+    /// `[m/s]`
+    velocity: [f64; 3],
+    /// From the body's axes to the scene's: i, j, k, w.
+    turned: [f64; 4],
+    /// Angular momentum about the centre `[m^2/s]`.
+    momentum: [f64; 3],
+}
+
+impl Rigid {
+    fn turned(&self) -> UnitQuaternion<f64> {
+        let [i, j, k, w] = self.turned;
+        UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, i, j, k))
+    }
+}
+
+/// All clumps of a simulation: the spheres of the first, of the second, and so on.
+#[derive(Clone, Debug)]
+pub(crate) struct Clumps {
+    shape: ClumpShape,
+    bodies: Vec<Rigid>,
+}
+
+/// What of the clumps changes.
+pub(crate) type ClumpState = Vec<([f64; 3], [f64; 3], [f64; 4], [f64; 3])>;
+
+impl Clumps {
+    /// The clumps of a scene, turned at random, if it has any.
+    pub fn of(scene: &Scene, seed: u64) -> Option<Self> {
+        let clump = &scene.effects.clump;
+        if !clump.is_on() {
+            return None;
+        }
+        let mut random = Pcg64::seed_from_u64(seed ^ STREAM);
+        let mut normal = || {
+            // Box and Muller; 1 - u is never 0.
+            let [u, v] = [0; 2].map(|_| unit_interval(random.next_u64()));
+            (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+        };
+        // Four normal numbers point everywhere alike on the sphere of quaternions.
+        let mut turn = || {
+            let [i, j, k, w] = [0; 4].map(|_| normal());
+            let norm = (i * i + j * j + k * k + w * w).sqrt().max(f64::MIN_POSITIVE);
+            [i, j, k, w].map(|part| part / norm)
+        };
+        let still = |centre: Vector3<f64>| Rigid {
+            centre: centre.into(),
+            velocity: [0.0; 3],
+            turned: turn(),
+            momentum: [0.0; 3],
+        };
+        let bodies = scene.start.positions(scene, seed).into_iter().map(still).collect();
+        Some(Self { shape: clump.shape(&scene.grains), bodies })
+    }
+
+    /// Spheres of a clump.
+    pub fn members(&self) -> usize {
+        self.shape.offsets.len()
+    }
+
+    /// Centre and radius of every sphere.
+    pub fn places(&self) -> Vec<Row> {
+        let mut places = Vec::with_capacity(self.bodies.len() * self.members());
+        for body in &self.bodies {
+            let (centre, turned) = (Vector3::from(body.centre), body.turned());
+            let place = |offset| Row::new(&(centre + turned * offset), self.shape.radius);
+            places.extend(self.shape.offsets.iter().map(place));
+        }
+        places
+    }
+
+    /// Inverse of the tensor of inertia in the scene's axes `[1/m^2]`.
+    fn inverse_inertia(&self, turned: &UnitQuaternion<f64>) -> Matrix3<f64> {
+        let rotation = turned.to_rotation_matrix();
+        let inverse = self.shape.inertia.map(|moment| 1.0 / moment);
+        rotation.matrix() * Matrix3::from_diagonal(&inverse) * rotation.matrix().transpose()
+    }
+
+    /// Takes what the spheres have got since they moved as one, and lets them move as one again.
+    pub fn join(&mut self, bodies: &mut [Body]) {
+        let (members, radius) = (self.members(), self.shape.radius);
+        let share = 1.0 / members as f64;
+        let spin_share = share * radius / INVERSE_INERTIA;
+        for number in 0..self.bodies.len() {
+            let rigid = self.bodies[number];
+            let turned = rigid.turned();
+            let inverse = self.inverse_inertia(&turned);
+            let (mut velocity, mut momentum) =
+                (Vector3::from(rigid.velocity), Vector3::from(rigid.momentum));
+            let (before, omega) = (velocity, inverse * momentum);
+            let spheres = &mut bodies[number * members..(number + 1) * members];
+            for (body, offset) in spheres.iter().zip(&self.shape.offsets) {
+                let arm = turned * offset;
+                let got = share * (body.velocity.vector() - before - omega.cross(&arm));
+                velocity += got;
+                momentum += arm.cross(&got);
+                momentum += spin_share * (body.spin.vector() - radius * omega);
+            }
+            let omega = inverse * momentum;
+            for (body, offset) in spheres.iter_mut().zip(&self.shape.offsets) {
+                let arm = turned * offset;
+                body.velocity = Row::new(&(velocity + omega.cross(&arm)), 0.0);
+                body.spin = Row::new(&(radius * omega), 0.0);
+            }
+            let rigid = &mut self.bodies[number];
+            (rigid.velocity, rigid.momentum) = (velocity.into(), momentum.into());
+        }
+    }
+
+    /// Moves and turns the clumps, once they are joined, and puts their spheres where they belong.
+    pub fn move_on(&mut self, bed: &mut Bed, dt: f64) {
+        let members = self.members();
+        for number in 0..self.bodies.len() {
+            let rigid = self.bodies[number];
+            let turned = rigid.turned();
+            // The angular velocity of the middle of the way: second order, for a body that tumbles.
+            let momentum = Vector3::from(rigid.momentum);
+            let half = UnitQuaternion::new(0.5 * dt * (self.inverse_inertia(&turned) * momentum));
+            let omega = self.inverse_inertia(&(half * turned)) * momentum;
+            let turned = UnitQuaternion::new(dt * omega) * turned;
+            let centre = Vector3::from(rigid.centre) + dt * Vector3::from(rigid.velocity);
+            let rigid = &mut self.bodies[number];
+            rigid.centre = centre.into();
+            rigid.turned = turned.coords.into();
+            // With the turned axes another angular velocity belongs to the same angular momentum.
+            let velocity = Vector3::from(rigid.velocity);
+            let omega = self.inverse_inertia(&turned) * momentum;
+            for (member, offset) in self.shape.offsets.iter().enumerate() {
+                let (sphere, arm) = (number * members + member, turned * offset);
+                bed.places[sphere] = Row::new(&(centre + arm), self.shape.radius);
+                bed.bodies[sphere] = Body {
+                    velocity: Row::new(&(velocity + omega.cross(&arm)), 0.0),
+                    spin: Row::new(&(self.shape.radius * omega), 0.0),
+                };
+            }
+        }
+    }
+
+    /// Kinetic and potential energy in `gravity`, per typical mass `[m^2/s^2]`.
+    pub fn energy(&self, gravity: &Vector3<f64>) -> f64 {
+        let of = |rigid: &Rigid| {
+            let momentum = Vector3::from(rigid.momentum);
+            let turning = momentum.dot(&(self.inverse_inertia(&rigid.turned()) * momentum));
+            let velocity = Vector3::from(rigid.velocity).norm_squared();
+            0.5 * (velocity + turning) - gravity.dot(&Vector3::from(rigid.centre))
+        };
+        self.bodies.iter().map(of).sum()
+    }
+
+    /// Sets a clump in motion; returns the kinetic energy that this adds, per typical mass `[m^2/s^2]`.
+    pub fn set_motion(
+        &mut self,
+        bed: &mut Bed,
+        clump: usize,
+        velocity: &Vector3<f64>,
+        angular: &Vector3<f64>,
+    ) -> f64 {
+        let before = self.energy(&Vector3::zeros());
+        let turned = self.bodies[clump].turned();
+        let local = turned.inverse() * angular;
+        let momentum = turned * local.component_mul(&self.shape.inertia);
+        let rigid = &mut self.bodies[clump];
+        (rigid.velocity, rigid.momentum) = ((*velocity).into(), momentum.into());
+        self.move_on(bed, 0.0);
+        self.energy(&Vector3::zeros()) - before
+    }
+
+    /// Number of clumps.
+    pub fn count(&self) -> usize {
+        self.bodies.len()
+    }
+
+    /// The state as numbers.
+    pub fn state(&self) -> ClumpState {
+        let of = |r: &Rigid| (r.centre, r.velocity, r.turned, r.momentum);
+        self.bodies.iter().map(of).collect()
+    }
+
+    /// Takes a state over that [`Self::state`] gave of as many clumps.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn take(&mut self, state: &ClumpState) -> Result<(), &'static str> {
+        if state.len() != self.bodies.len() {
+            return Err("another number of clumps");
+        }
+        for (rigid, &(centre, velocity, turned, momentum)) in self.bodies.iter_mut().zip(state) {
+            *rigid = Rigid { centre, velocity, turned, momentum };
+        }
+        Ok(())
+    }
+}
+
+/// Newton's restitution as a bias, for bodies whose impacts are no events: what closes faster than an impact must and touches
+/// within the substep may not leave slower than `-e w_n`. Source: Moreau 1988 as in Acary and Brogliato 2008, 10.1.
+pub(crate) fn rebound(set: &mut ContactSet, bed: &Bed, around: &Surroundings) {
+    let at_walls = set.is_at_walls();
+    for number in 0..set.batches.len() {
+        for lane in set.batches[number].lanes() {
+            let batch = &set.batches[number];
+            let (i, j) = (batch.i[lane] as usize, batch.j[lane] as usize);
+            let apart = bed.velocity(i) - bed.velocity(j);
+            let w_n = Vector3::from(batch.normal.get(lane)).dot(&apart);
+            if w_n >= -IMPACT_SPEED || w_n + batch.bias.0[lane] >= 0.0 {
+                continue;
+            }
+            let restitution = if at_walls {
+                around.walls.wall(set.at_walls[number].wall[lane] as usize).material.restitution
+            } else {
+                around.material.restitution
+            };
+            let restitution = around.effects.restitution_at(restitution, -w_n);
+            if restitution > 0.0 {
+                set.batches[number].bias.0[lane] = restitution * w_n;
+            }
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! A soft layer on the ground: a bed of springs and dampers above the hard ground (Winkler; Kelvin and Voigt).
+//!
+//! ```text
+//! F = max(0, k s + c ds/dt)   for a grain whose lowest point is s below the layer's surface, 0 < s <= thickness
+//! k = stiffness m g / R,      c = 2 damping sqrt(k m)
+//! ```
+//!
+//! Implicit in the substep's velocity, so that no layer is too stiff: with `w_n = -ds/dt` at its end,
+//! `lambda_n = dt (k (s - dt w_n) - c w_n)`, which is a contact that gives way,
+//!
+//! ```text
+//! 0 <= w_n + b + a lambda_n _|_ lambda_n >= 0,    a = 1 / (dt (dt k + c)),    b = -a dt k s
+//! ```
+//!
+//! with the ground's friction on its own `lambda_n`. Source: Winkler 1867 as in Johnson, Contact Mechanics (1985), 4.3; the
+//! contact that gives way as in Lacoursiere 2007 (doctoral thesis, Umea), 4.4. The hard ground lies below it and keeps
+//! its own coefficients: no thickness is no layer. Prior of the thickness: uniform over 0 to a radius.
+
+use serde::{Deserialize, Serialize};
+
+use crate::DemError;
+use crate::bed::Bed;
+use crate::blocks::Blocks;
+use crate::contact::{ContactLaw, Listed};
+use crate::contact_set::{ContactSet, Second};
+use crate::contacts::Surroundings;
+use crate::lanes::Lanes;
+use crate::scene::{Scene, non_negative, positive};
+
+/// The layer's surface is the plane z = 0, the hard ground lies `thickness` below.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Layer {
+    /// `[m]`
+    pub thickness: f64,
+    /// Weights of a typical grain that press it in by its radius `[-]`.
+    pub stiffness: f64,
+    /// Damping over the critical damping of a typical grain `[-]`.
+    pub damping: f64,
+}
+
+impl Default for Layer {
+    fn default() -> Self {
+        Self { thickness: 0.0, stiffness: 20.0, damping: 1.0 }
+    }
+}
+
+/// A layer as the solver sees it, over a typical mass.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pad {
+    /// k `[1/s^2]`
+    rigidity: f64,
+    /// c `[1/s]`
+    damping: f64,
+}
+
+impl Layer {
+    pub(super) fn check(&self) -> Result<(), DemError> {
+        non_negative("effects.layer.thickness", self.thickness)?;
+        positive("effects.layer.stiffness", self.stiffness)?;
+        non_negative("effects.layer.damping", self.damping)
+    }
+
+    pub(super) fn is_on(&self) -> bool {
+        self.thickness > 0.0
+    }
+
+    pub(super) fn pad(&self, scene: &Scene) -> Pad {
+        let weight = nalgebra::Vector3::from(scene.gravity).norm();
+        let rigidity = self.stiffness * weight / scene.grains.radius();
+        Pad { rigidity, damping: 2.0 * self.damping * rigidity.sqrt() }
+    }
+}
+
+impl Pad {
+    /// a `[-]`: how far a contact gives way to an impulse in a substep.
+    fn give(&self, dt: f64) -> f64 {
+        1.0 / (dt * (dt * self.rigidity + self.damping))
+    }
+
+    /// b of a contact of so much gap `[m]`, negative inside the layer `[m/s]`.
+    fn bias(&self, gap: f64, dt: f64) -> f64 {
+        if gap < 0.0 { self.give(dt) * dt * self.rigidity * gap } else { gap / dt }
+    }
+
+    /// Lists the grains that are in the layer by the end of the substep, with what they had before.
+    pub fn assemble(&self, set: &mut ContactSet, bed: &Bed, around: &Surroundings) {
+        let dt = around.settings.dt;
+        let gap = |grain: usize| bed.position(grain).z - bed.radius(grain);
+        let comes = |&grain: &usize| gap(grain) + dt * bed.velocity(grain).z.min(0.0) < 0.0;
+        let listed: Vec<Listed> =
+            bed.present().filter(comes).map(|i| Listed { i: i as u32, partner: 0 }).collect();
+        let give = self.give(dt);
+        set.rebuild(&listed, &Blocks::default(), bed.count(), Second::SoftLayer, |contact| {
+            ContactLaw { give, ..around.wall_law(bed, contact.i as usize, 0) }
+        });
+        for batch in &mut set.batches {
+            batch.bias = Lanes::splat(f64::INFINITY);
+            for lane in batch.lanes() {
+                batch.bias.0[lane] = self.bias(gap(batch.i[lane] as usize), dt);
+            }
+        }
+    }
+
+    /// What the layer's springs hold, per typical mass `[m^2/s^2]`.
+    pub fn energy(&self, bed: &Bed) -> f64 {
+        let depth = |grain| (bed.radius(grain) - bed.position(grain).z).max(0.0);
+        let spring = |grain| 0.5 * self.rigidity * depth(grain) * depth(grain);
+        bed.present().map(spring).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_contact_that_gives_way_is_a_spring_and_a_damper() {
+        let pad = Pad { rigidity: 4e4, damping: 300.0 };
+        let (dt, gap, w_n) = (1e-4, -2e-4, 0.03);
+        // The impulse of the complementarity condition at this velocity, and of the force at the substep's end.
+        let lambda = -(w_n + pad.bias(gap, dt)) / pad.give(dt);
+        let force = -pad.rigidity * (gap + dt * w_n) - pad.damping * w_n;
+        assert!((lambda - dt * force).abs() < 1e-12 * dt * force.abs(), "{lambda}");
+    }
+}
