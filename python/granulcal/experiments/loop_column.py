@@ -30,6 +30,9 @@ _EFFECTS = (
     "restitution.tangential",
     "fluid.density",
     "fluid.viscosity",
+    "fluid.saturated",
+    "fluid.entrained",
+    "ground.layer",
 )
 # Name, gravity, tests, density and viscosity of the fluid: of Experimental_Conditions.txt.
 _FITTED = (

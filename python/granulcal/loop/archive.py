@@ -225,11 +225,13 @@ class Archive:
             psi = np.zeros((n, len(plan.library)))
             for k, effect in enumerate(plan.library):
                 own = effect.at(plan.scene)
-                if effect.whole and part.name.startswith(f"effect-{effect.name}"):
+                if part.effect != effect.name:
+                    continue
+                if effect.whole:
                     # A whole number may lie half a grain beyond full strength.
                     strength = own.strength(np.full(n, scene.get(effect.path)))
                     psi[:, k] = np.clip(strength, -1.0, 1.0)
-                elif effect.path in columns and not effect.shift:
+                else:
                     psi[:, k] = own.strength(columns[effect.path])
             rows.append(
                 (cube(plan.prior, theta), plan.unit_condition(condition), psi, values[usable])
@@ -320,22 +322,31 @@ class Archive:
                 for number, psi in enumerate(_WHOLE_STRENGTHS):
                     scene = plan.scene.with_({effect.path: effect.value(psi)})
                     parts.append(
-                        _Part(f"{name}-{number}", scene, Prior(common), share, seed + number + 1)
+                        _Part(
+                            f"{name}-{number}",
+                            scene,
+                            Prior(common),
+                            share,
+                            seed + number + 1,
+                            effect.name,
+                        )
                     )
                 continue
-            parts.append(_Part(name, there, Prior([*common, effect.parameter()]), plan.each, seed))
+            prior = Prior([*common, effect.parameter()])
+            parts.append(_Part(name, there, prior, plan.each, seed, effect.name))
         return [piece for part in parts for piece in part.at(plan.places)]
 
 
 @dataclass(frozen=True)
 class _Part:
-    """One data set: its folder's name, what is poured, and the condition it is under, if one."""
+    """One data set: its folder's name, what is poured, and of which effect and place, if any."""
 
     name: str
     scene: Scene
     prior: Prior
     count: int
     seed: int
+    effect: str = ""
     place: dict[str, float] = field(default_factory=dict)
 
     def at(self, places: tuple[dict[str, float], ...]) -> list["_Part"]:
@@ -350,6 +361,7 @@ class _Part:
                 self.prior,
                 share,
                 self.seed + _PLACE_STEP * i,
+                self.effect,
                 place,
             )
             for i, place in enumerate(places)

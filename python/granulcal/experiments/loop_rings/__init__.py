@@ -13,7 +13,7 @@ from granulcal.loop.page import write_page
 
 __all__ = ["GROUPS", "reproduce", "task"]
 
-_BUDGET = 940
+_BUDGET = 1000
 
 
 def reproduce(out: Path, data: Path) -> None:

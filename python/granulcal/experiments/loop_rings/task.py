@@ -60,8 +60,9 @@ EFFECTS: tuple[LibraryEffect, ...] = (
         whole=True,
         doc="more sand than the ball has, as if the bed gave some",
     ),
+    *by_name(["ground.layer"]),
 )
-"""The library of a dry ball on a plane, and more or less sand.
+"""The library of a dry ball on a plane, more or less sand, and a soft layer for the bed.
 
 Not polydispersity: the ball begins as a lattice in which unequal grains overlap.
 """
