@@ -113,6 +113,36 @@ def test_a_tilted_table_is_found_named_and_removed(
     assert "registered for another analysis" in capsys.readouterr().err
 
 
+@pytest.mark.slow
+def test_a_declared_tilt_is_not_found(tilted: Path, tmp_path: Path) -> None:
+    file = tilted.parent / "declared.toml"
+    file.write_text('nuisances = { "tilt.y" = 0.07 }\n' + tilted.read_text())
+    closed = gc.close_loop(Task.load(file), tmp_path / "out", budget=1100)
+    assert closed.trace.verdict.kind == "NONE"
+    assert closed.trace.gate.p > 0.05
+
+
+def test_a_declared_tolerance_is_no_candidate(tilted: Path, tmp_path: Path) -> None:
+    text = tilted.read_text()
+
+    def load(nuisances: str) -> Task:
+        file = tilted.parent / f"{tmp_path.name}.toml"
+        file.write_text(f"nuisances = {{ {nuisances} }}\n{text}")
+        return Task.load(file)
+
+    task = load('"tilt.y" = 0.009, "count" = 2, "ground.sliding" = 0.1')
+    sds = {effect.name: effect.nuisance_sd for effect in task.library}
+    # Full strength of the library: 0.09 rad, a quarter of 90 grains less, a ratio of 4.
+    assert sds.pop("ground.restitution") is None
+    expected = {"tilt.y": 0.1, "count": 2 / 22.5, "ground.sliding": np.log(1.1) / np.log(4)}
+    assert sds == pytest.approx(expected)
+    assert all(effect.is_shared for effect in task.library if effect.nuisance_sd)
+    with pytest.raises(TrainingDataError, match=r"tolerance of tilt.y must be positive, got 0.0"):
+        load('"tilt.y" = 0.0')
+    with pytest.raises(TrainingDataError, match="no effect magnetism; there are cohesion"):
+        load('"magnetism" = 1.0')
+
+
 def test_a_budget_that_is_too_small_says_what_is_enough(
     tilted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -8,7 +8,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +89,28 @@ class LibraryEffect:
         ends = sorted((self.value(-1.0 if self.is_two_sided else 0.0), self.value(1.0)))
         kind = "log_uniform" if self.is_ratio else "uniform"
         return Parameter(path=self.path, distribution=kind, low=ends[0], high=ends[1])
+
+    def declared(self, sd: float, scene: Scene) -> "LibraryEffect":
+        """Returns the effect as a tolerance: a random effect of every fit, and never a finding.
+
+        A table's tilt or the grains' diameter is the same under all conditions; a condition's own
+        number (a height) is set anew for each.
+
+        Args:
+            sd: standard deviation of the number, in its unit.
+            scene: whose own number a relative effect starts from.
+
+        Raises:
+            TrainingDataError: `sd` is not positive.
+        """
+        if not (sd > 0 and math.isfinite(sd)):
+            raise TrainingDataError(f"tolerance of {self.name} must be positive, got {sd}")
+        own = self.at(scene)
+        if own.is_ratio:
+            psi = math.log1p(sd / own.off) / abs(math.log(own.full / own.off))
+        else:
+            psi = sd / abs(own.full - own.off)
+        return replace(own, nuisance_sd=psi, is_shared=not own.shift)
 
     @property
     def is_free(self) -> bool:

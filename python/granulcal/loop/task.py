@@ -10,7 +10,10 @@
     use = "fit"                     # or "sealed": opened once, after the verdict
     recordings = ["04cm/pour-0.png", "04cm/pour-1.png"]   # a pour each
 
-`tolerances = "tolerances.json"` declares in which directions the statistics may be off.
+`nuisances = { "tilt.x" = 0.005, "height" = 0.001 }` declares tolerances by the library's names: one
+standard deviation of each number in its unit. They are random effects of every fit and can never be
+a finding. `tolerances = "tolerances.json"` declares in which directions the statistics may be off.
+
 `camera = "camera.toml"` of a condition, or once for all, is the camera of PNGs; where it is left
 out it is looked for beside the recording. `reading = { width = 0.084 }`, likewise, are arguments of
 `Recording.observed`, or of `Recording.formation` where the scene observes nothing.
@@ -171,13 +174,17 @@ class Task:
             file,
             document,
             {"scene", "prior", "conditions"},
-            {"effects", "camera", "tolerances", "reading", "between"},
+            {"effects", "camera", "nuisances", "tolerances", "reading", "between"},
         )
         folder = file.parent
         shared = {key: document[key] for key in ("camera", "reading") if key in document}
+        scene = Scene.load(folder / document["scene"])
         library = by_name(document["effects"]) if "effects" in document else FUNNEL
+        sds = {str(name): float(sd) for name, sd in document.get("nuisances", {}).items()}
+        declared = tuple(effect.declared(sds[effect.name], scene) for effect in by_name(sds))
+        library = (*(effect for effect in library if effect.name not in sds), *declared)
         return cls(
-            scene=Scene.load(folder / document["scene"]),
+            scene=scene,
             prior=Prior.load(folder / document["prior"]),
             conditions=tuple(
                 _condition(file, {**shared, **table}) for table in document["conditions"]
