@@ -4,12 +4,16 @@
       archive.json        scene, prior, conditions, library; written first, refused if another
       base/               pours of the plain model, conditions and parameters from their priors
       effect-NAME/        the same with one effect at a strength from its prior
+      images/             further pours of the plain model, whose images are read again under each
+                          effect of the image; npz, see `image_rows.py`
       base-at-0/, ...     instead of base/ where pours are at the conditions alone, a part for each
 
-Each part is a data set of `generate`: it is stopped and continued anywhere and has the same rows.
+Each other part is a data set of `generate`: it is stopped and continued anywhere and has the same
+rows.
 """
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,6 +27,8 @@ from granulcal.dataset import Dataset, generate
 from granulcal.errors import TrainingDataError
 from granulcal.files import write_beside
 from granulcal.loop.design import Design
+from granulcal.loop.image_rows import ImageRows
+from granulcal.loop.images import require_image
 from granulcal.loop.library import LibraryEffect, fingerprint
 from granulcal.loop.measures import Measures
 from granulcal.loop.tolerance import Tolerances
@@ -42,6 +48,8 @@ _WHOLE_STRENGTHS = (0.25, 0.5, 0.75, 1.0)
 _SEED_STEP, _PLACE_STEP = 1009, 101
 # Base pours that are read anew for an effect that needs none of its own.
 _FREE_COPIES = 400
+# Most base pours whose images are kept at hand for that, and their largest share of the base.
+_IMAGES, _IMAGES_SHARE = 400, 0.25
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +61,7 @@ class Plan:
         prior: of the material.
         conditions: path and range of each condition input, q of them.
         library: the effects.
-        base: pours of the plain model.
+        base: pours of the plain model, those of `images` among them.
         each: pours of each effect.
         seed: of all of them.
         tolerances: of the statistics; they need no pours.
@@ -105,6 +113,13 @@ class Plan:
         own = [e for e in self.library if not e.is_free]
         return self.base + self.each * len(own)
 
+    @property
+    def images(self) -> int:
+        """Base pours whose images are read again; none where no effect is one of the image."""
+        if not any(effect.image for effect in self.library):
+            return 0
+        return min(_IMAGES, int(_IMAGES_SHARE * self.base))
+
     def unit(self, at: dict[str, float]) -> Array:
         """Returns the inputs of a condition that states the numbers `at` in [0, 1], shape (q,)."""
         return self.unit_condition(np.array([at[path] for path, _, _ in self.conditions]))
@@ -145,11 +160,13 @@ class Archive:
         plan: what it is of.
 
     Raises:
+        ObservationError: effects of the image for a scene that has none.
         TrainingDataError: the folder holds the archive of something else, or of another version.
     """
 
     def __init__(self, folder: Path, plan: Plan) -> None:
         """Opens or begins it."""
+        require_image(plan.scene, (effect.name for effect in plan.library if effect.image))
         self.folder, self.plan = folder, plan
         path = folder / _RECORD
         mine = plan.record()
@@ -196,6 +213,8 @@ class Archive:
                 threads=threads,
                 progress=progress,
             )
+        if self.plan.images:
+            self._image_rows().fill(threads=threads or os.cpu_count() or 1, say=say)
 
     def pours(self) -> Pours:
         """Returns all usable rows.
@@ -242,6 +261,7 @@ class Archive:
         theta, condition, psi, x = (np.concatenate(c) for c in zip(*rows[:many], strict=True))
         rows = [(theta, condition, psi, x), *rows[many:]]
         rows.extend(self._free_rows(rows[0], measures.powers))
+        rows.extend(self._rows_of_images())
         rows = self._with_tolerances(rows, names)
         theta, condition, psi, x = (np.concatenate(part) for part in zip(*rows, strict=True))
         return Pours(theta, condition, psi, x, names, left_out)
@@ -257,7 +277,7 @@ class Archive:
         paths = [path for path, _, _ in self.plan.conditions]
         found = []
         for k, effect in enumerate(self.plan.library):
-            if not effect.is_free or (
+            if not (effect.camera or effect.shift) or (
                 effect.shift and (effect.path not in paths or self.plan.places)
             ):
                 continue
@@ -277,6 +297,37 @@ class Archive:
             inside = ((condition >= 0.0) & (condition <= 1.0)).all(axis=1)
             found.append((theta[inside], condition[inside], psi[inside], x[inside]))
         return found
+
+    def _image_rows(self) -> ImageRows:
+        plan = self.plan
+        return ImageRows(
+            folder=self.folder / "images",
+            scene=plan.scene,
+            prior=plan.prior,
+            conditions=plan.conditions,
+            places=plan.places,
+            effects=tuple(effect for effect in plan.library if effect.image),
+            count=plan.images,
+            seed=plan.seed,
+        )
+
+    def _rows_of_images(self) -> list[tuple[Array, Array, Array, Array]]:
+        """Rows of `images/`: plain ones, then those under each effect."""
+        if not self.plan.images:
+            return []
+        found = self._image_rows().rows()
+        if found is None:
+            raise TrainingDataError(
+                f"{self.folder / 'images'} is not whole: fill the archive first"
+            )
+        names = [effect.name for effect in self.plan.library]
+        rows = []
+        for name, (theta, condition, strength, x) in found.items():
+            psi = np.zeros((len(x), len(names)))
+            if name:
+                psi[:, names.index(name)] = strength
+            rows.append((theta, condition, psi, x))
+        return rows
 
     def _with_tolerances(
         self, rows: list[tuple[Array, Array, Array, Array]], names: tuple[str, ...]
@@ -310,7 +361,7 @@ class Archive:
             for path, low, high in drawn
         ]
         common = [*plan.prior.parameters, *inputs]
-        parts = [_Part("base", plan.scene, Prior(common), plan.base, plan.seed)]
+        parts = [_Part("base", plan.scene, Prior(common), plan.base - plan.images, plan.seed)]
         for k, entry in enumerate(plan.library, start=1):
             if entry.is_free:
                 continue

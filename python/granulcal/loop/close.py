@@ -30,7 +30,7 @@ from granulcal.loop.thresholds import Thresholds
 from granulcal.loop.trace import Explanation, Power, Trace, power, trace
 from granulcal.scene import Scene
 
-__all__ = ["Closed", "close_loop", "fit_surrogate", "planned", "scene_of"]
+__all__ = ["Closed", "close_loop", "faults_of", "fit_surrogate", "planned", "scene_of"]
 
 Array = NDArray[np.float64]
 
@@ -79,6 +79,10 @@ class Closed:
     def scene(self, condition: Condition, one: Explanation) -> Scene:
         """Returns the scene of a model at its best fit under a condition."""
         return _scene(self.task, condition, one)
+
+    def faults(self, one: Explanation) -> dict[str, float]:
+        """Returns the faults of the image of a model at its best fit, by kind."""
+        return _faults(self.task, one)
 
     def parameters(self) -> dict[str, dict[str, float]]:
         """Returns the parameters before and after, in their own units.
@@ -294,6 +298,18 @@ def _scene(task: Task, condition: Condition, one: Explanation) -> Scene:
     return scene_of(task, condition, one.theta, strengths)
 
 
+def faults_of(task: Task, strengths: Mapping[str, float]) -> dict[str, float]:
+    """Returns the faults of the image of a model, by kind, from psi of its effects by name."""
+    found: dict[str, float] = {}
+    for name, psi in strengths.items():
+        found |= task.effect(name).faults(float(psi))
+    return found
+
+
+def _faults(task: Task, one: Explanation) -> dict[str, float]:
+    return faults_of(task, dict(zip(one.effects, one.best_strengths.tolist(), strict=True)))
+
+
 def _kin(path: str, other: str) -> bool:
     """Whether two numbers belong to one table of effects."""
     return path.rpartition(".")[0] == other.rpartition(".")[0]
@@ -307,7 +323,8 @@ def _both(
     before = forward.pours(_scene(task, condition, found.base), seeds)
     if found.best is found.base:
         return before, before
-    return before, forward.pours(_scene(task, condition, found.best), seeds)
+    after = _scene(task, condition, found.best)
+    return before, forward.pours(after, seeds, _faults(task, found.best))
 
 
 def _placebo(forward: Forward, task: Task, condition: Condition, found: Trace, seed: int) -> Array:

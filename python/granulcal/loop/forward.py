@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -35,17 +35,22 @@ class Forward:
         self.ran = 0
         folder.mkdir(parents=True, exist_ok=True)
 
-    def pours(self, scene: Scene, seeds: Sequence[int]) -> Array:
-        """Returns the statistics of usable pours, shape (n <= len(seeds), s)."""
+    def pours(
+        self, scene: Scene, seeds: Sequence[int], faults: Mapping[str, float] | None = None
+    ) -> Array:
+        """Returns the statistics of usable pours, shape (n <= len(seeds), s).
+
+        `faults` are those of the image, by kind.
+        """
         names = Measures.of(scene).names
-        text = json.dumps([_native.__version__, names, scene.to_toml(), list(seeds)])
+        of = [_native.__version__, names, scene.to_toml(), list(seeds)]
+        text = json.dumps([*of, dict(faults)] if faults else of)
         path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.npy"
         if path.exists():
             return np.load(path)
         with ThreadPoolExecutor(self.threads) as pool:
-            rows = [
-                row for row in pool.map(lambda seed: _row(scene, seed), seeds) if row is not None
-            ]
+            made = pool.map(lambda seed: _row(scene, seed, faults), seeds)
+            rows = [row for row in made if row is not None]
         self.ran += len(seeds)
         found = np.array(rows).reshape(len(rows), len(names))
         beside = path.with_suffix(".part.npy")
@@ -54,12 +59,12 @@ class Forward:
         return found
 
 
-def _row(scene: Scene, seed: int) -> Array | None:
+def _row(scene: Scene, seed: int, faults: Mapping[str, float] | None) -> Array | None:
     pour = simulate(scene, seed=seed)
     if pour.status in _UNUSABLE:
         return None
     try:
-        found = Measures.of(scene).of_pour(pour)
+        found = Measures.of(scene).of_pour(pour, faults)
     except ValueError:
         # Too few grains in view.
         return None

@@ -9,6 +9,7 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from granulcal.loop.design import Effect
 from granulcal.prior import Parameter
 from granulcal.scene import Scene
 
-__all__ = ["FUNNEL", "LIBRARY", "LibraryEffect", "by_name", "fingerprint"]
+__all__ = ["FUNNEL", "LIBRARY", "LibraryEffect", "by_name", "described", "fingerprint"]
 
 Array = NDArray[np.float64]
 
@@ -42,6 +43,8 @@ class LibraryEffect:
         also: other numbers of the scene wherever the effect is on, by path.
         camera: power p of `(1 + full psi)^(p length)` by which lengths scale: costs no pour.
         shift: the condition input `path` is not what was stated, by `full`: base pours, read anew.
+        image: kind of a fault of the image (`images.py`), in place of a number of the scene: base
+            pours whose images are read anew.
         nuisance_sd: of a declared tolerance, in psi; None for a candidate.
         is_shared: of a tolerance: one value for all conditions.
     """
@@ -60,6 +63,7 @@ class LibraryEffect:
     also: tuple[tuple[str, float], ...] = ()
     camera: bool = False
     shift: bool = False
+    image: str = ""
     nuisance_sd: float | None = None
     is_shared: bool = True
 
@@ -115,7 +119,11 @@ class LibraryEffect:
     @property
     def is_free(self) -> bool:
         """Whether base pours show the effect, without pours of its own."""
-        return self.camera or self.shift
+        return self.camera or self.shift or bool(self.image)
+
+    def faults(self, psi: float) -> dict[str, float]:
+        """Returns the faults of the image at strength `psi`, by kind; none of another effect."""
+        return {self.image: self.value(psi)} if self.image else {}
 
     def numbers(self, psi: float) -> dict[str, float]:
         """Returns the numbers of the scene at strength `psi`, by path; none of a free effect."""
@@ -262,6 +270,36 @@ FUNNEL: tuple[LibraryEffect, ...] = (
         nuisance_sd=1.0,
         doc="lengths of the image are 1 % too large (a tolerance)",
     ),
+    LibraryEffect(
+        name="camera.offset",
+        path="image.offset",
+        image="offset",
+        full=1e-3,
+        unit="m",
+        is_two_sided=True,
+        doc="heights of grains are told from a plane that lies this much below their ground",
+    ),
+    LibraryEffect(
+        name="camera.blur",
+        path="image.blur",
+        image="blur",
+        full=3.0,
+        unit="px",
+        doc="the image is smoothed by a Gaussian of this standard deviation",
+    ),
+    LibraryEffect(
+        name="camera.flying",
+        path="image.flying",
+        image="flying",
+        full=0.5,
+        doc="share of the pixels at depth edges that read a mixture of both sides",
+    ),
+    LibraryEffect(
+        name="grains.lost",
+        path="image.lost",
+        image="lost",
+        doc="share of the lone grains that the segmentation loses",
+    ),
 )
 """What a pour through a funnel may lack."""
 
@@ -381,5 +419,10 @@ def by_name(
 
 def fingerprint(library: Sequence[LibraryEffect]) -> str:
     """Returns a hash of everything that the library says."""
-    text = json.dumps([asdict(effect) for effect in library], sort_keys=True)
+    text = json.dumps([described(effect) for effect in library], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def described(effect: LibraryEffect) -> dict[str, Any]:
+    """Returns all that an entry says; fields that came later only where they say something."""
+    return {k: v for k, v in asdict(effect).items() if k != "image" or v}

@@ -10,10 +10,17 @@ from numpy.typing import NDArray
 
 from granulcal.dataset import Dataset
 from granulcal.errors import ObservationError
+from granulcal.loop.images import Frame
 from granulcal.recording import Formation, Recording
 from granulcal.scene import Scene
 from granulcal.simulate import Pour
-from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES, REGISTRY
+from granulcal.statistics import (
+    DIAGNOSTIC_NAMES,
+    NAMES,
+    REGISTRY,
+    diagnostic_statistics,
+    statistics,
+)
 
 __all__ = ["Measures", "formation_of"]
 
@@ -59,15 +66,25 @@ class Measures:
         values = np.column_stack([columns[name] for name in self.names])
         return values, data.is_usable & np.isfinite(values).all(axis=1)
 
-    def of_pour(self, pour: Pour) -> Array:
+    def of_pour(self, pour: Pour, faults: Mapping[str, float] | None = None) -> Array:
         """Returns the statistics of a pour, shape (s,).
+
+        `faults` are those of the image, by kind; see `images.py`.
 
         Raises:
             ValueError: too few grains are in view.
         """
         if self.observes:
             return np.asarray(pour.observed())
-        both = {**pour.statistics().to_dict(), **pour.diagnostic_statistics().to_dict()}
+        if faults:
+            frame = Frame.of(pour).with_(faults, pour.seed)
+            points, spacing = frame.points(), frame.spacing
+            found = diagnostic_statistics(
+                points, grain_diameter=frame.diameter, spacing=spacing, pour_axis=(0.0, 0.0)
+            )
+            both = {**statistics(points).to_dict(), **found.to_dict()}
+        else:
+            both = {**pour.statistics().to_dict(), **pour.diagnostic_statistics().to_dict()}
         return np.array([both[name] for name in self.names])
 
     def of_recording(

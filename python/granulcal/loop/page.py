@@ -11,6 +11,7 @@ from granulcal import _native
 from granulcal.files import write_beside
 from granulcal.formation_image import formation_figure
 from granulcal.loop.close import Closed
+from granulcal.loop.images import Frame
 from granulcal.loop.measures import Measures, formation_of
 from granulcal.loop.task import Condition
 from granulcal.report import data_uri, template
@@ -134,8 +135,8 @@ def _pictures(closed: Closed) -> str:
     if closed.trace.best is not closed.trace.base:
         models["with " + " + ".join(closed.trace.best.effects)] = closed.trace.best
     for label, one in models.items():
-        pour = simulate(closed.scene(condition, one), seed=0)
-        points = pour.points()
+        pour, faults = simulate(closed.scene(condition, one), seed=0), closed.faults(one)
+        points = Frame.of(pour).with_(faults, 0).points() if faults else pour.points()
         clouds[label] = points - np.array([*points[:, :2].mean(axis=0), 0.0])
     return data_uri(formation_figure(clouds))
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.baseline import Fit
-from granulcal.loop.close import Closed, scene_of
+from granulcal.loop.close import Closed, faults_of, scene_of
 from granulcal.loop.design import LARGEST_Z, Design, cube_from_normal
 from granulcal.loop.forward import Forward
 from granulcal.loop.task import Condition
@@ -51,9 +51,10 @@ def predict(
     fit = trace.base_fit if one is trace.base else trace.models[trace.explanations.index(one)].fit
     design = trace.local.surrogate.design
     seeds = [_SEED + i for i in range(draws)]
-    at_fit = forward.pours(closed.scene(condition, one), seeds)
+    at_fit = forward.pours(closed.scene(condition, one), seeds, closed.faults(one))
     rows = []
     for seed, theta, psi in zip(seeds, *draw(fit, design, draws, seed=_SEED), strict=True):
-        scene = scene_of(closed.task, condition, theta, dict(zip(one.effects, psi, strict=True)))
-        rows.append(forward.pours(scene, [seed]))
+        strengths = dict(zip(one.effects, psi, strict=True))
+        scene = scene_of(closed.task, condition, theta, strengths)
+        rows.append(forward.pours(scene, [seed], faults_of(closed.task, strengths)))
     return at_fit, np.concatenate(rows)

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ from granulcal import _native
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.archive import Plan
-from granulcal.loop.library import fingerprint
+from granulcal.loop.library import described, fingerprint
 from granulcal.loop.task import Task
 from granulcal.loop.thresholds import Thresholds
 
@@ -42,7 +41,7 @@ def register(
             | ({"averaged": True} if c.averaged else {})
             for c in task.conditions
         ],
-        "library": [asdict(effect) for effect in task.library],
+        "library": [described(effect) for effect in task.library],
         "library_sha256": fingerprint(task.library),
         "statistics": list(statistics),
         "archive": {"base": plan.base, "each": plan.each, "seed": plan.seed},

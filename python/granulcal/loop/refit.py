@@ -50,6 +50,8 @@ class Model:
         strengths: posterior mean of each strength, shape (|A|,).
         intervals: of each strength, shape (|A|, 2).
         at_end: whether a strength's posterior leans on the end of its prior.
+        curve: of a single effect: strengths, and the log of its posterior there over its largest,
+            shape (2, n); of other models empty.
     """
 
     effects: tuple[int, ...]
@@ -59,6 +61,7 @@ class Model:
     strengths: Array
     intervals: Array
     at_end: bool
+    curve: Array
 
 
 def fit_none(fit: Fit, thresholds: Thresholds) -> Model:
@@ -72,6 +75,7 @@ def fit_none(fit: Fit, thresholds: Thresholds) -> Model:
         np.empty(0),
         np.empty((0, 2)),
         False,
+        np.empty((2, 0)),
     )
 
 
@@ -116,6 +120,7 @@ def fit_single(local: Local, target: Array, base: Fit, k: int, thresholds: Thres
         np.array([mean]),
         interval[None],
         bool(weights[-1] > 0.2 or (effect.is_two_sided and weights[0] > 0.2)),
+        np.stack([fine, density - largest]),
     )
 
 
@@ -157,6 +162,7 @@ def fit_pair(
         used.mean(axis=0),
         np.quantile(used, [tail, 1 - tail], axis=0).T,
         bool((centre > 0.98).any()),
+        np.empty((2, 0)),
     )
 
 

@@ -2,7 +2,7 @@
 
     scene = "scene.toml"            # paths are relative to this file
     prior = "prior.toml"
-    effects = ["drag", "tilt.x"]    # of the library; all of it where this is left out
+    effects = ["drag", "tilt.x"]    # of the library; all that a funnel's pour may lack if left out
 
     [[conditions]]
     name = "4 cm"
@@ -35,6 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
+from granulcal.loop.images import require_image
 from granulcal.loop.library import FUNNEL, LibraryEffect, by_name
 from granulcal.loop.measures import Measures
 from granulcal.loop.tolerance import Tolerances
@@ -126,8 +127,10 @@ class Task:
 
         Raises:
             ObservationError: too few pours, conditions without the same paths, a name twice,
-                tolerances over a number that does not differ between conditions.
+                tolerances over a number that does not differ between conditions, effects of the
+                image for a scene that observes statistics of its own.
         """
+        require_image(self.scene, (effect.name for effect in self.library if effect.image))
         given = set(self.conditions[0].at) if self.conditions else set()
         meant = tuple(e for e in self.library if not e.shift or e.path in given)
         # An effect on a condition that this task does not have.
@@ -179,7 +182,7 @@ class Task:
         folder = file.parent
         shared = {key: document[key] for key in ("camera", "reading") if key in document}
         scene = Scene.load(folder / document["scene"])
-        library = by_name(document["effects"]) if "effects" in document else FUNNEL
+        library = by_name(document["effects"]) if "effects" in document else _default(scene)
         sds = {str(name): float(sd) for name, sd in document.get("nuisances", {}).items()}
         declared = tuple(effect.declared(sds[effect.name], scene) for effect in by_name(sds))
         library = (*(effect for effect in library if effect.name not in sds), *declared)
@@ -251,6 +254,15 @@ class Task:
         differing = set(self._differing)
         shared = {p: v for p, v in self.conditions[0].at.items() if p not in differing}
         return self.scene.with_(shared) if shared else self.scene
+
+
+def _default(scene: Scene) -> tuple[LibraryEffect, ...]:
+    """The library where a task names no effects: without those that its scene cannot show."""
+    try:
+        require_image(scene, ("camera",))
+    except ObservationError:
+        return tuple(effect for effect in FUNNEL if not effect.image)
+    return FUNNEL
 
 
 def _condition(file: Path, table: dict[str, Any]) -> Condition:

@@ -1,0 +1,142 @@
+"""The table of `loop_study.py`: rates with 95 % Wilson intervals beside the targets."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest
+
+__all__ = ["table"]
+
+Row = dict[str, Any]
+
+_NAMED = ("EFFECT", "SET", "EFFECTS")
+_BANDS = ((0.0, 0.5, ""), (0.5, 1.0, ">= 75 %"), (1.0, np.inf, ">= 98 %"))
+
+
+def table(paths: list[Path]) -> None:
+    """Prints the rates, and one line for each candidate and each effect outside the library."""
+    rows = [json.loads(line) for path in paths for line in path.read_text().splitlines()]
+    jammed = sum(row["kind"] == "jammed" for row in rows)
+    of = {k: [r for r in rows if r["kind"] == k] for k in ("null", "single", "pair", "hidden")}
+    counts = ", ".join(f"{len(v)} {k}" for k, v in of.items())
+    print(f"{len(rows)} sets: {counts}, {jammed} jammed\n")
+    print("| what | rate | 95 % | target |\n|---|---|---|---|")
+    _nulls(of["null"])
+    _singles(of["single"])
+    _names(of)
+    _strengths(of["single"])
+    _removed(of)
+    print("\n| effect | sets | p <= .05 | named | right | median delta | strength covered |")
+    print("|---|---|---|---|---|---|---|")
+    for name in dict.fromkeys(r["effects"][0] for r in (*of["single"], *of["hidden"])):
+        _effect(name, [r for r in (*of["single"], *of["hidden"]) if r["effects"][0] == name])
+
+
+def _nulls(rows: list[Row]) -> None:
+    _rate("false alarm, p <= .05", [r["p"] <= 0.05 for r in rows], "<= 5 % (<= 8 %)")
+    _rate("false alarm, p <= .01", [r["p"] <= 0.01 for r in rows])
+    for i, name in enumerate(("library", "any", "smooth")):
+        _rate(f"false alarm, {name} alone", [r["p_each"][i] <= 0.05 for r in rows])
+    _rate("null named", [_is_named(r) for r in rows])
+
+
+def _singles(rows: list[Row]) -> None:
+    for low, high, target in _BANDS:
+        chosen = [r for r in rows if low <= r["delta"] < high]
+        band = f"delta {low:g} to {high:g}" if np.isfinite(high) else f"delta from {low:g}"
+        _rate(f"detected, {band}", [r["p"] <= 0.05 for r in chosen], target)
+        named = [r for r in chosen if _is_named(r)]
+        _rate(f"named, {band}", [_is_named(r) for r in chosen])
+        right = [r["first"] == r["effects"][0] for r in named]
+        _rate("  of these the first is right", right, ">= 90 %" if low >= 1 else "")
+
+
+def _names(of: dict[str, list[Row]]) -> None:
+    named = [r for r in of["single"] if _is_named(r)]
+    inside = [r["effects"][0] in r["named"] for r in named]
+    _rate("single, named: truth in the set", inside, ">= 97 %")
+    if named:
+        size = np.mean([len(r["families"]) for r in named])
+        print(f"| mean number of families named | {size:.2f} | | <= 1.5 |")
+    _rate(
+        "single, p <= .01: UNEXPLAINED",
+        [r["verdict"] == "UNEXPLAINED" for r in of["single"] if r["p"] <= 0.01],
+    )
+    spoken = [*of["null"], *of["single"], *of["pair"]]
+    wrong = [_is_named(r) and not set(r["named"]) & set(r["effects"]) for r in spoken]
+    _rate("false naming, of all sets of the library", wrong, "<= 5 %")
+    told = [w for r, w in zip(spoken, wrong, strict=True) if _is_named(r)]
+    _rate("false naming, of the named ones", told)
+    strong = [r for r in of["hidden"] if r["delta"] >= 1]
+    _rate("outside, delta >= 1: not named", [not _is_named(r) for r in strong], ">= 70 %")
+    _rate("outside, delta >= 1: UNEXPLAINED", [r["verdict"] == "UNEXPLAINED" for r in strong])
+    _rate("outside, all: named", [_is_named(r) for r in of["hidden"]])
+    _rate("pairs, p <= .05", [r["p"] <= 0.05 for r in of["pair"]])
+    two = [r for r in of["pair"] if _is_named(r)]
+    alone = [set(r["named"]) <= set(r["effects"]) for r in two]
+    _rate("pairs, named: no false member", alone, ">= 95 %")
+    both = [set(r["named"]) == set(r["effects"]) for r in of["pair"]]
+    _rate("pairs: both found", both, ">= 60 %")
+
+
+def _strengths(rows: list[Row]) -> None:
+    _rate("strength in its 95 % interval, all singles", [_covers(r) for r in rows], "90 to 97 %")
+    for name, chosen in (
+        ("p <= .01", [r for r in rows if r["p"] <= 0.01]),
+        ("named rightly", [r for r in rows if r["effects"][0] in r["named"]]),
+        ("kappa at least .5", [r for r in rows if (r["kappa"] or 0) >= 0.5]),
+        ("kappa below .5 or not known", [r for r in rows if not (r["kappa"] or 0) >= 0.5]),
+    ):
+        _rate(f"strength in its 95 % interval, {name}", [_covers(r) for r in chosen])
+    signs = [np.sign(r["strengths"][0]) for r in rows]
+    shift = [s * (r["strength"][0] - r["strengths"][0]) for s, r in zip(signs, rows, strict=True)]
+    if shift:
+        print(f"| strength: mean error, rms | {np.mean(shift):.3f}, {np.std(shift):.3f} | | |")
+
+
+def _removed(of: dict[str, list[Row]]) -> None:
+    right = [r for r in of["single"] if r["verdict"] == "EFFECT" and r["effects"][0] in r["named"]]
+    _median("R at sealed heights, right effect", [r.get("removed") for r in right], ">= 90 %")
+    hidden = [r for r in of["hidden"] if _is_named(r)]
+    _median("R, outside that was named", [r.get("removed") for r in hidden])
+    unexplained = [r for rows in of.values() for r in rows if r["verdict"] == "UNEXPLAINED"]
+    left = [r.get("fallback") for r in unexplained]
+    _median("R of the correction, UNEXPLAINED", left, ">= 70 %")
+
+
+def _effect(name: str, rows: list[Row]) -> None:
+    found = sum(r["p"] <= 0.05 for r in rows)
+    named = [r for r in rows if _is_named(r)]
+    right = sum(name in r["named"] for r in named)
+    delta = np.median([r["delta"] for r in rows])
+    covered = f"{sum(map(_covers, rows))}" if "strength" in rows[0] else "-"
+    cells = [name, len(rows), found, len(named), right, f"{delta:.2f}", covered]
+    print("| " + " | ".join(map(str, cells)) + " |")
+
+
+def _is_named(row: Row) -> bool:
+    return row["verdict"] in _NAMED
+
+
+def _covers(row: Row) -> bool:
+    _, low, high = row["strength"]
+    return low <= row["strengths"][0] <= high
+
+
+def _rate(name: str, hits: list[bool], target: str = "") -> None:
+    n, k = len(hits), sum(hits)
+    if n == 0:
+        print(f"| {name} | 0 of 0 | | {target} |")
+        return
+    low, high = binomtest(k, n).proportion_ci(method="wilson")
+    print(f"| {name} | {k} of {n} = {k / n:.0%} | {low:.0%} to {high:.0%} | {target} |")
+
+
+def _median(name: str, values: list[float | None], target: str = "") -> None:
+    known = [v for v in values if v is not None and np.isfinite(v)]
+    if known:
+        low, middle, high = np.quantile(known, [0.25, 0.5, 0.75])
+        shown = f"{middle:.2f} ({low:.2f}, {high:.2f})"
+        print(f"| {name}: median (quartiles), n = {len(known)} | {shown} | | {target} |")

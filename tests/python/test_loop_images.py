@@ -1,0 +1,230 @@
+"""Effects of the image: closed forms of the operators, and what an archive makes of them."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.errors import ObservationError, TrainingDataError
+from granulcal.loop.archive import Archive, Plan
+from granulcal.loop.forward import Forward
+from granulcal.loop.images import KINDS, Frame, blurred, flying, lost, require_image
+from granulcal.loop.library import FUNNEL, LIBRARY, by_name
+from granulcal.loop.measures import Measures
+from granulcal.loop.task import FIT, Condition, Task
+
+SCENE = """
+name = "small"
+[grains]
+count = 90
+diameter = 4e-3
+density = 1300.0
+[start]
+kind = "grid"
+counts = [5, 5, 4]
+spacing = 6e-3
+jitter = 5e-4
+base = 0.04
+[end]
+horizon = 2.0
+[camera]
+projection = "PROJECTION"
+height = 0.3
+field_width = 0.3
+pixels = 300
+downsample = 1
+height_threshold = 1e-3
+"""
+PRIOR = """
+[[parameter]]
+path = "material.sliding_friction"
+distribution = "uniform"
+low = 0.3
+high = 0.8
+"""
+NAMES = [effect.name for effect in FUNNEL if effect.image]
+
+
+def scene(projection: str = "pinhole") -> gc.Scene:
+    return gc.Scene.from_toml(SCENE.replace("PROJECTION", projection))
+
+
+@pytest.fixture(scope="module")
+def pour() -> gc.Pour:
+    return gc.simulate(scene(), seed=4)
+
+
+@pytest.mark.parametrize("projection", ["pinhole", "orthographic"])
+def test_the_frame_has_the_points_of_the_image(projection: str) -> None:
+    seen = gc.simulate(scene(projection), seed=4)
+    np.testing.assert_allclose(Frame.of(seen).points(), seen.points(), rtol=0, atol=1e-9)
+
+
+def test_an_offset_moves_heights_by_itself_and_nothing_else(pour: gc.Pour) -> None:
+    measures = Measures.of(pour.scene)
+    plain = dict(zip(measures.names, measures.of_pour(pour), strict=True))
+    for offset in (7e-4, -5e-4):
+        found = dict(zip(measures.names, measures.of_pour(pour, {"offset": offset}), strict=True))
+        assert found["mean_z"] - plain["mean_z"] == pytest.approx(offset, rel=1e-9)
+        assert found["max_z"] - plain["max_z"] == pytest.approx(offset, rel=1e-9)
+        for name in ("mean_r", "sd_z", "isolated_grains"):
+            assert found[name] == pytest.approx(plain[name], rel=1e-9)
+
+
+def test_a_blurred_step_is_an_error_function() -> None:
+    sigma, count = 2.5, 81
+    z = np.zeros((7, count))
+    z[:, count // 2 + 1 :] = 1.0
+    u = np.arange(count) - count // 2 - 0.5
+    expected = [0.5 * (1 + math.erf(x / (sigma * math.sqrt(2)))) for x in u]
+    found = blurred(z, sigma)
+    # A sum over pixels for an integral: the error is h^2 / 24 of the kernel's slope at most.
+    inner = slice(12, -12)
+    largest = 1 / (24 * sigma**2 * math.sqrt(2 * math.pi * math.e))
+    np.testing.assert_allclose(found[3, inner], expected[inner], rtol=0, atol=1.1 * largest)
+    # Along the other axis nothing changes, and a constant stays one around missing pixels.
+    np.testing.assert_allclose(found, np.tile(found[3], (7, 1)), atol=1e-12)
+    holes = np.full((9, 9), 0.3)
+    holes[4, 2:5] = np.nan
+    np.testing.assert_allclose(blurred(holes, 1.0), holes, atol=1e-12)
+
+
+def test_flying_pixels_lie_between_both_sides_of_an_edge() -> None:
+    z = np.zeros((200, 40))
+    z[:, 20:] = 4e-3
+    z[5, 20] = np.nan
+    found = flying(z, 0.4, 1e-3, np.random.default_rng(1))
+    changed = (found != z) & np.isfinite(z)
+    # The two columns at the edge, a share of 0.4 of them, and nothing elsewhere.
+    assert not changed[:, :19].any() and not changed[:, 21:].any()
+    assert np.isnan(found[5, 20])
+    assert changed[:, 19:21].sum() == pytest.approx(0.4 * 400, abs=4 * math.sqrt(400 * 0.24))
+    mixed = found[changed]
+    assert mixed.min() >= 0 and mixed.max() <= 4e-3
+    assert mixed.mean() == pytest.approx(2e-3, abs=4 * 4e-3 / math.sqrt(12 * len(mixed)))
+    assert np.array_equal(flying(z, 1.0, 5e-3, np.random.default_rng(1)), z, equal_nan=True)
+
+
+def test_all_lone_grains_can_be_lost_and_the_heap_stays(pour: gc.Pour) -> None:
+    measures = Measures.of(pour.scene)
+    before = dict(zip(measures.names, measures.of_pour(pour), strict=True))
+    after = dict(zip(measures.names, measures.of_pour(pour, {"lost": 1.0}), strict=True))
+    assert before["isolated_grains"] >= 5 and after["isolated_grains"] == 0
+    assert after["clusters"] == before["clusters"] and after["max_z"] == before["max_z"]
+    assert after["count_in_view"] < before["count_in_view"]
+
+
+def test_a_share_of_lone_grains_is_lost_whole() -> None:
+    # 400 bodies of 2 x 2 pixels, and a bar of 30 pixels that is no grain.
+    is_grain = np.zeros((120, 84), dtype=bool)
+    for i in range(20):
+        for j in range(20):
+            is_grain[4 * i : 4 * i + 2, 4 * j : 4 * j + 2] = True
+    is_grain[100, 10:40] = True
+    y, x = np.mgrid[:120, :84].astype(float)
+    gone = lost(x, y, is_grain, 1.5, 1.5, 0.3, np.random.default_rng(2))
+    assert not gone[100].any() and not gone[~is_grain].any()
+    corners = gone[:80:4, :80:4]
+    assert np.array_equal(corners, gone[1:80:4, 1:80:4])
+    assert corners.sum() == pytest.approx(120, abs=4 * math.sqrt(400 * 0.21))
+
+
+def test_every_fault_of_the_library_is_one_and_is_off_at_no_strength(pour: gc.Pour) -> None:
+    measures = Measures.of(pour.scene)
+    plain = measures.of_pour(pour)
+    assert {effect.image for effect in LIBRARY if effect.image} == set(KINDS)
+    for name in NAMES:
+        (effect,) = by_name([name])
+        assert effect.is_free and effect.numbers(0.5) == {} and effect.doc
+        np.testing.assert_allclose(
+            measures.of_pour(pour, effect.faults(0.0)), plain, rtol=1e-9, atol=1e-12
+        )
+        full = measures.of_pour(pour, effect.faults(1.0))
+        assert np.isfinite(full).all() and np.abs(full - plain).max() > 1e-4
+    # The same seed, the same faults.
+    faults = {"flying": 0.3, "lost": 0.5}
+    np.testing.assert_array_equal(measures.of_pour(pour, faults), measures.of_pour(pour, faults))
+
+
+def plan(tmp: Path, *names: str) -> Plan:
+    return Plan(
+        scene=scene(),
+        prior=gc.Prior.from_toml(PRIOR),
+        conditions=(("start.base", 0.03, 0.05),),
+        library=by_name(names),
+        base=24,
+        each=4,
+    )
+
+
+def test_one_pour_serves_all_effects_of_the_image(tmp_path: Path) -> None:
+    folder = tmp_path / "archive"
+    one = Archive(folder, plan(tmp_path, "camera.offset"))
+    assert (one.plan.pours, one.plan.images) == (24, 6)
+    with pytest.raises(TrainingDataError, match="base is missing"):
+        one.pours()
+    one.fill(threads=1, say=lambda _: None, progress=False)
+    first = one.pours()
+    plain = ~first.psi.any(axis=1)
+    assert plain.sum() + first.left_out == 24
+    strengths = first.psi[~plain, 0]
+    assert 0 < len(strengths) <= 6 and np.abs(strengths).max() <= 1
+    # A row with the offset is a plain row, its heights moved.
+    column = first.names.index("mean_z")
+    for row in np.nonzero(~plain)[0]:
+        same = np.nonzero(plain & (first.theta == first.theta[row]).all(axis=1))[0]
+        assert len(same) == 1
+        gap = first.x[row, column] - first.x[same[0], column]
+        assert gap == pytest.approx(1e-3 * first.psi[row, 0], rel=1e-6)
+    # A further effect needs no further pour.
+    both = Archive(folder, plan(tmp_path, "camera.offset", "grains.lost"))
+    assert both.plan.pours == 24
+    both.fill(threads=1, say=lambda _: None, progress=False)
+    second = both.pours()
+    assert np.array_equal(second.x[: len(first.x)], first.x)
+    assert (second.psi[len(first.x) :, 1] > 0).all() and len(second.x) > len(first.x)
+
+
+def test_the_forward_run_has_the_fault(tmp_path: Path, pour: gc.Pour) -> None:
+    forward = Forward(tmp_path, 1)
+    plain, moved = (forward.pours(pour.scene, [4], f) for f in ({}, {"offset": 5e-4}))
+    column = Measures.of(pour.scene).names.index("mean_z")
+    assert moved[0, column] - plain[0, column] == pytest.approx(5e-4, rel=1e-9)
+    # Both are kept, each under its own name.
+    assert forward.ran == 2
+    assert np.array_equal(forward.pours(pour.scene, [4], {"offset": 5e-4}), moved)
+    assert forward.ran == 2
+
+
+def test_scenes_without_an_image_refuse_by_name(tmp_path: Path) -> None:
+    observing = gc.Scene.from_toml(
+        SCENE.replace("PROJECTION", "pinhole")
+        + "\n[observe]\nrate = 50.0\n[observe.radius]\npercentiles = [50.0]\n"
+    )
+    colour = gc.Scene.from_toml(SCENE.replace("PROJECTION", "pinhole") + 'mask = "colour"\n')
+    require_image(observing, [])
+    with pytest.raises(ObservationError, match="grains.lost: .* statistics of its own"):
+        require_image(observing, ["grains.lost"])
+    with pytest.raises(ObservationError, match="camera.blur, grains.lost: .* by height"):
+        require_image(colour, ["camera.blur", "grains.lost"])
+    recordings = tuple(Path(f"{i}.png") for i in range(3))
+    conditions = (Condition("one", {"start.base": 0.04}, FIT, recordings),)
+    prior = gc.Prior.from_toml(PRIOR)
+    with pytest.raises(ObservationError, match="camera.offset: effects of the image"):
+        Task(observing, prior, conditions, by_name(["tilt.x", "camera.offset"]))
+    # A task that names none has those that its scene can show.
+    for name, text, expected in (
+        ("image", scene().to_toml(), NAMES),
+        ("observing", observing.to_toml(), []),
+    ):
+        (tmp_path / "scene.toml").write_text(text)
+        (tmp_path / "prior.toml").write_text(PRIOR)
+        (tmp_path / "a.npz").write_bytes(b"")
+        (tmp_path / f"{name}.toml").write_text(
+            'scene = "scene.toml"\nprior = "prior.toml"\n[[conditions]]\nname = "one"\n'
+            'at = { "start.base" = 0.04 }\nuse = "fit"\nrecordings = ["a.npz", "a.npz", "a.npz"]\n'
+        )
+        library = Task.load(tmp_path / f"{name}.toml").library
+        assert [effect.name for effect in library if effect.image] == expected
