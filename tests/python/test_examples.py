@@ -31,6 +31,17 @@ def test_one_pour(capsys):
     assert "chi_df" in capsys.readouterr().out
 
 
+@pytest.mark.slow
+def test_neighbours_in_a_packing(capsys):
+    _run("neighbours.py")
+    counts = [
+        float(line.split(": ")[1].split()[0]) for line in capsys.readouterr().out.splitlines()
+    ]
+    # The fluid takes eight for crowded (docs/theory/effects.md).
+    assert len(counts) == 2
+    assert all(abs(count - 8) < 1 for count in counts)
+
+
 def test_side_view(tmp_path):
     pytest.importorskip("matplotlib")
     np.save(tmp_path / "at.npy", np.random.default_rng(0).uniform(0.0, 0.05, (40, 3)))
