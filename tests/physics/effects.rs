@@ -294,6 +294,24 @@ fn a_funnel_that_hangs_aside_pours_aside() {
 }
 
 #[test]
+fn a_rough_funnel_pours_more_slowly() {
+    let half_out = |ratio: f64| {
+        let mut scene = Scene::funnel(0.05);
+        scene.grains.count = 400;
+        scene.material.sliding_friction = 0.2;
+        scene.effects.funnel.sliding_friction = ratio;
+        let mut simulation = start(&scene);
+        while simulation.positions().iter().filter(|place| place.z < 0.05).count() < 200 {
+            assert!(simulation.time() < 2.0, "it does not flow");
+            simulation.advance(0.001);
+        }
+        simulation.time()
+    };
+    let (smooth, plain, rough) = (half_out(0.1), half_out(1.0), half_out(4.0));
+    assert!(smooth < plain && plain < rough, "{smooth} {plain} {rough}");
+}
+
+#[test]
 fn an_oval_outlet_pours_an_oval() {
     let spreads = |aspect: f64| {
         let mut scene = Scene::funnel(0.03);

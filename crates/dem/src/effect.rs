@@ -77,7 +77,7 @@ pub struct Effects {
     /// A table that is not level.
     #[serde(skip_serializing_if = "is_default")]
     pub tilt: Tilt,
-    /// A funnel that hangs beside its place or leans.
+    /// A funnel that hangs beside its place, leans, or has a friction of its own.
     #[serde(skip_serializing_if = "is_default")]
     pub funnel: FunnelPose,
     /// A funnel whose outlet is not round.

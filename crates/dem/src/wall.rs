@@ -116,6 +116,9 @@ impl Walls {
         all[0].material = scene.effects.ground.of(all[0].material);
         if let Some(funnel) = &scene.funnel {
             let mut walls = scene.effects.funnel.walls(funnel).map(|wall| of(&wall));
+            for wall in &mut walls {
+                wall.material = scene.effects.funnel.rubbed(wall.material);
+            }
             let pose = scene.effects.funnel.of(funnel);
             if let Some(mesh) = scene.effects.outlet.mesh(funnel, pose.as_ref()) {
                 // One mesh, so that its parts share their edges: the first wall has all of it, the second nothing.

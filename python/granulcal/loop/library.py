@@ -384,6 +384,15 @@ LIBRARY: tuple[LibraryEffect, ...] = (
         doc="the funnel leans about y",
     ),
     LibraryEffect(
+        name="funnel.friction",
+        path="effects.funnel.sliding_friction",
+        off=1.0,
+        full=4.0,
+        is_two_sided=True,
+        is_ratio=True,
+        doc="sliding friction at the funnel over that between grains",
+    ),
+    LibraryEffect(
         name="outlet",
         path="effects.outlet.aspect",
         off=1.0,
