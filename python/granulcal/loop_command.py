@@ -23,9 +23,9 @@ TASK is a TOML file: a scene, a prior of the material, and recordings under at l
     recordings = ["04cm/pour-0.png", "04cm/pour-1.png"]
 
 Written to the folder -o: preregistration.json (before any data is looked at), verdict.json,
-report.html. The archive of pours may serve many tasks of one scene; all of it is resumed after an
-interruption. Verdicts: NONE, RESIDUAL (not sure enough for a name), EFFECT, SET (not told apart),
-EFFECTS (two), UNEXPLAINED.
+report.html, and the tables conditions, candidates and residuals.parquet. The archive of pours may
+serve many tasks of one scene; all of it is resumed after an interruption. Verdicts: NONE, RESIDUAL
+(not sure enough for a name), EFFECT, SET (not told apart), EFFECTS (two), UNEXPLAINED.
 """
 
 
@@ -44,6 +44,13 @@ def add(commands: Any) -> None:
         "--tolerances", type=Path, help="JSON of directions in which the statistics may be off"
     )
     parser.add_argument("--budget", type=int, default=4000, help="pours, all told (default: 4000)")
+    parser.add_argument(
+        "--pairs",
+        type=int,
+        default=0,
+        help="simulated pairs that calibrate the interval of a named effect's strength, of the "
+        "budget; at least 19 (default: none)",
+    )
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
     parser.set_defaults(run=_run)
@@ -52,6 +59,7 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     from granulcal.loop.close import close_loop
     from granulcal.loop.page import write_page
+    from granulcal.loop.tables import write_tables
     from granulcal.loop.task import Task
     from granulcal.loop.tolerance import Tolerances
 
@@ -66,9 +74,11 @@ def _run(options: argparse.Namespace) -> int:
         budget=options.budget,
         threads=options.threads,
         seed=options.seed,
+        pairs=options.pairs,
     )
     page = options.out / "report.html"
     archive = "" if options.archive is None else f" --archive {options.archive}"
+    archive += f" --pairs {options.pairs}" if options.pairs else ""
     if options.tolerances is not None:
         archive += f" --tolerances {options.tolerances}"
     write_page(
@@ -78,5 +88,9 @@ def _run(options: argparse.Namespace) -> int:
         f"--budget {options.budget} --seed {options.seed}",
         title=f"Closing the loop on {path}",
     )
+    try:
+        write_tables(closed, options.out)
+    except ModuleNotFoundError as error:
+        print(f"tables left out: {error}")
     print(page)
     return 0

@@ -92,7 +92,7 @@ def test_a_tilted_table_is_found_named_and_removed(
     tilted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    words = ["close-loop", str(tilted), "-o", str(out), "--budget", "1100"]
+    words = ["close-loop", str(tilted), "-o", str(out), "--budget", "1250", "--pairs", "19"]
     assert main(words) == 0
     told = capsys.readouterr().out
     assert told.index("registered before any data") < told.index("kappa") < told.index("verdict")
@@ -102,8 +102,13 @@ def test_a_tilted_table_is_found_named_and_removed(
     assert low < 0.07 < high and abs(middle - 0.07) < 0.03
     assert verdict["misfit"]["fit"]["after"] < 0.5 * verdict["misfit"]["fit"]["before"]
     assert verdict["fit"]["is_improved"] and verdict["sealed"]["is_at_floor"]
+    assert verdict["calibrated"]["pairs"] == 19 and verdict["calibrated"]["stretch"] >= 1
+    assert verdict["confirmed_p"] > 1e-3
+    assert len(verdict["correction"]) == 3
+    assert "of 19 simulated pairs held" in told
     page = (out / "report.html").read_text()
     assert "tilt.y" in page and "data:image/png" in page
+    assert "Of 19 simulated pairs" in page and "A correction without physics" in page
     # Again: nothing is run twice, and the same comes out.
     before = (out / "verdict.json").read_text()
     assert main(words) == 0

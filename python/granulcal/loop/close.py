@@ -7,7 +7,7 @@ the sealed conditions once; run the placebo; write the report.
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,19 +18,23 @@ from numpy.typing import NDArray
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.archive import Archive, Plan, from_cube
+from granulcal.loop.checks import calibrated, confirmed, corrected
+from granulcal.loop.correction import Correction
 from granulcal.loop.experiment import Experiment, next_experiment
 from granulcal.loop.forward import Forward
 from granulcal.loop.measures import Measures
 from granulcal.loop.misfit import Improvement, compare
 from granulcal.loop.observation import Observation
+from granulcal.loop.pairs import Calibrated
 from granulcal.loop.preregistration import register
+from granulcal.loop.scenes import faults_of, scene_of
 from granulcal.loop.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.thresholds import Thresholds
 from granulcal.loop.trace import Explanation, Power, Trace, power, trace
 from granulcal.scene import Scene
 
-__all__ = ["Closed", "close_loop", "faults_of", "fit_surrogate", "planned", "scene_of"]
+__all__ = ["Closed", "close_loop", "fit_surrogate", "planned"]
 
 Array = NDArray[np.float64]
 
@@ -62,6 +66,9 @@ class Closed:
         registration: SHA-256 of what was fixed beforehand.
         measured: statistics of every condition's pours, by name.
         simulated: of the base and of the augmented model, by condition's name.
+        corrections: what the correction without physics leaves; none where nothing was detected.
+        confirmed: p that the surrogate is right at the verdict's model, by fresh pours of it.
+        calibrated: the interval of the named effect's strength by simulated pairs; None without.
     """
 
     task: Task
@@ -75,6 +82,9 @@ class Closed:
     registration: str
     measured: dict[str, Array]
     simulated: dict[str, tuple[Array, Array]]
+    corrections: tuple[Correction, ...] = ()
+    confirmed: float = float("nan")
+    calibrated: Calibrated | None = None
 
     def scene(self, condition: Condition, one: Explanation) -> Scene:
         """Returns the scene of a model at its best fit under a condition."""
@@ -98,12 +108,17 @@ class Closed:
         }
 
     def strengths(self) -> dict[str, tuple[float, float, float]]:
-        """Low, middle and high of each named effect's number, in the scene's unit."""
+        """Low, middle and high of each named effect's number, in the scene's unit.
+
+        Of the effect that simulated pairs were poured for the interval is theirs.
+        """
         found: dict[str, tuple[float, float, float]] = {}
         for one in self.trace.explanations:
             for name, middle, (low, high) in zip(
                 one.effects, one.strengths, one.intervals, strict=True
             ):
+                if one is self.trace.best and self.calibrated is not None:
+                    low, high = self.calibrated.interval
                 if name in self.trace.verdict.named and name not in found:
                     effect = self.task.effect(name)
                     if not effect.camera:
@@ -129,6 +144,9 @@ class Closed:
             "reason": verdict.reason,
             "strength": self.strengths(),
             "misfit": {"fit": squares(self.fit), "sealed": squares(self.sealed)},
+            "confirmed_p": None if np.isnan(self.confirmed) else self.confirmed,
+            "calibrated": None if self.calibrated is None else self.calibrated.to_dict(),
+            "correction": [one.to_dict() for one in self.corrections],
             "pours": self.pours,
             "placebo": {"verdict": self.placebo.verdict.kind, "p": self.placebo.verdict.p},
             "registration_sha256": self.registration,
@@ -151,6 +169,7 @@ def close_loop(
     seed: int = 0,
     thresholds: Thresholds | None = None,
     surrogate: Surrogate | None = None,
+    pairs: int = 0,
     say: Callable[[str], None] = print,
 ) -> Closed:
     """Finds what a model lacks, adds it, and tells the error before and after.
@@ -164,6 +183,8 @@ def close_loop(
         seed: of everything.
         thresholds: of the verdict.
         surrogate: of the same archive, where it has been fitted for another task.
+        pairs: simulated pairs that calibrate the interval of a named effect's strength, each as
+            many pours as were measured to fit; 19 are the fewest from which 95 % can be read.
         say: is told each step.
 
     Raises:
@@ -172,8 +193,9 @@ def close_loop(
     """
     folder, rules = Path(out), thresholds or Thresholds()
     workers = threads or os.cpu_count() or 1
-    plan = planned(task, budget, seed)
-    registration = register(folder, task, plan, rules, seed, Measures.of(plan.scene).names)
+    plan = planned(task, budget, seed, pairs)
+    names = Measures.of(plan.scene).names
+    registration = register(folder, task, plan, rules, seed, names, pairs)
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
 
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
@@ -192,6 +214,12 @@ def close_loop(
 
     forward = Forward(folder / "pours", workers)
     simulated = {c.name: _both(forward, task, c, found, seed) for c in task.conditions}
+    right = confirmed(surrogate, store.plan, fitted, found, simulated)
+    say(f"fresh pours of the verdict's model: the surrogate is right there with p = {right:.3g}")
+    wide = calibrated(forward, task, store.plan, surrogate, found, rules, pairs, seed)
+    if wide is not None:
+        held = f"{wide.held} of {wide.pairs} simulated pairs held by the plain interval"
+        say(f"{held}; stretched by {wide.stretch:.3g}")
     fit = _compare(task, fitted, measured, simulated, surrogate, seed)
     hidden = task.of(SEALED)
     # Opened here, once, after everything that could be chosen has been.
@@ -213,10 +241,13 @@ def close_loop(
         sealed=sealed,
         placebo=placebo,
         experiments=tuple(experiments),
-        pours=plan.pours + _needed(task),
+        pours=plan.pours + _needed(task, pairs if wide is not None else 0),
         registration=registration,
         measured=measured,
         simulated=simulated,
+        corrections=corrected(task, store.plan, surrogate, found, measured, simulated),
+        confirmed=right,
+        calibrated=wide,
     )
     write_beside(folder / "verdict.json", json.dumps(closed.to_dict(), indent=1) + "\n")
     return closed
@@ -231,19 +262,19 @@ def fit_surrogate(store: Archive, *, seed: int, say: Callable[[str], None] = pri
     )
 
 
-def planned(task: Task, budget: int, seed: int) -> Plan:
-    """Returns the archive that a budget affords.
+def planned(task: Task, budget: int, seed: int, pairs: int = 0) -> Plan:
+    """Returns the archive that a budget affords, `pairs` of simulated pours kept back.
 
     Raises:
         ObservationError: it affords too little, with what would be enough.
     """
     own = sum(not effect.is_free for effect in task.library)
-    spare = budget - _needed(task)
+    spare = budget - _needed(task, pairs)
     # A small budget has fewer pours to share than the base model needs.
     base = max(int(_BASE_SHARE * spare), min(_LEAST_BASE, spare - _LEAST_EACH * own))
     each = (spare - base) // max(own, 1)
     if base < _LEAST_BASE or each < _LEAST_EACH:
-        enough = _needed(task) + max(
+        enough = _needed(task, pairs) + max(
             _LEAST_BASE + _LEAST_EACH * own, int(_LEAST_EACH * own / (1 - _BASE_SHARE)) + 1
         )
         raise ObservationError(
@@ -263,33 +294,10 @@ def planned(task: Task, budget: int, seed: int) -> Plan:
     )
 
 
-def _needed(task: Task) -> int:
-    """Pours besides the archive: both models under every condition, and the placebo."""
-    placebo = sum(len(c.recordings) for c in task.of(FIT))
-    return 2 * _REPLICATES * len(task.conditions) + placebo
-
-
-def scene_of(
-    task: Task, condition: Condition, theta: Array, strengths: Mapping[str, float]
-) -> Scene:
-    """Returns the scene of a model under a condition.
-
-    Args:
-        task: scene and prior.
-        condition: the numbers that it states.
-        theta: parameters in unit coordinates, shape (p,).
-        strengths: psi of each effect of the model, by name.
-    """
-    own = from_cube(task.prior, theta[None])[0]
-    values = {**task.prior.fixed, **dict(zip(task.prior.names, own.tolist(), strict=True))}
-    at = dict(condition.at)
-    for name, psi in strengths.items():
-        effect = task.effect(name)
-        values |= effect.numbers(float(psi))
-        values |= {p: v for p, v in condition.known.items() if p in values or _kin(p, effect.path)}
-        if effect.shift:
-            at[effect.path] += effect.full * float(psi)
-    return task.scene.with_({**values, **at})
+def _needed(task: Task, pairs: int) -> int:
+    """Pours besides the archive: both models under every condition, the placebo, and pairs."""
+    measured = sum(len(c.recordings) for c in task.of(FIT))
+    return 2 * _REPLICATES * len(task.conditions) + (1 + pairs) * measured
 
 
 def _scene(task: Task, condition: Condition, one: Explanation) -> Scene:
@@ -298,21 +306,8 @@ def _scene(task: Task, condition: Condition, one: Explanation) -> Scene:
     return scene_of(task, condition, one.theta, strengths)
 
 
-def faults_of(task: Task, strengths: Mapping[str, float]) -> dict[str, float]:
-    """Returns the faults of the image of a model, by kind, from psi of its effects by name."""
-    found: dict[str, float] = {}
-    for name, psi in strengths.items():
-        found |= task.effect(name).faults(float(psi))
-    return found
-
-
 def _faults(task: Task, one: Explanation) -> dict[str, float]:
     return faults_of(task, dict(zip(one.effects, one.best_strengths.tolist(), strict=True)))
-
-
-def _kin(path: str, other: str) -> bool:
-    """Whether two numbers belong to one table of effects."""
-    return path.rpartition(".")[0] == other.rpartition(".")[0]
 
 
 def _both(

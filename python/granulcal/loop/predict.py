@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.baseline import Fit
-from granulcal.loop.close import Closed, faults_of, scene_of
+from granulcal.loop.close import Closed
 from granulcal.loop.design import LARGEST_Z, Design, cube_from_normal
 from granulcal.loop.forward import Forward
+from granulcal.loop.scenes import faults_of, scene_of
 from granulcal.loop.task import Condition
 from granulcal.loop.trace import Explanation
 

@@ -25,6 +25,7 @@ def register(
     thresholds: Thresholds,
     seed: int,
     statistics: tuple[str, ...],
+    pairs: int = 0,
 ) -> str:
     """Writes the file, or finds it as it is; returns its SHA-256.
 
@@ -48,7 +49,7 @@ def register(
         "tolerances_sha256": None if task.tolerances is None else task.tolerances.fingerprint(),
         "thresholds": thresholds.to_dict(),
         "seed": seed,
-    }
+    } | ({"pairs": pairs} if pairs else {})
     text = json.dumps(document, indent=1) + "\n"
     path = folder / _NAME
     if path.exists():

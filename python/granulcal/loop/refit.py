@@ -29,7 +29,7 @@ from granulcal.loop.baseline import Fit, improve
 from granulcal.loop.local import Local
 from granulcal.loop.thresholds import Thresholds
 
-__all__ = ["Model", "fit_none", "fit_pair", "fit_single"]
+__all__ = ["Model", "fit_none", "fit_pair", "fit_single", "interval"]
 
 Array = NDArray[np.float64]
 
@@ -103,9 +103,7 @@ def fit_single(local: Local, target: Array, base: Fit, k: int, thresholds: Thres
     mass = _trapezoid(weights, fine)
     log_evidence = largest + float(np.log(mass / (1 - effect.low)))
     mean = _trapezoid(weights * fine, fine) / mass
-    steps = np.concatenate([[0.0], np.cumsum((weights[1:] + weights[:-1]) / 2 * np.diff(fine))])
-    tail = (1 - thresholds.level) / 2
-    interval = np.interp([tail, 1 - tail], steps / steps[-1], fine)
+    curve = np.stack([fine, density - largest])
     best = float(fine[int(density.argmax())])
     psi = local.none()
     psi[k] = best
@@ -118,10 +116,25 @@ def fit_single(local: Local, target: Array, base: Fit, k: int, thresholds: Thres
         log_evidence,
         log_evidence + float(np.log(thresholds.single_share / count)),
         np.array([mean]),
-        interval[None],
+        np.array([interval(curve, thresholds.level)]),
         bool(weights[-1] > 0.2 or (effect.is_two_sided and weights[0] > 0.2)),
-        np.stack([fine, density - largest]),
+        curve,
     )
+
+
+def interval(curve: Array, level: float, stretch: float = 1.0) -> tuple[float, float]:
+    """Returns the central interval of a strength's posterior, stretched.
+
+    Args:
+        curve: strengths and log density, shape (2, n).
+        level: probability between its ends.
+        stretch: tau: the density is taken to the power 1 / tau^2, which stretches a normal by tau.
+    """
+    at, weights = curve[0], np.exp(curve[1] / stretch**2)
+    steps = np.concatenate([[0.0], np.cumsum((weights[1:] + weights[:-1]) / 2 * np.diff(at))])
+    tail = (1 - level) / 2
+    low, high = np.interp([tail, 1 - tail], steps / steps[-1], at)
+    return float(low), float(high)
 
 
 def fit_pair(

@@ -151,6 +151,15 @@ class Trace:
                     return one
         return self.base
 
+    def model_of(self, one: Explanation) -> Model:
+        """Returns the model of an explanation."""
+        return self.models[self.explanations.index(one)]
+
+    def residuals_of(self, one: Explanation) -> Array:
+        """Returns what a model leaves, in standard deviations of its covariance, shape (H, m)."""
+        fit = self.base_fit if one is self.base else self.model_of(one).fit
+        return _residuals(self.local, fit)
+
     def to_dict(self) -> dict[str, Any]:
         """Returns everything for JSON."""
         gate = self.gate
@@ -219,7 +228,6 @@ def trace(
         tested = _models(local, target, fit, rules, seed)
     merged = families(scores)
     verdict = decide(design, gate, none, tested, rules, merged)
-    spread = np.sqrt(np.sum(local.in_statistics(fit.root) ** 2, axis=1))
     explained = sorted(tested, key=lambda pair: -pair[0].log_probability)
     normal = scores.slopes.T @ scores.slopes + np.eye(len(fit.v))
     return Trace(
@@ -230,7 +238,7 @@ def trace(
         power=Power.of(surrogate, scores),
         labels=stack.labels,
         statistics=surrogate.names,
-        residuals=(local.in_statistics(fit.residual) / spread).reshape(len(stack.counts), -1),
+        residuals=_residuals(local, fit),
         beyond=surrogate.beyond(observations),
         thresholds=rules,
         seed=seed,
@@ -239,6 +247,11 @@ def trace(
         base_fit=fit,
         local=local,
     )
+
+
+def _residuals(local: Local, fit: Fit) -> Array:
+    spread = np.sqrt(np.sum(local.in_statistics(fit.root) ** 2, axis=1))
+    return (local.in_statistics(fit.residual) / spread).reshape(len(local.counts), -1)
 
 
 def power(
