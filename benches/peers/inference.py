@@ -26,6 +26,7 @@ import numpy as np
 import torch
 
 from granulcal.bayessim import BayesSim
+from granulcal.bayessim.average import EMULATOR_ALONE
 from granulcal.parameter import Parameter
 from granulcal.prior import Prior
 
@@ -97,7 +98,7 @@ class Ours:
         """Returns the emulator alone that `auto` holds: the fit of `emulated`, not made again."""
         alone = Ours(self.prior, "emulated")
         alone.model = copy.copy(self.model)
-        alone.model.amortised, alone.model.emulator_weight = None, 1.0
+        alone.model.amortised, alone.model.average = None, EMULATOR_ALONE
         return alone
 
     def log_prob(self, u: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.arrays import as_matrix
+from granulcal.bayessim.average import Average
 from granulcal.bayessim.density import Density, TruncatedMixture
-from granulcal.bayessim.importance import FEWEST_EFFECTIVE
+from granulcal.bayessim.geometric import geometric_density
+from granulcal.bayessim.importance import FEWEST_EFFECTIVE, ImportanceDensity
 from granulcal.bayessim.likelihood import Likelihood, joint_density
 from granulcal.bayessim.mixture import Mixture
 from granulcal.bayessim.product import LEAST_LOG_EVIDENCE_RATIO, product_density
@@ -244,19 +246,15 @@ class Posterior:
             conditions: for each the emulated likelihood and its k standardised pours, shape (k, s).
             warnings: what is known beforehand.
         """
-        density = joint_density(prior, conditions)
-        found = list(warnings)
-        if density.effective_sample_size < FEWEST_EFFECTIVE:
-            found.append(FewEffectiveDraws(density.effective_sample_size, FEWEST_EFFECTIVE))
-        return cls(prior, density, warnings=tuple(found))
+        return cls._sampled(prior, joint_density(prior, conditions), warnings)
 
     @classmethod
-    def from_stack(
+    def from_average(
         cls,
         prior: Prior,
         condition: tuple[Likelihood, Array],
         mixture: Mixture,
-        emulator_weight: float,
+        average: Average,
         *,
         warnings: tuple[Any, ...] = (),
     ) -> "Posterior":
@@ -266,13 +264,26 @@ class Posterior:
             prior: the prior.
             condition: the emulated likelihood and the pour, standardised, shape (1, s).
             mixture: the network's, over coordinates.
-            emulator_weight: weight of the emulator's.
+            average: form and weights.
             warnings: what is known beforehand.
         """
-        emulated = cls.from_conditions(prior, [condition], warnings=warnings)
-        learnt = cls.from_mixture(prior, mixture, warnings=emulated.warnings)
-        density = StackedDensity(emulated.density, learnt.density, emulator_weight)
-        return cls(prior, density, warnings=learnt.warnings)
+        learnt = cls.from_mixture(prior, mixture, warnings=warnings)
+        if average.form == "arithmetic":
+            emulated = cls.from_conditions(prior, [condition], warnings=learnt.warnings)
+            density = StackedDensity(emulated.density, learnt.density, average.emulator)
+            return cls(prior, density, warnings=emulated.warnings)
+        return cls._sampled(
+            prior, geometric_density(prior, condition, mixture, average), learnt.warnings
+        )
+
+    @classmethod
+    def _sampled(
+        cls, prior: Prior, density: ImportanceDensity, warnings: tuple[Any, ...]
+    ) -> "Posterior":
+        effective = density.effective_sample_size
+        if effective < FEWEST_EFFECTIVE:
+            warnings = (*warnings, FewEffectiveDraws(effective, FEWEST_EFFECTIVE))
+        return cls(prior, density, warnings=warnings)
 
     @property
     def names(self) -> list[str]:

@@ -39,7 +39,7 @@ def models(toy):
     theta, x = toy.simulate(1000, seed=20)
     return {
         method: BayesSim.fit(theta, x, toy.prior, quiet=True, method=method)
-        for method in ("emulated", "mdrff")
+        for method in ("auto", "emulated", "mdrff")
     }
 
 
@@ -77,7 +77,7 @@ def test_training_density_is_the_mixture_density():
 
 
 # The prior's own divergence from these posteriors is about 4 nat.
-@pytest.mark.parametrize(("method", "most"), [("emulated", 0.1), ("mdrff", 0.25)])
+@pytest.mark.parametrize(("method", "most"), [("auto", 0.1), ("emulated", 0.1), ("mdrff", 0.25)])
 def test_close_to_the_exact_posterior(toy, models, method, most):
     x = toy.simulate(60, seed=400)[1]
     divergences = []
@@ -205,7 +205,7 @@ def _drop_entry(folder):
     [
         (
             lambda f: _edit_json(f, version=99, made_by="granulcal 9.9"),
-            r"version must be 3 \(granulcal .*got 99 \(made by granulcal 9.9\): update granulcal",
+            r"version must be 3 or 4 \(granulcal .*got 99 \(made by granulcal 9.9\): update",
         ),
         (lambda f: _edit_json(f, version=2), "got 2 .*train the model again"),
         (lambda f: _edit_json(f, format="other"), "is not a granulcal-bayessim file"),

@@ -28,7 +28,7 @@ class Config:
 
     Attributes:
         method: `emulated`: likelihood of an emulator of the statistics. `mdrff`: network trained on
-            the pairs. `auto`, the default: both, averaged with the weight that says most about
+            the pairs. `auto`, the default: both, averaged with the weights that say most about
             held-out pairs. `distilled`: network trained on synthetic pairs of the emulator.
             `plain`: the original recipe of the network. The last two only change the network's
             defaults.

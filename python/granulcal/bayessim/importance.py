@@ -150,6 +150,7 @@ class ImportanceDensity:
         log_likelihood: Array,
         *,
         weigh: Callable[[Array], Array] | None = None,
+        mixtures: tuple[Mixture, ...] = (),
     ) -> "ImportanceDensity":
         """Returns the density whose pool are draws of the prior.
 
@@ -159,13 +160,14 @@ class ImportanceDensity:
             draws: of the prior, shape (m, p).
             log_likelihood: at the draws, shape (m,).
             weigh: a quicker `log_target`; None: the same.
+            mixtures: kept with the result.
         """
         largest = float(log_likelihood.max())
         log_normaliser = largest + math.log(float(np.mean(np.exp(log_likelihood - largest))))
         heights = log_likelihood + prior.coordinate_log_prob(draws)
         weights = _normalised(log_likelihood)
         weigh = weigh or log_target
-        return cls(log_target, prior, log_normaliser, draws, weights, heights, weigh)
+        return cls(log_target, prior, log_normaliser, draws, weights, heights, weigh, mixtures)
 
     @property
     def effective_sample_size(self) -> float:

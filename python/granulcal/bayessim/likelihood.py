@@ -4,14 +4,14 @@ The statistics are rotated to their signal axes (`signal.py`); the first r of th
 k pours with the mean $\bar y$ have
 
 $$ L(u) = t_\nu(\bar y; m(u), V_k), \qquad
-   V_k = c^2 (s^2 + h^2) - (1 - 1/k) a s^2 $$
+   V_k = c^2 (s^2 + h^2) - (1 - 1/k) \eta s^2 $$
 
 (axis by axis, with one correlation R), s the scale of what the emulator leaves of a pour, h that of
 what the pairs leave unknown about the mean, and $c \ge 1$ a widening. For one pour this is the
 widened noise. Of many, only what differs between them averages away: pairs of which no two share
 their parameters cannot tell noise from errors of the emulator, but several pours of one material
-can, and a is the share of $s^2$ by which they differ. The rest, the widening and h are errors that
-all pours share.
+can, and $\eta$ is the share of $s^2$ by which they differ. The rest, the widening and h are errors
+that all pours share.
 
 Which r and c, and whether the noise changes over the parameters, is chosen by held-out pairs: the
 parameters of pairs that an emulator has not seen are to be most probable under its posterior, among
@@ -24,8 +24,9 @@ Reference:
     a proposal for repairing it, Bayesian Analysis 12, 2017 (widening by held-out prediction).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import product
 from typing import NamedTuple
 
@@ -44,12 +45,13 @@ from granulcal.bayessim.importance import (
     mix,
     prior_normal,
 )
+from granulcal.bayessim.mixture import Mixture
 from granulcal.bayessim.noise import Noise
 from granulcal.bayessim.signal import SignalAxes
 from granulcal.diagnostics import uniform_p_value
 from granulcal.prior import Prior
 
-__all__ = ["EmulatorChoice", "Fold", "Likelihood", "joint_density"]
+__all__ = ["EmulatorChoice", "Fold", "Likelihood", "density_over_prior", "joint_density"]
 
 Array = NDArray[np.float64]
 
@@ -181,10 +183,9 @@ class Likelihood:
             float(scores[best][chosen].mean()),
             float(np.concatenate(linear).mean()),
         )
-        held_scores = np.split(scores[best][chosen], np.cumsum(_lengths(parts))[:-1])
         folds = [
-            Fold(fit.widened(widening), part[: _HELD_OUT // _FOLDS], score)
-            for fit, part, score in zip(fits[best], parts, held_scores, strict=True)
+            Fold(fit.widened(widening), part[: _HELD_OUT // _FOLDS])
+            for fit, part in zip(fits[best], parts, strict=True)
         ]
         grown = _Growing.fit(u, z, prior, lengths, features, best.varying_scale, seed)
         whole = grown.leading(best.axis_count, heavy=best.heavy_tails)
@@ -232,7 +233,7 @@ class Likelihood:
             u: coordinates.
             quick: as in `Basis`.
         """
-        return self._of_prediction(z, self.leading.predict(u, quick=quick))
+        return self.of_prediction(z, self.leading.predict(u, quick=quick))
 
     @cached_property
     def scales_at_pool(self) -> Array:
@@ -241,11 +242,16 @@ class Likelihood:
 
     def start(self, z: Array) -> Array:
         """Returns the log likelihood of k pours `z` (k, s) at `pool`, shape (m,)."""
-        return self._of_prediction(z, self.at_pool, self.scales_at_pool if len(z) == 1 else None)
+        return self.of_prediction(z, self.at_pool, self.scales_at_pool if len(z) == 1 else None)
 
-    def _of_prediction(
-        self, z: Array, prediction: Prediction, scales: Array | None = None
-    ) -> Array:
+    def of_prediction(self, z: Array, prediction: Prediction, scales: Array | None = None) -> Array:
+        """Returns the log likelihood where the leading emulator expects `prediction`, shape (n,).
+
+        Args:
+            z: standardised statistics of k pours, shape (k, s).
+            prediction: at n points.
+            scales: square root of V_k there, if known already.
+        """
         y = self.axes.apply(z)[:, : self.axis_count]
         if scales is not None:
             return self.leading.noise.log_density(y[0] - prediction.means, scales)
@@ -312,12 +318,10 @@ class Fold:
     Attributes:
         likelihood: fitted without them.
         held: their rows, shape (h,).
-        scores: log posterior density of their parameters, coordinates [nat], shape (h,).
     """
 
     likelihood: Likelihood
     held: NDArray[np.intp]
-    scores: Array
 
 
 @dataclass(frozen=True)
@@ -354,7 +358,7 @@ class _Growing:
 def averaging_share(y: Array, scales: Array) -> Array:
     r"""Returns the share of the noise that k pours have each for themselves, shape (n,).
 
-    $$ a = \min(1, (1 + 2 \sqrt{2 / r (k-1)}) \, \mathrm{mean}_j \min(w_j^2 / s_j^2, 2)) $$
+    $$ \eta = \min(1, (1 + 2 \sqrt{2 / r (k-1)}) \, \mathrm{mean}_j \min(w_j^2 / s_j^2, 2)) $$
 
     with $w_j$ the standard deviation between the pours: what the emulator calls noise and pours of
     one material do not differ by is an error of the emulator. The factor is two standard deviations
@@ -396,22 +400,52 @@ def joint_density(prior: Prior, conditions: list[tuple[Likelihood, Array]]) -> I
         conditions: for each the likelihood and its pours, standardised, shape (k, s).
     """
 
-    def log_target(u: Array, *, quick: bool = False) -> Array:
-        likelihoods = [likelihood.log_prob(z, u, quick=quick) for likelihood, z in conditions]
-        return np.sum(likelihoods, axis=0) + prior.coordinate_log_prob(u)
+    def log_likelihood(u: Array, quick: bool) -> Array:
+        return np.sum([part.log_prob(z, u, quick=quick) for part, z in conditions], axis=0)
 
-    pool = conditions[0][0].pool
     log_weights = np.sum([likelihood.start(z) for likelihood, z in conditions], axis=0)
-    found = ImportanceDensity.of_prior_draws(prior, log_target, pool, log_weights)
+    return density_over_prior(prior, log_likelihood, conditions[0][0].pool, log_weights)
+
+
+def density_over_prior(
+    prior: Prior,
+    log_likelihood: Callable[[Array, bool], Array],
+    pool: Array,
+    log_weights: Array,
+    *,
+    mixtures: tuple[Mixture, ...] = (),
+) -> ImportanceDensity:
+    """Returns prior times likelihood, normalised; a proposal is adapted if few draws carry weight.
+
+    Args:
+        prior: the prior.
+        log_likelihood: up to a constant, of points inside the bounds, shape (n, p); the second
+            argument says whether the exactness of a weight will do.
+        pool: draws of the prior, shape (m, p).
+        log_weights: the log likelihood at them, shape (m,).
+        mixtures: kept with the result; where there are some, adaptation starts from them too.
+    """
+
+    def log_target(u: Array) -> Array:
+        return log_likelihood(u, False) + prior.coordinate_log_prob(u)
+
+    def weigh(u: Array) -> Array:
+        return log_likelihood(u, True) + prior.coordinate_log_prob(u)
+
+    found = ImportanceDensity.of_prior_draws(
+        prior, log_target, pool, log_weights, weigh=weigh, mixtures=mixtures
+    )
     if found.effective_sample_size >= FEWEST_EFFECTIVE:
         return found
     # A few draws alone have no covariance.
     weights = found.pool_weights + 1e-6
     wide = prior_normal(prior)
     first = kernel_estimate(pool, weights / weights.sum(), np.random.default_rng(0))
+    if mixtures:
+        first = mix(first, Mixture.pooled(list(mixtures)), 0.5)
     start = mix(first, wide, DEFENSIVE_SHARE)
     return ImportanceDensity.of(
-        prior, log_target, start, wide, effort=_EFFORT, weigh=partial(log_target, quick=True)
+        prior, log_target, start, wide, effort=_EFFORT, weigh=weigh, mixtures=mixtures
     )
 
 
@@ -437,10 +471,6 @@ def _most_probable_of_the_honest(
         if uniform_p_value(levels[key][i]) >= _LEAST_P_VALUE:
             return key, i
     return ranked[0][1:]
-
-
-def _lengths(parts: list[NDArray[np.intp]]) -> list[int]:
-    return [len(part[: _HELD_OUT // _FOLDS]) for part in parts]
 
 
 def _spread_one(u: Array) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.amortised import Amortised
 from granulcal.bayessim.arrays import as_real
+from granulcal.bayessim.average import Average
 from granulcal.bayessim.calibration import Calibration
 from granulcal.bayessim.config import Config
 from granulcal.bayessim.likelihood import Likelihood
@@ -45,7 +46,7 @@ class BayesSim:
         standardiser: what brings statistics to spread 1.
         likelihood: the emulator of the statistics.
         amortised: the network, or None if the posterior is that of the emulator alone.
-        emulator_weight: share of the emulator's posterior in that of one pour.
+        average: how much both count in the posterior of one pour.
         summary: what the training did, with every excluded pair counted.
         misfit_reference: residuals that an observation of a right model can have.
         calibration: check on pairs that were not trained on, or None if there were too few.
@@ -73,7 +74,7 @@ class BayesSim:
         standardiser: Standardiser,
         likelihood: Likelihood,
         amortised: Amortised | None,
-        emulator_weight: float,
+        average: Average,
         x_names: tuple[str, ...],
         misfit_reference: MisfitReference,
         summary: TrainingSummary,
@@ -87,7 +88,7 @@ class BayesSim:
         self.standardiser = standardiser
         self.likelihood = likelihood
         self.amortised = amortised
-        self.emulator_weight = emulator_weight
+        self.average = average
         self.x_names = x_names
         self.summary = summary
         self.misfit_reference = misfit_reference
@@ -147,7 +148,7 @@ class BayesSim:
             standardiser=made.standardiser,
             likelihood=made.likelihood,
             amortised=made.amortised,
-            emulator_weight=made.emulator_weight,
+            average=made.average,
             x_names=pairs.x_names,
             misfit_reference=made.misfit,
             summary=made.summary,
@@ -194,13 +195,12 @@ class BayesSim:
         observed = self._checked(x_obs)
         warnings = self._range_warnings(observed)
         z = self.standardiser.apply(observed)
-        if self.amortised is not None and (self.emulator_weight == 0 or len(z) == 1):
+        if self.amortised is not None and (self.average.emulator == 0 or len(z) == 1):
             mixtures = self.amortised.mixtures(z)
-            if self.emulator_weight == 0:
+            if self.average.emulator == 0:
                 return Posterior.from_mixtures(self.prior, mixtures, warnings=warnings)
-            condition, weight = (self.likelihood, z), self.emulator_weight
-            return Posterior.from_stack(
-                self.prior, condition, mixtures[0], weight, warnings=warnings
+            return Posterior.from_average(
+                self.prior, (self.likelihood, z), mixtures[0], self.average, warnings=warnings
             )
         return Posterior.from_conditions(self.prior, [(self.likelihood, z)], warnings=warnings)
 

@@ -1,21 +1,14 @@
 r"""Posteriors of one observation by two ways, averaged as densities.
 
-$$ p(u \mid x) = \sum_i w_i p_i(u \mid x), \qquad
-   w = \arg\max \frac1n \sum_n \log \sum_i w_i p_i(u_n \mid x_n) $$
+$$ p(u \mid x) = w \, p_1(u \mid x) + (1 - w) \, p_2(u \mid x) $$
 
-over pairs that neither way has seen: where one is wrong with confidence the other holds the truth,
-and the mean log density of the average is never below that of the better one by more than
-$-\log w$. Emulator and network err for different reasons, so that the average may gain on both.
-An average of two honest densities is too wide (Gneiting and Ranjan), so it has to earn its place:
-it is kept only where its gain on the better one is beyond the error of that gain (the
-one-standard-error rule of Breiman et al.).
+Model files of version 3 mean this by the weight of their emulator. An average of two honest
+densities is too wide (Gneiting and Ranjan), which is why models are no longer made so: see
+`geometric.py`.
 
 Reference:
-    Breiman, Friedman, Olshen and Stone, Classification and regression trees, 1984, section 3.4.3.
     Gneiting and Ranjan, Combining predictive distributions, Electronic Journal of Statistics 7,
     2013.
-    Yao, Vehtari, Simpson and Gelman, Using stacking to average Bayesian predictive distributions,
-    Bayesian Analysis 13, 2018.
 """
 
 from dataclasses import dataclass
@@ -26,13 +19,9 @@ from numpy.typing import NDArray
 from granulcal.bayessim.density import Density
 from granulcal.bayessim.mixture import Mixture
 
-__all__ = ["StackedDensity", "stacking_weight"]
+__all__ = ["StackedDensity"]
 
 Array = NDArray[np.float64]
-
-_WEIGHTS = np.linspace(0, 1, 21)
-# An average of both is kept only if it gains so many standard errors on the better one.
-_WORTHWHILE = 1.0
 
 
 @dataclass(frozen=True)
@@ -65,20 +54,3 @@ class StackedDensity:
         count = int(generator.binomial(n, self.first_weight))
         parts = [self.first.sample(count, generator), self.second.sample(n - count, generator)]
         return generator.permutation(np.concatenate(parts))
-
-
-def stacking_weight(first: Array, second: Array) -> float:
-    """Returns the weight of the first density, 0 or 1 where an average is not worth it.
-
-    Args:
-        first: its log densities at the parameters of unseen pairs, shape (n,).
-        second: those of the other, shape (n,).
-    """
-    with np.errstate(divide="ignore"):
-        averages = [np.logaddexp(np.log(w) + first, np.log(1 - w) + second) for w in _WEIGHTS]
-    best = int(np.argmax([np.mean(average) for average in averages]))
-    better, alone = (first, 1.0) if np.mean(first) >= np.mean(second) else (second, 0.0)
-    gains = averages[best] - better
-    if np.mean(gains) <= _WORTHWHILE * np.std(gains) / np.sqrt(len(gains)):
-        return alone
-    return float(_WEIGHTS[best])

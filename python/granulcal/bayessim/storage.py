@@ -13,6 +13,7 @@ from safetensors.numpy import load as read_tensors
 from safetensors.numpy import save as tensor_bytes
 
 from granulcal import _native
+from granulcal.bayessim.average import FORMS, Average
 from granulcal.bayessim.calibration import Calibration
 from granulcal.bayessim.config import Config
 from granulcal.bayessim.summary import TrainingSummary
@@ -26,7 +27,9 @@ if TYPE_CHECKING:
 
 __all__ = ["load_model", "save_model"]
 
-FORMAT, VERSION = "granulcal-bayessim", 3
+FORMAT, VERSION = "granulcal-bayessim", 4
+# Of these the emulator's weight is that of an arithmetic average.
+_OLDER_VERSIONS = (3,)
 _JSON_NAME, _TENSORS_NAME = "model.json", "weights.safetensors"
 
 
@@ -89,7 +92,7 @@ def load_model(path: str | PathLike[str]) -> "BayesSim":
             standardiser=tensors.standardiser(),
             likelihood=tensors.likelihood(prior, config, document["emulator"]),
             amortised=tensors.amortised(config) if document["has_network"] else None,
-            emulator_weight=document["emulator_weight"],
+            average=_average(document, where),
             x_names=x_names,
             misfit_reference=tensors.misfit(),
             identifiability=None if known is None else Identifiability.from_dict(known),
@@ -116,7 +119,9 @@ def _document(model: "BayesSim") -> dict[str, Any]:
         "scene_toml": model.scene_toml,
         "scene_hash": model.scene_hash,
         "has_network": model.amortised is not None,
-        "emulator_weight": model.emulator_weight,
+        "average": model.average.form,
+        "emulator_weight": model.average.emulator,
+        "network_weight": model.average.network,
         "emulator": {
             "widening": likelihood.widening,
             "degrees": likelihood.emulator.noise.degrees,
@@ -136,14 +141,41 @@ def _check_header(document: Any, where: Path) -> None:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise ModelFormatError(f"{where} is not a {FORMAT} file")
     found = document.get("version")
-    if found != VERSION:
+    if found not in (*_OLDER_VERSIONS, VERSION):
         made_by = document.get("made_by", "an earlier granulcal")
         newer = isinstance(found, int) and found > VERSION
         advice = "update granulcal" if newer else "train the model again"
         raise ModelFormatError(
-            f"{where}: version must be {VERSION} (granulcal {_native.__version__}), got {found!r} "
-            f"(made by {made_by}): {advice}"
+            f"{where}: version must be {_versions()} (granulcal {_native.__version__}), "
+            f"got {found!r} (made by {made_by}): {advice}"
         )
+
+
+def _versions() -> str:
+    """The versions that can be read, in words."""
+    return " or ".join(str(version) for version in (*_OLDER_VERSIONS, VERSION))
+
+
+def _average(document: dict[str, Any], where: Path) -> Average:
+    weight = document["emulator_weight"]
+    if document["version"] in _OLDER_VERSIONS:
+        found = Average(weight, 1 - weight, "arithmetic")
+    else:
+        found = Average(weight, document["network_weight"], document["average"])
+    if found.form not in FORMS:
+        raise ModelFormatError(
+            f"{where}: average must be one of {', '.join(FORMS)}, got {found.form!r}"
+        )
+    weights = {"emulator_weight": found.emulator, "network_weight": found.network}
+    for name, value in weights.items():
+        if not 0 <= value < float("inf") or (found.form == "arithmetic" and value > 1):
+            raise ModelFormatError(f"{where}: {name} must be a weight, got {value!r}")
+    if found.emulator + found.network == 0 or (found.network > 0 and not document["has_network"]):
+        raise ModelFormatError(
+            f"{where}: one weight must be positive, and the network's 0 without a network, got "
+            f"{found.emulator!r} and {found.network!r}"
+        )
+    return found
 
 
 def _is_empty(path: Path) -> bool:

@@ -54,7 +54,7 @@ def model_tensors(model: "BayesSim") -> dict[str, NDArray[Any]]:
         "misfit_residuals": model.misfit_reference.residuals,
         "misfit_noise": model.misfit_reference.noise,
     }
-    if model.emulator_weight > 0:
+    if model.average.emulator > 0:
         # What the Rust side would have to work out before its first posterior; single precision
         # is enough for the weights of draws.
         at_pool = likelihood.at_pool

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.bayessim.amortised import Amortised
+from granulcal.bayessim.average import EMULATOR_ALONE, NETWORK_ALONE, Average, HeldOut
 from granulcal.bayessim.config import Config
-from granulcal.bayessim.density import TruncatedMixture
 from granulcal.bayessim.likelihood import EmulatorChoice, Fold, Likelihood
 from granulcal.bayessim.misfit import MisfitReference
+from granulcal.bayessim.mixture import Mixture
 from granulcal.bayessim.pairs import TrainingPairs
-from granulcal.bayessim.stack import stacking_weight
 from granulcal.bayessim.standardise import Standardiser
 from granulcal.bayessim.summary import TrainingSummary
 from granulcal.bayessim.trainer import Progress, TrainingResult
@@ -38,7 +38,7 @@ class Trained:
         standardiser: of the statistics.
         likelihood: the emulator.
         amortised: the network, or None if the posterior is that of the emulator alone.
-        emulator_weight: share of the emulator's posterior in that of one pour.
+        average: how much both count in the posterior of one pour.
         misfit: residuals of held-out pairs.
         summary: what was done.
         posteriors: posteriors of pairs that were not trained on.
@@ -48,7 +48,7 @@ class Trained:
     standardiser: Standardiser
     likelihood: Likelihood
     amortised: Amortised | None
-    emulator_weight: float
+    average: Average
     misfit: MisfitReference
     summary: TrainingSummary
     posteriors: list[Posterior]
@@ -75,7 +75,7 @@ def train_model(
     started = time.process_time()
     work = _Work(pairs, config, seed, proposal, progress)
     made = {
-        "auto": work.stacked,
+        "auto": work.averaged,
         "emulated": work.emulated,
         "distilled": work.distilled,
         "mdrff": work.network,
@@ -122,52 +122,61 @@ class _Work:
         likelihood = self._likelihood(self.rest)[0]
         return self._by_network(likelihood, amortised, result, "network on the statistics")
 
-    def stacked(self) -> Trained:
-        """Emulator and network, averaged with the weight that says most about held-out pairs."""
+    def averaged(self) -> Trained:
+        """Emulator and network, averaged with the weights that say most about held-out pairs."""
         order = np.concatenate([self.test, self.rest])
         likelihood, folds, choice = self._likelihood(np.arange(len(self.u)), order)
         if len(self.test) == 0:
             return self._by_emulator(likelihood, folds, choice)
         amortised, result = self._network()
         # The same pairs for both: those kept aside from the network are held out by the folds too.
-        owner = {int(row): (fold, i) for fold in folds for i, row in enumerate(fold.held)}
-        rows = np.array([row for row in self.test if int(row) in owner], dtype=np.intp)
-        emulator = np.array([owner[int(row)][0].scores[owner[int(row)][1]] for row in rows])
-        network = self._scores(amortised, rows)
-        weight = stacking_weight(emulator, network)
-        told = f"on {len(rows)} pairs unseen by both: emulator {emulator.mean():.2f}"
-        told += f", network {network.mean():.2f} nat above the prior"
-        if weight == 0:
+        unseen = [(fold, fold.held[np.isin(fold.held, self.test)]) for fold in folds]
+        rows = np.concatenate([rows for _, rows in unseen])
+        owners = [fold.likelihood for fold, rows in unseen for _ in rows]
+        mixtures = amortised.mixtures(self.z[rows])
+        held_out = self._held_out(unseen, mixtures)
+        average = held_out.choose()
+        alone = [float(held_out.scores(one).mean()) for one in (EMULATOR_ALONE, NETWORK_ALONE)]
+        told = f"on {len(rows)} pairs unseen by both: emulator {alone[0]:.2f}"
+        told += f", network {alone[1]:.2f} nat above the prior"
+        if average == NETWORK_ALONE:
             return self._by_network(likelihood, amortised, result, f"network alone; {told}")
-        if weight == 1:
+        if average == EMULATOR_ALONE:
             made = self._by_emulator(likelihood, folds, choice)
             told = f"{made.summary.choice}\n  {told}: the emulator alone"
             return replace(made, summary=replace(made.summary, choice=told))
-        chosen = rows[self._of_the_prior(rows)]
+        chosen = self._of_the_prior(rows)
         posteriors = [
-            Posterior.from_stack(
-                self.prior,
-                (owner[int(row)][0].likelihood, self.z[row][None]),
-                mixture,
-                weight,
+            Posterior.from_average(
+                self.prior, (owners[i], self.z[rows[i]][None]), mixtures[i], average
             )
-            for row, mixture in zip(chosen, amortised.mixtures(self.z[chosen]), strict=True)
+            for i in chosen
         ]
-        logs = np.log([weight, 1 - weight])
-        both = float(np.mean(np.logaddexp(logs[0] + emulator, logs[1] + network)))
-        told += f", {weight:.0%} + {1 - weight:.0%} of both {both:.2f}"
+        told += f", {average} {float(held_out.scores(average).mean()):.2f}"
         choice_text = f"average of an emulator and a network\n  emulator: {choice}\n  {told}"
-        summary = self._summary("stacked", choice_text, result, len(self.rest), len(rows))
+        summary = self._summary("averaged", choice_text, result, len(self.rest), len(rows))
         return Trained(
             self.standardiser,
             likelihood,
             amortised,
-            weight,
+            average,
             self.misfit,
             summary,
             posteriors,
-            self.pairs.theta[chosen],
+            self.pairs.theta[rows[chosen]],
         )
+
+    def _held_out(
+        self, unseen: list[tuple[Fold, NDArray[np.intp]]], mixtures: list[Mixture]
+    ) -> HeldOut:
+        """What both say of pairs that the folds leave out; `mixtures` in the order of the rows."""
+        ends = np.cumsum([len(rows) for _, rows in unseen])
+        parts = [
+            HeldOut.of(fold, mixtures[end - len(rows) : end], self.u[rows], self.z[rows])
+            for (fold, rows), end in zip(unseen, ends, strict=True)
+            if len(rows)
+        ]
+        return HeldOut.joined(parts)
 
     def _likelihood(
         self, rows: NDArray[np.intp], order: NDArray[np.intp] | None = None
@@ -189,13 +198,6 @@ class _Work:
             progress=self.progress,
         )
 
-    def _scores(self, amortised: Amortised, rows: NDArray[np.intp]) -> Array:
-        """Log posterior densities of some pairs, coordinates."""
-        mixtures = amortised.mixtures(self.z[rows])
-        truth = self.u[rows]
-        cut = [TruncatedMixture.cut(self.prior, mixture) for mixture in mixtures]
-        return np.array([c.log_prob(t[None])[0] for c, t in zip(cut, truth, strict=True)])
-
     def _by_emulator(
         self, likelihood: Likelihood, folds: list[Fold], choice: EmulatorChoice
     ) -> Trained:
@@ -212,7 +214,7 @@ class _Work:
             self.standardiser,
             likelihood,
             None,
-            1.0,
+            EMULATOR_ALONE,
             self.misfit,
             summary,
             posteriors,
@@ -231,7 +233,7 @@ class _Work:
             self.standardiser,
             likelihood,
             amortised,
-            0.0,
+            NETWORK_ALONE,
             self.misfit,
             summary,
             posteriors,

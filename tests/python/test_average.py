@@ -1,0 +1,216 @@
+"""Emulator and network as one: the geometric average, its weights, and what is saved of it."""
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+
+from granulcal.bayessim import BayesSim
+from granulcal.bayessim.average import EMULATOR_ALONE, NETWORK_ALONE, Average, HeldOut
+from granulcal.bayessim.density import TruncatedMixture, quasi_prior
+from granulcal.bayessim.geometric import geometric_density
+from granulcal.bayessim.likelihood import Fold
+from granulcal.bayessim.mixture import Mixture
+from granulcal.errors import ModelFormatError
+from granulcal.posterior import Posterior
+from granulcal.prior import Prior
+from granulcal.toys import LinearGaussian
+
+SMALL: dict[str, Any] = {
+    "features": 20,
+    "ensemble": 2,
+    "components": 2,
+    "emulator_features": 20,
+    "max_epochs": 30,
+}
+TOY = LinearGaussian.random(seed=1, noise=2.0)
+
+
+@dataclass(frozen=True)
+class _NormalLikelihood:
+    """A likelihood that is a normal of the coordinates."""
+
+    prior: Prior
+    normal: Mixture
+
+    @property
+    def pool(self):
+        return quasi_prior(self.prior, 16_384)
+
+    def start(self, z):
+        return self.normal.log_prob(self.pool)
+
+    def log_prob(self, z, u, *, quick=False):
+        return self.normal.log_prob(u)
+
+
+def _normal(mean, covariance):
+    return Mixture.from_covariances(np.ones(1), np.array([mean]), np.array([covariance]))
+
+
+@pytest.mark.parametrize("average", [Average(0.6, 0.4), Average(0.9, 0.7), Average(1.0, 0.0)])
+@pytest.mark.parametrize("width", [1.0, 0.05])
+def test_normals_pool_to_the_normal_of_weighted_precisions(average, width):
+    prior = TOY.prior
+    first = np.array([[0.3, 0.1, 0.0], [0.1, 0.4, -0.1], [0.0, -0.1, 0.2]]) * width
+    second = np.array([[0.2, -0.1, 0.1], [-0.1, 0.5, 0.0], [0.1, 0.0, 0.3]]) * width
+    means = np.array([0.2, -0.4, 0.1]), np.array([0.1, -0.2, 0.3])
+    likelihood: Any = _NormalLikelihood(prior, _normal(means[0], first))
+    pooled = geometric_density(
+        prior, (likelihood, np.zeros((1, 1))), _normal(means[1], second), average
+    )
+    precisions = [average.emulator * np.linalg.inv(first), average.network * np.linalg.inv(second)]
+    covariance = np.linalg.inv(sum(precisions) + (1 - average.network) * np.eye(3))
+    mean = covariance @ (precisions[0] @ means[0] + precisions[1] @ means[1])
+    exact = _normal(mean, covariance)
+    points = exact.sample(50, np.random.default_rng(0))
+    np.testing.assert_allclose(pooled.log_prob(points), exact.log_prob(points), atol=0.05)
+    draws = pooled.sample(4000, np.random.default_rng(1))
+    spreads = np.sqrt(np.diag(covariance))
+    assert np.all(np.abs(draws.mean(axis=0) - mean) < 0.1 * spreads)
+    np.testing.assert_allclose(draws.std(axis=0), spreads, rtol=0.1)
+
+
+def _two_measurements(pairs, sds, *, shared=False):
+    """Held-out pairs of a standard normal parameter measured by two ways, on a grid."""
+    generator = np.random.default_rng(3)
+    truth = generator.standard_normal(pairs)
+    noise = generator.standard_normal((pairs, 2))
+    x = truth[:, None] + noise[:, [0, 0] if shared else [0, 1]] * sds
+    grid = np.linspace(-6, 6, 1201)
+    normal = -0.5 * grid**2 - 0.5 * np.log(2 * np.pi)
+    # Log ratios of each posterior to the prior: the likelihoods.
+    at_points = -0.5 * ((x[:, None] - grid[:, None]) / sds) ** 2
+    at_truth = -0.5 * ((x - truth[:, None]) / sds) ** 2
+    # Mean over the grid of 1201 points, instead of an integral with steps of 0.01.
+    log_weights = np.tile(normal + np.log(12.01), (pairs, 1))
+    return HeldOut(at_truth, at_points, log_weights, -0.5 * truth**2 - 0.5 * np.log(2 * np.pi))
+
+
+def test_weights_of_independent_measurements_are_one_each():
+    held_out = _two_measurements(4000, np.array([0.5, 0.7]))
+    found = held_out.choose()
+    assert found.emulator == pytest.approx(1, abs=0.1)
+    assert found.network == pytest.approx(1, abs=0.1)
+    # The exact posterior of both: mean log density of a normal of the summed precision.
+    precision = 1 + 1 / 0.5**2 + 1 / 0.7**2
+    exact = 0.5 * np.log(precision / (2 * np.pi)) - 0.5
+    assert held_out.scores(Average(1, 1)).mean() == pytest.approx(exact, abs=0.05)
+
+
+def test_no_weights_say_more_than_those_that_are_found():
+    held_out = _two_measurements(300, np.array([0.5, 0.7]))
+    best = held_out.scores(held_out.choose()).mean()
+    tried = [Average(a, b) for a in np.arange(0, 1.6, 0.1) for b in np.arange(0, 1.6, 0.1)]
+    assert best > max(held_out.scores(average).mean() for average in tried) - 1e-4
+
+
+def test_an_average_has_to_earn_its_place():
+    # The second says what the first says, and says it worse.
+    held_out = _two_measurements(300, np.array([0.5, 1.0]), shared=True)
+    assert held_out.choose() == EMULATOR_ALONE
+    swapped = HeldOut(
+        held_out.at_truth[:, ::-1],
+        held_out.at_points[:, :, ::-1],
+        held_out.log_weights,
+        held_out.log_prior,
+    )
+    assert swapped.choose() == NETWORK_ALONE
+
+
+@pytest.fixture(scope="module")
+def averaged():
+    theta, x = TOY.simulate(200, seed=4)
+    model = BayesSim.fit(theta, x, TOY.prior, quiet=True, method="emulated", **SMALL)
+    network = BayesSim.fit(theta, x, TOY.prior, quiet=True, method="mdrff", **SMALL)
+    model.amortised, model.average = network.amortised, Average(0.6, 0.5)
+    return model
+
+
+def _density(model, mixture, row, average):
+    condition = (model.likelihood, row[None])
+    if average == EMULATOR_ALONE:
+        return Posterior.from_conditions(TOY.prior, [condition]).density
+    if average == NETWORK_ALONE:
+        return TruncatedMixture.cut(TOY.prior, mixture)
+    return geometric_density(TOY.prior, condition, mixture, average)
+
+
+def test_held_out_scores_are_those_of_the_posteriors(averaged):
+    theta, x = TOY.simulate(6, seed=9)
+    u, z = TOY.prior.to_unconstrained(theta), averaged.standardiser.apply(x)
+    mixtures = averaged.amortised.mixtures(z)
+    fold = Fold(averaged.likelihood, np.arange(6))
+    held_out = HeldOut.of(fold, mixtures, u, z)
+    for average in (EMULATOR_ALONE, NETWORK_ALONE, Average(0.6, 0.5)):
+        densities = [
+            _density(averaged, m, row, average) for m, row in zip(mixtures, z, strict=True)
+        ]
+        expected = [d.log_prob(truth[None])[0] for d, truth in zip(densities, u, strict=True)]
+        np.testing.assert_allclose(held_out.scores(average), expected, atol=0.15)
+
+
+def test_several_pours_are_the_emulators_alone(averaged):
+    theta, x = TOY.simulate(3, seed=9)
+    condition = (averaged.likelihood, averaged.standardiser.apply(x))
+    alone = Posterior.from_conditions(TOY.prior, [condition])
+    np.testing.assert_array_equal(averaged.posterior(x).log_prob(theta), alone.log_prob(theta))
+
+
+def test_an_average_comes_back_from_its_file(averaged, tmp_path):
+    theta, x = TOY.simulate(20, seed=9)
+    averaged.save(tmp_path / "model")
+    loaded = BayesSim.load(tmp_path / "model")
+    assert loaded.average == averaged.average
+    np.testing.assert_array_equal(
+        loaded.posterior(x[0]).log_prob(theta), averaged.posterior(x[0]).log_prob(theta)
+    )
+
+
+def test_a_file_of_version_3_is_an_arithmetic_average(averaged, tmp_path):
+    theta, x = TOY.simulate(20, seed=9)
+    averaged.save(tmp_path / "model")
+    _edit(tmp_path / "model", version=3, average=None, network_weight=None)
+    loaded = BayesSim.load(tmp_path / "model")
+    assert loaded.average == Average(0.6, 0.4, "arithmetic")
+    z = averaged.standardiser.apply(x[:1])
+    emulated = Posterior.from_conditions(TOY.prior, [(averaged.likelihood, z)])
+    learnt = Posterior.from_mixture(TOY.prior, averaged.amortised.mixtures(z)[0])
+    both = np.log(0.6 * np.exp(emulated.log_prob(theta)) + 0.4 * np.exp(learnt.log_prob(theta)))
+    np.testing.assert_allclose(loaded.posterior(x[0]).log_prob(theta), both, rtol=1e-10)
+    # Saved anew it stays one.
+    loaded.save(tmp_path / "again")
+    assert BayesSim.load(tmp_path / "again").average == loaded.average
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"average": None}, "no entry 'average'"),
+        ({"network_weight": None}, "no entry 'network_weight'"),
+        ({"average": "harmonic"}, "geometric, arithmetic, got 'harmonic'"),
+        ({"emulator_weight": -0.1}, "emulator_weight must be .* got -0.1"),
+        ({"average": "arithmetic", "network_weight": 1.5}, "network_weight must be .* got 1.5"),
+        ({"emulator_weight": 0.0, "network_weight": 0.0}, "one weight must be positive"),
+        ({"has_network": False}, "0 without a network"),
+    ],
+)
+def test_damaged_averages_are_named(averaged, tmp_path, changes, message):
+    averaged.save(tmp_path / "model")
+    _edit(tmp_path / "model", **changes)
+    with pytest.raises(ModelFormatError, match=message):
+        BayesSim.load(tmp_path / "model")
+
+
+def _edit(folder, **changes):
+    """Changes entries of a model's document; None takes one away."""
+    path = folder / "model.json"
+    document = {**json.loads(path.read_text()), **changes}
+    kept = {
+        key: value for key, value in document.items() if key not in changes or value is not None
+    }
+    path.write_text(json.dumps(kept))
