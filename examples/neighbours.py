@@ -8,7 +8,7 @@ Two grains are neighbours if the gap between them is less than a quarter of a ra
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 import granulcal as gc
 
@@ -29,7 +29,7 @@ def main() -> None:
         )
         pour = gc.simulate(scene, seed=1)
         places, diameter = np.asarray(pour.positions), 2 * pour.radii[0]
-        near = cKDTree(places).query_ball_point(places, 1.125 * diameter, return_length=True) - 1
+        near = KDTree(places).query_ball_point(places, 1.125 * diameter, return_length=True) - 1
         out, height = np.hypot(places[:, 0], places[:, 1]), places[:, 2]
         is_deep = (out < 0.6 * np.quantile(out, 0.95)) & (height > 2 * diameter)
         is_deep &= height < 0.7 * height.max()

@@ -159,8 +159,11 @@ def closed(linear: Linear, surrogate: Surrogate, psi: float) -> Any:
     """What the tables need of a closed loop."""
     found = trace(surrogate, linear.observe(0.4, psi, 1), RULES)
     generator = np.random.default_rng(4)
-    sets = [[linear.pours(0.4, c, s, 4, generator) for c in PLACES] for s in (psi, 0.0, psi)]
-    fit = compare([f"{c:g}" for c in PLACES], *sets, np.ones(SIZE), draws=50)
+    measured, before, after = (
+        [linear.pours(0.4, c, s, 4, generator) for c in PLACES] for s in (psi, 0.0, psi)
+    )
+    names = [f"{c:g}" for c in PLACES]
+    fit = compare(names, measured, before, after, np.ones(SIZE), draws=50)
     recordings = tuple(Path(f"{i}") for i in range(4))
     library = by_name(["tilt.x"])
     named = found.verdict.kind == "EFFECT"
