@@ -81,7 +81,9 @@ class Stack:
                 )
         return cls(
             labels=tuple(one.label for one in observations),
-            conditions=np.array([one.condition for one in observations]).reshape(-1, inputs),
+            conditions=np.array([one.condition for one in observations]).reshape(
+                len(observations), inputs
+            ),
             means=np.array([surrogate.standardise(o.pours).mean(axis=0) for o in observations]),
             counts=np.array([len(one.pours) for one in observations], dtype=np.float64),
         )

@@ -259,9 +259,11 @@ def power(
 ) -> Power:
     """Returns what `counts` (H,) pours under `conditions` (H, q) could see at `theta` (p,)."""
     v = normal_from_cube(np.asarray(theta, dtype=np.float64))
+    each = np.asarray(counts, dtype=np.float64)
+    # Repeats of one condition have no inputs: (H, 0) is what no -1 can stand for.
     where = np.asarray(conditions, dtype=np.float64)
-    where = where.reshape(-1, len(surrogate.design.conditions))
-    local = Local.at(surrogate, where, np.asarray(counts, dtype=np.float64), v)
+    where = where.reshape(len(each), len(surrogate.design.conditions))
+    local = Local.at(surrogate, where, each, v)
     return Power.of(surrogate, Scores.of(local, fit_at(local, v), surrogate.design.candidates))
 
 
