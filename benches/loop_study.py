@@ -2,12 +2,14 @@
 
     python benches/loop_study.py run OUT.jsonl --archive DIR --nulls 120 --rounds 4   # resumable
     python benches/loop_study.py table OUT.jsonl
+    python benches/loop_study.py run NULLS.jsonl --archive SMALL --small --rounds 0   # nulls alone
 
 The scene and prior are those of benches/blind, with pixels of 1 mm. Every set has a material of its
 own and three pours at each of 4, 8 and 12 cm. First the nulls; then rounds, each of every candidate
 effect at three strengths, four pairs, and six effects that the library lacks at two strengths.
-Sealed heights are 2, 6 and 10 cm. The pours of a set are kept in OUT.pours, so that the loop can be
-run on them again.
+Sealed heights are 2, 6 and 10 cm. `--small` has 120 grains, pixels of 1.6 mm without noise, and an
+archive of half the size: minutes on an idle core where the whole study takes an hour. The pours of
+a set are kept in OUT.pours, so that the loop can be run on them again.
 """
 
 import argparse
@@ -29,6 +31,7 @@ from granulcal.loop.baseline import fit_base
 from granulcal.loop.forward import Forward
 from granulcal.loop.library import FUNNEL, LibraryEffect
 from granulcal.loop.observation import Stack
+from granulcal.loop.pairs import calibrate
 from granulcal.loop.refit import fit_single
 from granulcal.statistics import NAMES
 
@@ -92,11 +95,20 @@ class Truth:
         return found
 
 
-def plan(base: int, each: int) -> Plan:
+def scene(is_small: bool) -> gc.Scene:
+    """Returns blind's scene with coarser pixels; the small one has few grains and no noise."""
+    text = (BLIND / "scene.toml").read_text(encoding="utf-8")
+    if is_small:
+        plain = gc.Scene.from_toml(text[: text.index("[camera.sensor]")])
+        return plain.with_({"grains.count": 120, "camera.pixels": 200})
+    # Pixels of 1 mm, half as fine as blind's: a pour is looked at in a third of the time.
+    return gc.Scene.from_toml(text).with_({"camera.pixels": 320})
+
+
+def plan(base: int, each: int, is_small: bool) -> Plan:
     """Returns what the archive of the study is of."""
     return Plan(
-        # Pixels of 1 mm, half as fine as blind's: a pour is looked at in a third of the time.
-        scene=gc.Scene.load(BLIND / "scene.toml").with_({"camera.pixels": 320}),
+        scene=scene(is_small),
         prior=gc.Prior.load(BLIND / "prior.toml"),
         conditions=(("funnel.height", *HEIGHTS),),
         library=FUNNEL,
@@ -109,9 +121,9 @@ def plan(base: int, each: int) -> Plan:
 class Study:
     """Sets of one archive."""
 
-    def __init__(self, archive: Path, kept: Path, base: int, each: int, threads: int) -> None:
+    def __init__(self, archive: Path, kept: Path, plan: Plan, threads: int, pairs: int = 0) -> None:
         """Fills the archive and fits its surrogate."""
-        self.plan = plan(base, each)
+        self.plan, self.pairs = plan, pairs
         store = Archive(archive, self.plan)
         store.fill(threads=threads, say=lambda line: print(line, file=sys.stderr))
         rows = store.pours()
@@ -173,6 +185,7 @@ class Study:
         )
         if truth.kind == "single":
             self._grade(row, found, Stack.of(self.surrogate, observed))
+            self._widen(row, found, index)
         is_named = found.verdict.kind in ("EFFECT", "SET", "EFFECTS")
         if (is_named and index % 2 == 0) or found.verdict.kind == "UNEXPLAINED":
             self._open(row, found, theta, psi, range(first + 100, first + 100 + MANY))
@@ -209,6 +222,26 @@ class Study:
         singles = [one for one in found.explanations if len(one.effects) == 1]
         first = names[candidates[int(found.gate.squares.argmax())]]
         row["first"] = singles[0].effects[0] if singles else first
+
+    def _widen(self, row: dict[str, Any], found: Trace, index: int) -> None:
+        """Adds the interval that simulated pairs have widened, where the right effect is named."""
+        best = found.best
+        if not self.pairs or best.effects != tuple(row["effects"]):
+            return
+        (name,) = best.effects
+
+        def pour(b: int, theta: Array, psi: float) -> list[Observation] | None:
+            first = 500_000_000 + 100_000 * index + 100 * b
+            sets = [
+                (h, self.pours(theta, h, {name: psi}, range(first, first + POURS))) for h in FIT
+            ]
+            if not all(len(rows) for _, rows in sets):
+                return None
+            return [self.observe(h, rows) for h, rows in sets]
+
+        model = found.model_of(best)
+        wide = calibrate(self.surrogate, model, pour, RULES, count=self.pairs, seed=index)
+        row["wide"] = None if wide is None else wide.to_dict()
 
     def _open(
         self, row: dict[str, Any], found: Trace, theta: Array, psi: dict[str, float], seeds: range
@@ -253,9 +286,10 @@ def run(options: argparse.Namespace) -> None:
     done = set()
     if path.exists():
         done = {json.loads(line)["index"] for line in path.read_text().splitlines()}
-    study = Study(
-        options.archive, path.with_suffix(".pours"), options.base, options.each, options.threads
-    )
+    half = 2 if options.small else 1
+    asked = plan(options.base // half, options.each // half, options.small)
+    kept = path.with_suffix(".pours")
+    study = Study(options.archive, kept, asked, options.threads, options.pairs)
     truths = Truth.all(options.nulls, options.rounds)
     with path.open("a", encoding="utf-8") as file:
         for index, truth in enumerate(truths):
@@ -279,6 +313,8 @@ def main() -> None:
     runner.add_argument("--rounds", type=int, default=4)
     runner.add_argument("--base", type=int, default=1500)
     runner.add_argument("--each", type=int, default=150)
+    runner.add_argument("--small", action="store_true")
+    runner.add_argument("--pairs", type=int, default=0, help="simulated pairs of a named effect")
     runner.add_argument("--threads", type=int, default=2)
     commands.add_parser("table").add_argument("paths", type=Path, nargs="+")
     options = parser.parse_args()

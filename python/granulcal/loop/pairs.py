@@ -19,7 +19,7 @@ Reference:
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, isfinite
 from typing import Any
 
 import numpy as np
@@ -66,7 +66,8 @@ class Calibrated:
         """Returns it for JSON."""
         return {
             "interval": self.interval.tolist(),
-            "stretch": self.stretch,
+            # None: too few pairs, or none wide enough; the interval is the whole prior.
+            "stretch": self.stretch if isfinite(self.stretch) else None,
             "plain_interval_held": self.held,
             "pairs": self.pairs,
             "mean_error": self.error,
