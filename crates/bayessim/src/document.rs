@@ -6,9 +6,13 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::ModelError;
+use crate::average::{Average, Form};
 
-/// The version that can be read.
-pub const VERSION: u64 = 3;
+/// The version that is written now.
+const VERSION: u64 = 4;
+/// The emulator's weight in such files is that of an arithmetic average.
+const OLDER_VERSION: u64 = 3;
+const VERSIONS: &str = "3 or 4";
 const FORMAT: &str = "granulcal-bayessim";
 
 #[derive(Debug, Deserialize)]
@@ -18,7 +22,9 @@ pub struct Document {
     pub config: Config,
     pub scene_toml: Option<String>,
     pub has_network: bool,
-    pub emulator_weight: f64,
+    average: Form,
+    emulator_weight: f64,
+    network_weight: f64,
     pub emulator: EmulatorScalars,
     pub is_calibrated: Option<bool>,
 }
@@ -41,7 +47,7 @@ pub struct EmulatorScalars {
 impl Document {
     pub fn parse(text: &str, path: &Path) -> Result<Self, ModelError> {
         let wrong = |source| ModelError::Document { path: path.to_owned(), source };
-        let value: Value = serde_json::from_str(text).map_err(wrong)?;
+        let mut value: Value = serde_json::from_str(text).map_err(wrong)?;
         let content = |what: &str, allowed: String, found: String| ModelError::Content {
             path: path.to_owned(),
             what: what.to_owned(),
@@ -52,21 +58,25 @@ impl Document {
             return Err(content("format", FORMAT.to_owned(), value["format"].to_string()));
         }
         let version = &value["version"];
-        if *version != VERSION {
+        let is_older = *version == OLDER_VERSION;
+        if !is_older && *version != VERSION {
             let is_newer = version.as_u64().is_some_and(|version| version > VERSION);
             return Err(ModelError::Version {
                 path: path.to_owned(),
-                allowed: VERSION,
+                allowed: VERSIONS,
                 found: version.to_string(),
                 made_by: value["made_by"].as_str().unwrap_or("an earlier granulcal").to_owned(),
                 advice: if is_newer { "update granulcal" } else { "train the model again" },
             });
         }
+        if let (true, Some(weight)) = (is_older, value["emulator_weight"].as_f64()) {
+            value["average"] = "arithmetic".into();
+            value["network_weight"] = (1.0 - weight).into();
+        }
         let document: Self = serde_json::from_value(value).map_err(wrong)?;
-        let weight = document.emulator_weight;
-        if !(0.0..=1.0).contains(&weight) || (weight < 1.0 && !document.has_network) {
-            let allowed = "between 0 and 1, and 1 without a network".to_owned();
-            return Err(content("emulator_weight", allowed, weight.to_string()));
+        if let Some((name, weight)) = document.average().wrong(document.has_network) {
+            let allowed = "a weight, and the network's 0 where there is none".to_owned();
+            return Err(content(name, allowed, weight.to_string()));
         }
         let axes = document.emulator.axis_count;
         if axes == 0 || axes > document.x_names.len() {
@@ -74,5 +84,10 @@ impl Document {
             return Err(content("axis_count", allowed, axes.to_string()));
         }
         Ok(document)
+    }
+
+    /// How much emulator and network count.
+    pub fn average(&self) -> Average {
+        Average { form: self.average, emulator: self.emulator_weight, network: self.network_weight }
     }
 }

@@ -30,8 +30,8 @@ pub enum ModelError {
     Version {
         /// The file.
         path: PathBuf,
-        /// The version that can be read.
-        allowed: u64,
+        /// The versions that can be read.
+        allowed: &'static str,
         /// What the file says.
         found: String,
         /// Who wrote it.

@@ -47,9 +47,14 @@ impl Importance {
         (0..n).map(|_| self.draws[random.index(&sums)].clone()).collect()
     }
 
-    /// The same density by a proposal that starts at these draws and is adapted to `log_target`, which is
-    /// asked inside the bounds only.
-    pub fn adapted(&self, coordinates: &Coordinates, log_target: &dyn Fn(&[f64]) -> f64) -> Self {
+    /// The same density by a proposal that starts at these draws, and half at what may be known of the
+    /// density, and is adapted to `log_target`, which is asked inside the bounds only.
+    pub fn adapted(
+        &self,
+        coordinates: &Coordinates,
+        log_target: &dyn Fn(&[f64]) -> f64,
+        known: Option<&Mixture>,
+    ) -> Self {
         let mut random = Random::new(0);
         let (mean, variance) = coordinates.moments();
         let wide = Component {
@@ -63,6 +68,9 @@ impl Importance {
         // A few draws alone have no covariance.
         let weights: Vec<_> = self.weights.iter().map(|weight| weight + 1e-6).collect();
         let mut proposal = kernel_estimate(&self.draws, &weights, &wide, &mut random);
+        if let Some(known) = known {
+            proposal = proposal.halved_with(known);
+        }
         let ratios = |proposal: &Mixture, count: usize, random: &mut Random| {
             let sampler = proposal.sampler();
             let draws: Vec<_> = (0..count).map(|_| sampler.draw(random)).collect();
@@ -129,7 +137,7 @@ fn kernel_estimate(
     };
     let mut components: Vec<_> = (0..CENTRES).map(|_| centre(random)).collect();
     components.push(wide.clone());
-    Mixture { components }
+    Mixture::of(components)
 }
 
 fn tempered(log_ratios: &[f64]) -> Vec<f64> {
@@ -171,7 +179,7 @@ mod tests {
         let likelihood: Vec<_> = draws.iter().map(|u| log_target(u)).collect();
         let start = Importance::of_prior_draws(draws, &likelihood);
         assert!(start.effective_sample_size() < 100.0);
-        let found = start.adapted(&coordinates, &log_target);
+        let found = start.adapted(&coordinates, &log_target, None);
         assert!(found.effective_sample_size() > 500.0, "{}", found.effective_sample_size());
         // Half of the mass is cut off.
         let exact = 1.5 * (std::f64::consts::TAU * sd * sd).ln() - 2f64.ln();

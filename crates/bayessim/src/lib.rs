@@ -12,9 +12,11 @@
 //! | `standardiser` | statistics to spread 1 |
 //! | `emulator`, `noise`, `likelihood` | density of statistics given coordinates |
 //! | `network`, `mixture` | density of coordinates given statistics |
+//! | `average`, `tilt` | how much each of both counts, and what the prior is multiplied by |
 //! | `importance` | normaliser and draws of a density known up to a factor |
 //! | [`Model`], [`Posterior`] | the file, and what it says |
 
+mod average;
 mod coordinates;
 mod document;
 mod emulator;
@@ -31,6 +33,7 @@ mod quasi;
 mod random;
 mod standardiser;
 mod tensors;
+mod tilt;
 
 pub use error::ModelError;
 pub use model::Model;

@@ -8,7 +8,6 @@ use crate::ModelError;
 use crate::coordinates::Coordinates;
 use crate::document::Document;
 use crate::emulator::{Emulator, Prediction};
-use crate::importance::Importance;
 use crate::matrix::Matrix;
 use crate::noise::Noise;
 use crate::tensors::Tensors;
@@ -32,9 +31,9 @@ pub struct Likelihood {
 
 /// Evenly spread points of the prior and what the emulator expects there.
 #[derive(Debug)]
-struct Pool {
-    points: Vec<Vec<f64>>,
-    at: Vec<Prediction>,
+pub struct Pool {
+    pub points: Vec<Vec<f64>>,
+    pub at: Vec<Prediction>,
 }
 
 /// What a model's file says that its emulator of so many axes expects at the pool, if it does.
@@ -55,7 +54,7 @@ fn expected_at_pool(tensors: &Tensors, axes: usize) -> Result<Option<Vec<Predict
 }
 
 /// Mean of some pours on the signal axes, and how much they differ.
-struct Observed {
+pub struct Observed {
     pours: f64,
     mean: Vec<f64>,
     variance: Vec<f64>,
@@ -86,34 +85,22 @@ impl Likelihood {
         })
     }
 
-    /// The normalised posterior given k standardised pours.
-    pub fn posterior(&self, coordinates: &Coordinates, z: &[Vec<f64>]) -> Importance {
-        let observed = self.observe(z);
-        let pool = self.pool.get_or_init(|| {
+    /// The points of the prior, made at the first call unless the model's file had the table.
+    pub fn pool(&self, coordinates: &Coordinates) -> &Pool {
+        self.pool.get_or_init(|| {
             let points = coordinates.quasi_prior(POOL);
             let at = points.par_iter().map(|u| self.emulator.predict(u)).collect();
             Pool { points, at }
-        });
-        let log_weights: Vec<_> =
-            pool.at.par_iter().map(|at| self.of_prediction(&observed, at)).collect();
-        let draws = pool.points.clone();
-        let found = Importance::of_prior_draws(draws, &log_weights);
-        if found.effective_sample_size() >= FEWEST_EFFECTIVE {
-            return found;
-        }
-        let log_target = |u: &[f64]| {
-            let at = self.emulator.predict(u);
-            self.of_prediction(&observed, &at) + coordinates.log_density(u)
-        };
-        found.adapted(coordinates, &log_target)
+        })
     }
 
-    /// Log likelihood of k standardised pours.
-    pub fn log_prob(&self, z: &[Vec<f64>], u: &[f64]) -> f64 {
-        self.of_prediction(&self.observe(z), &self.emulator.predict(u))
+    /// Log likelihood at coordinates.
+    pub fn log_prob(&self, observed: &Observed, u: &[f64]) -> f64 {
+        self.at(observed, &self.emulator.predict(u))
     }
 
-    fn observe(&self, z: &[Vec<f64>]) -> Observed {
+    /// What the likelihood needs of k standardised pours.
+    pub fn observe(&self, z: &[Vec<f64>]) -> Observed {
         let pours = z.len() as f64;
         let rows: Vec<_> = z.iter().map(|row| self.axes.after(row)).collect();
         let axes = 0..self.noise_size();
@@ -128,8 +115,9 @@ impl Likelihood {
         self.emulator.axis_count()
     }
 
-    /// `V_k = c^2 (s^2 + h^2) - (1 - 1/k) a s^2`, a the share by which the pours differ.
-    fn of_prediction(&self, observed: &Observed, at: &Prediction) -> f64 {
+    /// Log likelihood where the emulator expects this, with `V_k = c^2 (s^2 + h^2) - (1 - 1/k) eta s^2`, eta the
+    /// share by which the pours differ.
+    pub fn at(&self, observed: &Observed, at: &Prediction) -> f64 {
         let size = at.means.len();
         let share = observed.share(&at.noise);
         let averaged = (1.0 - 1.0 / observed.pours) * share;

@@ -1,6 +1,6 @@
 //! A Gaussian mixture over coordinates, cut to the prior's bounds.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{LN_2, TAU};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -26,24 +26,49 @@ pub struct Component {
 }
 
 impl Component {
-    fn log_density(&self, u: &DVector<f64>) -> f64 {
-        let white = self.factor.tr_mul(&(u - &self.mean));
+    /// What of the log density does not depend on where.
+    fn constant(&self) -> f64 {
         let log_det: f64 = self.factor.diagonal().iter().map(|d| d.ln()).sum();
-        self.log_weight + log_det - 0.5 * white.norm_squared() - 0.5 * u.len() as f64 * TAU.ln()
+        self.log_weight + log_det - 0.5 * self.mean.len() as f64 * TAU.ln()
+    }
+
+    /// Squared length of `F^T (u - m)`, without an allocation: a posterior asks 400,000 times.
+    fn square(&self, u: &[f64]) -> f64 {
+        let (size, mean) = (u.len(), self.mean.as_slice());
+        let column = |j: usize| {
+            let entries = &self.factor.as_slice()[j * size..(j + 1) * size];
+            (j..size).map(|i| entries[i] * (u[i] - mean[i])).sum::<f64>()
+        };
+        (0..size).map(|j| column(j).powi(2)).sum()
     }
 }
 
 /// A density over coordinates.
 #[derive(Clone, Debug)]
 pub struct Mixture {
-    pub components: Vec<Component>,
+    components: Vec<Component>,
+    constants: Vec<f64>,
 }
 
 impl Mixture {
+    pub fn of(components: Vec<Component>) -> Self {
+        let constants = components.iter().map(Component::constant).collect();
+        Self { components, constants }
+    }
+
     pub fn log_prob(&self, u: &[f64]) -> f64 {
-        let u = DVector::from_column_slice(u);
-        let parts: Vec<_> = self.components.iter().map(|c| c.log_density(&u)).collect();
+        let parts = self.components.iter().zip(&self.constants);
+        let parts: Vec<_> = parts.map(|(c, constant)| constant - 0.5 * c.square(u)).collect();
         log_sum_exp(parts.iter().copied())
+    }
+
+    /// The mixture of both with a half of the weight each.
+    pub fn halved_with(&self, other: &Self) -> Self {
+        let mut components = [&self.components[..], &other.components].concat();
+        for component in &mut components {
+            component.log_weight -= LN_2;
+        }
+        Self::of(components)
     }
 
     /// Standard normal points carried into a component: `m + F^-T n`.

@@ -6,14 +6,16 @@ use std::path::Path;
 use granulcal_dataset::Prior;
 
 use crate::ModelError;
+use crate::average::{Average, Form};
 use crate::coordinates::Coordinates;
 use crate::document::Document;
 use crate::likelihood::{FEWEST_EFFECTIVE, Likelihood};
 use crate::mixture::TruncatedMixture;
 use crate::network::Network;
-use crate::posterior::{Emulated, Posterior, Warning};
+use crate::posterior::{Belief, Posterior, Tilted, Warning};
 use crate::standardiser::Standardiser;
 use crate::tensors::Tensors;
+use crate::tilt::Tilt;
 
 const DOCUMENT: &str = "model.json";
 const TENSORS: &str = "weights.safetensors";
@@ -34,7 +36,7 @@ pub struct Model {
     standardiser: Standardiser,
     likelihood: Likelihood,
     network: Option<Network>,
-    emulator_weight: f64,
+    average: Average,
 }
 
 impl Model {
@@ -70,7 +72,7 @@ impl Model {
             likelihood: Likelihood::read(&tensors, &document, &coordinates, p)?,
             coordinates,
             network,
-            emulator_weight: document.emulator_weight,
+            average: document.average(),
             prior,
             x_names: document.x_names,
             scene_toml: document.scene_toml,
@@ -89,34 +91,39 @@ impl Model {
         self.check(x)?;
         let mut warnings = self.out_of_range(x);
         let z: Vec<_> = x.iter().map(|row| self.standardiser.apply(row)).collect();
-        let learnt = match &self.network {
-            Some(network) if x.len() == 1 && self.emulator_weight < 1.0 => {
-                let cut = TruncatedMixture::cut(&self.coordinates, network.mixture(&z[0]));
-                if cut.is_mostly_outside() {
-                    warnings.push(Warning::MassOutsidePrior { inside: cut.log_mass.exp() });
-                }
-                Some(cut)
-            }
-            _ => None,
-        };
-        let emulator_weight = if learnt.is_some() { self.emulator_weight } else { 1.0 };
-        let emulated = (emulator_weight > 0.0).then(|| {
-            let density = self.likelihood.posterior(&self.coordinates, &z);
-            Emulated { likelihood: &self.likelihood, z, density }
-        });
-        if let Some(few) = emulated.as_ref().map(|e| e.density.effective_sample_size())
-            && few < FEWEST_EFFECTIVE
-        {
-            warnings.push(Warning::FewEffectiveDraws { effective: few });
+        let learnt = self
+            .network
+            .as_ref()
+            .filter(|_| x.len() == 1 && self.average.network > 0.0)
+            .map(|network| TruncatedMixture::cut(&self.coordinates, network.mixture(&z[0])));
+        if let Some(cut) = learnt.as_ref().filter(|cut| cut.is_mostly_outside()) {
+            warnings.push(Warning::MassOutsidePrior { inside: cut.log_mass.exp() });
         }
-        Ok(Posterior {
-            coordinates: &self.coordinates,
-            names: &self.names,
-            emulated,
-            learnt,
-            emulator_weight,
-            warnings,
-        })
+        let belief = self.belief(&z, learnt);
+        if let Belief::Tilted(tilted) | Belief::Sum(tilted, ..) = &belief {
+            let effective = tilted.density.effective_sample_size();
+            if effective < FEWEST_EFFECTIVE {
+                warnings.push(Warning::FewEffectiveDraws { effective });
+            }
+        }
+        Ok(Posterior { coordinates: &self.coordinates, names: &self.names, belief, warnings })
+    }
+
+    fn belief<'a>(&'a self, z: &[Vec<f64>], learnt: Option<TruncatedMixture>) -> Belief<'a> {
+        let average = self.average;
+        let tilted = |tilt: Tilt<'a>| {
+            let density = tilt.posterior(&self.coordinates);
+            Tilted { tilt, density }
+        };
+        let tilt = || Tilt::of(&self.likelihood, z);
+        match learnt {
+            None => Belief::Tilted(tilted(tilt())),
+            Some(learnt) if average.emulator == 0.0 => Belief::Learnt(learnt),
+            Some(learnt) => match average.form {
+                Form::Geometric => Belief::Tilted(tilted(tilt().averaged(learnt.mixture, average))),
+                Form::Arithmetic => Belief::Sum(tilted(tilt()), learnt, average.emulator),
+            },
+        }
     }
 
     fn check(&self, x: &[Vec<f64>]) -> Result<(), ModelError> {
@@ -126,7 +133,7 @@ impl Model {
         if x.is_empty() {
             return wrong("at least one pour".to_owned(), "none".to_owned());
         }
-        if x.len() > 1 && self.emulator_weight == 0.0 {
+        if x.len() > 1 && self.average.emulator == 0.0 {
             let allowed = "one pour, for this model is a network alone".to_owned();
             return wrong(allowed, format!("{} pours", x.len()));
         }

@@ -77,7 +77,7 @@ impl Network {
                 component
             })
             .collect();
-        Mixture { components }
+        Mixture::of(components)
     }
 
     fn heads(&self, outputs: &[f64]) -> Vec<Component> {

@@ -4,10 +4,10 @@ use std::fmt;
 
 use crate::coordinates::Coordinates;
 use crate::importance::Importance;
-use crate::likelihood::Likelihood;
 use crate::matrix::log_sum_exp;
 use crate::mixture::TruncatedMixture;
 use crate::random::Random;
+use crate::tilt::Tilt;
 
 /// What a reader must know before trusting the numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,31 +68,36 @@ pub struct Marginal {
     pub interval90: (f64, f64),
 }
 
-/// The emulator's posterior of some standardised pours.
-pub(crate) struct Emulated<'a> {
-    pub likelihood: &'a Likelihood,
-    pub z: Vec<Vec<f64>>,
+/// A posterior as weighted draws: prior times tilt, normalised.
+pub(crate) struct Tilted<'a> {
+    pub tilt: Tilt<'a>,
     pub density: Importance,
 }
 
-impl Emulated<'_> {
+impl Tilted<'_> {
     fn log_prob(&self, coordinates: &Coordinates, u: &[f64]) -> f64 {
         if !coordinates.is_inside(u) {
             return f64::NEG_INFINITY;
         }
-        self.likelihood.log_prob(&self.z, u) + coordinates.log_density(u)
-            - self.density.log_normaliser
+        self.tilt.log(coordinates, u) + coordinates.log_density(u) - self.density.log_normaliser
     }
+}
+
+/// Where a posterior comes from.
+pub(crate) enum Belief<'a> {
+    /// The emulator, alone or in a geometric average with the network.
+    Tilted(Tilted<'a>),
+    /// The network alone.
+    Learnt(TruncatedMixture),
+    /// The arithmetic average of both, and the weight of the first.
+    Sum(Tilted<'a>, TruncatedMixture, f64),
 }
 
 /// A normalised density over the parameters, in own units, zero outside the prior's bounds.
 pub struct Posterior<'a> {
     pub(crate) coordinates: &'a Coordinates,
     pub(crate) names: &'a [String],
-    /// The emulator's density, the network's, and the weight of the first.
-    pub(crate) emulated: Option<Emulated<'a>>,
-    pub(crate) learnt: Option<TruncatedMixture>,
-    pub(crate) emulator_weight: f64,
+    pub(crate) belief: Belief<'a>,
     /// What to know before trusting it.
     pub warnings: Vec<Warning>,
 }
@@ -111,13 +116,18 @@ impl Posterior<'_> {
 
     /// Log density of the prior's coordinates.
     pub fn coordinate_log_prob(&self, u: &[f64]) -> f64 {
-        let weight = self.emulator_weight;
-        let emulated =
-            self.emulated.as_ref().map(|e| weight.ln() + e.log_prob(self.coordinates, u));
-        let learnt =
-            self.learnt.as_ref().map(|l| (1.0 - weight).ln() + l.log_prob(self.coordinates, u));
-        let parts: Vec<_> = emulated.into_iter().chain(learnt).collect();
-        log_sum_exp(parts.iter().copied())
+        let coordinates = self.coordinates;
+        match &self.belief {
+            Belief::Tilted(tilted) => tilted.log_prob(coordinates, u),
+            Belief::Learnt(learnt) => learnt.log_prob(coordinates, u),
+            Belief::Sum(tilted, learnt, weight) => log_sum_exp(
+                [
+                    weight.ln() + tilted.log_prob(coordinates, u),
+                    (1.0 - weight).ln() + learnt.log_prob(coordinates, u),
+                ]
+                .into_iter(),
+            ),
+        }
     }
 
     /// `n` draws in own units; the same seed gives the same draws.
@@ -128,19 +138,16 @@ impl Posterior<'_> {
 
     fn coordinate_sample(&self, n: usize, seed: u64) -> Vec<Vec<f64>> {
         let mut random = Random::new(seed);
-        let count = match (&self.emulated, &self.learnt) {
-            (Some(_), None) => n,
-            (None, _) => 0,
-            _ => (0..n).filter(|_| random.uniform() < self.emulator_weight).count(),
-        };
-        let mut draws = Vec::with_capacity(n);
-        if let Some(emulated) = &self.emulated {
-            draws.extend(emulated.density.sample(count, &mut random));
+        match &self.belief {
+            Belief::Tilted(tilted) => tilted.density.sample(n, &mut random),
+            Belief::Learnt(learnt) => learnt.sample(self.coordinates, n, &mut random),
+            Belief::Sum(tilted, learnt, weight) => {
+                let count = (0..n).filter(|_| random.uniform() < *weight).count();
+                let mut draws = tilted.density.sample(count, &mut random);
+                draws.extend(learnt.sample(self.coordinates, n - count, &mut random));
+                draws
+            }
         }
-        if let Some(learnt) = &self.learnt {
-            draws.extend(learnt.sample(self.coordinates, n - count, &mut random));
-        }
-        draws
     }
 
     /// Mean, median and central interval of each parameter.

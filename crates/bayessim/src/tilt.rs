@@ -1,0 +1,59 @@
+//! What the prior is multiplied by to become the posterior: a likelihood, or its geometric average with a
+//! network's posterior.
+
+use rayon::prelude::*;
+
+use crate::average::Average;
+use crate::coordinates::Coordinates;
+use crate::importance::Importance;
+use crate::likelihood::{FEWEST_EFFECTIVE, Likelihood, Observed};
+use crate::mixture::Mixture;
+
+/// `L(u)` of some pours, or `L^a (q/p)^b` of one.
+pub struct Tilt<'a> {
+    likelihood: &'a Likelihood,
+    observed: Observed,
+    network: Option<(Mixture, Average)>,
+}
+
+impl<'a> Tilt<'a> {
+    /// Of k standardised pours.
+    pub fn of(likelihood: &'a Likelihood, z: &[Vec<f64>]) -> Self {
+        Self { likelihood, observed: likelihood.observe(z), network: None }
+    }
+
+    /// The same with the network's mixture.
+    pub fn averaged(self, mixture: Mixture, average: Average) -> Self {
+        Self { network: Some((mixture, average)), ..self }
+    }
+
+    /// Its logarithm at coordinates inside the bounds, up to a constant.
+    pub fn log(&self, coordinates: &Coordinates, u: &[f64]) -> f64 {
+        self.with(coordinates, u, self.likelihood.log_prob(&self.observed, u))
+    }
+
+    /// The posterior, normalised.
+    pub fn posterior(&self, coordinates: &Coordinates) -> Importance {
+        let pool = self.likelihood.pool(coordinates);
+        let log_weights: Vec<_> = pool
+            .points
+            .par_iter()
+            .zip(&pool.at)
+            .map(|(u, at)| self.with(coordinates, u, self.likelihood.at(&self.observed, at)))
+            .collect();
+        let found = Importance::of_prior_draws(pool.points.clone(), &log_weights);
+        if found.effective_sample_size() >= FEWEST_EFFECTIVE {
+            return found;
+        }
+        let log_target = |u: &[f64]| self.log(coordinates, u) + coordinates.log_density(u);
+        let network = self.network.as_ref().map(|(mixture, _)| mixture);
+        found.adapted(coordinates, &log_target, network)
+    }
+
+    fn with(&self, coordinates: &Coordinates, u: &[f64], emulated: f64) -> f64 {
+        self.network.as_ref().map_or(emulated, |(mixture, average)| {
+            let learnt = mixture.log_prob(u) - coordinates.log_density(u);
+            average.emulator * emulated + average.network * learnt
+        })
+    }
+}
