@@ -62,6 +62,11 @@ impl Mixture {
         log_sum_exp(parts.iter().copied())
     }
 
+    /// Log of what the density is nowhere above: the sum of its components' peaks.
+    pub fn log_bound(&self) -> f64 {
+        log_sum_exp(self.constants.iter().copied())
+    }
+
     /// The mixture of both with a half of the weight each.
     pub fn halved_with(&self, other: &Self) -> Self {
         let mut components = [&self.components[..], &other.components].concat();

@@ -9,6 +9,9 @@ use crate::importance::Importance;
 use crate::likelihood::{FEWEST_EFFECTIVE, Likelihood, Observed};
 use crate::mixture::Mixture;
 
+/// A point whose weight is that much below another's cannot matter [nat].
+const NEGLIGIBLE: f64 = 30.0;
+
 /// `L(u)` of some pours, or `L^a (q/p)^b` of one.
 pub struct Tilt<'a> {
     likelihood: &'a Likelihood,
@@ -35,12 +38,30 @@ impl<'a> Tilt<'a> {
     /// The posterior, normalised.
     pub fn posterior(&self, coordinates: &Coordinates) -> Importance {
         let pool = self.likelihood.pool(coordinates);
-        let log_weights: Vec<_> = pool
-            .points
-            .par_iter()
-            .zip(&pool.at)
-            .map(|(u, at)| self.with(coordinates, u, self.likelihood.at(&self.observed, at)))
-            .collect();
+        let emulated: Vec<_> =
+            pool.at.par_iter().map(|at| self.likelihood.at(&self.observed, at)).collect();
+        let log_weights = match &self.network {
+            None => emulated,
+            Some((mixture, average)) => {
+                // The mixture is dear, and nowhere above its bound.
+                let at_most = mixture.log_bound();
+                let bound = |u: &[f64], emulated: f64| {
+                    let learnt = at_most - coordinates.log_density(u);
+                    average.emulator * emulated + average.network * learnt
+                };
+                let best = (0..emulated.len()).max_by(|&i, &j| emulated[i].total_cmp(&emulated[j]));
+                let reached = best.map_or(f64::NEG_INFINITY, |i| {
+                    self.with(coordinates, &pool.points[i], emulated[i])
+                });
+                let weigh = |(u, &emulated): (&Vec<f64>, &f64)| {
+                    if bound(u, emulated) < reached - NEGLIGIBLE {
+                        return f64::NEG_INFINITY;
+                    }
+                    self.with(coordinates, u, emulated)
+                };
+                pool.points.par_iter().zip(&emulated).map(weigh).collect()
+            }
+        };
         let found = Importance::of_prior_draws(pool.points.clone(), &log_weights);
         if found.effective_sample_size() >= FEWEST_EFFECTIVE {
             return found;

@@ -19,6 +19,9 @@ __all__ = ["geometric_density"]
 
 Array = NDArray[np.float64]
 
+# A point whose weight is that much below another's cannot matter [nat].
+_NEGLIGIBLE = 30.0
+
 
 def geometric_density(
     prior: Prior, condition: tuple[Likelihood, Array], mixture: Mixture, average: Average
@@ -37,10 +40,19 @@ def geometric_density(
         learnt = mixture.log_prob(u) - prior.coordinate_log_prob(u)
         return average.emulator * emulated + average.network * learnt
 
+    # The mixture is dear, and nowhere above its bound: points that cannot matter go without.
+    pool, emulated = likelihood.pool, likelihood.start(z)
+    at_most = mixture.log_bound() - prior.coordinate_log_prob(pool)
+    bound = average.emulator * emulated + average.network * at_most
+    best = int(emulated.argmax())
+    reached = tilt(pool[best : best + 1], emulated[best : best + 1])[0]
+    matters = bound >= reached - _NEGLIGIBLE
+    log_weights = np.full(len(pool), -np.inf)
+    log_weights[matters] = tilt(pool[matters], emulated[matters])
     return density_over_prior(
         prior,
         lambda u, quick: tilt(u, likelihood.log_prob(z, u, quick=quick)),
-        likelihood.pool,
-        tilt(likelihood.pool, likelihood.start(z)),
+        pool,
+        log_weights,
         mixtures=(mixture,),
     )

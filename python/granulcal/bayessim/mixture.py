@@ -67,12 +67,18 @@ class Mixture:
             off -= shift
             off *= off
             squares += off
+        squares *= -0.5
+        squares += self._log_peaks()
+        return squares.T
+
+    def log_bound(self) -> float:
+        """Returns what the log density is nowhere above: that of the sum of all peaks."""
+        return float(np.logaddexp.reduce(self._log_peaks()))
+
+    def _log_peaks(self) -> Array:
         log_det = np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
         with np.errstate(divide="ignore"):
-            constant = np.log(self.weights) + log_det - 0.5 * self.dimension * np.log(2 * np.pi)
-        squares *= -0.5
-        squares += constant
-        return squares.T
+            return np.log(self.weights) + log_det - 0.5 * self.dimension * np.log(2 * np.pi)
 
     def log_prob(self, u: Array) -> Array:
         """Returns the log density at `u` (n, p), shape (n,)."""
