@@ -51,6 +51,13 @@ def add(commands: Any) -> None:
         help="simulated pairs that calibrate the interval of a named effect's strength, of the "
         "budget; at least 19 (default: none)",
     )
+    parser.add_argument(
+        "--rounds",
+        type=int,
+        default=0,
+        help="rounds of further pours where the fits are, once a residual is found, after each of "
+        "which everything is asked again; 96 pours of the budget each (default: none)",
+    )
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
     parser.set_defaults(run=_run)
@@ -75,10 +82,12 @@ def _run(options: argparse.Namespace) -> int:
         threads=options.threads,
         seed=options.seed,
         pairs=options.pairs,
+        rounds=options.rounds,
     )
     page = options.out / "report.html"
     archive = "" if options.archive is None else f" --archive {options.archive}"
     archive += f" --pairs {options.pairs}" if options.pairs else ""
+    archive += f" --rounds {options.rounds}" if options.rounds else ""
     if options.tolerances is not None:
         archive += f" --tolerances {options.tolerances}"
     write_page(

@@ -2,6 +2,8 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,11 @@ from granulcal.camera import Camera
 from granulcal.cli import main
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.archive import Archive, Plan
+from granulcal.loop.close import planned
+from granulcal.loop.forward import Forward
 from granulcal.loop.library import FUNNEL, by_name, fingerprint
+from granulcal.loop.measures import Measures
+from granulcal.loop.refine import further
 from granulcal.loop.task import Task
 
 SCENE = """
@@ -146,6 +152,40 @@ def test_a_declared_tolerance_is_no_candidate(tilted: Path, tmp_path: Path) -> N
         load('"tilt.y" = 0.0')
     with pytest.raises(TrainingDataError, match="no effect magnetism; there are cohesion"):
         load('"magnetism" = 1.0')
+
+
+def test_further_pours_are_where_the_fits_are(tilted: Path, tmp_path: Path) -> None:
+    task = Task.load(tilted)
+    plan = planned(task, 1100, 0)
+    names = [effect.name for effect in plan.design.effects]
+    tilt = names.index("tilt.y")
+
+    def fit(active: tuple[int, ...]) -> Any:
+        slopes = np.random.default_rng(1).normal(size=(6, 2 + len(active)))
+        return SimpleNamespace(
+            v=np.array([0.5, -0.3]),
+            psi=0.4 * np.eye(len(names))[tilt],
+            active=active,
+            root=0.2 * np.eye(6),
+            slopes=slopes,
+        )
+
+    found: Any = SimpleNamespace(base_fit=fit(()), models=[SimpleNamespace(fit=fit((tilt,)))])
+    forward = Forward(tmp_path, 1)
+    base, tilts = further(forward, task, plan, found, 0, 0)
+    assert forward.ran == 48 and len(base.x) > 20 and len(tilts.x) > 20
+    assert not base.psi.any() and not np.delete(tilts.psi, tilt, axis=1).any()
+    assert abs(tilts.psi[:, tilt].mean() - 0.4) < 0.1
+    for rows in (base, tilts):
+        assert np.isfinite(rows.x).all() and ((rows.theta > 0) & (rows.theta < 1)).all()
+        assert abs(rows.theta.mean(axis=0) - [0.69, 0.38]).max() < 0.15
+        assert sorted(set(rows.condition[:, 0])) == [0.0, 1.0]
+    # More of the mass lies downhill.
+    where = Measures.of(task.scene).names.index("mass_cos_1")
+    lean = abs(tilts.x[:, where].mean() - base.x[:, where].mean())
+    assert lean > 4 * base.x[:, where].std() / len(base.x) ** 0.5
+    again = further(forward, task, plan, found, 0, 0)
+    assert forward.ran == 48 and np.array_equal(again[1].x, tilts.x)
 
 
 def test_a_budget_that_is_too_small_says_what_is_enough(

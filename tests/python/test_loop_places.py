@@ -13,8 +13,8 @@ from granulcal.loop.archive import Archive, Plan
 from granulcal.loop.baseline import Fit
 from granulcal.loop.close import planned
 from granulcal.loop.design import Design, Effect, normal_from_cube
+from granulcal.loop.draws import draw
 from granulcal.loop.library import LibraryEffect, by_name
-from granulcal.loop.predict import draw
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 
 SCENE = """

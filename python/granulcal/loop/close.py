@@ -7,7 +7,7 @@ the sealed conditions once; run the placebo; write the report.
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from granulcal.loop.misfit import Improvement, compare
 from granulcal.loop.observation import Observation
 from granulcal.loop.pairs import Calibrated
 from granulcal.loop.preregistration import register
+from granulcal.loop.refine import ROUND, Rows, further
 from granulcal.loop.scenes import faults_of, scene_of
 from granulcal.loop.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Condition, Task
@@ -170,6 +171,7 @@ def close_loop(
     thresholds: Thresholds | None = None,
     surrogate: Surrogate | None = None,
     pairs: int = 0,
+    rounds: int = 0,
     say: Callable[[str], None] = print,
 ) -> Closed:
     """Finds what a model lacks, adds it, and tells the error before and after.
@@ -185,6 +187,8 @@ def close_loop(
         surrogate: of the same archive, where it has been fitted for another task.
         pairs: simulated pairs that calibrate the interval of a named effect's strength, each as
             many pours as were measured to fit; 19 are the fewest from which 95 % can be read.
+        rounds: of further pours where the fits are, once the gate has opened; each takes up to
+            `refine.ROUND` pours, and everything is asked again afterwards.
         say: is told each step.
 
     Raises:
@@ -193,9 +197,9 @@ def close_loop(
     """
     folder, rules = Path(out), thresholds or Thresholds()
     workers = threads or os.cpu_count() or 1
-    plan = planned(task, budget, seed, pairs)
+    plan = planned(task, budget, seed, pairs, rounds)
     names = Measures.of(plan.scene).names
-    registration = register(folder, task, plan, rules, seed, names, pairs)
+    registration = register(folder, task, plan, rules, seed, names, pairs, rounds)
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
 
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
@@ -212,7 +216,14 @@ def close_loop(
     found = trace(surrogate, observed, rules, seed=seed)
     say(f"verdict {found.verdict.kind}: {found.verdict.reason}")
 
-    forward = Forward(folder / "pours", workers)
+    forward, more = Forward(folder / "pours", workers), list[Rows]()
+    for number in range(rounds):
+        if found.gate.p > rules.name:
+            break
+        more.extend(further(forward, task, store.plan, found, number, seed))
+        surrogate = fit_surrogate(store, seed=seed, say=say, more=more)
+        found = trace(surrogate, observed, rules, seed=seed)
+        say(f"after pours where the fits are, {found.verdict.kind}: {found.verdict.reason}")
     simulated = {c.name: _both(forward, task, c, found, seed) for c in task.conditions}
     right = confirmed(surrogate, store.plan, fitted, found, simulated)
     say(f"fresh pours of the verdict's model: the surrogate is right there with p = {right:.3g}")
@@ -241,7 +252,9 @@ def close_loop(
         sealed=sealed,
         placebo=placebo,
         experiments=tuple(experiments),
-        pours=plan.pours + _needed(task, pairs if wide is not None else 0),
+        pours=plan.pours
+        + _needed(task, pairs if wide is not None else 0)
+        + sum(len(rows.x) for rows in more),
         registration=registration,
         measured=measured,
         simulated=simulated,
@@ -253,28 +266,38 @@ def close_loop(
     return closed
 
 
-def fit_surrogate(store: Archive, *, seed: int, say: Callable[[str], None] = print) -> Surrogate:
-    """Returns the surrogate of all pours of an archive."""
+def fit_surrogate(
+    store: Archive,
+    *,
+    seed: int,
+    say: Callable[[str], None] = print,
+    more: Sequence[Rows] = (),
+) -> Surrogate:
+    """Returns the surrogate of all pours of an archive, and of `more`."""
     rows, design = store.pours(), store.plan.design
-    say(f"surrogate of {len(rows.x)} pours ({rows.left_out} left out: jammed, unhealthy, unseen)")
-    return Surrogate.fit(
-        design, rows.theta, rows.condition, rows.psi, rows.x, names=rows.names, seed=seed
-    )
+    whole = [rows, *more]
+    theta = np.concatenate([part.theta for part in whole])
+    condition = np.concatenate([part.condition for part in whole])
+    psi = np.concatenate([part.psi for part in whole])
+    x = np.concatenate([part.x for part in whole])
+    say(f"surrogate of {len(x)} pours ({rows.left_out} left out: jammed, unhealthy, unseen)")
+    return Surrogate.fit(design, theta, condition, psi, x, names=rows.names, seed=seed)
 
 
-def planned(task: Task, budget: int, seed: int, pairs: int = 0) -> Plan:
-    """Returns the archive that a budget affords, `pairs` of simulated pours kept back.
+def planned(task: Task, budget: int, seed: int, pairs: int = 0, rounds: int = 0) -> Plan:
+    """Returns the archive that a budget affords, `pairs` and `rounds` of pours kept back.
 
     Raises:
         ObservationError: it affords too little, with what would be enough.
     """
     own = sum(not effect.is_free for effect in task.library)
-    spare = budget - _needed(task, pairs)
+    kept = _needed(task, pairs) + rounds * ROUND
+    spare = budget - kept
     # A small budget has fewer pours to share than the base model needs.
     base = max(int(_BASE_SHARE * spare), min(_LEAST_BASE, spare - _LEAST_EACH * own))
     each = (spare - base) // max(own, 1)
     if base < _LEAST_BASE or each < _LEAST_EACH:
-        enough = _needed(task, pairs) + max(
+        enough = kept + max(
             _LEAST_BASE + _LEAST_EACH * own, int(_LEAST_EACH * own / (1 - _BASE_SHARE)) + 1
         )
         raise ObservationError(

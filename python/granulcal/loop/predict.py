@@ -8,32 +8,19 @@ each draw, so that the spread is that of parameters and of pours together.
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.baseline import Fit
 from granulcal.loop.close import Closed
-from granulcal.loop.design import LARGEST_Z, Design, cube_from_normal
+from granulcal.loop.draws import draw
 from granulcal.loop.forward import Forward
 from granulcal.loop.scenes import faults_of, scene_of
 from granulcal.loop.task import Condition
 from granulcal.loop.trace import Explanation
 
-__all__ = ["draw", "predict"]
+__all__ = ["predict"]
 
 Array = NDArray[np.float64]
 
 # Seeds of pours, apart from those of the archive and of the replicates.
 _SEED = 8_000_009
-
-
-def draw(fit: Fit, design: Design, count: int, *, seed: int = 0) -> tuple[Array, Array]:
-    """Returns theta in unit coordinates (count, p) and the active strengths (count, |A|)."""
-    p, low = len(fit.v), np.array([design.effects[k].low for k in fit.active])
-    white = np.linalg.solve(fit.root, fit.slopes)
-    precision = np.concatenate([np.ones(p), np.full(len(low), 1e-6)])
-    root = np.linalg.cholesky(np.linalg.inv(white.T @ white + np.diag(precision)))
-    at = np.concatenate([fit.v, fit.psi[list(fit.active)]])
-    drawn = at + np.random.default_rng(seed).standard_normal((count, len(at))) @ root.T
-    theta = cube_from_normal(np.clip(drawn[:, :p], -LARGEST_Z, LARGEST_Z))
-    return theta, np.clip(drawn[:, p:], low, 1.0)
 
 
 def predict(

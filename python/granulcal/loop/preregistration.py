@@ -26,30 +26,35 @@ def register(
     seed: int,
     statistics: tuple[str, ...],
     pairs: int = 0,
+    rounds: int = 0,
 ) -> str:
     """Writes the file, or finds it as it is; returns its SHA-256.
 
     Raises:
         ObservationError: the folder holds the registration of another analysis.
     """
-    document: dict[str, Any] = {
-        "version": _native.__version__,
-        "scene": plan.scene.to_toml(),
-        "prior": plan.prior.to_toml(),
-        "conditions": [
-            {"name": c.name, "at": c.at, "use": c.use, "recordings": _digests(c.recordings)}
-            | ({"reading": c.reading} if c.reading else {})
-            | ({"averaged": True} if c.averaged else {})
-            for c in task.conditions
-        ],
-        "library": [described(effect) for effect in task.library],
-        "library_sha256": fingerprint(task.library),
-        "statistics": list(statistics),
-        "archive": {"base": plan.base, "each": plan.each, "seed": plan.seed},
-        "tolerances_sha256": None if task.tolerances is None else task.tolerances.fingerprint(),
-        "thresholds": thresholds.to_dict(),
-        "seed": seed,
-    } | ({"pairs": pairs} if pairs else {})
+    document: dict[str, Any] = (
+        {
+            "version": _native.__version__,
+            "scene": plan.scene.to_toml(),
+            "prior": plan.prior.to_toml(),
+            "conditions": [
+                {"name": c.name, "at": c.at, "use": c.use, "recordings": _digests(c.recordings)}
+                | ({"reading": c.reading} if c.reading else {})
+                | ({"averaged": True} if c.averaged else {})
+                for c in task.conditions
+            ],
+            "library": [described(effect) for effect in task.library],
+            "library_sha256": fingerprint(task.library),
+            "statistics": list(statistics),
+            "archive": {"base": plan.base, "each": plan.each, "seed": plan.seed},
+            "tolerances_sha256": None if task.tolerances is None else task.tolerances.fingerprint(),
+            "thresholds": thresholds.to_dict(),
+            "seed": seed,
+        }
+        | ({"pairs": pairs} if pairs else {})
+        | ({"rounds": rounds} if rounds else {})
+    )
     text = json.dumps(document, indent=1) + "\n"
     path = folder / _NAME
     if path.exists():

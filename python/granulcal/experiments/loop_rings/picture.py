@@ -58,7 +58,7 @@ def picture(path: Path, closed: dict[str, Closed]) -> None:
             axis.set_axis_off()
         column[3].axhline(0, color="0.7", lw=0.8)
         column[3].set(xlabel="radius [mm]", ylabel="mean height [mm]", xlim=(0, 180))
-        column[3].legend(fontsize=7, loc="lower right")
+        column[3].legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.25))
     assert image is not None
     figure.colorbar(image, ax=axes[:3], label="height above the bed [mm]", shrink=0.6)
     figure.savefig(path, dpi=62)
