@@ -194,6 +194,8 @@ def test_a_budget_that_is_too_small_says_what_is_enough(
     words = ["close-loop", str(tilted), "-o", str(tmp_path / "out"), "--budget", "100"]
     assert main(words) == 2
     assert "446 would be enough" in capsys.readouterr().err
+    assert main([*words, "--pairs", "7"]) == 2
+    assert "pairs must be 0, or at least 19 to read 95 % from, got 7" in capsys.readouterr().err
 
 
 def test_what_a_task_file_lacks_is_named(tilted: Path, tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from granulcal.loop.forward import Forward
 from granulcal.loop.measures import Measures
 from granulcal.loop.misfit import Improvement, compare
 from granulcal.loop.observation import Observation
-from granulcal.loop.pairs import Calibrated
+from granulcal.loop.pairs import FEWEST_PAIRS, Calibrated
 from granulcal.loop.preregistration import register
 from granulcal.loop.refine import ROUND, Rows, further
 from granulcal.loop.scenes import faults_of, scene_of
@@ -192,9 +192,14 @@ def close_loop(
         say: is told each step.
 
     Raises:
-        ObservationError: recordings that do not fit the scene, or a budget that is too small.
+        ObservationError: recordings that do not fit the scene, a budget that is too small, or too
+            few pairs.
         TrainingDataError: an archive of something else.
     """
+    if pairs and pairs < FEWEST_PAIRS:
+        raise ObservationError(
+            f"pairs must be 0, or at least {FEWEST_PAIRS} to read 95 % from, got {pairs}"
+        )
     folder, rules = Path(out), thresholds or Thresholds()
     workers = threads or os.cpu_count() or 1
     plan = planned(task, budget, seed, pairs, rounds)

@@ -32,9 +32,12 @@ from granulcal.loop.refit import Model, fit_single, interval
 from granulcal.loop.surrogate import Surrogate
 from granulcal.loop.thresholds import Thresholds
 
-__all__ = ["Calibrated", "calibrate", "needed_stretch"]
+__all__ = ["FEWEST_PAIRS", "Calibrated", "calibrate", "needed_stretch"]
 
 Array = NDArray[np.float64]
+
+FEWEST_PAIRS = 19
+"""Fewest pairs from which an interval of 95 % can be read."""
 
 # Tried stretches; beyond the largest the whole prior is the interval.
 _STRETCHES = np.concatenate([np.arange(1.0, 4.0, 0.1), np.arange(4.0, 12.5, 0.5)])
