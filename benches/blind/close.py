@@ -12,7 +12,7 @@ from pathlib import Path
 
 from granulcal.loop.archive import Archive
 from granulcal.loop.close import close_loop, fit_surrogate, planned
-from granulcal.loop.page import write_page
+from granulcal.loop.report import write_report
 from granulcal.loop.task import Task
 from granulcal.loop.tolerance import Tolerances
 
@@ -50,11 +50,12 @@ def main() -> None:
             surrogate=surrogate,
             say=lambda line: None,
         )
-        write_page(
+        write_report(
             closed,
-            out / "report.html",
+            out,
             command=f"granulcal close-loop {file}",
             title=file.parent.name,
+            say=lambda line: None,
         )
         verdict = closed.trace.verdict
         print(f"{file.parent.name}: {verdict.kind} {', '.join(verdict.named)} (p {verdict.p:.3g})")

@@ -65,8 +65,7 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     from granulcal.loop.close import close_loop
-    from granulcal.loop.page import write_page
-    from granulcal.loop.tables import write_tables
+    from granulcal.loop.report import write_report
     from granulcal.loop.task import Task
     from granulcal.loop.tolerance import Tolerances
 
@@ -84,22 +83,16 @@ def _run(options: argparse.Namespace) -> int:
         pairs=options.pairs,
         rounds=options.rounds,
     )
-    page = options.out / "report.html"
     archive = "" if options.archive is None else f" --archive {options.archive}"
     archive += f" --pairs {options.pairs}" if options.pairs else ""
     archive += f" --rounds {options.rounds}" if options.rounds else ""
     if options.tolerances is not None:
         archive += f" --tolerances {options.tolerances}"
-    write_page(
+    write_report(
         closed,
-        page,
+        options.out,
         command=f"granulcal close-loop {path} -o {options.out}{archive} "
         f"--budget {options.budget} --seed {options.seed}",
         title=f"Closing the loop on {path}",
     )
-    try:
-        write_tables(closed, options.out)
-    except ModuleNotFoundError as error:
-        print(f"tables left out: {error}")
-    print(page)
     return 0

@@ -9,8 +9,8 @@ from pathlib import Path
 from granulcal.loop.close import Closed, close_loop
 from granulcal.loop.forward import Forward
 from granulcal.loop.library import by_name
-from granulcal.loop.page import write_page
 from granulcal.loop.refine import ROUND
+from granulcal.loop.report import write_report
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.prior import Parameter, Prior
 from granulcal.scene import Scene
@@ -94,13 +94,12 @@ def reproduce(out: Path, data: Path) -> None:
     """Runs the loop; report.html and verdict.json in `out`/loop_column."""
     folder = out / "loop_column"
     closed = close_loop(task(data), folder, budget=_BUDGET, rounds=2)
-    write_page(
+    write_report(
         closed,
-        folder / "report.html",
+        folder,
         command=f"granulcal reproduce loop_column --out {out}",
         title="Columns of beads in water and glycerol, modelled dry",
     )
-    print(folder / "report.html")
     _picture(folder / "fronts.png", closed, Forward(folder / "pours", 1))
     print(folder / "fronts.png")
 

@@ -10,7 +10,7 @@ from granulcal.experiments.loop_drum.report import compare_speeds, table
 from granulcal.experiments.loop_drum.task import task
 from granulcal.files import write_beside
 from granulcal.loop.close import close_loop
-from granulcal.loop.page import write_page
+from granulcal.loop.report import write_report
 
 __all__ = ["reproduce", "task"]
 
@@ -35,9 +35,9 @@ def reproduce(out: Path, data: Path) -> None:
         if surrogate is None:
             # The pours are the same whatever is fitted, and so is what they say.
             surrogate = closed.trace.local.surrogate
-        write_page(
+        write_report(
             closed,
-            folder / name / "report.html",
+            folder / name,
             command=f"granulcal reproduce loop_drum --out {out}",
             title=f"MCC spheres in a drum, fitted at {' and '.join(map(str, fitted))} rpm",
         )
@@ -45,4 +45,3 @@ def reproduce(out: Path, data: Path) -> None:
             text = "\n".join(table(closed, compare_speeds(closed, folder))) + "\n"
             write_beside(folder / "results.md", text)
             print(folder / "results.md")
-        print(folder / name / "report.html")

@@ -9,7 +9,7 @@ from granulcal.experiments.loop_rings.picture import picture
 from granulcal.experiments.loop_rings.task import GROUPS, task
 from granulcal.files import write_beside
 from granulcal.loop.close import Closed, close_loop
-from granulcal.loop.page import write_page
+from granulcal.loop.report import write_report
 
 __all__ = ["GROUPS", "reproduce", "task"]
 
@@ -31,13 +31,12 @@ def reproduce(out: Path, data: Path) -> None:
         )
         # Every group has the same pours.
         surrogate = closed[group].trace.local.surrogate
-        write_page(
+        write_report(
             closed[group],
-            folder / group / "report.html",
+            folder / group,
             command=f"granulcal reproduce loop_rings --out {out}",
             title=f"Rings on a loose bed, modelled on a rigid plane: {group}",
         )
-        print(folder / group / "report.html")
     picture(folder / "rings.png", closed)
     lines = [line for group, one in closed.items() for line in _table(group, one)]
     write_beside(folder / "results.md", "\n".join(lines) + "\n")
