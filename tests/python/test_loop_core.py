@@ -207,6 +207,17 @@ def test_the_residual_of_a_fit_is_efficient(toy: Linear, surrogate: Surrogate) -
     assert np.isnan(scores.kappa[1]) or scores.kappa[1] < 0.5
 
 
+def test_what_is_nearest_to_a_residual_is_named(toy: Linear, surrogate: Surrogate) -> None:
+    strengths = np.array([0.9, 0.0, 0.0])
+    found = trace(surrogate, toy.observe(np.array([0.5, 0.5]), strengths, 3), Thresholds(), seed=1)
+    names = [effect.name for effect in surrogate.design.effects]
+    nearest = dict(found.nearest)
+    assert next(iter(nearest)) == names[0]
+    assert all(0 <= cosine <= 1 for cosine in nearest.values())
+    assert nearest[names[0]] > 0.7
+    assert found.to_dict()["nearest_effects"][0]["name"] == names[0]
+
+
 def test_false_alarms_and_coverage(toy: Linear, surrogate: Surrogate) -> None:
     generator = np.random.default_rng(9)
     p_values, inside = [], 0

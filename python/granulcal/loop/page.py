@@ -57,6 +57,7 @@ def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
         calibrated=closed.calibrated,
         held=_HELD,
         residuals=_residuals(closed),
+        nearest=closed.trace.nearest,
         strengths=_strengths(closed),
         parameters=closed.parameters(),
         pictures=_pictures(closed),

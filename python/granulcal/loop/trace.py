@@ -28,6 +28,10 @@ _HOPELESS = 12.0
 _PARENTS = 2
 
 
+# Effects named beside a residual.
+_NEAREST = 3
+
+
 @dataclass(frozen=True)
 class Power:
     """What an experiment could see, before its data are looked at.
@@ -118,6 +122,7 @@ class Trace:
         statistics: names, m of them.
         residuals: of the base fit in standard deviations of its covariance, shape (H, m).
         beyond: statistics that no pour of the archive comes near, with condition and values.
+        nearest: effects whose directions are nearest to the residual, and the cosine of each.
         thresholds: what was fixed beforehand.
         seed: of all random numbers.
         theta_sd: standard deviations of theta's z-scores at the base fit, shape (p,).
@@ -135,6 +140,7 @@ class Trace:
     statistics: tuple[str, ...]
     residuals: Array
     beyond: tuple[str, ...]
+    nearest: tuple[tuple[str, float], ...]
     thresholds: Thresholds
     seed: int
     theta_sd: Array
@@ -190,6 +196,7 @@ class Trace:
             "statistics": list(self.statistics),
             "residuals": self.residuals.tolist(),
             "beyond_the_archive": list(self.beyond),
+            "nearest_effects": [{"name": n, "cosine": c} for n, c in self.nearest],
             "thresholds": self.thresholds.to_dict(),
             "seed": self.seed,
         }
@@ -240,6 +247,7 @@ def trace(
         statistics=surrogate.names,
         residuals=_residuals(local, fit),
         beyond=surrogate.beyond(observations),
+        nearest=_nearest(surrogate, scores, fit),
         thresholds=rules,
         seed=seed,
         theta_sd=np.sqrt(np.diag(np.linalg.inv(normal))),
@@ -247,6 +255,16 @@ def trace(
         base_fit=fit,
         local=local,
     )
+
+
+def _nearest(surrogate: Surrogate, scores: Scores, fit: Fit) -> tuple[tuple[str, float], ...]:
+    """The largest cosines of effects with the efficient residual, `sqrt(T_k / Q)`."""
+    residual = scores.whiten @ fit.residual
+    whole = max(float(residual @ residual), 1e-300)
+    cosines = np.sqrt(scores.squares(residual[:, None])[:, 0] / whole)
+    order = np.argsort(-cosines)[:_NEAREST]
+    names = [surrogate.design.effects[k].name for k in scores.effects]
+    return tuple((names[i], float(cosines[i])) for i in order)
 
 
 def _residuals(local: Local, fit: Fit) -> Array:

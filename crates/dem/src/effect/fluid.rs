@@ -10,7 +10,7 @@
 //! Source: Schiller and Naumann 1933 as in Clift, Grace and Weber, Bubbles, Drops and Particles (1978), table 5.1; the moment
 //! is Stokes'; chi and the superficial velocity w are Di Felice's (Int. J. Multiphase Flow 20 (1994) 153,
 //! doi:10.1016/0301-9322(94)90011-6), whose drag agrees with Ergun's in a packing. phi, between 0 and 1, is how crowded a grain is:
-//! its neighbours over those inside a packing; <v> is their mean velocity. `crowding` 0 is the drag of a lone grain, `entrained`
+//! its neighbours over those inside a packing; `<v>` is their mean velocity. `crowding` 0 is the drag of a lone grain, `entrained`
 //! 0 a fluid at rest, and with both at 0 eps is 1. With `entrained` 1 the fluid inside a packing goes with the grains, as it must
 //! where it cannot seep as fast as they fall, and only the outer grains are dragged. The fluid has no inertia but the added mass.
 //!
