@@ -166,7 +166,7 @@ def main() -> None:
         prior_loss = -float(np.mean(toy.prior.log_prob(new_theta)))
         exact = -float(np.mean(toy.exact_log_prob(new_theta, new_x))) - prior_loss
         print(f"seed {seed}: exact {exact:.2f}")
-        for method in ("emulated", "distilled", "mdrff", "plain"):
+        for method in ("auto", "emulated", "distilled", "mdrff", "plain"):
             model = BayesSim.fit(theta, x, toy.prior, seed=seed, quiet=True, method=method)
             check = model.check(new_theta, new_x)
             counts = ", ".join(
