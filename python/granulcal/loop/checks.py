@@ -34,10 +34,9 @@ def confirmed(
     simulated: dict[str, tuple[Array, Array]],
 ) -> float:
     """Returns p of fresh pours of the verdict's model at its fit; NaN where too few are usable."""
-    fit = found.base_fit if found.best is found.base else found.model_of(found.best).fit
     rows = [(c, simulated[c.name][1]) for c in fitted]
     fresh = [Observation.of(c.name, plan.unit(c.at), x) for c, x in rows if len(x) >= _FEWEST]
-    return confirm(surrogate, fit, fresh) if fresh else float("nan")
+    return confirm(surrogate, found.fit_of(found.best), fresh) if fresh else float("nan")
 
 
 def calibrated(

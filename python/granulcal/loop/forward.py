@@ -14,11 +14,12 @@ from granulcal.loop.measures import Measures
 from granulcal.scene import Scene
 from granulcal.simulate import simulate
 
-__all__ = ["Forward"]
+__all__ = ["UNUSABLE", "Forward"]
 
 Array = NDArray[np.float64]
 
-_UNUSABLE = ("unhealthy", "jammed")
+UNUSABLE = ("unhealthy", "jammed")
+"""Statuses of pours that nothing is learnt from."""
 
 
 class Forward:
@@ -61,7 +62,7 @@ class Forward:
 
 def _row(scene: Scene, seed: int, faults: Mapping[str, float] | None) -> Array | None:
     pour = simulate(scene, seed=seed)
-    if pour.status in _UNUSABLE:
+    if pour.status in UNUSABLE:
         return None
     try:
         found = Measures.of(scene).of_pour(pour, faults)

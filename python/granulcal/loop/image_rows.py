@@ -15,6 +15,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.loop.forward import UNUSABLE
 from granulcal.loop.library import LibraryEffect
 from granulcal.loop.measures import Measures
 from granulcal.prior import Prior
@@ -31,7 +32,6 @@ _STREAM = 5
 # Share of the pours that each effect reads again: copies of a pour share its noise, and a surrogate
 # that took many for pours of their own would be too sure of itself.
 _SHARE = 0.5
-_UNUSABLE = ("unhealthy", "jammed")
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class ImageRows:
         pour = simulate(scene, seed=int(generator.integers(2**62)))
         measures = Measures.of(scene)
         nothing = np.full(len(measures.names), np.nan)
-        is_usable = pour.status not in _UNUSABLE
+        is_usable = pour.status not in UNUSABLE
 
         def look(faults: dict[str, float]) -> Array:
             try:

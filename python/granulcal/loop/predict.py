@@ -36,12 +36,13 @@ def predict(
         draws: pours of each kind.
     """
     trace = closed.trace
-    fit = trace.base_fit if one is trace.base else trace.models[trace.explanations.index(one)].fit
     design = trace.local.surrogate.design
     seeds = [_SEED + i for i in range(draws)]
     at_fit = forward.pours(closed.scene(condition, one), seeds, closed.faults(one))
     rows = []
-    for seed, theta, psi in zip(seeds, *draw(fit, design, draws, seed=_SEED), strict=True):
+    for seed, theta, psi in zip(
+        seeds, *draw(trace.fit_of(one), design, draws, seed=_SEED), strict=True
+    ):
         strengths = dict(zip(one.effects, psi, strict=True))
         scene = scene_of(closed.task, condition, theta, strengths)
         rows.append(forward.pours(scene, [seed], faults_of(closed.task, strengths)))

@@ -161,10 +161,13 @@ class Trace:
         """Returns the model of an explanation."""
         return self.models[self.explanations.index(one)]
 
+    def fit_of(self, one: Explanation) -> Fit:
+        """Returns the fit of the base model or of an explanation."""
+        return self.base_fit if one is self.base else self.model_of(one).fit
+
     def residuals_of(self, one: Explanation) -> Array:
         """Returns what a model leaves, in standard deviations of its covariance, shape (H, m)."""
-        fit = self.base_fit if one is self.base else self.model_of(one).fit
-        return _residuals(self.local, fit)
+        return _residuals(self.local, self.fit_of(one))
 
     def to_dict(self) -> dict[str, Any]:
         """Returns everything for JSON."""

@@ -208,7 +208,7 @@ impl Drag {
 pub(super) const PACKED: f64 = 0.6;
 /// Gap below which two grains are neighbours, in radii `[-]`: what every preset lists.
 const NEIGHBOUR: f64 = 0.25;
-/// Neighbours inside a random packing: `python examples/neighbours.py` counts 8.1 and, of smoother beads, 8.9 deep in a column.
+/// Neighbours inside a random packing: `python examples/neighbours.py` counts 7.9 and, of smoother beads, 8.7 deep in a column.
 const NEIGHBOURS: f64 = 8.0;
 
 /// The neighbours of a grain.
