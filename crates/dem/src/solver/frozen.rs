@@ -55,18 +55,10 @@ impl FrozenSolve {
     /// [`DemError::OutOfRange`] for settings that no simulation would take.
     pub fn solve(&self, settings: &SolverSettings) -> Result<FrozenSolution, DemError> {
         settings.check()?;
-        let Self { mut sets, mut bed, radius } = self.clone();
-        let mut both = sets.each_mut();
-        let work = solver::solve(
-            &mut both,
-            &mut bed.bodies,
-            settings,
-            None,
-            radius,
-            None,
-            &Threads::default(),
-        );
-        let residual = ResidualSums::of(&both, &mut bed.bodies).relative();
+        let mut copy = self.clone();
+        let work = copy.run(settings);
+        let Self { mut sets, mut bed, .. } = copy;
+        let residual = ResidualSums::of(&sets.each_mut(), &mut bed.bodies).relative();
         let batches = sets.iter().flat_map(|set| &set.batches);
         let grains = &bed.bodies[..bed.count()];
         Ok(FrozenSolution {
@@ -91,17 +83,16 @@ impl FrozenSolve {
             solver::nsgs::warm_start(set, &mut warm.bed.bodies, &Threads::default());
         }
         let before = ResidualSums::of(&warm_sets, &mut warm.bed.bodies).squares();
-        let Self { mut sets, mut bed, radius } = self.clone();
-        let mut both = sets.each_mut();
-        solver::solve(
-            &mut both,
-            &mut bed.bodies,
-            settings,
-            None,
-            radius,
-            None,
-            &Threads::default(),
-        );
-        [before, ResidualSums::of(&both, &mut bed.bodies).squares()]
+        let mut copy = self.clone();
+        copy.run(settings);
+        [before, ResidualSums::of(&copy.sets.each_mut(), &mut copy.bed.bodies).squares()]
+    }
+
+    /// Solves it where it is.
+    fn run(&mut self, settings: &SolverSettings) -> solver::Work {
+        let Self { sets, bed, radius } = self;
+        let threads = Threads::default();
+        let sets = &mut sets.each_mut();
+        solver::solve(sets, &mut bed.bodies, settings, None, *radius, None, &threads)
     }
 }
