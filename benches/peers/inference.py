@@ -43,11 +43,23 @@ FIELDS = {
 
 
 class Sbi:
-    """sbi's neural posterior estimation with its defaults, in the prior's coordinates."""
+    """sbi's neural posterior estimation with its defaults, in the prior's coordinates.
+
+    A flow may put a posterior outside the prior, so that sbi would draw for hours: where nothing
+    was accepted for `PATIENCE` seconds, the prior stands in for it, and `outside` counts that.
+    """
+
+    PATIENCE = 20.0
 
     def __init__(self, prior: Any, estimator: str) -> None:
         """Takes a torch prior over coordinates."""
         self.prior, self.estimator = prior, estimator
+        self.lost: list[bytes] = []
+
+    @property
+    def outside(self) -> int:
+        """Observations whose posterior lies outside the prior."""
+        return len(self.lost)
 
     def fit(self, u: np.ndarray, x: np.ndarray) -> "Sbi":
         """Trains on coordinates (n, p) and statistics (n, s)."""
@@ -64,12 +76,19 @@ class Sbi:
     def sample(self, x: np.ndarray, n: int) -> np.ndarray:
         """Returns `n` draws of the coordinates given statistics (s,)."""
         observed = torch.as_tensor(x, dtype=torch.float32)[None]
-        return self.posterior.sample((n,), x=observed, show_progress_bars=False).numpy()
+        limits = {"show_progress_bars": False, "max_sampling_time": self.PATIENCE}
+        try:
+            return self.posterior.sample((n,), x=observed, **limits).numpy()
+        except RuntimeError:
+            self.lost.append(x.tobytes())
+            return self.prior.sample((n,)).numpy()
 
     def log_prob(self, u: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Returns log densities of coordinates (n, p) given statistics (s,)."""
         observed = torch.as_tensor(x, dtype=torch.float32)[None]
         points = torch.as_tensor(u, dtype=torch.float32)
+        if x.tobytes() in self.lost:
+            return self.prior.log_prob(points).numpy()
         # The share of the flow outside the prior, which sbi divides by: to a hundredth of a nat.
         leakage = {"num_rejection_samples": 2000}
         log_prob = self.posterior.log_prob(points, x=observed, leakage_correction_params=leakage)
@@ -209,6 +228,8 @@ def run_pours(options: argparse.Namespace, add: Callable[..., None], done: set[t
                 " ".join(f"{e:.3f}" for e in errors), *cover,
                 round(seconds, 1), round(1e3 * took / len(test), 1),
             )  # fmt: skip
+            if isinstance(made, Sbi) and made.outside:
+                print(f"    {made.outside} of {len(test)} posteriors lie outside the prior")
 
 
 def main() -> None:

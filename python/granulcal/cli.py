@@ -10,6 +10,7 @@ from typing import Any
 
 from granulcal import _native, design_command, loop_command
 from granulcal.files import write_beside
+from granulcal.one_thread import one_thread
 
 __all__ = ["main"]
 
@@ -63,7 +64,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _guarded(command: Callable[[], int]) -> int:
     """Runs a command; tells what was wrong in one line instead of a traceback."""
     try:
-        return command()
+        with one_thread():
+            return command()
     except KeyboardInterrupt:
         print("granulcal: stopped", file=sys.stderr)
         return _INTERRUPTED

@@ -16,6 +16,7 @@ from granulcal.bayessim.likelihood import Likelihood, joint_density
 from granulcal.bayessim.mixture import Mixture
 from granulcal.bayessim.product import LEAST_LOG_EVIDENCE_RATIO, product_density
 from granulcal.bayessim.stack import StackedDensity
+from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
 
 if TYPE_CHECKING:
@@ -290,6 +291,7 @@ class Posterior:
         """Paths of the parameters, in the order of the columns."""
         return self.prior.names
 
+    @one_thread()
     def sample(self, n: int, seed: int = 0) -> Array:
         """Returns `n` draws, own units, shape (n, p); the same seed gives the same draws."""
         if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 0:
@@ -297,6 +299,7 @@ class Posterior:
         coordinates = self.density.sample(int(n), np.random.default_rng(seed))
         return self.prior.from_unconstrained(coordinates)
 
+    @one_thread()
     def log_prob(self, theta: ArrayLike) -> Array:
         """Returns the log density at `theta` (n, p) or (p,), shape (n,); -inf outside the bounds.
 
@@ -308,6 +311,7 @@ class Posterior:
         result[inside] += self.prior.log_slope(values[inside])
         return result
 
+    @one_thread()
     def coordinate_log_prob(self, theta: ArrayLike) -> Array:
         """Returns the log density of the coordinates of `theta` (n, p), shape (n,).
 
@@ -321,10 +325,12 @@ class Posterior:
         result[inside] = self.density.log_prob(self.prior.to_unconstrained(values[inside]))
         return result
 
+    @one_thread()
     def mean(self) -> Array:
         """Returns the means, own units, shape (p,), over 10,000 draws."""
         return self.prior.from_unconstrained(self._draws()[0]).mean(axis=0)
 
+    @one_thread()
     def mode(self) -> Array:
         """Returns the parameters of highest density in coordinates, own units, shape (p,).
 
@@ -350,6 +356,7 @@ class Posterior:
             step *= 0.85
         return self.prior.from_unconstrained(points[heights.argmax()][None])[0]
 
+    @one_thread()
     def credible_region(self, level: float = 0.9) -> CredibleRegion:
         """Returns central intervals and the highest-density region of probability `level`."""
         if not 0 < level < 1:
@@ -361,6 +368,7 @@ class Posterior:
         threshold = float(np.quantile(log_density, 1 - level))
         return CredibleRegion(level, tuple(self.names), intervals, threshold, self)
 
+    @one_thread()
     def marginals(self, *, grid: int = 200) -> dict[str, Marginal]:
         """Returns the marginal of each parameter by name, on `grid` points."""
         draws = self._draws()[0]

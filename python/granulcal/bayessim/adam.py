@@ -1,4 +1,4 @@
-r"""Adam with decoupled decay of the weights, for arrays of numpy and tensors of torch alike.
+r"""Adam with decoupled decay of the weights.
 
 $$ m \leftarrow \beta_1 m + (1 - \beta_1) g, \qquad v \leftarrow \beta_2 v + (1 - \beta_2) g^2,
    \qquad x \leftarrow (1 - \eta \lambda) x
@@ -12,7 +12,8 @@ Reference:
 """
 
 from collections.abc import Sequence
-from typing import Any
+
+import torch
 
 __all__ = ["Adam"]
 
@@ -20,32 +21,33 @@ _FIRST, _SECOND, _SMALL = 0.9, 0.999, 1e-8
 
 
 class Adam:
-    """Moments of the gradients of some arrays.
+    """Moments of the gradients of some tensors.
 
     Args:
-        arrays: changed in place by `step`.
-        decays: lambda of each array; None: no decay.
+        tensors: changed in place by `step`.
+        decays: lambda of each tensor; None: no decay.
     """
 
-    def __init__(self, arrays: Sequence[Any], decays: Sequence[float] | None = None) -> None:
+    def __init__(
+        self, tensors: Sequence[torch.Tensor], decays: Sequence[float] | None = None
+    ) -> None:
         """Starts at zero moments."""
-        self.arrays = list(arrays)
-        self.decays = list(decays or [0.0] * len(self.arrays))
-        self.first = [0 * array for array in self.arrays]
-        self.second = [0 * array for array in self.arrays]
+        self.tensors = list(tensors)
+        self.decays = list(decays or [0.0] * len(self.tensors))
+        self.first = [torch.zeros_like(tensor) for tensor in self.tensors]
+        self.second = [torch.zeros_like(tensor) for tensor in self.tensors]
         self.steps = 0
 
-    def step(self, gradients: Sequence[Any], rate: float) -> None:
-        """Moves each array against its gradient; `rate` is eta."""
+    def step(self, gradients: Sequence[torch.Tensor], rate: float) -> None:
+        """Moves each tensor against its gradient; `rate` is eta."""
         self.steps += 1
-        size = rate / (1 - _FIRST**self.steps)
-        root = (1 - _SECOND**self.steps) ** -0.5
-        together = zip(self.arrays, gradients, self.first, self.second, self.decays, strict=True)
-        for array, gradient, first, second, decay in together:
-            first *= _FIRST
-            first += (1 - _FIRST) * gradient
-            second *= _SECOND
-            second += (1 - _SECOND) * gradient * gradient
+        root = (1 - _SECOND**self.steps) ** 0.5
+        # Numerator and denominator times the root of the second correction.
+        size = rate * root / (1 - _FIRST**self.steps)
+        together = zip(self.tensors, gradients, self.first, self.second, self.decays, strict=True)
+        for tensor, gradient, first, second, decay in together:
+            first.lerp_(gradient, 1 - _FIRST)
+            second.mul_(_SECOND).addcmul_(gradient, gradient, value=1 - _SECOND)
             if decay:
-                array *= 1 - rate * decay
-            array -= size * first / (root * second**0.5 + _SMALL)
+                tensor.mul_(1 - rate * decay)
+            tensor.addcdiv_(first, second.sqrt().add_(root * _SMALL), value=-size)

@@ -8,12 +8,12 @@ length scales maximise the summed evidence of all statistics.
 """
 
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
+from functools import cache
+from itertools import chain, combinations_with_replacement
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from granulcal.bayessim.adam import Adam
 
 __all__ = ["Basis", "learn_length_scales"]
 
@@ -62,29 +62,49 @@ class Basis:
                 is too much for a log density to the last digit, but not for a weight.
         """
         v = (u - self.centre) / self.scale
-        phase: NDArray[np.floating] = v @ self.frequencies.T
-        size = len(self.frequencies) ** -0.5
+        phase: NDArray[np.floating] = self.frequencies @ v.T
         if quick:
             # The turns are taken away before digits are lost.
-            phase = (phase - 2 * np.pi * np.rint(phase / (2 * np.pi))).astype(np.float32)
-        parts = [
-            _POLYNOMIAL * polynomial(v, self.degree),
-            size * np.cos(phase),
-            size * np.sin(phase),
-        ]
-        return np.concatenate(parts, axis=1)
+            turns = phase / (2 * np.pi)
+            turns -= np.rint(turns)
+            phase = turns.astype(np.float32)
+            phase *= np.float32(2 * np.pi)
+        terms, count = _terms(u.shape[1], self.degree), len(self.frequencies)
+        # One feature after the other lies in memory, so that each is filled in one go.
+        features: Any = np.empty((len(terms) + 2 * count, len(u)), dtype=phase.dtype)
+        _fill_polynomial(v, terms, features)
+        features[: len(terms)] *= _POLYNOMIAL
+        waves = features[len(terms) :]
+        np.cos(phase, out=waves[:count])
+        np.sin(phase, out=waves[count:])
+        waves *= count**-0.5
+        return features.T
 
 
 def polynomial(v: Array, degree: int) -> Array:
     """Returns all monomials of `v` (n, p) up to `degree`, the constant first."""
-    columns = [np.ones(len(v))]
-    for power in range(1, degree + 1):
-        for term in combinations_with_replacement(range(v.shape[1]), power):
-            column = v[:, term[0]]
-            for i in term[1:]:
-                column = column * v[:, i]
-            columns.append(column)
-    return np.stack(columns, axis=1)
+    terms = _terms(v.shape[1], degree)
+    rows = np.empty((len(terms), len(v)))
+    _fill_polynomial(v, terms, rows)
+    return rows.T
+
+
+@cache
+def _terms(dimension: int, degree: int) -> tuple[tuple[int, ...], ...]:
+    """Which coordinates each monomial multiplies."""
+    powers = range(degree + 1)
+    return tuple(
+        chain.from_iterable(combinations_with_replacement(range(dimension), d) for d in powers)
+    )
+
+
+def _fill_polynomial(
+    v: Array, terms: tuple[tuple[int, ...], ...], rows: NDArray[np.floating]
+) -> None:
+    for term, row in zip(terms, rows, strict=False):
+        row[:] = v[:, term[0]] if term else 1.0
+        for i in term[1:]:
+            row *= v[:, i]
 
 
 def learn_length_scales(u: Array, z: Array, *, features: int, seed: int) -> Array:
@@ -96,6 +116,10 @@ def learn_length_scales(u: Array, z: Array, *, features: int, seed: int) -> Arra
         features: random frequencies.
         seed: seed of the frequencies.
     """
+    import torch
+
+    from granulcal.bayessim.adam import Adam
+
     chosen = np.random.default_rng(seed).permutation(len(u))[:_PAIRS]
     spread = u.std(axis=0)
     v = (u[chosen] - u.mean(axis=0)) / np.where(spread > 0, spread, 1.0)
@@ -103,11 +127,12 @@ def learn_length_scales(u: Array, z: Array, *, features: int, seed: int) -> Arra
     log_length = np.full(v.shape[1], _LOG_LENGTH_MEAN)
     log_ratio = np.full(z.shape[1], -2.0)
     evidence = _Evidence(v, targets, _frequencies(features, v.shape[1], seed))
-    adam = Adam([log_length, log_ratio])
+    # The tensors are views of the arrays.
+    adam = Adam([torch.from_numpy(log_length), torch.from_numpy(log_ratio)])
     for _ in range(_STEPS):
         by_length, by_ratio = evidence.slopes(log_length, log_ratio)
         by_length += (log_length - _LOG_LENGTH_MEAN) / _LOG_LENGTH_SD**2
-        adam.step([by_length, by_ratio], _STEP)
+        adam.step([torch.from_numpy(by_length), torch.from_numpy(by_ratio)], _STEP)
     return np.exp(log_length)
 
 

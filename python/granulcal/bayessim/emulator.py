@@ -175,13 +175,15 @@ class Emulator:
 
     def predict(self, u: Array, *, quick: bool = False) -> Prediction:
         """Returns what is expected at `u` (n, p); `quick` as in `Basis`."""
+        kind = np.float32 if quick else np.float64
+        coefficients = self.coefficients.T.astype(kind, copy=False)
         means = np.empty((len(u), len(self.coefficients)))
         for start in range(0, len(u), _BLOCK):
             rows = slice(start, start + _BLOCK)
-            means[rows] = self.basis(u[rows], quick=quick) @ self.coefficients.T
+            means[rows] = self.basis(u[rows], quick=quick) @ coefficients
         design = self.scale_basis(u, quick=quick)
-        scales = np.exp(design @ self.scale_coefficients.T)
-        unknown = np.exp(design @ self.unknown_coefficients.T)
+        scales = np.exp(design @ self.scale_coefficients.T.astype(kind, copy=False))
+        unknown = np.exp(design @ self.unknown_coefficients.T.astype(kind, copy=False))
         return Prediction(
             self.shift + self.spread * means, self.spread * scales, self.spread * unknown
         )

@@ -12,7 +12,7 @@ Reference:
 
 import torch
 
-__all__ = ["draw_frequencies", "fourier_features"]
+__all__ = ["draw_frequencies", "fourier_features", "waves"]
 
 _MATERN_DEGREES_OF_FREEDOM = {"matern12": 1.0, "matern32": 3.0, "matern52": 5.0}
 # Sobol points may touch 0 or 1, where the inverse normal is infinite.
@@ -52,9 +52,13 @@ def fourier_features(x: torch.Tensor, frequencies: torch.Tensor) -> torch.Tensor
     Returns:
         Cosines, then sines, over the root of m; shape (..., n, 2 m).
     """
+    return frequencies.shape[-2] ** -0.5 * waves(x, frequencies)
+
+
+def waves(x: torch.Tensor, frequencies: torch.Tensor) -> torch.Tensor:
+    """Returns cosines, then sines, of size one; otherwise as `fourier_features`."""
     phase = x @ frequencies.transpose(-1, -2)
-    scale = frequencies.shape[-2] ** -0.5
-    return scale * torch.cat([torch.cos(phase), torch.sin(phase)], dim=-1)
+    return torch.cat([torch.cos(phase), torch.sin(phase)], dim=-1)
 
 
 def _chi2_quantile(probability: torch.Tensor, degrees: float) -> torch.Tensor:

@@ -36,8 +36,8 @@ def geometric_density(
     """
     likelihood, z = condition
 
-    def tilt(u: Array, emulated: Array) -> Array:
-        learnt = mixture.log_prob(u) - prior.coordinate_log_prob(u)
+    def tilt(u: Array, emulated: Array, quick: bool) -> Array:
+        learnt = mixture.log_prob(u, quick=quick) - prior.coordinate_log_prob(u)
         return average.emulator * emulated + average.network * learnt
 
     # The mixture is dear, and nowhere above its bound: points that cannot matter go without.
@@ -45,13 +45,13 @@ def geometric_density(
     at_most = mixture.log_bound() - prior.coordinate_log_prob(pool)
     bound = average.emulator * emulated + average.network * at_most
     best = int(emulated.argmax())
-    reached = tilt(pool[best : best + 1], emulated[best : best + 1])[0]
+    reached = tilt(pool[best : best + 1], emulated[best : best + 1], True)[0]
     matters = bound >= reached - _NEGLIGIBLE
     log_weights = np.full(len(pool), -np.inf)
-    log_weights[matters] = tilt(pool[matters], emulated[matters])
+    log_weights[matters] = tilt(pool[matters], emulated[matters], True)
     return density_over_prior(
         prior,
-        lambda u, quick: tilt(u, likelihood.log_prob(z, u, quick=quick)),
+        lambda u, quick: tilt(u, likelihood.log_prob(z, u, quick=quick), quick),
         pool,
         log_weights,
         mixtures=(mixture,),

@@ -117,7 +117,7 @@ class ImportanceDensity:
         for _ in range(effort.rounds):
             draws = proposal.sample(effort.draws, generator)
             found = _inside(prior, weigh, draws)
-            log_ratio = found - proposal.log_prob(draws)
+            log_ratio = found - proposal.log_prob(draws, quick=True)
             if _effective(_normalised(log_ratio)) > effort.good_share * len(draws):
                 # A round whose proposal is kept is the beginning of the pool.
                 pool, heights = draws, found
@@ -127,7 +127,7 @@ class ImportanceDensity:
         rest = proposal.sample(effort.pool - len(pool), generator)
         pool = np.concatenate([pool, rest])
         heights = np.concatenate([heights, _inside(prior, weigh, rest)])
-        log_ratio = heights - proposal.log_prob(pool)
+        log_ratio = heights - proposal.log_prob(pool, quick=True)
         largest = float(log_ratio.max())
         log_normaliser = largest + math.log(float(np.mean(np.exp(log_ratio - largest))))
         return cls(

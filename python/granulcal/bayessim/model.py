@@ -22,6 +22,7 @@ from granulcal.bayessim.trainer import Progress
 from granulcal.bayessim.training import train_model
 from granulcal.errors import ObservationError
 from granulcal.identifiability import Identifiability
+from granulcal.one_thread import one_thread
 from granulcal.posterior import OutOfRange, Posterior
 from granulcal.prior import Prior
 
@@ -97,6 +98,7 @@ class BayesSim:
         self.scene_toml = scene_toml
 
     @classmethod
+    @one_thread()
     def fit(
         cls,
         data_or_theta: Any,
@@ -177,6 +179,7 @@ class BayesSim:
             return None
         return hashlib.sha256(self.scene_toml.encode()).hexdigest()
 
+    @one_thread()
     def posterior(self, x_obs: ArrayLike) -> Posterior:
         """Returns the posterior given one observation, or several of one material.
 
@@ -204,6 +207,7 @@ class BayesSim:
             )
         return Posterior.from_conditions(self.prior, [(self.likelihood, z)], warnings=warnings)
 
+    @one_thread()
     def misfit(self, x_obs: ArrayLike) -> Misfit:
         """Returns whether any parameters explain one observation, or several of one material.
 
@@ -218,6 +222,7 @@ class BayesSim:
         z = self.standardiser.apply(self._checked(x_obs), clip=False)
         return self.misfit_reference.test(self.likelihood, z, self.x_names)
 
+    @one_thread()
     def check(self, theta: ArrayLike, x: ArrayLike, *, draw_count: int = 1000) -> Calibration:
         """Returns the calibration on pairs, which must not have been trained on.
 

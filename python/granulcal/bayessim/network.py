@@ -14,12 +14,13 @@ Reference:
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from granulcal.bayessim.features import fourier_features
+from granulcal.bayessim.features import waves
 from granulcal.bayessim.mixture import Mixture
 
 __all__ = ["HeadLayout", "Network"]
@@ -53,23 +54,32 @@ class HeadLayout:
 
     def split(self, outputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Returns log weights (..., k), means (..., k, p) and factors (..., k, p, p)."""
+        log_weights, means, log_diagonal, below = self._entries(outputs)
+        factors = torch.diag_embed(log_diagonal.exp())
+        rows, columns = _below(self.dimension)
+        factors[..., rows, columns] = below
+        return log_weights, means, factors
+
+    def log_density(self, outputs: torch.Tensor, u: torch.Tensor) -> torch.Tensor:
+        """Returns the log mixture density of `u` (..., p), shape (...)."""
+        log_weights, means, log_diagonal, below = self._entries(outputs)
+        rows, columns = _below(self.dimension)
+        off = u[..., None, :] - means
+        # F^T (u - m) entry by entry: thousands of products of small matrices take longer.
+        whitened = off * log_diagonal.exp()
+        if len(rows):
+            whitened = whitened.index_add(-1, columns, below * off[..., rows])
+        parts = log_weights + log_diagonal.sum(-1) - 0.5 * whitened.square().sum(-1)
+        return torch.logsumexp(parts, dim=-1) - 0.5 * self.dimension * math.log(2 * math.pi)
+
+    def _entries(self, outputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        """Log weights, means, log diagonals of the factors, and what lies below them."""
         k, p = self.components, self.dimension
         log_weights = torch.log_softmax(outputs[..., :k], dim=-1)
         means = outputs[..., self.mean_columns].unflatten(-1, (k, p))
         entries = outputs[..., self.mean_columns.stop :].unflatten(-1, (k, p * (p + 1) // 2))
         log_diagonal = entries[..., :p].clamp(-_LARGEST_LOG_DIAGONAL, _LARGEST_LOG_DIAGONAL)
-        factors = torch.diag_embed(log_diagonal.exp())
-        rows, columns = torch.tril_indices(p, p, offset=-1)
-        factors[..., rows, columns] = entries[..., p:]
-        return log_weights, means, factors
-
-    def log_density(self, outputs: torch.Tensor, u: torch.Tensor) -> torch.Tensor:
-        """Returns the log mixture density of `u` (..., p), shape (...)."""
-        log_weights, means, factors = self.split(outputs)
-        whitened = ((u[..., None, :] - means)[..., None, :] @ factors)[..., 0, :]
-        log_det = torch.diagonal(factors, dim1=-2, dim2=-1).log().sum(-1)
-        parts = log_weights + log_det - 0.5 * whitened.square().sum(-1)
-        return torch.logsumexp(parts, dim=-1) - 0.5 * self.dimension * math.log(2 * math.pi)
+        return log_weights, means, log_diagonal, entries[..., p:]
 
     def mixtures(self, outputs: torch.Tensor) -> list[Mixture]:
         """Returns one mixture for each row of `outputs` (n, size)."""
@@ -77,6 +87,13 @@ class HeadLayout:
         weights = np.exp(log_weights)
         weights /= weights.sum(axis=-1, keepdims=True)
         return [Mixture(*row) for row in zip(weights, means, factors, strict=True)]
+
+
+@cache
+def _below(dimension: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """Rows and columns of the entries below the diagonal."""
+    rows, columns = torch.tril_indices(dimension, dimension, offset=-1)
+    return rows, columns
 
 
 @dataclass
@@ -150,8 +167,7 @@ class Network:
     def outputs(self, x: torch.Tensor) -> torch.Tensor:
         """Returns the heads' outputs at `x` (e, n, d), shape (e, n, layout.size)."""
         # Unit-size features: with Adam, steps of all weights are then alike.
-        features = fourier_features(x, self.frequencies) * self.frequencies.shape[-2] ** 0.5
-        return x @ self.linear + features @ self.fourier + self.bias
+        return x @ self.linear + waves(x, self.frequencies) @ self.fourier + self.bias
 
     def mixtures(self, x: NDArray[np.float64]) -> list[Mixture]:
         """Returns the pooled mixture of all members at each row of `x` (n, d)."""

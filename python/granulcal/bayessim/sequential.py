@@ -31,6 +31,7 @@ from granulcal.bayessim.likelihood import EmulatorChoice
 from granulcal.bayessim.misfit import Misfit
 from granulcal.bayessim.round_fit import RoundFit, first_design
 from granulcal.errors import ObservationError, TrainingDataError
+from granulcal.one_thread import one_thread
 from granulcal.posterior import Posterior
 from granulcal.prior import Prior
 
@@ -110,6 +111,7 @@ def round_sizes(budget: int) -> list[int]:
     return [first, *np.diff(ends).tolist()]
 
 
+@one_thread()
 def infer_within_budget(
     simulate: Callable[[Array, int], Array],
     prior: Prior,

@@ -12,6 +12,7 @@ from granulcal.bayessim.adam import Adam
 from granulcal.bayessim.config import Config
 from granulcal.bayessim.features import draw_frequencies
 from granulcal.bayessim.network import HeadLayout, Network
+from granulcal.one_thread import one_thread
 
 __all__ = ["Progress", "TrainingResult", "train"]
 
@@ -57,6 +58,7 @@ class TrainingResult:
     curve: tuple[tuple[float, float], ...]
 
 
+@one_thread()
 def train(
     u: Array,
     x: Array,
@@ -78,15 +80,9 @@ def train(
         weights: of each pair in the loss, shape (n,); None: all the same.
         progress: called after each pass.
 
-    The thread count of torch is set to 1 meanwhile: the sums, and so the result, would otherwise
-    depend on the machine.
+    On one thread: see `one_thread`.
     """
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        return _Training(u, x, relevance, config, seed, weights).run(progress)
-    finally:
-        torch.set_num_threads(threads)
+    return _Training(u, x, relevance, config, seed, weights).run(progress)
 
 
 class _Training:

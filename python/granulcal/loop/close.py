@@ -33,6 +33,7 @@ from granulcal.loop.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.thresholds import Thresholds
 from granulcal.loop.trace import Explanation, Power, Trace, power, trace
+from granulcal.one_thread import one_thread
 from granulcal.scene import Scene
 
 __all__ = ["Closed", "close_loop", "fit_surrogate", "planned"]
@@ -160,6 +161,7 @@ class Closed:
         }
 
 
+@one_thread()
 def close_loop(
     task: Task,
     out: str | os.PathLike[str],
@@ -271,6 +273,7 @@ def close_loop(
     return closed
 
 
+@one_thread()
 def fit_surrogate(
     store: Archive,
     *,
@@ -289,6 +292,7 @@ def fit_surrogate(
     return Surrogate.fit(design, theta, condition, psi, x, names=rows.names, seed=seed)
 
 
+@one_thread()
 def planned(task: Task, budget: int, seed: int, pairs: int = 0, rounds: int = 0) -> Plan:
     """Returns the archive that a budget affords, `pairs` and `rounds` of pours kept back.
 
