@@ -16,6 +16,7 @@ import numpy as np
 import torch
 from rounds_on_pours import judged, show
 
+from granulcal.bayessim import BayesSim
 from granulcal.bayessim.likelihood import Likelihood
 from granulcal.bayessim.sequential import rounds_of
 from granulcal.bayessim.standardise import Standardiser
@@ -59,13 +60,23 @@ def of_the_prior(prior: Prior, u: Array, x: Array, observed: Array) -> list[Post
     return [Posterior.from_conditions(prior, [(fitted, row[None])]) for row in rows]
 
 
+def by_default(prior: Prior, u: Array, x: Array, observed: Array) -> list[Posterior]:
+    """Returns the same by the default of `granulcal train`."""
+    usable = np.isfinite(x).all(axis=1)
+    theta = prior.from_unconstrained(u[usable])
+    model = BayesSim.fit(theta, x[usable], prior, quiet=True)
+    return [model.posterior(row) for row in observed]
+
+
 def main() -> None:
     """Prints one row for each way; the last is the difference that the bar asks for."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path, help="data set of `granulcal generate`")
     parser.add_argument("--recordings", type=int, default=30)
     parser.add_argument("--budget", type=int, default=150)
-    parser.add_argument("--most", type=int, default=900, help="pours of the prior to compare with")
+    parser.add_argument(
+        "--most", type=int, default=1000, help="pours of the prior to compare with, usable or not"
+    )
     options = parser.parse_args()
     torch.set_num_threads(1)
     data = Dataset.load(options.data)
@@ -80,20 +91,26 @@ def main() -> None:
     print("| pours | log density | each | truths in 90 % intervals | sd, coordinates |")
     print("|---|---|---|---|---|")
     rows = {}
-    for count in (options.budget, min(options.most, len(u))):
-        posteriors = of_the_prior(prior, u[:count], x[:count], observed)
-        rows[count] = [judged(p, truth) for p, truth in zip(posteriors, truths, strict=True)]
-        show(f"{count} of the prior", rows[count])
+    most = min(options.most, len(u))
+    ways = {
+        f"{options.budget} of the prior": (options.budget, of_the_prior),
+        f"{most} of the prior": (most, of_the_prior),
+        f"{most} of the prior, by `auto`": (most, by_default),
+    }
+    for name, (count, posteriors_of) in ways.items():
+        posteriors = posteriors_of(prior, u[:count], x[:count], observed)
+        rows[name] = [judged(p, truth) for p, truth in zip(posteriors, truths, strict=True)]
+        show(name, rows[name])
     rounds = []
     for number, (truth, row) in enumerate(zip(truths, observed, strict=True)):
         found = rounds_of(Bank(u, x), prior, row, budget=options.budget, seed=number)
         rounds.append(judged(found.posterior, truth))
         print(f"recording {number}: {rounds[-1][0]:.2f}, {found.choice}", flush=True)
     show(f"{options.budget} in rounds", rounds)
-    for count, others in rows.items():
+    for name, others in rows.items():
         gain = np.array([a[0] - b[0] for a, b in zip(rounds, others, strict=True)])
         error = gain.std(ddof=1) / np.sqrt(len(gain))
-        print(f"in rounds less {count} of the prior: {gain.mean():.2f} ± {error:.2f}")
+        print(f"in rounds less {name}: {gain.mean():.2f} ± {error:.2f}")
 
 
 if __name__ == "__main__":

@@ -1,10 +1,12 @@
 //! The prior's coordinates: a uniform range is [0, 1], a log-uniform one too in its logarithm, a normal z-scores.
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+use std::sync::OnceLock;
 
 use granulcal_dataset::{Distribution, Prior};
+use nalgebra::DMatrix;
 
-use crate::quasi::QuasiUniform;
+use crate::quasi::{QuasiUniform, quasi_normal};
 
 /// One free parameter.
 #[derive(Clone, Debug)]
@@ -22,25 +24,29 @@ struct Coordinate {
 
 /// The free parameters of a prior.
 #[derive(Clone, Debug)]
-pub struct Coordinates(Vec<Coordinate>);
+pub struct Coordinates {
+    each: Vec<Coordinate>,
+    normal: OnceLock<DMatrix<f64>>,
+}
 
 impl Coordinates {
     pub fn of(prior: &Prior) -> Self {
         let free = prior.free();
-        Self(free.iter().map(|&i| coordinate(prior.parameters()[i].distribution)).collect())
+        let each = free.iter().map(|&i| coordinate(prior.parameters()[i].distribution)).collect();
+        Self { each, normal: OnceLock::new() }
     }
 
     pub fn dimension(&self) -> usize {
-        self.0.len()
+        self.each.len()
     }
 
     /// Whether nothing bounds any of them.
     pub fn is_unbounded(&self) -> bool {
-        self.0.iter().all(|c| c.low == f64::NEG_INFINITY && c.high == f64::INFINITY)
+        self.each.iter().all(|c| c.low == f64::NEG_INFINITY && c.high == f64::INFINITY)
     }
 
     pub fn is_inside(&self, u: &[f64]) -> bool {
-        self.0.iter().zip(u).all(|(c, &u)| c.low <= u && u <= c.high)
+        self.each.iter().zip(u).all(|(c, &u)| c.low <= u && u <= c.high)
     }
 
     /// Log prior density of coordinates, minus infinity outside the bounds.
@@ -52,24 +58,24 @@ impl Coordinates {
             Distribution::Normal { .. } => -0.5 * u * u - 0.5 * TAU.ln() - c.log_mass,
             _ => 0.0,
         };
-        self.0.iter().zip(u).map(|(c, &u)| normal(c, u)).sum()
+        self.each.iter().zip(u).map(|(c, &u)| normal(c, u)).sum()
     }
 
     /// Values in own units.
     pub fn values(&self, u: &[f64]) -> Vec<f64> {
-        self.0.iter().zip(u).map(|(c, &u)| c.value(u)).collect()
+        self.each.iter().zip(u).map(|(c, &u)| c.value(u)).collect()
     }
 
     /// Coordinates of values in own units.
     pub fn of_values(&self, theta: &[f64]) -> Vec<f64> {
-        self.0.iter().zip(theta).map(|(c, &value)| c.of_value(value)).collect()
+        self.each.iter().zip(theta).map(|(c, &value)| c.of_value(value)).collect()
     }
 
     /// log |du / dtheta|.
     pub fn log_slope(&self, theta: &[f64]) -> f64 {
         let slope =
             |c: &Coordinate, value: f64| -c.scale.ln() - if c.is_log { value.ln() } else { 0.0 };
-        self.0.iter().zip(theta).map(|(c, &value)| slope(c, value)).sum()
+        self.each.iter().zip(theta).map(|(c, &value)| slope(c, value)).sum()
     }
 
     /// Variance of the prior along each coordinate, over evenly spread draws.
@@ -86,11 +92,17 @@ impl Coordinates {
         (mean, variance)
     }
 
+    /// Evenly spread standard normal points of this dimension, one a column; the count of the first call.
+    pub fn normal_points(&self, count: usize) -> &DMatrix<f64> {
+        let points = || quasi_normal(count, self.dimension()).concat();
+        self.normal.get_or_init(|| DMatrix::from_vec(self.dimension(), count, points()))
+    }
+
     /// Evenly spread draws of the prior.
     pub fn quasi_prior(&self, count: usize) -> Vec<Vec<f64>> {
         let uniform = QuasiUniform::new(self.dimension());
         let draw = |p: &[f64]| {
-            let draws = self.0.iter().zip(p);
+            let draws = self.each.iter().zip(p);
             draws.map(|(c, &p)| c.of_value(c.distribution.quantile(p))).collect()
         };
         (0..count).map(|index| draw(&uniform.point(index))).collect()

@@ -1,64 +1,84 @@
 //! Means and scales of the leading signal axes, linear in random features of the coordinates.
 
+use pulp::{Arch, NullaryFnOnce};
+
 use crate::ModelError;
 use crate::matrix::{Matrix, dot};
 use crate::tensors::Tensors;
+use crate::waves::Waves;
 
 /// Prior standard deviation of constant and slopes over that of the random features' sum.
 const POLYNOMIAL: f64 = 3.0;
 
-/// Polynomial and random Fourier features.
+/// Polynomial and random Fourier features of coordinates that are standardised already.
 #[derive(Clone, Debug)]
 struct Basis {
-    centre: Vec<f64>,
-    scale: Vec<f64>,
-    frequencies: Matrix,
+    inputs: usize,
+    waves: Waves,
+    wave_size: f64,
     is_quadratic: bool,
 }
 
 impl Basis {
-    fn size(&self) -> usize {
-        let p = self.centre.len();
-        let quadratic = if self.is_quadratic { p * (p + 1) / 2 } else { 0 };
-        1 + p + quadratic + 2 * self.frequencies.rows()
+    fn of(frequencies: &Matrix, is_quadratic: bool) -> Self {
+        let wave_size = (frequencies.rows() as f64).powf(-0.5);
+        Self { inputs: frequencies.columns, waves: Waves::of(frequencies), wave_size, is_quadratic }
     }
 
-    fn fill(&self, u: &[f64], features: &mut Vec<f64>) {
-        let p = u.len();
-        let v: Vec<_> = (0..p).map(|i| (u[i] - self.centre[i]) / self.scale[i]).collect();
+    fn size(&self) -> usize {
+        let p = self.inputs;
+        let quadratic = if self.is_quadratic { p * (p + 1) / 2 } else { 0 };
+        1 + p + quadratic + self.waves.size()
+    }
+
+    #[inline(always)]
+    fn fill(&self, v: &[f64], features: &mut Vec<f64>) {
         features.clear();
         features.push(POLYNOMIAL);
         features.extend(v.iter().map(|v| POLYNOMIAL * v));
         if self.is_quadratic {
-            for i in 0..p {
+            for i in 0..v.len() {
                 features.extend(v[i..].iter().map(|other| POLYNOMIAL * v[i] * other));
             }
         }
-        let count = self.frequencies.rows();
-        let size = (count as f64).powf(-0.5);
-        let cosines = features.len();
-        features.resize(cosines + 2 * count, 0.0);
-        for k in 0..count {
-            let (sine, cosine) = dot(self.frequencies.row(k), &v).sin_cos();
-            features[cosines + k] = size * cosine;
-            features[cosines + count + k] = size * sine;
-        }
+        let polynomial = features.len();
+        features.resize(polynomial + self.waves.size(), 0.0);
+        self.waves.fill(v, self.wave_size, &mut features[polynomial..]);
     }
 }
 
 /// What is expected at one point, axis by axis.
-#[derive(Clone, Debug)]
-pub struct Prediction {
-    pub means: Vec<f64>,
+#[derive(Clone, Copy, Debug)]
+pub struct Prediction<'a> {
+    pub means: &'a [f64],
     /// Variance of what the emulator leaves of one pour.
-    pub noise: Vec<f64>,
+    pub noise: &'a [f64],
     /// Variance of the means themselves.
-    pub unknown: Vec<f64>,
+    pub unknown: &'a [f64],
+}
+
+impl<'a> Prediction<'a> {
+    /// Of the three one after the other.
+    pub fn of(row: &'a [f64]) -> Self {
+        let axes = row.len() / 3;
+        let (means, variances) = row.split_at(axes);
+        let (noise, unknown) = variances.split_at(axes);
+        Self { means, noise, unknown }
+    }
+}
+
+/// Room for the numbers on the way to a prediction, used again for the next.
+#[derive(Default)]
+pub struct Workings {
+    coordinates: Vec<f64>,
+    features: Vec<f64>,
 }
 
 /// Emulator of r axes.
 #[derive(Clone, Debug)]
 pub struct Emulator {
+    centre: Vec<f64>,
+    scale: Vec<f64>,
     basis: Basis,
     coefficients: Matrix,
     scale_basis: Basis,
@@ -79,14 +99,9 @@ impl Emulator {
     ) -> Result<Self, ModelError> {
         let centre = tensors.take("emulator_centre", &[p])?;
         let scale = tensors.take("emulator_scale", &[p])?;
-        let basis = Basis {
-            centre: centre.clone(),
-            scale: scale.clone(),
-            frequencies: tensors.matrix("emulator_frequencies", features, p)?,
-            is_quadratic: false,
-        };
+        let basis = Basis::of(&tensors.matrix("emulator_frequencies", features, p)?, false);
         let frequencies = tensors.rows("emulator_scale_frequencies", None, Some(p))?;
-        let scale_basis = Basis { centre, scale, frequencies, is_quadratic: true };
+        let scale_basis = Basis::of(&frequencies, true);
         let first = |name: &str, columns: usize| -> Result<Matrix, ModelError> {
             Ok(tensors.matrix(name, s, columns)?.first(axes))
         };
@@ -96,6 +111,8 @@ impl Emulator {
             Ok(all)
         };
         Ok(Self {
+            centre,
+            scale,
             coefficients: first("emulator_coefficients", basis.size())?,
             scale_coefficients: first("emulator_scale_coefficients", scale_basis.size())?,
             unknown_coefficients: first("emulator_unknown_coefficients", scale_basis.size())?,
@@ -110,21 +127,45 @@ impl Emulator {
         self.shift.len()
     }
 
-    pub fn predict(&self, u: &[f64]) -> Prediction {
-        let mut features = Vec::with_capacity(self.basis.size());
-        self.basis.fill(u, &mut features);
-        let axes = 0..self.shift.len();
-        let mean =
-            |j: usize| self.shift[j] + self.spread[j] * dot(self.coefficients.row(j), &features);
-        let means = axes.clone().map(mean).collect();
-        self.scale_basis.fill(u, &mut features);
-        let variance = |coefficients: &Matrix, j: usize| {
-            (self.spread[j] * dot(coefficients.row(j), &features).exp()).powi(2)
-        };
-        Prediction {
-            means,
-            noise: axes.clone().map(|j| variance(&self.scale_coefficients, j)).collect(),
-            unknown: axes.map(|j| variance(&self.unknown_coefficients, j)).collect(),
+    /// What is expected at coordinates: means, noise, unknown, which fill `row`.
+    pub fn predict(&self, u: &[f64], workings: &mut Workings, row: &mut [f64]) {
+        Arch::new().dispatch(Predict { emulator: self, u, workings, row });
+    }
+}
+
+/// A closure would not be compiled for wide registers.
+struct Predict<'a> {
+    emulator: &'a Emulator,
+    u: &'a [f64],
+    workings: &'a mut Workings,
+    row: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Predict<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { emulator, u, workings, row } = self;
+        let Workings { coordinates: v, features } = workings;
+        v.clear();
+        v.extend(
+            u.iter().zip(&emulator.centre).zip(&emulator.scale).map(|((u, c), s)| (u - c) / s),
+        );
+        let (means, variances) = row.split_at_mut(emulator.axis_count());
+        let (noise, unknown) = variances.split_at_mut(emulator.axis_count());
+        emulator.basis.fill(v, features);
+        for (j, mean) in means.iter_mut().enumerate() {
+            let sum = dot(emulator.coefficients.row(j), features);
+            *mean = emulator.shift[j] + emulator.spread[j] * sum;
+        }
+        emulator.scale_basis.fill(v, features);
+        let tables = [&emulator.scale_coefficients, &emulator.unknown_coefficients];
+        for (coefficients, variances) in tables.into_iter().zip([noise, unknown]) {
+            for (j, variance) in variances.iter_mut().enumerate() {
+                let scale = emulator.spread[j] * dot(coefficients.row(j), features).exp();
+                *variance = scale * scale;
+            }
         }
     }
 }

@@ -1,58 +1,125 @@
-//! A density known up to a factor, by weighted draws of a proposal: Cappe, Guillin, Marin and Robert (2004).
+//! A density known up to a factor, by weighted draws of a proposal: Cappe, Guillin, Marin and Robert (2004). A draw of
+//! it is one of those that then walks some steps of Metropolis along differences of others (Gilks and Berzuini 2001; ter
+//! Braak 2006): without them a thousand draws are some hundred points, each several times.
 
-use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DMatrixView, DVector};
+use rayon::prelude::*;
 
 use crate::coordinates::Coordinates;
-use crate::matrix::log_sum_exp;
+use crate::likelihood::{FEWEST_EFFECTIVE, Scratch};
+use crate::matrix::Matrix;
 use crate::mixture::{Component, Mixture};
 use crate::random::{Random, cumulative};
 
 const CENTRES: usize = 60;
 /// Share of every proposal that stays as wide as the prior.
 const DEFENSIVE_SHARE: f64 = 0.1;
-const ADAPTING_DRAWS: usize = 1500;
-const FINAL_DRAWS: usize = 3000;
-const ROUNDS: usize = 5;
+const ADAPTING_DRAWS: usize = 1000;
+const FINAL_DRAWS: usize = 2000;
+const ROUNDS: usize = 6;
 /// The target is tempered until so many draws carry weight.
 const EFFECTIVE: f64 = 150.0;
 /// Adaptation ends when this share of an untempered round's draws carries weight.
 const GOOD_SHARE: f64 = 0.25;
+/// Steps of each draw: to part equal draws, and to mend a pool that is worth few draws.
+const STEPS: usize = 3;
+const MENDING_STEPS: usize = 20;
+/// Factors on the length of a step that is best for a normal.
+const STEP_FACTORS: [f64; 3] = [0.3, 0.7, 1.0];
+
+/// The log of a density up to a constant, of coordinates inside the bounds.
+pub type LogTarget<'a> = dyn Fn(&[f64], &mut Scratch) -> f64 + Sync + 'a;
 
 /// A normalised density and weighted draws of it.
 #[derive(Clone, Debug)]
 pub struct Importance {
     pub log_normaliser: f64,
-    draws: Vec<Vec<f64>>,
+    /// A row for each draw.
+    draws: Arc<Matrix>,
+    /// Log target of each.
+    heights: Vec<f64>,
     weights: Vec<f64>,
 }
 
 impl Importance {
-    /// Of draws of the prior and the log likelihood at them.
-    pub fn of_prior_draws(draws: Vec<Vec<f64>>, log_likelihood: &[f64]) -> Self {
-        Self::of(draws, log_likelihood)
+    /// Of draws of the prior and the log of the target over it.
+    pub fn of_prior_draws(
+        draws: Arc<Matrix>,
+        log_ratios: &[f64],
+        coordinates: &Coordinates,
+    ) -> Self {
+        let rows = draws.data.chunks_exact(draws.columns).zip(log_ratios);
+        let heights = rows.map(|(u, ratio)| ratio + coordinates.log_density(u)).collect();
+        Self::of(draws, heights, log_ratios)
     }
 
-    fn of(draws: Vec<Vec<f64>>, log_ratios: &[f64]) -> Self {
-        let log_normaliser =
-            log_sum_exp(log_ratios.iter().copied()) - (log_ratios.len() as f64).ln();
-        Self { log_normaliser, draws, weights: normalised(log_ratios, 1.0) }
+    fn of(draws: Arc<Matrix>, heights: Vec<f64>, log_ratios: &[f64]) -> Self {
+        let (weights, log_sum) = normalised(log_ratios, 1.0);
+        Self { log_normaliser: log_sum - (log_ratios.len() as f64).ln(), draws, heights, weights }
     }
 
     pub fn effective_sample_size(&self) -> f64 {
         effective(&self.weights)
     }
 
-    pub fn sample(&self, n: usize, random: &mut Random) -> Vec<Vec<f64>> {
+    /// Draws by resampling alone: some of them are the same.
+    pub fn resample(&self, n: usize, random: &mut Random) -> Vec<Vec<f64>> {
         let sums = cumulative(self.weights.iter().copied());
-        (0..n).map(|_| self.draws[random.index(&sums)].clone()).collect()
+        (0..n).map(|_| self.draws.row(random.index(&sums)).to_vec()).collect()
+    }
+
+    /// Draws that walk.
+    pub fn sample(
+        &self,
+        n: usize,
+        random: &mut Random,
+        coordinates: &Coordinates,
+        log_target: &LogTarget<'_>,
+    ) -> Vec<Vec<f64>> {
+        let sums = cumulative(self.weights.iter().copied());
+        let is_poor = self.effective_sample_size() < FEWEST_EFFECTIVE;
+        let best = 2.38 / (2.0 * coordinates.dimension() as f64).sqrt();
+        // All that is random is drawn first, so that threads may share the walks.
+        let walks: Vec<_> = (0..n)
+            .map(|_| Walk {
+                from: random.index(&sums),
+                steps: (0..if is_poor { MENDING_STEPS } else { STEPS })
+                    .map(|_| Step {
+                        between: [random.index(&sums), random.index(&sums)],
+                        length: best * STEP_FACTORS[random.below(STEP_FACTORS.len())],
+                        log_level: random.uniform().ln(),
+                    })
+                    .collect(),
+            })
+            .collect();
+        let walk = |scratch: &mut Scratch, walk: &Walk| {
+            let mut draw = self.draws.row(walk.from).to_vec();
+            let mut height = self.heights[walk.from];
+            for step in &walk.steps {
+                let [first, second] = step.between.map(|row| self.draws.row(row));
+                let along = first.iter().zip(second).map(|(a, b)| step.length * (a - b));
+                let tried: Vec<_> = draw.iter().zip(along).map(|(u, along)| u + along).collect();
+                if !coordinates.is_inside(&tried) {
+                    continue;
+                }
+                let reached = log_target(&tried, scratch);
+                if step.log_level < reached - height {
+                    (draw, height) = (tried, reached);
+                }
+            }
+            draw
+        };
+        walks.par_iter().map_init(Scratch::default, walk).collect()
     }
 
     /// The same density by a proposal that starts at these draws, and half at what may be known of the
-    /// density, and is adapted to `log_target`, which is asked inside the bounds only.
+    /// density, and is adapted to `log_target`.
     pub fn adapted(
         &self,
         coordinates: &Coordinates,
-        log_target: &dyn Fn(&[f64]) -> f64,
+        log_target: &LogTarget<'_>,
         known: Option<&Mixture>,
     ) -> Self {
         let mut random = Random::new(0);
@@ -71,50 +138,94 @@ impl Importance {
         if let Some(known) = known {
             proposal = proposal.halved_with(known);
         }
-        let ratios = |proposal: &Mixture, count: usize, random: &mut Random| {
-            let sampler = proposal.sampler();
-            let draws: Vec<_> = (0..count).map(|_| sampler.draw(random)).collect();
-            let log_ratios: Vec<_> = draws
-                .iter()
-                .map(|u| {
-                    if coordinates.is_inside(u) {
-                        log_target(u) - proposal.log_prob(u)
-                    } else {
-                        f64::NEG_INFINITY
-                    }
-                })
-                .collect();
-            (draws, log_ratios)
-        };
+        let mut tried = Tried::none(coordinates.dimension());
         for _ in 0..ROUNDS {
-            let (draws, log_ratios) = ratios(&proposal, ADAPTING_DRAWS, &mut random);
-            if effective(&normalised(&log_ratios, 1.0)) > GOOD_SHARE * ADAPTING_DRAWS as f64 {
+            tried.add(ADAPTING_DRAWS, &proposal, coordinates, log_target, &mut random);
+            let (weights, _) = normalised(&tried.log_ratios, 1.0);
+            if effective(&weights) > GOOD_SHARE * ADAPTING_DRAWS as f64 {
+                // A round whose proposal is kept is the beginning of the draws.
                 break;
             }
-            proposal = kernel_estimate(&draws, &tempered(&log_ratios), &wide, &mut random);
+            let weights = tempered(&tried.log_ratios);
+            proposal = kernel_estimate(&tried.draws, &weights, &wide, &mut random);
+            tried = Tried::none(coordinates.dimension());
         }
-        let (draws, log_ratios) = ratios(&proposal, FINAL_DRAWS, &mut random);
-        Self::of(draws, &log_ratios)
+        let missing = FINAL_DRAWS - tried.draws.rows();
+        tried.add(missing, &proposal, coordinates, log_target, &mut random);
+        Self::of(Arc::new(tried.draws), tried.heights, &tried.log_ratios)
+    }
+}
+
+/// A draw and the steps that it tries.
+struct Walk {
+    from: usize,
+    steps: Vec<Step>,
+}
+
+/// Along the difference of two other draws.
+struct Step {
+    between: [usize; 2],
+    length: f64,
+    /// Taken where the log density rises by more.
+    log_level: f64,
+}
+
+/// Draws of a proposal, log target and log of target over proposal at them.
+struct Tried {
+    draws: Matrix,
+    heights: Vec<f64>,
+    log_ratios: Vec<f64>,
+}
+
+impl Tried {
+    fn none(dimension: usize) -> Self {
+        let draws = Matrix { data: Vec::new(), columns: dimension };
+        Self { draws, heights: Vec::new(), log_ratios: Vec::new() }
+    }
+
+    fn add(
+        &mut self,
+        count: usize,
+        proposal: &Mixture,
+        coordinates: &Coordinates,
+        log_target: &LogTarget<'_>,
+        random: &mut Random,
+    ) {
+        let (sampler, first) = (proposal.sampler(), self.draws.data.len());
+        for _ in 0..count {
+            self.draws.data.extend(sampler.draw(random));
+        }
+        let height = |scratch: &mut Scratch, u: &[f64]| {
+            if coordinates.is_inside(u) { log_target(u, scratch) } else { f64::NEG_INFINITY }
+        };
+        let new = self.draws.data[first..].par_chunks_exact(self.draws.columns);
+        self.heights.par_extend(new.clone().map_init(Scratch::default, height));
+        let heights = self.heights[self.log_ratios.len()..].par_iter();
+        let ratio = |(u, height): (&[f64], &f64)| height - proposal.log_prob(u);
+        self.log_ratios.par_extend(new.zip(heights).map(ratio));
     }
 }
 
 /// Equal normals around some of the weighted draws with their total covariance, and the wide one.
 fn kernel_estimate(
-    draws: &[Vec<f64>],
+    draws: &Matrix,
     weights: &[f64],
     wide: &Component,
     random: &mut Random,
 ) -> Mixture {
     let p = wide.mean.len();
     let total: f64 = weights.iter().sum();
+    let points = DMatrixView::from_slice(&draws.data, p, draws.rows());
     let mut mean = DVector::zeros(p);
-    for (u, weight) in draws.iter().zip(weights) {
-        mean += DVector::from_column_slice(u) * (weight / total);
+    for (u, weight) in points.column_iter().zip(weights) {
+        mean.axpy(weight / total, &u, 1.0);
     }
     let mut covariance = DMatrix::zeros(p, p);
-    for (u, weight) in draws.iter().zip(weights) {
-        let off = DVector::from_column_slice(u) - &mean;
-        covariance += &off * off.transpose() * (weight / total);
+    let mut off = DVector::zeros(p);
+    for (u, weight) in points.column_iter().zip(weights) {
+        off.copy_from(&u);
+        off -= &mean;
+        covariance.ger(weight / total, &off, &off, 1.0);
     }
     // Silverman's rule for a normal of this dimension.
     let dimension = p as f64;
@@ -132,7 +243,7 @@ fn kernel_estimate(
     let log_weight = ((1.0 - DEFENSIVE_SHARE) / CENTRES as f64).ln();
     let centre = |random: &mut Random| Component {
         log_weight,
-        mean: DVector::from_column_slice(&draws[random.index(&sums)]),
+        mean: DVector::from_column_slice(draws.row(random.index(&sums))),
         factor: factor.clone(),
     };
     let mut components: Vec<_> = (0..CENTRES).map(|_| centre(random)).collect();
@@ -143,7 +254,7 @@ fn kernel_estimate(
 fn tempered(log_ratios: &[f64]) -> Vec<f64> {
     let mut power = 1.0;
     loop {
-        let weights = normalised(log_ratios, power);
+        let (weights, _) = normalised(log_ratios, power);
         if effective(&weights) >= EFFECTIVE || power < 1e-3 {
             return weights;
         }
@@ -151,12 +262,18 @@ fn tempered(log_ratios: &[f64]) -> Vec<f64> {
     }
 }
 
-fn normalised(log_ratios: &[f64], power: f64) -> Vec<f64> {
-    let total = log_sum_exp(log_ratios.iter().map(|ratio| power * ratio));
-    if !total.is_finite() {
-        return vec![1.0 / log_ratios.len() as f64; log_ratios.len()];
+/// Weights of sum one, and the log of the sum that they had.
+fn normalised(log_ratios: &[f64], power: f64) -> (Vec<f64>, f64) {
+    let largest = power * log_ratios.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !largest.is_finite() {
+        return (vec![1.0 / log_ratios.len() as f64; log_ratios.len()], largest);
     }
-    log_ratios.iter().map(|ratio| (power * ratio - total).exp()).collect()
+    let mut weights: Vec<_> = log_ratios.iter().map(|r| (power * r - largest).exp()).collect();
+    let sum: f64 = weights.iter().sum();
+    for weight in &mut weights {
+        *weight /= sum;
+    }
+    (weights, largest + sum.ln())
 }
 
 fn effective(weights: &[f64]) -> f64 {
@@ -173,19 +290,33 @@ mod tests {
     fn a_narrow_density_is_found_and_normalised() {
         let coordinates = Coordinates::of(&Prior::default());
         let (at, sd) = ([0.0, 0.4, 0.9], 0.01);
-        let log_target =
-            |u: &[f64]| -0.5 * u.iter().zip(at).map(|(u, m)| ((u - m) / sd).powi(2)).sum::<f64>();
+        let log_target = |u: &[f64], _: &mut Scratch| {
+            -0.5 * u.iter().zip(at).map(|(u, m)| ((u - m) / sd).powi(2)).sum::<f64>()
+        };
         let draws = coordinates.quasi_prior(4096);
-        let likelihood: Vec<_> = draws.iter().map(|u| log_target(u)).collect();
-        let start = Importance::of_prior_draws(draws, &likelihood);
+        let likelihood: Vec<_> =
+            draws.iter().map(|u| log_target(u, &mut Scratch::default())).collect();
+        let draws = Matrix { data: draws.concat(), columns: 3 };
+        let start = Importance::of_prior_draws(Arc::new(draws), &likelihood, &coordinates);
         assert!(start.effective_sample_size() < 100.0);
         let found = start.adapted(&coordinates, &log_target, None);
         assert!(found.effective_sample_size() > 500.0, "{}", found.effective_sample_size());
         // Half of the mass is cut off.
         let exact = 1.5 * (std::f64::consts::TAU * sd * sd).ln() - 2f64.ln();
         assert!((found.log_normaliser - exact).abs() < 0.1, "{} {exact}", found.log_normaliser);
-        let sample = found.sample(4000, &mut Random::new(1));
+        let sample = found.sample(4000, &mut Random::new(1), &coordinates, &log_target);
         let mean = sample.iter().map(|u| u[1]).sum::<f64>() / 4000.0;
-        assert!((mean - 0.4).abs() < 2e-3, "{mean}");
+        let variance = sample.iter().map(|u| (u[1] - mean).powi(2)).sum::<f64>() / 4000.0;
+        assert!((mean - 0.4).abs() < 1e-3, "{mean}");
+        assert!((variance.sqrt() / sd - 1.0).abs() < 0.05, "{variance}");
+        assert!(sample.iter().all(|u| coordinates.is_inside(u)));
+        let different = |draws: &[Vec<f64>]| {
+            let mut first: Vec<_> = draws.iter().map(|u| u[0]).collect();
+            first.sort_by(f64::total_cmp);
+            first.dedup();
+            first.len()
+        };
+        assert!(different(&sample) > 3700, "{} of 4000", different(&sample));
+        assert!(different(&found.resample(4000, &mut Random::new(1))) < 2000);
     }
 }

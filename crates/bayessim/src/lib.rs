@@ -14,7 +14,10 @@
 //! | `network`, `mixture` | density of coordinates given statistics |
 //! | `average`, `tilt` | how much each of both counts, and what the prior is multiplied by |
 //! | `importance` | normaliser and draws of a density known up to a factor |
+//! | `waves`, `lanes` | random features and mixtures in wide registers |
 //! | [`Model`], [`Posterior`] | the file, and what it says |
+
+#![allow(clippy::inline_always)] // what is compiled for wider registers must be inlined to reach them
 
 mod average;
 mod coordinates;
@@ -22,6 +25,7 @@ mod document;
 mod emulator;
 mod error;
 mod importance;
+mod lanes;
 mod likelihood;
 mod matrix;
 mod mixture;
@@ -34,6 +38,7 @@ mod random;
 mod standardiser;
 mod tensors;
 mod tilt;
+mod waves;
 
 pub use error::ModelError;
 pub use model::Model;

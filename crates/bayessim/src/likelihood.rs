@@ -1,13 +1,13 @@
 //! Likelihood of the coordinates by the emulator of the leading signal axes.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
 use crate::ModelError;
 use crate::coordinates::Coordinates;
 use crate::document::Document;
-use crate::emulator::{Emulator, Prediction};
+use crate::emulator::{Emulator, Prediction, Workings};
 use crate::matrix::Matrix;
 use crate::noise::Noise;
 use crate::tensors::Tensors;
@@ -32,25 +32,41 @@ pub struct Likelihood {
 /// Evenly spread points of the prior and what the emulator expects there.
 #[derive(Debug)]
 pub struct Pool {
-    pub points: Vec<Vec<f64>>,
-    pub at: Vec<Prediction>,
+    /// A row for each point.
+    pub points: Arc<Matrix>,
+    /// A prediction for each point.
+    rows: Matrix,
+}
+
+impl Pool {
+    /// What is expected at each point.
+    pub fn predictions(&self) -> impl IndexedParallelIterator<Item = Prediction<'_>> {
+        self.rows.data.par_chunks_exact(self.rows.columns).map(Prediction::of)
+    }
 }
 
 /// What a model's file says that its emulator of so many axes expects at the pool, if it does.
-fn expected_at_pool(tensors: &Tensors, axes: usize) -> Result<Option<Vec<Prediction>>, ModelError> {
+fn expected_at_pool(tensors: &Tensors, axes: usize) -> Result<Option<Matrix>, ModelError> {
     let read = |name| tensors.matrix_if_there(name, POOL, axes);
     let (Some(means), Some(scales), Some(unknown)) =
         (read("pool_means")?, read("pool_scales")?, read("pool_unknown")?)
     else {
         return Ok(None);
     };
-    let squares = |row: &[f64]| row.iter().map(|sd| sd * sd).collect();
-    let at = |i| Prediction {
-        means: means.row(i).to_vec(),
-        noise: squares(scales.row(i)),
-        unknown: squares(unknown.row(i)),
-    };
-    Ok(Some((0..POOL).map(at).collect()))
+    let mut data = Vec::with_capacity(3 * axes * POOL);
+    for i in 0..POOL {
+        data.extend_from_slice(means.row(i));
+        data.extend([scales.row(i), unknown.row(i)].into_iter().flatten().map(|sd| sd * sd));
+    }
+    Ok(Some(Matrix { data, columns: 3 * axes }))
+}
+
+/// Room for the numbers on the way to a likelihood, used again for the next.
+#[derive(Default)]
+pub struct Scratch {
+    workings: Workings,
+    row: Vec<f64>,
+    scaled: Vec<f64>,
 }
 
 /// Mean of some pours on the signal axes, and how much they differ.
@@ -72,9 +88,9 @@ impl Likelihood {
         let root = tensors.matrix("emulator_leading_root", count, count)?;
         let features = document.config.emulator_features;
         let pool = OnceLock::new();
-        if let Some(at) = expected_at_pool(tensors, count)? {
-            let points = coordinates.quasi_prior(POOL);
-            pool.set(Pool { points, at }).expect("a lock that is still empty");
+        if let Some(rows) = expected_at_pool(tensors, count)? {
+            let points = points(coordinates);
+            pool.set(Pool { points, rows }).expect("a lock that is still empty");
         }
         Ok(Self {
             axes: tensors.matrix("emulator_axes", s, s)?,
@@ -88,15 +104,23 @@ impl Likelihood {
     /// The points of the prior, made at the first call unless the model's file had the table.
     pub fn pool(&self, coordinates: &Coordinates) -> &Pool {
         self.pool.get_or_init(|| {
-            let points = coordinates.quasi_prior(POOL);
-            let at = points.par_iter().map(|u| self.emulator.predict(u)).collect();
-            Pool { points, at }
+            let points = points(coordinates);
+            let columns = 3 * self.emulator.axis_count();
+            let mut data = vec![0.0; columns * points.rows()];
+            let rows = data.par_chunks_exact_mut(columns).enumerate();
+            rows.for_each_init(Workings::default, |workings, (i, row)| {
+                self.emulator.predict(points.row(i), workings, row);
+            });
+            Pool { points, rows: Matrix { data, columns } }
         })
     }
 
     /// Log likelihood at coordinates.
-    pub fn log_prob(&self, observed: &Observed, u: &[f64]) -> f64 {
-        self.at(observed, &self.emulator.predict(u))
+    pub fn log_prob(&self, observed: &Observed, u: &[f64], scratch: &mut Scratch) -> f64 {
+        let Scratch { workings, row, scaled } = scratch;
+        row.resize(3 * self.emulator.axis_count(), 0.0);
+        self.emulator.predict(u, workings, row);
+        self.at(observed, Prediction::of(row), scaled)
     }
 
     /// What the likelihood needs of k standardised pours.
@@ -116,20 +140,20 @@ impl Likelihood {
     }
 
     /// Log likelihood where the emulator expects this, with `V_k = c^2 (s^2 + h^2) - (1 - 1/k) eta s^2`, eta the
-    /// share by which the pours differ.
-    pub fn at(&self, observed: &Observed, at: &Prediction) -> f64 {
+    /// share by which the pours differ; `scaled` is room for what is computed on the way.
+    pub fn at(&self, observed: &Observed, at: Prediction<'_>, scaled: &mut Vec<f64>) -> f64 {
         let size = at.means.len();
-        let share = observed.share(&at.noise);
+        let share = observed.share(at.noise);
         let averaged = (1.0 - 1.0 / observed.pours) * share;
         let widened = self.widening * self.widening;
-        let mut scaled = Vec::with_capacity(size);
+        scaled.clear();
         let mut product = 1.0;
         for j in 0..size {
             let variance = widened * (at.noise[j] + at.unknown[j]) - averaged * at.noise[j];
             product *= variance;
             scaled.push((observed.mean[j] - at.means[j]) / variance.sqrt());
         }
-        self.noise.log_density(&scaled, 0.5 * product.ln())
+        self.noise.log_density(scaled, 0.5 * product.ln())
     }
 }
 
@@ -143,4 +167,9 @@ impl Observed {
         let doubt = 1.0 + 2.0 * (2.0 / (size * (self.pours - 1.0))).sqrt();
         (doubt * ratios.sum::<f64>() / size).min(1.0)
     }
+}
+
+fn points(coordinates: &Coordinates) -> Arc<Matrix> {
+    let data = coordinates.quasi_prior(POOL).concat();
+    Arc::new(Matrix { data, columns: coordinates.dimension() })
 }

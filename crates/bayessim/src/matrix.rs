@@ -36,6 +36,7 @@ impl Matrix {
 }
 
 /// Sum of products; four sums side by side, so that the compiler may use wide registers.
+#[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (fours, others) = (a.chunks_exact(4), b.chunks_exact(4));

@@ -4,16 +4,17 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::ModelError;
 use crate::document::Config;
-use crate::matrix::{Matrix, dot, log_sum_exp};
+use crate::matrix::{Matrix, log_sum_exp};
 use crate::mixture::{Component, Mixture};
 use crate::tensors::Tensors;
+use crate::waves::Waves;
 
 /// Beyond this a logarithm of a factor's diagonal is cut.
 const LARGEST_LOG_DIAGONAL: f64 = 12.0;
 
 #[derive(Debug)]
 struct Member {
-    frequencies: Matrix,
+    waves: Waves,
     linear: Matrix,
     fourier: Matrix,
     bias: Vec<f64>,
@@ -48,7 +49,7 @@ impl Network {
             Matrix { data: all[i * length..(i + 1) * length].to_vec(), columns }
         };
         let member = |i: usize| Member {
-            frequencies: part(&frequencies, i, m, d),
+            waves: Waves::of(&part(&frequencies, i, m, d)),
             linear: part(&linear, i, d, size),
             fourier: part(&fourier, i, 2 * m, size),
             bias: part(&bias, i, 1, size).data,
@@ -111,11 +112,8 @@ impl Network {
 impl Member {
     /// Weights multiply unit-size cosines and sines, in this order.
     fn outputs(&self, x: &[f64]) -> Vec<f64> {
-        let count = self.frequencies.rows();
-        let mut features = vec![0.0; 2 * count];
-        for k in 0..count {
-            (features[count + k], features[k]) = dot(self.frequencies.row(k), x).sin_cos();
-        }
+        let mut features = vec![0.0; self.waves.size()];
+        self.waves.fill(x, 1.0, &mut features);
         let (linear, fourier) = (self.linear.after(x), self.fourier.after(&features));
         (0..self.bias.len()).map(|i| linear[i] + fourier[i] + self.bias[i]).collect()
     }

@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::coordinates::Coordinates;
 use crate::importance::Importance;
+use crate::likelihood::Scratch;
 use crate::matrix::log_sum_exp;
 use crate::mixture::TruncatedMixture;
 use crate::random::Random;
@@ -68,6 +69,15 @@ pub struct Marginal {
     pub interval90: (f64, f64),
 }
 
+/// How draws come from weighted ones.
+#[derive(Clone, Copy)]
+enum Draws {
+    /// Those that weigh most several times: enough for quantiles.
+    Resampled,
+    /// Each then walks, so that no two are the same.
+    Walked,
+}
+
 /// A posterior as weighted draws: prior times tilt, normalised.
 pub(crate) struct Tilted<'a> {
     pub tilt: Tilt<'a>,
@@ -79,7 +89,21 @@ impl Tilted<'_> {
         if !coordinates.is_inside(u) {
             return f64::NEG_INFINITY;
         }
-        self.tilt.log(coordinates, u) + coordinates.log_density(u) - self.density.log_normaliser
+        let tilt = self.tilt.log(coordinates, u, &mut Scratch::default());
+        tilt + coordinates.log_density(u) - self.density.log_normaliser
+    }
+
+    fn sample(
+        &self,
+        coordinates: &Coordinates,
+        n: usize,
+        random: &mut Random,
+        draws: Draws,
+    ) -> Vec<Vec<f64>> {
+        match draws {
+            Draws::Resampled => self.density.resample(n, random),
+            Draws::Walked => self.tilt.sample(&self.density, coordinates, n, random),
+        }
     }
 }
 
@@ -130,30 +154,29 @@ impl Posterior<'_> {
         }
     }
 
-    /// `n` draws in own units; the same seed gives the same draws.
+    /// `n` draws in own units; the same seed gives the same draws on any number of threads.
     pub fn sample(&self, n: usize, seed: u64) -> Vec<Vec<f64>> {
-        let draws = self.coordinate_sample(n, seed);
-        draws.iter().map(|u| self.coordinates.values(u)).collect()
+        self.values(n, seed, Draws::Walked)
     }
 
-    fn coordinate_sample(&self, n: usize, seed: u64) -> Vec<Vec<f64>> {
-        let mut random = Random::new(seed);
-        match &self.belief {
-            Belief::Tilted(tilted) => tilted.density.sample(n, &mut random),
-            Belief::Learnt(learnt) => learnt.sample(self.coordinates, n, &mut random),
+    fn values(&self, n: usize, seed: u64, kind: Draws) -> Vec<Vec<f64>> {
+        let (coordinates, mut random) = (self.coordinates, Random::new(seed));
+        let draws = match &self.belief {
+            Belief::Tilted(tilted) => tilted.sample(coordinates, n, &mut random, kind),
+            Belief::Learnt(learnt) => learnt.sample(coordinates, n, &mut random),
             Belief::Sum(tilted, learnt, weight) => {
                 let count = (0..n).filter(|_| random.uniform() < *weight).count();
-                let mut draws = tilted.density.sample(count, &mut random);
-                draws.extend(learnt.sample(self.coordinates, n - count, &mut random));
+                let mut draws = tilted.sample(coordinates, count, &mut random, kind);
+                draws.extend(learnt.sample(coordinates, n - count, &mut random));
                 draws
             }
-        }
+        };
+        draws.iter().map(|u| coordinates.values(u)).collect()
     }
 
     /// Mean, median and central interval of each parameter.
     pub fn marginals(&self, draws: usize, seed: u64) -> Vec<Marginal> {
-        let sample = self.coordinate_sample(draws, seed);
-        let values: Vec<_> = sample.iter().map(|u| self.coordinates.values(u)).collect();
+        let values = self.values(draws, seed, Draws::Resampled);
         let marginal = |(i, name): (usize, &String)| {
             let mut column: Vec<_> = values.iter().map(|row| row[i]).collect();
             column.sort_by(f64::total_cmp);
