@@ -5,7 +5,8 @@
     python benches/ten_pours.py model --out truths
 
 Ten materials are drawn, each is poured ten times (minutes on one core; pours that are there are
-not made again), and the posteriors of the first pour and of all ten are held against the truth.
+not made again), and the posteriors of the first pour and of all ten are held against the truth;
+log densities are over the prior's coordinates.
 """
 
 import argparse
@@ -61,24 +62,31 @@ def main() -> None:
     for number, truth in enumerate(draw(options.seed)):
         x = pours(truth, options.out / f"{number:02d}.npy", 100 * (number + 1))
         for k, rows in found.items():
-            sample = model.posterior(x[:k]).sample(SAMPLES, seed=1)
+            posterior = model.posterior(x[:k])
+            sample = posterior.sample(SAMPLES, seed=1)
+            density = posterior.coordinate_log_prob(truth)[0]
             low, high = np.quantile(sample, [0.05, 0.95], axis=0)
             inside = (low <= truth) & (truth <= high)
             misfit = model.misfit(x[:k])
-            rows.append((inside, sample.std(axis=0), sample.mean(axis=0) - truth, misfit.is_inside))
+            error = sample.mean(axis=0) - truth
+            rows.append((density, inside, sample.std(axis=0), error, misfit.is_inside))
     print(
-        "| pours | truths in their 90 % interval | sd of the posterior | rms error of its mean "
-        "| inside the model |"
+        "| pours | log density | truths in their 90 % interval | sd of the posterior "
+        "| rms error of its mean | inside the model |"
     )
-    print("|---|---|---|---|---|")
+    print("|---|---|---|---|---|---|")
     for k, rows in found.items():
-        inside, width, error, is_inside = (np.array(column) for column in zip(*rows, strict=True))
+        columns = (np.array(column) for column in zip(*rows, strict=True))
+        density, inside, width, error, is_inside = columns
         text = [
             ", ".join(f"{v:.3f}" for v in values)
             for values in (width.mean(axis=0), np.sqrt((error**2).mean(axis=0)))
         ]
         held = f"{inside.sum()} of {inside.size}"
-        print(f"| {k} | {held} | {text[0]} | {text[1]} | {is_inside.sum()} of {len(rows)} |")
+        known = f"{density.mean():.2f} ± {density.std(ddof=1) / np.sqrt(len(rows)):.2f}"
+        print(
+            f"| {k} | {known} | {held} | {text[0]} | {text[1]} | {is_inside.sum()} of {len(rows)} |"
+        )
 
 
 if __name__ == "__main__":

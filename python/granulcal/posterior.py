@@ -217,12 +217,7 @@ class Posterior:
         sampling; it is not their average.
         """
         factors = [TruncatedMixture.cut(prior, mixture) for mixture in mixtures]
-        found = list(warnings)
-        found += [
-            MassOutsidePrior(i, float(np.exp(factor.log_mass)))
-            for i, factor in enumerate(factors)
-            if factor.is_mostly_outside
-        ]
+        found = [*warnings, *_outside(factors)]
         if len(factors) == 1:
             return cls(prior, factors[0], warnings=tuple(found))
         product = product_density(prior, factors)
@@ -254,28 +249,32 @@ class Posterior:
         cls,
         prior: Prior,
         condition: tuple[Likelihood, Array],
-        mixture: Mixture,
+        mixtures: list[Mixture],
         average: Average,
         *,
         warnings: tuple[Any, ...] = (),
     ) -> "Posterior":
-        """Returns the average of an emulator's and a network's posterior of one pour.
+        """Returns the average of an emulator's and a network's posterior of k pours.
+
+        The arithmetic average is for one pour: several are the emulator's alone.
 
         Args:
             prior: the prior.
-            condition: the emulated likelihood and the pour, standardised, shape (1, s).
-            mixture: the network's, over coordinates.
+            condition: the emulated likelihood and the pours, standardised, shape (k, s).
+            mixtures: the network's of each pour, over coordinates.
             average: form and weights.
             warnings: what is known beforehand.
         """
-        learnt = cls.from_mixture(prior, mixture, warnings=warnings)
+        if average.form == "arithmetic" and len(mixtures) > 1:
+            return cls.from_conditions(prior, [condition], warnings=warnings)
+        learnt = [TruncatedMixture.cut(prior, mixture) for mixture in mixtures]
+        warnings = (*warnings, *_outside(learnt))
         if average.form == "arithmetic":
-            emulated = cls.from_conditions(prior, [condition], warnings=learnt.warnings)
-            density = StackedDensity(emulated.density, learnt.density, average.emulator)
+            emulated = cls.from_conditions(prior, [condition], warnings=warnings)
+            density = StackedDensity(emulated.density, learnt[0], average.emulator)
             return cls(prior, density, warnings=emulated.warnings)
-        return cls._sampled(
-            prior, geometric_density(prior, condition, mixture, average), learnt.warnings
-        )
+        density = geometric_density(prior, condition, mixtures, average)
+        return cls._sampled(prior, density, warnings)
 
     @classmethod
     def _sampled(
@@ -408,6 +407,14 @@ class Posterior:
             draws = self.density.sample(_SUMMARY_DRAWS, np.random.default_rng(0))
             self._summary = draws, self.density.log_prob(draws)
         return self._summary
+
+
+def _outside(factors: list[TruncatedMixture]) -> list[MassOutsidePrior]:
+    return [
+        MassOutsidePrior(i, float(np.exp(factor.log_mass)))
+        for i, factor in enumerate(factors)
+        if factor.is_mostly_outside
+    ]
 
 
 def _kernel_density(draws: Array, bounds: tuple[float, float], grid: int) -> tuple[Array, Array]:

@@ -61,7 +61,7 @@ def test_normals_pool_to_the_normal_of_weighted_precisions(average, width):
     means = np.array([0.2, -0.4, 0.1]), np.array([0.1, -0.2, 0.3])
     likelihood: Any = _NormalLikelihood(prior, _normal(means[0], first))
     pooled = geometric_density(
-        prior, (likelihood, np.zeros((1, 1))), _normal(means[1], second), average
+        prior, (likelihood, np.zeros((1, 1))), [_normal(means[1], second)], average
     )
     precisions = [average.emulator * np.linalg.inv(first), average.network * np.linalg.inv(second)]
     covariance = np.linalg.inv(sum(precisions) + (1 - average.network) * np.eye(3))
@@ -140,7 +140,7 @@ def _density(model, mixture, row, average):
         return Posterior.from_conditions(TOY.prior, [condition]).density
     if average == NETWORK_ALONE:
         return TruncatedMixture.cut(TOY.prior, mixture)
-    return geometric_density(TOY.prior, condition, mixture, average)
+    return geometric_density(TOY.prior, condition, [mixture], average)
 
 
 def test_held_out_scores_are_those_of_the_posteriors(averaged):
@@ -157,11 +157,49 @@ def test_held_out_scores_are_those_of_the_posteriors(averaged):
         np.testing.assert_allclose(held_out.scores(average), expected, atol=0.15)
 
 
-def test_several_pours_are_the_emulators_alone(averaged):
+def test_networks_of_several_pours_pool_like_one_of_their_mean_precision():
+    prior, average = TOY.prior, Average(0.6, 0.4)
+    spreads, means = (0.3, 0.2, 0.5), ([0.2, 0.0, 0.1], [-0.1, 0.3, 0.0], [0.0, 0.1, -0.2])
+    precisions = [np.eye(3) / spread**2 for spread in spreads]
+    networks = [
+        _normal(np.array(m), np.linalg.inv(p)) for m, p in zip(means, precisions, strict=True)
+    ]
+    centre = np.array([0.1, 0.1, 0.0])
+    likelihood: Any = _NormalLikelihood(prior, _normal(centre, 0.16 * np.eye(3)))
+    pooled = geometric_density(prior, (likelihood, np.zeros((3, 1))), networks, average)
+    shared = sum(precisions) / 3
+    pull = sum(p @ np.array(m) for p, m in zip(precisions, means, strict=True)) / 3
+    covariance = np.linalg.inv(
+        average.emulator * np.eye(3) / 0.16
+        + average.network * shared
+        + (1 - average.network) * np.eye(3)
+    )
+    mean = covariance @ (average.emulator * centre / 0.16 + average.network * pull)
+    exact = _normal(mean, covariance)
+    points = exact.sample(50, np.random.default_rng(0))
+    np.testing.assert_allclose(pooled.log_prob(points), exact.log_prob(points), atol=0.05)
+
+
+def test_one_pour_shown_thrice_has_one_networks_posterior(averaged):
+    theta, x = TOY.simulate(1, seed=9)
+    z = averaged.standardiser.apply(x)
+    mixtures = averaged.amortised.mixtures(z)
+    condition = (averaged.likelihood, z)
+    one = geometric_density(TOY.prior, condition, mixtures, averaged.average)
+    thrice = geometric_density(TOY.prior, condition, 3 * mixtures, averaged.average)
+    at = TOY.prior.to_unconstrained(theta)
+    # The draws that the normalisers come from differ.
+    np.testing.assert_allclose(thrice.log_prob(at), one.log_prob(at), atol=0.01)
+
+
+def test_several_pours_of_an_arithmetic_average_are_the_emulators_alone(averaged):
     theta, x = TOY.simulate(3, seed=9)
     condition = (averaged.likelihood, averaged.standardiser.apply(x))
+    mixtures = averaged.amortised.mixtures(condition[1])
+    average = Average(0.6, 0.4, "arithmetic")
+    several = Posterior.from_average(TOY.prior, condition, mixtures, average)
     alone = Posterior.from_conditions(TOY.prior, [condition])
-    np.testing.assert_array_equal(averaged.posterior(x).log_prob(theta), alone.log_prob(theta))
+    np.testing.assert_array_equal(several.log_prob(theta), alone.log_prob(theta))
 
 
 def test_an_average_comes_back_from_its_file(averaged, tmp_path):

@@ -136,7 +136,7 @@ impl Importance {
         let weights: Vec<_> = self.weights.iter().map(|weight| weight + 1e-6).collect();
         let mut proposal = kernel_estimate(&self.draws, &weights, &wide, &mut random);
         if let Some(known) = known {
-            proposal = proposal.halved_with(known);
+            proposal = Mixture::pooled(&[proposal, known.clone()]);
         }
         let mut tried = Tried::none(coordinates.dimension());
         for _ in 0..ROUNDS {

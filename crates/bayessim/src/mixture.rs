@@ -1,6 +1,6 @@
 //! A Gaussian mixture over coordinates, cut to the prior's bounds.
 
-use std::f64::consts::{LN_2, TAU};
+use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -57,11 +57,11 @@ impl Mixture {
         log_sum_exp(self.constants.iter().copied())
     }
 
-    /// The mixture of both with a half of the weight each.
-    pub fn halved_with(&self, other: &Self) -> Self {
-        let mut components = [&self.components[..], &other.components].concat();
+    /// The mixture of some with the same weight each.
+    pub fn pooled(mixtures: &[Self]) -> Self {
+        let mut components: Vec<_> = mixtures.iter().flat_map(|m| m.components.clone()).collect();
         for component in &mut components {
-            component.log_weight -= LN_2;
+            component.log_weight -= (mixtures.len() as f64).ln();
         }
         Self::of(components)
     }

@@ -82,7 +82,7 @@ impl Model {
 
     /// The posterior given one pour, or several of one material, as statistics in own units.
     ///
-    /// Several pours are the emulator's alone; a model that is a network only takes one.
+    /// A model that is a network takes one pour only.
     ///
     /// # Errors
     /// [`ModelError::Observation`] for no pour, another number of statistics, one that is not finite, or
@@ -91,14 +91,10 @@ impl Model {
         self.check(x)?;
         let mut warnings = self.out_of_range(x);
         let z: Vec<_> = x.iter().map(|row| self.standardiser.apply(row)).collect();
-        let learnt = self
-            .network
-            .as_ref()
-            .filter(|_| x.len() == 1 && self.average.network > 0.0)
-            .map(|network| TruncatedMixture::cut(&self.coordinates, network.mixture(&z[0])));
-        if let Some(cut) = learnt.as_ref().filter(|cut| cut.is_mostly_outside()) {
-            warnings.push(Warning::MassOutsidePrior { inside: cut.log_mass.exp() });
-        }
+        let learnt = self.learnt(&z);
+        let outside = learnt.iter().filter(|cut| cut.is_mostly_outside());
+        warnings
+            .extend(outside.map(|cut| Warning::MassOutsidePrior { inside: cut.log_mass.exp() }));
         let belief = self.belief(&z, learnt);
         if let Belief::Tilted(tilted) | Belief::Sum(tilted, ..) = &belief {
             let effective = tilted.density.effective_sample_size();
@@ -109,20 +105,35 @@ impl Model {
         Ok(Posterior { coordinates: &self.coordinates, names: &self.names, belief, warnings })
     }
 
-    fn belief<'a>(&'a self, z: &[Vec<f64>], learnt: Option<TruncatedMixture>) -> Belief<'a> {
+    /// The network's mixture of each pour, where it counts: an arithmetic average is of one pour.
+    fn learnt(&self, z: &[Vec<f64>]) -> Vec<TruncatedMixture> {
+        let average = self.average;
+        match &self.network {
+            Some(network)
+                if average.network > 0.0 && (average.form == Form::Geometric || z.len() == 1) =>
+            {
+                let cut = |z| TruncatedMixture::cut(&self.coordinates, network.mixture(z));
+                z.iter().map(|z| cut(z)).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn belief<'a>(&'a self, z: &[Vec<f64>], mut learnt: Vec<TruncatedMixture>) -> Belief<'a> {
         let average = self.average;
         let tilted = |tilt: Tilt<'a>| {
             let density = tilt.posterior(&self.coordinates);
             Tilted { tilt, density }
         };
-        let tilt = || Tilt::of(&self.likelihood, z);
-        match learnt {
-            None => Belief::Tilted(tilted(tilt())),
+        let tilt = Tilt::of(&self.likelihood, z);
+        if average.form == Form::Geometric && average.emulator > 0.0 && !learnt.is_empty() {
+            let mixtures = learnt.into_iter().map(|cut| cut.mixture).collect();
+            return Belief::Tilted(tilted(tilt.averaged(mixtures, average)));
+        }
+        match learnt.pop() {
+            None => Belief::Tilted(tilted(tilt)),
             Some(learnt) if average.emulator == 0.0 => Belief::Learnt(learnt),
-            Some(learnt) => match average.form {
-                Form::Geometric => Belief::Tilted(tilted(tilt().averaged(learnt.mixture, average))),
-                Form::Arithmetic => Belief::Sum(tilted(tilt()), learnt, average.emulator),
-            },
+            Some(learnt) => Belief::Sum(tilted(tilt), learnt, average.emulator),
         }
     }
 

@@ -15,11 +15,11 @@ use crate::random::Random;
 /// A point whose weight is that much below another's cannot matter [nat].
 const NEGLIGIBLE: f64 = 30.0;
 
-/// `L(u)` of some pours, or `L^a (q/p)^b` of one.
+/// `L(u)` of k pours, or `L^a prod (q_i/p)^(b/k)`.
 pub struct Tilt<'a> {
     likelihood: &'a Likelihood,
     observed: Observed,
-    network: Option<(Mixture, Average)>,
+    network: Option<(Vec<Mixture>, Average)>,
 }
 
 impl<'a> Tilt<'a> {
@@ -28,9 +28,9 @@ impl<'a> Tilt<'a> {
         Self { likelihood, observed: likelihood.observe(z), network: None }
     }
 
-    /// The same with the network's mixture.
-    pub fn averaged(self, mixture: Mixture, average: Average) -> Self {
-        Self { network: Some((mixture, average)), ..self }
+    /// The same with the network's mixture of each pour.
+    pub fn averaged(self, mixtures: Vec<Mixture>, average: Average) -> Self {
+        Self { network: Some((mixtures, average)), ..self }
     }
 
     /// Its logarithm at coordinates inside the bounds, up to a constant.
@@ -63,9 +63,9 @@ impl<'a> Tilt<'a> {
         let emulated: Vec<_> = pool.predictions().map_init(Vec::new, at).collect();
         let log_weights = match &self.network {
             None => emulated,
-            Some((mixture, average)) => {
-                // The mixture is dear, and nowhere above its bound.
-                let at_most = mixture.log_bound();
+            Some((mixtures, average)) => {
+                // Mixtures are dear, and nowhere above their bounds.
+                let at_most = mean(mixtures, Mixture::log_bound);
                 let bound = |u: &[f64], emulated: f64| {
                     let learnt = at_most - coordinates.log_density(u);
                     average.emulator * emulated + average.network * learnt
@@ -90,14 +90,18 @@ impl<'a> Tilt<'a> {
         }
         let log_target =
             |u: &[f64], scratch: &mut Scratch| self.log_target(coordinates, u, scratch);
-        let network = self.network.as_ref().map(|(mixture, _)| mixture);
-        found.adapted(coordinates, &log_target, network)
+        let network = self.network.as_ref().map(|(mixtures, _)| Mixture::pooled(mixtures));
+        found.adapted(coordinates, &log_target, network.as_ref())
     }
 
     fn with(&self, coordinates: &Coordinates, u: &[f64], emulated: f64) -> f64 {
-        self.network.as_ref().map_or(emulated, |(mixture, average)| {
-            let learnt = mixture.log_prob(u) - coordinates.log_density(u);
+        self.network.as_ref().map_or(emulated, |(mixtures, average)| {
+            let learnt = mean(mixtures, |mixture| mixture.log_prob(u)) - coordinates.log_density(u);
             average.emulator * emulated + average.network * learnt
         })
     }
+}
+
+fn mean(mixtures: &[Mixture], of: impl Fn(&Mixture) -> f64) -> f64 {
+    mixtures.iter().map(of).sum::<f64>() / mixtures.len() as f64
 }

@@ -186,8 +186,8 @@ class BayesSim:
         Several pours share their parameters. Under the emulator they have one likelihood, in which
         what differs between them averages away and the emulator's own error does not; a network's
         posteriors are multiplied and the prior divided out k - 1 times. Neither is an average of
-        posteriors. Where emulator and network are averaged for one pour, several are the emulator's
-        alone: a network's error would be counted k times.
+        posteriors. Where emulator and network are averaged, the networks' posteriors together count
+        as much as one does for one pour: their error is the same in all.
 
         Args:
             x_obs: statistics, own units, shape (s,) for one pour or (k, s) for k pours.
@@ -198,14 +198,15 @@ class BayesSim:
         observed = self._checked(x_obs)
         warnings = self._range_warnings(observed)
         z = self.standardiser.apply(observed)
-        if self.amortised is not None and (self.average.emulator == 0 or len(z) == 1):
-            mixtures = self.amortised.mixtures(z)
-            if self.average.emulator == 0:
-                return Posterior.from_mixtures(self.prior, mixtures, warnings=warnings)
-            return Posterior.from_average(
-                self.prior, (self.likelihood, z), mixtures[0], self.average, warnings=warnings
-            )
-        return Posterior.from_conditions(self.prior, [(self.likelihood, z)], warnings=warnings)
+        condition = self.likelihood, z
+        if self.amortised is None:
+            return Posterior.from_conditions(self.prior, [condition], warnings=warnings)
+        mixtures = self.amortised.mixtures(z)
+        if self.average.emulator == 0:
+            return Posterior.from_mixtures(self.prior, mixtures, warnings=warnings)
+        return Posterior.from_average(
+            self.prior, condition, mixtures, self.average, warnings=warnings
+        )
 
     @one_thread()
     def misfit(self, x_obs: ArrayLike) -> Misfit:

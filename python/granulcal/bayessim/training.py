@@ -148,7 +148,7 @@ class _Work:
         chosen = self._of_the_prior(rows)
         posteriors = [
             Posterior.from_average(
-                self.prior, (owners[i], self.z[rows[i]][None]), mixtures[i], average
+                self.prior, (owners[i], self.z[rows[i]][None]), [mixtures[i]], average
             )
             for i in chosen
         ]
