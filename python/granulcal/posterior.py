@@ -201,6 +201,7 @@ class Posterior:
         self.density = density
         self.warnings = warnings
         self._summary: tuple[Array, Array] | None = None
+        self._last: tuple[tuple[int, int], Array] | None = None
 
     @classmethod
     def from_mixture(cls, prior: Prior, mixture: Mixture, **options: Any) -> "Posterior":
@@ -295,8 +296,11 @@ class Posterior:
         """Returns `n` draws, own units, shape (n, p); the same seed gives the same draws."""
         if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 0:
             raise ValueError(f"n must be a whole number of at least 0, got {n!r}")
-        coordinates = self.density.sample(int(n), np.random.default_rng(seed))
-        return self.prior.from_unconstrained(coordinates)
+        # Checks ask the same draws one after the other.
+        if self._last is None or self._last[0] != (n, seed):
+            coordinates = self.density.sample(int(n), np.random.default_rng(seed))
+            self._last = (n, seed), self.prior.from_unconstrained(coordinates)
+        return self._last[1].copy()
 
     @one_thread()
     def log_prob(self, theta: ArrayLike) -> Array:

@@ -70,22 +70,21 @@ class Calibration:
             [-p.log_prob(t)[0] for p, t in zip(posteriors, truth, strict=True)], dtype=np.float64
         )
         points = prior.sample(len(truth), seed=1)
+        # One after the other: both look at the same draws.
+        coverage = expected_coverage(
+            posteriors, truth, draw_count=draw_count, significance=_SIGNIFICANCE
+        )
+        balls = tarp(
+            posteriors, truth, points, draw_count=draw_count, coordinates=prior.to_unconstrained
+        )
         return cls(
             names=tuple(prior.names),
             posterior_loss=float(losses.mean()),
             prior_loss=float(-np.mean(prior.log_prob(truth))),
             posterior_losses=losses,
-            coverage=expected_coverage(
-                posteriors, truth, draw_count=draw_count, significance=_SIGNIFICANCE
-            ),
+            coverage=coverage,
             ranks=sbc_ranks(posteriors, truth, draw_count=min(_RANK_DRAWS, draw_count)),
-            tarp=tarp(
-                posteriors,
-                truth,
-                points,
-                draw_count=draw_count,
-                coordinates=prior.to_unconstrained,
-            ),
+            tarp=balls,
         )
 
     @property
