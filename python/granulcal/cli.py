@@ -123,6 +123,14 @@ def _add_train(commands: Any) -> None:
         "statistics; auto (default): the average of these two that says most about held-out "
         "pours; distilled: a network that imitates the emulator; plain: the paper's recipe",
     )
+    parser.add_argument(
+        "--components",
+        type=int,
+        nargs="+",
+        metavar="K",
+        help="Gaussians in the mixture of each of the network's five members (default: 5); of "
+        "several numbers the one of the best validation loss is kept",
+    )
     parser.set_defaults(run=_train)
 
 
@@ -219,7 +227,10 @@ def _train(options: argparse.Namespace) -> int:
     from granulcal.dataset import Dataset
 
     data = Dataset.load(options.data)
-    model = BayesSim.fit(data, seed=options.seed, method=options.method)
+    settings: dict[str, Any] = {}
+    if options.components:
+        settings["components"] = tuple(options.components)
+    model = BayesSim.fit(data, seed=options.seed, method=options.method, **settings)
     model.save(options.out)
     data.save(options.out / _TRAINING)
     print(f"model written to {options.out}")

@@ -366,6 +366,8 @@ def test_bad_training_data(arguments, options, error, message):
     [
         {"components": 0},
         {"components": 2.5},
+        {"components": (3, 0)},
+        {"components": ()},
         {"ensemble": True},
         {"kernel": "linear"},
         {"method": "best"},

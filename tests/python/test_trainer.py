@@ -1,12 +1,16 @@
 """How a network is trained where there are many pairs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 pytest.importorskip("torch")
 
+from granulcal.bayessim import BayesSim
 from granulcal.bayessim.config import Config
 from granulcal.bayessim.trainer import train
+from granulcal.toys import PileStandIn
 
 
 def test_many_pairs_take_fewer_passes_and_less_jitter():
@@ -19,3 +23,40 @@ def test_many_pairs_take_fewer_passes_and_less_jitter():
     (mixture,) = result.network.mixtures(np.zeros((1, 1)))
     # Jitter of 0.05 would widen it to that.
     assert 0.008 < 1 / mixture.factors[0, 0, 0] < 0.015
+
+
+def test_validation_chooses_the_number_of_components():
+    generator = np.random.default_rng(0)
+    u = np.where(generator.random((600, 1)) < 0.5, -1.0, 1.0)
+    u += 0.05 * generator.standard_normal(u.shape)
+    x = generator.standard_normal(u.shape)
+    config = Config(features=4, ensemble=1, components=(1, 2), max_epochs=60)
+    chosen = train(u, x, np.ones(1), config=config, seed=0)
+    assert chosen.network.layout.components == 2
+    for count in (1, 2):
+        alone = train(u, x, np.ones(1), config=replace(config, components=count), seed=0)
+        assert chosen.validation_losses <= alone.validation_losses
+
+
+def test_a_chosen_number_of_components_is_in_the_model(tmp_path):
+    toy = PileStandIn(seed=0)
+    theta, x = toy.simulate(150, seed=1)
+    model = BayesSim.fit(
+        theta,
+        x,
+        toy.prior,
+        quiet=True,
+        method="mdrff",
+        components=(1, 2),
+        features=10,
+        ensemble=1,
+        max_epochs=5,
+    )
+    assert model.amortised is not None
+    kept = model.amortised.network.layout.components
+    assert model.config.components == kept and kept in (1, 2)
+    model.save(tmp_path / "model")
+    loaded = BayesSim.load(tmp_path / "model")
+    np.testing.assert_array_equal(
+        loaded.posterior(x[0]).log_prob(theta), model.posterior(x[0]).log_prob(theta)
+    )

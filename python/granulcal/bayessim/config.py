@@ -34,7 +34,8 @@ class Config:
             defaults.
         kernel: kernel whose spectrum the frequencies are drawn from.
         features: number of random frequencies; each gives a cosine and a sine.
-        components: Gaussians in the mixture of one member.
+        components: Gaussians in the mixture of one member; where several numbers are given, each is
+            trained, and the one of the best validation loss is kept.
         ensemble: networks whose densities are averaged.
         length_scale: factor on the median distance between training inputs.
         snr: whether each statistic's frequency is scaled by its explained share of variance.
@@ -56,7 +57,7 @@ class Config:
     method: str = "auto"
     kernel: str = "matern52"
     features: int = 250
-    components: int = 5
+    components: int | tuple[int, ...] = 5
     ensemble: int = 5
     length_scale: float = 1.0
     snr: bool = True
@@ -79,9 +80,10 @@ class Config:
                 raise ValueError(
                     f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}"
                 )
+        for count in self.component_counts or (self.components,):
+            self._check_count("components", count)
         for name in (
             "features",
-            "components",
             "ensemble",
             "batch_size",
             "max_epochs",
@@ -89,9 +91,7 @@ class Config:
             "synthetic",
             "emulator_features",
         ):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise ValueError(f"{name} must be a whole number of at least 1, got {value!r}")
+            self._check_count(name, getattr(self, name))
         for name in ("length_scale", "learning_rate"):
             self._check_real(name, low=0.0, exclusive=True)
         for name in ("jitter", "weight_decay"):
@@ -101,6 +101,17 @@ class Config:
         for name in ("snr", "linear_start"):
             if not isinstance(getattr(self, name), bool):
                 raise ValueError(f"{name} must be True or False, got {getattr(self, name)!r}")
+
+    @property
+    def component_counts(self) -> tuple[int, ...]:
+        """The numbers of `components` to choose from."""
+        counts = self.components
+        return tuple(counts) if isinstance(counts, tuple | list) else (counts,)
+
+    @staticmethod
+    def _check_count(name: str, value: Any) -> None:
+        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+            raise ValueError(f"{name} must be a whole number of at least 1, got {value!r}")
 
     def _check_real(
         self, name: str, *, low: float, high: float = float("inf"), exclusive: bool = False

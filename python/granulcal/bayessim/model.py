@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from os import PathLike
 from typing import Any
 
@@ -143,10 +144,13 @@ class BayesSim:
             data_or_theta, x, prior=prior, status=status, x_names=x_names, scene=scene
         )
         made = train_model(pairs, settings, int(seed), proposal=proposal, progress=progress)
+        kept = settings.component_counts[0]
+        if made.amortised is not None:
+            kept = made.amortised.network.layout.components
         enough = len(made.posteriors) >= _FEWEST_TEST_PAIRS
         model = cls(
             prior=pairs.prior,
-            config=settings,
+            config=replace(settings, components=kept),
             standardiser=made.standardiser,
             likelihood=made.likelihood,
             amortised=made.amortised,

@@ -144,7 +144,7 @@ class Tensors:
 
     def amortised(self, config: Config) -> Amortised:
         """Returns the network."""
-        layout, members = HeadLayout(config.components, self.p), config.ensemble
+        layout, members = HeadLayout(config.component_counts[0], self.p), config.ensemble
         matrix = self.take("axes_matrix", self.s, None)
         inputs = matrix.shape[1]
         network = (

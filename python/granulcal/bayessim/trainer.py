@@ -80,9 +80,14 @@ def train(
         weights: of each pair in the loss, shape (n,); None: all the same.
         progress: called after each pass.
 
-    On one thread: see `one_thread`.
+    Of several numbers of components the one of the lowest mean validation loss is kept. On one
+    thread: see `one_thread`.
     """
-    return _Training(u, x, relevance, config, seed, weights).run(progress)
+    results = [
+        _Training(u, x, relevance, config, count, seed, weights).run(progress)
+        for count in config.component_counts
+    ]
+    return min(results, key=lambda result: float(np.mean(result.validation_losses)))
 
 
 class _Training:
@@ -92,6 +97,7 @@ class _Training:
         x: Array,
         relevance: Array,
         config: Config,
+        components: int,
         seed: int,
         weights: Array | None,
     ) -> None:
@@ -119,7 +125,7 @@ class _Training:
                 for i in range(members)
             ]
         )
-        layout = HeadLayout(config.components, u.shape[1])
+        layout = HeadLayout(components, u.shape[1])
         self.network = Network.initial(layout, frequencies, self.generator)
         if config.linear_start:
             for i, rows in enumerate(self.training):
