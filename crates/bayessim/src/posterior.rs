@@ -74,7 +74,7 @@ pub struct Marginal {
 enum Draws {
     /// Those that weigh most several times: enough for quantiles.
     Resampled,
-    /// Each then walks, so that no two are the same.
+    /// Each then walks, so that hardly any two are the same.
     Walked,
 }
 
