@@ -11,7 +11,6 @@ from dataclasses import replace
 from unittest.mock import patch
 
 import numpy as np
-import torch
 
 from granulcal.bayessim import likelihood
 from granulcal.bayessim.basis import learn_length_scales
@@ -19,6 +18,7 @@ from granulcal.bayessim.emulator import Prediction
 from granulcal.bayessim.likelihood import WIDENINGS, Likelihood
 from granulcal.bayessim.signal import SignalAxes
 from granulcal.bayessim.standardise import Standardiser
+from granulcal.one_thread import one_thread
 from granulcal.toys import PileStandIn
 
 TESTS = 300
@@ -38,6 +38,7 @@ class Joined:
         return Prediction(means.means, self.noisy.predict(u, **options).scales, means.unknown)
 
 
+@one_thread()
 def main() -> None:
     """Prints one row for each part."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -45,7 +46,6 @@ def main() -> None:
     parser.add_argument("--many", type=int, default=1000)
     parser.add_argument("--noise", type=float, default=2.0)
     options = parser.parse_args()
-    torch.set_num_threads(1)
     toy = PileStandIn(seed=0, noise=options.noise)
     theta, x = toy.simulate(options.many + TESTS, seed=77)
     u = toy.prior.to_unconstrained(theta)

@@ -18,12 +18,12 @@ Reference:
 import argparse
 
 import numpy as np
-import torch
 
 from granulcal.bayessim.likelihood import Likelihood, joint_density
 from granulcal.bayessim.mixture import Mixture
 from granulcal.bayessim.sequential import infer_within_budget
 from granulcal.bayessim.standardise import Standardiser
+from granulcal.one_thread import one_thread
 from granulcal.posterior import Posterior
 from granulcal.toys import PileStandIn
 
@@ -77,6 +77,7 @@ def filtered(toy: PileStandIn, x_obs: np.ndarray, seed: int) -> Posterior:
     return Posterior.from_mixture(toy.prior, mixture)
 
 
+@one_thread()
 def main() -> None:
     """Prints one row for each way."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -85,7 +86,6 @@ def main() -> None:
     parser.add_argument("--noise", type=float, default=1.0, help="factor on the toy's noise")
     parser.add_argument("--no-filter", action="store_true", help="leave the iterative filter out")
     options = parser.parse_args()
-    torch.set_num_threads(1)
     toy = PileStandIn(seed=0, noise=options.noise)
     theta, x = toy.simulate(options.recordings, seed=500)
     exact = toy.exact_log_prob(theta, x) - toy.prior.log_slope(theta)

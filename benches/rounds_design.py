@@ -11,12 +11,12 @@ looked for more coarsely than by `infer_within_budget`, at a third of the time.
 import argparse
 
 import numpy as np
-import torch
 
 from granulcal.bayessim import likelihood, round_fit
 from granulcal.bayessim.likelihood import Likelihood
 from granulcal.bayessim.round_fit import RoundFit, first_design
 from granulcal.bayessim.standardise import Standardiser
+from granulcal.one_thread import one_thread
 from granulcal.posterior import Posterior
 from granulcal.toys import PileStandIn
 
@@ -78,6 +78,7 @@ class Study:
         return float(posterior.coordinate_log_prob(self.theta[i][None])[0])
 
 
+@one_thread()
 def main() -> None:
     """Prints one row for each way."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -85,7 +86,6 @@ def main() -> None:
     parser.add_argument("--noise", type=float, default=2.0)
     parser.add_argument("--designs", nargs="+", default=["even"], choices=list(DESIGNS))
     options = parser.parse_args()
-    torch.set_num_threads(1)
     likelihood._CELLS, likelihood._POOL = 1024, 8192
     likelihood.AXIS_COUNTS = (6, 16)
     study = Study(options.noise, options.recordings)

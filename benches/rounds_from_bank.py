@@ -13,7 +13,6 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-import torch
 from rounds_on_pours import judged, show
 
 from granulcal.bayessim import BayesSim
@@ -21,6 +20,7 @@ from granulcal.bayessim.likelihood import Likelihood
 from granulcal.bayessim.sequential import rounds_of
 from granulcal.bayessim.standardise import Standardiser
 from granulcal.dataset import Dataset
+from granulcal.one_thread import one_thread
 from granulcal.posterior import Posterior
 from granulcal.prior import Prior
 
@@ -68,6 +68,7 @@ def by_default(prior: Prior, u: Array, x: Array, observed: Array) -> list[Poster
     return [model.posterior(row) for row in observed]
 
 
+@one_thread()
 def main() -> None:
     """Prints one row for each way; the last is the difference that the bar asks for."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -78,7 +79,6 @@ def main() -> None:
         "--most", type=int, default=1000, help="pours of the prior to compare with, usable or not"
     )
     options = parser.parse_args()
-    torch.set_num_threads(1)
     data = Dataset.load(options.data)
     prior = data.prior
     columns = [data.theta_names.index(name) for name in prior.names]

@@ -14,12 +14,12 @@ import json
 from pathlib import Path
 
 import numpy as np
-import torch
 from ten_pours import RANGES, draw
 
 import granulcal as gc
 from granulcal.bayessim.sequential import infer_within_budget
 from granulcal.files import write_beside
+from granulcal.one_thread import one_thread
 from granulcal.posterior import Posterior
 from granulcal.within_budget import KeptPours
 
@@ -67,6 +67,7 @@ def show(name: str, rows: list[tuple[float, int, np.ndarray]]) -> None:
     print(f"| {name} | {density.mean():.2f} ± {error:.2f} | {each} | {inside} | {spreads} |")
 
 
+@one_thread()
 def main() -> None:
     """Prints a table: one row for the rounds, one for the model of the prior's pours."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -77,7 +78,6 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=303)
     parser.add_argument("--threads", type=int, default=1)
     options = parser.parse_args()
-    torch.set_num_threads(1)
     prior = gc.Prior.default()
     recordings = recorded(prior, options.out, options.seed)[: options.recordings]
     rounds, misfits = [], []

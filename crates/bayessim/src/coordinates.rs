@@ -8,6 +8,9 @@ use nalgebra::DMatrix;
 
 use crate::quasi::{QuasiUniform, quasi_normal};
 
+/// Points of `normal_points`: enough for the mass of a mixture's component inside the bounds.
+const NORMAL_POINTS: usize = 2048;
+
 /// One free parameter.
 #[derive(Clone, Debug)]
 struct Coordinate {
@@ -92,10 +95,10 @@ impl Coordinates {
         (mean, variance)
     }
 
-    /// Evenly spread standard normal points of this dimension, one a column; the count of the first call.
-    pub fn normal_points(&self, count: usize) -> &DMatrix<f64> {
-        let points = || quasi_normal(count, self.dimension()).concat();
-        self.normal.get_or_init(|| DMatrix::from_vec(self.dimension(), count, points()))
+    /// Evenly spread standard normal points of this dimension, one a column; made at the first call.
+    pub fn normal_points(&self) -> &DMatrix<f64> {
+        let points = || quasi_normal(NORMAL_POINTS, self.dimension()).concat();
+        self.normal.get_or_init(|| DMatrix::from_vec(self.dimension(), NORMAL_POINTS, points()))
     }
 
     /// Evenly spread draws of the prior.

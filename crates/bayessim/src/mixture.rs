@@ -9,8 +9,6 @@ use crate::lanes::Lanes;
 use crate::matrix::log_sum_exp;
 use crate::random::{Random, cumulative};
 
-/// Quasi-random points per component for the mass inside the bounds.
-const MASS_POINTS: usize = 2048;
 /// With less mass than this inside the bounds the density is integrated over draws of the prior.
 const SMALLEST_MASS: f64 = 0.02;
 const PRIOR_POINTS: usize = 20_000;
@@ -111,7 +109,7 @@ impl TruncatedMixture {
         if coordinates.is_unbounded() {
             return Self { mixture, log_mass: 0.0 };
         }
-        let points = coordinates.normal_points(MASS_POINTS);
+        let points = coordinates.normal_points();
         let mut placed = DVector::zeros(coordinates.dimension());
         let mut inside = |component: &Component, spread: &DMatrix<f64>| {
             let mut count = 0;
@@ -120,7 +118,7 @@ impl TruncatedMixture {
                 placed.gemv(1.0, spread, &point, 1.0);
                 count += usize::from(coordinates.is_inside(placed.as_slice()));
             }
-            count as f64 / MASS_POINTS as f64
+            count as f64 / points.ncols() as f64
         };
         let spreads = mixture.placer();
         let parts = mixture.components.iter().zip(&spreads);

@@ -125,15 +125,19 @@ impl Model {
             let density = tilt.posterior(&self.coordinates);
             Tilted { tilt, density }
         };
-        let tilt = Tilt::of(&self.likelihood, z);
-        if average.form == Form::Geometric && average.emulator > 0.0 && !learnt.is_empty() {
-            let mixtures = learnt.into_iter().map(|cut| cut.mixture).collect();
-            return Belief::Tilted(tilted(tilt.averaged(mixtures, average)));
+        let tilt = || Tilt::of(&self.likelihood, z);
+        if learnt.is_empty() {
+            return Belief::Tilted(tilted(tilt()));
         }
-        match learnt.pop() {
-            None => Belief::Tilted(tilted(tilt)),
-            Some(learnt) if average.emulator == 0.0 => Belief::Learnt(learnt),
-            Some(learnt) => Belief::Sum(tilted(tilt), learnt, average.emulator),
+        if average.emulator == 0.0 {
+            return Belief::Learnt(learnt.remove(0));
+        }
+        match average.form {
+            Form::Geometric => {
+                let mixtures = learnt.into_iter().map(|cut| cut.mixture).collect();
+                Belief::Tilted(tilted(tilt().averaged(mixtures, average)))
+            }
+            Form::Arithmetic => Belief::Sum(tilted(tilt()), learnt.remove(0), average.emulator),
         }
     }
 

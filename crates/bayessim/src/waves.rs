@@ -33,7 +33,7 @@ impl Waves {
     pub fn fill(&self, v: &[f64], size: f64, waves: &mut [f64]) {
         let (cosines, sines) = waves.split_at_mut(self.count);
         sines.fill(0.0);
-        for (v, turns) in v.iter().zip(self.turns.chunks_exact(self.count)) {
+        for (v, turns) in v.iter().zip(self.turns.chunks_exact(self.count.max(1))) {
             for (sum, turn) in sines.iter_mut().zip(turns) {
                 *sum += v * turn;
             }
