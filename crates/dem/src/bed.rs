@@ -101,7 +101,7 @@ impl Bed {
         let count = scene.grains.count;
         let radius = scene.grains.radius();
         let mut places: Vec<Row> =
-            scene.start.positions(scene, seed).iter().map(|at| Row::new(at, radius)).collect();
+            scene.starting_positions(seed).iter().map(|at| Row::new(at, radius)).collect();
         let mut inverse_mass = vec![1.0; count];
         if let Some(clumps) = Clumps::of(scene, seed) {
             places = clumps.places();

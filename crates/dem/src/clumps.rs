@@ -23,7 +23,8 @@ use crate::contacts::Surroundings;
 use crate::effect::ClumpShape;
 use crate::lanes::Row;
 use crate::law::IMPACT_SPEED;
-use crate::scene::{Scene, unit_interval};
+use crate::random::unit_interval;
+use crate::scene::Scene;
 
 /// Keeps the orientations of a seed apart from its places.
 const STREAM: u64 = 0x6a09_e667_f3bc_c909;
@@ -83,7 +84,7 @@ impl Clumps {
             turned: turn(),
             momentum: [0.0; 3],
         };
-        let bodies = scene.start.positions(scene, seed).into_iter().map(still).collect();
+        let bodies = scene.starting_positions(seed).into_iter().map(still).collect();
         Some(Self { shape: clump.shape(&scene.grains), bodies })
     }
 

@@ -32,6 +32,7 @@
 mod assemble;
 mod bed;
 mod blocks;
+mod check;
 mod checkpoint;
 mod clumps;
 mod contact;
@@ -54,6 +55,7 @@ mod placement;
 mod pour;
 mod preset;
 mod problem;
+mod random;
 mod scene;
 mod simulation;
 mod solver;

@@ -4,6 +4,7 @@
 //! ground is the plane z = 0 and gravity points down unless the scene says otherwise.
 
 mod camera;
+mod grains;
 mod mesh;
 mod motion;
 mod observe;
@@ -15,9 +16,11 @@ mod start;
 mod view;
 mod walls;
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 pub use camera::{CameraSpec, Mask, Projection};
+pub use grains::Grains;
 pub use mesh::{Mesh, MeshFile};
 pub use motion::Motion;
 pub use observe::{
@@ -27,10 +30,10 @@ pub use outflow::Outflow;
 pub use periodic::{Periodic, PeriodicAxis};
 pub use sensor::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 pub use start::Start;
-pub(crate) use start::unit_interval;
 pub use view::ViewSpec;
 pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
 
+use crate::check::{finite, positive};
 use crate::effect::{Effects, Polydispersity};
 use crate::{DemError, Material, Preset};
 
@@ -86,25 +89,6 @@ pub struct Scene {
     /// What is observed while the pour goes on, and at its end beside the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observe: Option<Observe>,
-}
-
-/// What is poured: equal spheres.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Grains {
-    /// How many.
-    pub count: usize,
-    /// Diameter `[m]`.
-    pub diameter: f64,
-    /// Density `[kg/m^3]`; it drops out of dry pours of equal grains and only sets the unit of energy.
-    pub density: f64,
-}
-
-impl Grains {
-    /// Radius of a grain `[m]`.
-    pub fn radius(&self) -> f64 {
-        0.5 * self.diameter
-    }
 }
 
 /// When a pour ends: at rest, with every moving grain out of view, or at the horizon. [`Outflow::until`] may end it before.
@@ -225,6 +209,12 @@ impl Scene {
         Grains { diameter: self.effects.clump.envelope(&self.grains), ..self.grains }
     }
 
+    /// Centres of the grains at time zero `[m]`, one each.
+    pub(crate) fn starting_positions(&self, seed: u64) -> Vec<Vector3<f64>> {
+        let pose = self.funnel.as_ref().and_then(|funnel| self.effects.funnel.of(funnel));
+        self.start.positions(&self.held_grains(), self.funnel.as_ref(), pose.as_ref(), seed)
+    }
+
     /// What grains that are not round cannot be with.
     fn check_clump(&self) -> Result<(), DemError> {
         let others = [
@@ -281,27 +271,6 @@ impl Scene {
         view::check_views(&self.views)?;
         self.camera.check()
     }
-}
-
-pub(crate) fn positive(name: &str, got: f64) -> Result<(), DemError> {
-    if got > 0.0 && got.is_finite() {
-        return Ok(());
-    }
-    Err(DemError::range(name, got, "positive and finite"))
-}
-
-pub(crate) fn non_negative(name: &str, got: f64) -> Result<(), DemError> {
-    if got >= 0.0 && got.is_finite() {
-        return Ok(());
-    }
-    Err(DemError::range(name, got, "zero or positive, and finite"))
-}
-
-pub(crate) fn finite(name: &str, got: f64) -> Result<(), DemError> {
-    if got.is_finite() {
-        return Ok(());
-    }
-    Err(DemError::range(name, got, "finite"))
 }
 
 #[cfg(test)]

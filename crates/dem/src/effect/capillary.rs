@@ -15,7 +15,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::DemError;
-use crate::scene::{non_negative, positive};
+use crate::check::{non_negative, positive};
 
 /// Liquid bridges; prior of `bond`: log-uniform over 0.03 to 3.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -34,8 +34,9 @@ use serde::{Deserialize, Serialize};
 use super::pore_surface::PoreSurface;
 use crate::DemError;
 use crate::bed::Bed;
+use crate::check::non_negative;
 use crate::contact_set::ContactSet;
-use crate::scene::{Grains, non_negative};
+use crate::scene::Grains;
 
 /// Reynolds number from which on the drag coefficient is constant.
 const NEWTON: f64 = 1000.0;

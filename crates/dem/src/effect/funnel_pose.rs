@@ -8,7 +8,8 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::scene::{Funnel, Shape, Wall, finite, non_negative};
+use crate::check::{finite, non_negative};
+use crate::scene::{Funnel, Shape, Wall};
 use crate::{DemError, Material};
 
 /// Steepest lean `[rad]`.

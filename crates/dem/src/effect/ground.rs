@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::scene::non_negative;
+use crate::check::non_negative;
 use crate::{DemError, Material};
 
 /// Ratios of the ground's coefficients to those it would have `[-]`.

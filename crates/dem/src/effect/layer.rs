@@ -21,11 +21,12 @@ use serde::{Deserialize, Serialize};
 use crate::DemError;
 use crate::bed::Bed;
 use crate::blocks::Blocks;
+use crate::check::{non_negative, positive};
 use crate::contact::{ContactLaw, Listed};
 use crate::contact_set::{ContactSet, Second};
 use crate::contacts::Surroundings;
 use crate::lanes::Lanes;
-use crate::scene::{Scene, non_negative, positive};
+use crate::scene::Scene;
 
 /// The layer's surface is the plane z = 0, the hard ground lies `thickness` below.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

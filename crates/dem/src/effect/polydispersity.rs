@@ -11,7 +11,8 @@ use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
 use crate::DemError;
-use crate::scene::{non_negative, positive, unit_interval};
+use crate::check::{non_negative, positive};
+use crate::random::unit_interval;
 
 /// Farthest z of a grain `[-]`.
 const CUT: f64 = 2.5;

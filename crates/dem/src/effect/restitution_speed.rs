@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::DemError;
-use crate::scene::{finite, positive};
+use crate::check::{finite, positive};
 
 /// Restitution and speed; prior of `exponent`: uniform over -0.1 to 0.25.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -11,7 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::DemError;
-use crate::scene::non_negative;
+use crate::check::non_negative;
 
 /// The speed that tells the forms apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -7,7 +7,8 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
 use crate::DemError;
-use crate::scene::{GRAVITY, non_negative, positive};
+use crate::check::{non_negative, positive};
+use crate::scene::GRAVITY;
 
 /// A shaking table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -4,8 +4,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::sensor::SensorSpec;
-use super::{non_negative, positive};
 use crate::DemError;
+use crate::check::{non_negative, positive};
 
 /// How the camera projects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{finite, non_negative, positive};
 use crate::DemError;
+use crate::check::{finite, non_negative, positive};
 
 /// Most samples of a pour: beyond it the rate is a mistake.
 const MAX_SAMPLES: f64 = 1e6;

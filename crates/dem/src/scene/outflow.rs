@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::finite;
 use crate::DemError;
+use crate::check::finite;
 
 /// Grains whose centre comes below a height leave the scene: nothing touches them and no camera sees them any more.
 ///

@@ -1,12 +1,14 @@
 //! Where the grains are when a pour begins.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use super::{Funnel, Grains, Scene, finite, non_negative, positive};
-use crate::DemError;
+use super::{Funnel, Grains};
+use crate::check::{finite, non_negative, positive};
+use crate::error::DemError;
+use crate::random::unit_interval;
 
 /// Solid fraction of the closest packing of equal spheres, pi / sqrt(18).
 const CLOSEST_PACKING: f64 = 0.740_480_489_693_061;
@@ -110,14 +112,19 @@ impl Start {
         Ok(())
     }
 
-    /// Centres of the grains `[m]`, one each.
-    pub(crate) fn positions(&self, scene: &Scene, seed: u64) -> Vec<Vector3<f64>> {
-        let grains = &scene.held_grains();
+    /// Centres of the grains `[m]`, one each. `grains` are the balls that hold them, `pose` is where the funnel hangs beside
+    /// its place.
+    pub(super) fn positions(
+        &self,
+        grains: &Grains,
+        funnel: Option<&Funnel>,
+        pose: Option<&Isometry3<f64>>,
+        seed: u64,
+    ) -> Vec<Vector3<f64>> {
         let (mut positions, jitter) = match self {
             &Self::Grid { counts, spacing, jitter, base } => {
-                let floor = scene.funnel.as_ref().map_or(0.0, Funnel::rim_height);
-                let mut points = grid(scene.grains.count, counts, spacing, floor + base);
-                let pose = scene.funnel.as_ref().and_then(|f| scene.effects.funnel.of(f));
+                let floor = funnel.map_or(0.0, Funnel::rim_height);
+                let mut points = grid(grains.count, counts, spacing, floor + base);
                 if let Some(pose) = pose {
                     for point in &mut points {
                         *point = (pose * Point3::from(*point)).coords;
@@ -132,7 +139,7 @@ impl Start {
             &Self::Cylinder { from, to, radius, spacing, jitter } => {
                 let mut points = cylinder(grains, from, to, radius, spacing, jitter);
                 points.sort_by(|a, b| a.z.total_cmp(&b.z));
-                points.truncate(scene.grains.count);
+                points.truncate(grains.count);
                 (points, jitter)
             }
             Self::Positions { positions } => {
@@ -160,11 +167,6 @@ fn jitter_fits(jitter: f64, gap: f64) -> Result<(), DemError> {
 
 fn lattice_spacing(diameter: f64, solid_fraction: f64) -> f64 {
     diameter * (CLOSEST_PACKING / solid_fraction).cbrt()
-}
-
-/// The top 53 bits of a random word as a number in [0, 1).
-pub(crate) fn unit_interval(word: u64) -> f64 {
-    (word >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 
 fn grid(count: usize, counts: [usize; 3], spacing: f64, bottom: f64) -> Vec<Vector3<f64>> {
@@ -248,6 +250,7 @@ fn ball(grains: &Grains, spacing: f64, height: f64) -> Vec<Vector3<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Scene;
 
     fn nearest_pair(points: &[Vector3<f64>]) -> f64 {
         let mut nearest = f64::INFINITY;
@@ -263,7 +266,7 @@ mod tests {
     fn no_grains_overlap_at_the_start() {
         for mut scene in [Scene::funnel(0.12), Scene::drop(0.1)] {
             scene.grains.count = 700;
-            let points = scene.start.positions(&scene, 3);
+            let points = scene.starting_positions(3);
             assert_eq!(points.len(), 700);
             assert!(nearest_pair(&points) >= scene.grains.diameter);
         }
@@ -272,7 +275,7 @@ mod tests {
     #[test]
     fn ball_hangs_at_its_height_and_is_round() {
         let scene = Scene::drop(0.1);
-        let points = scene.start.positions(&scene, 1);
+        let points = scene.starting_positions(1);
         let lowest = points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
         assert!((lowest - 0.002 - 0.1).abs() < 2.1e-4, "{lowest}");
         // Radius of a ball of 2000 grains at 60 % solid: (2000 / 0.6)^(1/3) * R.
@@ -290,7 +293,7 @@ mod tests {
             let (radius, spacing, jitter) = (0.03, 2.8e-3, 1e-4);
             scene.start = Start::Cylinder { from, to, radius, spacing, jitter };
             scene.check().unwrap();
-            let points = scene.start.positions(&scene, 2);
+            let points = scene.starting_positions(2);
             assert!(nearest_pair(&points) >= scene.grains.diameter);
             let (from, to) = (Vector3::from(from), Vector3::from(to));
             let axis = (to - from).normalize();
@@ -311,7 +314,7 @@ mod tests {
     #[test]
     fn seeds_differ_and_repeat() {
         let scene = Scene::funnel(0.12);
-        let at = |seed| scene.start.positions(&scene, seed);
+        let at = |seed| scene.starting_positions(seed);
         assert_eq!(at(1), at(1));
         assert_ne!(at(1), at(2));
     }
@@ -324,9 +327,9 @@ mod tests {
         scene.start = Start::Positions { positions: positions.clone() };
         scene.check().unwrap();
         assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
-        let started = scene.start.positions(&scene, 5);
+        let started = scene.starting_positions(5);
         assert_eq!(started, positions.iter().map(|p| Vector3::from(*p)).collect::<Vec<_>>());
-        assert_eq!(started, scene.start.positions(&scene, 6));
+        assert_eq!(started, scene.starting_positions(6));
     }
 
     #[test]

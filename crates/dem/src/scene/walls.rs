@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{Grains, MeshFile, Motion, finite, positive};
+use super::{Grains, MeshFile, Motion};
+use crate::check::{finite, positive};
 use crate::{DemError, Material, WallMaterial};
 
 /// The plane z = 0.
