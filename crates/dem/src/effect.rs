@@ -40,8 +40,8 @@ pub use tilt::Tilt;
 pub use vibration::Vibration;
 
 use crate::DemError;
+use crate::preset::Method;
 use crate::scene::Scene;
-use crate::solver::Method;
 
 /// The effects of a scene. Every default is off.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -134,7 +134,9 @@ impl Effects {
     /// [`DemError::EffectNeedsMethod`].
     pub(crate) fn check_method(&self, got: Method) -> Result<(), DemError> {
         match self.of_contacts() {
-            Some(effect) if got != Method::Nsgs => Err(DemError::EffectNeedsMethod { effect, got }),
+            Some(effect) if got != Method::Nsgs => {
+                Err(DemError::EffectNeedsMethod { effect, got: got.name() })
+            }
             _ => Ok(()),
         }
     }

@@ -165,7 +165,7 @@ pub enum DemError {
         /// The table of the effect in the scene.
         effect: &'static str,
         /// The method found.
-        got: crate::solver::Method,
+        got: &'static str,
     },
     /// A view without a name of its own.
     #[error("{path} must be of letters, digits, - and _, and no other view's, got {got:?}")]

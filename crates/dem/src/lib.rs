@@ -74,7 +74,9 @@ pub use material::{
     Material, WallMaterial, rolling_friction_from_length, rolling_friction_to_length,
 };
 pub use pour::{Pour, Status};
-pub use preset::{Preset, SolverSettings};
+pub use preset::{
+    Complementarity, Method, NewtonSettings, Preset, ReferenceSettings, SolverSettings,
+};
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
     BoxSide, CameraSpec, EndRule, Ends, Funnel, GRAVITY, Grains, Ground, Mask, Mesh, MeshFile,
@@ -83,8 +85,5 @@ pub use scene::{
     StereoSpec, TimeOfFlightSpec, ViewSpec, Wall,
 };
 pub use simulation::Simulation;
-pub use solver::Method;
 pub use solver::frozen::{FrozenSolution, FrozenSolve};
-pub use solver::newton_pcr::{Complementarity, NewtonSettings};
-pub use solver::reference::ReferenceSettings;
 pub use wall_load::WallLoad;

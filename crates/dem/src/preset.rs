@@ -1,14 +1,14 @@
 //! Solver presets: named choices of step, sweeps and margins. They change cost and error, never the law.
 
+mod method;
+
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
-use crate::solver::Method;
-use crate::solver::newton_pcr::NewtonSettings;
-use crate::solver::reference::ReferenceSettings;
+use crate::error::DemError;
+pub use method::{Complementarity, Method, NewtonSettings, ReferenceSettings};
 
 /// The name of a set of solver settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]

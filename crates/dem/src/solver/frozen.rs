@@ -7,6 +7,7 @@ use crate::bed::Bed;
 use crate::contact_set::ContactSet;
 use crate::parallel::Threads;
 use crate::preset::SolverSettings;
+use crate::solver::work::Work;
 use crate::solver::{self, nsgs::ResidualSums};
 
 /// Contacts with normals, biases and warm impulses, and the velocities before they are solved, as
@@ -89,7 +90,7 @@ impl FrozenSolve {
     }
 
     /// Solves it where it is.
-    fn run(&mut self, settings: &SolverSettings) -> solver::Work {
+    fn run(&mut self, settings: &SolverSettings) -> Work {
         let Self { sets, bed, radius } = self;
         let threads = Threads::default();
         let sets = &mut sets.each_mut();

@@ -10,48 +10,20 @@
 //! lambda <- projection on the cones,  v to match
 //! ```
 
-use serde::{Deserialize, Serialize};
-
 use crate::bed::Body;
 use crate::contact_set::ContactSet;
 use crate::law::TANGENTIAL_INERTIA;
 use crate::parallel::Threads;
-use crate::solver::Work;
+use crate::preset::{Complementarity, NewtonSettings};
 use crate::solver::components::{
     Components, Parts, add_scaled, batches, collect, impulses, scale_and_add, spread,
 };
 use crate::solver::newton_pcr::guard::Guard;
 use crate::solver::pcr::{Diagonal, System};
+use crate::solver::work::Work;
 
 mod complementarity;
 mod guard;
-
-pub use complementarity::Complementarity;
-
-/// How Newton's method is run.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct NewtonSettings {
-    /// Newton steps in a substep.
-    pub outer: usize,
-    /// Iterations of the linear solver in a Newton step.
-    pub inner: usize,
-    /// Share of a Newton step that is taken `[-]`.
-    pub relaxation: f64,
-    /// The equation for complementarity.
-    pub complementarity: Complementarity,
-}
-
-impl Default for NewtonSettings {
-    /// 4 steps of 20 iterations, relaxation 0.75 (Matl et al. 2020).
-    fn default() -> Self {
-        Self {
-            outer: 4,
-            inner: 20,
-            relaxation: 0.75,
-            complementarity: Complementarity::FischerBurmeister,
-        }
-    }
-}
 
 /// Runs `settings.outer` guarded Newton steps; the work is unconverged if a contact still closes faster than
 /// `too_fast` `[m/s]`.

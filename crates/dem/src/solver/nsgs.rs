@@ -23,7 +23,7 @@ use crate::contact_set::ContactSet;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Width, each, widest};
 use crate::law::{TANGENTIAL_INERTIA, project_ball};
 use crate::preset::SolverSettings;
-use crate::solver::Work;
+use crate::solver::work::Work;
 
 /// How far a sweep still was from the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

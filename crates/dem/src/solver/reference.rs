@@ -11,34 +11,18 @@
 //!     else:      lambda <- lambda + beta p,  p <- beta p - g
 //! ```
 
-use serde::{Deserialize, Serialize};
-
 use crate::bed::Body;
 use crate::contact_set::ContactSet;
 use crate::parallel::Threads;
-use crate::solver::Work;
+use crate::preset::ReferenceSettings;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, dot, impulses, put_impulses, scale_and_add, spread,
 };
 use crate::solver::nsgs::{self, Manner, ResidualSums};
+use crate::solver::work::Work;
 
 /// Sweeps between two looks at the residual, which costs a sweep.
 const LOOK: usize = 8;
-
-/// How far the reference is iterated.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ReferenceSettings {
-    /// Natural-map residual over the rms normal impulse at which to stop `[-]`.
-    pub residual: f64,
-    /// Sweeps in a solve, at most.
-    pub max_sweeps: usize,
-}
-
-impl Default for ReferenceSettings {
-    fn default() -> Self {
-        Self { residual: 1e-6, max_sweeps: 20_000 }
-    }
-}
 
 /// Iterates to `settings.residual`; the work is unconverged if that takes more than `settings.max_sweeps`.
 pub(super) fn solve(

@@ -7,10 +7,8 @@ use crate::blocks::Blocks;
 use crate::contact::{ContactLaw, Listed};
 use crate::contact_set::Second;
 use crate::lanes::Row;
-use crate::preset::Preset;
-use crate::solver::newton_pcr::{Complementarity, NewtonSettings};
+use crate::preset::{Complementarity, NewtonSettings, Preset, ReferenceSettings};
 use crate::solver::nsgs::ResidualSums;
-use crate::solver::reference::ReferenceSettings;
 use crate::{Material, Scene, Simulation};
 
 /// One contact between grains 0 and 1, or of grain 0 at a wall, with the normal z.

@@ -3,21 +3,10 @@
 //! `0 <= x _|_ y >= 0` becomes `psi(x, y) = 0`; docs/theory/solvers.md, box 2a. What is 0/0 in the formulas
 //! has a limit, and a row whose S grows without bound is an impulse that vanishes: both are said here.
 
-use serde::{Deserialize, Serialize};
+use crate::preset::Complementarity;
 
 /// S over the contact's own stiffness from which a row is an impulse that vanishes.
 const NEVER_ACTS: f64 = 1e9;
-
-/// The function whose root is complementarity.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Complementarity {
-    /// `psi = x + y - sqrt(x^2 + y^2)` (Fischer 1992): smooth but at the origin.
-    #[default]
-    FischerBurmeister,
-    /// `psi = min(x, y)`: an active set.
-    MinMap,
-}
 
 /// A row `(A + shift) d_lambda = right` of the Newton system; `None` where the impulse must vanish.
 pub(super) type NormalRow = Option<(f64, f64)>;
