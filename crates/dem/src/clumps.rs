@@ -20,11 +20,10 @@ use serde::{Deserialize, Serialize};
 use crate::bed::{Bed, Body, INVERSE_INERTIA};
 use crate::contact_set::ContactSet;
 use crate::contacts::Surroundings;
-use crate::effect::ClumpShape;
 use crate::lanes::Row;
 use crate::law::IMPACT_SPEED;
 use crate::random::unit_interval;
-use crate::scene::Scene;
+use crate::scene::{ClumpShape, Scene};
 
 /// Keeps the orientations of a seed apart from its places.
 const STREAM: u64 = 0x6a09_e667_f3bc_c909;

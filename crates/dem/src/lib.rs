@@ -63,10 +63,6 @@ mod wall;
 mod wall_load;
 
 pub use checkpoint::CheckpointHeader;
-pub use effect::{
-    Adhesion, Capillary, Clump, Effects, Fluid, FunnelPose, GroundUnlike, Layer, Polydispersity,
-    RestitutionSpeed, RollingForm, Tilt, Vibration,
-};
 pub use error::DemError;
 pub use frozen_search::FrozenSearch;
 pub use health::{Health, MAX_ENERGY_CREATED};
@@ -79,10 +75,12 @@ pub use preset::{
 };
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
-    BoxSide, CameraSpec, EndRule, Ends, Funnel, GRAVITY, Grains, Ground, Mask, Mesh, MeshFile,
-    Motion, NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill,
-    ObserveSurface, Outflow, Periodic, PeriodicAxis, Projection, Scene, SensorSpec, Shape, Start,
-    StereoSpec, TimeOfFlightSpec, ViewSpec, Wall,
+    Adhesion, BoxSide, CameraSpec, Capillary, Clump, Effects, EndRule, Ends, Fluid, Funnel,
+    FunnelPose, GRAVITY, Grains, Ground, GroundUnlike, Layer, Mask, Mesh, MeshFile, Motion,
+    NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill,
+    ObserveSurface, Outflow, Outlet, Periodic, PeriodicAxis, Polydispersity, Projection,
+    RestitutionSpeed, RollingForm, Scene, SensorSpec, Shape, Start, StereoSpec, Tilt,
+    TimeOfFlightSpec, Vibration, ViewSpec, Wall,
 };
 pub use simulation::Simulation;
 pub use solver::frozen::{FrozenSolution, FrozenSolve};

@@ -4,6 +4,7 @@
 //! ground is the plane z = 0 and gravity points down unless the scene says otherwise.
 
 mod camera;
+mod effects;
 mod grains;
 mod mesh;
 mod motion;
@@ -20,6 +21,11 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 pub use camera::{CameraSpec, Mask, Projection};
+pub(crate) use effects::ClumpShape;
+pub use effects::{
+    Adhesion, Capillary, Clump, Effects, Fluid, FunnelPose, GroundUnlike, Layer, Outlet,
+    Polydispersity, RestitutionSpeed, RollingForm, Tilt, Vibration,
+};
 pub use grains::Grains;
 pub use mesh::{Mesh, MeshFile};
 pub use motion::Motion;
@@ -34,7 +40,6 @@ pub use view::ViewSpec;
 pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
 
 use crate::check::{finite, positive};
-use crate::effect::{Effects, Polydispersity};
 use crate::{DemError, Material, Preset};
 
 /// Standard gravity as the peers' scenes use it `[m/s^2]`.

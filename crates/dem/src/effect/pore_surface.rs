@@ -8,9 +8,10 @@
 //! Journal for Numerical Methods in Fluids 47 (2005) 139, doi:10.1002/fld.801). W is a binomial filter, with a standard deviation of 1.4 grains, on a grid of cells as
 //! wide as a typical grain. Slopes are central differences between cells, interpolated linearly.
 
-use super::fluid::PACKED;
 use crate::bed::Bed;
 
+/// Solid fraction of a random packing `[-]`.
+pub(super) const PACKED: f64 = 0.6;
 /// Times that the heights are filtered with 1/4, 1/2, 1/4 along either axis: half a cell squared of variance each.
 const FILTERS: usize = 4;
 /// Cells along an axis, at most: grains that have been thrown far must not ask for a map of the room.

@@ -6,13 +6,12 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{Adhesion, Capillary};
 use crate::bed::Bed;
 use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
 use crate::lanes::Row;
 use crate::period::Period;
-use crate::scene::Scene;
+use crate::scene::{Adhesion, Capillary, Scene};
 use crate::wall::Walls;
 
 /// The pairs that a bridge joins, sorted: first grain, then second grain or the number of grains plus the wall's surface.

@@ -29,50 +29,16 @@
 //! speed is not far above the speed of the fall; for couscous in air at 12 cm it takes 0.6 % of the speed.
 
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 
-use super::pore_surface::PoreSurface;
-use crate::DemError;
+use super::pore_surface::{PACKED, PoreSurface};
 use crate::bed::Bed;
-use crate::check::non_negative;
 use crate::contact_set::ContactSet;
-use crate::scene::Grains;
+use crate::scene::{Fluid, Grains};
 
 /// Reynolds number from which on the drag coefficient is constant.
 const NEWTON: f64 = 1000.0;
 /// The drag coefficient there.
 const NEWTON_DRAG: f64 = 0.44;
-
-/// A fluid; known, or a prior of its viscosity.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Fluid {
-    /// Density rho_f `[kg/m^3]`.
-    pub density: f64,
-    /// Dynamic viscosity mu `[Pa s]`.
-    pub viscosity: f64,
-    /// Added mass C_a over the displaced mass `[-]`: 1/2 for a sphere.
-    pub added_mass: f64,
-    /// Share of Di Felice's exponent for the drag among neighbours `[-]`: 0 for that of a lone grain.
-    pub crowding: f64,
-    /// Share of its neighbours' velocity that the fluid around a grain has `[-]`: 0 for a fluid at rest.
-    pub entrained: f64,
-    /// Share of the pressure of a fluid that fills the grains up to their own surface `[-]`: 0 for one that is everywhere.
-    pub saturated: f64,
-}
-
-impl Default for Fluid {
-    fn default() -> Self {
-        Self {
-            density: 0.0,
-            viscosity: 0.0,
-            added_mass: 0.5,
-            crowding: 0.0,
-            entrained: 0.0,
-            saturated: 0.0,
-        }
-    }
-}
 
 /// What a fluid does to grains of a density.
 #[derive(Clone, Copy, Debug)]
@@ -89,41 +55,19 @@ pub(crate) struct Drag {
     push: f64,
 }
 
-impl Fluid {
-    pub(super) fn check(&self) -> Result<(), DemError> {
-        non_negative("effects.fluid.density", self.density)?;
-        non_negative("effects.fluid.viscosity", self.viscosity)?;
-        non_negative("effects.fluid.added_mass", self.added_mass)?;
-        for (name, got) in [
-            ("effects.fluid.crowding", self.crowding),
-            ("effects.fluid.entrained", self.entrained),
-            ("effects.fluid.saturated", self.saturated),
-        ] {
-            if !(0.0..=1.0).contains(&got) {
-                return Err(DemError::range(name, got, "in [0, 1]"));
-            }
-        }
-        Ok(())
-    }
-
-    pub(super) fn is_on(&self) -> bool {
-        self.density > 0.0 || self.viscosity > 0.0
-    }
-
-    /// `gravity`: its magnitude along the vertical `[m/s^2]`.
-    pub(super) fn drag(self, grains: &Grains, gravity: f64) -> Drag {
-        let inertia = grains.density + self.added_mass * self.density;
-        Drag {
-            fluid: self,
-            inertia,
-            weight: (grains.density - self.density) / inertia,
-            inverse_inertia: grains.density / inertia,
-            push: self.saturated * self.density * gravity / (PACKED * inertia),
-        }
-    }
-}
-
 impl Drag {
+    /// `gravity`: its magnitude along the vertical `[m/s^2]`.
+    pub fn of(fluid: Fluid, grains: &Grains, gravity: f64) -> Self {
+        let inertia = grains.density + fluid.added_mass * fluid.density;
+        Self {
+            fluid,
+            inertia,
+            weight: (grains.density - fluid.density) / inertia,
+            inverse_inertia: grains.density / inertia,
+            push: fluid.saturated * fluid.density * gravity / (PACKED * inertia),
+        }
+    }
+
     /// Rates at which a grain of `radius` `[m]` at `speed` `[m/s]` loses its velocity and its spin `[1/s]`.
     fn rates(&self, radius: f64, speed: f64) -> [f64; 2] {
         let Fluid { density, viscosity, .. } = self.fluid;
@@ -205,8 +149,6 @@ impl Drag {
     }
 }
 
-/// Solid fraction of a random packing `[-]`.
-pub(super) const PACKED: f64 = 0.6;
 /// Gap below which two grains are neighbours, in radii `[-]`: what every preset lists.
 const NEIGHBOUR: f64 = 0.25;
 /// Neighbours inside a random packing: `python examples/neighbours.py` counts 7.9 and, of smoother beads, 8.7 deep in a column.
@@ -262,11 +204,14 @@ mod tests {
 
     const GRAINS: Grains = Grains { count: 1, diameter: 4e-3, density: 2500.0 };
 
+    fn drag(fluid: Fluid) -> Drag {
+        Drag::of(fluid, &GRAINS, 9.81)
+    }
+
     #[test]
     fn drag_is_stokes_when_slow_and_newtons_when_fast() {
         let glycerol =
-            Fluid { density: 1260.0, viscosity: 1.4, added_mass: 0.5, ..Fluid::default() }
-                .drag(&GRAINS, 9.81);
+            drag(Fluid { density: 1260.0, viscosity: 1.4, added_mass: 0.5, ..Fluid::default() });
         let (radius, volume) = (2e-3, 4.0 / 3.0 * std::f64::consts::PI * 8e-9);
         let stokes = 6.0 * std::f64::consts::PI * 1.4 * radius / (glycerol.inertia * volume);
         let [linear, angular] = glycerol.rates(radius, 1e-9);
@@ -275,8 +220,8 @@ mod tests {
         let turned = moment / (0.4 * glycerol.inertia * volume * radius * radius);
         assert!((angular / turned - 1.0).abs() < 1e-12);
         // C_D/8 pi rho_f d^2 |v| over the mass, at Re = 4000.
-        let water = Fluid { density: 1000.0, viscosity: 1e-3, added_mass: 0.5, ..Fluid::default() }
-            .drag(&GRAINS, 9.81);
+        let water =
+            drag(Fluid { density: 1000.0, viscosity: 1e-3, added_mass: 0.5, ..Fluid::default() });
         let area = std::f64::consts::PI * 16e-6;
         let fast = 0.44 / 8.0 * 1000.0 * area * 1.0 / (water.inertia * volume);
         assert!((water.rates(radius, 1.0)[0] / fast - 1.0).abs() < 1e-12);
@@ -292,7 +237,7 @@ mod tests {
         let diameter = 2.0 * radius;
         for (viscosity, slip) in [(1.0, 1e-3), (1e-3, 5e-3), (1e-3, 0.1)] {
             let fluid = Fluid { density: 1000.0, viscosity, crowding: 1.0, ..Fluid::default() };
-            let drag = fluid.drag(&GRAINS, 9.81);
+            let drag = drag(fluid);
             let [rate, _] = drag.crowded_rates(radius, slip, 1.0);
             let ergun = 150.0 * (1.0 - void) * viscosity / (void * diameter).powi(2)
                 + 1.75 * 1000.0 * slip / (void * diameter);
@@ -303,8 +248,8 @@ mod tests {
 
     #[test]
     fn weight_has_buoyancy_and_added_mass() {
-        let water = Fluid { density: 1000.0, viscosity: 1e-3, added_mass: 0.5, ..Fluid::default() }
-            .drag(&GRAINS, 9.81);
+        let water =
+            drag(Fluid { density: 1000.0, viscosity: 1e-3, added_mass: 0.5, ..Fluid::default() });
         assert_eq!(water.weight, 1500.0 / 3000.0);
         assert_eq!(water.inverse_inertia, 2500.0 / 3000.0);
     }

@@ -16,35 +16,13 @@
 //! contact that gives way as in Lacoursiere 2007 (doctoral thesis, Umea), 4.4. The hard ground lies below it and keeps
 //! its own coefficients: no thickness is no layer. Prior of the thickness: uniform over 0 to a radius.
 
-use serde::{Deserialize, Serialize};
-
-use crate::DemError;
 use crate::bed::Bed;
 use crate::blocks::Blocks;
-use crate::check::{non_negative, positive};
 use crate::contact::{ContactLaw, Listed};
 use crate::contact_set::{ContactSet, Second};
 use crate::contacts::Surroundings;
 use crate::lanes::Lanes;
 use crate::scene::Scene;
-
-/// The layer's surface is the plane z = 0, the hard ground lies `thickness` below.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Layer {
-    /// `[m]`
-    pub thickness: f64,
-    /// Weights of a typical grain that press it in by its radius `[-]`.
-    pub stiffness: f64,
-    /// Damping over the critical damping of a typical grain `[-]`.
-    pub damping: f64,
-}
-
-impl Default for Layer {
-    fn default() -> Self {
-        Self { thickness: 0.0, stiffness: 20.0, damping: 1.0 }
-    }
-}
 
 /// A layer as the solver sees it, over a typical mass.
 #[derive(Clone, Copy, Debug)]
@@ -55,25 +33,15 @@ pub(crate) struct Pad {
     damping: f64,
 }
 
-impl Layer {
-    pub(super) fn check(&self) -> Result<(), DemError> {
-        non_negative("effects.layer.thickness", self.thickness)?;
-        positive("effects.layer.stiffness", self.stiffness)?;
-        non_negative("effects.layer.damping", self.damping)
-    }
-
-    pub(super) fn is_on(&self) -> bool {
-        self.thickness > 0.0
-    }
-
-    pub(super) fn pad(&self, scene: &Scene) -> Pad {
-        let weight = nalgebra::Vector3::from(scene.gravity).norm();
-        let rigidity = self.stiffness * weight / scene.grains.radius();
-        Pad { rigidity, damping: 2.0 * self.damping * rigidity.sqrt() }
-    }
-}
-
 impl Pad {
+    /// The layer of a scene.
+    pub fn of(scene: &Scene) -> Self {
+        let layer = scene.effects.layer;
+        let weight = nalgebra::Vector3::from(scene.gravity).norm();
+        let rigidity = layer.stiffness * weight / scene.grains.radius();
+        Self { rigidity, damping: 2.0 * layer.damping * rigidity.sqrt() }
+    }
+
     /// a `[-]`: how far a contact gives way to an impulse in a substep.
     fn give(&self, dt: f64) -> f64 {
         1.0 / (dt * (dt * self.rigidity + self.damping))

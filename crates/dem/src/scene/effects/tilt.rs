@@ -32,7 +32,7 @@ impl Tilt {
     }
 
     /// Gravity as it is seen from the table.
-    pub(super) fn turn(&self, gravity: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn turn(&self, gravity: &Vector3<f64>) -> Vector3<f64> {
         let axis = Vector3::new(self.x, self.y, 0.0);
         Rotation3::new(axis).inverse() * gravity
     }

@@ -26,7 +26,7 @@ impl RollingForm {
         non_negative("effects.rolling_form.speed", self.speed)
     }
 
-    pub(super) fn is_on(self) -> bool {
+    pub(crate) fn is_on(self) -> bool {
         self.speed > 0.0
     }
 }

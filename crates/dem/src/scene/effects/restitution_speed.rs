@@ -31,12 +31,12 @@ impl RestitutionSpeed {
         positive("effects.restitution_speed.reference", self.reference)
     }
 
-    pub(super) fn is_on(&self) -> bool {
+    pub(crate) fn is_on(&self) -> bool {
         self.exponent != 0.0
     }
 
     /// The restitution of an impact at `speed` `[m/s]`.
-    pub(super) fn at(&self, restitution: f64, speed: f64) -> f64 {
+    pub(crate) fn at(&self, restitution: f64, speed: f64) -> f64 {
         (restitution * (speed / self.reference).powf(-self.exponent)).min(1.0)
     }
 }

@@ -37,7 +37,7 @@ impl Adhesion {
     }
 
     /// Pull over that of touching typical grains `[-]`; lengths in radii of a typical grain.
-    pub(super) fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
+    pub(crate) fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
         if gap <= self.range { derjaguin } else { 0.0 }
     }
 }

@@ -38,7 +38,7 @@ impl Vibration {
         non_negative("effects.vibration.duration", self.duration)
     }
 
-    pub(super) fn is_on(&self) -> bool {
+    pub(crate) fn is_on(&self) -> bool {
         self.acceleration > 0.0 && self.duration > 0.0
     }
 
@@ -48,7 +48,7 @@ impl Vibration {
     }
 
     /// What is added to the vertical component of gravity `[m/s^2]`.
-    pub(super) fn acceleration_at(&self, time: f64) -> f64 {
+    pub(crate) fn acceleration_at(&self, time: f64) -> f64 {
         let since = time - self.begin;
         if (0.0..self.duration).contains(&since) {
             self.acceleration * GRAVITY * (TAU * self.frequency * since).sin()

@@ -53,12 +53,12 @@ impl Capillary {
     }
 
     /// Separation at which a bridge ruptures, in radii of a typical grain `[-]`.
-    pub(super) fn rupture(&self) -> f64 {
+    pub(crate) fn rupture(&self) -> f64 {
         (1.0 + 0.5 * self.contact_angle) * self.volume.cbrt()
     }
 
     /// Pull of a bridge over that of touching typical grains `[-]`: `gap` and `derjaguin` (R) in radii of a typical grain.
-    pub(super) fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
+    pub(crate) fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
         let s = gap.max(0.0) * (derjaguin / self.volume).sqrt();
         derjaguin / (1.0 + 1.05 * s + 2.5 * s * s)
     }
