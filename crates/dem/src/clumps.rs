@@ -19,11 +19,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::bed::{Bed, Body, INVERSE_INERTIA};
 use crate::contact_set::ContactSet;
-use crate::contacts::Surroundings;
 use crate::lanes::Row;
 use crate::law::IMPACT_SPEED;
 use crate::random::unit_interval;
 use crate::scene::{ClumpShape, Scene};
+use crate::surroundings::Surroundings;
 
 /// Keeps the orientations of a seed apart from its places.
 const STREAM: u64 = 0x6a09_e667_f3bc_c909;

@@ -1,10 +1,10 @@
 //! One search for pairs, frozen: what studies of its cost repeat.
 
 use crate::bed::Bed;
-use crate::contacts::Surroundings;
 use crate::neighbor::{Neighbours, PairSearch};
 use crate::parallel::Threads;
 use crate::path::{Path, Reach};
+use crate::surroundings::Surroundings;
 
 /// The grains of a moment, whose neighbours can be searched again and again.
 #[derive(Clone, Debug)]

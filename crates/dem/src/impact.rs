@@ -13,8 +13,9 @@ use crate::Material;
 use crate::assemble::Candidate;
 use crate::bed::{Bed, INVERSE_INERTIA};
 use crate::contact::ContactLaw;
-use crate::contacts::{Contacts, Surroundings};
+use crate::contacts::Contacts;
 use crate::law::{IMPACT_SPEED, TANGENTIAL_INERTIA};
+use crate::surroundings::Surroundings;
 
 /// Impacts of one grain in a substep, at most; what is left then is for the contact solve.
 const MAX_IMPACTS: u32 = 1024;

@@ -59,6 +59,7 @@ mod random;
 mod scene;
 mod simulation;
 mod solver;
+mod surroundings;
 mod wall;
 mod wall_load;
 

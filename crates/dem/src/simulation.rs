@@ -14,7 +14,7 @@ use crate::assemble::Seen;
 use crate::bed::Bed;
 use crate::clumps::{self, Clumps};
 use crate::contact_set::ContactSet;
-use crate::contacts::{Contacts, Surroundings};
+use crate::contacts::Contacts;
 use crate::effect::Bridges;
 use crate::frozen_search::FrozenSearch;
 use crate::health::{Health, HealthWatch};
@@ -26,6 +26,7 @@ use crate::problem::{ContactProblem, SWEEPS_A_LOOK};
 use crate::scene::Scene;
 use crate::solver::frozen::FrozenSolve;
 use crate::solver::{self, nsgs};
+use crate::surroundings::Surroundings;
 use crate::wall_load::{self, WallLoad};
 
 /// Mean energy of a grain's translation over that of a fall by its radius below which grains hardly move `[-]`.

@@ -20,9 +20,9 @@ use crate::bed::Bed;
 use crate::blocks::Blocks;
 use crate::contact::{ContactLaw, Listed};
 use crate::contact_set::{ContactSet, Second};
-use crate::contacts::Surroundings;
 use crate::lanes::Lanes;
 use crate::scene::Scene;
+use crate::surroundings::Surroundings;
 
 /// A layer as the solver sees it, over a typical mass.
 #[derive(Clone, Copy, Debug)]
