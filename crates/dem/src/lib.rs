@@ -56,6 +56,7 @@ mod pour;
 mod preset;
 mod problem;
 mod random;
+mod rebound;
 mod scene;
 mod simulation;
 mod solver;

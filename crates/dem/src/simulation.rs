@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use crate::DemError;
 use crate::assemble::Seen;
 use crate::bed::Bed;
-use crate::clumps::{self, Clumps};
+use crate::clumps::Clumps;
 use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
 use crate::effect::Bridges;
@@ -23,6 +23,7 @@ use crate::parallel::Threads;
 use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
 use crate::problem::{ContactProblem, SWEEPS_A_LOOK};
+use crate::rebound;
 use crate::scene::Scene;
 use crate::solver::frozen::FrozenSolve;
 use crate::solver::{self, nsgs};
@@ -301,12 +302,14 @@ impl Simulation {
         }
         contacts.move_walls(bed, around);
         if self.clumps.is_some() {
-            clumps::rebound(&mut contacts.pairs, bed, around);
-            clumps::rebound(&mut contacts.at_walls, bed, around);
+            rebound::rebound(&mut contacts.pairs, bed, around);
+            rebound::rebound(&mut contacts.at_walls, bed, around);
         }
         self.pull();
         if let Some(pad) = &self.around.effects.pad {
-            pad.assemble(&mut self.on_layer, &self.bed, &self.around);
+            let (bed, around) = (&self.bed, &self.around);
+            let ground = |grain| around.wall_law(bed, grain, 0);
+            pad.assemble(&mut self.on_layer, bed, around.settings.dt, ground);
         }
         seen
     }
@@ -334,7 +337,8 @@ impl Simulation {
     fn pull(&mut self) {
         if let Some(pull) = &self.around.effects.pull {
             let (walls, dt) = (&self.around.walls, self.around.settings.dt);
-            pull.act(&mut self.bed, &self.contacts, walls, &mut self.bridges, dt);
+            let near = [&self.contacts.pairs, &self.contacts.at_walls];
+            pull.act(&mut self.bed, near, walls, &mut self.bridges, dt);
         }
     }
 

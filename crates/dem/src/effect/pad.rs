@@ -22,7 +22,6 @@ use crate::contact::{ContactLaw, Listed};
 use crate::contact_set::{ContactSet, Second};
 use crate::lanes::Lanes;
 use crate::scene::Scene;
-use crate::surroundings::Surroundings;
 
 /// A layer as the solver sees it, over a typical mass.
 #[derive(Clone, Copy, Debug)]
@@ -52,16 +51,22 @@ impl Pad {
         if gap < 0.0 { self.give(dt) * dt * self.rigidity * gap } else { gap / dt }
     }
 
-    /// Lists the grains that are in the layer by the end of the substep, with what they had before.
-    pub fn assemble(&self, set: &mut ContactSet, bed: &Bed, around: &Surroundings) {
-        let dt = around.settings.dt;
+    /// Lists the grains that are in the layer by the end of a substep of `dt` `[s]`, with what they had before; `ground` has the
+    /// coefficients of a grain on the hard ground.
+    pub fn assemble(
+        &self,
+        set: &mut ContactSet,
+        bed: &Bed,
+        dt: f64,
+        ground: impl Fn(usize) -> ContactLaw,
+    ) {
         let gap = |grain: usize| bed.position(grain).z - bed.radius(grain);
         let comes = |&grain: &usize| gap(grain) + dt * bed.velocity(grain).z.min(0.0) < 0.0;
         let listed: Vec<Listed> =
             bed.present().filter(comes).map(|i| Listed { i: i as u32, partner: 0 }).collect();
         let give = self.give(dt);
         set.rebuild(&listed, &Blocks::default(), bed.count(), Second::SoftLayer, |contact| {
-            ContactLaw { give, ..around.wall_law(bed, contact.i as usize, 0) }
+            ContactLaw { give, ..ground(contact.i as usize) }
         });
         for batch in &mut set.batches {
             batch.bias = Lanes::splat(f64::INFINITY);

@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::bed::Bed;
 use crate::contact_set::ContactSet;
-use crate::contacts::Contacts;
 use crate::lanes::Row;
 use crate::period::Period;
 use crate::scene::{Adhesion, Capillary, Scene};
@@ -64,11 +63,11 @@ impl Pull {
         self.radius * self.adhesion.as_ref().map_or(0.0, |a| a.range).max(capillary)
     }
 
-    /// Pulls all that is near for `dt` `[s]`; bridges form at a touch and go at their rupture.
+    /// Pulls all that is near for `dt` `[s]`: pairs of grains and grains at walls; bridges form at a touch and go at their rupture.
     pub fn act(
         &self,
         bed: &mut Bed,
-        contacts: &Contacts,
+        [pair_set, wall_set]: [&ContactSet; 2],
         walls: &Walls,
         bridges: &mut Bridges,
         dt: f64,
@@ -76,9 +75,9 @@ impl Pull {
         bridges.next.clear();
         // Velocities change while the pull acts, places do not.
         let places = bed.places.clone();
-        let between = pairs(&contacts.pairs, &places, bed.period);
+        let between = pairs(pair_set, &places, bed.period);
         let count = bed.count() as u32;
-        for near in between.chain(at_walls(&contacts.at_walls, &places, count, walls)) {
+        for near in between.chain(at_walls(wall_set, &places, count, walls)) {
             let force = self.force(&near, bridges);
             if force > 0.0 {
                 let impulse = force * dt * near.normal;
