@@ -3,7 +3,7 @@
 //! Reads places and velocities (gravity included), writes the batches.
 
 use crate::bed::Bed;
-use crate::contact::Batch;
+use crate::contact::{Batch, Candidate};
 use crate::contact_set::ContactSet;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, widest};
 use crate::law;
@@ -27,14 +27,6 @@ impl Seen {
     pub fn max(self, other: Self) -> Self {
         Self { penetration: self.penetration.max(other.penetration) }
     }
-}
-
-/// Two grains, or a grain and a wall, that may be an impact within the substep.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Candidate {
-    pub i: u32,
-    /// Second grain, or the number of grains plus the wall's number.
-    pub partner: u32,
 }
 
 widest! {

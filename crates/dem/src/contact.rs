@@ -74,6 +74,14 @@ pub(crate) struct Listed {
     pub partner: u32,
 }
 
+/// Two grains, or a grain and a wall, that may be an impact within the substep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Candidate {
+    pub i: u32,
+    /// Second grain, or the number of grains plus the wall's number.
+    pub partner: u32,
+}
+
 /// Coefficients of one contact, put into a lane when the list is made.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ContactLaw {

@@ -8,12 +8,11 @@ mod check;
 
 use std::ops::Range;
 
-use crate::assemble::{self, Candidate, Seen};
+use crate::assemble::{self, Seen};
 use crate::bed::{Bed, Body};
 use crate::blocks::Blocks;
-use crate::contact::{Batch, Listed};
+use crate::contact::{Batch, Candidate, Listed};
 use crate::contact_set::{ContactSet, Second};
-use crate::impact::Impacts;
 use crate::lanes::Row;
 use crate::neighbor::{Neighbours, PairSearch};
 use crate::partners::Partners;
@@ -128,15 +127,15 @@ impl Contacts {
         self.partners.of(grain)
     }
 
-    /// Gaps, normals and biases of every listed contact, and what may be an impact.
+    /// Gaps, normals and biases of every listed contact; `found` gets what may be an impact.
     pub fn assemble(
         &mut self,
         bed: &Bed,
         around: &Surroundings,
         lost: &mut [bool],
-        impacts: &mut Impacts,
+        found: &mut Vec<Candidate>,
     ) -> Seen {
-        let (dt, found) = (around.settings.dt, &mut impacts.candidates);
+        let dt = around.settings.dt;
         self.age += 1;
         let assemble = |batches: &mut [Batch], found: &mut Vec<Candidate>| {
             assemble::assemble_pairs(batches, bed, dt, found)
@@ -206,7 +205,6 @@ impl Contacts {
         self.renewed = 0;
         self.paths = Path::all_of(bed);
         let reach = around.reach();
-        let interval = reach.interval;
 
         self.search.pairs(bed, &self.paths, reach, &around.threads, &mut self.found);
         // Where space repeats the first and the last block are neighbours, which phases do not know: one block.
@@ -227,7 +225,7 @@ impl Contacts {
             around.pair_law(bed, contact.i as usize, contact.partner as usize)
         });
 
-        self.list_walls(bed, around, interval);
+        self.list_walls(bed, around, reach);
         self.listed.clear();
         for &(contact, is_near) in &self.near_walls {
             if is_near { &mut self.listed } else { &mut self.far }.push(contact);
@@ -240,14 +238,14 @@ impl Contacts {
     }
 
     /// Lists the walls within reach of each grain, and whether they may be touched.
-    fn list_walls(&mut self, bed: &Bed, around: &Surroundings, interval: f64) {
+    fn list_walls(&mut self, bed: &Bed, around: &Surroundings, reach: Reach) {
         self.near_walls.clear();
         let (paths, walls) = (&self.paths, &around.walls);
         let list = |grains: Range<usize>, found: &mut Vec<(Listed, bool)>| {
             for grain in grains.filter(|&grain| !bed.has_left(grain)) {
                 let Path { from, velocity } = &paths[grain];
-                let near = bed.radius(grain) + NEAR * around.radius + interval * velocity.norm();
-                let range = near + around.margin - NEAR * around.radius;
+                let near = bed.radius(grain) + reach.near + reach.interval * velocity.norm();
+                let range = near + around.margin - reach.near;
                 walls.reached(from, range, |surface| {
                     let contact = Listed { i: grain as u32, partner: surface as u32 };
                     found.push((contact, walls.may_reach(surface, from, near)));

@@ -10,9 +10,8 @@ use std::collections::BinaryHeap;
 use nalgebra::Vector3;
 
 use crate::Material;
-use crate::assemble::Candidate;
 use crate::bed::{Bed, INVERSE_INERTIA};
-use crate::contact::ContactLaw;
+use crate::contact::{Candidate, ContactLaw};
 use crate::contacts::Contacts;
 use crate::law::{IMPACT_SPEED, TANGENTIAL_INERTIA};
 use crate::surroundings::Surroundings;

@@ -291,7 +291,8 @@ impl Simulation {
         self.contacts.follow(&self.bed, &self.around);
         self.accelerate();
         let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
-        let seen = contacts.assemble(bed, around, self.watch.lost_mut(), &mut self.impacts);
+        let seen =
+            contacts.assemble(bed, around, self.watch.lost_mut(), &mut self.impacts.candidates);
         if self.clumps.is_some() {
             // Impacts of bodies that turn are a matter of the contact solve.
             self.impacts.candidates.clear();
