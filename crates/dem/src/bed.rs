@@ -5,11 +5,9 @@ use std::marker::PhantomData;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::clumps::Clumps;
 use crate::lanes::{Row, Width};
 use crate::parallel::Threads;
 use crate::period::Period;
-use crate::scene::Scene;
 
 /// Grains that a thread takes at once.
 const SHARE: usize = if cfg!(test) { 16 } else { 4096 };
@@ -97,23 +95,9 @@ pub(crate) struct Bed {
 pub(crate) const INVERSE_INERTIA: f64 = 2.5;
 
 impl Bed {
-    pub fn new(scene: &Scene, seed: u64) -> Self {
-        let count = scene.grains.count;
-        let radius = scene.grains.radius();
-        let mut places: Vec<Row> =
-            scene.starting_positions(seed).iter().map(|at| Row::new(at, radius)).collect();
-        let mut inverse_mass = vec![1.0; count];
-        if let Some(clumps) = Clumps::of(scene, seed) {
-            places = clumps.places();
-            inverse_mass = vec![clumps.members() as f64; places.len()];
-        }
+    /// Grains at rest, each with its centre and radius `[m]` and its inverse mass.
+    pub fn new(mut places: Vec<Row>, inverse_mass: Vec<f64>, period: Option<Period>) -> Self {
         let count = inverse_mass.len();
-        if let Some(radii) = scene.effects.polydispersity.radii(count, radius, seed) {
-            for ((place, inverse), own) in places.iter_mut().zip(&mut inverse_mass).zip(radii) {
-                place.0[3] = own;
-                *inverse = (radius / own).powi(3);
-            }
-        }
         places.push(Row::default());
         Self {
             places,
@@ -121,7 +105,7 @@ impl Bed {
             clocks: vec![0.0; count],
             inverse_mass,
             left: Vec::new(),
-            period: scene.periodic.as_ref().map(Period::of),
+            period,
         }
     }
 
@@ -322,13 +306,8 @@ mod tests {
 
     /// Three grains of different size and mass, in motion.
     fn bed() -> Bed {
-        let mut scene = Scene::drop(0.1);
-        scene.grains.count = 3;
-        let mut bed = Bed::new(&scene, 1);
-        for (place, radius) in bed.places.iter_mut().zip([1e-3, 2e-3, 4e-3]) {
-            place.0[3] = radius;
-        }
-        bed.inverse_mass = vec![8.0, 1.0, 0.125];
+        let places = [1e-3, 2e-3, 4e-3].map(|radius| Row([5.0 * radius, 0.0, 0.1, radius]));
+        let mut bed = Bed::new(places.to_vec(), vec![8.0, 1.0, 0.125], None);
         for (i, body) in bed.bodies[..3].iter_mut().enumerate() {
             let i = i as f64;
             body.velocity = Row([1.0 + i, -2.0, 0.5 * i, 0.0]);

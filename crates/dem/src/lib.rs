@@ -43,6 +43,7 @@ mod error;
 mod frozen_search;
 mod health;
 mod impact;
+mod initial;
 mod lanes;
 mod law;
 mod material;

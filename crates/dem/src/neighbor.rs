@@ -380,14 +380,11 @@ mod tests {
 
     use super::*;
     use crate::lanes::Row;
-    use crate::scene::Scene;
 
     fn bed(points: &[([f64; 3], [f64; 3], f64)]) -> Bed {
-        let mut scene = Scene::drop(0.0);
-        scene.grains.count = points.len();
-        let mut bed = Bed::new(&scene, 0);
-        for (i, (position, velocity, radius)) in points.iter().enumerate() {
-            bed.places[i] = Row::new(&(*position).into(), *radius);
+        let places = points.iter().map(|&(position, _, radius)| Row::new(&position.into(), radius));
+        let mut bed = Bed::new(places.collect(), vec![1.0; points.len()], None);
+        for (i, (_, velocity, _)) in points.iter().enumerate() {
             bed.bodies[i].velocity = Row::new(&(*velocity).into(), 0.0);
         }
         bed

@@ -19,6 +19,7 @@ use crate::effect::Bridges;
 use crate::frozen_search::FrozenSearch;
 use crate::health::{Health, HealthWatch};
 use crate::impact::Impacts;
+use crate::initial;
 use crate::parallel::Threads;
 use crate::pour::{Pour, Status};
 use crate::preset::SolverSettings;
@@ -77,7 +78,8 @@ impl Simulation {
     /// What [`Scene::check`] says.
     pub fn new(scene: &Scene, seed: u64) -> Result<Self, DemError> {
         scene.check()?;
-        let bed = Bed::new(scene, seed);
+        let clumps = Clumps::of(scene, seed);
+        let bed = initial::bed(scene, clumps.as_ref(), seed);
         let around = Surroundings::new(scene);
         let gravity = around.gravity;
         let lift = gravity.norm() * scene.grains.radius();
@@ -90,7 +92,7 @@ impl Simulation {
             impacts: Impacts::default(),
             bridges: Bridges::default(),
             on_layer: ContactSet::default(),
-            clumps: Clumps::of(scene, seed),
+            clumps,
             origin: Arc::new(Origin { scene: scene.clone(), seed }),
             substep: 0,
             is_quiet: false,

@@ -112,25 +112,23 @@ impl PoreSurface {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Scene, Start};
+    use crate::lanes::Row;
 
     #[test]
     fn a_wedge_of_grains_has_the_wedges_slope() {
         // Stacks of grains whose number falls by one from row to row.
-        let mut scene = Scene::drop(0.1);
-        let (radius, mut positions) = (scene.grains.radius(), Vec::new());
+        let (radius, mut places) = (2e-3, Vec::new());
         let cell = 2.0 * radius;
         for a in 0..14 {
             for b in -14..=14 {
                 for c in 0..(14 - a) {
                     let [x, y, z] = [a, b, c].map(|k| cell * f64::from(k));
-                    positions.push([x, y, radius + z]);
+                    places.push(Row([x, y, radius + z, radius]));
                 }
             }
         }
-        scene.grains.count = positions.len();
-        scene.start = Start::Positions { positions };
-        let surface = PoreSurface::of(&Bed::new(&scene, 0), radius);
+        let inverse_mass = vec![1.0; places.len()];
+        let surface = PoreSurface::of(&Bed::new(places, inverse_mass, None), radius);
         // A grain a cell is a thickness of pi / 6 / 0.6 cells.
         let expected = -std::f64::consts::PI / 3.6;
         for [x, y] in [[0.03, 0.0], [0.027, -0.0071]] {

@@ -1,0 +1,27 @@
+//! The grains of a scene at time zero.
+
+use crate::bed::Bed;
+use crate::clumps::Clumps;
+use crate::lanes::Row;
+use crate::period::Period;
+use crate::scene::Scene;
+
+/// The grains where they start, as large and as heavy as the scene says: the spheres of `clumps` if they are not round.
+pub(crate) fn bed(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Bed {
+    let radius = scene.grains.radius();
+    let (mut places, inverse): (Vec<Row>, f64) = match clumps {
+        Some(clumps) => (clumps.places(), clumps.members() as f64),
+        None => {
+            let centres = scene.starting_positions(seed);
+            (centres.iter().map(|at| Row::new(at, radius)).collect(), 1.0)
+        }
+    };
+    let mut inverse_mass = vec![inverse; places.len()];
+    if let Some(radii) = scene.effects.polydispersity.radii(places.len(), radius, seed) {
+        for ((place, inverse), own) in places.iter_mut().zip(&mut inverse_mass).zip(radii) {
+            place.0[3] = own;
+            *inverse = (radius / own).powi(3);
+        }
+    }
+    Bed::new(places, inverse_mass, scene.periodic.as_ref().map(Period::of))
+}
