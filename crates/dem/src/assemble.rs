@@ -5,7 +5,7 @@
 use crate::bed::Bed;
 use crate::contact::{Batch, Candidate};
 use crate::contact_set::ContactSet;
-use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, widest};
+use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, vectors, widest};
 use crate::law;
 use crate::period::Period;
 use crate::wall::Walls;
@@ -143,13 +143,6 @@ widest! {
             finish(batch, law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt));
         }
     }
-}
-
-/// The vectors of eight rows, one for each lane.
-#[inline(always)]
-pub(crate) fn vectors<W: Width>(rows: [W::Quad; LANES]) -> Reg3<W> {
-    let [x, y, z, _] = W::columns(rows);
-    Reg3 { x: Reg(x), y: Reg(y), z: Reg(z) }
 }
 
 /// Which lanes would close within the substep faster than an impact must.

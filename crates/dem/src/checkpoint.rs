@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use toml::Value;
 use xxhash_rust::xxh3::xxh3_128;
 
+use crate::error::DemError;
 use crate::preset::SolverSettings;
+use crate::scene::Scene;
 use crate::scene::path::first_difference;
-use crate::{DemError, Scene};
 
 /// What a checkpoint begins with.
 const MAGIC: &[u8] = b"granulcal checkpoint\n";

@@ -17,8 +17,10 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use crate::bed::{Bed, Body, INVERSE_INERTIA};
+use crate::bed::Bed;
+use crate::body::Body;
 use crate::lanes::Row;
+use crate::law::INVERSE_INERTIA;
 use crate::random::unit_interval;
 use crate::scene::{ClumpShape, Scene};
 

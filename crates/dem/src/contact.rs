@@ -8,6 +8,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::lanes::{LANES, Lanes, Lanes3};
+use crate::law::INVERSE_INERTIA;
 
 /// [`LANES`] contacts: geometry, law and impulses. Empty lanes refer to the resting body and have no compliance.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -150,7 +151,7 @@ impl LawLanes {
         self.compliance_n.0[lane] = 1.0 / (mass_i + mass_j + law.give);
         self.give.0[lane] = law.give;
         let roll = lever_i * lever_i * mass_i + lever_j * lever_j * mass_j;
-        self.compliance_r.0[lane] = 1.0 / (crate::bed::INVERSE_INERTIA * roll);
+        self.compliance_r.0[lane] = 1.0 / (INVERSE_INERTIA * roll);
         self.sliding_friction.0[lane] = law.sliding_friction;
         self.rolling_friction.0[lane] = law.rolling_friction;
         self.torsional_friction.0[lane] = law.torsional_friction;

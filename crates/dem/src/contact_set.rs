@@ -9,8 +9,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::bed::Body;
 use crate::blocks::Blocks;
+use crate::body::Body;
 use crate::contact::{Batch, ContactLaw, LawLanes, Listed, WallLanes};
 use crate::lanes::LANES;
 

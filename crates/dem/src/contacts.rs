@@ -9,8 +9,9 @@ mod check;
 use std::ops::Range;
 
 use crate::assemble::{self, Seen};
-use crate::bed::{Bed, Body};
+use crate::bed::Bed;
 use crate::blocks::Blocks;
+use crate::body::Body;
 use crate::contact::{Batch, Candidate, Listed};
 use crate::contact_set::{ContactSet, Second};
 use crate::lanes::Row;

@@ -9,11 +9,11 @@ use std::collections::BinaryHeap;
 
 use nalgebra::Vector3;
 
-use crate::Material;
-use crate::bed::{Bed, INVERSE_INERTIA};
+use crate::bed::Bed;
 use crate::contact::{Candidate, ContactLaw};
 use crate::contacts::Contacts;
-use crate::law::{IMPACT_SPEED, TANGENTIAL_INERTIA};
+use crate::law::{IMPACT_SPEED, INVERSE_INERTIA, TANGENTIAL_INERTIA};
+use crate::material::Material;
 use crate::surroundings::Surroundings;
 
 /// Impacts of one grain in a substep, at most; what is left then is for the contact solve.

@@ -17,7 +17,7 @@ pub(crate) use avx2::Avx2;
 pub(crate) use avx512::Avx512;
 use nalgebra::Vector3;
 pub(crate) use portable::Portable;
-pub(crate) use reg::{Reg, Reg3};
+pub(crate) use reg::{Reg, Reg3, vectors};
 use serde::{Deserialize, Serialize};
 
 /// Contacts in a batch.

@@ -16,6 +16,9 @@ pub(crate) const PINNED_SPEED: f64 = 0.1;
 /// Approach below which an impact is inelastic `[m/s]`: a matter of the contact solve, not of `impact`.
 pub(crate) const IMPACT_SPEED: f64 = 0.05;
 
+/// Inverse moment of inertia of a sphere times its mass and squared radius, 5/2.
+pub(crate) const INVERSE_INERTIA: f64 = 2.5;
+
 /// Inverse of the tangential over the normal Delassus element of two spheres: 1 + 5/2.
 pub(crate) const TANGENTIAL_INERTIA: f64 = 3.5;
 

@@ -32,6 +32,7 @@
 mod assemble;
 mod bed;
 mod blocks;
+mod body;
 mod check;
 mod checkpoint;
 mod clumps;

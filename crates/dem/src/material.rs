@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
+use crate::error::DemError;
 
 /// Coefficients of a contact between two surfaces of the same kind.
 ///

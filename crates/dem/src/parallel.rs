@@ -9,7 +9,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::DemError;
+use crate::error::DemError;
 
 /// The threads of one simulation. Small loops, and all loops of a single thread, stay on the calling thread.
 #[derive(Clone, Debug, Default)]

@@ -5,10 +5,12 @@
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use crate::bed::{Bed, Body, INVERSE_INERTIA};
+use crate::bed::Bed;
+use crate::body::Body;
 use crate::contact::Batch;
 use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
+use crate::law::INVERSE_INERTIA;
 
 /// Residual at which a solution counts as converged, over the fastest velocity or impulse `[-]`: some
 /// fifty roundings.

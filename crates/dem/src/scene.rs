@@ -6,6 +6,7 @@
 mod camera;
 mod effects;
 mod grains;
+mod gravity;
 mod mesh;
 mod motion;
 mod observe;
@@ -27,6 +28,8 @@ pub use effects::{
     Polydispersity, RestitutionSpeed, RollingForm, Tilt, Vibration,
 };
 pub use grains::Grains;
+pub use gravity::GRAVITY;
+use gravity::standard_gravity;
 pub use mesh::{Mesh, MeshFile};
 pub use motion::Motion;
 pub use observe::{
@@ -40,10 +43,9 @@ pub use view::ViewSpec;
 pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
 
 use crate::check::{finite, positive};
-use crate::{DemError, Material, Preset};
-
-/// Standard gravity as the peers' scenes use it `[m/s^2]`.
-pub const GRAVITY: f64 = 9.81;
+use crate::error::DemError;
+use crate::material::Material;
+use crate::preset::Preset;
 
 /// A whole experiment but for its seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -110,10 +112,6 @@ impl Default for EndRule {
     fn default() -> Self {
         Self { horizon: 4.0, kinetic_energy: 1e-8 }
     }
-}
-
-fn standard_gravity() -> [f64; 3] {
-    [0.0, 0.0, -GRAVITY]
 }
 
 impl Scene {

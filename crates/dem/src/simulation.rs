@@ -9,13 +9,13 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use crate::DemError;
 use crate::assemble::Seen;
 use crate::bed::Bed;
 use crate::clumps::Clumps;
 use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
 use crate::effect::Bridges;
+use crate::error::DemError;
 use crate::frozen_search::FrozenSearch;
 use crate::health::{Health, HealthWatch};
 use crate::impact::Impacts;

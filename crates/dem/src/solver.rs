@@ -4,7 +4,7 @@
 //! before, the warm start, and leaves the impulses and velocities of its solution.
 //! docs/theory/solvers.md derives and compares them; each file reads as its box there.
 
-use crate::bed::Body;
+use crate::body::Body;
 use crate::clumps::Clumps;
 use crate::contact_set::ContactSet;
 use crate::parallel::Threads;

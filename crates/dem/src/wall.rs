@@ -9,9 +9,9 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use crate::material::{Material, WallMaterial};
 use crate::placement::Placement;
 use crate::scene::{self, BoxSide, Motion, Scene, Shape};
-use crate::{Material, WallMaterial};
 use facets::Facets;
 pub(crate) use surface::Nearest;
 use surface::{Surface, surfaces};

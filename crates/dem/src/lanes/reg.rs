@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use super::{Lanes, Lanes3, Width};
+use super::{LANES, Lanes, Lanes3, Width};
 
 /// One number for each contact of a batch, in registers.
 #[derive(Clone, Copy)]
@@ -168,4 +168,11 @@ impl<W: Width> Sub for Reg3<W> {
     fn sub(self, other: Self) -> Self {
         Self { x: self.x - other.x, y: self.y - other.y, z: self.z - other.z }
     }
+}
+
+/// The vectors of eight rows, one for each lane.
+#[inline(always)]
+pub(crate) fn vectors<W: Width>(rows: [W::Quad; LANES]) -> Reg3<W> {
+    let [x, y, z, _] = W::columns(rows);
+    Reg3 { x: Reg(x), y: Reg(y), z: Reg(z) }
 }

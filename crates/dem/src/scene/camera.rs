@@ -4,8 +4,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::sensor::SensorSpec;
-use crate::DemError;
 use crate::check::{non_negative, positive};
+use crate::error::DemError;
 
 /// How the camera projects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

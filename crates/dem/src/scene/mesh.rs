@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::positive;
+use crate::error::DemError;
 
 /// Extent of a mesh, in diameters of a grain, beyond which its unit is taken for a mistake.
 const MOST_DIAMETERS: f64 = 20_000.0;

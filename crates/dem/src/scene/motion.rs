@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::{finite, non_negative, positive};
+use crate::error::DemError;
 
 /// The motion of a wall from its stated place. Times are simulated times `[s]`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

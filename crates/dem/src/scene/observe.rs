@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::{finite, non_negative, positive};
+use crate::error::DemError;
 
 /// Most samples of a pour: beyond it the rate is a mistake.
 const MAX_SAMPLES: f64 = 1e6;

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::finite;
+use crate::error::DemError;
 
 /// Grains whose centre comes below a height leave the scene: nothing touches them and no camera sees them any more.
 ///

@@ -6,7 +6,7 @@
 use toml::{Table, Value};
 
 use super::Scene;
-use crate::DemError;
+use crate::error::DemError;
 
 impl Scene {
     /// A copy with the number at `path` set to `value`, checked like any scene.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::finite;
+use crate::error::DemError;
 
 /// Diameters that the period must have at least: a grain must not meet itself, nor one grain from two sides.
 const FEWEST_DIAMETERS: f64 = 4.0;

@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::{non_negative, positive};
+use crate::error::DemError;
 
 /// What a depth camera adds to the image; `granulcal-cli fit-sensor` writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::{finite, positive};
+use crate::error::DemError;
 
 /// A depth camera at rest anywhere, that looks at a point. Its image is without noise, and no statistics are taken of it.
 ///

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Grains, MeshFile, Motion};
 use crate::check::{finite, positive};
-use crate::{DemError, Material, WallMaterial};
+use crate::error::DemError;
+use crate::material::{Material, WallMaterial};
 
 /// The plane z = 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,7 +1,7 @@
 //! Whether the grains of a start are clear of the walls and of the outflow.
 
 use super::Simulation;
-use crate::DemError;
+use crate::error::DemError;
 
 /// How deep in a wall a grain may start, in its radii: as deep as the hastiest preset lets grains at rest be.
 const MAX_DEPTH: f64 = 0.25;

@@ -10,13 +10,13 @@ use std::borrow::Cow;
 use serde::{Deserialize, Serialize};
 
 use super::Simulation;
-use crate::DemError;
 use crate::bed::Bed;
 use crate::checkpoint::{self, CheckpointHeader};
 use crate::clumps::{ClumpState, Clumps};
 use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
 use crate::effect::Bridges;
+use crate::error::DemError;
 use crate::health::HealthWatch;
 use crate::impact::Impacts;
 use crate::pour::Status;

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use crate::DemError;
 use crate::bed::Bed;
 use crate::contact_set::ContactSet;
+use crate::error::DemError;
 use crate::parallel::Threads;
 use crate::preset::SolverSettings;
 use crate::solver::work::Work;

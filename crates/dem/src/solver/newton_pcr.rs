@@ -10,7 +10,7 @@
 //! lambda <- projection on the cones,  v to match
 //! ```
 
-use crate::bed::Body;
+use crate::body::Body;
 use crate::contact_set::ContactSet;
 use crate::law::TANGENTIAL_INERTIA;
 use crate::parallel::Threads;

@@ -15,13 +15,12 @@
 
 use crate::parallel::Threads;
 
-use crate::assemble::vectors;
-use crate::bed::{Body, INVERSE_INERTIA, SharedBodies};
+use crate::body::{Body, SharedBodies};
 use crate::clumps::Clumps;
 use crate::contact::{Batch, LawLanes};
 use crate::contact_set::ContactSet;
-use crate::lanes::{LANES, Lanes, Reg, Reg3, Width, each, widest};
-use crate::law::{TANGENTIAL_INERTIA, project_ball};
+use crate::lanes::{LANES, Lanes, Reg, Reg3, Width, each, vectors, widest};
+use crate::law::{INVERSE_INERTIA, TANGENTIAL_INERTIA, project_ball};
 use crate::preset::SolverSettings;
 use crate::solver::work::Work;
 

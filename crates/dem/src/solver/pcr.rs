@@ -3,7 +3,7 @@
 //! docs/theory/solvers.md, box 2b. S is diagonal; so is the preconditioner `P = 1 / (diag(J M^-1 J^T) + S)`.
 //! A row whose S is infinite has P = 0: its unknown keeps the value that it starts with, exactly.
 
-use crate::bed::Body;
+use crate::body::Body;
 use crate::contact_set::ContactSet;
 use crate::lanes::{Lanes, Reg, widest};
 use crate::solver::components::{

@@ -11,7 +11,7 @@
 //!     else:      lambda <- lambda + beta p,  p <- beta p - g
 //! ```
 
-use crate::bed::Body;
+use crate::body::Body;
 use crate::contact_set::ContactSet;
 use crate::parallel::Threads;
 use crate::preset::ReferenceSettings;

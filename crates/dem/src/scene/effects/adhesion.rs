@@ -8,8 +8,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::{non_negative, positive};
+use crate::error::DemError;
 
 /// Dry adhesion; prior of `bond`: log-uniform over 0.003 to 0.3.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

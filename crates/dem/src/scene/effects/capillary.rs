@@ -14,8 +14,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::{non_negative, positive};
+use crate::error::DemError;
 
 /// Liquid bridges; prior of `bond`: log-uniform over 0.03 to 3.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -13,7 +13,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
+use crate::error::DemError;
 use crate::scene::Grains;
 
 /// The shape of every grain.

@@ -9,8 +9,9 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::check::{finite, non_negative};
+use crate::error::DemError;
+use crate::material::Material;
 use crate::scene::{Funnel, Shape, Wall};
-use crate::{DemError, Material};
 
 /// Steepest lean `[rad]`.
 const STEEPEST: f64 = 0.8;

@@ -8,7 +8,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::check::non_negative;
-use crate::{DemError, Material};
+use crate::error::DemError;
+use crate::material::Material;
 
 /// Ratios of the ground's coefficients to those it would have `[-]`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

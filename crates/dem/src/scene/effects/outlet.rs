@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
+use crate::error::DemError;
 use crate::scene::Funnel;
 
 /// Facets around the axis. A chord of 48 is 0.2 % of the radius off the circle.

@@ -10,8 +10,8 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::{non_negative, positive};
+use crate::error::DemError;
 use crate::random::unit_interval;
 
 /// Farthest z of a grain `[-]`.

@@ -6,8 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::{finite, positive};
+use crate::error::DemError;
 
 /// Restitution and speed; prior of `exponent`: uniform over -0.1 to 0.25.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -10,8 +10,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::non_negative;
+use crate::error::DemError;
 
 /// The speed that tells the forms apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -6,7 +6,7 @@
 use nalgebra::{Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
+use crate::error::DemError;
 
 /// Steepest tilt `[rad]`: beyond it the words "table" and "ground" lose their sense.
 const STEEPEST: f64 = 0.8;

@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use crate::DemError;
 use crate::check::{non_negative, positive};
+use crate::error::DemError;
 use crate::scene::GRAVITY;
 
 /// A shaking table.

@@ -7,7 +7,7 @@
 
 use crate::parallel::Threads;
 
-use crate::bed::Body;
+use crate::body::Body;
 use crate::contact_set::ContactSet;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, batches, collect, impulses, put_impulses, spread,
