@@ -1,0 +1,49 @@
+//! Parts of the coming substep by themselves, for studies; the simulation stays as it is.
+
+use super::Simulation;
+use super::substep::Until;
+use crate::contacts::Contacts;
+use crate::error::DemError;
+use crate::frozen_search::FrozenSearch;
+use crate::problem::{ContactProblem, SWEEPS_A_LOOK};
+use crate::solver::frozen::FrozenSolve;
+use crate::solver::nsgs;
+
+impl Simulation {
+    /// The contact problem of the next substep, frozen as it is assembled, with its solution after
+    /// as many sweeps as its residual needs to be rounding. The simulation itself stays as it is.
+    ///
+    /// # Errors
+    /// [`DemError::NotInContactProblem`] for a scene with an effect that changes what a contact is.
+    pub fn contact_problem(&self) -> Result<ContactProblem, DemError> {
+        if let Some(effect) = self.origin.scene.effects.of_contacts() {
+            return Err(DemError::NotInContactProblem { effect });
+        }
+        let mut twin = self.clone();
+        let dt = twin.around.settings.dt;
+        twin.substep(Until::Assembled);
+        let (bed, contacts) = (&mut twin.bed, &mut twin.contacts);
+        let mut problem = ContactProblem::new(bed, contacts, self.time(), dt);
+        while !problem.is_solved() {
+            problem.put_velocities(&mut bed.bodies);
+            let Contacts { pairs, at_walls, .. } = &mut *contacts;
+            nsgs::sweep_plainly(&mut [pairs, at_walls], &mut bed.bodies, SWEEPS_A_LOOK);
+            problem.take_impulses(contacts, &bed.bodies, SWEEPS_A_LOOK);
+        }
+        Ok(problem)
+    }
+
+    /// The contact problem that the coming substep has to solve, for studies of solvers; the simulation stays as
+    /// it is.
+    pub fn frozen_solve(&self) -> FrozenSolve {
+        let mut copy = self.clone();
+        copy.substep(Until::Assembled);
+        let Contacts { pairs, at_walls, .. } = copy.contacts;
+        FrozenSolve::new([pairs, at_walls], copy.bed, self.around.radius)
+    }
+
+    /// The search for pairs of the present state, for studies of its cost; the simulation stays as it is.
+    pub fn frozen_search(&self) -> FrozenSearch {
+        FrozenSearch::new(self.bed.clone(), &self.around)
+    }
+}

@@ -1,0 +1,178 @@
+//! One substep, line by line as box 3 of docs/theory/contact.md, and what is seen of the state between them.
+
+use super::{Simulation, energy};
+use crate::assemble::Seen;
+use crate::contacts::Contacts;
+use crate::pour::Status;
+use crate::rebound::rebound;
+use crate::solver::{self, nsgs};
+
+/// Mean energy of a grain's translation over that of a fall by its radius below which grains hardly move `[-]`.
+const QUIET: f64 = 0.0025;
+/// Change of an impulse in a sweep over that by gravity in a substep below which it has settled in a quiet state `[-]`.
+const QUIET_SETTLED: f64 = 1e-2;
+/// Examinations between two looks at the residual, which costs about a sweep.
+const RESIDUAL_PERIOD: usize = 4;
+
+/// How much of a substep is done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Until {
+    /// Up to the contact problem, which waits to be solved.
+    Assembled,
+    /// All of it.
+    End,
+}
+
+impl Simulation {
+    /// One substep.
+    pub(super) fn step(&mut self) {
+        let threads = self.around.threads.clone();
+        threads.run(|| self.substep(Until::End));
+    }
+
+    /// The box of the substep.
+    pub(super) fn substep(&mut self, until: Until) {
+        self.around.move_walls(self.time());
+        self.follow();
+        self.act_forces();
+        let seen = self.assemble();
+        self.resolve_impacts();
+        self.act_pulls();
+        self.assemble_layer();
+        if until == Until::Assembled {
+            return;
+        }
+        self.solve();
+        self.move_on();
+        self.watch.see_penetration(seen.penetration);
+        self.substep += 1;
+        if self.substep.is_multiple_of(self.around.settings.list_period) {
+            self.examine();
+        }
+    }
+
+    /// Lists what may touch, once the grains that have left the period are in at its other end.
+    fn follow(&mut self) {
+        let gained = self.contacts.wrap(&mut self.bed, &self.around.effects.gravity);
+        self.watch.see_work(gained);
+        self.contacts.follow(&self.bed, &self.around);
+    }
+
+    /// Lets gravity and drag act.
+    fn act_forces(&mut self) {
+        let dt = self.around.settings.dt;
+        if self.around.effects.vibration.is_some() {
+            // The middle of the substep, where velocities are.
+            self.around.gravity = self.around.effects.gravity_at(self.time() + 0.5 * dt);
+            let shaking = self.around.gravity - self.around.effects.gravity;
+            self.watch.see_work(self.bed.work_of(&shaking, dt));
+        }
+        let (bed, around) = (&mut self.bed, &self.around);
+        bed.accelerate(&around.gravity, dt, &around.threads);
+        if let Some(drag) = &around.effects.drag {
+            let pairs = &self.contacts.pairs;
+            let given = drag.act(bed, pairs, &around.gravity, around.radius, dt);
+            self.watch.see_work(given);
+        }
+        bed.hold_those_out();
+    }
+
+    /// Gaps, normals and biases of the listed contacts.
+    fn assemble(&mut self) -> Seen {
+        let found = &mut self.impacts.candidates;
+        self.contacts.assemble(&self.bed, &self.around, self.watch.lost_mut(), found)
+    }
+
+    /// Resolves the impacts, each at its time; those of bodies that turn are a matter of the contact solve.
+    fn resolve_impacts(&mut self) {
+        let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
+        if self.clumps.is_some() {
+            self.impacts.candidates.clear();
+        }
+        if self.impacts.resolve(bed, contacts, around) > 0 {
+            contacts.assemble_again(bed, around);
+            bed.rewind();
+        }
+        contacts.move_walls(bed, around);
+        if self.clumps.is_some() {
+            rebound(&mut contacts.pairs, bed, around);
+            rebound(&mut contacts.at_walls, bed, around);
+        }
+    }
+
+    /// Lets pulls act, after the impacts: what a pull adds in a substep to a closed contact is not an impact.
+    fn act_pulls(&mut self) {
+        if let Some(pull) = &self.around.effects.pull {
+            let (walls, dt) = (&self.around.walls, self.around.settings.dt);
+            let near = [&self.contacts.pairs, &self.contacts.at_walls];
+            pull.act(&mut self.bed, near, walls, &mut self.bridges, dt);
+        }
+    }
+
+    /// Lists the contacts with a soft layer, if there is one.
+    fn assemble_layer(&mut self) {
+        let (bed, around) = (&self.bed, &self.around);
+        if let Some(pad) = &around.effects.pad {
+            let ground = |grain| around.wall_law(bed, grain, 0);
+            pad.assemble(&mut self.on_layer, bed, around.settings.dt, ground);
+        }
+    }
+
+    /// Solves the lasting contacts.
+    fn solve(&mut self) {
+        let Contacts { pairs, at_walls, .. } = &mut self.contacts;
+        let (bodies, around) = (&mut self.bed.bodies, &self.around);
+        let sets = &mut [pairs, at_walls, &mut self.on_layer];
+        let sets = if around.effects.pad.is_some() { &mut sets[..] } else { &mut sets[..2] };
+        let settings = &around.settings;
+        let still = self.is_quiet.then(|| QUIET_SETTLED * around.gravity.norm() * settings.dt);
+        let clumps = self.clumps.as_mut();
+        let (radius, threads) = (around.radius, &around.threads);
+        let work = solver::solve(sets, bodies, settings, still, radius, clumps, threads);
+        self.watch.see_solve(&work);
+        self.count_work_of_walls();
+    }
+
+    /// What moving walls put into the grains is not created.
+    fn count_work_of_walls(&mut self) {
+        if self.around.has_moving_walls {
+            let in_impacts = std::mem::take(&mut self.impacts.work_of_walls);
+            self.watch.see_work(in_impacts + self.contacts.work_of_walls(&self.bed));
+        }
+    }
+
+    /// Moves the grains, and with those that are not round their spheres.
+    fn move_on(&mut self) {
+        let dt = self.around.settings.dt;
+        match &mut self.clumps {
+            None => self.bed.move_on(dt),
+            Some(clumps) => clumps.move_on(&mut self.bed, dt),
+        }
+    }
+
+    /// Looks at the state between two searches: outflow, health and the end rule.
+    fn examine(&mut self) {
+        if let Some(outflow) = &self.origin.scene.outflow
+            && self.bed.let_out(outflow.below)
+        {
+            self.contacts.forget_list();
+        }
+        if self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period) {
+            let Contacts { pairs, at_walls, .. } = &mut self.contacts;
+            let sets = [pairs, at_walls, &mut self.on_layer];
+            let residual = nsgs::ResidualSums::of(&sets, &mut self.bed.bodies);
+            self.watch.see_residual(residual.relative());
+        }
+        let fall = self.around.effects.gravity.norm() * self.around.radius;
+        self.is_quiet = self.bed.mean_translation() <= QUIET * fall;
+        self.watch.see_contacts(self.contacts.count());
+        self.watch.see_energy(energy(&self.bed, self.clumps.as_ref(), &self.around));
+        self.ended = self.end_reached().map(|status| {
+            let trusted = self.watch.is_healthy(self.around.settings.max_penetration);
+            if trusted { status } else { Status::Unhealthy }
+        });
+        if self.ended.is_none() && !self.watch.is_finite() {
+            self.ended = Some(Status::Unhealthy);
+        }
+    }
+}
