@@ -9,12 +9,11 @@ use crate::scene::Scene;
 /// The grains where they start, as large and as heavy as the scene says: the spheres of `clumps` if they are not round.
 pub(crate) fn bed(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Bed {
     let radius = scene.grains.radius();
-    let (mut places, inverse): (Vec<Row>, f64) = match clumps {
-        Some(clumps) => (clumps.places(), clumps.members() as f64),
-        None => {
-            let centres = scene.starting_positions(seed);
-            (centres.iter().map(|at| Row::new(at, radius)).collect(), 1.0)
-        }
+    let (mut places, inverse): (Vec<Row>, f64) = if let Some(clumps) = clumps {
+        (clumps.places(), clumps.members() as f64)
+    } else {
+        let centres = scene.starting_positions(seed);
+        (centres.iter().map(|at| Row::new(at, radius)).collect(), 1.0)
     };
     let mut inverse_mass = vec![inverse; places.len()];
     if let Some(radii) = scene.effects.polydispersity.radii(places.len(), radius, seed) {
