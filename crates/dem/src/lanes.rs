@@ -8,141 +8,19 @@
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+mod memory;
 mod portable;
 mod reg;
+mod width;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx512::Avx512;
-use nalgebra::Vector3;
+pub(crate) use memory::{LANES, Lanes, Lanes3, Row, each};
 pub(crate) use portable::Portable;
 pub(crate) use reg::{Reg, Reg3, vectors};
-use serde::{Deserialize, Serialize};
-
-/// Contacts in a batch.
-pub(crate) const LANES: usize = 8;
-
-/// One number for each contact of a batch, in memory.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[repr(C, align(64))]
-pub(crate) struct Lanes(pub [f64; LANES]);
-
-/// Four numbers of one grain, in memory: a vector and a fourth number.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[repr(C, align(32))]
-pub(crate) struct Row(pub [f64; 4]);
-
-impl Row {
-    /// The vector.
-    #[inline(always)]
-    pub fn vector(&self) -> Vector3<f64> {
-        Vector3::new(self.0[0], self.0[1], self.0[2])
-    }
-
-    /// A vector and a fourth number.
-    #[inline(always)]
-    pub fn new(vector: &Vector3<f64>, fourth: f64) -> Self {
-        Self([vector.x, vector.y, vector.z, fourth])
-    }
-
-    /// Adds `step` to the vector.
-    #[inline(always)]
-    pub fn add(&mut self, step: &Vector3<f64>) {
-        self.0[0] += step.x;
-        self.0[1] += step.y;
-        self.0[2] += step.z;
-    }
-
-    /// Multiplies the vector by `factor`.
-    #[inline(always)]
-    pub fn scale(&mut self, factor: f64) {
-        self.0[..3].iter_mut().for_each(|c| *c *= factor);
-    }
-}
-
-/// One 3-vector for each contact of a batch, component by component, in memory.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Lanes3 {
-    pub x: Lanes,
-    pub y: Lanes,
-    pub z: Lanes,
-}
-
-impl Lanes {
-    pub const ZERO: Self = Self([0.0; LANES]);
-
-    pub fn splat(value: f64) -> Self {
-        Self([value; LANES])
-    }
-}
-
-impl Lanes3 {
-    pub const ZERO: Self = Self { x: Lanes::ZERO, y: Lanes::ZERO, z: Lanes::ZERO };
-
-    /// Puts `value` into lane `lane`.
-    #[inline(always)]
-    pub fn set(&mut self, lane: usize, value: [f64; 3]) {
-        self.x.0[lane] = value[0];
-        self.y.0[lane] = value[1];
-        self.z.0[lane] = value[2];
-    }
-
-    /// The vector in lane `lane`.
-    #[inline(always)]
-    pub fn get(&self, lane: usize) -> [f64; 3] {
-        [self.x.0[lane], self.y.0[lane], self.z.0[lane]]
-    }
-}
-
-/// `f` of every lane's index; written out, for an array's own `map` is not inlined into the wide kernels.
-#[inline(always)]
-pub(crate) fn each<T>(index: &[u32; LANES], f: impl Fn(u32) -> T) -> [T; LANES] {
-    let [a, b, c, d, e, g, h, i] = *index;
-    [f(a), f(b), f(c), f(d), f(e), f(g), f(h), f(i)]
-}
-
-/// The operations that the contact kernels are written in, on one kind of machine.
-///
-/// Implementations for wide registers may only be used behind [`widest`], which tests for them.
-pub(crate) trait Width: Copy {
-    /// Eight numbers in registers.
-    type Value: Copy;
-    /// One [`Row`] in registers.
-    type Quad: Copy;
-
-    fn load(from: &Lanes) -> Self::Value;
-    fn store(value: Self::Value, to: &mut Lanes);
-    fn splat(value: f64) -> Self::Value;
-    fn add(a: Self::Value, b: Self::Value) -> Self::Value;
-    fn sub(a: Self::Value, b: Self::Value) -> Self::Value;
-    fn mul(a: Self::Value, b: Self::Value) -> Self::Value;
-    /// `a * b + c`, rounded once.
-    fn mul_add(a: Self::Value, b: Self::Value, c: Self::Value) -> Self::Value;
-    /// `c - a * b`, rounded once.
-    fn mul_sub_from(a: Self::Value, b: Self::Value, c: Self::Value) -> Self::Value;
-    fn div(a: Self::Value, b: Self::Value) -> Self::Value;
-    fn sqrt(a: Self::Value) -> Self::Value;
-    /// `yes` where `a < b`, `no` elsewhere (also where either is NaN).
-    fn select_less(
-        a: Self::Value,
-        b: Self::Value,
-        yes: Self::Value,
-        no: Self::Value,
-    ) -> Self::Value;
-    /// `b` where `a < b`, `a` elsewhere (also where either is NaN).
-    fn max(a: Self::Value, b: Self::Value) -> Self::Value;
-    /// `a` where `a < b`, `b` elsewhere (also where either is NaN).
-    fn min(a: Self::Value, b: Self::Value) -> Self::Value;
-    /// One bit for each lane in which `a < b`.
-    fn less_bits(a: Self::Value, b: Self::Value) -> u32;
-    fn load_row(from: &Row) -> Self::Quad;
-    fn store_row(value: Self::Quad, to: &mut Row);
-    /// Eight rows as their four columns.
-    fn columns(rows: [Self::Quad; LANES]) -> [Self::Value; 4];
-    /// Four columns as their eight rows.
-    fn rows(columns: [Self::Value; 4]) -> [Self::Quad; LANES];
-}
+pub(crate) use width::Width;
 
 /// The widest registers that kernels may use `[bits]`. Only tests ask for less, to compare.
 #[cfg(test)]

@@ -1,0 +1,179 @@
+"""Which file of a crate uses which: what its `use` and its paths name, followed to where it is defined.
+
+A `mod` line alone is no arrow, and what is compiled for tests alone is not looked at: a test may reach up.
+"""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from graph import Arrows
+
+PATH = re.compile(r"\b(?:crate|self|super)(?:::\w+)+|(?<![\w:.])[a-z_]\w*(?:::\w+)+")
+USE = re.compile(r"^[ \t]*(?P<public>pub(?:\([^)]*\))? )?use (?P<tree>[^;]+);", re.MULTILINE)
+CHILD = re.compile(r"^[ \t]*(?:pub(?:\([^)]*\))? )?mod (\w+);", re.MULTILINE)
+TEST = re.compile(r"#\[cfg\((?:all\()?test\b[^\]]*\]\s*(?:#\[[^\]]*\]\s*)*")
+NOISE = re.compile(
+    r'//[^\n]*|/\*.*?\*/|r(?P<hash>#*)".*?"(?P=hash)|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])\'', re.DOTALL
+)
+
+Module = tuple[str, ...]
+
+
+@dataclass
+class File:
+    """One file as a module: what it imports, what it hands on, which modules are its children."""
+
+    path: Path
+    text: str
+    children: set[str] = field(default_factory=set)
+    imports: dict[str, Module] = field(default_factory=dict)
+    handed_on: dict[str, Module] = field(default_factory=dict)
+    all_of: list[Module] = field(default_factory=list)
+
+
+def arrows_of(crate: Path) -> Arrows:
+    """Returns which file uses which, as paths relative to the crate's `src`."""
+    files = read(crate / "src")
+    arrows: Arrows = {}
+    for module, file in files.items():
+        name = file.path.relative_to(crate / "src").as_posix()
+        uses = arrows.setdefault(name, set())
+        for path in named(module, file):
+            target = resolve(files, path)
+            if target is not None and target != module:
+                uses.add(files[target].path.relative_to(crate / "src").as_posix())
+    return arrows
+
+
+def read(source: Path) -> dict[Module, File]:
+    """Returns every module of a crate that is not compiled for tests alone."""
+    files: dict[Module, File] = {}
+    roots = [source / name for name in ("lib.rs", "main.rs") if (source / name).exists()]
+    waiting: list[tuple[Module, Path]] = [((), root) for root in roots[:1]]
+    while waiting:
+        module, path = waiting.pop()
+        text = without_tests(NOISE.sub(" ", path.read_text(encoding="utf-8")))
+        file = files[module] = File(path, text, children=set(CHILD.findall(text)))
+        folder = path.parent if path.name in ("lib.rs", "main.rs", "mod.rs") else path.with_suffix("")
+        for child in sorted(file.children):
+            inside = [folder / f"{child}.rs", folder / child / "mod.rs"]
+            waiting += [((*module, child), at) for at in inside if at.exists()]
+        for use in USE.finditer(text):
+            for names, alias in branches(use["tree"]):
+                target = absolute(module, file, names)
+                if target is None:
+                    continue
+                if alias == "*":
+                    file.all_of.append(target[:-1])
+                else:
+                    file.imports[alias] = target
+                    if use["public"]:
+                        file.handed_on[alias] = target
+    return files
+
+
+def without_tests(text: str) -> str:
+    """Cuts out what follows a `cfg(test)`: a block in braces, or up to the semicolon."""
+    while found := TEST.search(text):
+        end = re.compile(r"[{;]").search(text, found.end())
+        if end is None:
+            return text[: found.start()]
+        at = end.end()
+        if end[0] == "{":
+            depth = 1
+            while depth:
+                brace = re.compile(r"[{}]").search(text, at)
+                if brace is None:
+                    return text[: found.start()]
+                depth += 1 if brace[0] == "{" else -1
+                at = brace.end()
+        text = text[: found.start()] + text[at:]
+    return text
+
+
+def branches(tree: str) -> list[tuple[Module, str]]:
+    """Returns the paths of a `use`, each with the name that it has here."""
+    tree = tree.strip()
+    if "{" not in tree:
+        path, _, alias = tree.partition(" as ")
+        names = tuple(part.strip() for part in path.split("::"))
+        if names[-1] == "self":
+            names = names[:-1]
+        return [(names, alias.strip() or names[-1])]
+    before, _, inside = tree.partition("{")
+    prefix = tuple(part for part in before.strip().removesuffix("::").split("::") if part)
+    found, depth, part = [], 0, ""
+    for letter in inside.rstrip()[:-1] + ",":
+        depth += {"{": 1, "}": -1}.get(letter, 0)
+        if letter == "," and depth == 0:
+            if part.strip():
+                found += [((*prefix, *rest), alias if alias != "self" else prefix[-1]) for rest, alias in inner(part)]
+            part = ""
+        else:
+            part += letter
+    return found
+
+
+def inner(part: str) -> list[tuple[Module, str]]:
+    """Returns the paths of one branch in braces; `self` is the branch's stem."""
+    return [((), "self")] if part.strip() == "self" else branches(part)
+
+
+def absolute(module: Module, file: File, names: Module) -> Module | None:
+    """Returns a path from the crate's root; None for another crate's."""
+    if names[0] == "crate":
+        return names[1:]
+    if names[0] == "self":
+        return (*module, *names[1:])
+    if names[0] == "super":
+        up = module
+        rest = list(names)
+        while rest and rest[0] == "super":
+            up, rest = up[:-1], rest[1:]
+        return (*up, *rest)
+    if names[0] in file.children:
+        return (*module, *names)
+    return None
+
+
+def named(module: Module, file: File) -> set[Module]:
+    """Returns every path from the crate's root that a file names."""
+    found = set(file.imports.values()) | set(file.all_of)
+    body = USE.sub(" ", file.text)
+    for path in PATH.findall(body):
+        names = tuple(path.split("::"))
+        whole = absolute(module, file, names)
+        if whole is None and names[0] in file.imports:
+            whole = (*file.imports[names[0]], *names[1:])
+        if whole is not None:
+            found.add(whole)
+    return found
+
+
+def resolve(files: dict[Module, File], path: Module, depth: int = 0) -> Module | None:
+    """Returns the module in whose file the thing that a path names is defined."""
+    if depth > 20:
+        return None
+    module: Module = ()
+    rest = path
+    while rest and (*module, rest[0]) in files:
+        module, rest = (*module, rest[0]), rest[1:]
+    if not rest:
+        return module
+    file = files[module]
+    if rest[0] in file.handed_on:
+        return resolve(files, (*file.handed_on[rest[0]], *rest[1:]), depth + 1)
+    if not re.search(rf"\b(?:fn|struct|enum|trait|type|const|static|macro_rules!|union|mod)\s+{rest[0]}\b", file.text):
+        for other in file.all_of:
+            target = resolve(files, (*other, *rest), depth + 1)
+            if target is not None and defines(files, target, rest[0]):
+                return target
+        if rest[0] in file.imports:
+            return resolve(files, (*file.imports[rest[0]], *rest[1:]), depth + 1)
+    return module
+
+
+def defines(files: dict[Module, File], module: Module, name: str) -> bool:
+    """Returns whether a file defines a name."""
+    return bool(re.search(rf"\b(?:fn|struct|enum|trait|type|const|static)\s+{name}\b", files[module].text))
