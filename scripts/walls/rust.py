@@ -30,6 +30,7 @@ class File:
     imports: dict[str, Module] = field(default_factory=dict)
     handed_on: dict[str, Module] = field(default_factory=dict)
     all_of: list[Module] = field(default_factory=list)
+    all_handed_on: list[Module] = field(default_factory=list)
 
 
 def arrows_of(crate: Path) -> Arrows:
@@ -66,6 +67,8 @@ def read(source: Path) -> dict[Module, File]:
                     continue
                 if alias == "*":
                     file.all_of.append(target[:-1])
+                    if use["public"]:
+                        file.all_handed_on.append(target[:-1])
                 else:
                     file.imports[alias] = target
                     if use["public"]:
@@ -139,8 +142,14 @@ def absolute(module: Module, file: File, names: Module) -> Module | None:
 
 def named(module: Module, file: File) -> set[Module]:
     """Returns every path from the crate's root that a file names."""
-    found = set(file.imports.values()) | set(file.all_of)
     body = USE.sub(" ", file.text)
+    # What is only handed on is an arrow of those who take it from here.
+    own = {
+        target
+        for alias, target in file.imports.items()
+        if alias not in file.handed_on or re.search(rf"\b{alias}\b", body)
+    }
+    found = own | (set(file.all_of) - set(file.all_handed_on))
     for path in PATH.findall(body):
         names = tuple(path.split("::"))
         whole = absolute(module, file, names)

@@ -7,10 +7,11 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
+use crate::component::Component;
 use crate::coordinates::Coordinates;
 use crate::likelihood::{FEWEST_EFFECTIVE, Scratch};
 use crate::matrix::Matrix;
-use crate::mixture::{Component, Mixture};
+use crate::mixture::Mixture;
 use crate::random::{Random, cumulative};
 
 const CENTRES: usize = 60;

@@ -2,7 +2,7 @@
 
 use pulp::{Arch, NullaryFnOnce};
 
-use crate::mixture::Component;
+use crate::component::Component;
 
 const WIDTH: usize = 4;
 /// Parts that much below the largest do not change the last bit of a sum of fewer than a thousand [nat].

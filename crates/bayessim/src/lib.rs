@@ -20,6 +20,7 @@
 #![allow(clippy::inline_always)] // what is compiled for wider registers must be inlined to reach them
 
 mod average;
+mod component;
 mod coordinates;
 mod document;
 mod emulator;

@@ -1,9 +1,8 @@
 //! A Gaussian mixture over coordinates, cut to the prior's bounds.
 
-use std::f64::consts::TAU;
-
 use nalgebra::{DMatrix, DVector};
 
+use crate::component::Component;
 use crate::coordinates::Coordinates;
 use crate::lanes::Lanes;
 use crate::matrix::log_sum_exp;
@@ -12,24 +11,6 @@ use crate::random::{Random, cumulative};
 /// With less mass than this inside the bounds the density is integrated over draws of the prior.
 const SMALLEST_MASS: f64 = 0.02;
 const PRIOR_POINTS: usize = 20_000;
-
-/// One component: its precision is `F F^T`.
-#[derive(Clone, Debug)]
-pub struct Component {
-    /// Log weight.
-    pub log_weight: f64,
-    pub mean: DVector<f64>,
-    /// F, lower triangular with a positive diagonal.
-    pub factor: DMatrix<f64>,
-}
-
-impl Component {
-    /// What of the log density does not depend on where.
-    fn constant(&self) -> f64 {
-        let log_det: f64 = self.factor.diagonal().iter().map(|d| d.ln()).sum();
-        self.log_weight + log_det - 0.5 * self.mean.len() as f64 * TAU.ln()
-    }
-}
 
 /// A density over coordinates.
 #[derive(Clone, Debug)]

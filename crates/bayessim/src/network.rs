@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::ModelError;
+use crate::component::Component;
 use crate::document::Config;
 use crate::matrix::{Matrix, log_sum_exp};
-use crate::mixture::{Component, Mixture};
+use crate::mixture::Mixture;
 use crate::tensors::Tensors;
 use crate::waves::Waves;
 

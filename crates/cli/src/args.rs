@@ -1,6 +1,9 @@
 //! The arguments: clap types and nothing else.
 
+mod completions;
+mod global;
 mod infer;
+mod read;
 mod sensor;
 
 use std::path::PathBuf;
@@ -8,11 +11,13 @@ use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
-use granulcal_dataset::{ReadOptions, Shard};
+use granulcal_dataset::Shard;
 use granulcal_dem::Preset;
 
-use crate::commands::completions::CompletionsArgs;
+pub use completions::CompletionsArgs;
+pub use global::Global;
 pub use infer::InferArgs;
+pub use read::ReadArgs;
 pub use sensor::{FitSensorArgs, PickColourArgs};
 
 /// Calibrates a granular simulator from depth images: pours grains, looks at them, describes them.
@@ -32,17 +37,6 @@ pub struct Cli {
     pub global: Global,
     #[command(subcommand)]
     pub command: Command,
-}
-
-/// Options that every command takes.
-#[derive(Clone, Debug, Args)]
-pub struct Global {
-    /// No progress and no messages but errors
-    #[arg(long, short, global = true)]
-    pub quiet: bool,
-    /// More messages; twice for all
-    #[arg(long, short, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
-    pub verbose: u8,
 }
 
 /// What can be done.
@@ -308,52 +302,6 @@ pub struct FeaturesArgs {
     pub list: bool,
 }
 
-/// What of a recording is read.
-#[derive(Clone, Debug, Args)]
-pub struct ReadArgs {
-    /// TOML of the camera: lens, depth unit and segmentation. Images as PNG need it; for .bag and .mcap
-    /// it replaces what they say, key by key
-    #[arg(long, value_name = "CAMERA.toml")]
-    pub camera: Option<PathBuf>,
-    /// Topic of the depth images, where several fit
-    #[arg(long)]
-    pub topic: Option<String>,
-    /// Topic of the lens, where several fit
-    #[arg(long, value_name = "TOPIC")]
-    pub camera_topic: Option<String>,
-    /// Topic of the colour images, where several fit; read when the camera's TOML marks grains by colour
-    #[arg(long, value_name = "TOPIC")]
-    pub colour_topic: Option<String>,
-    /// Average so many frames, or `all`
-    #[arg(long, value_name = "N", default_value = "10", value_parser = parse_frames)]
-    pub frames: usize,
-    /// Index of the first frame that is averaged, from 0 [default: so that the last are]
-    #[arg(long, value_name = "INDEX")]
-    pub first_frame: Option<u64>,
-}
-
-impl ReadArgs {
-    /// The options of the library.
-    pub fn options(&self) -> ReadOptions {
-        ReadOptions {
-            camera: self.camera.clone(),
-            topic: self.topic.clone(),
-            colour_topic: self.colour_topic.clone(),
-            camera_topic: self.camera_topic.clone(),
-            frames: self.frames,
-            first_frame: self.first_frame,
-        }
-    }
-}
-
-fn parse_frames(text: &str) -> Result<usize, String> {
-    let refuse = || format!("must be `all` or a number from 1, got {text:?}");
-    match text {
-        "all" => Ok(usize::MAX),
-        number => number.parse().ok().filter(|&n| n > 0).ok_or_else(refuse),
-    }
-}
-
 /// Say what is in a scene, prior, data set, recording or MCAP file, or in one substep of a scene
 #[derive(Debug, Args)]
 #[command(long_about = "\
@@ -427,12 +375,6 @@ mod tests {
     #[test]
     fn arguments_are_consistent() {
         Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn frames_are_a_number_or_all() {
-        assert_eq!((parse_frames("30"), parse_frames("all")), (Ok(30), Ok(usize::MAX)));
-        assert!(parse_frames("0").is_err() && parse_frames("ten").is_err());
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::ReadArgs;
+use super::read::ReadArgs;
 
 /// Infer the parameters from recordings with a trained model, without Python
 #[derive(Debug, Args)]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use granulcal_features::Region;
 
-use super::ReadArgs;
+use super::read::ReadArgs;
 
 /// Fit a depth camera's noise, fixed pattern, rounding and holes to frames of a flat surface
 #[derive(Debug, Args)]
