@@ -6,13 +6,15 @@
 
 mod component;
 mod flying;
+mod formation;
 mod levelled;
 mod settings;
 mod shape;
 mod spacing;
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector3;
 
+pub use formation::Formation;
 pub use levelled::Levelled;
 pub use settings::{Segmentation, Threshold};
 pub use shape::{Kind, Shape};
@@ -24,44 +26,6 @@ use crate::error::{FeatureError, require_finite};
 use crate::height_map::HeightMap;
 use crate::plane::PlaneFit;
 use levelled::{Cloud, Footprint, flipped};
-
-/// The points of a formation and how they were found.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Formation {
-    /// Points of the grains `[m]`: ground at z = 0, z up, centroid at x = y = 0.
-    pub points: Vec<Vector3<f64>>,
-    /// Which pixels the points are, row by row, shape [height · width].
-    pub mask: Vec<bool>,
-    /// Columns of the mask `[px]`, after down-sampling.
-    pub width: usize,
-    /// Rows of the mask `[px]`, after down-sampling.
-    pub height: usize,
-    /// Height above the fitted ground `[m]` of every pixel, not only of the grains, row by row, shape
-    /// [height · width]; `None` = no data.
-    pub heights: Vec<Option<f64>>,
-    /// The ground in the frame of the input, normal towards the camera.
-    pub plane: PlaneFit,
-    /// Robust standard deviation of the ground about its plane `[m]`.
-    pub ground_sd: f64,
-    /// Pixels that carry data, within the border.
-    pub valid_count: usize,
-    /// Pixels taken for grains.
-    pub masked_count: usize,
-    /// Height above the ground from which a pixel counts as grain `[m]`; not applied when a colour
-    /// decides.
-    pub threshold: f64,
-    /// Where the centroid was in the levelled frame, before it was moved to 0 `[m]`.
-    pub centroid: Vector2<f64>,
-    /// Volume between the ground and the surface of the grains' pixels `[m³]`; what is hidden under
-    /// an overhang counts as grain.
-    pub volume: f64,
-    /// Pile or ring.
-    pub shape: Shape,
-    /// The factor by which the image was down-sampled.
-    pub downsample: usize,
-    /// Width of a pixel on the ground, along x and y `[m/px]`.
-    pub resolution: (f64, f64),
-}
 
 /// Sides of the grid `[px]` on which the ground is looked for to choose the down-sampling.
 const GLANCE_PX: usize = 160;

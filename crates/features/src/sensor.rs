@@ -9,6 +9,7 @@ mod depth_sensor;
 mod field;
 pub mod fit;
 mod holes;
+mod observe;
 
 pub use depth_sensor::{DepthSensor, GRAZING_DEG, StereoSensor, TimeOfFlightSensor};
 pub use field::NoiseField;

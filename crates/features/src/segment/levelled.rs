@@ -1,9 +1,9 @@
 //! An image turned so that its ground is z = 0: what depth images and height maps share.
 
-use nalgebra::{Point3, Vector2, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use super::component::{remove_low, remove_small};
-use super::{Formation, Segmentation};
+use super::settings::Segmentation;
 use crate::error::FeatureError;
 use crate::plane::{PlaneFit, fit_plane_within, refine_plane};
 
@@ -77,11 +77,11 @@ pub struct Levelled {
     /// Width of a pixel on the ground, along x and y `[m/px]`.
     pub resolution: (f64, f64),
     /// Volume between the ground and the surface of each pixel with data `[m³]`.
-    volumes: Vec<f64>,
+    pub(super) volumes: Vec<f64>,
     /// Points of the pixels with data, in the frame in which the ground is z = 0 `[m]`.
-    points: Vec<Vector3<f64>>,
+    pub(super) points: Vec<Vector3<f64>>,
     /// The pixels with data.
-    pixels: Vec<usize>,
+    pub(super) pixels: Vec<usize>,
 }
 
 impl Cloud {
@@ -225,40 +225,6 @@ impl Cloud {
 }
 
 impl Levelled {
-    /// The points of the grains, centred.
-    ///
-    /// # Errors
-    /// `EmptyMask` on a flat bed.
-    pub fn into_formation(self) -> Result<Formation, FeatureError> {
-        let masked = || self.pixels.iter().zip(0..).filter(|(pixel, _)| self.mask[**pixel]);
-        let mut points: Vec<_> = masked().map(|(_, i)| self.points[i]).collect();
-        if points.is_empty() {
-            let highest = self.points.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
-            let (valid, threshold) = (self.valid_count, self.threshold);
-            return Err(FeatureError::EmptyMask { valid, highest, threshold });
-        }
-        let volume = masked().map(|(_, i): (_, usize)| self.volumes[i]).sum();
-        let shape = super::shape::of(&self);
-        let centroid = centre(&mut points);
-        Ok(Formation {
-            masked_count: points.len(),
-            points,
-            mask: self.mask,
-            heights: self.heights,
-            width: self.width,
-            height: self.height,
-            plane: self.plane,
-            ground_sd: self.ground_sd,
-            valid_count: self.valid_count,
-            threshold: self.threshold,
-            centroid,
-            volume,
-            shape,
-            downsample: self.downsample,
-            resolution: self.resolution,
-        })
-    }
-
     /// (point, whether it is grain, volume `[m³]`) of the pixels with data.
     pub(super) fn samples(&self) -> impl Iterator<Item = (&Vector3<f64>, bool, f64)> {
         self.points
@@ -309,14 +275,4 @@ fn sd_from_below(ground: &[Vector3<f64>], fit: &PlaneFit, reach: f64) -> f64 {
 pub(super) fn flipped(fit: PlaneFit) -> PlaneFit {
     let plane = fit.plane.flipped();
     PlaneFit { plane, tilt_rad: plane.tilt_rad(), ..fit }
-}
-
-/// Moves the points' centroid to x = y = 0 and returns where it was.
-fn centre(points: &mut [Vector3<f64>]) -> Vector2<f64> {
-    let centroid = points.iter().map(Vector3::xy).sum::<Vector2<f64>>() / points.len() as f64;
-    for point in points {
-        point.x -= centroid.x;
-        point.y -= centroid.y;
-    }
-    centroid
 }

@@ -21,6 +21,7 @@
 //! # Ok::<(), granulcal_features::FeatureError>(())
 //! ```
 
+mod comparison;
 mod components;
 mod covariance;
 mod expected;
@@ -28,60 +29,23 @@ mod flat;
 mod frames;
 mod margins;
 mod session;
+mod settings;
 mod step;
 
-use serde::Serialize;
-
 use super::{DepthSensor, NoiseField, StereoSensor, TimeOfFlightSensor};
-use crate::error::{FeatureError, require_in};
-use crate::region::Region;
+use crate::error::FeatureError;
+pub use comparison::Comparison;
 use components::Estimator;
 pub use covariance::{Covariances, Split};
 pub use frames::FlatFrames;
 use session::Session;
+pub use settings::FitSettings;
 
 /// Share of the variance below which a component of the noise is dropped.
 const LEAST_NOISE: f64 = 0.005;
 /// Share of the variance below which a component of the fixed pattern is dropped: two frames do not
 /// tell it from chance.
 const LEAST_PATTERN: f64 = 0.02;
-/// Highest degree of the trend.
-const MAX_DEGREE: usize = 4;
-/// Longest lag `[px]`.
-const MAX_LAG: usize = 200;
-/// Longest shift `[px]`.
-const MAX_SHIFT: usize = 64;
-
-/// How a sensor is fitted.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FitSettings {
-    /// Where the frames show a flat surface; none is the whole frame.
-    pub regions: Vec<Region>,
-    /// Degree of the polynomial that is removed `[-]`; 1 is a plane.
-    pub trend_degree: usize,
-    /// Longest lag of the covariances `[px]`.
-    pub max_lag: usize,
-    /// Farthest that the frames may have been cut from different places of the sensor `[px]`.
-    pub max_shift: usize,
-    /// Sessions that are simulated to judge the fit.
-    pub sessions: usize,
-    /// Seed of the simulated sessions.
-    pub seed: u64,
-}
-
-impl Default for FitSettings {
-    fn default() -> Self {
-        Self {
-            regions: Vec::new(),
-            trend_degree: 2,
-            max_lag: 24,
-            max_shift: 0,
-            sessions: 24,
-            seed: 0,
-        }
-    }
-}
-
 /// A fitted sensor and how well its simulated frames resemble the measured ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorFit {
@@ -91,26 +55,6 @@ pub struct SensorFit {
     pub comparison: Comparison,
     /// Holes at depth edges that decided the margin; 0 where the frames show too few.
     pub edge_holes: usize,
-}
-
-/// Covariances of measured frames beside those of a model's simulated frames, both after the same
-/// trend removal.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Comparison {
-    /// Unit of the standard deviations: "px" of disparity, or "m".
-    pub unit: &'static str,
-    /// Frames that were compared.
-    pub frames: usize,
-    /// Pixels of a frame that have a residual, on average.
-    pub pixels: usize,
-    /// Where each frame was cut, relative to the first `[px]`.
-    pub shifts: Vec<(isize, isize)>,
-    /// Covariances of the measured frames.
-    pub measured: Split,
-    /// Mean over the simulated sessions.
-    pub model: Split,
-    /// Standard deviation from session to session: what chance alone does to `measured`.
-    pub spread: Split,
 }
 
 /// Fits noise, fixed pattern, rounding and holes to frames of a flat surface.
@@ -142,36 +86,6 @@ pub fn compare(
 ) -> Result<Comparison, FeatureError> {
     sensor.require_valid()?;
     Session::new(frames, settings)?.compare(sensor, settings)
-}
-
-impl Comparison {
-    /// Standard deviation of a single frame, measured and of the model, in `unit`.
-    pub fn sd(&self) -> (f64, f64) {
-        let sd = |split: &Split| split.total().variance().max(0.0).sqrt();
-        (sd(&self.measured), sd(&self.model))
-    }
-
-    /// Largest difference of the correlations of a single frame at lags up to `max_lag`, along the
-    /// rows and the columns `[-]`.
-    pub fn worst_correlation(&self, max_lag: usize) -> f64 {
-        let (measured, model) = (self.measured.total(), self.model.total());
-        let own = |covariances: &Covariances| covariances.variance().max(f64::MIN_POSITIVE);
-        let (a, b) = (own(&measured), own(&model));
-        let along = |x: &[f64], y: &[f64]| {
-            let pairs = x.iter().zip(y).take(max_lag + 1);
-            pairs.map(|(x, y)| (x / a - y / b).abs()).fold(0.0, f64::max)
-        };
-        along(&measured.x, &model.x).max(along(&measured.y, &model.y))
-    }
-}
-
-impl FitSettings {
-    fn require_valid(&self) -> Result<(), FeatureError> {
-        require_in("trend_degree", self.trend_degree as f64, 0.0, MAX_DEGREE as f64)?;
-        require_in("max_lag [px]", self.max_lag as f64, 1.0, MAX_LAG as f64)?;
-        require_in("max_shift [px]", self.max_shift as f64, 0.0, MAX_SHIFT as f64)?;
-        require_in("sessions", self.sessions as f64, 2.0, 1e4)
-    }
 }
 
 /// The sensor without fields: what is known of the optics, the rounding and the holes.

@@ -15,8 +15,8 @@
 
 mod rising;
 
-use super::prepared::{Ranked, is_constant, ranking};
-use super::sum::sum;
+use super::prepared::{Ranked, ranking};
+use super::sum::{is_constant, sum};
 use super::{Behaviour, Prepared, Statistic};
 use rising::rising;
 

@@ -10,8 +10,7 @@
 
 use nalgebra::Vector2;
 
-use super::prepared::is_constant;
-use super::sum::{extremes, mean, sum};
+use super::sum::{extremes, is_constant, mean, sum};
 use super::{Behaviour, Statistic};
 
 /// Excess kurtosis of the distance from the centroid.

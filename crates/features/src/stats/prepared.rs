@@ -4,17 +4,15 @@ use std::cell::OnceCell;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::MIN_POINTS;
 use super::chi::ChiFit;
 use super::sum::{extremes, sum};
 use crate::error::{FeatureError, require_finite, require_in};
 
+/// Points below which no statistic is computed: two have no spread in a plane worth the name.
+pub const MIN_POINTS: usize = 3;
+
 /// Largest coordinate `[m]`: its square, summed over any number of points, is far from overflow.
 pub const MAX_COORDINATE: f64 = 1e100;
-
-/// Relative range below which values count as equal. The rounding of coordinates and of r leaves a
-/// few 1e-16 of the value; nothing that was measured is this exact.
-const EQUAL: f64 = 1e-12;
 
 /// Points in the form that the statistics need.
 #[derive(Debug, Clone)]
@@ -139,13 +137,6 @@ pub(super) fn ranking(values: &[f64]) -> Vec<Ranked> {
         start = end;
     }
     ranking
-}
-
-/// Whether all values are equal up to rounding.
-pub(super) fn is_constant(values: &[f64]) -> bool {
-    let (low, high) = extremes(values);
-    // Also true of no values, where high < low.
-    high - low <= EQUAL * low.abs().max(high.abs()) || high <= low
 }
 
 #[cfg(test)]

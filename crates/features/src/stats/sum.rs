@@ -5,6 +5,10 @@
 
 use std::ops::{Add, AddAssign};
 
+/// Relative range below which values count as equal. The rounding of coordinates and of r leaves a
+/// few 1e-16 of the value; nothing that was measured is this exact.
+const EQUAL: f64 = 1e-12;
+
 /// Running sums side by side.
 pub(super) const LANES: usize = 8;
 
@@ -45,6 +49,13 @@ pub(super) fn extremes(values: &[f64]) -> (f64, f64) {
     }
     let least = low.into_iter().fold(f64::INFINITY, f64::min);
     (least, high.into_iter().fold(f64::NEG_INFINITY, f64::max))
+}
+
+/// Whether all values are equal up to rounding.
+pub(super) fn is_constant(values: &[f64]) -> bool {
+    let (low, high) = extremes(values);
+    // Also true of no values, where high < low.
+    high - low <= EQUAL * low.abs().max(high.abs()) || high <= low
 }
 
 #[cfg(test)]

@@ -1,10 +1,11 @@
 //! Measured frames and simulated ones under one estimator.
 
+use super::comparison::Comparison;
 use super::components::Estimator;
 use super::covariance::{self, Split};
 use super::flat::{Patch, detrend};
 use super::frames::{FlatFrames, Optics};
-use super::{Comparison, FitSettings};
+use super::settings::FitSettings;
 use crate::error::FeatureError;
 use crate::region::Region;
 use crate::sensor::DepthSensor;

@@ -2,8 +2,7 @@
 
 use super::gamma::{gamma_shape, ln_gamma};
 use super::log_sum::{ln_and_inverse_sums, ln_sum};
-use crate::stats::prepared::is_constant;
-use crate::stats::sum::{extremes, mean, sum};
+use crate::stats::sum::{extremes, is_constant, mean, sum};
 
 /// Fewest degrees of freedom: below, the likelihood is unbounded.
 pub const MIN_DF: f64 = 1.0;

@@ -18,18 +18,11 @@
 //! Source: Fourier coefficients on the circle, Mardia & Jupp 2000, Directional Statistics, section 2.4,
 //! weighted; the loop's design for mass and rim as the two functions of azimuth.
 
-use std::f64::consts::{PI, TAU};
+pub(super) mod fourier;
 
-use super::{Diagnostic, Survey};
-use crate::stats::iqr::quantile;
+use self::fourier::VALUES;
+use super::survey::Diagnostic;
 use crate::stats::{Behaviour, Rotation};
-
-/// Sectors of the rim.
-const SECTORS: usize = 24;
-/// Share of a sector's points within its rim.
-const RIM_QUANTILE: f64 = 0.9;
-/// Values of three modes: cos and sin in turn.
-const VALUES: usize = 6;
 
 /// Modes 1 to 3 of the volume.
 pub(super) const MASS: [Diagnostic; VALUES] = [
@@ -61,58 +54,4 @@ const fn rim<const VALUE: usize>(name: &'static str, doc: &'static str) -> Diagn
     let rotation = Rotation::Mode { order: VALUE as u8 / 2 + 1 };
     let behaviour = Behaviour { rotation, ..Behaviour::NUMBER };
     Diagnostic { name, unit: "-", doc, behaviour, value: |survey| survey.modes().rim[VALUE] }
-}
-
-/// Modes 1 to 3 of mass and rim, cos and sin in turn.
-#[derive(Debug, Clone)]
-pub(super) struct Modes {
-    pub(super) mass: [f64; VALUES],
-    pub(super) rim: [f64; VALUES],
-}
-
-impl Modes {
-    pub(super) fn new(survey: &Survey) -> Self {
-        Self { mass: mass_modes(survey), rim: rim_modes(survey) }
-    }
-}
-
-/// cos and sin of φ, 2φ, 3φ from those of φ.
-fn waves(cos: f64, sin: f64) -> [f64; VALUES] {
-    let (cos_2, sin_2) = (cos * cos - sin * sin, 2.0 * cos * sin);
-    [cos, sin, cos_2, sin_2, cos * cos_2 - sin * sin_2, sin * cos_2 + cos * sin_2]
-}
-
-fn mass_modes(survey: &Survey) -> [f64; VALUES] {
-    let (mut modes, mut total) = ([0.0; VALUES], 0.0);
-    for (((x, y), r), z) in survey.x.iter().zip(&survey.y).zip(&survey.r).zip(&survey.z) {
-        let weight = z.max(0.0);
-        total += weight;
-        // A point on the axis has weight and no azimuth.
-        if *r > 0.0 {
-            for (mode, wave) in modes.iter_mut().zip(waves(x / r, y / r)) {
-                *mode += weight * wave;
-            }
-        }
-    }
-    modes.map(|mode| if total > 0.0 { mode / total } else { 0.0 })
-}
-
-fn rim_modes(survey: &Survey) -> [f64; VALUES] {
-    let mut sectors = [const { Vec::new() }; SECTORS];
-    for ((&x, &y), &r) in survey.x.iter().zip(&survey.y).zip(&survey.r) {
-        if r > 0.0 {
-            let sector = ((y.atan2(x) + PI) / TAU * SECTORS as f64) as usize;
-            sectors[sector.min(SECTORS - 1)].push(r);
-        }
-    }
-    let (mut modes, mut total) = ([0.0; VALUES], 0.0);
-    for (sector, radii) in sectors.iter_mut().enumerate() {
-        let rim = quantile(radii, RIM_QUANTILE);
-        let (sin, cos) = ((sector as f64 + 0.5) / SECTORS as f64 * TAU - PI).sin_cos();
-        for (mode, wave) in modes.iter_mut().zip(waves(cos, sin)) {
-            *mode += 2.0 * rim * wave;
-        }
-        total += rim;
-    }
-    modes.map(|mode| if total > 0.0 { mode / total } else { 0.0 })
 }

@@ -17,13 +17,11 @@
 //! least squares is how angles of repose are read (Beakawi Al-Hashemi & Baghabra Al-Amoudi 2018,
 //! doi:10.1016/j.powtec.2018.02.003).
 
-use std::f64::consts::PI;
+pub(super) mod rings;
 
-use super::{Diagnostic, Survey};
+use self::rings::RINGS;
+use super::survey::Diagnostic;
 use crate::stats::Behaviour;
-
-/// Rings of the profile.
-pub(super) const RINGS: usize = 20;
 
 /// Mean height in each ring, from the pour axis outwards.
 pub(super) const HEIGHTS: [Diagnostic; RINGS] = [
@@ -76,61 +74,3 @@ pub(super) const RING_DEPTH: Diagnostic = Diagnostic {
     behaviour: Behaviour::WEIGHED_NUMBER,
     value: |survey| survey.profile().ring_depth,
 };
-
-/// The profile and what is read from it.
-#[derive(Debug, Clone)]
-pub(super) struct Profile {
-    pub(super) heights: [f64; RINGS],
-    pub(super) slope: f64,
-    pub(super) ring_depth: f64,
-}
-
-impl Profile {
-    pub(super) fn new(survey: &Survey) -> Self {
-        let outer = survey.r_95;
-        let (mut counts, mut totals) = ([0_u32; RINGS], [0.0; RINGS]);
-        for (&r, &z) in survey.r.iter().zip(&survey.z) {
-            if r > outer {
-                continue;
-            }
-            // The outermost points of all, r = R, belong to the last ring; 0/0 to the first.
-            let ring = ((r / outer).powi(2) * RINGS as f64) as usize;
-            let ring = ring.min(RINGS - 1);
-            counts[ring] += 1;
-            totals[ring] += z;
-        }
-        let pixels = PI * (outer / survey.spacing).powi(2) / RINGS as f64;
-        let heights: [f64; RINGS] = std::array::from_fn(|ring| {
-            // A ring smaller than its points is covered; one without points is bare.
-            totals[ring] / pixels.max(f64::from(counts[ring])).max(f64::MIN_POSITIVE)
-        });
-        let (peak, highest) =
-            heights.iter().copied().enumerate().fold((0, f64::NEG_INFINITY), |best, ring| {
-                if ring.1 > best.1 { ring } else { best }
-            });
-        let ring_depth = if highest > 0.0 { heights[0].max(0.0) / highest } else { 1.0 };
-        // Within a pixel there is no flank.
-        let slope =
-            if outer < survey.spacing { 0.0 } else { slope(&heights[peak..], peak) / outer };
-        Self { heights, slope, ring_depth }
-    }
-}
-
-/// Slope of ring heights, from ring number `first` on, over the radius in units of R; 0 of fewer than two
-/// rings with anything in them.
-fn slope(heights: &[f64], first: usize) -> f64 {
-    let rings: Vec<(f64, f64)> = (first..)
-        .zip(heights)
-        .map(|(ring, &h)| (((ring as f64 + 0.5) / RINGS as f64).sqrt(), h))
-        .filter(|(_, h)| *h > 0.0)
-        .collect();
-    if rings.len() < 2 {
-        return 0.0;
-    }
-    let total: f64 = rings.iter().map(|(_, h)| h).sum();
-    let mean = |value: &dyn Fn(f64, f64) -> f64| {
-        rings.iter().map(|&(rho, h)| h / total * value(rho, h)).sum::<f64>()
-    };
-    let (middle, height) = (mean(&|rho, _| rho), mean(&|_, h| h));
-    mean(&|rho, h| (rho - middle) * (h - height)) / mean(&|rho, _| (rho - middle).powi(2))
-}

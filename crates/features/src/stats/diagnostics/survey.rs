@@ -4,18 +4,22 @@ use std::cell::OnceCell;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::DiagnosticSettings;
-use super::bodies::Bodies;
-use super::modes::Modes;
-use super::profile::Profile;
+use super::bodies::joined::Bodies;
+use super::modes::fourier::Modes;
+use super::profile::rings::Profile;
+use super::settings::DiagnosticSettings;
 use crate::error::{FeatureError, require_in};
 use crate::stats::iqr::quantile;
 use crate::stats::prepared::{centroid, require_points};
+use crate::stats::statistic::Statistic;
 use crate::stats::sum::extremes;
 
 /// Largest extent of the points, in spacings: the bodies are found in cells of about a spacing, whose
 /// numbers must be exact.
 const MAX_EXTENT: f64 = 1e12;
+
+/// A statistic of the second family.
+pub type Diagnostic = Statistic<Survey>;
 
 /// Points counted from the pour axis.
 #[derive(Debug, Clone)]
@@ -76,16 +80,16 @@ impl Survey {
 
     /// The radial profile of the height.
     pub(super) fn profile(&self) -> &Profile {
-        self.profile.get_or_init(|| Profile::new(self))
+        self.profile.get_or_init(|| Profile::new(&self.r, &self.z, self.r_95, self.spacing))
     }
 
     /// The azimuthal modes.
     pub(super) fn modes(&self) -> &Modes {
-        self.modes.get_or_init(|| Modes::new(self))
+        self.modes.get_or_init(|| Modes::new([&self.x, &self.y, &self.z, &self.r]))
     }
 
     /// The connected bodies.
     pub(super) fn bodies(&self) -> &Bodies {
-        self.bodies.get_or_init(|| Bodies::new(self))
+        self.bodies.get_or_init(|| Bodies::new(&self.x, &self.y, self.spacing, self.grain_diameter))
     }
 }

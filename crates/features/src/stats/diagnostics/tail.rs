@@ -11,7 +11,7 @@
 //!
 //! Source: Hill 1975, doi:10.1214/aos/1176343247.
 
-use super::{Diagnostic, Survey};
+use super::survey::{Diagnostic, Survey};
 use crate::stats::Behaviour;
 
 /// Radius about the pour axis that holds 95 % of the points.
