@@ -4,11 +4,12 @@
 //! threads, of shards, of interruptions. Rows are written in chunks; a part is complete on disk or
 //! absent, so a run that was killed loses the rows in flight and nothing else.
 
+mod chunk;
 mod folder;
+mod options;
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
@@ -24,82 +25,15 @@ use crate::observer::Observer;
 use crate::random::pour_seed;
 use crate::row::{Row, RowStatus};
 use crate::{DatasetError, Prior, table};
+use chunk::OpenChunk;
+pub use chunk::Progress;
 use folder::Folder;
+pub use options::{GenerateOptions, Shard};
 
 /// How long the caller goes unasked at most while pours run.
 const PATIENCE: Duration = Duration::from_millis(100);
 /// Largest seed: manifests are TOML, whose whole numbers have a sign.
 const MAX_SEED: u64 = i64::MAX as u64;
-
-/// Which part of the rows one machine of several makes: chunk c belongs to shard c mod count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    /// From 0 to count - 1.
-    pub index: u64,
-    /// How many shards there are.
-    pub count: u64,
-}
-
-impl Shard {
-    /// Everything.
-    pub const WHOLE: Self = Self { index: 0, count: 1 };
-}
-
-impl FromStr for Shard {
-    type Err = DatasetError;
-
-    fn from_str(text: &str) -> Result<Self, DatasetError> {
-        let parse = || {
-            let (index, count) = text.split_once('/')?;
-            let shard = Self { index: index.parse().ok()?, count: count.parse().ok()? };
-            (shard.index < shard.count).then_some(shard)
-        };
-        let allowed = "i/k with whole numbers 0 <= i < k";
-        parse().ok_or(DatasetError::Argument { what: "shard", got: format!("{text:?}"), allowed })
-    }
-}
-
-/// What [`generate`] is asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GenerateOptions {
-    /// Rows of the whole data set, over all shards.
-    pub rows: u64,
-    /// Seed of the data set, below 2^63.
-    pub seed: u64,
-    /// Which rows are made here.
-    pub shard: Shard,
-    /// Pours at once.
-    pub threads: usize,
-    /// Rows in a part; a folder keeps the number that it began with.
-    pub chunk: u64,
-    /// Whether rows that are in the folder already are kept; else a folder with rows is refused.
-    pub resume: bool,
-}
-
-impl Default for GenerateOptions {
-    /// 1000 rows on all cores, in parts of 16.
-    fn default() -> Self {
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        Self { rows: 1000, seed: 0, shard: Shard::WHOLE, threads, chunk: 16, resume: true }
-    }
-}
-
-/// How far a batch is. Rows count for this shard only.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Progress {
-    /// Rows asked for.
-    pub total: u64,
-    /// Rows that were in the folder already.
-    pub resumed: u64,
-    /// Rows made by this call.
-    pub made: u64,
-    /// Rows, resumed or made, whose numbers cannot be used: unhealthy, or no grains in view.
-    pub unhealthy: u64,
-    /// Rows, resumed or made, in which grains remain in the funnel.
-    pub jammed: u64,
-    /// Rows on disk beyond those asked for, left as they are.
-    pub beyond: u64,
-}
 
 /// What a batch has come to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,14 +87,6 @@ fn check(options: &GenerateOptions) -> Result<(), DatasetError> {
         return refuse("the index of the shard", options.shard.index, "below the number of shards");
     }
     Ok(())
-}
-
-/// A chunk that is not complete: the rows it has and how many it lacks.
-#[derive(Debug)]
-struct OpenChunk {
-    rows: Vec<Row>,
-    missing: Vec<u64>,
-    changed: bool,
 }
 
 /// The collecting side of a batch.

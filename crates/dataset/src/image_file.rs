@@ -5,8 +5,8 @@ use std::io::Cursor;
 use granulcal_features::ColourImage;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
+use crate::depth_frame::{DepthFrame, Values};
 use crate::fault::Fault;
-use crate::message::{DepthFrame, Values};
 
 /// Why an image file cannot be used.
 #[derive(Debug)]

@@ -24,6 +24,7 @@ mod camera_file;
 mod checkpoint_file;
 mod contact_problem_file;
 mod dataset;
+mod depth_frame;
 mod distribution;
 mod error;
 mod fault;

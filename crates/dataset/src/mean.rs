@@ -2,8 +2,8 @@
 
 use granulcal_features::DepthImage;
 
+use crate::depth_frame::{DepthFrame, Values};
 use crate::fault::Fault;
-use crate::message::{DepthFrame, Values};
 
 /// Depth images of one size and kind, summed. Counts are summed as whole numbers, so that the mean
 /// of counts is rounded once.

@@ -4,19 +4,19 @@
 //! its channel. Kinds that a recording needs nothing of are [`Kind::Other`].
 
 mod compressed;
+mod facts;
 mod foxglove;
+mod picture;
 mod pixels;
 mod ros;
 mod wire;
 
-use std::borrow::Cow;
-
 use nalgebra::Isometry3;
-
-pub(crate) use pixels::{DepthFrame, Values};
 
 use crate::fault::Fault;
 use crate::message_file::Channel;
+pub(crate) use facts::{Lens, PictureFacts, Shows};
+pub(crate) use picture::Picture;
 
 /// What a message is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,63 +74,6 @@ fn encoding(channel: &Channel) -> Option<Encoding> {
     }
 }
 
-/// A picture, its pixels not yet read.
-#[derive(Clone, Debug)]
-pub(crate) struct Picture<'a> {
-    /// The frame of reference that the camera stands in, empty where none is given.
-    pub(crate) frame_id: String,
-    pub(crate) pixels: Pixels<'a>,
-}
-
-/// The pixels of a picture.
-#[derive(Clone, Debug)]
-pub(crate) enum Pixels<'a> {
-    /// Row by row, `step` bytes each.
-    Raw(pixels::Raw<'a>),
-    /// An image file.
-    Compressed {
-        /// As ROS and Foxglove name it: `png`, `jpeg`, `16UC1; compressedDepth png` and so on.
-        format: String,
-        /// Its bytes.
-        data: Cow<'a, [u8]>,
-    },
-}
-
-/// What a picture is known to be before its pixels are read.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct PictureFacts {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-    /// Encoding of the pixels, or the format of the compression.
-    pub(crate) encoding: String,
-    pub(crate) shows: Shows,
-}
-
-/// What the pixels of a picture mean.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Shows {
-    /// Counts of a unit, or metres.
-    Depth,
-    /// Red, green and blue.
-    Colour,
-    /// Neither.
-    Other,
-}
-
-/// Size and lens of a camera, as ROS and Foxglove give them.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Lens {
-    pub(crate) frame_id: String,
-    pub(crate) width: u32,
-    pub(crate) height: u32,
-    /// Coefficients of the distortion of the raw image.
-    pub(crate) distortion: Vec<f64>,
-    /// Lens of the raw image, 3 × 3 by rows.
-    pub(crate) k: [f64; 9],
-    /// Lens of the rectified image, 3 × 4 by rows.
-    pub(crate) p: [f64; 12],
-}
-
 /// Reads a message of kind [`Kind::Image`] or [`Kind::CompressedImage`].
 pub(crate) fn picture<'a>(channel: &Channel, data: &'a [u8]) -> Result<Picture<'a>, Fault> {
     let is_raw = Kind::of(channel) == Kind::Image;
@@ -164,31 +107,5 @@ fn ros_wire<'a>(channel: &Channel, data: &'a [u8]) -> Result<wire::Wire<'a>, Fau
     match encoding(channel) {
         Some(Encoding::Cdr) => wire::Wire::cdr(data),
         _ => Ok(wire::Wire::ros1(data)),
-    }
-}
-
-impl Picture<'_> {
-    /// Size and meaning, checked as far as it costs no more than a look at the header.
-    pub(crate) fn facts(&self) -> Result<PictureFacts, Fault> {
-        match &self.pixels {
-            Pixels::Raw(raw) => raw.facts(),
-            Pixels::Compressed { format, data } => compressed::facts(format, data),
-        }
-    }
-
-    /// The depth of each pixel, in counts or metres. No more than `limit` bytes are unpacked.
-    pub(crate) fn depth(&self, limit: u64) -> Result<DepthFrame, Fault> {
-        match &self.pixels {
-            Pixels::Raw(raw) => raw.depth(),
-            Pixels::Compressed { format, data } => compressed::depth(format, data, limit),
-        }
-    }
-
-    /// The colour of each pixel, red, green and blue, row by row.
-    pub(crate) fn colour(&self, limit: u64) -> Result<granulcal_features::ColourImage, Fault> {
-        match &self.pixels {
-            Pixels::Raw(raw) => raw.colour(),
-            Pixels::Compressed { format, data } => compressed::colour(format, data, limit),
-        }
     }
 }

@@ -9,11 +9,10 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use self::header::Source;
+use self::header::{MAGIC, Source};
 use crate::input::Input;
 use crate::{DatasetError, files};
 
-const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Bytes that are turned into numbers at a time; a multiple of all sizes of a number.
 const BUFFER: usize = 8 << 10;
 /// Bytes beyond which one word is none.

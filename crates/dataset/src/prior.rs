@@ -16,21 +16,15 @@
 //! ```
 
 mod entry;
+mod parameter;
 
 use granulcal_dem::Scene;
 
 use crate::random::Uniforms;
 use crate::{DatasetError, Distribution};
 use entry::{Entry, File};
-
-/// One parameter of a prior.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Parameter {
-    /// Path of the number in the scene, for example `material.sliding_friction`.
-    pub path: String,
-    /// Its distribution.
-    pub distribution: Distribution,
-}
+pub use parameter::Parameter;
+use parameter::refuse;
 
 /// Independent parameters, each named by its path in the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,10 +141,6 @@ impl Prior {
 /// The path without the optional `scene.` in front.
 fn plain(path: &str) -> &str {
     path.strip_prefix("scene.").unwrap_or(path)
-}
-
-fn refuse(parameter: &str, what: &'static str, got: String, allowed: &'static str) -> DatasetError {
-    DatasetError::Prior { parameter: parameter.to_owned(), what, got, allowed }
 }
 
 fn check_distribution(path: &str, distribution: &Distribution) -> Result<(), DatasetError> {

@@ -12,7 +12,7 @@ use granulcal_features::{
     level_height_map, paper16,
 };
 
-pub use folder::Folder;
+pub use folder::{Folder, Frame};
 pub use options::{FRAMES, ReadOptions};
 
 use crate::camera_file::camera_of;
@@ -35,9 +35,6 @@ pub enum Source {
         colour: Option<ColourImage>,
     },
 }
-
-/// A PNG frame: its name and its bytes, or why it cannot be read.
-pub type Frame = Result<(PathBuf, Vec<u8>), DatasetError>;
 
 /// One measured formation.
 #[derive(Clone, Debug)]

@@ -18,6 +18,7 @@ from granulcal.bayessim.likelihood import Likelihood
 from granulcal.bayessim.misfit import Misfit, MisfitReference
 from granulcal.bayessim.pairs import TrainingPairs
 from granulcal.bayessim.standardise import Standardiser
+from granulcal.bayessim.storage import load_parts, save_model
 from granulcal.bayessim.summary import TrainingSummary
 from granulcal.bayessim.trainer import Progress
 from granulcal.bayessim.training import train_model
@@ -242,8 +243,6 @@ class BayesSim:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Writes the folder `path`: model.json and weights.safetensors, all or nothing."""
-        from granulcal.bayessim.storage import save_model
-
         save_model(self, path)
 
     @classmethod
@@ -254,9 +253,7 @@ class BayesSim:
             FileNotFoundError: the folder or one of its files does not exist.
             ModelFormatError: the files are there but cannot be this model; the message says why.
         """
-        from granulcal.bayessim.storage import load_model
-
-        return load_model(path)
+        return cls(**load_parts(path))
 
     def _checked(self, x_obs: ArrayLike) -> Array:
         observed = as_real("x_obs", x_obs)

@@ -6,16 +6,20 @@ import shutil
 import tempfile
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from safetensors import SafetensorError
 from safetensors.numpy import load as read_tensors
 from safetensors.numpy import save as tensor_bytes
 
 from granulcal import _native
+from granulcal.bayessim.amortised import Amortised
 from granulcal.bayessim.average import FORMS, Average
 from granulcal.bayessim.calibration import Calibration
 from granulcal.bayessim.config import Config
+from granulcal.bayessim.likelihood import Likelihood
+from granulcal.bayessim.misfit import MisfitReference
+from granulcal.bayessim.standardise import Standardiser
 from granulcal.bayessim.summary import TrainingSummary
 from granulcal.bayessim.tensors import Tensors, model_tensors
 from granulcal.errors import ModelFormatError, PriorError
@@ -25,12 +29,29 @@ from granulcal.prior import Prior
 if TYPE_CHECKING:
     from granulcal.bayessim.model import BayesSim
 
-__all__ = ["load_model", "save_model"]
+__all__ = ["Parts", "load_parts", "save_model"]
 
 FORMAT, VERSION = "granulcal-bayessim", 4
 # Of these the emulator's weight is that of an arithmetic average.
 _OLDER_VERSIONS = (3,)
 _JSON_NAME, _TENSORS_NAME = "model.json", "weights.safetensors"
+
+
+class Parts(TypedDict):
+    """What a saved model is joined from: the arguments of `BayesSim`."""
+
+    prior: Prior
+    config: Config
+    standardiser: Standardiser
+    likelihood: Likelihood
+    amortised: Amortised | None
+    average: Average
+    x_names: tuple[str, ...]
+    misfit_reference: MisfitReference
+    summary: TrainingSummary
+    calibration: Calibration | None
+    identifiability: Identifiability | None
+    scene_toml: str | None
 
 
 def save_model(model: "BayesSim", path: str | PathLike[str]) -> None:
@@ -62,10 +83,8 @@ def save_model(model: "BayesSim", path: str | PathLike[str]) -> None:
         shutil.rmtree(workshop, ignore_errors=True)
 
 
-def load_model(path: str | PathLike[str]) -> "BayesSim":
-    """Returns the model in the folder `path`; see `BayesSim.load`."""
-    from granulcal.bayessim.model import BayesSim
-
+def load_parts(path: str | PathLike[str]) -> Parts:
+    """Returns what the model in the folder `path` is joined from; see `BayesSim.load`."""
     folder = Path(path)
     for name in (_JSON_NAME, _TENSORS_NAME):
         if not (folder / name).is_file():
@@ -86,7 +105,7 @@ def load_model(path: str | PathLike[str]) -> "BayesSim":
         x_names = tuple(document["x_names"])
         tensors = Tensors(tensors, folder / _TENSORS_NAME, len(prior.names), len(x_names))
         calibration, known = document["calibration"], document["identifiability"]
-        return BayesSim(
+        return Parts(
             prior=prior,
             config=config,
             standardiser=tensors.standardiser(),

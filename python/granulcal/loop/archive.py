@@ -26,6 +26,7 @@ from granulcal import _native
 from granulcal.dataset import Dataset, generate
 from granulcal.errors import TrainingDataError
 from granulcal.files import write_beside
+from granulcal.loop.cube import cube
 from granulcal.loop.design import Design
 from granulcal.loop.image_rows import ImageRows
 from granulcal.loop.images import require_image
@@ -417,22 +418,6 @@ class _Part:
             )
             for i, place in enumerate(places)
         ]
-
-
-def cube(prior: Prior, theta: Array) -> Array:
-    """Returns parameters (n, p) by the distribution function of each."""
-    from granulcal.loop.design import cube_from_normal
-
-    coordinates = prior.to_unconstrained(theta)
-    for i, parameter in enumerate(prior.free):
-        if parameter.distribution == "normal":
-            coordinates[:, i] = cube_from_normal(coordinates[:, i])
-    return coordinates
-
-
-def from_cube(prior: Prior, u: Array) -> Array:
-    """Returns parameters in own units of unit coordinates (n, p)."""
-    return np.column_stack([p.quantile(u[:, i]) for i, p in enumerate(prior.free)])
 
 
 def _continued(theirs: dict[str, Any], mine: dict[str, Any]) -> dict[str, Any] | None:

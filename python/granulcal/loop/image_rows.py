@@ -15,6 +15,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.loop.cube import from_cube
 from granulcal.loop.forward import UNUSABLE
 from granulcal.loop.library import LibraryEffect
 from granulcal.loop.measures import Measures
@@ -121,8 +122,6 @@ class ImageRows:
 
     def _row(self, row: int) -> dict[str, Array]:
         """One pour: NaN for what it does not show, and under effects that leave it out."""
-        from granulcal.loop.archive import from_cube
-
         generator = np.random.default_rng([self.seed, _STREAM, row])
         theta = generator.random(len(self.prior.names))
         unit = generator.random(len(self.conditions))

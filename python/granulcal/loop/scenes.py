@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.archive import from_cube
+from granulcal.loop.cube import from_cube
 from granulcal.loop.task import Condition, Task
 from granulcal.scene import Scene
 

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
-use super::{GenerateOptions, OpenChunk, Progress};
+use super::chunk::{OpenChunk, Progress};
+use super::options::GenerateOptions;
 use crate::header::Header;
 use crate::manifest::{self, Manifest};
 use crate::random::pour_seed;

@@ -8,7 +8,8 @@
 use granulcal_features::ColourImage;
 use image::ColorType;
 
-use super::{DepthFrame, PictureFacts, Shows, Values};
+use super::facts::{PictureFacts, Shows};
+use crate::depth_frame::{DepthFrame, Values};
 use crate::fault::Fault;
 use crate::image_file::{self, Unreadable};
 

@@ -5,8 +5,9 @@ use std::borrow::Cow;
 use foxglove::Decode;
 use foxglove::messages::{CameraCalibration, CompressedImage, RawImage};
 
+use super::facts::Lens;
+use super::picture::{Picture, Pixels};
 use super::pixels::Raw;
-use super::{Lens, Picture, Pixels};
 use crate::fault::Fault;
 
 fn decode<T: Decode>(name: &str, data: &[u8]) -> Result<T, Fault> {

@@ -9,29 +9,13 @@ use std::borrow::Cow;
 use granulcal_features::ColourImage;
 use granulcal_features::camera::MAX_SIDE_PX;
 
-use super::{PictureFacts, Shows};
+use super::facts::{PictureFacts, Shows};
+use crate::depth_frame::{DepthFrame, Values};
 use crate::fault::Fault;
 
 /// Encodings that are read, for messages.
 const DEPTH: &str = "16UC1, mono16 or 32FC1";
 const COLOUR: &str = "rgb8, bgr8, 8UC3, rgba8, bgra8 or 8UC4";
-
-/// One depth image, in the numbers of its file.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct DepthFrame {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-    pub(crate) values: Values,
-}
-
-/// Depth row by row; 0, and what is not finite, is no data.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Values {
-    /// Counts of a unit.
-    Counts(Vec<u16>),
-    /// Metres.
-    Metres(Vec<f32>),
-}
 
 /// An image whose pixels stand in the message.
 #[derive(Clone, Debug)]

@@ -7,9 +7,10 @@ use std::borrow::Cow;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
+use super::facts::Lens;
+use super::picture::{Picture, Pixels};
 use super::pixels::Raw;
 use super::wire::Wire;
-use super::{Lens, Picture, Pixels};
 use crate::fault::Fault;
 
 /// `sensor_msgs/Image`.

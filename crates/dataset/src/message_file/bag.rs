@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 
 use self::fields::{Cut, Fields};
 use super::unpack::unpack;
-use super::{Channel, Message, Visit, Walk};
+use super::visit::{Channel, Message, Visit, Walk};
 use crate::DatasetError;
 use crate::fault::Fault;
 use crate::input::Input;

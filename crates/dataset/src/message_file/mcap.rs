@@ -14,7 +14,7 @@ use mcap::records::{Record, op};
 
 use super::mcap_record::parse;
 use super::unpack::unpack;
-use super::{Channel, Message, Visit, Walk};
+use super::visit::{Channel, Message, Visit, Walk};
 use crate::DatasetError;
 use crate::fault::Fault;
 use crate::input::Input;

@@ -3,8 +3,10 @@
 use std::io::{self, Read};
 use std::path::Path;
 
-use super::MAGIC;
 use crate::DatasetError;
+
+/// What a file begins with.
+pub(super) const MAGIC: &[u8; 6] = b"\x93NUMPY";
 
 /// Bytes of a header beyond which it is none: NumPy's own limit is 10 000.
 const MAX_HEADER: usize = 1 << 16;

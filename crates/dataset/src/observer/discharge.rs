@@ -3,7 +3,7 @@
 use granulcal_dem::{ObserveDischarge, Pour};
 use nalgebra::Vector3;
 
-use super::{Frame, Observation, ObservedStatistic, Series, holds};
+use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 
 /// Between these shares the rate of a discharge is taken `[%]`: after the start, before the end.
 pub const RATE_RANGE: (f64, f64) = (5.0, 85.0);

@@ -4,7 +4,7 @@ use granulcal_dem::{ObserveFront, Pour};
 use granulcal_features::series::front_radius;
 use nalgebra::Vector2;
 
-use super::{Frame, Observation, ObservedStatistic, Series, holds};
+use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 
 /// `front_radius[t]` at the stated times, and `front_radius[end]`.
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use granulcal_dem::{ObserveRadius, Pour};
 use granulcal_features::series::mass_percentiles;
 use nalgebra::Vector2;
 
-use super::{Observation, ObservedStatistic};
+use super::observation::{Observation, ObservedStatistic};
 
 /// `radius[p]` of the stated percentiles.
 #[derive(Debug)]

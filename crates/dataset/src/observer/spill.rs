@@ -3,7 +3,7 @@
 use granulcal_dem::{ObserveSpill, Pour};
 use nalgebra::Vector2;
 
-use super::{Observation, ObservedStatistic};
+use super::observation::{Observation, ObservedStatistic};
 
 /// `spilled`.
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use granulcal_features::series::Silhouette;
 use granulcal_features::series::silhouette::slope_deg;
 use nalgebra::Vector3;
 
-use super::{Frame, Observation, ObservedStatistic, Series};
+use super::observation::{Frame, Observation, ObservedStatistic, Series};
 
 /// Columns from which the slope is taken, over its width.
 const SLOPE_COLUMNS: usize = 41;

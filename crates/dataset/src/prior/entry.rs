@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Parameter, refuse};
+use super::parameter::{Parameter, refuse};
 use crate::{DatasetError, Distribution};
 
 /// A prior as it stands in a file.

@@ -4,12 +4,14 @@ use std::path::{Path, PathBuf};
 
 use granulcal_features::{DepthImage, Intrinsics};
 
-use super::Frame;
 use crate::DatasetError;
 use crate::image_file::{self, Unreadable};
 use crate::input::unpack_limit;
 use crate::mean::Mean;
 use crate::png::unreadable;
+
+/// A PNG frame: its name and its bytes, or why it cannot be read.
+pub type Frame = Result<(PathBuf, Vec<u8>), DatasetError>;
 
 /// A folder that is a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,0 +1,18 @@
+//! One depth image in the numbers of its file, whatever the file.
+
+/// One depth image, in the numbers of its file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct DepthFrame {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) values: Values,
+}
+
+/// Depth row by row; 0, and what is not finite, is no data.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Values {
+    /// Counts of a unit.
+    Counts(Vec<u16>),
+    /// Metres.
+    Metres(Vec<f32>),
+}
