@@ -49,6 +49,7 @@ lint: $(VENV)/.deps ## format, lints, types, spelling, documentation, licences
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
 	cargo deny --version >/dev/null 2>&1 || cargo install cargo-deny --locked
 	cargo deny --workspace check bans licenses sources
+	$(PYTHON) scripts/walls/check.py
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/pyright

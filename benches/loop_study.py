@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 import granulcal as gc
 from granulcal.loop import Discrepancy, Observation, Surrogate, Thresholds, Trace, compare, trace
 from granulcal.loop.archive import Archive, Plan
-from granulcal.loop.cube import from_cube
 from granulcal.loop.baseline import fit_base
+from granulcal.loop.cube import from_cube
 from granulcal.loop.forward import Forward
 from granulcal.loop.library import FUNNEL, LibraryEffect
 from granulcal.loop.observation import Stack

@@ -1,6 +1,7 @@
-"""Which file of a Python package imports which, followed through `__init__` to where a name is defined.
+"""Which file of a Python package imports which, followed to where a name is defined.
 
-An import inside a function counts: it hides a circle, it does not open it. What is imported for types alone does not run.
+An import inside a function counts: it hides a circle, it does not open it. What is imported for
+types alone does not run.
 """
 
 import ast

@@ -1,6 +1,7 @@
-"""Which file of a crate uses which: what its `use` and its paths name, followed to where it is defined.
+"""Which file of a crate uses which: what it names, followed to where that is defined.
 
-A `mod` line alone is no arrow, and what is compiled for tests alone is not looked at: a test may reach up.
+A `mod` line alone is no arrow, nor is what is handed on and not used. What is compiled for tests
+alone is not looked at: a test may reach up.
 """
 
 import re
@@ -13,9 +14,9 @@ PATH = re.compile(r"\b(?:crate|self|super)(?:::\w+)+|(?<![\w:.])[a-z_]\w*(?:::\w
 USE = re.compile(r"^[ \t]*(?P<public>pub(?:\([^)]*\))? )?use (?P<tree>[^;]+);", re.MULTILINE)
 CHILD = re.compile(r"^[ \t]*(?:pub(?:\([^)]*\))? )?mod (\w+);", re.MULTILINE)
 TEST = re.compile(r"#\[cfg\((?:all\()?test\b[^\]]*\]\s*(?:#\[[^\]]*\]\s*)*")
-NOISE = re.compile(
-    r'//[^\n]*|/\*.*?\*/|r(?P<hash>#*)".*?"(?P=hash)|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])\'', re.DOTALL
-)
+DEFINITION = r"\b(?:fn|struct|enum|trait|type|const|static|macro_rules!|union)\s+{}\b"
+COMMENT, STRING = r"//[^\n]*|/\*.*?\*/", r'r(?P<hash>#*)".*?"(?P=hash)|"(?:\\.|[^"\\])*"'
+NOISE = re.compile(rf"{COMMENT}|{STRING}|'(?:\\.|[^'\\])'", re.DOTALL)
 
 Module = tuple[str, ...]
 
@@ -32,18 +33,27 @@ class File:
     all_of: list[Module] = field(default_factory=list)
     all_handed_on: list[Module] = field(default_factory=list)
 
+    @property
+    def body(self) -> str:
+        """The text without its imports."""
+        return USE.sub(" ", self.text)
+
+    def defines(self, name: str) -> bool:
+        """Returns whether a name is defined here."""
+        return re.search(DEFINITION.format(re.escape(name)), self.text) is not None
+
 
 def arrows_of(crate: Path) -> Arrows:
     """Returns which file uses which, as paths relative to the crate's `src`."""
-    files = read(crate / "src")
+    source = crate / "src"
+    files = read(source)
     arrows: Arrows = {}
     for module, file in files.items():
-        name = file.path.relative_to(crate / "src").as_posix()
-        uses = arrows.setdefault(name, set())
+        uses = arrows.setdefault(file.path.relative_to(source).as_posix(), set())
         for path in named(module, file):
             target = resolve(files, path)
-            if target is not None and target != module:
-                uses.add(files[target].path.relative_to(crate / "src").as_posix())
+            if target != module:
+                uses.add(files[target].path.relative_to(source).as_posix())
     return arrows
 
 
@@ -56,41 +66,44 @@ def read(source: Path) -> dict[Module, File]:
         module, path = waiting.pop()
         text = without_tests(NOISE.sub(" ", path.read_text(encoding="utf-8")))
         file = files[module] = File(path, text, children=set(CHILD.findall(text)))
-        folder = path.parent if path.name in ("lib.rs", "main.rs", "mod.rs") else path.with_suffix("")
+        is_folder = path.name in ("lib.rs", "main.rs", "mod.rs")
+        folder = path.parent if is_folder else path.with_suffix("")
         for child in sorted(file.children):
             inside = [folder / f"{child}.rs", folder / child / "mod.rs"]
             waiting += [((*module, child), at) for at in inside if at.exists()]
         for use in USE.finditer(text):
             for names, alias in branches(use["tree"]):
                 target = absolute(module, file, names)
-                if target is None:
-                    continue
-                if alias == "*":
-                    file.all_of.append(target[:-1])
-                    if use["public"]:
-                        file.all_handed_on.append(target[:-1])
-                else:
-                    file.imports[alias] = target
-                    if use["public"]:
-                        file.handed_on[alias] = target
+                if target is not None:
+                    take(file, target, alias, is_public=use["public"] is not None)
     return files
+
+
+def take(file: File, target: Module, alias: str, *, is_public: bool) -> None:
+    """Notes one import."""
+    if alias == "*":
+        file.all_of.append(target[:-1])
+        if is_public:
+            file.all_handed_on.append(target[:-1])
+        return
+    file.imports[alias] = target
+    if is_public:
+        file.handed_on[alias] = target
 
 
 def without_tests(text: str) -> str:
     """Cuts out what follows a `cfg(test)`: a block in braces, or up to the semicolon."""
     while found := TEST.search(text):
         end = re.compile(r"[{;]").search(text, found.end())
-        if end is None:
-            return text[: found.start()]
-        at = end.end()
-        if end[0] == "{":
-            depth = 1
-            while depth:
-                brace = re.compile(r"[{}]").search(text, at)
-                if brace is None:
-                    return text[: found.start()]
-                depth += 1 if brace[0] == "{" else -1
-                at = brace.end()
+        at = len(text) if end is None else end.end()
+        depth = int(end is not None and end[0] == "{")
+        while depth:
+            brace = re.compile(r"[{}]").search(text, at)
+            if brace is None:
+                at = len(text)
+                break
+            depth += 1 if brace[0] == "{" else -1
+            at = brace.end()
         text = text[: found.start()] + text[at:]
     return text
 
@@ -101,55 +114,45 @@ def branches(tree: str) -> list[tuple[Module, str]]:
     if "{" not in tree:
         path, _, alias = tree.partition(" as ")
         names = tuple(part.strip() for part in path.split("::"))
-        if names[-1] == "self":
-            names = names[:-1]
         return [(names, alias.strip() or names[-1])]
     before, _, inside = tree.partition("{")
     prefix = tuple(part for part in before.strip().removesuffix("::").split("::") if part)
     found, depth, part = [], 0, ""
     for letter in inside.rstrip()[:-1] + ",":
         depth += {"{": 1, "}": -1}.get(letter, 0)
-        if letter == "," and depth == 0:
-            if part.strip():
-                found += [((*prefix, *rest), alias if alias != "self" else prefix[-1]) for rest, alias in inner(part)]
-            part = ""
-        else:
+        if letter != "," or depth:
             part += letter
+            continue
+        if part.strip() == "self":
+            found.append((prefix, prefix[-1]))
+        elif part.strip():
+            found += [((*prefix, *rest), alias) for rest, alias in branches(part)]
+        part = ""
     return found
-
-
-def inner(part: str) -> list[tuple[Module, str]]:
-    """Returns the paths of one branch in braces; `self` is the branch's stem."""
-    return [((), "self")] if part.strip() == "self" else branches(part)
 
 
 def absolute(module: Module, file: File, names: Module) -> Module | None:
     """Returns a path from the crate's root; None for another crate's."""
     if names[0] == "crate":
         return names[1:]
-    if names[0] == "self":
-        return (*module, *names[1:])
-    if names[0] == "super":
-        up = module
-        rest = list(names)
-        while rest and rest[0] == "super":
-            up, rest = up[:-1], rest[1:]
+    if names[0] in ("self", "super"):
+        up, rest = module, names
+        while rest and rest[0] in ("self", "super"):
+            up, rest = (up[:-1] if rest[0] == "super" else up), rest[1:]
         return (*up, *rest)
-    if names[0] in file.children:
-        return (*module, *names)
-    return None
+    return (*module, *names) if names[0] in file.children else None
 
 
 def named(module: Module, file: File) -> set[Module]:
-    """Returns every path from the crate's root that a file names."""
-    body = USE.sub(" ", file.text)
+    """Returns every path from the crate's root that a file uses."""
+    body = file.body
     # What is only handed on is an arrow of those who take it from here.
-    own = {
+    found = {
         target
         for alias, target in file.imports.items()
         if alias not in file.handed_on or re.search(rf"\b{alias}\b", body)
     }
-    found = own | (set(file.all_of) - set(file.all_handed_on))
+    found |= set(file.all_of) - set(file.all_handed_on)
     for path in PATH.findall(body):
         names = tuple(path.split("::"))
         whole = absolute(module, file, names)
@@ -160,29 +163,23 @@ def named(module: Module, file: File) -> set[Module]:
     return found
 
 
-def resolve(files: dict[Module, File], path: Module, depth: int = 0) -> Module | None:
+def resolve(files: dict[Module, File], path: Module, depth: int = 0) -> Module:
     """Returns the module in whose file the thing that a path names is defined."""
-    if depth > 20:
-        return None
-    module: Module = ()
-    rest = path
+    module, rest = (), path
     while rest and (*module, rest[0]) in files:
         module, rest = (*module, rest[0]), rest[1:]
-    if not rest:
+    # A circle of names that are handed on has no end.
+    if not rest or depth > len(files):
         return module
     file = files[module]
     if rest[0] in file.handed_on:
         return resolve(files, (*file.handed_on[rest[0]], *rest[1:]), depth + 1)
-    if not re.search(rf"\b(?:fn|struct|enum|trait|type|const|static|macro_rules!|union|mod)\s+{rest[0]}\b", file.text):
-        for other in file.all_of:
-            target = resolve(files, (*other, *rest), depth + 1)
-            if target is not None and defines(files, target, rest[0]):
-                return target
-        if rest[0] in file.imports:
-            return resolve(files, (*file.imports[rest[0]], *rest[1:]), depth + 1)
+    if file.defines(rest[0]):
+        return module
+    for other in file.all_of:
+        target = resolve(files, (*other, *rest), depth + 1)
+        if files[target].defines(rest[0]):
+            return target
+    if rest[0] in file.imports:
+        return resolve(files, (*file.imports[rest[0]], *rest[1:]), depth + 1)
     return module
-
-
-def defines(files: dict[Module, File], module: Module, name: str) -> bool:
-    """Returns whether a file defines a name."""
-    return bool(re.search(rf"\b(?:fn|struct|enum|trait|type|const|static)\s+{name}\b", files[module].text))

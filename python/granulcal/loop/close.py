@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.archive import Archive, Plan
-from granulcal.loop.cube import from_cube
 from granulcal.loop.checks import calibrated, confirmed, corrected
 from granulcal.loop.correction import Correction
+from granulcal.loop.cube import from_cube
 from granulcal.loop.experiment import Experiment, next_experiment
 from granulcal.loop.forward import Forward
 from granulcal.loop.measures import Measures
