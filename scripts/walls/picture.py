@@ -16,8 +16,9 @@ STYLE = """
   .title { font-weight: bold; text-anchor: start }
   .floor { font-size: 12px; fill: #666; text-anchor: start }
   rect { fill: #f4f7fb; stroke: #46627f; stroke-width: 1.2; rx: 5 }
-  line { stroke: #46627f; stroke-width: 1; opacity: 0.45; marker-end: url(#tip) }
-  path { fill: #46627f }
+  line, .bow { stroke: #46627f; stroke-width: 1; opacity: 0.45; marker-end: url(#tip) }
+  .bow { fill: none }
+  .tip { fill: #46627f }
 """
 
 
@@ -44,7 +45,7 @@ def draw(crates: Arrows, floors: list[Floor], modules: Arrows) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {end + 10:.0f}" '
         f'role="img" aria-label="Crates and floors of granulcal">\n<style>{STYLE}</style>\n'
         '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" '
-        'markerHeight="7" orient="auto"><path d="M0 0 L8 4 L0 8 z"/></marker></defs>\n'
+        'markerHeight="7" orient="auto"><path class="tip" d="M0 0 L8 4 L0 8 z"/></marker></defs>\n'
         f'<rect width="100%" height="100%" style="fill: white; stroke: none; rx: 0"/>\n'
         f"{body}\n</svg>\n"
     )
@@ -88,14 +89,15 @@ def placed(names: tuple[str, ...], y: float) -> list[Box]:
 
 
 def arrow(from_: Box, to: Box) -> str:
-    """Returns a line from a box to one that it uses, below it or beside it."""
-    if from_.y == to.y:
-        side = 1 if to.x > from_.x else -1
-        ends = (from_.x + side * from_.width / 2, from_.y + HEIGHT / 2)
-        ends += (to.x - side * to.width / 2, to.y + HEIGHT / 2)
-    else:
-        ends = (from_.x, from_.y + HEIGHT, to.x, to.y)
-    return '<line x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}"/>'.format(*ends)
+    """Returns a line from a box to one that it uses, below it; a bow to one on the same floor."""
+    foot = from_.y + HEIGHT
+    if from_.y != to.y:
+        return f'<line x1="{from_.x:.1f}" y1="{foot:.0f}" x2="{to.x:.1f}" y2="{to.y:.0f}"/>'
+    middle, depth = (from_.x + to.x) / 2, foot + 12 + abs(from_.x - to.x) / 16
+    return (
+        f'<path class="bow" d="M{from_.x:.1f} {foot:.0f} Q{middle:.1f} {depth:.0f} '
+        f'{to.x:.1f} {foot:.0f}"/>'
+    )
 
 
 def rows(arrows: Arrows) -> list[list[str]]:
