@@ -9,6 +9,7 @@ mod clump;
 mod collision;
 mod counters;
 mod determinism;
+mod effect_lists;
 mod effects;
 mod impact;
 mod incline;

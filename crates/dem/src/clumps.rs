@@ -22,7 +22,7 @@ use crate::body::Body;
 use crate::lanes::Row;
 use crate::law::INVERSE_INERTIA;
 use crate::random::unit_interval;
-use crate::scene::{ClumpShape, Scene};
+use crate::scene::{ClumpShape, Effect, Scene};
 
 /// Keeps the orientations of a seed apart from its places.
 const STREAM: u64 = 0x6a09_e667_f3bc_c909;

@@ -8,7 +8,7 @@ mod pull;
 
 use nalgebra::Vector3;
 
-use crate::scene::{RestitutionSpeed, Scene, Tilt, Vibration};
+use crate::scene::{Effect, RestitutionSpeed, Scene, Vibration};
 use drag::Drag;
 pub(crate) use pad::Pad;
 pub(crate) use pull::{Bridges, Pull};
@@ -31,7 +31,7 @@ impl Acting {
     pub fn of(scene: &Scene) -> Self {
         let effects = &scene.effects;
         let mut gravity = Vector3::from(scene.gravity);
-        if effects.tilt != Tilt::default() {
+        if effects.tilt.is_on() {
             gravity = effects.tilt.turn(&gravity);
         }
         let drag = effects

@@ -79,7 +79,7 @@ pub use preset::{
 };
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
-    Adhesion, BoxSide, CameraSpec, Capillary, Clump, Effects, EndRule, Ends, Fluid, Funnel,
+    Adhesion, BoxSide, CameraSpec, Capillary, Clump, Effect, Effects, EndRule, Ends, Fluid, Funnel,
     FunnelPose, GRAVITY, Grains, Ground, GroundUnlike, Layer, Mask, Mesh, MeshFile, Motion,
     NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill,
     ObserveSurface, Outflow, Outlet, Periodic, PeriodicAxis, Polydispersity, Projection,

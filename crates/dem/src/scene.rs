@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 pub use camera::{CameraSpec, Mask, Projection};
 pub(crate) use effects::ClumpShape;
 pub use effects::{
-    Adhesion, Capillary, Clump, Effects, Fluid, FunnelPose, GroundUnlike, Layer, Outlet,
+    Adhesion, Capillary, Clump, Effect, Effects, Fluid, FunnelPose, GroundUnlike, Layer, Outlet,
     Polydispersity, RestitutionSpeed, RollingForm, Tilt, Vibration,
 };
 pub use grains::Grains;
@@ -221,7 +221,7 @@ impl Scene {
     /// What grains that are not round cannot be with.
     fn check_clump(&self) -> Result<(), DemError> {
         let others = [
-            ("effects.polydispersity", self.effects.polydispersity != Polydispersity::default()),
+            (self.effects.polydispersity.path(), self.effects.polydispersity.is_on()),
             ("outflow", self.outflow.is_some()),
             ("periodic", self.periodic.is_some()),
         ];

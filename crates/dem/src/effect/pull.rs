@@ -10,7 +10,7 @@ use crate::bed::Bed;
 use crate::contact_set::ContactSet;
 use crate::lanes::Row;
 use crate::period::Period;
-use crate::scene::{Adhesion, Capillary, Scene};
+use crate::scene::{Adhesion, Capillary, Effect, Scene};
 use crate::wall::Walls;
 
 /// The pairs that a bridge joins, sorted: first grain, then second grain or the number of grains plus the wall's surface.
@@ -49,8 +49,8 @@ impl Pull {
     pub fn of(scene: &Scene, inverse_inertia: f64) -> Option<Self> {
         let (capillary, adhesion) = (scene.effects.capillary, scene.effects.adhesion);
         let pull = Self {
-            capillary: (capillary.bond > 0.0).then_some(capillary),
-            adhesion: (adhesion.bond > 0.0).then_some(adhesion),
+            capillary: capillary.is_on().then_some(capillary),
+            adhesion: adhesion.is_on().then_some(adhesion),
             weight: Vector3::from(scene.gravity).norm() * inverse_inertia,
             radius: scene.grains.radius(),
         };

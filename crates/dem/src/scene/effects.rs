@@ -6,6 +6,7 @@
 mod adhesion;
 mod capillary;
 mod clump;
+mod effect;
 mod fluid;
 mod funnel_pose;
 mod ground;
@@ -23,6 +24,7 @@ pub use adhesion::Adhesion;
 pub use capillary::Capillary;
 pub use clump::Clump;
 pub(crate) use clump::ClumpShape;
+pub use effect::Effect;
 pub use fluid::Fluid;
 pub use funnel_pose::FunnelPose;
 pub use ground::GroundUnlike;
@@ -37,49 +39,71 @@ pub use vibration::Vibration;
 use crate::error::DemError;
 use crate::preset::Method;
 
-/// The effects of a scene. Every default is off.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Effects {
+/// Makes [`Effects`] of the one list of all effects.
+macro_rules! effects {
+    ($($(#[$doc:meta])* $table:ident: $kind:ty,)*) => {
+        /// The effects of a scene. Every default is off.
+        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct Effects {
+            $(
+                $(#[$doc])*
+                #[serde(skip_serializing_if = "is_default")]
+                pub $table: $kind,
+            )*
+        }
+
+        impl Effects {
+            /// Every effect, on or off.
+            pub fn all(&self) -> Vec<&dyn Effect> {
+                vec![$(&self.$table),*]
+            }
+
+            /// The path of every number of every effect, for example `effects.capillary.bond`; lists have none.
+            ///
+            /// # Errors
+            /// [`DemError::TomlWrite`] if a default cannot be written.
+            pub fn paths() -> Result<Vec<String>, DemError> {
+                let (effects, mut paths) = (Self::default(), Vec::new());
+                $(paths.extend(paths_of(&effects.$table)?);)*
+                Ok(paths)
+            }
+        }
+    };
+}
+
+effects! {
     /// Liquid bridges.
-    #[serde(skip_serializing_if = "is_default")]
-    pub capillary: Capillary,
+    capillary: Capillary,
     /// Dry adhesion of touching grains.
-    #[serde(skip_serializing_if = "is_default")]
-    pub adhesion: Adhesion,
+    adhesion: Adhesion,
     /// Grains that are not round.
-    #[serde(skip_serializing_if = "is_default")]
-    pub clump: Clump,
+    clump: Clump,
     /// Grains of different size.
-    #[serde(skip_serializing_if = "is_default")]
-    pub polydispersity: Polydispersity,
+    polydispersity: Polydispersity,
     /// A ground whose coefficients are not the grains'.
-    #[serde(skip_serializing_if = "is_default")]
-    pub ground: GroundUnlike,
+    ground: GroundUnlike,
     /// A soft layer on the ground.
-    #[serde(skip_serializing_if = "is_default")]
-    pub layer: Layer,
+    layer: Layer,
     /// Restitution that depends on the speed of an impact.
-    #[serde(skip_serializing_if = "is_default")]
-    pub restitution_speed: RestitutionSpeed,
+    restitution_speed: RestitutionSpeed,
     /// Rolling resistance that grows with the speed of rolling.
-    #[serde(skip_serializing_if = "is_default")]
-    pub rolling_form: RollingForm,
+    rolling_form: RollingForm,
     /// A fluid at rest around the grains.
-    #[serde(skip_serializing_if = "is_default")]
-    pub fluid: Fluid,
+    fluid: Fluid,
     /// A table that is not level.
-    #[serde(skip_serializing_if = "is_default")]
-    pub tilt: Tilt,
+    tilt: Tilt,
     /// A funnel that hangs beside its place, leans, or has a friction of its own.
-    #[serde(skip_serializing_if = "is_default")]
-    pub funnel: FunnelPose,
+    funnel: FunnelPose,
     /// A funnel whose outlet is not round.
-    #[serde(skip_serializing_if = "is_default")]
-    pub outlet: Outlet,
+    outlet: Outlet,
     /// A table that shakes.
-    #[serde(skip_serializing_if = "is_default")]
-    pub vibration: Vibration,
+    vibration: Vibration,
+}
+
+fn paths_of<T: Effect + Serialize>(effect: &T) -> Result<Vec<String>, DemError> {
+    let table = toml::Table::try_from(effect).map_err(|e| DemError::TomlWrite(Box::new(e)))?;
+    Ok(table.keys().map(|number| format!("{}.{number}", effect.path())).collect())
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
@@ -97,29 +121,13 @@ impl Effects {
     /// # Errors
     /// [`DemError::OutOfRange`].
     pub(crate) fn check(&self) -> Result<(), DemError> {
-        self.capillary.check()?;
-        self.adhesion.check()?;
-        self.clump.check()?;
-        self.polydispersity.check()?;
-        self.ground.check()?;
-        self.layer.check()?;
-        self.rolling_form.check()?;
-        self.funnel.check()?;
-        self.outlet.check()?;
-        self.restitution_speed.check()?;
-        self.fluid.check()?;
-        self.tilt.check()?;
-        self.vibration.check()
+        self.all().into_iter().try_for_each(Effect::check)
     }
 
     /// The first effect that is on and changes what a contact is: one that only the method nsgs knows.
     pub(crate) fn of_contacts(&self) -> Option<&'static str> {
-        let on = [
-            ("effects.layer", self.layer.is_on()),
-            ("effects.rolling_form", self.rolling_form.is_on()),
-            ("effects.clump", self.clump.is_on()),
-        ];
-        on.into_iter().find(|(_, is_on)| *is_on).map(|(effect, _)| effect)
+        let mut all = self.all().into_iter();
+        all.find(|effect| effect.is_on() && effect.changes_contacts()).map(Effect::path)
     }
 
     /// Refuses a method that does not know an effect.
@@ -140,3 +148,6 @@ impl Effects {
         self.vibration.end()
     }
 }
+
+#[cfg(test)]
+mod tests;

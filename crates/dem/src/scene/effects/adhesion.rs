@@ -8,6 +8,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::check::{non_negative, positive};
 use crate::error::DemError;
 
@@ -29,13 +30,23 @@ impl Default for Adhesion {
     }
 }
 
-impl Adhesion {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+impl Effect for Adhesion {
+    fn path(&self) -> &'static str {
+        "effects.adhesion"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         non_negative("effects.adhesion.bond", self.bond)?;
         positive("effects.adhesion.range", self.range)?;
         non_negative("effects.adhesion.walls", self.walls)
     }
 
+    fn is_on(&self) -> bool {
+        self.bond > 0.0
+    }
+}
+
+impl Adhesion {
     /// Pull over that of touching typical grains `[-]`; lengths in radii of a typical grain.
     pub(crate) fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
         if gap <= self.range { derjaguin } else { 0.0 }

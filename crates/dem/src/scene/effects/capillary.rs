@@ -14,6 +14,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::check::{non_negative, positive};
 use crate::error::DemError;
 
@@ -37,8 +38,12 @@ impl Default for Capillary {
     }
 }
 
-impl Capillary {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+impl Effect for Capillary {
+    fn path(&self) -> &'static str {
+        "effects.capillary"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         non_negative("effects.capillary.bond", self.bond)?;
         positive("effects.capillary.volume", self.volume)?;
         if !(0.0..std::f64::consts::FRAC_PI_2).contains(&self.contact_angle) {
@@ -52,6 +57,12 @@ impl Capillary {
         non_negative("effects.capillary.walls", self.walls)
     }
 
+    fn is_on(&self) -> bool {
+        self.bond > 0.0
+    }
+}
+
+impl Capillary {
     /// Separation at which a bridge ruptures, in radii of a typical grain `[-]`.
     pub(crate) fn rupture(&self) -> f64 {
         (1.0 + 0.5 * self.contact_angle) * self.volume.cbrt()

@@ -13,6 +13,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::error::DemError;
 use crate::scene::Grains;
 
@@ -43,8 +44,12 @@ pub(crate) struct ClumpShape {
     pub inertia: Vector3<f64>,
 }
 
-impl Clump {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+impl Effect for Clump {
+    fn path(&self) -> &'static str {
+        "effects.clump"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         if !(2..=4).contains(&self.spheres) {
             let got = self.spheres as f64;
             return Err(DemError::range("effects.clump.spheres", got, "2, 3 or 4"));
@@ -56,10 +61,16 @@ impl Clump {
         Ok(())
     }
 
-    pub(crate) fn is_on(&self) -> bool {
+    fn is_on(&self) -> bool {
         self.aspect > 1.0
     }
 
+    fn changes_contacts(&self) -> bool {
+        true
+    }
+}
+
+impl Clump {
     /// Spheres that a grain of the scene is made of.
     pub(crate) fn members(&self) -> usize {
         if self.is_on() { self.spheres } else { 1 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::check::non_negative;
 use crate::error::DemError;
 
@@ -36,8 +37,12 @@ impl Default for Fluid {
     }
 }
 
-impl Fluid {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+impl Effect for Fluid {
+    fn path(&self) -> &'static str {
+        "effects.fluid"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         non_negative("effects.fluid.density", self.density)?;
         non_negative("effects.fluid.viscosity", self.viscosity)?;
         non_negative("effects.fluid.added_mass", self.added_mass)?;
@@ -53,7 +58,7 @@ impl Fluid {
         Ok(())
     }
 
-    pub(crate) fn is_on(&self) -> bool {
+    fn is_on(&self) -> bool {
         self.density > 0.0 || self.viscosity > 0.0
     }
 }

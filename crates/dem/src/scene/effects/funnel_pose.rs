@@ -8,6 +8,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::check::{finite, non_negative};
 use crate::error::DemError;
 use crate::material::Material;
@@ -38,8 +39,12 @@ impl Default for FunnelPose {
     }
 }
 
-impl FunnelPose {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+impl Effect for FunnelPose {
+    fn path(&self) -> &'static str {
+        "effects.funnel"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         finite("effects.funnel.x", self.x)?;
         finite("effects.funnel.y", self.y)?;
         non_negative("effects.funnel.sliding_friction", self.sliding_friction)?;
@@ -53,6 +58,12 @@ impl FunnelPose {
         Ok(())
     }
 
+    fn is_on(&self) -> bool {
+        *self != Self::default()
+    }
+}
+
+impl FunnelPose {
     /// From the funnel's place to where it hangs; `None` if that is the same.
     pub(crate) fn of(&self, funnel: &Funnel) -> Option<Isometry3<f64>> {
         if [self.x, self.y, self.lean_x, self.lean_y] == [0.0; 4] {

@@ -7,6 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::check::non_negative;
 use crate::error::DemError;
 use crate::material::Material;
@@ -29,13 +30,23 @@ impl Default for GroundUnlike {
     }
 }
 
-impl GroundUnlike {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+impl Effect for GroundUnlike {
+    fn path(&self) -> &'static str {
+        "effects.ground"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         non_negative("effects.ground.sliding_friction", self.sliding_friction)?;
         non_negative("effects.ground.rolling_friction", self.rolling_friction)?;
         non_negative("effects.ground.restitution", self.restitution)
     }
 
+    fn is_on(&self) -> bool {
+        *self != Self::default()
+    }
+}
+
+impl GroundUnlike {
     /// The ground's material of what it would be without the effect.
     pub(crate) fn of(&self, plain: Material) -> Material {
         Material {

@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::check::{non_negative, positive};
 use crate::error::DemError;
 
@@ -26,14 +27,22 @@ impl Default for Layer {
     }
 }
 
-impl Layer {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+impl Effect for Layer {
+    fn path(&self) -> &'static str {
+        "effects.layer"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         non_negative("effects.layer.thickness", self.thickness)?;
         positive("effects.layer.stiffness", self.stiffness)?;
         non_negative("effects.layer.damping", self.damping)
     }
 
-    pub(crate) fn is_on(&self) -> bool {
+    fn is_on(&self) -> bool {
         self.thickness > 0.0
+    }
+
+    fn changes_contacts(&self) -> bool {
+        true
     }
 }

@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::error::DemError;
 use crate::scene::Funnel;
 
@@ -41,14 +42,24 @@ impl Default for Outlet {
     }
 }
 
-impl Outlet {
-    pub(super) fn check(self) -> Result<(), DemError> {
+impl Effect for Outlet {
+    fn path(&self) -> &'static str {
+        "effects.outlet"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         if (1.0..=LONGEST).contains(&self.aspect) {
             return Ok(());
         }
         Err(DemError::range("effects.outlet.aspect", self.aspect, "in [1, 3]"))
     }
 
+    fn is_on(&self) -> bool {
+        self.aspect != 1.0
+    }
+}
+
+impl Outlet {
     /// The funnel if its outlet is not round, turned and moved by `pose`; `None` if it is.
     pub(crate) fn mesh(self, funnel: &Funnel, pose: Option<&Isometry3<f64>>) -> Option<OutletMesh> {
         if self.aspect == 1.0 {

@@ -10,6 +10,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::check::{non_negative, positive};
 use crate::error::DemError;
 use crate::random::unit_interval;
@@ -30,8 +31,12 @@ pub struct Polydispersity {
     pub diameters: Vec<f64>,
 }
 
-impl Polydispersity {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+impl Effect for Polydispersity {
+    fn path(&self) -> &'static str {
+        "effects.polydispersity"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         non_negative("effects.polydispersity.cv", self.cv)?;
         for (number, &diameter) in self.diameters.iter().enumerate() {
             positive(&format!("effects.polydispersity.diameters.{number}"), diameter)?;
@@ -43,6 +48,12 @@ impl Polydispersity {
         Ok(())
     }
 
+    fn is_on(&self) -> bool {
+        self.cv > 0.0 || !self.diameters.is_empty()
+    }
+}
+
+impl Polydispersity {
     /// Radii of `count` grains of typical radius `radius` `[m]`; `None` when they are all alike.
     pub(crate) fn radii(&self, count: usize, radius: f64, seed: u64) -> Option<Vec<f64>> {
         let mut random = Pcg64::seed_from_u64(seed ^ STREAM);

@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::check::{finite, positive};
 use crate::error::DemError;
 
@@ -25,16 +26,22 @@ impl Default for RestitutionSpeed {
     }
 }
 
-impl RestitutionSpeed {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+impl Effect for RestitutionSpeed {
+    fn path(&self) -> &'static str {
+        "effects.restitution_speed"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         finite("effects.restitution_speed.exponent", self.exponent)?;
         positive("effects.restitution_speed.reference", self.reference)
     }
 
-    pub(crate) fn is_on(&self) -> bool {
+    fn is_on(&self) -> bool {
         self.exponent != 0.0
     }
+}
 
+impl RestitutionSpeed {
     /// The restitution of an impact at `speed` `[m/s]`.
     pub(crate) fn at(&self, restitution: f64, speed: f64) -> f64 {
         (restitution * (speed / self.reference).powf(-self.exponent)).min(1.0)

@@ -10,6 +10,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::check::non_negative;
 use crate::error::DemError;
 
@@ -21,12 +22,20 @@ pub struct RollingForm {
     pub speed: f64,
 }
 
-impl RollingForm {
-    pub(super) fn check(self) -> Result<(), DemError> {
+impl Effect for RollingForm {
+    fn path(&self) -> &'static str {
+        "effects.rolling_form"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         non_negative("effects.rolling_form.speed", self.speed)
     }
 
-    pub(crate) fn is_on(self) -> bool {
+    fn is_on(&self) -> bool {
         self.speed > 0.0
+    }
+
+    fn changes_contacts(&self) -> bool {
+        true
     }
 }

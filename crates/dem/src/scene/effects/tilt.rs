@@ -6,6 +6,7 @@
 use nalgebra::{Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::error::DemError;
 
 /// Steepest tilt `[rad]`: beyond it the words "table" and "ground" lose their sense.
@@ -21,8 +22,12 @@ pub struct Tilt {
     pub y: f64,
 }
 
-impl Tilt {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+impl Effect for Tilt {
+    fn path(&self) -> &'static str {
+        "effects.tilt"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         for (name, got) in [("effects.tilt.x", self.x), ("effects.tilt.y", self.y)] {
             if !(-STEEPEST..=STEEPEST).contains(&got) {
                 return Err(DemError::range(name, got, "in [-0.8, 0.8]"));
@@ -31,6 +36,12 @@ impl Tilt {
         Ok(())
     }
 
+    fn is_on(&self) -> bool {
+        *self != Self::default()
+    }
+}
+
+impl Tilt {
     /// Gravity as it is seen from the table.
     pub(crate) fn turn(&self, gravity: &Vector3<f64>) -> Vector3<f64> {
         let axis = Vector3::new(self.x, self.y, 0.0);

@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
+use super::effect::Effect;
 use crate::check::{non_negative, positive};
 use crate::error::DemError;
 use crate::scene::GRAVITY;
@@ -30,18 +31,24 @@ impl Default for Vibration {
     }
 }
 
-impl Vibration {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+impl Effect for Vibration {
+    fn path(&self) -> &'static str {
+        "effects.vibration"
+    }
+
+    fn check(&self) -> Result<(), DemError> {
         non_negative("effects.vibration.acceleration", self.acceleration)?;
         positive("effects.vibration.frequency", self.frequency)?;
         non_negative("effects.vibration.begin", self.begin)?;
         non_negative("effects.vibration.duration", self.duration)
     }
 
-    pub(crate) fn is_on(&self) -> bool {
+    fn is_on(&self) -> bool {
         self.acceleration > 0.0 && self.duration > 0.0
     }
+}
 
+impl Vibration {
     /// When it ends `[s]`; 0 for one that is off.
     pub(super) fn end(&self) -> f64 {
         if self.is_on() { self.begin + self.duration } else { 0.0 }
