@@ -1,31 +1,16 @@
 //! From a scene to 16 numbers: solver, camera and statistics in one go, against `tests/golden`.
 
+mod heap;
+
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 use granulcal::dataset::{View, observe, overhead};
-use granulcal::dem::{Material, Pour, Scene, Simulation, Status};
+use granulcal::dem::Status;
 use granulcal::features::{
     PAPER16, Segmentation, SensorNoise, paper16, render, render_grid, segment_depth,
 };
 
-/// 400 grains that make a heap within a second of simulated time.
-fn scene() -> Scene {
-    let mut scene = Scene::drop(0.02);
-    scene.grains.count = 400;
-    scene.material =
-        Material { sliding_friction: 0.6, rolling_friction: 0.4, ..Material::default() };
-    scene.camera.downsample = 4;
-    scene
-}
-
-fn pour() -> Pour {
-    Simulation::new(&scene(), 11).expect("a valid scene").run()
-}
-
-fn golden_path() -> PathBuf {
-    [env!("CARGO_MANIFEST_DIR"), "tests", "golden", "drop_400.json"].iter().collect()
-}
+use heap::{golden_path, pour, scene};
 
 /// A line of the golden file: `"name": {"value": ..., "tolerance": ...}`.
 fn golden_line(line: &str) -> Option<(&str, f64, f64)> {
@@ -52,29 +37,6 @@ fn a_heap_has_the_statistics_it_always_had() {
         }
     }
     assert!(difference.is_empty(), "{difference}");
-}
-
-#[test]
-#[ignore = "rewrites the golden file; see tests/golden/README.md"]
-fn renew_golden() {
-    // Named on purpose: a run of all ignored tests must not rewrite what it is compared with.
-    if std::env::var_os("GRANULCAL_RENEW_GOLDEN").is_none() {
-        println!("set GRANULCAL_RENEW_GOLDEN to rewrite {}", golden_path().display());
-        return;
-    }
-    let seen = observe(&scene().camera, &pour(), 11).expect("a camera");
-    let statistics = seen.statistics.expect("grains in view");
-    let lines: Vec<_> = PAPER16
-        .iter()
-        .zip(statistics)
-        .map(|(statistic, value)| {
-            // Statistics use libm (logarithms, powers), whose last bits differ between systems.
-            let tolerance = 1e-6 * value.abs();
-            let name = statistic.name;
-            format!("  \"{name}\": {{\"value\": {value:?}, \"tolerance\": {tolerance:.1e}}}")
-        })
-        .collect();
-    std::fs::write(golden_path(), format!("{{\n{}\n}}\n", lines.join(",\n"))).expect("written");
 }
 
 #[test]

@@ -19,8 +19,11 @@ _needs_maps = pytest.mark.skipif(
 def test_scene_and_prior_of_the_study_fit_each_other():
     scene = Scene.load(kinect_mounds._HERE / "kinect_mounds.toml")
     prior = Prior.load(kinect_mounds._HERE / "kinect_mounds_prior.toml")
+    assert prior.names
     for theta in prior.sample(20, seed=1):
-        scene.with_(dict(zip(prior.names, theta.tolist(), strict=True)))
+        numbers = dict(zip(prior.names, theta.tolist(), strict=True))
+        changed = scene.with_(numbers)
+        assert {path: changed.get(path) for path in numbers} == numbers
 
 
 def test_missing_maps_are_named(tmp_path):

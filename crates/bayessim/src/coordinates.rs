@@ -1,9 +1,10 @@
 //! The prior's coordinates: a uniform range is [0, 1], a log-uniform one too in its logarithm, a normal z-scores.
 
-use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
 use granulcal_dataset::{Distribution, Prior};
+use granulcal_numbers::normal_cdf;
 use nalgebra::DMatrix;
 
 use crate::quasi::{QuasiUniform, quasi_normal};
@@ -145,10 +146,6 @@ fn coordinate(distribution: Distribution) -> Coordinate {
             Coordinate { distribution, origin: mean, scale: sd, is_log: false, low, high, log_mass }
         }
     }
-}
-
-fn normal_cdf(z: f64) -> f64 {
-    0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Evenly spread points, the same as Python's: Niederreiter (1992), section 3.1, and Box and Muller (1958).
 
-use std::f64::consts::TAU;
+use granulcal_numbers::box_muller;
 
 /// Point `index` of the additive recurrence on powers of the generalised golden ratio, in (0, 1)^p.
 pub struct QuasiUniform(Vec<f64>);
@@ -26,13 +26,11 @@ pub fn quasi_normal(count: usize, dimension: usize) -> Vec<Vec<f64>> {
     (0..count)
         .map(|index| {
             let point = uniform.point(index);
-            let polar: Vec<_> = (0..pairs)
-                .map(|i| ((-2.0 * (1.0 - point[2 * i]).ln()).sqrt(), TAU * point[2 * i + 1]))
-                .collect();
+            let normal = |i: usize| box_muller(1.0 - point[2 * i], point[2 * i + 1]);
+            let found: Vec<_> = (0..pairs).map(normal).collect();
             // First all cosines, then all sines.
-            let cosines = polar.iter().map(|(radius, angle)| radius * angle.cos());
-            let sines = polar.iter().map(|(radius, angle)| radius * angle.sin());
-            cosines.chain(sines).take(dimension).collect()
+            let cosines = found.iter().map(|[cosine, _]| *cosine);
+            cosines.chain(found.iter().map(|[_, sine]| *sine)).take(dimension).collect()
         })
         .collect()
 }

@@ -1,7 +1,6 @@
 //! Random numbers of a seed.
 
-use std::f64::consts::TAU;
-
+use granulcal_numbers::{box_muller, open};
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 
@@ -20,11 +19,12 @@ impl Random {
 
     /// In the open interval (0, 1).
     pub fn uniform(&mut self) -> f64 {
-        ((self.0.next_u64() >> 12) as f64 + 0.5) * (1.0 / (1u64 << 52) as f64)
+        open(self.0.next_u64())
     }
 
     pub fn normal(&mut self) -> f64 {
-        (-2.0 * self.uniform().ln()).sqrt() * (TAU * self.uniform()).cos()
+        let (u, v) = (self.uniform(), self.uniform());
+        box_muller(u, v)[0]
     }
 
     /// A whole number below `count`.

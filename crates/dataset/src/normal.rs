@@ -3,12 +3,7 @@
 // Coefficients are copied from the reference digit by digit.
 #![allow(clippy::excessive_precision)]
 
-use std::f64::consts::FRAC_1_SQRT_2;
-
-/// Standard normal distribution function.
-fn normal_cdf(z: f64) -> f64 {
-    0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
-}
+use granulcal_numbers::normal_cdf;
 
 /// Quantile of a standard normal that is cut to [a, b].
 pub(crate) fn truncated_normal_quantile(u: f64, a: f64, b: f64) -> f64 {

@@ -1,10 +1,8 @@
 //! Seeds and numbers that depend on the seed and the row only.
 
+use granulcal_numbers::{open, scatter};
 use rand_core::Rng;
 use rand_pcg::Pcg64;
-
-/// Increment of Steele, Lea and Flood's SplitMix64 (2014), doi:10.1145/2660193.2660195.
-const GOLDEN_GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Seeds of rows are below 2^53, so that every tool that reads numbers as f64 keeps them whole.
 const SEED_BITS: u32 = 53;
@@ -20,14 +18,6 @@ pub(crate) enum Use {
     Camera = 3,
     /// The seed of the sensor's noise.
     Sensor = 4,
-}
-
-/// The output function of SplitMix64: a bijection that scatters neighbouring numbers.
-fn scatter(word: u64) -> u64 {
-    let mut z = word.wrapping_add(GOLDEN_GAMMA);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 /// One word for (seed, row, use).
@@ -63,7 +53,7 @@ impl Uniforms {
 
     /// The next number, in the open interval (0, 1): the middles of 2^52 cells.
     pub(crate) fn next(&mut self) -> f64 {
-        ((self.0.next_u64() >> 12) as f64 + 0.5) * (1.0 / (1u64 << 52) as f64)
+        open(self.0.next_u64())
     }
 }
 

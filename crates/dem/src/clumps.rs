@@ -12,6 +12,7 @@
 //! does not change any more is the solution for rigid bodies. Source: mass splitting, Tonge et al., ACM Trans. Graph. 31 (2012)
 //! 105, doi:10.1145/2185520.2185601. Angular momentum is what is kept in flight, in a frame that does not turn.
 
+use granulcal_numbers::{box_muller, half_open};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -21,7 +22,6 @@ use crate::bed::Bed;
 use crate::body::Body;
 use crate::lanes::Row;
 use crate::law::INVERSE_INERTIA;
-use crate::random::unit_interval;
 use crate::scene::{ClumpShape, Effect, Scene};
 
 /// Keeps the orientations of a seed apart from its places.
@@ -66,9 +66,9 @@ impl Clumps {
         }
         let mut random = Pcg64::seed_from_u64(seed ^ STREAM);
         let mut normal = || {
-            // Box and Muller; 1 - u is never 0.
-            let [u, v] = [0; 2].map(|_| unit_interval(random.next_u64()));
-            (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+            let [u, v] = [0; 2].map(|_| half_open(random.next_u64()));
+            // 1 - u is never 0.
+            box_muller(1.0 - u, v)[0]
         };
         // Four normal numbers point everywhere alike on the sphere of quaternions.
         let mut turn = || {

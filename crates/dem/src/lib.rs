@@ -57,7 +57,6 @@ mod placement;
 mod pour;
 mod preset;
 mod problem;
-mod random;
 mod rebound;
 mod scene;
 mod simulation;

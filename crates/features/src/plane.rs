@@ -1,9 +1,6 @@
 //! Robust plane fit: random sampling to find the plane, total least squares to place it.
-//!
-//! The only file that names faer.
 
-use faer::{Mat, Side};
-use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
 
 use crate::error::{FeatureError, require_finite, require_in};
 use crate::rng::Stream;
@@ -18,6 +15,8 @@ const MAX_SAMPLES: usize = 10_000;
 const SCORED_POINTS: usize = 2048;
 /// Rounds of "least squares on the inliers, find the inliers again".
 const MAX_REFINEMENTS: usize = 50;
+/// Steps of the eigenvalue iteration at most; a finite 3 × 3 matrix takes fewer than ten.
+const MAX_ROTATIONS: usize = 100;
 /// Relative extent below which points count as a line or a point; far above f64 rounding.
 const FLATNESS: f64 = 1e-7;
 
@@ -228,16 +227,16 @@ fn least_squares<'a>(
     Ok((plane, values[0].max(0.0).sqrt()))
 }
 
-/// Eigenvalues in rising order and the unit eigenvector of the first; NaN when faer does not
-/// converge, which for a finite symmetric 3 × 3 matrix has not been seen.
+/// Eigenvalues in rising order and the unit eigenvector of the first; NaN of a matrix that is not finite, for which the
+/// iteration does not converge.
 fn smallest_eigenvector(symmetric: &Matrix3<f64>) -> ([f64; 3], Vector3<f64>) {
-    let matrix = Mat::from_fn(3, 3, |row, column| symmetric[(row, column)]);
-    let Ok(eigen) = matrix.self_adjoint_eigen(Side::Lower) else {
+    let Some(eigen) = SymmetricEigen::try_new(*symmetric, f64::EPSILON, MAX_ROTATIONS) else {
         return ([f64::NAN; 3], Vector3::repeat(f64::NAN));
     };
-    let (values, vectors) = (eigen.S().column_vector(), eigen.U());
-    let vector = Vector3::new(vectors[(0, 0)], vectors[(1, 0)], vectors[(2, 0)]);
-    ([values[0], values[1], values[2]], vector.normalize())
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let vector = eigen.eigenvectors.column(order[0]).normalize();
+    (order.map(|rank| eigen.eigenvalues[rank]), vector)
 }
 
 #[cfg(test)]

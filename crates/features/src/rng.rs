@@ -1,8 +1,6 @@
-//! Uniform and normal numbers from a seed, by formulas written here.
-//!
-//! A distribution crate may change its algorithm between versions and with it every image that a
-//! seed stands for; the generator's 64-bit words do not change.
+//! Uniform and normal numbers from a seed: the generator's 64-bit words do not change between versions.
 
+use granulcal_numbers::{box_muller, half_open};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
@@ -20,7 +18,7 @@ impl Stream {
 
     /// Uniform in [0, 1), on the grid of 2^-53.
     pub(crate) fn uniform(&mut self) -> f64 {
-        (self.words.next_u64() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
+        half_open(self.words.next_u64())
     }
 
     /// Uniform index below `len`, which must not be 0 (it gives 0 then).
@@ -29,16 +27,16 @@ impl Stream {
         ((u128::from(self.words.next_u64()) * len as u128) >> 64) as usize
     }
 
-    /// Standard normal, by the transform of Box and Muller (1958), doi:10.1214/aoms/1177706645.
+    /// Standard normal.
     pub(crate) fn normal(&mut self) -> f64 {
         if let Some(value) = self.spare.take() {
             return value;
         }
-        // 1 - u is in (0, 1], so the logarithm is finite.
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        let (sin, cos) = (std::f64::consts::TAU * self.uniform()).sin_cos();
-        self.spare = Some(radius * sin);
-        radius * cos
+        let (u, v) = (self.uniform(), self.uniform());
+        // 1 - u is in (0, 1].
+        let [first, second] = box_muller(1.0 - u, v);
+        self.spare = Some(second);
+        first
     }
 }
 

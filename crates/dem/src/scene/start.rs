@@ -1,5 +1,6 @@
 //! Where the grains are when a pour begins.
 
+use granulcal_numbers::half_open;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -8,7 +9,6 @@ use serde::{Deserialize, Serialize};
 use super::{Funnel, Grains};
 use crate::check::{finite, non_negative, positive};
 use crate::error::DemError;
-use crate::random::unit_interval;
 
 /// Solid fraction of the closest packing of equal spheres, pi / sqrt(18).
 const CLOSEST_PACKING: f64 = 0.740_480_489_693_061;
@@ -149,7 +149,7 @@ impl Start {
         let mut random = Pcg64::seed_from_u64(seed);
         for position in &mut positions {
             for axis in 0..3 {
-                position[axis] += jitter * (2.0 * unit_interval(random.next_u64()) - 1.0);
+                position[axis] += jitter * (2.0 * half_open(random.next_u64()) - 1.0);
             }
         }
         positions

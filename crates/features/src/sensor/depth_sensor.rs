@@ -3,9 +3,10 @@
 //!
 //! Equations (1) to (5) of `docs/theory/sensor.md`.
 
+use granulcal_numbers::scatter;
 use serde::{Deserialize, Serialize};
 
-use super::field::{NoiseField, scatter};
+use super::field::NoiseField;
 use crate::error::{FeatureError, require_in};
 
 /// Largest step of the disparity `[px]` that is accepted.

@@ -2,6 +2,7 @@
 //!
 //! Equations (3) and (5) of `docs/theory/sensor.md`.
 
+use granulcal_numbers::scatter;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{FeatureError, require_in};
@@ -266,15 +267,6 @@ fn taps(length: f64) -> Vec<f64> {
     let taps: Vec<f64> = (0..=2 * reach as usize).map(|i| weight(i as f64 - reach)).collect();
     let norm = taps.iter().map(|w| w * w).sum::<f64>().sqrt();
     taps.into_iter().map(|w| w / norm).collect()
-}
-
-/// The output function of SplitMix64 (Steele, Lea & Flood 2014, doi:10.1145/2660193.2660195): seeds
-/// that differ by one become unrelated.
-pub(crate) fn scatter(word: u64) -> u64 {
-    let mut z = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 #[cfg(test)]

@@ -2,8 +2,10 @@
 //!
 //! Equations (1) to (5) of `docs/theory/sensor.md`.
 
+use granulcal_numbers::scatter;
+
 use super::depth_sensor::{DepthSensor, round_to};
-use super::field::{SensorGrid, scatter};
+use super::field::SensorGrid;
 use super::holes;
 use crate::camera::Camera;
 use crate::depth::{DepthImage, is_valid};

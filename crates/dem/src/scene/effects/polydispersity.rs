@@ -4,8 +4,7 @@
 //! of diameter d (for the uncut distribution), so the pour's mass stays what it is. A list is scaled by nothing: its
 //! diameters are what they are. Masses go with the cube. Prior of `cv`: uniform over 0 to 0.35.
 
-use std::f64::consts::TAU;
-
+use granulcal_numbers::{box_muller, half_open};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
@@ -13,7 +12,6 @@ use serde::{Deserialize, Serialize};
 use super::effect::Effect;
 use crate::check::{non_negative, positive};
 use crate::error::DemError;
-use crate::random::unit_interval;
 
 /// Farthest z of a grain `[-]`.
 const CUT: f64 = 2.5;
@@ -57,7 +55,7 @@ impl Polydispersity {
     /// Radii of `count` grains of typical radius `radius` `[m]`; `None` when they are all alike.
     pub(crate) fn radii(&self, count: usize, radius: f64, seed: u64) -> Option<Vec<f64>> {
         let mut random = Pcg64::seed_from_u64(seed ^ STREAM);
-        let mut uniform = move || unit_interval(random.next_u64());
+        let mut uniform = move || half_open(random.next_u64());
         if !self.diameters.is_empty() {
             let pick = |u: f64| (u * self.diameters.len() as f64) as usize;
             return Some((0..count).map(|_| 0.5 * self.diameters[pick(uniform())]).collect());
@@ -67,8 +65,9 @@ impl Polydispersity {
         }
         let variance = (1.0 + self.cv * self.cv).ln();
         let mut size = move || loop {
-            // Box and Muller; 1 - u is never 0.
-            let z = (-2.0 * (1.0 - uniform()).ln()).sqrt() * (TAU * uniform()).cos();
+            let (u, v) = (uniform(), uniform());
+            // 1 - u is never 0.
+            let [z, _] = box_muller(1.0 - u, v);
             if z.abs() <= CUT {
                 return radius * (variance.sqrt() * z - 1.5 * variance).exp();
             }

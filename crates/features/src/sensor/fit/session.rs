@@ -1,5 +1,7 @@
 //! Measured frames and simulated ones under one estimator.
 
+use granulcal_numbers::scatter;
+
 use super::comparison::Comparison;
 use super::components::Estimator;
 use super::covariance::{self, Split};
@@ -10,7 +12,7 @@ use crate::error::FeatureError;
 use crate::region::Region;
 use crate::sensor::DepthSensor;
 use crate::sensor::depth_sensor::round_to;
-use crate::sensor::field::{SensorGrid, scatter};
+use crate::sensor::field::SensorGrid;
 
 /// Frames of one sensor, their trends and residuals.
 pub(super) struct Session<'a> {
