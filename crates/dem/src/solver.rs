@@ -17,6 +17,8 @@ pub(crate) mod newton_pcr;
 pub(crate) mod nsgs;
 mod pcr;
 pub(crate) mod reference;
+pub(crate) mod residual;
+mod velocities;
 pub(crate) mod work;
 
 /// Solves the contacts of `sets` together, from the impulses that they carry and velocities without them;

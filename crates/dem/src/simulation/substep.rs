@@ -5,7 +5,8 @@ use crate::assemble::Seen;
 use crate::contacts::Contacts;
 use crate::pour::Status;
 use crate::rebound::rebound;
-use crate::solver::{self, nsgs};
+use crate::solver;
+use crate::solver::residual::ResidualSums;
 
 /// Mean energy of a grain's translation over that of a fall by its radius below which grains hardly move `[-]`.
 const QUIET: f64 = 0.0025;
@@ -160,7 +161,7 @@ impl Simulation {
         if self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period) {
             let Contacts { pairs, at_walls, .. } = &mut self.contacts;
             let sets = [pairs, at_walls, &mut self.on_layer];
-            let residual = nsgs::ResidualSums::of(&sets, &mut self.bed.bodies);
+            let residual = ResidualSums::of(&sets, &mut self.bed.bodies);
             self.watch.see_residual(residual.relative());
         }
         let fall = self.around.effects.gravity.norm() * self.around.radius;

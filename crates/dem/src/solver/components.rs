@@ -7,7 +7,8 @@ use crate::body::{Body, SharedBodies};
 use crate::contact::Batch;
 use crate::contact_set::ContactSet;
 use crate::lanes::{Lanes, Reg, Reg3, Width, widest};
-use crate::solver::nsgs::{Velocities, is_at_rest};
+use crate::solver::nsgs::is_at_rest;
+use crate::solver::velocities::Velocities;
 
 /// Numbers of a contact: one normal, three tangential, three rolling, one of torsion.
 pub(super) const COUNT: usize = 8;

@@ -7,8 +7,9 @@ use crate::contact_set::ContactSet;
 use crate::error::DemError;
 use crate::parallel::Threads;
 use crate::preset::SolverSettings;
+use crate::solver;
+use crate::solver::residual::ResidualSums;
 use crate::solver::work::Work;
-use crate::solver::{self, nsgs::ResidualSums};
 
 /// Contacts with normals, biases and warm impulses, and the velocities before they are solved, as
 /// [`Simulation::frozen_solve`](crate::Simulation::frozen_solve) has frozen them.

@@ -13,15 +13,15 @@
 //! between unequal spheres sliding and rolling couple, and the three lines are one pass inside the contact.
 //! Contacts of a batch share no grain: the order within a batch cannot change a bit.
 
-use crate::parallel::Threads;
-
 use crate::body::{Body, SharedBodies};
 use crate::clumps::Clumps;
 use crate::contact::{Batch, LawLanes};
 use crate::contact_set::ContactSet;
-use crate::lanes::{LANES, Lanes, Reg, Reg3, Width, each, vectors, widest};
-use crate::law::{INVERSE_INERTIA, TANGENTIAL_INERTIA, project_ball};
+use crate::lanes::{Lanes, Reg, Reg3, Width, widest};
+use crate::law::{TANGENTIAL_INERTIA, project_ball};
+use crate::parallel::Threads;
 use crate::preset::SolverSettings;
+use crate::solver::velocities::Velocities;
 use crate::solver::work::Work;
 
 /// How far a sweep still was from the end.
@@ -249,68 +249,17 @@ fn apply_batches<W: Width, const AT_WALLS: bool>(
     Progress::default()
 }
 
-/// Velocities of both grains of each contact.
-#[derive(Clone, Copy)]
-pub(super) struct Velocities<W: Width> {
-    pub v_i: Reg3<W>,
-    pub w_i: Reg3<W>,
-    pub v_j: Reg3<W>,
-    pub w_j: Reg3<W>,
-}
-
 /// The impulses of each contact.
 #[derive(Clone, Copy)]
-struct Impulses<W: Width> {
-    n: Reg<W>,
+pub(super) struct Impulses<W: Width> {
+    pub n: Reg<W>,
     t: Reg3<W>,
     r: Reg3<W>,
 }
 
-impl<W: Width> Velocities<W> {
-    #[inline(always)]
-    #[allow(unsafe_code)]
-    pub fn gather<const AT_WALLS: bool>(batch: &Batch, bodies: &SharedBodies<'_>) -> Self {
-        // SAFETY: the indices are in bounds (`for_each_phase`), and a body is another batch's only if it rests.
-        let body = |body| unsafe { bodies.load::<W>(body) };
-        let [v_i, w_i] = pairs(each(&batch.i, body));
-        let rest = Reg3 { x: Reg::splat(0.0), y: Reg::splat(0.0), z: Reg::splat(0.0) };
-        let [v_j, w_j] = if AT_WALLS { [rest; 2] } else { pairs(each(&batch.j, body)) };
-        Self { v_i, w_i, v_j, w_j }
-    }
-
-    #[inline(always)]
-    pub fn scatter<const AT_WALLS: bool>(&self, batch: &Batch, bodies: &SharedBodies<'_>) {
-        scatter(batch.used, &batch.i, bodies, self.v_i, self.w_i);
-        if !AT_WALLS {
-            scatter(batch.used, &batch.j, bodies, self.v_j, self.w_j);
-        }
-    }
-
-    /// Applies normal and tangential impulses.
-    #[inline(always)]
-    pub fn push(&mut self, law: &LawLanes, n: &Reg3<W>, normal: Reg<W>, tangential: Reg3<W>) {
-        let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
-        let force = tangential.plus(normal, *n);
-        let twist = n.cross(tangential).scale(Reg::splat(INVERSE_INERTIA));
-        self.v_i = self.v_i.plus(mass_i, force);
-        self.v_j = self.v_j.minus(mass_j, force);
-        self.w_i = self.w_i.minus(mass_i, twist);
-        self.w_j = self.w_j.minus(mass_j, twist);
-    }
-
-    /// Applies rolling impulses.
-    #[inline(always)]
-    pub fn roll(&mut self, law: &LawLanes, rolling: Reg3<W>) {
-        let (mass_i, mass_j) = (Reg::load(&law.inverse_mass_i), Reg::load(&law.inverse_mass_j));
-        let step = rolling.scale(Reg::splat(INVERSE_INERTIA));
-        self.w_i = self.w_i.plus(mass_i * Reg::load(&law.lever_i), step);
-        self.w_j = self.w_j.minus(mass_j * Reg::load(&law.lever_j), step);
-    }
-}
-
 impl<W: Width> Impulses<W> {
     #[inline(always)]
-    fn load(batch: &Batch) -> Self {
+    pub fn load(batch: &Batch) -> Self {
         Self {
             n: Reg::load(&batch.lambda_n),
             t: Reg3::load(&batch.lambda_t),
@@ -320,7 +269,7 @@ impl<W: Width> Impulses<W> {
 
     /// `|lambda - old|^2` of all three impulses.
     #[inline(always)]
-    fn square_of_change(&self, old: &Self) -> Reg<W> {
+    pub fn square_of_change(&self, old: &Self) -> Reg<W> {
         let (n, t, r) = (self.n - old.n, self.t - old.t, self.r - old.r);
         n.times_plus(n, t.dot(t)) + r.dot(r)
     }
@@ -362,7 +311,7 @@ fn solve_batch<W: Width, const AT_WALLS: bool, const SOFT: bool>(
 
 /// How fast each contact closes against its constraint, `-(w_n + b)`; a soft one, `-(w_n + b + give lambda_n)`.
 #[inline(always)]
-fn closing<W: Width, const SOFT: bool>(
+pub(super) fn closing<W: Width, const SOFT: bool>(
     batch: &Batch,
     law: &LawLanes,
     velocities: &Velocities<W>,
@@ -377,7 +326,7 @@ fn closing<W: Width, const SOFT: bool>(
 /// The exact solution of each contact of a batch by itself, or as much beyond it as `relaxation` exceeds 1,
 /// on the cones; updates the velocities to match.
 #[inline(always)]
-fn local_solution<W: Width, const SOFT: bool>(
+pub(super) fn local_solution<W: Width, const SOFT: bool>(
     batch: &Batch,
     law: &LawLanes,
     closing: Reg<W>,
@@ -428,116 +377,4 @@ fn slow_rolling<W: Width>(law: &LawLanes, limit: Reg<W>, stopping: Reg3<W>) -> R
     let soft = Reg::splat(law.rolling_speed) * Reg::load(&law.compliance_r);
     // An empty lane has neither.
     stopping.scale(limit.over((limit + soft).max(Reg::splat(f64::MIN_POSITIVE))))
-}
-
-#[inline(always)]
-fn pairs<W: Width>(rows: [(W::Quad, W::Quad); LANES]) -> [Reg3<W>; 2] {
-    let [a, b, c, d, e, f, g, h] = rows;
-    let first = [a.0, b.0, c.0, d.0, e.0, f.0, g.0, h.0];
-    let second = [a.1, b.1, c.1, d.1, e.1, f.1, g.1, h.1];
-    [vectors(first), vectors(second)]
-}
-
-#[inline(always)]
-#[allow(unsafe_code)]
-fn scatter<W: Width>(
-    used: u32,
-    index: &[u32; LANES],
-    bodies: &SharedBodies<'_>,
-    v: Reg3<W>,
-    w: Reg3<W>,
-) {
-    let zero = W::splat(0.0);
-    let velocities = W::rows([v.x.0, v.y.0, v.z.0, zero]);
-    let spins = W::rows([w.x.0, w.y.0, w.z.0, zero]);
-    // SAFETY: the lanes in use have grains of their own, in bounds, that no other contact of this colour has.
-    let store = |lane: usize| unsafe {
-        bodies.store::<W>(index[lane], velocities[lane], spins[lane]);
-    };
-    if used as usize == LANES {
-        store(0);
-        store(1);
-        store(2);
-        store(3);
-        store(4);
-        store(5);
-        store(6);
-        store(7);
-    } else {
-        (0..used as usize).for_each(store);
-    }
-}
-
-/// Sums of squares for the natural-map residual.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ResidualSums {
-    squares: f64,
-    impulses: f64,
-}
-
-impl ResidualSums {
-    /// The sums over the contacts of all sets.
-    pub fn of(sets: &[&mut ContactSet], bodies: &mut [Body]) -> Self {
-        let mut sums = Self::default();
-        for set in sets {
-            let lanes = if set.is_soft() { residual_of_soft } else { residual_of_rigid };
-            lanes(set, bodies, &mut sums.squares, &mut sums.impulses);
-        }
-        sums
-    }
-
-    /// Sum of the squares of the residual, how far its own exact solution would still move each impulse
-    /// `[m^2/s^2]`.
-    pub fn squares(&self) -> f64 {
-        self.squares
-    }
-
-    /// Whether the relative residual is at most `bound`; true without any impulse.
-    pub fn is_below(&self, bound: f64) -> bool {
-        self.squares <= bound * bound * self.impulses
-    }
-
-    /// Root mean square of the residual over that of the normal impulses; 0 without any impulse.
-    pub fn relative(&self) -> f64 {
-        if self.impulses > 0.0 { (self.squares / self.impulses).sqrt() } else { 0.0 }
-    }
-}
-
-widest! {
-    fn residual_of_rigid<W>(set: &ContactSet, bodies: &mut [Body], squares: &mut f64, impulses: &mut f64) {
-        residual_lanes::<W, false>(set, bodies, squares, impulses);
-    }
-}
-
-widest! {
-    fn residual_of_soft<W>(set: &ContactSet, bodies: &mut [Body], squares: &mut f64, impulses: &mut f64) {
-        residual_lanes::<W, true>(set, bodies, squares, impulses);
-    }
-}
-
-#[inline(always)]
-fn residual_lanes<W: Width, const SOFT: bool>(
-    set: &ContactSet,
-    bodies: &mut [Body],
-    squares: &mut f64,
-    impulses: &mut f64,
-) {
-    assert!(set.fits(bodies));
-    let bodies = SharedBodies::new(bodies);
-    for batch in &set.batches {
-        let law = &set.laws[batch.law as usize];
-        let old = Impulses::<W>::load(batch);
-        let mut velocities = Velocities::gather::<false>(batch, &bodies);
-        let closing = closing::<W, SOFT>(batch, law, &velocities);
-        let one = Reg::splat(1.0);
-        let new = local_solution::<W, SOFT>(batch, law, closing, one, old, &mut velocities);
-        let (mut square, mut impulse) = (Lanes::ZERO, Lanes::ZERO);
-        new.square_of_change(&old).store(&mut square);
-        (old.n * old.n).store(&mut impulse);
-        // Lane after lane, so that every width sums in the same order; empty lanes hold zeros.
-        for lane in batch.lanes() {
-            *squares += square.0[lane];
-            *impulses += impulse.0[lane];
-        }
-    }
 }

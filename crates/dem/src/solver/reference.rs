@@ -18,7 +18,8 @@ use crate::preset::ReferenceSettings;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, dot, impulses, put_impulses, scale_and_add, spread,
 };
-use crate::solver::nsgs::{self, Manner, ResidualSums};
+use crate::solver::nsgs::{self, Manner};
+use crate::solver::residual::ResidualSums;
 use crate::solver::work::Work;
 
 /// Sweeps between two looks at the residual, which costs a sweep.

@@ -8,7 +8,7 @@ use crate::contact::{ContactLaw, Listed};
 use crate::contact_set::Second;
 use crate::lanes::Row;
 use crate::preset::{Complementarity, NewtonSettings, Preset, ReferenceSettings};
-use crate::solver::nsgs::ResidualSums;
+use crate::solver::residual::ResidualSums;
 use crate::{Material, Scene, Simulation};
 
 /// One contact between grains 0 and 1, or of grain 0 at a wall, with the normal z.

@@ -12,7 +12,8 @@ use crate::contact_set::ContactSet;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, batches, collect, impulses, put_impulses, spread,
 };
-use crate::solver::nsgs::{self, Manner, ResidualSums};
+use crate::solver::nsgs::{self, Manner};
+use crate::solver::residual::ResidualSums;
 
 /// Shares of a step that are tried in turn.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
