@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import final
+from typing import Unpack, final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from granulcal.segmentation import SegmentationSettings
 
 __version__: str
 
@@ -134,36 +136,8 @@ class Recording:
     def depth(self) -> NDArray[np.float32] | None: ...
     @property
     def heights(self) -> NDArray[np.float64] | None: ...
-    def formation(
-        self,
-        *,
-        height_threshold: float | None = None,
-        threshold_floor: float | None = None,
-        border_px: int | None = None,
-        downsample: int | None = None,
-        ground_resolution: float | None = None,
-        inlier_distance: float | None = None,
-        max_tilt_deg: float | None = None,
-        flying_deg: float | None = None,
-        max_height: float | None = None,
-        min_component_px: int | None = None,
-        plane_seed: int | None = None,
-    ) -> Formation: ...
-    def level(
-        self,
-        *,
-        height_threshold: float | None = None,
-        threshold_floor: float | None = None,
-        border_px: int | None = None,
-        downsample: int | None = None,
-        ground_resolution: float | None = None,
-        inlier_distance: float | None = None,
-        max_tilt_deg: float | None = None,
-        flying_deg: float | None = None,
-        max_height: float | None = None,
-        min_component_px: int | None = None,
-        plane_seed: int | None = None,
-    ) -> Levelled: ...
+    def formation(self, **settings: Unpack[SegmentationSettings]) -> Formation: ...
+    def level(self, **settings: Unpack[SegmentationSettings]) -> Levelled: ...
 
 @final
 class Levelled:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from granulcal import _native
 from granulcal.camera import Camera
 from granulcal.measured import DischargeCurve, DrumImage, RunOut
 from granulcal.scene import Scene
+from granulcal.segmentation import SegmentationSettings
 from granulcal.statistics import (
     DiagnosticStatistics,
     ObservedStatistics,
@@ -29,6 +31,7 @@ __all__ = [
     "Lost",
     "Plane",
     "Recording",
+    "SegmentationSettings",
 ]
 
 Array = NDArray[np.float64]
@@ -287,62 +290,19 @@ class Recording:
         """Heights [m], NaN is no data, shape (h, w); None for a depth image."""
         return self._native.heights
 
-    def formation(
-        self,
-        *,
-        height_threshold: float | None = None,
-        threshold_floor: float | None = None,
-        border_px: int | None = None,
-        downsample: int | None = None,
-        ground_resolution: float | None = None,
-        inlier_distance: float | None = None,
-        max_tilt_deg: float | None = None,
-        flying_deg: float | None = None,
-        max_height: float | None = None,
-        min_component_px: int | None = None,
-        plane_seed: int | None = None,
-    ) -> Formation:
+    def formation(self, **settings: Unpack[SegmentationSettings]) -> Formation:
         """Returns the points of the formation, levelled and centred.
 
-        What is None is as the camera's file says, else the default.
-
         Args:
-            height_threshold: height from which a pixel counts as grain [m]; the default is
-                automatic, three robust standard deviations of the ground; a patch of
-                grains must reach six of them somewhere.
-            threshold_floor: least automatic threshold [m]; the default is 1 mm.
-            border_px: frame at the edge of the full image that is ignored [px]; default 0.
-            downsample: keep one pixel of every block of this side; the default matches
-                `ground_resolution`, or is 1 without.
-            ground_resolution: width on the ground that a pixel should have [m], as in the
-                simulated images to compare with; see `Scene.ground_resolution`.
-            inlier_distance: distance within which a pixel can be ground [m]; the default is
-                automatic, from 3 mm on.
-            max_tilt_deg: tilt beyond which a plane is a wall and not the ground [deg]; default 45.
-            flying_deg: incidence beyond which two steps in a row are a pixel between two surfaces
-                and no surface [deg]; default 80, 90 keeps all.
-            max_height: height above which a pixel is a fault and not data [m]; default none.
-            min_component_px: least number of connected pixels of grain; default 1.
-            plane_seed: seed of the search for the ground; default 0.
+            settings: what differs from the camera's file, else from the default; see
+                `SegmentationSettings`.
 
         Raises:
             ValueError: no pixel belongs to a grain, an image without data, a setting out of range,
                 or both a fixed threshold and a floor.
         """
-        _refuse_two_thresholds(height_threshold, threshold_floor)
-        found = self._native.formation(
-            height_threshold=height_threshold,
-            threshold_floor=threshold_floor,
-            border_px=border_px,
-            downsample=downsample,
-            ground_resolution=ground_resolution,
-            inlier_distance=inlier_distance,
-            max_tilt_deg=max_tilt_deg,
-            flying_deg=flying_deg,
-            max_height=max_height,
-            min_component_px=min_component_px,
-            plane_seed=plane_seed,
-        )
+        _refuse_two_thresholds(settings)
+        found = self._native.formation(**settings)
         return Formation(
             points=found.points,
             mask=found.mask,
@@ -361,41 +321,15 @@ class Recording:
             spacing=float("nan") if found.spacing is None else found.spacing,
         )
 
-    def level(
-        self,
-        *,
-        height_threshold: float | None = None,
-        threshold_floor: float | None = None,
-        border_px: int | None = None,
-        downsample: int | None = None,
-        ground_resolution: float | None = None,
-        inlier_distance: float | None = None,
-        max_tilt_deg: float | None = None,
-        flying_deg: float | None = None,
-        max_height: float | None = None,
-        min_component_px: int | None = None,
-        plane_seed: int | None = None,
-    ) -> Levelled:
-        """Returns ground, heights and mask, also of a flat bed; arguments as `formation`.
+    def level(self, **settings: Unpack[SegmentationSettings]) -> Levelled:
+        """Returns ground, heights and mask, also of a flat bed; settings as `formation`.
 
         Raises:
             ValueError: an image without data, a setting out of range, or both a fixed threshold
                 and a floor.
         """
-        _refuse_two_thresholds(height_threshold, threshold_floor)
-        found = self._native.level(
-            height_threshold=height_threshold,
-            threshold_floor=threshold_floor,
-            border_px=border_px,
-            downsample=downsample,
-            ground_resolution=ground_resolution,
-            inlier_distance=inlier_distance,
-            max_tilt_deg=max_tilt_deg,
-            flying_deg=flying_deg,
-            max_height=max_height,
-            min_component_px=min_component_px,
-            plane_seed=plane_seed,
-        )
+        _refuse_two_thresholds(settings)
+        found = self._native.level(**settings)
         return Levelled(
             heights=found.heights,
             mask=found.mask,
@@ -484,6 +418,7 @@ def _plane(parts: tuple[tuple[float, float, float], float, float, float, int]) -
     )
 
 
-def _refuse_two_thresholds(height_threshold: float | None, floor: float | None) -> None:
-    if height_threshold is not None and floor is not None:
+def _refuse_two_thresholds(settings: SegmentationSettings) -> None:
+    both = settings.get("height_threshold"), settings.get("threshold_floor")
+    if None not in both:
         raise ValueError("give height_threshold or threshold_floor, not both")

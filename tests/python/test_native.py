@@ -226,6 +226,7 @@ def test_stubs_have_the_arguments_that_are_there():
                 continue
             real = inspect.signature(getattr(getattr(_native, node.name), method.name))
             arguments = [a.arg for a in method.args.args + method.args.kwonlyargs]
+            arguments += [method.args.kwarg.arg] if method.args.kwarg else []
             assert arguments == list(real.parameters), f"{node.name}.{method.name}"
 
 

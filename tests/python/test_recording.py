@@ -1,4 +1,5 @@
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -66,6 +67,14 @@ def test_segmentation_options_are_honoured(pour, camera, tmp_path):
         recording.formation(height_threshold=0.002, threshold_floor=0.001)
     with pytest.raises(ValueError, match="none of .* pixels belongs to a grain"):
         recording.formation(height_threshold=0.5)
+    same = recording.formation(height_threshold=None, border_px=None)
+    assert np.array_equal(same.mask, recording.formation().mask)
+    wrong: Any = {"border": 3}
+    with pytest.raises(TypeError, match="unexpected keyword argument .border.; allowed are height"):
+        recording.formation(**wrong)
+    wrong = {"border_px": "wide"}
+    with pytest.raises(TypeError, match="border_px: "):
+        recording.level(**wrong)
 
 
 def test_a_height_map_is_read(tmp_path):

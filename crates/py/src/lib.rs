@@ -17,6 +17,7 @@ mod pour;
 mod recording;
 mod run_cli;
 mod scene;
+mod segmentation;
 mod signals;
 mod simulate;
 mod statistics;

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use granulcal_dataset::{ReadOptions, Source};
-use granulcal_features::{Segmentation, Threshold};
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::formation::Formation;
 use crate::levelled::Levelled;
-use crate::{array, error};
+use crate::{array, error, segmentation};
 
 /// A measured depth image or height map.
 #[pyclass(frozen, module = "granulcal._native")]
@@ -97,134 +97,22 @@ impl Recording {
     }
 
     /// The points of the formation; what is None stays as the camera's file says.
-    #[pyo3(signature = (
-        *,
-        height_threshold = None,
-        threshold_floor = None,
-        border_px = None,
-        downsample = None,
-        ground_resolution = None,
-        inlier_distance = None,
-        max_tilt_deg = None,
-        flying_deg = None,
-        max_height = None,
-        min_component_px = None,
-        plane_seed = None,
-    ))]
-    #[allow(clippy::too_many_arguments)] // Python's keywords.
+    #[pyo3(signature = (**settings))]
     fn formation(
         &self,
         py: Python<'_>,
-        height_threshold: Option<f64>,
-        threshold_floor: Option<f64>,
-        border_px: Option<usize>,
-        downsample: Option<usize>,
-        ground_resolution: Option<f64>,
-        inlier_distance: Option<f64>,
-        max_tilt_deg: Option<f64>,
-        flying_deg: Option<f64>,
-        max_height: Option<f64>,
-        min_component_px: Option<usize>,
-        plane_seed: Option<u64>,
+        settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Formation> {
-        let settings = self.settings(
-            height_threshold,
-            threshold_floor,
-            border_px,
-            downsample,
-            ground_resolution,
-            inlier_distance,
-            max_tilt_deg,
-            flying_deg,
-            max_height,
-            min_component_px,
-            plane_seed,
-        );
+        let settings = segmentation::changed(&self.inner.segmentation, settings)?;
         let inner = py.detach(|| self.inner.formation_with(&settings));
         Ok(Formation { inner: inner.map_err(error::dataset)? })
     }
 
-    /// Ground, heights and mask, whether or not there is a grain; arguments as `formation`.
-    #[pyo3(signature = (
-        *,
-        height_threshold = None,
-        threshold_floor = None,
-        border_px = None,
-        downsample = None,
-        ground_resolution = None,
-        inlier_distance = None,
-        max_tilt_deg = None,
-        flying_deg = None,
-        max_height = None,
-        min_component_px = None,
-        plane_seed = None,
-    ))]
-    #[allow(clippy::too_many_arguments)] // Python's keywords.
-    fn level(
-        &self,
-        py: Python<'_>,
-        height_threshold: Option<f64>,
-        threshold_floor: Option<f64>,
-        border_px: Option<usize>,
-        downsample: Option<usize>,
-        ground_resolution: Option<f64>,
-        inlier_distance: Option<f64>,
-        max_tilt_deg: Option<f64>,
-        flying_deg: Option<f64>,
-        max_height: Option<f64>,
-        min_component_px: Option<usize>,
-        plane_seed: Option<u64>,
-    ) -> PyResult<Levelled> {
-        let settings = self.settings(
-            height_threshold,
-            threshold_floor,
-            border_px,
-            downsample,
-            ground_resolution,
-            inlier_distance,
-            max_tilt_deg,
-            flying_deg,
-            max_height,
-            min_component_px,
-            plane_seed,
-        );
+    /// Ground, heights and mask, whether or not there is a grain; keywords as `formation`.
+    #[pyo3(signature = (**settings))]
+    fn level(&self, py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Levelled> {
+        let settings = segmentation::changed(&self.inner.segmentation, settings)?;
         let inner = py.detach(|| self.inner.level_with(&settings));
         Ok(Levelled { inner: inner.map_err(error::dataset)? })
-    }
-}
-
-impl Recording {
-    /// The recording's own segmentation with what the keywords change.
-    #[allow(clippy::too_many_arguments)] // Python's keywords.
-    fn settings(
-        &self,
-        height_threshold: Option<f64>,
-        threshold_floor: Option<f64>,
-        border_px: Option<usize>,
-        downsample: Option<usize>,
-        ground_resolution: Option<f64>,
-        inlier_distance: Option<f64>,
-        max_tilt_deg: Option<f64>,
-        flying_deg: Option<f64>,
-        max_height: Option<f64>,
-        min_component_px: Option<usize>,
-        plane_seed: Option<u64>,
-    ) -> Segmentation {
-        let mut settings = self.inner.segmentation.clone();
-        let replace = |place: &mut usize, value: Option<usize>| *place = value.unwrap_or(*place);
-        replace(&mut settings.border_px, border_px);
-        replace(&mut settings.min_component_px, min_component_px);
-        settings.downsample = downsample.or(settings.downsample);
-        settings.ground_resolution = ground_resolution.or(settings.ground_resolution);
-        settings.height_threshold = height_threshold
-            .map(Threshold::Absolute)
-            .or(threshold_floor.map(|floor| Threshold::Automatic { floor }))
-            .unwrap_or(settings.height_threshold);
-        settings.inlier_distance = inlier_distance.or(settings.inlier_distance);
-        settings.max_tilt_deg = max_tilt_deg.unwrap_or(settings.max_tilt_deg);
-        settings.flying_deg = flying_deg.unwrap_or(settings.flying_deg);
-        settings.max_height = max_height.or(settings.max_height);
-        settings.plane_seed = plane_seed.unwrap_or(settings.plane_seed);
-        settings
     }
 }

@@ -1,0 +1,63 @@
+//! How a recording is segmented, as Python's keywords.
+
+use granulcal_features::{Segmentation, Threshold};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Every keyword, in the order of the page.
+const KEYWORDS: &str = "height_threshold, threshold_floor, border_px, downsample, ground_resolution, inlier_distance, \
+                        max_tilt_deg, flying_deg, max_height, min_component_px, plane_seed";
+
+/// A recording's own segmentation with what the keywords change; what is None stays.
+///
+/// # Errors
+/// `TypeError` names a keyword that there is not, and one whose value is of another type; `OverflowError` one that is no count.
+pub(crate) fn changed(
+    own: &Segmentation,
+    keywords: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Segmentation> {
+    let mut settings = own.clone();
+    let (mut threshold, mut floor) = (None, None);
+    for (keyword, value) in keywords.into_iter().flatten() {
+        let keyword: String = keyword.extract()?;
+        if value.is_none() {
+            refuse_unknown(&keyword)?;
+            continue;
+        }
+        let named = |error: PyErr| {
+            let text = format!("{keyword}: {}", error.value(value.py()));
+            PyErr::from_type(error.get_type(value.py()), text)
+        };
+        let real = || value.extract::<f64>().map_err(named);
+        let whole = || value.extract::<usize>().map_err(named);
+        match keyword.as_str() {
+            "height_threshold" => threshold = Some(real()?),
+            "threshold_floor" => floor = Some(real()?),
+            "border_px" => settings.border_px = whole()?,
+            "downsample" => settings.downsample = Some(whole()?),
+            "ground_resolution" => settings.ground_resolution = Some(real()?),
+            "inlier_distance" => settings.inlier_distance = Some(real()?),
+            "max_tilt_deg" => settings.max_tilt_deg = real()?,
+            "flying_deg" => settings.flying_deg = real()?,
+            "max_height" => settings.max_height = Some(real()?),
+            "min_component_px" => settings.min_component_px = whole()?,
+            "plane_seed" => settings.plane_seed = value.extract().map_err(named)?,
+            other => refuse_unknown(other)?,
+        }
+    }
+    settings.height_threshold = match (threshold, floor) {
+        (Some(height), _) => Threshold::Absolute(height),
+        (None, Some(floor)) => Threshold::Automatic { floor },
+        (None, None) => settings.height_threshold,
+    };
+    Ok(settings)
+}
+
+fn refuse_unknown(keyword: &str) -> PyResult<()> {
+    if KEYWORDS.split(", ").any(|known| known == keyword) {
+        return Ok(());
+    }
+    let text = format!("got an unexpected keyword argument {keyword:?}; allowed are {KEYWORDS}");
+    Err(PyTypeError::new_err(text))
+}
