@@ -108,6 +108,7 @@ fn tangential_restitution_reverses_the_sliding_of_a_sticking_impact() {
         restitution: 0.5,
         tangential_restitution: 0.4,
         torsional_friction: 0.0,
+        ..Material::default()
     };
     for seed in 0..8 {
         let (before, after) = collide(&pair(grains, 1.2e-3), seed);

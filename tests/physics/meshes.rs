@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use granulcal::dem::{
-    Funnel, Mesh, MeshFile, Motion as WallMotion, Scene, Shape, Start, Status, Wall, WallMaterial,
+    Funnel, Mesh, MeshFile, Motion as WallMotion, Scene, Shape, Simulation, Start, Status, Wall,
+    WallMaterial,
 };
 use nalgebra::Vector3;
 
@@ -104,17 +105,24 @@ fn a_mesh_of_the_funnel_pours_as_the_funnel_does() {
     // Without a funnel the start counts from the ground.
     let Start::Grid { base, .. } = &mut meshed.start else { unreachable!() };
     *base += funnel.rim_height();
+    // Means of three seeds.
     let pile = |scene: &Scene| {
-        let pour = start(scene).run();
-        assert!(matches!(pour.status, Status::AtRest | Status::OutOfView), "{:?}", pour.health);
-        // Single grains roll far: the median.
-        let mut radii: Vec<_> = pour.positions.iter().map(|x| x.xy().norm()).collect();
-        radii.sort_by(f64::total_cmp);
-        let heights = pour.positions.iter().map(|x| x.z);
-        (radii[radii.len() / 2], heights.sum::<f64>() / radii.len() as f64)
+        let (mut radius, mut height) = (0.0_f64, 0.0_f64);
+        for seed in 1..=3 {
+            let pour = Simulation::new(scene, seed).expect("a valid scene").run();
+            assert!(matches!(pour.status, Status::AtRest | Status::OutOfView), "{:?}", pour.health);
+            // Single grains roll far: the median.
+            let mut radii: Vec<_> = pour.positions.iter().map(|x| x.xy().norm()).collect();
+            radii.sort_by(f64::total_cmp);
+            radius += radii[radii.len() / 2] / 3.0;
+            let heights = pour.positions.iter().map(|x| x.z);
+            height += heights.sum::<f64>() / radii.len() as f64 / 3.0;
+        }
+        (radius, height)
     };
     let ((r_mesh, z_mesh), (r, z)) = (pile(&meshed), pile(&analytic));
-    // Three seeds of the analytic funnel differ by 2 % in mean r and 3 % in mean z.
+    println!("{r_mesh} {r} {z_mesh} {z}");
+    // Single seeds of the analytic funnel differ by 2 to 4 % in the median and in mean z.
     assert!((r_mesh / r - 1.0).abs() < 0.06, "{r_mesh} {r}");
     assert!((z_mesh / z - 1.0).abs() < 0.09, "{z_mesh} {z}");
 }

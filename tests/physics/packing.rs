@@ -61,6 +61,7 @@ fn no_material_creates_energy() {
                         restitution,
                         tangential_restitution,
                         torsional_friction: 0.1,
+                        ..Material::default()
                     };
                     // A margin of a radius lists every neighbour in time: the law without late contacts.
                     let settings = SolverSettings { margin: 1.0, ..Preset::Default.settings() };
@@ -72,6 +73,9 @@ fn no_material_creates_energy() {
                     assert!(health.energy_created <= MAX_ENERGY_CREATED, "{grains:?} {health:?}");
                     assert!(health.worst_penetration < 0.1, "{grains:?} {health:?}");
                     assert_eq!(health.grains_lost, 0);
+                    // No impact gives energy, not even to rounding of its hundreds of turns.
+                    let ratio = simulation.impact_work().largest_energy_ratio;
+                    assert!((0.5..1.0 + 1e-14).contains(&ratio), "{grains:?} {ratio}");
                 }
             }
         }

@@ -1,26 +1,59 @@
-//! Impacts within a substep: one pair after the other, each at its own time (docs/theory/contact.md, box 1).
+//! Impacts within a substep: one after the other, each at its own time (docs/theory/contact.md, box 1).
 //!
-//! Between impacts grains move straight on, as in event-driven simulation. What approaches faster than
-//! [`IMPACT_SPEED`] and meets before the substep ends is an impact with Newton's restitution; what is slower or
-//! stays closed is left to the contact solve. Every impact takes energy, whatever its coefficients are.
+//! Between impacts grains move straight on, as in event-driven simulation. A pair that approaches faster than
+//! [`IMPACT_SPEED`] and meets before the substep ends collides, together with every contact that is closed then
+//! (`impact/cluster.rs`); what is slower is left to the contact solve.
+
+mod cluster;
+mod friction;
+mod links;
+mod members;
+mod spring;
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use nalgebra::Vector3;
-
 use crate::bed::Bed;
-use crate::contact::{Candidate, ContactLaw};
+use crate::contact::Candidate;
 use crate::contacts::Contacts;
-use crate::law::{IMPACT_SPEED, INVERSE_INERTIA, TANGENTIAL_INERTIA};
-use crate::material::Material;
+use crate::law::IMPACT_SPEED;
 use crate::surroundings::Surroundings;
+
+use cluster::{Cluster, Outcome};
 
 /// Impacts of one grain in a substep, at most; what is left then is for the contact solve.
 const MAX_IMPACTS: u32 = 1024;
 
 /// Candidates that a thread takes at once.
 const SHARE: usize = if cfg!(test) { 4 } else { 512 };
+
+/// What the impacts of a simulation have cost and taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImpactWork {
+    /// Impacts resolved.
+    pub impacts: usize,
+    /// Of pairs that touched nothing.
+    pub alone: usize,
+    /// Closed contacts of all impacts.
+    pub links: usize,
+    /// Grains hit, in all impacts.
+    pub grains_hit: usize,
+    /// Micro-steps of all impacts.
+    pub micro_steps: usize,
+    /// Largest energy after an impact over that before, moving walls' work added to it `[-]`.
+    pub largest_energy_ratio: f64,
+}
+
+impl ImpactWork {
+    fn note(&mut self, outcome: &Outcome, grains_hit: usize) {
+        self.impacts += 1;
+        self.alone += usize::from(outcome.micro_steps == 0);
+        self.links += outcome.links;
+        self.grains_hit += grains_hit;
+        self.micro_steps += outcome.micro_steps;
+        self.largest_energy_ratio = self.largest_energy_ratio.max(outcome.energy_ratio);
+    }
+}
 
 /// An impact to come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +113,9 @@ pub(crate) struct Impacts {
     /// The grains with impacts.
     hit: Vec<u32>,
     partners: Vec<u32>,
+    cluster: Cluster,
+    /// What impacts have cost and taken so far.
+    pub work: ImpactWork,
 }
 
 impl Impacts {
@@ -104,21 +140,25 @@ impl Impacts {
             if counts != self.counts_of(pair) {
                 continue;
             }
-            let Some(work) = collide(pair, time, bed, around) else { continue };
-            self.work_of_walls += work;
+            let Some(outcome) = self.cluster.resolve(pair, time, bed, contacts, around) else {
+                continue;
+            };
+            self.work.note(&outcome, self.cluster.hit.len());
+            self.work_of_walls += outcome.work_of_walls;
             resolved += 1;
-            for grain in [pair.i, pair.partner] {
-                let grain = grain as usize;
-                if grain >= bed.count() {
-                    continue;
-                }
+            let hit = std::mem::take(&mut self.cluster.hit);
+            for &grain in &hit {
+                let (number, grain) = (grain, grain as usize);
                 if self.counts[grain] == 0 {
-                    self.hit.push(grain as u32);
+                    self.hit.push(number);
                 }
                 self.counts[grain] += 1;
                 contacts.follow_after_impact(grain, time, bed, around);
-                self.foresee_all(grain, time, bed, contacts, around);
             }
+            for &grain in &hit {
+                self.foresee_all(grain as usize, time, bed, contacts, around);
+            }
+            self.cluster.hit = hit;
         }
         self.candidates.clear();
         for grain in self.hit.drain(..) {
@@ -215,125 +255,4 @@ fn time_at_wall(pair: Candidate, now: f64, bed: &Bed, around: &Surroundings) -> 
     let root = discriminant.sqrt();
     // Downhill the larger denominator is the earlier root; without one the wall is never reached.
     (speed + root > 0.0).then(|| now + 2.0 * gap / (speed + root))
-}
-
-/// What a grain meets at the time of an impact.
-struct Meeting {
-    law: ContactLaw,
-    material: Material,
-    /// From the other to the grain.
-    normal: Vector3<f64>,
-    velocity: Vector3<f64>,
-    spin: Vector3<f64>,
-    /// What gravity adds to the approach between the middle of the substep, whose velocities we have, and now.
-    falling: f64,
-}
-
-impl Meeting {
-    fn with_grain(i: usize, j: usize, time: f64, bed: &Bed, around: &Surroundings) -> Self {
-        let (a, b) = (bed.place_at(i, time), bed.place_at(j, time));
-        let apart = bed.nearest(a.vector() - b.vector());
-        let distance = apart.norm();
-        Self {
-            law: around.pair_law(bed, i, j),
-            material: around.material,
-            normal: if distance > 0.0 { apart / distance } else { Vector3::z() },
-            velocity: bed.velocity(j),
-            spin: bed.bodies[j].spin.vector(),
-            falling: 0.0,
-        }
-    }
-
-    /// `None` where the wall is not at hand: the grain's place at the foreseen time may be, by a rounding, past its edge.
-    fn with_wall(
-        i: usize,
-        surface: usize,
-        time: f64,
-        bed: &Bed,
-        around: &Surroundings,
-    ) -> Option<Self> {
-        let place = bed.place_at(i, time).vector();
-        let law = around.wall_law(bed, i, surface);
-        let (wall, near) =
-            (around.walls.wall(surface), around.walls.nearest(surface, &place, time));
-        if near.distance.is_infinite() {
-            return None;
-        }
-        let normal = near.normal;
-        let (velocity, omega) = wall.motion_at(&(place - near.distance * normal));
-        let spin = bed.radius(i) * omega;
-        Some(Self {
-            law,
-            material: wall.material,
-            normal,
-            // The contact sees the surface of its second body at v - n x w.
-            velocity: velocity + normal.cross(&spin),
-            spin,
-            falling: normal.dot(&around.gravity) * (time - 0.5 * around.settings.dt),
-        })
-    }
-}
-
-/// Lets two collide at `time` if they still approach fast enough: Newton's restitution, Coulomb's friction
-/// and rolling friction, each solved exactly in this order. If they do not, both stay as they are.
-/// Returns the work of a moving wall per typical mass `[m^2/s^2]`.
-fn collide(pair: Candidate, time: f64, bed: &mut Bed, around: &Surroundings) -> Option<f64> {
-    let (i, other) = (pair.i as usize, other_grain(pair, bed));
-    let meeting = if let Some(j) = other {
-        Meeting::with_grain(i, j, time, bed, around)
-    } else {
-        Meeting::with_wall(i, pair.partner as usize - bed.count(), time, bed, around)?
-    };
-    let Meeting { law, material, normal, velocity, spin: spin_j, falling } = meeting;
-    let ([c_i, c_j], [l_i, l_j]) = (law.inverse_mass, law.lever);
-    let dv = bed.velocity(i) - velocity;
-    let w_n = normal.dot(&dv);
-    if w_n + falling >= -IMPACT_SPEED {
-        return None;
-    }
-    bed.advance(i, time);
-    if let Some(j) = other {
-        bed.advance(j, time);
-    }
-    let a_n = c_i + c_j;
-    let restitution = around.effects.restitution_at(material.restitution, -(w_n + falling));
-    let lambda_n = -(1.0 + restitution) * (w_n + falling) / a_n;
-
-    let spin_i = bed.bodies[i].spin.vector();
-    let u_t = dv + normal.cross(&(spin_i + spin_j)) - w_n * normal;
-    let a_t = TANGENTIAL_INERTIA * a_n;
-    let lambda_t = -(1.0 + material.tangential_restitution) / a_t * u_t;
-    let lambda_t = shorten(lambda_t, law.sliding_friction * lambda_n);
-    let force = lambda_n * normal + lambda_t;
-    let twist = INVERSE_INERTIA * normal.cross(&lambda_t);
-
-    let rho = l_i * (spin_i - c_i * twist) - l_j * (spin_j - c_j * twist);
-    let a_r = INVERSE_INERTIA * (l_i * l_i * c_i + l_j * l_j * c_j);
-    let (about, limit) = (normal.dot(&rho), law.torsional_friction * lambda_n);
-    let most = law.rolling_friction * lambda_n;
-    let mut stopping = (about * normal - rho) / a_r;
-    if law.rolling_speed > 0.0 {
-        stopping *= most / (most + law.rolling_speed / a_r);
-    }
-    let rolling = shorten(stopping, most);
-    // Not `clamp`, which panics at a NaN: what is not finite is for the health to see.
-    let lambda_r = rolling + (-about / a_r).max(-limit).min(limit) * normal;
-    let roll = INVERSE_INERTIA * lambda_r;
-
-    let body = &mut bed.bodies[i];
-    body.velocity.add(&(c_i * force));
-    body.spin.add(&(c_i * (l_i * roll - twist)));
-    if let Some(j) = other {
-        let body = &mut bed.bodies[j];
-        body.velocity.add(&(-c_j * force));
-        body.spin.add(&(-c_j * (l_j * roll + twist)));
-        return Some(0.0);
-    }
-    Some(force.dot(&(velocity - normal.cross(&spin_j))) + lambda_r.dot(&spin_j))
-}
-
-/// The vector, or the part of it that is as long as `limit`.
-fn shorten(vector: Vector3<f64>, limit: f64) -> Vector3<f64> {
-    let norm = vector.norm();
-    if norm > limit { vector * (limit / norm) } else { vector }
 }

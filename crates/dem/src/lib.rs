@@ -69,12 +69,14 @@ pub use checkpoint::CheckpointHeader;
 pub use error::DemError;
 pub use frozen_search::FrozenSearch;
 pub use health::{Health, MAX_ENERGY_CREATED};
+pub use impact::ImpactWork;
 pub use material::{
     Material, WallMaterial, rolling_friction_from_length, rolling_friction_to_length,
 };
 pub use pour::{Pour, Status};
 pub use preset::{
-    Complementarity, Method, NewtonSettings, Preset, ReferenceSettings, SolverSettings,
+    Complementarity, ImpactSettings, Method, NewtonSettings, Preset, ReferenceSettings,
+    SolverSettings,
 };
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{

@@ -13,6 +13,9 @@ use crate::error::DemError;
 /// | `restitution` | e | - | `[0, 1]` |
 /// | `tangential_restitution` | e_t | - | `[0, 1]` |
 /// | `torsional_friction` | mu_t | - | `[0, 10^3]` |
+/// | `softness` | delta / R | - | `[0, 0.2]` |
+/// | `touching_exponent` | q | - | `[0, 10]` |
+/// | `impact_friction` | - | - | `[0, 10]` |
 ///
 /// `rolling_friction` limits the rolling moment by `mu_r R_eff F_n`, `torsional_friction` the moment about the
 /// normal by `mu_t R_eff F_n`, `R_eff = r_i r_j / (r_i + r_j)` for a pair and `r` at a wall (Ai et al. 2011);
@@ -32,6 +35,29 @@ pub struct Material {
     /// Torsional friction mu_t `[-]`: resists spinning about the normal, as `rolling_friction` resists rolling.
     #[serde(default = "default_torsional_friction")]
     pub torsional_friction: f64,
+    /// Gap below which two grains count as touching when one of them is struck, over the mean of their radii `[-]`: about
+    /// the overlap of a typical impact. 0.01 stands for a Young's modulus of some 3e8 Pa at 1 m/s, 0.05 for 3e6 to 3e7.
+    #[serde(default = "default_softness")]
+    pub softness: f64,
+    /// q `[-]`: contacts that touched before a blow have the restitution e^q, the pair that strikes has e. 1 is a viscous
+    /// dashpot, 0 an elastic contact; numbers in between are nuisances of other engines' contacts.
+    #[serde(default = "one")]
+    pub touching_exponent: f64,
+    /// Friction cones in impacts over those in lasting contacts `[-]`; above 1 for dashpots that pull, whose tension
+    /// other engines count into |F_n|.
+    #[serde(default = "one")]
+    pub impact_friction: f64,
+}
+
+/// Softness where none is stated: that of the engines that pile grains in rows (docs/theory/contact.md).
+const SOFTNESS: f64 = 0.05;
+
+fn default_softness() -> f64 {
+    SOFTNESS
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// Torsional friction where none is stated: 2/3 mu_s a / R_eff for mu_s 0.5 and a contact of radius a = 0.06 R_eff.
@@ -51,6 +77,9 @@ impl Default for Material {
             restitution: 0.5,
             tangential_restitution: 0.0,
             torsional_friction: TORSIONAL_FRICTION,
+            softness: SOFTNESS,
+            touching_exponent: 1.0,
+            impact_friction: 1.0,
         }
     }
 }
@@ -78,6 +107,9 @@ impl Material {
         in_range(name, "sliding_friction", self.sliding_friction, 10.0, "in [0, 10]")?;
         in_range(name, "rolling_friction", self.rolling_friction, 1e3, "in [0, 1000]")?;
         in_range(name, "torsional_friction", self.torsional_friction, 1e3, "in [0, 1000]")?;
+        in_range(name, "softness", self.softness, 0.2, "in [0, 0.2]")?;
+        in_range(name, "touching_exponent", self.touching_exponent, 10.0, "in [0, 10]")?;
+        in_range(name, "impact_friction", self.impact_friction, 10.0, "in [0, 10]")?;
         in_range(name, "restitution", self.restitution, 1.0, "in [0, 1]")?;
         in_range(name, "tangential_restitution", self.tangential_restitution, 1.0, "in [0, 1]")
     }
@@ -102,6 +134,15 @@ pub struct WallMaterial {
     /// Torsional friction of grain on wall `[-]`, relative to the grain's radius.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub torsional_friction: Option<f64>,
+    /// Softness of grain on wall `[-]`, relative to the grain's radius.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub softness: Option<f64>,
+    /// Exponent of restitution of grains that touch the wall before a blow `[-]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub touching_exponent: Option<f64>,
+    /// Friction cones of grain on wall in impacts over those in lasting contacts `[-]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub impact_friction: Option<f64>,
 }
 
 impl WallMaterial {
@@ -120,6 +161,9 @@ impl WallMaterial {
                 .tangential_restitution
                 .unwrap_or(grains.tangential_restitution),
             torsional_friction: self.torsional_friction.unwrap_or(grains.torsional_friction),
+            softness: self.softness.unwrap_or(grains.softness),
+            touching_exponent: self.touching_exponent.unwrap_or(grains.touching_exponent),
+            impact_friction: self.impact_friction.unwrap_or(grains.impact_friction),
         }
     }
 }

@@ -57,6 +57,16 @@ impl FromStr for Preset {
     }
 }
 
+/// How finely the springs of an impact are followed (docs/theory/contact.md, box 1).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ImpactSettings {
+    /// Time that a contact moves by itself, in 1/omega of its spring `[-]`: what is handed on through a chain of grains
+    /// needs it small, the rebound of a pair does not depend on it.
+    pub micro_step: f64,
+    /// Normal impulse of a micro-step below which an impact is over `[m/s]`.
+    pub stopping_speed: f64,
+}
+
 /// What a preset stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolverSettings {
@@ -84,6 +94,8 @@ pub struct SolverSettings {
     pub margin: f64,
     /// Penetration beyond which a pour is unhealthy, in radii `[-]`.
     pub max_penetration: f64,
+    /// How finely an impact is followed.
+    pub impact: ImpactSettings,
     /// What only [`Method::NewtonPcr`] reads.
     pub newton: NewtonSettings,
     /// What only [`Method::Reference`] reads.
@@ -109,6 +121,8 @@ impl SolverSettings {
         positive("settings.list_period", self.list_period as f64)?;
         positive("settings.margin", self.margin)?;
         positive("settings.max_penetration", self.max_penetration)?;
+        positive("settings.impact.micro_step", self.impact.micro_step)?;
+        positive("settings.impact.stopping_speed", self.impact.stopping_speed)?;
         positive("settings.newton.outer", self.newton.outer as f64)?;
         positive("settings.newton.inner", self.newton.inner as f64)?;
         positive("settings.newton.relaxation", self.newton.relaxation)?;
@@ -133,6 +147,7 @@ impl Preset {
                 list_period: 2,
                 margin: 0.3,
                 max_penetration: 0.25,
+                impact: ImpactSettings { micro_step: 0.5, stopping_speed: 0.02 },
                 newton: NewtonSettings::default(),
                 reference: ReferenceSettings::default(),
             },
@@ -148,6 +163,7 @@ impl Preset {
                 list_period: 5,
                 margin: 0.25,
                 max_penetration: 0.1,
+                impact: ImpactSettings { micro_step: 0.3, stopping_speed: 0.01 },
                 newton: NewtonSettings::default(),
                 reference: ReferenceSettings::default(),
             },
@@ -163,6 +179,7 @@ impl Preset {
                 list_period: 8,
                 margin: 0.3,
                 max_penetration: 0.1,
+                impact: ImpactSettings { micro_step: 0.1, stopping_speed: 0.001 },
                 newton: NewtonSettings::default(),
                 reference: ReferenceSettings::default(),
             },
@@ -179,6 +196,7 @@ impl Preset {
                 list_period: 1,
                 margin: 0.5,
                 max_penetration: 0.4,
+                impact: ImpactSettings { micro_step: 0.3, stopping_speed: 0.01 },
                 newton: NewtonSettings::default(),
                 reference: ReferenceSettings::default(),
             },

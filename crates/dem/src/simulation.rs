@@ -18,7 +18,7 @@ use crate::contacts::Contacts;
 use crate::effect::Bridges;
 use crate::error::DemError;
 use crate::health::{Health, HealthWatch};
-use crate::impact::Impacts;
+use crate::impact::{ImpactWork, Impacts};
 use crate::initial;
 use crate::parallel::Threads;
 use crate::pour::{Pour, Status};
@@ -207,6 +207,11 @@ impl Simulation {
     /// The health so far.
     pub fn health(&self) -> Health {
         self.watch.health(self.substep)
+    }
+
+    /// What the impacts so far have cost and taken; a simulation that goes on from a checkpoint counts afresh.
+    pub fn impact_work(&self) -> ImpactWork {
+        self.impacts.work
     }
 
     /// Simulates `seconds`, or less if the pour ends before.

@@ -29,6 +29,12 @@ impl Row {
         Self([vector.x, vector.y, vector.z, fourth])
     }
 
+    /// Replaces the vector.
+    #[inline(always)]
+    pub fn set(&mut self, vector: &Vector3<f64>) {
+        self.0[..3].copy_from_slice(vector.as_slice());
+    }
+
     /// Adds `step` to the vector.
     #[inline(always)]
     pub fn add(&mut self, step: &Vector3<f64>) {
