@@ -21,6 +21,12 @@ class Material:
         tangential_restitution: e_t [-], in [0, 1].
         torsional_friction: resistance to spinning about the normal mu_t [-], relative to the
             effective radius, in [0, 1000].
+        softness: gap below which grains touch when one of them is struck, over their mean
+            radius [-], in [0, 0.2].
+        touching_exponent: contacts that touched before a blow have the restitution e^q, q [-], in
+            [0, 10].
+        impact_friction: friction cones in impacts over those in lasting contacts [-], in [0, 10].
+        rolling_damping: dashpot on rolling in impacts over the critical one [-], in [0, 10].
 
     Example:
         >>> Material(sliding_friction=0.5, rolling_friction=0.1, restitution=0.5).restitution
@@ -32,6 +38,10 @@ class Material:
     restitution: float
     tangential_restitution: float = 0.0
     torsional_friction: float = 0.02
+    softness: float = 0.05
+    touching_exponent: float = 1.0
+    impact_friction: float = 1.0
+    rolling_damping: float = 0.0
 
     def values(self) -> dict[str, float]:
         """Returns the coefficients by their path in a scene."""

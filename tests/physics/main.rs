@@ -21,6 +21,7 @@ mod packing;
 mod periodic;
 mod rebound;
 mod restitution;
+mod rim;
 mod robustness;
 mod rolling;
 mod scenes;

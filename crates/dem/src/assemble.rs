@@ -8,7 +8,8 @@ use crate::contact_set::ContactSet;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, vectors, widest};
 use crate::law;
 use crate::period::Period;
-use crate::wall::Walls;
+use crate::wall::{Nearest, Walls};
+use nalgebra::Vector3;
 
 /// Distance below which two centres are one point and the normal is the vertical `[m]`.
 const COINCIDENT: f64 = 1e-12;
@@ -73,7 +74,8 @@ widest! {
     ) -> Seen {
         let mut seen = Seen::default();
         for number in 0..set.batches.len() {
-            let (gap, follows) = wall_geometry(set, number, walls, bed, &mut seen);
+            let WallGeometry { gap, follows, passing } =
+                wall_geometry(set, number, walls, bed, dt, &mut seen);
             let gap = Reg::<W>::load(&gap);
             let (batch, at) = (&mut set.batches[number], &mut set.at_walls[number]);
             for lane in batch.lanes() {
@@ -82,7 +84,7 @@ widest! {
             let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
             let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
             let w_n = w_n - Reg::load(&follows);
-            finish(batch, law::bias_lanes(gap, dt));
+            finish(batch, law::bias_lanes(gap, dt) + Reg::load(&passing));
             let closes = closing_bits(gap, w_n, dt);
             for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
                 let partner = bed.count() as u32 + at.wall[lane];
@@ -134,13 +136,15 @@ widest! {
             if clocks == Lanes::ZERO {
                 continue;
             }
-            let (gap, follows) = wall_geometry(set, number, walls, bed, &mut Seen::default());
+            let WallGeometry { gap, follows, passing } =
+                wall_geometry(set, number, walls, bed, dt, &mut Seen::default());
             let gap = Reg::<W>::load(&gap);
             let batch = &mut set.batches[number];
             let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
             let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
             let w_n = w_n - Reg::load(&follows);
-            finish(batch, law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt));
+            let bias = law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt);
+            finish(batch, bias + Reg::load(&passing));
         }
     }
 }
@@ -203,32 +207,62 @@ fn pair_geometry<W: Width>(
     (gap, distance)
 }
 
-/// Sets the normals of a batch at walls and returns the gaps, and how fast the walls move along them; a grain that has had
-/// an impact is seen where it was then.
+/// Contacts of a batch at walls.
+struct WallGeometry {
+    gap: Lanes,
+    /// How fast the walls move along the normals `[m/s]`.
+    follows: Lanes,
+    /// How much slower the grains approach walls that bend than along their first normal `[m/s]`.
+    passing: Lanes,
+}
+
+/// Sets the normals of a batch at walls; a grain that has had an impact is seen where it was then.
 fn wall_geometry(
     set: &mut ContactSet,
     number: usize,
     walls: &Walls,
     bed: &Bed,
+    dt: f64,
     seen: &mut Seen,
-) -> (Lanes, Lanes) {
+) -> WallGeometry {
     let (batch, at) = (&mut set.batches[number], &mut set.at_walls[number]);
-    let (mut gap, mut follows) = (Lanes::splat(f64::INFINITY), Lanes::ZERO);
+    let (follows, passing) = (Lanes::ZERO, Lanes::ZERO);
+    let mut geometry = WallGeometry { gap: Lanes::splat(f64::INFINITY), follows, passing };
     for lane in batch.lanes() {
         let i = batch.i[lane] as usize;
         let (surface, place) = (at.wall[lane] as usize, bed.position(i));
         let (wall, near) = (walls.wall(surface), walls.nearest(surface, &place, bed.clocks[i]));
+        let mut relative = bed.velocity(i);
         if wall.is_moving() && near.distance.is_finite() {
             let touching = place - near.distance * near.normal;
-            follows.0[lane] = near.normal.dot(&wall.motion_at(&touching).0);
+            let velocity = wall.motion_at(&touching).0;
+            geometry.follows.0[lane] = near.normal.dot(&velocity);
+            relative -= velocity;
         }
         batch.normal.set(lane, near.normal.into());
-        gap.0[lane] = near.distance - bed.radius(i);
+        let gap = near.distance - bed.radius(i);
+        geometry.gap.0[lane] = gap;
+        let left = dt - bed.clocks[i];
+        if near.bends && gap < left * relative.norm() {
+            let end = walls.nearest(surface, &(place + left * bed.velocity(i)), dt);
+            geometry.passing.0[lane] = passing_of_wall(&near, &end, &relative, left) / dt;
+        }
         at.went_through[lane] |= near.side * at.side[lane] < 0;
         at.side[lane] = near.side;
-        seen.penetration = seen.penetration.max(-gap.0[lane] / bed.radius(i));
+        seen.penetration = seen.penetration.max(-gap / bed.radius(i));
     }
-    (gap, follows)
+    geometry
+}
+
+/// How much farther from a wall that bends a grain is after a time on its straight way than its first normal says `[m]`; at the
+/// edge of a mesh whose next point to touch is another facet's, as from the edge.
+fn passing_of_wall(near: &Nearest, end: &Nearest, relative: &Vector3<f64>, time: f64) -> f64 {
+    let w_n = near.normal.dot(relative);
+    if end.distance.is_finite() {
+        return end.distance - near.distance - time * w_n;
+    }
+    let across = relative.norm_squared() - w_n * w_n;
+    across * time * time / (2.0 * near.distance.max(COINCIDENT))
 }
 
 /// Bias and tangent plane of a batch whose normals are fresh.

@@ -8,6 +8,7 @@ mod cluster;
 mod friction;
 mod links;
 mod members;
+mod rolling_damping;
 mod spring;
 
 use std::cmp::Ordering;
@@ -23,6 +24,9 @@ use cluster::{Cluster, Outcome};
 
 /// Impacts of one grain in a substep, at most; what is left then is for the contact solve.
 const MAX_IMPACTS: u32 = 1024;
+
+/// Gap below which a grain has reached a wall that bends, in radii `[-]`.
+const TOUCHES: f64 = 1e-4;
 
 /// Candidates that a thread takes at once.
 const SHARE: usize = if cfg!(test) { 4 } else { 512 };
@@ -140,6 +144,9 @@ impl Impacts {
             if counts != self.counts_of(pair) {
                 continue;
             }
+            if self.is_early(pair, time, bed, around) {
+                continue;
+            }
             let Some(outcome) = self.cluster.resolve(pair, time, bed, contacts, around) else {
                 continue;
             };
@@ -165,6 +172,19 @@ impl Impacts {
             self.counts[grain as usize] = 0;
         }
         resolved
+    }
+
+    /// Whether a wall that bends is not reached yet at the time that its first normal gave; the impact is then foreseen anew.
+    fn is_early(&mut self, pair: Candidate, time: f64, bed: &Bed, around: &Surroundings) -> bool {
+        let Some(surface) = (pair.partner as usize).checked_sub(bed.count()) else { return false };
+        let place = bed.place_at(pair.i as usize, time);
+        let near = around.walls.nearest(surface, &place.vector(), time);
+        let (gap, radius) = (near.distance - place.0[3], place.0[3]);
+        let is_early = near.bends && gap > TOUCHES * radius;
+        if is_early {
+            self.foresee(pair, time, bed, around);
+        }
+        is_early
     }
 
     fn counts_of(&self, pair: Candidate) -> [u32; 2] {

@@ -16,6 +16,7 @@ use crate::error::DemError;
 /// | `softness` | delta / R | - | `[0, 0.2]` |
 /// | `touching_exponent` | q | - | `[0, 10]` |
 /// | `impact_friction` | - | - | `[0, 10]` |
+/// | `rolling_damping` | x_r | - | `[0, 10]` |
 ///
 /// `rolling_friction` limits the rolling moment by `mu_r R_eff F_n`, `torsional_friction` the moment about the
 /// normal by `mu_t R_eff F_n`, `R_eff = r_i r_j / (r_i + r_j)` for a pair and `r` at a wall (Ai et al. 2011);
@@ -47,6 +48,10 @@ pub struct Material {
     /// other engines count into |F_n|.
     #[serde(default = "one")]
     pub impact_friction: f64,
+    /// Dashpot on rolling during an impact, beside the moment limit and not bounded by it, as a share of the critical one
+    /// `[-]`: LIGGGHTS' `epsd` (`coefficientRollingViscousDamping`).
+    #[serde(default)]
+    pub rolling_damping: f64,
 }
 
 /// Softness where none is stated: that of the engines that pile grains in rows (docs/theory/contact.md).
@@ -80,6 +85,7 @@ impl Default for Material {
             softness: SOFTNESS,
             touching_exponent: 1.0,
             impact_friction: 1.0,
+            rolling_damping: 0.0,
         }
     }
 }
@@ -110,6 +116,7 @@ impl Material {
         in_range(name, "softness", self.softness, 0.2, "in [0, 0.2]")?;
         in_range(name, "touching_exponent", self.touching_exponent, 10.0, "in [0, 10]")?;
         in_range(name, "impact_friction", self.impact_friction, 10.0, "in [0, 10]")?;
+        in_range(name, "rolling_damping", self.rolling_damping, 10.0, "in [0, 10]")?;
         in_range(name, "restitution", self.restitution, 1.0, "in [0, 1]")?;
         in_range(name, "tangential_restitution", self.tangential_restitution, 1.0, "in [0, 1]")
     }
@@ -143,6 +150,9 @@ pub struct WallMaterial {
     /// Friction cones of grain on wall in impacts over those in lasting contacts `[-]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub impact_friction: Option<f64>,
+    /// Dashpot on rolling of grain on wall during an impact `[-]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rolling_damping: Option<f64>,
 }
 
 impl WallMaterial {
@@ -164,6 +174,7 @@ impl WallMaterial {
             softness: self.softness.unwrap_or(grains.softness),
             touching_exponent: self.touching_exponent.unwrap_or(grains.touching_exponent),
             impact_friction: self.impact_friction.unwrap_or(grains.impact_friction),
+            rolling_damping: self.rolling_damping.unwrap_or(grains.rolling_damping),
         }
     }
 }

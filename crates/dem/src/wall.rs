@@ -130,6 +130,9 @@ impl Walls {
             all.extend(walls);
         }
         all.extend(scene.walls.iter().map(of));
+        // Walls that move part from those that they join.
+        let still = all.iter_mut().filter(|wall| wall.placement.is_none());
+        surface::join_rims(still.flat_map(|wall| &mut wall.surfaces));
         let (mut first, mut owner) = (Vec::new(), Vec::new());
         for (number, wall) in all.iter().enumerate() {
             first.push(owner.len() as u32);

@@ -29,7 +29,7 @@ fn vector(range: std::ops::Range<f64>) -> impl Strategy<Value = [f64; 3]> {
 fn material() -> impl Strategy<Value = Material> {
     let coefficient = |max: f64| prop_oneof![Just(0.0), Just(max), 0.0..1.0f64];
     let share = || prop_oneof![Just(0.0), Just(1.0), 0.0..1.0f64];
-    let law = (0.0..0.2f64, coefficient(10.0), coefficient(10.0));
+    let law = (0.0..0.2f64, coefficient(10.0), coefficient(10.0), coefficient(10.0));
     (coefficient(10.0), coefficient(1e3), coefficient(1e3), share(), share(), law).prop_map(
         |(sliding_friction, rolling_friction, torsional_friction, e, e_t, law)| Material {
             sliding_friction,
@@ -40,6 +40,7 @@ fn material() -> impl Strategy<Value = Material> {
             softness: law.0,
             touching_exponent: law.1,
             impact_friction: law.2,
+            rolling_damping: law.3,
         },
     )
 }

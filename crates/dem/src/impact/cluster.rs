@@ -72,7 +72,7 @@ impl Cluster {
         let scenery = Scenery { time, bed, contacts, around, fallen };
         self.clear();
         let closing = self.strike(pair, &scenery)?;
-        let micro_steps = if self.links.len() == 1 {
+        let micro_steps = if self.links.len() == 1 && self.links[0].rolling_damping == 0.0 {
             self.collide_alone(closing);
             0
         } else {
@@ -103,7 +103,7 @@ impl Cluster {
             return None;
         }
         let second = link.ends[1];
-        self.links.push(link);
+        self.links.push(&link);
         self.find_spring(0, closing, scenery.around);
         self.link_all_of(first, Some(pair.partner), scenery);
         if partner < scenery.bed.count() {
@@ -121,7 +121,7 @@ impl Cluster {
                 continue;
             }
             if let Some(link) = self.link(member, partner as usize, false, scenery) {
-                self.links.push(link);
+                self.links.push(&link);
             }
         }
     }
@@ -207,6 +207,7 @@ impl Cluster {
     /// Micro-steps, forward and backward through the links in turn, until nothing presses any more; returns their number.
     fn ring(&mut self, settings: ImpactSettings, scenery: &Scenery) -> usize {
         let enough = settings.stopping_speed;
+        let mut rubbed = 0;
         let period = (FRICTION_PERIOD / settings.micro_step).round().max(1.0) as usize;
         for micro_step in 0..MAX_MICRO_STEPS {
             let begin = self.links.len();
@@ -230,13 +231,14 @@ impl Cluster {
             // In the first micro-step the pair's own spring may hardly push yet.
             let is_over = strongest < enough && micro_step > 1;
             if is_over || (micro_step + 1).is_multiple_of(period) {
-                self.rub();
+                self.rub(settings.micro_step * (micro_step + 1 - rubbed) as f64);
+                rubbed = micro_step + 1;
             }
             if is_over {
                 return micro_step + 1;
             }
         }
-        self.rub();
+        self.rub(settings.micro_step);
         MAX_MICRO_STEPS
     }
 
@@ -265,8 +267,8 @@ impl Cluster {
         push
     }
 
-    /// Friction of every link under what has been pressed since it last acted.
-    fn rub(&mut self) {
+    /// Friction of every link under what has been pressed since it last acted, a time ago.
+    fn rub(&mut self, time: f64) {
         for number in 0..self.links.len() {
             let push = std::mem::take(&mut self.links[number].pushed);
             if push > 0.0 {
@@ -274,8 +276,20 @@ impl Cluster {
                 let friction = link.block.act(&self.members.slip(link), push);
                 self.rub_with(number, &friction);
                 self.links[number].total.normal += push;
+                if self.links[number].rolling_damping > 0.0 {
+                    self.damp_rolling(number, push, time);
+                }
             }
         }
+    }
+
+    /// Lets the dashpot on rolling act.
+    fn damp_rolling(&mut self, number: usize, push: f64, time: f64) {
+        let r = self.members.slip(&self.links[number]).r;
+        let link = &mut self.links[number];
+        let rows = [link.rolling_damping, link.block.rolling, link.block.a_r, link.compliance_n];
+        let m = link.rolling_spring.act(&r, push, time, rows);
+        self.rub_with(number, &Friction { m, ..Friction::default() });
     }
 
     /// Applies and notes friction of a link.

@@ -5,6 +5,7 @@ use std::ops::{Index, IndexMut};
 use nalgebra::Vector3;
 
 use super::friction::{Friction, FrictionBlock};
+use super::rolling_damping::RollingSpring;
 use crate::contact::ContactLaw;
 use crate::material::Material;
 
@@ -34,6 +35,8 @@ pub(super) struct Link {
     /// What it is raised to here: 1 for the pair that strikes `[-]`.
     pub exponent: f64,
     pub tangential_restitution: f64,
+    pub rolling_damping: f64,
+    pub rolling_spring: RollingSpring,
     pub total: Total,
 }
 
@@ -69,6 +72,8 @@ impl Link {
             restitution: material.restitution,
             exponent: if strikes { 1.0 } else { material.touching_exponent },
             tangential_restitution: material.tangential_restitution,
+            rolling_damping: material.rolling_damping,
+            rolling_spring: RollingSpring::default(),
             total: Total::default(),
         }
     }
@@ -93,8 +98,8 @@ impl Links {
         self.0.len()
     }
 
-    pub fn push(&mut self, link: Link) {
-        self.0.push(link);
+    pub fn push(&mut self, link: &Link) {
+        self.0.push(*link);
     }
 
     /// Whether a member has a link to a wall that faces the same way: the next facet of a curved mesh is no second wall.

@@ -31,8 +31,8 @@ enum Mode {
     Rings { beta: f64, nu: f64 },
     /// beta = 1.
     Critical,
-    /// Two rates a < 1 < b of decay, a b = 1; beta = (a + b) / 2, nu = (b - a) / 2.
-    Creeps { slow: f64, fast: f64 },
+    /// beta = cosh psi, nu = sinh psi; two rates of decay, beta - nu and beta + nu.
+    Creeps { beta: f64, nu: f64, slow: f64, fast: f64 },
     /// e = 0.
     Plastic,
 }
@@ -48,7 +48,8 @@ impl Mode {
             return Self::Critical;
         }
         if wanted < 2.0 {
-            let mut phi = std::f64::consts::FRAC_PI_2.min((3.0 - 1.5 * wanted).sqrt() + 1e-3);
+            // From where the curve is steeper: phi cot phi <= 1 - phi^2 / 3.
+            let mut phi = std::f64::consts::FRAC_PI_2.min((3.0 - 1.5 * wanted).sqrt());
             for _ in 0..ROUNDS {
                 let (sin, cos) = libm::sincos(phi);
                 let slope = 2.0 * (cos - phi / sin) / sin;
@@ -58,26 +59,26 @@ impl Mode {
             let beta = if wanted == 0.0 { 0.0 } else { libm::cos(phi) };
             return Self::Rings { beta, nu: libm::sin(phi) };
         }
-        let mut psi = 0.5 * wanted;
+        let mut psi = (0.5 * wanted).min((1.5 * wanted - 3.0).sqrt());
         for _ in 0..ROUNDS {
             let (sinh, cosh) = (libm::sinh(psi), libm::cosh(psi));
             let slope = 2.0 * (cosh - psi / sinh) / sinh;
             psi -= (2.0 * psi * cosh / sinh - wanted) / slope;
         }
-        Self::Creeps { slow: libm::exp(-psi), fast: libm::exp(psi) }
+        let (slow, fast) = (libm::exp(-psi), libm::exp(psi));
+        Self::Creeps { beta: libm::cosh(psi), nu: libm::sinh(psi), slow, fast }
     }
 
     fn beta(self) -> f64 {
         match self {
-            Self::Rings { beta, .. } => beta,
+            Self::Rings { beta, .. } | Self::Creeps { beta, .. } => beta,
             Self::Critical => 1.0,
-            Self::Creeps { slow, fast } => 0.5 * (slow + fast),
             Self::Plastic => f64::INFINITY,
         }
     }
 }
 
-/// Newton steps; five are enough but next to beta = 1.
+/// Newton steps; six are enough.
 const ROUNDS: usize = 12;
 
 impl Spring {
@@ -102,9 +103,13 @@ impl Spring {
                 (decay * cos, decay * sin / nu, beta)
             }
             Mode::Critical => (libm::exp(-time), time * libm::exp(-time), 1.0),
-            Mode::Creeps { slow, fast } => {
+            Mode::Creeps { beta, nu, .. } if nu * time < 1.0 => {
+                let decay = libm::exp(-beta * time);
+                (decay * libm::cosh(nu * time), decay * libm::sinh(nu * time) / nu, beta)
+            }
+            Mode::Creeps { beta, nu, slow, fast } => {
                 let (late, early) = (libm::exp(-slow * time), libm::exp(-fast * time));
-                (0.5 * (late + early), (late - early) / (fast - slow), self.mode.beta())
+                (0.5 * (late + early), 0.5 * (late - early) / nu, beta)
             }
             Mode::Plastic => return [0.0; 2],
         };
@@ -119,9 +124,8 @@ impl Spring {
         match self.mode {
             Mode::Rings { nu, .. } => libm::atan2(force, -rise / nu) / nu,
             Mode::Critical => -force / rise,
-            Mode::Creeps { slow, fast } => {
-                let nu = 0.5 * (fast - slow);
-                libm::log((rise - nu * force) / (rise + nu * force)) / (2.0 * nu)
+            Mode::Creeps { nu, .. } => {
+                libm::log1p(-2.0 * nu * force / (rise + nu * force)) / (2.0 * nu)
             }
             Mode::Plastic => 0.0,
         }

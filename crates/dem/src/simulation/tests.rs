@@ -15,7 +15,7 @@ fn scene() -> Scene {
     scene.start = Start::Grid { counts: [8, 8, 8], spacing: 4.4e-3, jitter: 1e-4, base: 2e-3 };
     scene.funnel = Some(Funnel {
         height: 0.015,
-        stem_radius: 0.012,
+        stem_radius: 0.014,
         rim_radius: 0.025,
         cone_length: 0.02,
         ..Funnel::default()

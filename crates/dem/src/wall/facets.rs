@@ -148,13 +148,14 @@ impl Facets {
             TrianglePointLocation::OnSolid => (true, true),
         };
         if !is_own {
-            return Nearest { distance: f64::INFINITY, normal: facet.normal, side: 0 };
+            let normal = facet.normal;
+            return Nearest { distance: f64::INFINITY, normal, side: 0, bends: false };
         }
         let distance = offset.norm();
         let normal = if distance > 0.0 { offset / distance } else { facet.normal };
         let height = offset.dot(&facet.normal);
         let side = if is_inside && height != 0.0 { height.signum() as i8 } else { 0 };
-        Nearest { distance, normal, side }
+        Nearest { distance, normal, side, bends: !is_inside }
     }
 
     /// Whether the distance at this edge falls into no triangle across, and none of them comes first.

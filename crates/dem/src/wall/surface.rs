@@ -29,6 +29,8 @@ pub(crate) struct Frustum {
     /// Ball about the middle of the axis that holds the shell: a cheap first test.
     middle: Vector3<f64>,
     reach: f64,
+    /// Whether the rims at its begin and end are its own to touch, or those of a shell that it joins.
+    owns: [bool; 2],
 }
 
 type Vector2 = nalgebra::Vector2<f64>;
@@ -42,6 +44,8 @@ pub(crate) struct Nearest {
     pub normal: Vector3<f64>,
     /// Which side of a shell's generator the centre is on, 0 beyond its ends; a change is a passage through the wall.
     pub side: i8,
+    /// Whether the surface bends here, or ends: the distance then changes to second order with a motion across the normal.
+    pub bends: bool,
 }
 
 impl Surface {
@@ -51,7 +55,7 @@ impl Surface {
             Self::Plane { point, normal } => {
                 let distance = (centre - point).dot(normal);
                 let side = if distance < 0.0 { -1 } else { 1 };
-                Nearest { distance, normal: *normal, side }
+                Nearest { distance, normal: *normal, side, bends: false }
             }
             Self::Frustum(shell) => shell.nearest(centre),
             Self::Disc { centre: middle, normal, radius } => {
@@ -67,7 +71,7 @@ impl Surface {
             Self::Frustum(shell) => {
                 let reach = shell.reach + range;
                 (centre - shell.middle).norm_squared() < reach * reach
-                    && shell.nearest(centre).distance < range
+                    && shell.nearest_of_all(centre).0.distance < range
             }
             Self::Disc { .. } => self.nearest(centre).distance < range,
         }
@@ -80,10 +84,18 @@ impl Frustum {
         let generator = Vector2::new(length, radius_to - radius_from);
         let reach = (0.5 * length).hypot(radius_from.max(radius_to));
         let middle = 0.5 * (from + to);
-        Self { from, axis: (to - from) / length, radius_from, generator, middle, reach }
+        let axis = (to - from) / length;
+        Self { from, axis, radius_from, generator, middle, reach, owns: [true; 2] }
     }
 
     fn nearest(&self, centre: &Vector3<f64>) -> Nearest {
+        let (near, share) = self.nearest_of_all(centre);
+        let is_joined = (share <= 0.0 && !self.owns[0]) || (share >= 1.0 && !self.owns[1]);
+        if is_joined { Nearest { distance: f64::INFINITY, ..near } } else { near }
+    }
+
+    /// The nearest point whoever owns it, and where along the generator it would be.
+    fn nearest_of_all(&self, centre: &Vector3<f64>) -> (Nearest, f64) {
         let offset = centre - self.from;
         let along = offset.dot(&self.axis);
         let outward = offset - along * self.axis;
@@ -102,7 +114,7 @@ impl Frustum {
         let inwards = Vector2::new(self.generator.y, -self.generator.x);
         let direction = if distance > 0.0 { gap / distance } else { inwards.normalize() };
         let normal = direction.x * self.axis + direction.y * outward;
-        Nearest { distance, normal, side }
+        (Nearest { distance, normal, side, bends: true }, share)
     }
 }
 
@@ -118,17 +130,38 @@ fn nearest_of_disc(
     let beyond = outward.norm() - radius;
     if beyond <= 0.0 {
         let side = if height < 0.0 { -1 } else { 1 };
-        return Nearest { distance: height.abs(), normal: f64::from(side) * normal, side };
+        let normal = f64::from(side) * normal;
+        return Nearest { distance: height.abs(), normal, side, bends: false };
     }
     let gap = height * normal + outward * (beyond / outward.norm());
     let distance = gap.norm();
-    Nearest { distance, normal: gap / distance, side: 0 }
+    Nearest { distance, normal: gap / distance, side: 0, bends: true }
 }
 
 fn any_normal(axis: &Vector3<f64>) -> Vector3<f64> {
     let other = if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
     axis.cross(&other).normalize()
 }
+
+/// Gives each rim that two shells share to the first of them: a grain that slides off one onto the rim would else be hit by the
+/// other's, which juts out by as much as the first contact overlaps.
+pub(super) fn join_rims<'a>(surfaces: impl Iterator<Item = &'a mut Surface>) {
+    let mut known: Vec<(Vector3<f64>, f64)> = Vec::new();
+    for surface in surfaces {
+        let Surface::Frustum(shell) = surface else { continue };
+        for (end, [along, outward]) in [[0.0; 2], shell.generator.into()].into_iter().enumerate() {
+            let rim = (shell.from + along * shell.axis, shell.radius_from + outward);
+            let is_same = |(centre, radius): &(Vector3<f64>, f64)| {
+                (centre - rim.0).norm() + (radius - rim.1).abs() < SAME * rim.1
+            };
+            shell.owns[end] = !known.iter().any(is_same);
+            known.push(rim);
+        }
+    }
+}
+
+/// How far apart two rims may be to be one, over their radius `[-]`.
+const SAME: f64 = 1e-9;
 
 /// The surfaces of a shape, but for those of a mesh.
 pub(crate) fn surfaces(shape: &Shape) -> Vec<Surface> {

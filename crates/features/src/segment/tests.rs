@@ -5,6 +5,7 @@ use crate::colour::HsvRange;
 use crate::raster::{height_map, render};
 use crate::rng::Stream;
 use crate::sensor::SensorNoise;
+use nalgebra::Vector2;
 
 const RADIUS: f64 = 0.002;
 

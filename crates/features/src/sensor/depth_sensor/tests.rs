@@ -1,7 +1,9 @@
 //! Images whose errors have a closed form.
 
 use super::*;
-use crate::camera::Intrinsics;
+use crate::camera::{Camera, Intrinsics};
+use crate::depth::DepthImage;
+use crate::height_map::HeightMap;
 use crate::raster::render;
 
 /// The D435 of `docs/results/sensor.md`: focal length [px] and baseline [m].

@@ -4,6 +4,7 @@ use super::*;
 use crate::camera::{Camera, Intrinsics};
 use crate::depth::DepthImage;
 use crate::height_map::HeightMap;
+use crate::region::Region;
 
 const FOCAL: f64 = 390.0;
 const BASELINE: f64 = 0.05;

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use super::*;
 use crate::rng::Stream;
+use nalgebra::{Vector2, Vector3};
 
 const SPACING: f64 = 5e-4;
 const GRAIN: f64 = 4e-3;
@@ -55,7 +56,7 @@ fn a_cone_has_its_profile_and_its_slope() {
     let outer = radius * 0.95_f64.sqrt();
     for (ring, statistic) in profile::HEIGHTS.iter().enumerate() {
         // Mean of r over a ring from a to b: ⅔ (b³ - a³)/(b² - a²).
-        let edge = |k: usize| outer * (k as f64 / profile::RINGS as f64).sqrt();
+        let edge = |k: usize| outer * (k as f64 / profile::HEIGHTS.len() as f64).sqrt();
         let (a, b) = (edge(ring), edge(ring + 1));
         let mean = 2.0 / 3.0 * (b.powi(3) - a.powi(3)) / (b * b - a * a);
         let expected = steepness * (radius - mean);
