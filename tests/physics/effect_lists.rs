@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use granulcal::dem::{Effect, Effects};
+use granulcal::dem::Effects;
 
 /// A list of diameters, which is no number and has no path.
 const LISTS: [&str; 1] = ["effects.polydispersity.diameters"];
