@@ -182,9 +182,10 @@ impl Cluster {
         if link.exponent != 1.0 {
             restitution = libm::pow(restitution, link.exponent);
         }
-        let at = self.springs.iter().position(|spring| spring.restitution() == restitution);
+        let h = around.settings.impact.micro_step;
+        let at = self.springs.iter().position(|spring| spring.is_of(restitution, h));
         let at = at.unwrap_or_else(|| {
-            self.springs.push(Spring::new(restitution, around.settings.impact.micro_step));
+            self.springs.push(Spring::new(restitution, h));
             self.springs.len() - 1
         });
         self.links[number].spring = Some(at);

@@ -90,6 +90,11 @@ impl Spring {
         spring
     }
 
+    /// Whether it is the one for this restitution and micro-step.
+    pub fn is_of(&self, restitution: f64, h: f64) -> bool {
+        self.restitution == restitution && self.h == h
+    }
+
     pub fn restitution(&self) -> f64 {
         self.restitution
     }
