@@ -280,6 +280,21 @@ class Recording:
         """What is cut off or damaged, a line each."""
         return self._native.damage
 
+    @property
+    def lens(self) -> dict[str, float] | None:
+        """Lens of a depth image: width, height, fx, fy, cx, cy [px]; None for a height map.
+
+        As OpenCV and the RealSense SDK give it: the centre of the first pixel is (0, 0).
+        """
+        found = self._native.lens
+        names = ("width", "height", "fx", "fy", "cx", "cy")
+        return None if found is None else dict(zip(names, found, strict=True))
+
+    @property
+    def depth_unit(self) -> float | None:
+        """Metres per count of a depth image; None for a height map and for depths in metres."""
+        return self._native.depth_unit
+
     @cached_property
     def depth(self) -> NDArray[np.float32] | None:
         """Depth [m], 0 is no data, shape (h, w); None for a height map."""

@@ -10,6 +10,7 @@ use crate::progress::RowProgress;
 use crate::scene;
 
 pub fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
+    scene::refuse_engine(args.engine.as_deref())?;
     let scene = scene::load(&args.scene)?;
     let prior = scene::prior(&args.prior)?;
     let defaults = GenerateOptions::default();
