@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from granulcal import _native, design_command, loop_command
-from granulcal.commands import engine_command, export, init, model
+from granulcal.commands import engine_command, export, film, init, model, record
 from granulcal.commands.program import Parser, describe
 from granulcal.files import write_beside
 from granulcal.one_thread import one_thread
@@ -95,6 +95,8 @@ def _parser() -> argparse.ArgumentParser:
     loop_command.add(commands)
     design_command.add(commands)
     export.add(commands)
+    film.add(commands)
+    record.add(commands)
     _add_reproduce(commands)
     _add_demo(commands)
     return parser

@@ -134,6 +134,18 @@ class Dataset:
     def __len__(self) -> int:
         return len(self.theta)
 
+    def _repr_html_(self) -> str:
+        from granulcal.html import page
+
+        rows: dict[str, object] = {"pours": len(self), **self.status_counts()}
+        rows |= {
+            name: f"{low:.3g} to {high:.3g}"
+            for name, low, high in zip(
+                self.theta_names, self.theta.min(axis=0), self.theta.max(axis=0), strict=True
+            )
+        }
+        return page(f"Dataset of {self.scene.name}", rows)
+
     def __repr__(self) -> str:
         counts = ", ".join(f"{n} {status}" for status, n in self.status_counts().items())
         return f"Dataset({len(self)} pours: {counts}; {', '.join(self.theta_names)})"

@@ -417,6 +417,20 @@ class Recording:
             return run_out.observed(scene)
         return DischargeCurve.open(path, series).observed(scene)
 
+    def _repr_html_(self) -> str:
+        from granulcal.html import page, picture, seen_from_above
+
+        rows: dict[str, object] = {"frames": self.frames, "topic": self.topic or "-"}
+        image, label = (
+            (self.depth, "depth [m]") if self.depth is not None else (self.heights, "z [m]")
+        )
+        if image is not None:
+            rows["size"] = f"{image.shape[1]} x {image.shape[0]}"
+        if self.lost is not None:
+            rows["damage"] = str(self.lost)
+        drawn = "" if image is None else picture(seen_from_above(image, label))
+        return page(f"Recording {self.path.name}", rows, drawn)
+
     def __repr__(self) -> str:
         kind = "height map" if self.depth is None else f"depth, {self.frames} frame(s)"
         return f"Recording({str(self.path)!r}, {kind})"

@@ -176,6 +176,18 @@ class Pour:
     def _observation(self) -> _native.Observation:
         return self._native.observe()
 
+    def _repr_html_(self) -> str:
+        from granulcal.html import page, picture, seen_from_above
+
+        rows = {"status": self.status, "grains": len(self.radii)}
+        rows |= {"simulated": f"{self.simulated_s:.2f} s", "seed": self.seed}
+        view = self._observation
+        image, label = (
+            (view.depth, "depth [m]") if view.heights is None else (view.heights, "z [m]")
+        )
+        drawn = "" if image is None else picture(seen_from_above(image, label))
+        return page(f"Pour of {self.scene.name}", rows, drawn)
+
     def __repr__(self) -> str:
         return f"Pour({len(self.radii)} grains, {self.status}, {self.simulated_s:.2f} s)"
 

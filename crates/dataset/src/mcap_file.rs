@@ -3,6 +3,7 @@
 //! | topic | schema | what |
 //! |---|---|---|
 //! | `/grains` | foxglove.PointCloud | centres and radii, f32 `[m]`, frame `world` |
+//! | `/walls` | foxglove.SceneUpdate | ground, funnel and walls, once, or in every frame where one moves |
 //! | `/depth` | foxglove.RawImage, 32FC1 | what the scene's camera delivers `[m]`, frame `camera`; 0 is no data |
 //! | `/heights` | foxglove.RawImage, 32FC1 | the same for an orthographic camera, instead of `/depth` |
 //! | `/camera` | foxglove.CameraCalibration | the pinhole camera of `/depth` |
@@ -11,6 +12,8 @@
 //!
 //! Time 0 is the start of the pour. The scene's TOML, the seed and the outcome stand in the metadata
 //! record `granulcal`, the TOML also as the attachment `scene.toml`.
+
+mod walls;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -90,6 +93,7 @@ struct Recorder<'a> {
     writer: Writer<PendingFile>,
     path: &'a Path,
     sequences: BTreeMap<u16, u32>,
+    has_walls: bool,
 }
 
 impl<'a> Recorder<'a> {
@@ -98,7 +102,7 @@ impl<'a> Recorder<'a> {
         let writer = options
             .create(PendingFile::create(path)?)
             .map_err(|source| DatasetError::Mcap { path: path.to_owned(), source })?;
-        Ok(Self { writer, path, sequences: BTreeMap::new() })
+        Ok(Self { writer, path, sequences: BTreeMap::new(), has_walls: false })
     }
 
     fn attach_scene(&mut self, scene_toml: &str) -> McapResult<()> {
@@ -127,7 +131,12 @@ impl<'a> Recorder<'a> {
             .iter()
             .map(|view| (format!("views/{}", view.name), look_from(view, &positions, &radii)))
             .collect();
+        let shows_walls = !self.has_walls || walls::move_ever(scene);
+        self.has_walls = true;
         let messages = |recorder: &mut Self| -> McapResult<()> {
+            if shows_walls {
+                recorder.send("/walls", time, &walls::walls(scene, time))?;
+            }
             recorder.send("/grains", time, &grains(time, simulation))?;
             match view {
                 Ok(View::Depth(camera, image)) => {
