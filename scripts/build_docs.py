@@ -2,7 +2,8 @@
 
     make docs
 
-The pages of theory and results are found by their folders. Links that leave docs/ lead to the repository.
+The pages of theory and results are found by their folders. Links out of docs/ lead to the
+repository.
 """
 
 import argparse

@@ -2,8 +2,8 @@
 
     python scripts/check_wheel.py
 
-Run it where `granulcal` is installed and not from the source tree's own build. It ends with 0 and the
-version, or says what is wrong.
+It tries the installed package and not the source tree. It ends with 0 and the version, or says
+what is wrong.
 """
 
 import sys
@@ -24,17 +24,8 @@ def main() -> int:
     assert (Path(gc.__file__).parent / "py.typed").exists()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "couscous"
-        words = [
-            "init",
-            str(folder),
-            "--scene",
-            "drop",
-            "--preset",
-            "fast",
-            "--set",
-            "grains.count=60",
-        ]
-        assert granulcal(words) == 0
+        words = ["--scene", "drop", "--preset", "fast", "--set", "grains.count=60"]
+        assert granulcal(["init", str(folder), *words]) == 0
         assert granulcal(["sample", str(folder)]) == 0
         scene = gc.Scene.load(folder / "scene.toml")
         pour = gc.simulate(scene, seed=1)

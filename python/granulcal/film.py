@@ -107,15 +107,8 @@ def film(
     frames += last
     times = [round(1000 / fps)] * (len(frames) - 1) + [_HOLD_MS]
     beside = Path(path).with_name(Path(path).name + ".part")
-    frames[0].save(
-        beside,
-        "GIF",
-        save_all=True,
-        append_images=frames[1:],
-        duration=times,
-        loop=0,
-        optimize=True,
-    )
+    options: dict[str, Any] = {"append_images": frames[1:], "duration": times, "loop": 0}
+    frames[0].save(beside, "GIF", save_all=True, optimize=True, **options)
     beside.replace(path)
     return len(frames)
 

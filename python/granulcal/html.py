@@ -15,8 +15,9 @@ __all__ = ["page", "picture"]
 
 def page(title: str, rows: Mapping[str, object], image: str = "") -> str:
     """Returns HTML of a title, rows of a table, and an image that `picture` made."""
+    head = "<tr><th style='text-align:left'>"
     cells = "".join(
-        f"<tr><th style='text-align:left'>{html.escape(name)}</th><td>{html.escape(str(value))}</td></tr>"
+        f"{head}{html.escape(name)}</th><td>{html.escape(str(value))}</td></tr>"
         for name, value in rows.items()
     )
     return f"<div><b>{html.escape(title)}</b><table>{cells}</table>{image}</div>"

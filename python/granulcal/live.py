@@ -1,4 +1,4 @@
-"""Depth frames from a camera at this computer: a RealSense, a topic of ROS 2, or a source of one's own."""
+"""Depth frames from a camera at this computer: a RealSense, a topic of ROS 2, one's own source."""
 
 import time
 from collections.abc import Iterator

@@ -387,9 +387,7 @@ class Posterior:
         import arviz  # pyright: ignore[reportMissingImports]
 
         if chains < 1 or draws < chains:
-            raise ValueError(
-                f"draws must be at least chains and those at least 1, got {draws}, {chains}"
-            )
+            raise ValueError(f"draws must be at least chains, and chains 1, got {draws}, {chains}")
         each = draws // chains
 
         def split(values: Array) -> dict[str, Array]:

@@ -421,9 +421,8 @@ class Recording:
         from granulcal.html import page, picture, seen_from_above
 
         rows: dict[str, object] = {"frames": self.frames, "topic": self.topic or "-"}
-        image, label = (
-            (self.depth, "depth [m]") if self.depth is not None else (self.heights, "z [m]")
-        )
+        label = "z [m]" if self.depth is None else "depth [m]"
+        image = self.heights if self.depth is None else self.depth
         if image is not None:
             rows["size"] = f"{image.shape[1]} x {image.shape[0]}"
         if self.lost is not None:

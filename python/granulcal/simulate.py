@@ -182,9 +182,8 @@ class Pour:
         rows = {"status": self.status, "grains": len(self.radii)}
         rows |= {"simulated": f"{self.simulated_s:.2f} s", "seed": self.seed}
         view = self._observation
-        image, label = (
-            (view.depth, "depth [m]") if view.heights is None else (view.heights, "z [m]")
-        )
+        label = "z [m]" if view.depth is None else "depth [m]"
+        image = view.heights if view.depth is None else view.depth
         drawn = "" if image is None else picture(seen_from_above(image, label))
         return page(f"Pour of {self.scene.name}", rows, drawn)
 
