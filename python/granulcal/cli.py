@@ -1,6 +1,7 @@
 """Command line `granulcal`: what needs Python here, every other word by granulcal-cli."""
 
 import argparse
+import contextlib
 import importlib.util
 import json
 import sys
@@ -54,7 +55,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         # argparse ends the process; here the exit code is returned like every other.
         return end.code if isinstance(end.code, int) else _BAD_INPUT
     options.words = words
-    return _guarded(lambda: options.run(options))
+    return _guarded(lambda: _run_told(options))
+
+
+def _run_told(options: argparse.Namespace) -> int:
+    """Runs a command; with --json what it says goes to stderr, and `options.told` to stdout at its end.
+
+    Commands that print a document of their own leave `told` empty.
+    """
+    options.told = {}
+    if not getattr(options, "json", False) or options.run not in (_train, _check, _report):
+        return options.run(options)
+    with contextlib.redirect_stdout(sys.stderr):
+        code = options.run(options)
+    print(json.dumps(options.told, indent=1))
+    return code
 
 
 def _guarded(command: Callable[[], int]) -> int:
@@ -124,6 +139,7 @@ def _add_train(commands: Any) -> None:
         help="Gaussians in the mixture of each of the network's five members (default: 5); of "
         "several numbers the one of the best validation loss is kept",
     )
+    parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_train)
 
 
@@ -139,6 +155,7 @@ def _add_check(commands: Any) -> None:
         type=Path,
         help="write coverage.png, sbc.png and training.png to this folder",
     )
+    parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_check)
 
 
@@ -204,6 +221,7 @@ def _add_report(commands: Any) -> None:
     parser.add_argument(
         "--data", type=Path, help=f"training data (default: {_TRAINING} in the model's folder)"
     )
+    parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_report)
 
 
@@ -221,6 +239,7 @@ def _train(options: argparse.Namespace) -> int:
     from granulcal.dataset import Dataset
 
     data = Dataset.load(options.data)
+    told = options.told
     settings: dict[str, Any] = {}
     if options.components:
         settings["components"] = tuple(options.components)
@@ -228,6 +247,8 @@ def _train(options: argparse.Namespace) -> int:
     model.save(options.out)
     data.save(options.out / _TRAINING)
     print(f"model written to {options.out}")
+    checked = None if model.calibration is None else model.calibration.is_calibrated
+    told |= {"model": str(options.out), "pours": len(data), "calibrated": checked}
     return _DONE
 
 
@@ -248,6 +269,8 @@ def _check(options: argparse.Namespace) -> int:
             )
         print(f"on the {len(pairs.theta)} usable pours of {options.data}:")
         calibration = model.check(pairs.theta, pairs.x)
+    options.told["model"] = str(options.model)
+    options.told["calibrated"] = None if calibration is None else calibration.is_calibrated
     if calibration is None:
         print("  not checked: too few pours to keep some aside; give some with --data")
         return _UNHEALTHY
@@ -325,12 +348,20 @@ def _infer_without_torch(options: argparse.Namespace) -> int:
 def _calibrate(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named
     from granulcal.prior import Prior
+    from granulcal.progress import ProgressLine
     from granulcal.scene import Scene
     from granulcal.within_budget import calibrate_within
 
     scene = Scene.named(options.scene)
     prior = Prior.named(options.prior)
     recordings = _recordings(options)
+    line, first = ProgressLine(), []
+
+    def poured(kept: int) -> None:
+        # What was kept before the first pour of this run is not counted in the time that is left.
+        first.append(kept - 1)
+        line(options.budget, first[0], kept - first[0], 0)
+
     found = calibrate_within(
         scene,
         prior,
@@ -340,13 +371,10 @@ def _calibrate(options: argparse.Namespace) -> int:
         seed=options.seed,
         threads=options.threads,
         progress=lambda each: print(each, file=sys.stderr, flush=True),
-        poured=lambda n: (
-            print(f"\r{n} of {options.budget} pours", end="", file=sys.stderr, flush=True)
-            if sys.stderr.isatty()
-            else None
-        ),
+        poured=poured,
         engine=None if options.engine is None else engine_named(options.engine),
     )
+    line.close()
     posterior = found.posterior
     document = {
         "recordings": [str(path) for path in options.recording],
@@ -419,6 +447,7 @@ def _report(options: argparse.Namespace) -> int:
         f"-o {options.out} --seeds {options.seeds}",
     )
     print(found.report)
+    options.told["report"] = str(found.report)
     is_healthy = all(p.status != "unhealthy" for p in [*found.pours, *found.prior_pours])
     return _outcome(recordings, is_healthy)
 
@@ -464,12 +493,15 @@ def _demo(options: argparse.Namespace) -> int:
 
 
 def _model(options: argparse.Namespace) -> Any:
+    from granulcal.starter.models import model_named
+
+    # Before PyTorch is loaded: a name that leads nowhere is told at once.
+    folder = model_named(options.model)
     from granulcal.bayessim import BayesSim
     from granulcal.calibrate import require_own_statistics, require_same_scene
     from granulcal.scene import Scene
-    from granulcal.starter.models import model_named
 
-    model = BayesSim.load(model_named(options.model))
+    model = BayesSim.load(folder)
     require_own_statistics(model)
     if options.scene is not None:
         require_same_scene(model, Scene.load(options.scene))

@@ -8,9 +8,10 @@ import pytest
 
 from granulcal.cli import _parser, main
 
-ALL = "scene simulate generate render features infer fit-sensor pick-colour inspect merge completions "
-ALL += "init sample model train check calibrate report close-loop design export film record "
-ALL += "reproduce demo"
+ALL = """
+scene simulate generate render features infer fit-sensor pick-colour inspect merge completions
+init sample model train check calibrate report close-loop design export film record reproduce demo
+"""
 
 
 def _told(*words: str) -> subprocess.CompletedProcess[str]:

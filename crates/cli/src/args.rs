@@ -208,6 +208,9 @@ pub struct GenerateArgs {
     /// Refuse a folder that holds rows already
     #[arg(long)]
     pub no_resume: bool,
+    /// Say how long it would take, from three pours, and make nothing
+    #[arg(long)]
+    pub dry_run: bool,
     /// Print the summary as one JSON object
     #[arg(long)]
     pub json: bool,

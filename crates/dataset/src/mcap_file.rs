@@ -13,6 +13,7 @@
 //! Time 0 is the start of the pour. The scene's TOML, the seed and the outcome stand in the metadata
 //! record `granulcal`, the TOML also as the attachment `scene.toml`.
 
+mod stamp;
 mod walls;
 
 use std::borrow::Cow;
@@ -23,17 +24,18 @@ use foxglove::Encode;
 use foxglove::messages::packed_element_field::NumericType;
 use foxglove::messages::{
     CameraCalibration, FrameTransform, PackedElementField, PointCloud, Pose, Quaternion, RawImage,
-    Timestamp, Vector3,
+    Vector3,
 };
 use granulcal_dem::{Pour, Scene, Simulation};
 use granulcal_features::{Camera, DepthImage, Intrinsics};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 
+use stamp::{WORLD, nanoseconds, timestamp};
+
 use crate::files::PendingFile;
 use crate::{DatasetError, Observer, VERSION, View, look, look_from};
 
-const WORLD: &str = "world";
 const CAMERA: &str = "camera";
 /// Bytes of one grain in `/grains`: x, y, z, radius.
 const STRIDE: u32 = 16;
@@ -207,15 +209,6 @@ impl<'a> Recorder<'a> {
         self.writer.finish().map_err(failed)?;
         self.writer.into_inner().commit()
     }
-}
-
-fn nanoseconds(time: f64) -> u64 {
-    (time * 1e9).round() as u64
-}
-
-fn timestamp(time: f64) -> Option<Timestamp> {
-    let total = nanoseconds(time);
-    Timestamp::new_checked((total / 1_000_000_000) as u32, (total % 1_000_000_000) as u32)
 }
 
 fn grains(time: f64, simulation: &Simulation) -> PointCloud {

