@@ -1,9 +1,11 @@
 """One grain in MuJoCo under the exported material, beside the closed forms of our law.
 
-    python -m venv build/engines-venv && build/engines-venv/bin/pip install mujoco numpy threadpoolctl
+    python -m venv build/engines-venv
+    build/engines-venv/bin/pip install mujoco numpy threadpoolctl
     PYTHONPATH=python build/engines-venv/bin/python benches/export_grain.py
 
-It falls 5 cm and rebounds with e; it slides and is slowed by mu_s g; it rolls and is slowed by 5/7 mu_r g.
+It falls 5 cm and rebounds with e; it slides and is slowed by mu_s g; it rolls and is slowed by
+5/7 mu_r g.
 """
 
 import mujoco

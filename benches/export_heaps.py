@@ -1,10 +1,11 @@
-"""The exported pour in other engines, and how far its pile is from ours; docs/export.md has the table.
+"""The exported pour in other engines beside ours, the table of docs/export.md.
 
-    python benches/export_heaps.py                        pours what benches/export_heaps.csv lacks, prints the table
+    python benches/export_heaps.py
     python benches/export_heaps.py --engines lammps yade --rows heap --seeds 2
 
-Engines that are not installed are left out. Python engines are looked for in build/engines-venv too. A pour is
-kept once it is made; pours of another version of our simulator are made anew, those of the engines are kept.
+Pours what export_heaps.csv lacks and prints the table. Engines that are not installed are left
+out; those of PyPI are looked for in build/engines-venv too. A pour is kept once it is made; ours
+are made anew when our simulator has changed, those of the engines stay.
 """
 
 import argparse
