@@ -14,7 +14,7 @@ BENCH_VENV := build/bench-venv
 # Sets and dictionaries of words keep one order in every run.
 export PYTHONHASHSEED := 0
 
-.PHONY: help demo test test-rust test-python test-long bench-physics bench-features referee lint bench build fuzz clean
+.PHONY: help demo docs model test test-rust test-python test-long bench-physics bench-features referee lint bench build fuzz clean
 
 help: ## list the verbs
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -84,6 +84,22 @@ fuzz: ## fuzz the readers of recordings, FUZZ_SECONDS (600) on each of FUZZ_TARG
 			$$(ls -d fuzz/regressions/$$target 2>/dev/null) -- \
 			-max_total_time=$(FUZZ_SECONDS) -max_len=65536 -timeout=30 -rss_limit_mb=1024; \
 	done
+
+# The site has an environment of its own: none of it is needed to use or test granulcal.
+DOCS_VENV := build/docs-venv
+
+docs: $(VENV)/.native ## the site in build/site: guide, gallery, commands, Python, theory, results; links are strict
+	test -x $(DOCS_VENV)/bin/mkdocs || { $(PYTHON) -m venv $(DOCS_VENV); \
+		$(DOCS_VENV)/bin/python -m pip install --quiet -r docs/requirements.txt; }
+	$(BIN)/python scripts/build_docs.py
+	$(DOCS_VENV)/bin/mkdocs build --strict --quiet --config-file build/mkdocs.yml
+	cargo doc --workspace --no-deps --locked --target-dir build/rustdoc
+	rm -rf build/site/rust && cp -r build/rustdoc/doc build/site/rust
+
+MODEL_POURS ?= 1000
+
+model: $(VENV)/.native ## the model of the built-in funnel that ships with the wheel; MODEL_POURS pours (1000), resumed
+	$(BIN)/granulcal model funnel -n $(MODEL_POURS) -o python/granulcal/models/funnel
 
 clean: ## remove what was built, not what was measured
 	rm -rf target $(VENV) python/granulcal/_native.abi3.so

@@ -1,5 +1,6 @@
 """A camera that makes recordings of simulated grains, as a real one would."""
 
+import tomllib
 from os import PathLike
 from pathlib import Path
 
@@ -13,6 +14,7 @@ __all__ = ["Camera"]
 
 # A tenth of a millimetre: finer than a depth camera at this range, and 16 bits reach 6.5 m.
 _DEPTH_UNIT = 1e-4
+_LENS = ("width", "height", "fx", "fy", "cx", "cy")
 
 
 class Camera:
@@ -37,6 +39,29 @@ class Camera:
             ValueError: a number is out of its range.
         """
         return cls(_native.Camera.overhead(height, field_width, pixels))
+
+    @classmethod
+    def load(cls, path: str | PathLike[str], *, height: float) -> "Camera":
+        """Returns the camera whose lens stands in a TOML, looking straight down.
+
+        Args:
+            path: TOML with width, height, fx, fy, cx and cy, as `Recording.open` takes it.
+            height: height above the ground [m].
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: it lacks a number of the lens, or one is out of its range.
+        """
+        try:
+            table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ValueError(f"{path}: not valid TOML: {error}") from None
+        missing = [name for name in _LENS if name not in table]
+        if missing:
+            raise ValueError(f"{path} must have {', '.join(_LENS)}; it lacks {', '.join(missing)}")
+        columns, rows, *rest = (table[name] for name in _LENS)
+        fx, fy, cx, cy = map(float, rest)
+        return cls(_native.Camera.above(height, (columns, rows, fx, fy, cx, cy)))
 
     def tilted(self, *, x_deg: float = 0.0, y_deg: float = 0.0) -> "Camera":
         """Returns the camera turned about its own x axis, then its own y axis [deg]."""
@@ -102,5 +127,16 @@ class Camera:
         place = Path(folder)
         place.mkdir(parents=True, exist_ok=True)
         paths = place / "depth.png", place / "camera.toml"
-        self._native.save_image(image, *paths, depth_unit)
+        self.save(image, *paths, depth_unit=depth_unit)
         return paths
+
+    def save(
+        self,
+        image: NDArray[np.float32],
+        png: str | PathLike[str],
+        toml: str | PathLike[str],
+        *,
+        depth_unit: float = _DEPTH_UNIT,
+    ) -> None:
+        """Writes a depth image [m] of shape (h, w) as a 16-bit PNG, and the camera's TOML."""
+        self._native.save_image(image, png, toml, depth_unit)

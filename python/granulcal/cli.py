@@ -1,6 +1,8 @@
 """Command line `granulcal`: what needs Python here, every other word by granulcal-cli."""
 
 import argparse
+import contextlib
+import importlib.util
 import json
 import sys
 import warnings
@@ -9,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from granulcal import _native, design_command, loop_command
+from granulcal.commands import engine_command, export, film, init, model, record
+from granulcal.commands.program import Parser, describe
 from granulcal.files import write_beside
 from granulcal.one_thread import one_thread
 
@@ -19,46 +23,53 @@ _UNHEALTHY = 3
 _SAMPLES = 1000
 _TRAINING = "training.parquet"
 
-_DESCRIPTION = """\
-Calibrates a granular simulator from depth images.
-
+_EPILOG = """\
+From a recording to a material:
+  granulcal init couscous                                     scene, prior, camera and task, commented
+  granulcal sample couscous                                   no camera at hand? recordings of a known truth
   granulcal generate scene.toml prior.toml -n 1000 -o pours   simulate a training set
   granulcal train pours -o model                              train BayesSim on it
   granulcal check model                                       may its intervals be trusted?
-  granulcal infer model couscous.png --camera camera.toml     posterior of the material
-  granulcal report model couscous.png --camera camera.toml -o report.html
-  granulcal calibrate scene.toml prior.toml couscous.png --camera camera.toml --budget 100 -o run
-                                                              one recording, few pours
+  granulcal infer model couscous.bag                          posterior of the material
+  granulcal calibrate scene.toml prior.toml couscous.bag --budget 100 -o run
+                                                              one recording, few pours, no model
+  granulcal export posterior posterior.json scene.toml --to lammps -o pour
   granulcal close-loop loop.toml -o loop                      what does the model lack?
-  granulcal design rings scene.toml --ring 0.04 0.073 -o plan  from which height to pour a ring
-  granulcal design spill bowl.toml --grains 10 -o spill       how probably a height spills 10 grains
 
-Commands of the simulator (granulcal COMMAND --help tells more):
-  simulate, generate, render, features, fit-sensor, pick-colour, inspect, merge, completions
-"""
-_EPILOG = (
-    "Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy, "
-    "some frames of a recording lost, or a model that fails its check."
-)
+Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy, some frames of a
+recording lost, or a model that fails its check, 130 stopped."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command line without the program's name; returns the exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
     parser = _parser()
-    if words and not words[0].startswith("-") and words[0] not in _commands():
-        return _native.run_cli(["granulcal", *words])
-    if words and words[0] == "demo":
-        return _guarded(lambda: _demo(words[1:]))
+    word = words[0] if words else ""
+    if word in ("simulate", "generate") and engine_command.is_asked(words):
+        return _guarded(lambda: engine_command.run(words))
+    if word not in _commands(parser):
+        return _native.run_cli(["granulcal", *words], describe(parser, after_help=_EPILOG))
     try:
         options = parser.parse_args(words)
     except SystemExit as end:
         # argparse ends the process; here the exit code is returned like every other.
         return end.code if isinstance(end.code, int) else _BAD_INPUT
-    if options.run is None:
-        parser.print_help()
-        return _BAD_INPUT
-    return _guarded(lambda: options.run(options))
+    options.words = words
+    return _guarded(lambda: _run_told(options))
+
+
+def _run_told(options: argparse.Namespace) -> int:
+    """Runs a command; with --json what it says goes to stderr, and `options.told` to stdout at its end.
+
+    Commands that print a document of their own leave `told` empty.
+    """
+    options.told = {}
+    if not getattr(options, "json", False) or options.run not in (_train, _check, _report):
+        return options.run(options)
+    with contextlib.redirect_stdout(sys.stderr):
+        code = options.run(options)
+    print(json.dumps(options.told, indent=1))
+    return code
 
 
 def _guarded(command: Callable[[], int]) -> int:
@@ -82,21 +93,15 @@ def _guarded(command: Callable[[], int]) -> int:
         return _FAILED
 
 
-def _commands() -> tuple[str, ...]:
-    words = "train check infer calibrate report close-loop design reproduce demo"
-    return tuple(words.split())
+def _commands(parser: argparse.ArgumentParser) -> set[str]:
+    return {name for action in parser._actions for name in (action.choices or ())}
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="granulcal",
-        description=_DESCRIPTION,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("--version", action="version", version=f"granulcal {_native.__version__}")
-    parser.set_defaults(run=None)
-    commands = parser.add_subparsers(title="commands of the inference", metavar="COMMAND")
+    parser = Parser(prog="granulcal")
+    commands = parser.add_subparsers(metavar="COMMAND")
+    init.add(commands)
+    model.add(commands)
     _add_train(commands)
     _add_check(commands)
     _add_infer(commands)
@@ -104,8 +109,11 @@ def _parser() -> argparse.ArgumentParser:
     _add_report(commands)
     loop_command.add(commands)
     design_command.add(commands)
+    export.add(commands)
+    film.add(commands)
+    record.add(commands)
     _add_reproduce(commands)
-    commands.add_parser("demo", help="the whole job on a recording with a known truth")
+    _add_demo(commands)
     return parser
 
 
@@ -131,6 +139,7 @@ def _add_train(commands: Any) -> None:
         help="Gaussians in the mixture of each of the network's five members (default: 5); of "
         "several numbers the one of the best validation loss is kept",
     )
+    parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_train)
 
 
@@ -146,11 +155,12 @@ def _add_check(commands: Any) -> None:
         type=Path,
         help="write coverage.png, sbc.png and training.png to this folder",
     )
+    parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_check)
 
 
 def _add_recordings(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("model", type=Path, help="folder of `train`")
+    parser.add_argument("model", type=Path, help="folder of `train`, or a scene of `model`")
     _add_reading(parser)
     parser.add_argument("--scene", type=Path, help="refuse a model of another scene than this TOML")
 
@@ -196,6 +206,7 @@ def _add_calibrate(commands: Any) -> None:
     parser.add_argument("-o", "--out", type=Path, required=True, help="folder; holds the pours")
     parser.add_argument("--seed", type=int, default=0, help="seed of the run (default: 0)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.set_defaults(run=_calibrate)
 
@@ -210,6 +221,7 @@ def _add_report(commands: Any) -> None:
     parser.add_argument(
         "--data", type=Path, help=f"training data (default: {_TRAINING} in the model's folder)"
     )
+    parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_report)
 
 
@@ -227,6 +239,7 @@ def _train(options: argparse.Namespace) -> int:
     from granulcal.dataset import Dataset
 
     data = Dataset.load(options.data)
+    told = options.told
     settings: dict[str, Any] = {}
     if options.components:
         settings["components"] = tuple(options.components)
@@ -234,6 +247,8 @@ def _train(options: argparse.Namespace) -> int:
     model.save(options.out)
     data.save(options.out / _TRAINING)
     print(f"model written to {options.out}")
+    checked = None if model.calibration is None else model.calibration.is_calibrated
+    told |= {"model": str(options.out), "pours": len(data), "calibrated": checked}
     return _DONE
 
 
@@ -241,8 +256,9 @@ def _check(options: argparse.Namespace) -> int:
     from granulcal.bayessim import BayesSim
     from granulcal.bayessim.pairs import TrainingPairs
     from granulcal.dataset import Dataset
+    from granulcal.starter.models import model_named
 
-    model = BayesSim.load(options.model)
+    model = BayesSim.load(model_named(options.model))
     print(model.summary)
     calibration = model.calibration
     if options.data is not None:
@@ -253,6 +269,8 @@ def _check(options: argparse.Namespace) -> int:
             )
         print(f"on the {len(pairs.theta)} usable pours of {options.data}:")
         calibration = model.check(pairs.theta, pairs.x)
+    options.told["model"] = str(options.model)
+    options.told["calibrated"] = None if calibration is None else calibration.is_calibrated
     if calibration is None:
         print("  not checked: too few pours to keep some aside; give some with --data")
         return _UNHEALTHY
@@ -268,6 +286,8 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _infer(options: argparse.Namespace) -> int:
+    if importlib.util.find_spec("torch") is None:
+        return _infer_without_torch(options)
     import numpy as np
 
     from granulcal.identifiability import Identifiability
@@ -314,14 +334,34 @@ def _infer(options: argparse.Namespace) -> int:
     return _outcome(recordings)
 
 
+def _infer_without_torch(options: argparse.Namespace) -> int:
+    """Lets the Rust side evaluate the model: the same posterior, without its picture."""
+    if options.plot is not None:
+        raise ModuleNotFoundError("--plot needs PyTorch")
+    from granulcal.starter.models import model_named
+
+    named = str(options.model)
+    words = [str(model_named(named)) if word == named else word for word in options.words]
+    return _native.run_cli(["granulcal", *words])
+
+
 def _calibrate(options: argparse.Namespace) -> int:
+    from granulcal.engines import engine_named
     from granulcal.prior import Prior
+    from granulcal.progress import ProgressLine
     from granulcal.scene import Scene
     from granulcal.within_budget import calibrate_within
 
     scene = Scene.named(options.scene)
-    prior = Prior.default() if str(options.prior) == "default" else Prior.load(options.prior)
+    prior = Prior.named(options.prior)
     recordings = _recordings(options)
+    line, first = ProgressLine(), []
+
+    def poured(kept: int) -> None:
+        # What was kept before the first pour of this run is not counted in the time that is left.
+        first.append(kept - 1)
+        line(options.budget, first[0], kept - first[0], 0)
+
     found = calibrate_within(
         scene,
         prior,
@@ -331,12 +371,10 @@ def _calibrate(options: argparse.Namespace) -> int:
         seed=options.seed,
         threads=options.threads,
         progress=lambda each: print(each, file=sys.stderr, flush=True),
-        poured=lambda n: (
-            print(f"\r{n} of {options.budget} pours", end="", file=sys.stderr, flush=True)
-            if sys.stderr.isatty()
-            else None
-        ),
+        poured=poured,
+        engine=None if options.engine is None else engine_named(options.engine),
     )
+    line.close()
     posterior = found.posterior
     document = {
         "recordings": [str(path) for path in options.recording],
@@ -379,11 +417,13 @@ def _report(options: argparse.Namespace) -> int:
     from granulcal.calibrate import calibrate
     from granulcal.dataset import Dataset
     from granulcal.recording import FRAMES
+    from granulcal.starter.models import model_named
 
     if options.seeds < 1:
         raise ValueError(f"--seeds must be at least 1, got {options.seeds}")
     model = _model(options)
-    data = Dataset.load(options.model / _TRAINING if options.data is None else options.data)
+    folder = model_named(options.model)
+    data = Dataset.load(folder / _TRAINING if options.data is None else options.data)
     names = " ".join(str(path) for path in options.recording)
     flags = "".join(
         f" --{name.replace('_', '-')} {getattr(options, name)}"
@@ -407,6 +447,7 @@ def _report(options: argparse.Namespace) -> int:
         f"-o {options.out} --seeds {options.seeds}",
     )
     print(found.report)
+    options.told["report"] = str(found.report)
     is_healthy = all(p.status != "unhealthy" for p in [*found.pours, *found.prior_pours])
     return _outcome(recordings, is_healthy)
 
@@ -432,21 +473,35 @@ def _reproduce(options: argparse.Namespace) -> int:
     return _DONE
 
 
-def _demo(words: list[str]) -> int:
+def _add_demo(commands: Any) -> None:
+    text = "the whole job on a recording with a known truth"
+    parser = commands.add_parser("demo", help=text, description=text)
+    parser.add_argument("--out", type=Path, default=Path("demo"), help="folder (default: demo)")
+    parser.add_argument("--pours", type=int, help="pours to train on; fewer are less sharp")
+    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.set_defaults(run=_demo)
+
+
+def _demo(options: argparse.Namespace) -> int:
     from granulcal.demo import main as demo
 
-    try:
-        return demo(words)
-    except SystemExit as end:
-        return end.code if isinstance(end.code, int) else _BAD_INPUT
+    words = ["--out", str(options.out)]
+    for name in ("pours", "threads"):
+        value = getattr(options, name)
+        words += [] if value is None else [f"--{name}", str(value)]
+    return demo(words)
 
 
 def _model(options: argparse.Namespace) -> Any:
+    from granulcal.starter.models import model_named
+
+    # Before PyTorch is loaded: a name that leads nowhere is told at once.
+    folder = model_named(options.model)
     from granulcal.bayessim import BayesSim
     from granulcal.calibrate import require_own_statistics, require_same_scene
     from granulcal.scene import Scene
 
-    model = BayesSim.load(options.model)
+    model = BayesSim.load(folder)
     require_own_statistics(model)
     if options.scene is not None:
         require_same_scene(model, Scene.load(options.scene))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from granulcal.progress import ProgressLine
 from granulcal.scene import Scene
 from granulcal.simulate import check_whole
 from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES
+
+if TYPE_CHECKING:
+    from granulcal.engines import Engine
 
 __all__ = ["Dataset", "generate"]
 
@@ -131,9 +134,26 @@ class Dataset:
     def __len__(self) -> int:
         return len(self.theta)
 
+    def _repr_html_(self) -> str:
+        from granulcal.html import page
+
+        rows: dict[str, object] = {"pours": len(self), **self.status_counts()}
+        rows |= {
+            name: f"{low:.3g} to {high:.3g}"
+            for name, low, high in zip(
+                self.theta_names, self.theta.min(axis=0), self.theta.max(axis=0), strict=True
+            )
+        }
+        return page(f"Dataset of {self.scene.name}", rows)
+
     def __repr__(self) -> str:
         counts = ", ".join(f"{n} {status}" for status, n in self.status_counts().items())
         return f"Dataset({len(self)} pours: {counts}; {', '.join(self.theta_names)})"
+
+
+def _asked(engine: "Engine") -> Callable[[_native.Scene, int], Any]:
+    """Returns the function that the Rust side calls from its threads."""
+    return lambda scene, seed: engine(Scene(scene), seed)
 
 
 def generate(
@@ -146,6 +166,7 @@ def generate(
     resume: bool = True,
     *,
     progress: bool | Callable[[int, int, int, int], object] = True,
+    engine: "Engine | None" = None,
 ) -> Dataset:
     """Returns `n` pours with parameters drawn from `prior`, simulating what `out` lacks.
 
@@ -161,6 +182,7 @@ def generate(
         threads: pours at once; the default is one for each core.
         resume: keep the rows that are in `out` already; else a folder with rows is refused.
         progress: show a line on stderr; or a function of (total, resumed, made, unhealthy).
+        engine: another simulator in place of ours; docs/engines.md says what it must do.
 
     Raises:
         ValueError: a parameter that does not fit the scene, or a folder made from something else.
@@ -189,6 +211,7 @@ def generate(
             threads=threads,
             resume=resume,
             progress=report,
+            engine=None if engine is None else (engine.name, _asked(engine)),
         )
         if report is not None:
             report(*counts)

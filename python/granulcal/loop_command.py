@@ -1,6 +1,8 @@
 """The word `close-loop` of the command line; the loop itself needs torch and is imported late."""
 
 import argparse
+import contextlib
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -60,10 +62,20 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
+    parser.add_argument("--json", action="store_true", help="print the verdict as JSON at the end")
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
+    if not options.json:
+        return _close(options)
+    with contextlib.redirect_stdout(sys.stderr):
+        code = _close(options)
+    print((options.out / "verdict.json").read_text(encoding="utf-8"), end="")
+    return code
+
+
+def _close(options: argparse.Namespace) -> int:
     from granulcal.loop.close import close_loop
     from granulcal.loop.report import write_report
     from granulcal.loop.task import Task

@@ -371,6 +371,54 @@ class Posterior:
         threshold = float(np.quantile(log_density, 1 - level))
         return CredibleRegion(level, tuple(self.names), intervals, threshold, self)
 
+    def to_arviz(self, draws: int = 4000, *, chains: int = 4, seed: int = 0) -> Any:
+        """Returns the posterior as an ArviZ `InferenceData`, with draws of the prior beside it.
+
+        The draws are independent: chains are there because ArviZ wants some.
+
+        Args:
+            draws: in all, split over the chains.
+            chains: how many.
+            seed: of the draws.
+
+        Raises:
+            ModuleNotFoundError: arviz is not installed (`granulcal[arviz]`).
+        """
+        import arviz  # pyright: ignore[reportMissingImports]
+
+        if chains < 1 or draws < chains:
+            raise ValueError(f"draws must be at least chains, and chains 1, got {draws}, {chains}")
+        each = draws // chains
+
+        def split(values: Array) -> dict[str, Array]:
+            columns = values.reshape(chains, each, len(self.names))
+            return {name: columns[:, :, i] for i, name in enumerate(self.names)}
+
+        found = split(self.sample(chains * each, seed))
+        return arviz.from_dict(
+            {"posterior": found, "prior": split(self.prior.sample(chains * each, seed))}
+        )
+
+    def _repr_html_(self) -> str:
+        from granulcal.html import page, picture
+
+        region, mode = self.credible_region(0.9), self.mode()
+        rows = {
+            name: f"{mode[i]:.3g} ({region[name][0]:.3g} to {region[name][1]:.3g})"
+            for i, name in enumerate(self.names)
+        }
+        rows |= {f"note {i}": str(warning) for i, warning in enumerate(self.warnings, start=1)}
+
+        def draw(figure: Any) -> None:
+            panels = figure.subplots(1, len(self.names), squeeze=False)[0]
+            for axes, marginal in zip(panels, self.marginals().values(), strict=True):
+                axes.fill_between(marginal.grid, marginal.density, alpha=0.4)
+                axes.set_xlabel(marginal.name.rpartition(".")[2])
+                axes.set_yticks([])
+
+        drawn = picture(draw, width=2.6 * len(self.names), height=2.2)
+        return page("Posterior: mode (90 % interval)", rows, drawn)
+
     @one_thread()
     def marginals(self, *, grid: int = 200) -> dict[str, Marginal]:
         """Returns the marginal of each parameter by name, on `grid` points."""

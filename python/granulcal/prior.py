@@ -106,6 +106,16 @@ class Prior:
             raise PriorError(f"{path}: {error}") from None
 
     @classmethod
+    def named(cls, name: str | PathLike[str]) -> "Prior":
+        """Returns the prior that a command line names: the word `default`, or a TOML file.
+
+        Raises:
+            FileNotFoundError: neither the word nor a file.
+            PriorError: the file is not a prior.
+        """
+        return cls.default() if str(name) == "default" else cls.load(name)
+
+    @classmethod
     def from_toml(cls, text: str) -> "Prior":
         """Returns the prior written as `[[parameter]]` tables.
 

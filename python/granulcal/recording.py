@@ -280,6 +280,21 @@ class Recording:
         """What is cut off or damaged, a line each."""
         return self._native.damage
 
+    @property
+    def lens(self) -> dict[str, float] | None:
+        """Lens of a depth image: width, height, fx, fy, cx, cy [px]; None for a height map.
+
+        As OpenCV and the RealSense SDK give it: the centre of the first pixel is (0, 0).
+        """
+        found = self._native.lens
+        names = ("width", "height", "fx", "fy", "cx", "cy")
+        return None if found is None else dict(zip(names, found, strict=True))
+
+    @property
+    def depth_unit(self) -> float | None:
+        """Metres per count of a depth image; None for a height map and for depths in metres."""
+        return self._native.depth_unit
+
     @cached_property
     def depth(self) -> NDArray[np.float32] | None:
         """Depth [m], 0 is no data, shape (h, w); None for a height map."""
@@ -401,6 +416,19 @@ class Recording:
             run_out = RunOut.open(path) if fps is None else RunOut.open(path, fps=fps)
             return run_out.observed(scene)
         return DischargeCurve.open(path, series).observed(scene)
+
+    def _repr_html_(self) -> str:
+        from granulcal.html import page, picture, seen_from_above
+
+        rows: dict[str, object] = {"frames": self.frames, "topic": self.topic or "-"}
+        label = "z [m]" if self.depth is None else "depth [m]"
+        image = self.heights if self.depth is None else self.depth
+        if image is not None:
+            rows["size"] = f"{image.shape[1]} x {image.shape[0]}"
+        if self.lost is not None:
+            rows["damage"] = str(self.lost)
+        drawn = "" if image is None else picture(seen_from_above(image, label))
+        return page(f"Recording {self.path.name}", rows, drawn)
 
     def __repr__(self) -> str:
         kind = "height map" if self.depth is None else f"depth, {self.frames} frame(s)"

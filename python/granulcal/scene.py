@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from os import PathLike
 
+import numpy as np
+from numpy.typing import NDArray
+
 from granulcal import _native
 
 __all__ = ["Material", "Scene"]
@@ -120,14 +123,26 @@ class Scene:
         return cls(_native.Scene.load(path))
 
     @classmethod
+    def built_in(cls, name: str) -> "Scene":
+        """Returns the built-in scene `funnel` (tip at 12 cm) or `drop` (from 10 cm).
+
+        Raises:
+            ValueError: there is none of this name.
+        """
+        makers = {"funnel": cls.funnel, "drop": lambda: cls.drop(0.1)}
+        if name not in makers:
+            raise ValueError(f"built-in scenes are {', '.join(makers)}; got {name!r}")
+        return makers[name]()
+
+    @classmethod
     def named(cls, name: str | PathLike[str]) -> "Scene":
-        """Returns the scene that a command line names: the word `funnel`, or a TOML file.
+        """Returns the scene that a command line names: a built-in one by its word, or a TOML file.
 
         Raises:
             FileNotFoundError: neither the word nor a file.
             ValueError: the file is not a scene; the message names the key.
         """
-        return cls.funnel() if str(name) == "funnel" else cls.load(name)
+        return cls.built_in(str(name)) if str(name) in ("funnel", "drop") else cls.load(name)
 
     @classmethod
     def from_toml(cls, text: str) -> "Scene":
@@ -167,6 +182,17 @@ class Scene:
     def with_material(self, material: Material) -> "Scene":
         """Returns a copy whose grains have this material."""
         return self.with_(material.values())
+
+    def start(self, seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Returns where the grains are when the pour begins.
+
+        Args:
+            seed: seed of the pour, which decides the jitter.
+
+        Returns:
+            Centres [m], shape (n, 3), and radii [m], shape (n,).
+        """
+        return self.native.start(seed)
 
     def get(self, path: str) -> float:
         """Returns the number at `path`, for example `scene.get("funnel.height")`.

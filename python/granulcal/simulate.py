@@ -1,6 +1,7 @@
 """One pour: from a scene to grains at rest, and what the camera sees of them."""
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,9 @@ from numpy.typing import NDArray
 from granulcal import _native
 from granulcal.scene import Material, Scene
 from granulcal.statistics import DiagnosticStatistics, ObservedStatistics, Statistics
+
+if TYPE_CHECKING:
+    from granulcal.engines import Engine
 
 __all__ = ["Pour", "simulate"]
 
@@ -172,6 +176,17 @@ class Pour:
     def _observation(self) -> _native.Observation:
         return self._native.observe()
 
+    def _repr_html_(self) -> str:
+        from granulcal.html import page, picture, seen_from_above
+
+        rows = {"status": self.status, "grains": len(self.radii)}
+        rows |= {"simulated": f"{self.simulated_s:.2f} s", "seed": self.seed}
+        view = self._observation
+        label = "z [m]" if view.depth is None else "depth [m]"
+        image = view.heights if view.depth is None else view.depth
+        drawn = "" if image is None else picture(seen_from_above(image, label))
+        return page(f"Pour of {self.scene.name}", rows, drawn)
+
     def __repr__(self) -> str:
         return f"Pour({len(self.radii)} grains, {self.status}, {self.simulated_s:.2f} s)"
 
@@ -182,6 +197,8 @@ def simulate(
     seed: int = 0,
     preset: str | None = None,
     threads: int = 1,
+    *,
+    engine: "Engine | None" = None,
 ) -> Pour:
     """Returns the pour of a scene; the same arguments give the same bits.
 
@@ -195,6 +212,8 @@ def simulate(
             unless the scene states another.
         threads: threads that share this one pour. The bits stay the same; only scenes of some ten
             thousand grains gain from a second thread, and `generate` runs many pours at once.
+        engine: another simulator in place of ours; docs/engines.md says what it must do. It has to
+            give grains: points alone are for `generate`.
 
     Raises:
         ValueError: a number is out of its range.
@@ -205,7 +224,16 @@ def simulate(
         scene = scene.with_material(material)
     if preset is not None:
         scene = scene.with_(preset=preset)
+    if engine is not None:
+        return Pour(_left_by(engine, scene, seed), scene, seed)
     return Pour(_native.simulate(scene.native, seed, threads), scene, seed)
+
+
+def _left_by(engine: "Engine", scene: Scene, seed: int) -> _native.Pour:
+    left = engine(scene, seed)
+    if not isinstance(left, tuple):
+        raise ValueError(f"{engine.name} gave points of a surface and no grains")
+    return scene.native.pour_of(*left, seed)
 
 
 def check_whole(name: str, value: int, *, at_least: int) -> None:

@@ -17,11 +17,12 @@ from granulcal.forward import scene_at
 from granulcal.prior import Prior
 from granulcal.recording import Recording
 from granulcal.scene import Scene
-from granulcal.simulate import simulate
-from granulcal.statistics import NAMES
+from granulcal.simulate import Pour, simulate
+from granulcal.statistics import NAMES, statistics
 
 if TYPE_CHECKING:
     from granulcal.bayessim.sequential import Round, SequentialFit
+    from granulcal.engines import Engine
 
 __all__ = ["KeptPours", "calibrate_within"]
 
@@ -43,6 +44,7 @@ class KeptPours:
         threads: pours at once; the default is one for each core.
         progress: called with the number of pours that are kept, after each.
         observed: keep the statistics that the scene observes in place of the paper's 16.
+        engine: another simulator in place of ours.
 
     Raises:
         ValueError: the file is that of another scene, prior or seed, or is damaged.
@@ -58,13 +60,15 @@ class KeptPours:
         threads: int | None = None,
         progress: Callable[[int], None] | None = None,
         observed: bool = False,
+        engine: "Engine | None" = None,
     ) -> None:
         """Reads what is kept already."""
-        self.observed = observed
+        self.observed, self.engine = observed, engine
         self.x_names: tuple[str, ...] = scene.observed_names if observed else NAMES
         self.scene, self.prior, self.path, self.seed = scene, prior, path, seed
         self.threads, self.progress = threads or os.cpu_count() or 1, progress
         text = f"{scene.to_toml()}\n{prior.to_toml()}\n{seed}" + ("\nobserved" if observed else "")
+        text += "" if engine is None else f"\n{engine.name}"
         self.key = hashlib.sha256(text.encode()).hexdigest()
         self.rows: dict[str, dict] = self._read() if path.exists() else {}
 
@@ -90,10 +94,16 @@ class KeptPours:
         return row is not None and np.allclose(row["theta"], theta, rtol=1e-12, atol=0)
 
     def _pour(self, theta: Array, index: int) -> dict:
-        pour = simulate(
-            scene_at(self.scene, self.prior, theta),
-            seed=_FIRST_SEED + 100_000 * self.seed + index,
-        )
+        scene = scene_at(self.scene, self.prior, theta)
+        seed = _FIRST_SEED + 100_000 * self.seed + index
+        if self.engine is not None:
+            left = self.engine(scene, seed)
+            if not isinstance(left, tuple):
+                x = np.asarray(statistics(left)).tolist()
+                return {"theta": theta.tolist(), "status": "at_rest", "x": x}
+            pour = Pour(scene.native.pour_of(*left, seed), scene, seed)
+        else:
+            pour = simulate(scene, seed=seed)
         status, x = pour.status, None
         if status not in _EXCLUDED:
             try:
@@ -128,6 +138,7 @@ def calibrate_within(
     threads: int | None = None,
     progress: "Callable[[Round], None] | None" = None,
     poured: Callable[[int], None] | None = None,
+    engine: "Engine | None" = None,
 ) -> "SequentialFit":
     """Returns the posterior of recordings of one material from `budget` pours.
 
@@ -143,6 +154,7 @@ def calibrate_within(
         threads: pours at once; the default is one for each core.
         progress: called after each round.
         poured: called with the number of kept pours after each.
+        engine: another simulator in place of ours; docs/engines.md says what it must do.
     """
     from granulcal.bayessim.sequential import infer_within_budget, round_sizes
 
@@ -155,7 +167,13 @@ def calibrate_within(
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     pours = KeptPours(
-        scene, prior, folder / "pours.json", seed=seed, threads=threads, progress=poured
+        scene,
+        prior,
+        folder / "pours.json",
+        seed=seed,
+        threads=threads,
+        progress=poured,
+        engine=engine,
     )
     return infer_within_budget(
         pours, prior, observed, budget=budget, seed=seed, x_names=NAMES, progress=progress

@@ -42,6 +42,15 @@ pub struct Cli {
 /// What can be done.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Print a scene as TOML, every number of it: a built-in one, or a file with changes
+    #[command(long_about = "\
+Prints a scene as TOML with every number that it has, those that its file leaves out too. The
+result is a scene file.
+
+Example:
+  granulcal-cli scene funnel > scene.toml
+  granulcal-cli scene examples/drum.toml --set walls.0.motion.rate=4")]
+    Scene(SceneArgs),
     Simulate(SimulateArgs),
     Generate(GenerateArgs),
     Render(RenderArgs),
@@ -107,6 +116,10 @@ Example:
 pub struct SimulateArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
+    /// Another simulator in place of ours: lammps, liggghts, yade, mujoco, newton, module:function or a
+    /// command; `granulcal` of the Python package only
+    #[arg(long, value_name = "ENGINE")]
+    pub engine: Option<String>,
     /// Seed of the grains' jitter at the start and of the camera's noise
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
@@ -170,6 +183,10 @@ pub struct GenerateArgs {
     pub scene: SceneArgs,
     /// Prior as TOML, or the word `default` for the friction, rolling friction and restitution of a dry grain
     pub prior: PathBuf,
+    /// Another simulator in place of ours: lammps, liggghts, yade, mujoco, newton, module:function or a
+    /// command; `granulcal` of the Python package only
+    #[arg(long, value_name = "ENGINE")]
+    pub engine: Option<String>,
     /// Rows of the whole data set
     #[arg(long = "rows", short = 'n', default_value_t = 1000)]
     pub rows: u64,
@@ -191,6 +208,9 @@ pub struct GenerateArgs {
     /// Refuse a folder that holds rows already
     #[arg(long)]
     pub no_resume: bool,
+    /// Say how long it would take, from three pours, and make nothing
+    #[arg(long)]
+    pub dry_run: bool,
     /// Print the summary as one JSON object
     #[arg(long)]
     pub json: bool,

@@ -9,18 +9,21 @@ mod inspect;
 mod merge;
 mod pick_colour;
 mod render;
+mod scene;
 mod simulate;
 
 use crate::args::Command;
 use crate::context::Context;
 use crate::outcome::Outcome;
+use crate::program::Program;
 
 /// Runs a command.
 ///
 /// # Errors
 /// Whatever went wrong, to be printed once.
-pub fn dispatch(context: &Context, command: Command) -> anyhow::Result<Outcome> {
+pub fn dispatch(context: &Context, program: &Program, command: Command) -> anyhow::Result<Outcome> {
     match command {
+        Command::Scene(args) => scene::run(&args),
         Command::Simulate(args) => simulate::run(context, &args),
         Command::Generate(args) => generate::run(context, &args),
         Command::Render(args) => render::run(context, &args),
@@ -30,6 +33,6 @@ pub fn dispatch(context: &Context, command: Command) -> anyhow::Result<Outcome> 
         Command::PickColour(args) => pick_colour::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Merge(args) => merge::run(&args),
-        Command::Completions(args) => completions::run(&args),
+        Command::Completions(args) => completions::run(program, &args),
     }
 }

@@ -14,16 +14,18 @@ mod args;
 mod commands;
 mod context;
 mod outcome;
+mod program;
 mod progress;
 mod scene;
 
 use std::ffi::OsString;
 
-use clap::Parser;
+use clap::FromArgMatches;
 
 use args::Cli;
 use context::Context;
 use outcome::Outcome;
+pub use program::{Further, FurtherOption, Program};
 
 /// Runs one command line, the name of the program first, and returns its exit code.
 ///
@@ -32,7 +34,29 @@ use outcome::Outcome;
 /// assert_eq!(granulcal_cli::run(args), 0);
 /// ```
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
-    let cli = match Cli::try_parse_from(args) {
+    run_as(&Program::default(), args)
+}
+
+/// Runs one command line as a part of `program`, which has parsed none of it.
+///
+/// ```
+/// let program = granulcal_cli::Program { name: "granulcal".to_owned(), ..Default::default() };
+/// let args = ["granulcal", "features", "--list"].map(Into::into);
+/// assert_eq!(granulcal_cli::run_as(&program, args), 0);
+/// ```
+pub fn run_as(program: &Program, args: impl IntoIterator<Item = OsString>) -> u8 {
+    let args: Vec<_> = args.into_iter().collect();
+    let mut command = program.command();
+    let found = command.try_get_matches_from_mut(args.clone());
+    let parsed = found.and_then(|mut found| {
+        // The words of the program's own commands are known for help and completions alone.
+        if program.is_further(&args) {
+            let text = format!("{} runs this command itself", program.binary());
+            return Err(command.error(clap::error::ErrorKind::InvalidSubcommand, text));
+        }
+        Cli::from_arg_matches_mut(&mut found).map_err(|refusal| refusal.format(&mut command))
+    });
+    let cli = match parsed {
         Ok(cli) => cli,
         Err(refusal) => {
             // Help and version are no failures; if even stderr is closed there is no one to tell.
@@ -41,7 +65,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     let context = Context::new(&cli.global);
-    match commands::dispatch(&context, cli.command) {
+    match commands::dispatch(&context, program, cli.command) {
         Ok(outcome) => outcome.exit_code(),
         Err(error) => {
             let code = outcome::exit_code_of(&error);

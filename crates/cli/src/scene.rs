@@ -12,6 +12,7 @@ use granulcal_dem::{Pour, Scene, Simulation};
 
 use crate::args::{SceneArgs, SceneChanges};
 use crate::context::{Context, keeps_going};
+use crate::outcome::BadArgument;
 use crate::progress::PourProgress;
 
 /// Height of the funnel's tip of the built-in scene, the paper's `[m]`.
@@ -27,6 +28,19 @@ const GLANCE: f64 = 0.002;
 /// What is wrong with the file, a path or a value.
 pub fn load(args: &SceneArgs) -> anyhow::Result<Scene> {
     changed(&args.scene, &args.with)
+}
+
+/// Refuses another engine: they are run by the Python package, which does not come here then.
+///
+/// # Errors
+/// [`BadArgument`] if one is named.
+pub fn refuse_engine(engine: Option<&str>) -> Result<(), BadArgument> {
+    match engine {
+        Some(name) => Err(BadArgument(format!(
+            "--engine {name:?}: other simulators are run by `granulcal` of the Python package alone"
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// The scene of that name, with changes.

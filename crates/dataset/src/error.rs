@@ -45,6 +45,14 @@ pub enum DatasetError {
         #[source]
         source: Box<toml::de::Error>,
     },
+    /// Another simulator did not give a pour.
+    #[error("{name} gave no pour: {reason}")]
+    Engine {
+        /// What it is called.
+        name: String,
+        /// What it said.
+        reason: String,
+    },
     /// Something could not be written as TOML.
     #[error("{what} cannot be written as TOML")]
     TomlWrite {
@@ -196,7 +204,10 @@ impl DatasetError {
             Self::Io { action, source, .. } => {
                 matches!(*action, "read" | "list") || source.kind() == io::ErrorKind::NotFound
             }
-            Self::TomlWrite { .. } | Self::Mcap { .. } | Self::Locked { .. } => false,
+            Self::TomlWrite { .. }
+            | Self::Mcap { .. }
+            | Self::Locked { .. }
+            | Self::Engine { .. } => false,
             Self::Row { source, .. } => source.is_bad_input(),
             _ => true,
         }

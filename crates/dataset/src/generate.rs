@@ -15,9 +15,10 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
-use granulcal_dem::{Simulation, Status};
+use granulcal_dem::{Pour, Simulation, Status};
 use granulcal_features::stats::DIAGNOSTIC_COUNT;
 
+use crate::engine::{Engine, Outcome, describe, foreign_pour};
 use crate::header::Header;
 use crate::manifest;
 use crate::observe::observe;
@@ -60,11 +61,31 @@ pub fn generate(
     out: &Path,
     watch: &mut dyn FnMut(&Progress) -> bool,
 ) -> Result<Summary, DatasetError> {
+    generate_with(None, scene, prior, options, out, watch)
+}
+
+/// As [`generate`], the pours simulated by another engine where one is given; its name stands in the version
+/// of the rows.
+///
+/// # Errors
+/// As [`generate`], and what the engine says, as [`DatasetError::Row`].
+pub fn generate_with(
+    engine: Option<Engine>,
+    scene: &granulcal_dem::Scene,
+    prior: &Prior,
+    options: &GenerateOptions,
+    out: &Path,
+    watch: &mut dyn FnMut(&Progress) -> bool,
+) -> Result<Summary, DatasetError> {
     check(options)?;
-    let header = Header::new(scene, prior, options.seed)?;
+    let mut header = Header::new(scene, prior, options.seed)?;
+    if let Some(engine) = &engine {
+        header.version = engine.version();
+    }
     let folder = Folder::open(out, header, options)?;
     let plan = folder.plan(options)?;
-    Batch { folder: &folder, chunks: plan.chunks, progress: plan.progress }.run(options, watch)
+    let batch = Batch { folder: &folder, engine, chunks: plan.chunks, progress: plan.progress };
+    batch.run(options, watch)
 }
 
 fn check(options: &GenerateOptions) -> Result<(), DatasetError> {
@@ -92,6 +113,7 @@ fn check(options: &GenerateOptions) -> Result<(), DatasetError> {
 /// The collecting side of a batch.
 struct Batch<'a> {
     folder: &'a Folder,
+    engine: Option<Engine<'a>>,
     chunks: BTreeMap<u64, OpenChunk>,
     progress: Progress,
 }
@@ -107,7 +129,7 @@ impl Batch<'_> {
         let next = AtomicUsize::new(0);
         let stop = AtomicBool::new(!watch(&self.progress));
         let (sender, finished) = channel();
-        let header = &self.folder.header;
+        let (header, engine) = (&self.folder.header, self.engine);
 
         let outcome = std::thread::scope(|scope| {
             for _ in 0..options.threads.min(queue.len()) {
@@ -119,7 +141,8 @@ impl Batch<'_> {
                         let Some(&row) = queue.get(next.fetch_add(1, Ordering::Relaxed)) else {
                             break;
                         };
-                        let Some(made) = make_row(header, row, &keep_going).transpose() else {
+                        let Some(made) = make_row(header, engine, row, &keep_going).transpose()
+                        else {
                             break;
                         };
                         let failed = made.is_err();
@@ -194,6 +217,7 @@ impl Batch<'_> {
 /// Simulates one row, or gives up when told to.
 fn make_row(
     header: &Header,
+    engine: Option<Engine>,
     row: u64,
     keep_going: &dyn Fn() -> bool,
 ) -> Result<Option<Row>, DatasetError> {
@@ -201,29 +225,59 @@ fn make_row(
     let parameters = header.prior.sample(header.seed, row);
     let scene = header.prior.apply(&header.scene, &parameters)?;
     let seed = pour_seed(header.seed, row);
-    let simulation = Simulation::new(&scene, seed).map_err(DatasetError::Simulation)?;
-    simulation.check_start().map_err(DatasetError::Simulation)?;
     let mut observer = Observer::new(&scene);
-    let Some(pour) = observer.run_while(simulation, keep_going) else { return Ok(None) };
-
-    let mut status = observer.status(&pour);
+    let pour = match engine {
+        Some(engine) => match (engine.pour)(&scene, seed)? {
+            Outcome::Grains { positions, radii } => foreign_pour(&scene, positions, radii)?,
+            Outcome::Points(points) => {
+                let seen = describe(&scene, &points)?;
+                let pour = foreign_pour(&scene, Vec::new(), Vec::new())?;
+                let observed = vec![f64::NAN; header.observed().len()];
+                return Ok(Some(finish(row, parameters, seed, start, &pour, None, seen, observed)));
+            }
+        },
+        None => {
+            let simulation = Simulation::new(&scene, seed).map_err(DatasetError::Simulation)?;
+            simulation.check_start().map_err(DatasetError::Simulation)?;
+            let Some(pour) = observer.run_while(simulation, keep_going) else { return Ok(None) };
+            pour
+        }
+    };
+    let status = observer.status(&pour);
     let observed = observer.observed(&pour).statistics;
-    let (mut statistics, mut diagnostics) = ([f64::NAN; 16], [f64::NAN; DIAGNOSTIC_COUNT]);
     let seen = observe(&scene.camera, &pour, seed).and_then(|seen| {
         let Ok(values) = seen.statistics else { return Ok(None) };
         Ok(Some((values, seen.diagnostics().map_err(DatasetError::Features)?)))
     });
-    match seen {
-        Ok(Some(values)) => (statistics, diagnostics) = values,
+    let seen = match seen {
         // The grains of an unhealthy pour can be anywhere, NaN included: the status says enough.
-        _ if pour.status == Status::Unhealthy => {}
-        Ok(None) if status.is_jammed() => {}
-        // The scene has other eyes than its camera.
-        Ok(None) if !observer.is_idle() => {}
-        Ok(None) => status = RowStatus::NoGrainsInView,
-        Err(error) => return Err(error),
-    }
-    Ok(Some(Row {
+        Err(_) if pour.status == Status::Unhealthy => None,
+        other => other?,
+    };
+    // The scene may have other eyes than its camera.
+    let says_enough = !status.is_healthy() || status.is_jammed() || !observer.is_idle();
+    let status = says_enough.then_some(status);
+    Ok(Some(finish(row, parameters, seed, start, &pour, status, seen, observed)))
+}
+
+/// The row of a pour; without a status of its own it is that of the pour, or tells that no grain is seen.
+#[allow(clippy::too_many_arguments)] // What a row is made of.
+fn finish(
+    row: u64,
+    parameters: Vec<f64>,
+    seed: u64,
+    start: ThreadTime,
+    pour: &Pour,
+    status: Option<RowStatus>,
+    seen: Option<([f64; 16], [f64; DIAGNOSTIC_COUNT])>,
+    observed: Vec<f64>,
+) -> Row {
+    let status = status.unwrap_or(match seen {
+        Some(_) => RowStatus::Pour(pour.status),
+        None => RowStatus::NoGrainsInView,
+    });
+    let (statistics, diagnostics) = seen.unwrap_or(([f64::NAN; 16], [f64::NAN; DIAGNOSTIC_COUNT]));
+    Row {
         row,
         parameters,
         seed,
@@ -234,7 +288,7 @@ fn make_row(
         statistics,
         diagnostics,
         observed,
-    }))
+    }
 }
 
 #[cfg(test)]

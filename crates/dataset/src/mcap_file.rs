@@ -3,6 +3,7 @@
 //! | topic | schema | what |
 //! |---|---|---|
 //! | `/grains` | foxglove.PointCloud | centres and radii, f32 `[m]`, frame `world` |
+//! | `/walls` | foxglove.SceneUpdate | ground, funnel and walls, once, or in every frame where one moves |
 //! | `/depth` | foxglove.RawImage, 32FC1 | what the scene's camera delivers `[m]`, frame `camera`; 0 is no data |
 //! | `/heights` | foxglove.RawImage, 32FC1 | the same for an orthographic camera, instead of `/depth` |
 //! | `/camera` | foxglove.CameraCalibration | the pinhole camera of `/depth` |
@@ -12,6 +13,9 @@
 //! Time 0 is the start of the pour. The scene's TOML, the seed and the outcome stand in the metadata
 //! record `granulcal`, the TOML also as the attachment `scene.toml`.
 
+mod stamp;
+mod walls;
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,17 +24,18 @@ use foxglove::Encode;
 use foxglove::messages::packed_element_field::NumericType;
 use foxglove::messages::{
     CameraCalibration, FrameTransform, PackedElementField, PointCloud, Pose, Quaternion, RawImage,
-    Timestamp, Vector3,
+    Vector3,
 };
 use granulcal_dem::{Pour, Scene, Simulation};
 use granulcal_features::{Camera, DepthImage, Intrinsics};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 
+use stamp::{WORLD, nanoseconds, timestamp};
+
 use crate::files::PendingFile;
 use crate::{DatasetError, Observer, VERSION, View, look, look_from};
 
-const WORLD: &str = "world";
 const CAMERA: &str = "camera";
 /// Bytes of one grain in `/grains`: x, y, z, radius.
 const STRIDE: u32 = 16;
@@ -90,6 +95,7 @@ struct Recorder<'a> {
     writer: Writer<PendingFile>,
     path: &'a Path,
     sequences: BTreeMap<u16, u32>,
+    has_walls: bool,
 }
 
 impl<'a> Recorder<'a> {
@@ -98,7 +104,7 @@ impl<'a> Recorder<'a> {
         let writer = options
             .create(PendingFile::create(path)?)
             .map_err(|source| DatasetError::Mcap { path: path.to_owned(), source })?;
-        Ok(Self { writer, path, sequences: BTreeMap::new() })
+        Ok(Self { writer, path, sequences: BTreeMap::new(), has_walls: false })
     }
 
     fn attach_scene(&mut self, scene_toml: &str) -> McapResult<()> {
@@ -127,7 +133,12 @@ impl<'a> Recorder<'a> {
             .iter()
             .map(|view| (format!("views/{}", view.name), look_from(view, &positions, &radii)))
             .collect();
+        let shows_walls = !self.has_walls || walls::move_ever(scene);
+        self.has_walls = true;
         let messages = |recorder: &mut Self| -> McapResult<()> {
+            if shows_walls {
+                recorder.send("/walls", time, &walls::walls(scene, time))?;
+            }
             recorder.send("/grains", time, &grains(time, simulation))?;
             match view {
                 Ok(View::Depth(camera, image)) => {
@@ -198,15 +209,6 @@ impl<'a> Recorder<'a> {
         self.writer.finish().map_err(failed)?;
         self.writer.into_inner().commit()
     }
-}
-
-fn nanoseconds(time: f64) -> u64 {
-    (time * 1e9).round() as u64
-}
-
-fn timestamp(time: f64) -> Option<Timestamp> {
-    let total = nanoseconds(time);
-    Timestamp::new_checked((total / 1_000_000_000) as u32, (total % 1_000_000_000) as u32)
 }
 
 fn grains(time: f64, simulation: &Simulation) -> PointCloud {

@@ -59,6 +59,7 @@ fn schemas_counts_stamps_and_bytes_are_those_of_the_pour() {
         ("/camera", "foxglove.CameraCalibration"),
         ("/depth", "foxglove.RawImage"),
         ("/grains", "foxglove.PointCloud"),
+        ("/walls", "foxglove.SceneUpdate"),
         ("/tf", "foxglove.FrameTransform"),
     ];
     assert_eq!(schemas, expected.map(|(t, s)| (t.to_owned(), s.to_owned())).into());
@@ -95,7 +96,7 @@ fn schemas_counts_stamps_and_bytes_are_those_of_the_pour() {
     assert_eq!(metadata.metadata["status"], pour.status.name());
 
     let ours = Survey::open(&path).unwrap();
-    assert_eq!(ours.topics.len(), 4);
+    assert_eq!(ours.topics.len(), 5);
     assert!((ours.end_s - pour.simulated_s).abs() < 1e-9);
     assert!(ours.damage().is_empty());
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use granulcal_dataset::{CameraFile, load_sensor, png, sensor_of};
-use granulcal_features::{DepthImage, SensorNoise};
+use granulcal_features::{DepthImage, Intrinsics, SensorNoise};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
@@ -22,6 +22,17 @@ impl Camera {
     fn overhead(height: f64, field_width: f64, pixels: usize) -> PyResult<Self> {
         let inner = granulcal_features::Camera::overhead(height, field_width, pixels);
         Ok(Self { inner: inner.map_err(error::features)? })
+    }
+
+    /// Looks straight down from `height` [m]; the lens as OpenCV gives it, the first pixel's centre at 0.
+    #[staticmethod]
+    fn above(height: f64, lens: (usize, usize, f64, f64, f64, f64)) -> PyResult<Self> {
+        let (columns, rows, fx, fy, cx, cy) = lens;
+        let camera =
+            granulcal_features::Camera::overhead(height, 1.0, 1).map_err(error::features)?;
+        let intrinsics = Intrinsics::from_integer_centres(columns, rows, fx, fy, cx, cy);
+        let intrinsics = intrinsics.map_err(error::features)?;
+        Ok(Self { inner: granulcal_features::Camera { intrinsics, ..camera } })
     }
 
     fn tilted(&self, tilt_x_rad: f64, tilt_y_rad: f64) -> Self {

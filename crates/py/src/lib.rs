@@ -9,6 +9,7 @@ mod array;
 mod camera;
 mod dataset;
 mod error;
+mod film;
 mod formation;
 mod generate;
 mod levelled;
@@ -30,6 +31,8 @@ mod _native {
     use crate::camera::Camera;
     #[pymodule_export]
     use crate::dataset::Dataset;
+    #[pymodule_export]
+    use crate::film::film;
     #[pymodule_export]
     use crate::formation::Formation;
     #[pymodule_export]

@@ -74,6 +74,25 @@ impl Recording {
         self.inner.frames
     }
 
+    /// Width, height, focal lengths and principal point [px], the first pixel's centre at 0; or None for a height map.
+    #[getter]
+    fn lens(&self) -> Option<(usize, usize, f64, f64, f64, f64)> {
+        match &self.inner.source {
+            Source::Depth { camera, .. } => {
+                let lens = &camera.intrinsics;
+                let centre = (lens.cx - 0.5, lens.cy - 0.5);
+                Some((lens.width, lens.height, lens.fx, lens.fy, centre.0, centre.1))
+            }
+            Source::Heights(_) => None,
+        }
+    }
+
+    /// Metres per count of a depth image.
+    #[getter]
+    fn depth_unit(&self) -> Option<f64> {
+        self.inner.depth_unit
+    }
+
     /// Depth [m], or None for a height map.
     #[getter]
     fn depth<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {

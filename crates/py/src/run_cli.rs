@@ -2,10 +2,22 @@
 
 use std::ffi::OsString;
 
+use granulcal_cli::Program;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Runs a command line of granulcal-cli, the name of the program first; returns its exit code.
+/// Runs a command line, the name of the program first; returns its exit code.
+///
+/// `program` is JSON: name, `after_help` and the further commands of the program that the command is part of; without
+/// it that is granulcal-cli.
 #[pyfunction]
-pub(crate) fn run_cli(py: Python<'_>, args: Vec<OsString>) -> u8 {
-    py.detach(|| granulcal_cli::run(args))
+#[pyo3(signature = (args, program = None))]
+pub(crate) fn run_cli(py: Python<'_>, args: Vec<OsString>, program: Option<&str>) -> PyResult<u8> {
+    let program = match program {
+        Some(text) => serde_json::from_str(text).map_err(|error| {
+            PyValueError::new_err(format!("the program is no JSON of one: {error}"))
+        })?,
+        None => Program::default(),
+    };
+    Ok(py.detach(|| granulcal_cli::run_as(&program, args)))
 }

@@ -3,9 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use granulcal_dem as dem;
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-use crate::error;
+use crate::array::{Numbers, Vectors};
+use crate::pour::Pour;
+use crate::{array, error};
 
 /// A scene, checked.
 #[pyclass(frozen, module = "granulcal._native")]
@@ -72,6 +75,43 @@ impl Scene {
     fn observed_statistics(&self) -> Vec<(String, &'static str, String)> {
         let all = granulcal_dataset::observed_statistics(&self.inner);
         all.into_iter().map(|statistic| (statistic.name, statistic.unit, statistic.doc)).collect()
+    }
+
+    /// Centres [m] and radii [m] of the grains when the pour begins.
+    #[allow(clippy::type_complexity)] // Python's tuple.
+    fn start<'py>(
+        &self,
+        py: Python<'py>,
+        seed: u64,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let simulation = dem::Simulation::new(&self.inner, seed).map_err(error::dem)?;
+        let positions = array::from_vectors(py, &simulation.positions())?;
+        Ok((positions, PyArray1::from_slice(py, &simulation.radii())))
+    }
+
+    /// The pour of this scene that another simulator has left as spheres at rest.
+    fn pour_of(
+        &self,
+        positions: &Bound<'_, PyAny>,
+        radii: &Bound<'_, PyAny>,
+        seed: u64,
+    ) -> PyResult<Pour> {
+        let positions = Vectors::borrow("positions", positions)?;
+        let radii = Numbers::borrow("radii", radii)?;
+        let (positions, radii) = (positions.as_slice()?.to_vec(), radii.as_slice()?.to_vec());
+        let scene = &self.inner;
+        let pour = granulcal_dataset::foreign_pour(scene, positions, radii);
+        let pour = pour.map_err(error::dataset)?;
+        let observer = granulcal_dataset::Observer::new(scene);
+        Ok(Pour {
+            status: observer.status(&pour),
+            observed: observer.observed(&pour),
+            inner: pour,
+            camera: scene.camera,
+            views: scene.views.clone(),
+            seed,
+            cpu_seconds: f64::NAN,
+        })
     }
 
     #[getter]

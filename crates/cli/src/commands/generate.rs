@@ -1,15 +1,21 @@
 //! `generate`: many pours to a folder of Parquet parts.
 
-use granulcal_dataset::{GenerateOptions, Summary, generate};
+use cpu_time::ThreadTime;
+use granulcal_dataset::{Dataset, GenerateOptions, Observer, Prior, Summary, generate};
+use granulcal_dem::Scene;
 use serde_json::json;
 
 use crate::args::GenerateArgs;
 use crate::context::{Context, keeps_going, print_json, print_line};
 use crate::outcome::Outcome;
 use crate::progress::RowProgress;
-use crate::scene;
+use crate::scene::{self, Keep};
+
+/// Pours that a dry run makes.
+const TRIED: u64 = 3;
 
 pub fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
+    scene::refuse_engine(args.engine.as_deref())?;
     let scene = scene::load(&args.scene)?;
     let prior = scene::prior(&args.prior)?;
     let defaults = GenerateOptions::default();
@@ -21,6 +27,9 @@ pub fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
         chunk: args.chunk,
         resume: !args.no_resume,
     };
+    if args.dry_run {
+        return dry_run(context, args, &scene, &prior, &options);
+    }
     let mut progress = RowProgress::new(context);
     let summary = generate(&scene, &prior, &options, &args.out, &mut |p| {
         progress.show(p.resumed + p.made, p.resumed, p.total, p.unhealthy);
@@ -28,6 +37,49 @@ pub fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
     });
     progress.finish();
     report(args, &summary?)
+}
+
+/// Pours the first rows, keeps nothing and tells what all of them would take.
+fn dry_run(
+    context: &Context,
+    args: &GenerateArgs,
+    scene: &Scene,
+    prior: &Prior,
+    options: &GenerateOptions,
+) -> anyhow::Result<Outcome> {
+    prior.check(scene)?;
+    let tried = options.rows.min(TRIED);
+    let mut cpu_s = 0.0;
+    for row in 0..tried {
+        let scene = prior.apply(scene, &prior.sample(options.seed, row))?;
+        let started = ThreadTime::now();
+        let simulation = scene::start(&scene, row, 1, None)?;
+        let mut observer = Observer::new(&scene);
+        if scene::pour(context, &scene, row, simulation, &Keep::Nothing, &mut observer)?.is_none() {
+            return Ok(Outcome::Stopped);
+        }
+        cpu_s += started.elapsed().as_secs_f64();
+    }
+    let there = Dataset::open(&args.out).map_or(0, |data| data.rows.len() as u64);
+    let missing = options.rows.saturating_sub(there);
+    let pour_s = cpu_s / tried as f64;
+    let seconds = pour_s * missing as f64 / options.threads as f64;
+    if args.json {
+        print_json(&json!({
+            "missing": missing,
+            "threads": options.threads,
+            "pour_cpu_s": pour_s,
+            "seconds": seconds,
+        }))?;
+    } else {
+        print_line(&format!(
+            "about {:.1} min: {missing} rows are missing, {pour_s:.2} s of a core each (mean of {tried} pours), \
+             {} at once",
+            seconds / 60.0,
+            options.threads
+        ))?;
+    }
+    Ok(Outcome::Done)
 }
 
 fn report(args: &GenerateArgs, summary: &Summary) -> anyhow::Result<Outcome> {

@@ -1,0 +1,1 @@
+"""Commands of `granulcal`, one file each; what they do stands in the library."""

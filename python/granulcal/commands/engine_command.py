@@ -1,0 +1,116 @@
+"""`simulate --engine` and `generate --engine`: pours of another simulator."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from granulcal.commands.init import assignment
+from granulcal.commands.program import Parser
+
+__all__ = ["is_asked", "run"]
+
+_FLAG = "--engine"
+_UNHEALTHY = 3
+
+
+def is_asked(words: Sequence[str]) -> bool:
+    """Returns whether the words name another engine."""
+    return any(word == _FLAG or word.startswith(f"{_FLAG}=") for word in words)
+
+
+def run(words: Sequence[str]) -> int:
+    """Runs `simulate` or `generate` with another engine; returns the exit code."""
+    try:
+        options = _parser().parse_args(words)
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else 2
+    return options.run(options)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Parser(prog="granulcal")
+    commands = parser.add_subparsers(required=True)
+    simulate = commands.add_parser("simulate")
+    _add_common(simulate)
+    simulate.add_argument("--positions", type=Path)
+    simulate.set_defaults(run=_simulate)
+    generate = commands.add_parser("generate")
+    _add_common(generate)
+    generate.add_argument("prior", type=Path)
+    generate.add_argument("-n", "--rows", type=int, default=1000)
+    generate.add_argument("-o", "--out", type=Path, required=True)
+    generate.add_argument("--threads", type=int)
+    generate.add_argument("--no-resume", action="store_true")
+    generate.set_defaults(run=_generate)
+    return parser
+
+
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", type=Path)
+    parser.add_argument(_FLAG, required=True)
+    parser.add_argument("--set", action="append", default=[], type=assignment)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("-q", "--quiet", action="store_true")
+
+
+def _simulate(options: argparse.Namespace) -> int:
+    from granulcal.engines import engine_named
+    from granulcal.scene import Scene
+    from granulcal.simulate import simulate
+
+    scene = Scene.named(options.scene).with_(dict(options.set))
+    pour = simulate(scene, seed=options.seed, engine=engine_named(options.engine))
+    statistics = pour.statistics().to_dict()
+    if options.positions is not None:
+        np.save(options.positions, pour.positions)
+    document = {
+        "scene": scene.name,
+        "seed": options.seed,
+        "engine": options.engine,
+        "status": pour.status,
+        "grains_in_funnel": pour.grains_in_funnel,
+        "statistics": statistics,
+    }
+    if options.json:
+        print(json.dumps(document, indent=1))
+    else:
+        print(f"scene              {scene.name} (seed {options.seed})")
+        print(f"engine             {options.engine}")
+        print(f"status             {pour.status}")
+        for name, value in statistics.items():
+            print(f"{name:<18} {value:<12.6f}")
+    return 0 if pour.status != "unhealthy" else _UNHEALTHY
+
+
+def _generate(options: argparse.Namespace) -> int:
+    from granulcal.dataset import generate
+    from granulcal.engines import engine_named
+    from granulcal.prior import Prior
+    from granulcal.scene import Scene
+
+    scene = Scene.named(options.scene).with_(dict(options.set))
+    data = generate(
+        scene,
+        Prior.named(options.prior),
+        options.rows,
+        seed=options.seed,
+        out=options.out,
+        threads=options.threads,
+        resume=not options.no_resume,
+        progress=not options.quiet,
+        engine=engine_named(options.engine),
+    )
+    counts = data.status_counts()
+    if options.json:
+        print(json.dumps({"folder": str(options.out), "rows": len(data), "status": counts}))
+    else:
+        print(f"{options.out}: {data}")
+    unusable = len(data) - int(data.is_usable.sum())
+    if unusable:
+        print(f"note: {unusable} pours cannot be used", file=sys.stderr)
+    return 0 if not unusable else _UNHEALTHY

@@ -1,0 +1,174 @@
+"""The word `export`: materials, posteriors, scenes and beds for other simulators."""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from granulcal.commands.init import assignment
+
+__all__ = ["add"]
+
+_TEXT = "write a material, a posterior, a scene or a bed of grains for another simulator"
+_DESCRIPTION = """\
+Write what was found in the words of another simulator, with each engine's conventions: rolling friction as
+a ratio or as a length, restitution as a dashpot, what has no counterpart said in the file (docs/export.md).
+
+  granulcal export material scene.toml --to mujoco -o material.xml
+  granulcal export posterior posterior.json scene.toml --to lammps --draws 20 -o materials
+  granulcal export scene scene.toml --to liggghts -o pour        a whole pour; README.txt says how to run it
+  granulcal export bed scene.toml --to vtk -o pile.vtk           the grains at rest
+
+posterior.json is what `infer -o` or `calibrate` wrote.
+"""
+_ENGINES = ("lammps", "liggghts", "yade", "mujoco", "chrono", "isaac", "gazebo", "newton")
+_FORMATS = ("lammps-data", "vtk", "ply", "csv", "mjcf", "sdf", "urdf")
+
+
+def add(commands: Any) -> None:
+    """Adds the word to the command line."""
+    parser = commands.add_parser(
+        "export",
+        help=_TEXT,
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=lambda _: parser.print_help() or 2)
+    words = parser.add_subparsers(title="what to export", metavar="WHAT")
+    _add_material(words)
+    _add_posterior(words)
+    _add_scene(words)
+    _add_bed(words)
+
+
+def _add_common(parser: argparse.ArgumentParser, out: str) -> None:
+    parser.add_argument("-o", "--out", type=Path, required=True, help=out)
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        type=assignment,
+        metavar="PATH=VALUE",
+        help="another number of the scene, as material.restitution=0.5; may be repeated",
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a list")
+
+
+def _add_engine(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--to", required=True, choices=_ENGINES, help="the engine")
+    parser.add_argument(
+        "--young", type=float, metavar="PA", help="Young's modulus of elastic engines"
+    )
+
+
+def _add_material(words: Any) -> None:
+    text = "the material of a scene"
+    parser = words.add_parser("material", help=text, description=text)
+    parser.add_argument("scene", type=Path, help="TOML, or the word funnel or drop")
+    _add_engine(parser)
+    _add_common(parser, "the file")
+    parser.set_defaults(run=_material)
+
+
+def _add_posterior(words: Any) -> None:
+    text = "the most probable material of a posterior, and draws of it"
+    parser = words.add_parser("posterior", help=text, description=text)
+    parser.add_argument("posterior", type=Path, help="JSON of `infer -o` or `calibrate`")
+    parser.add_argument("scene", type=Path, help="TOML, or the word funnel or drop")
+    parser.add_argument("--draws", type=int, default=0, help="files of draws (default: none)")
+    _add_engine(parser)
+    _add_common(parser, "the folder")
+    parser.set_defaults(run=_posterior)
+
+
+def _add_scene(words: Any) -> None:
+    text = "a whole pour: grains at the start, walls, material, until it rests"
+    parser = words.add_parser("scene", help=text, description=text)
+    parser.add_argument("scene", type=Path, help="TOML, or the word funnel or drop")
+    parser.add_argument("--posterior", type=Path, help="take the most probable material of this")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the start (default: 0)")
+    _add_engine(parser)
+    _add_common(parser, "the folder")
+    parser.set_defaults(run=_scene)
+
+
+def _add_bed(words: Any) -> None:
+    text = "grains at rest: those of a pour, or of a file"
+    parser = words.add_parser("bed", help=text, description=text)
+    parser.add_argument("scene", type=Path, help="TOML, or the word funnel or drop")
+    parser.add_argument("--to", required=True, choices=_FORMATS, help="the format")
+    parser.add_argument(
+        "--positions", type=Path, help="centres [m] of `simulate --positions`, instead of a pour"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of the pour (default: 0)")
+    _add_common(parser, "the file")
+    parser.set_defaults(run=_bed)
+
+
+def _loaded(options: argparse.Namespace) -> Any:
+    from granulcal.scene import Scene
+
+    return Scene.named(options.scene).with_(dict(options.set))
+
+
+def _told(options: argparse.Namespace, files: list[Path]) -> int:
+    names = [str(path) for path in files]
+    print(json.dumps({"files": names}, indent=1) if options.json else "\n".join(names))
+    return 0
+
+
+def _material(options: argparse.Namespace) -> int:
+    from granulcal.export import export_material
+
+    file = export_material(_loaded(options), options.to, options.out, young=options.young)
+    return _told(options, [file])
+
+
+def _posterior(options: argparse.Namespace) -> int:
+    from granulcal.design.posterior_file import PosteriorDraws
+    from granulcal.export import export_posterior
+
+    if options.draws < 0:
+        raise ValueError(f"--draws must be at least 0, got {options.draws}")
+    found = PosteriorDraws.load(options.posterior)
+    if options.draws > len(found.samples):
+        raise ValueError(
+            f"--draws must be at most {len(found.samples)}, the samples in {options.posterior}; "
+            f"got {options.draws}"
+        )
+    files = export_posterior(
+        found.names,
+        found.mode,
+        found.samples[: options.draws],
+        _loaded(options),
+        options.to,
+        options.out,
+        young=options.young,
+    )
+    return _told(options, files)
+
+
+def _scene(options: argparse.Namespace) -> int:
+    from granulcal.design.posterior_file import PosteriorDraws
+    from granulcal.export import export_scene
+
+    scene = _loaded(options)
+    if options.posterior is not None:
+        scene = PosteriorDraws.load(options.posterior).at_mode(scene)
+    files = export_scene(scene, options.to, options.out, seed=options.seed, young=options.young)
+    return _told(options, files)
+
+
+def _bed(options: argparse.Namespace) -> int:
+    import numpy as np
+
+    from granulcal.export import export_bed
+    from granulcal.simulate import simulate
+
+    scene = _loaded(options)
+    if options.positions is not None:
+        positions, radii = np.load(options.positions), None
+    else:
+        pour = simulate(scene, seed=options.seed)
+        positions, radii = pour.positions, pour.radii
+    return _told(options, [export_bed(scene, positions, radii, options.to, options.out)])

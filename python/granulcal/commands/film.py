@@ -1,0 +1,70 @@
+"""The word `film`: a pour as an animated GIF."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from granulcal.commands.init import assignment
+
+__all__ = ["add"]
+
+_TEXT = "pour a scene and write an animated GIF of it"
+_DESCRIPTION = """\
+Pour a scene and write an animated GIF: grains as balls, walls at rest as lines, half as fast as it was.
+
+  granulcal film funnel -o pour.gif
+  granulcal film scene.toml --set funnel.height=0.06 --slow 4 -o pour.gif
+
+`simulate --mcap` writes a film for Foxglove, with depth images and walls; examples/foxglove.json is a layout for it.
+"""
+
+
+def add(commands: Any) -> None:
+    """Adds the word to the command line."""
+    parser = commands.add_parser(
+        "film",
+        help=_TEXT,
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("scene", type=Path, help="TOML, or the word funnel or drop")
+    parser.add_argument("-o", "--out", type=Path, required=True, help="the GIF")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the pour (default: 0)")
+    parser.add_argument("--fps", type=float, default=15.0, help="frames a second (default: 15)")
+    parser.add_argument(
+        "--slow", type=float, default=2.0, help="seconds of film for one of the pour (default: 2)"
+    )
+    parser.add_argument("--width", type=int, default=480, help="pixels (default: 480)")
+    parser.add_argument(
+        "--set", action="append", default=[], type=assignment, metavar="PATH=VALUE",
+        help="another number of the scene; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print JSON at the end")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from granulcal.film import film
+    from granulcal.scene import Scene
+
+    scene = Scene.named(options.scene).with_(dict(options.set))
+    frames = film(
+        scene,
+        options.out,
+        seed=options.seed,
+        fps=options.fps,
+        slow=options.slow,
+        width=options.width,
+        progress=_line if sys.stderr.isatty() else None,
+    )
+    if options.json:
+        print(json.dumps({"file": str(options.out), "frames": frames}))
+    else:
+        print(f"{options.out}: {frames} frames")
+    return 0
+
+
+def _line(time: float) -> None:
+    print(f"\r{time:.2f} s poured", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,82 @@
+"""What the simulator's half must know of the other commands: for help, completions, suggestions."""
+
+import argparse
+import difflib
+import json
+from typing import Any, NoReturn
+
+__all__ = ["Parser", "describe"]
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that asks `did you mean` when an option is misspelt."""
+
+    def error(self, message: str) -> NoReturn:
+        """Ends with the message, and the option that is nearest to what was not known."""
+        _, mark, unknown = message.partition("unrecognized arguments: ")
+        if mark:
+            known = [word for action in self._all_actions() for word in action.option_strings]
+            for word in unknown.split():
+                near = difflib.get_close_matches(word.split("=")[0], known, n=1)
+                if near:
+                    message += f"; did you mean {near[0]}?"
+        super().error(message)
+
+    def _all_actions(self) -> list[argparse.Action]:
+        found: list[argparse.Action] = []
+        for action in self._actions:
+            found.append(action)
+            if isinstance(action, argparse._SubParsersAction):
+                for parser in action.choices.values():
+                    found += parser._all_actions() if isinstance(parser, Parser) else []
+        return found
+
+
+def describe(parser: argparse.ArgumentParser, *, after_help: str) -> str:
+    """Returns the JSON that `_native.run_cli` takes for `program`.
+
+    Args:
+        parser: of the whole program.
+        after_help: text at the end of its help.
+    """
+    document = {
+        "name": parser.prog,
+        "after_help": after_help,
+        "further": _commands(parser),
+    }
+    return json.dumps(document)
+
+
+def _commands(parser: argparse.ArgumentParser) -> list[dict[str, Any]]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            abouts = {choice.dest: choice.help or "" for choice in action._choices_actions}
+            return [
+                {
+                    "name": name,
+                    "about": abouts.get(name, ""),
+                    "options": _options(inner),
+                    "commands": _commands(inner),
+                }
+                for name, inner in action.choices.items()
+            ]
+    return []
+
+
+def _options(parser: argparse.ArgumentParser) -> list[dict[str, Any]]:
+    found = []
+    for action in parser._actions:
+        longs = [word[2:] for word in action.option_strings if word.startswith("--")]
+        shorts = [word[1:] for word in action.option_strings if len(word) == 2]
+        if not longs or longs[0] == "help":
+            continue
+        found.append(
+            {
+                "long": longs[0],
+                "short": shorts[0] if shorts else None,
+                "help": (action.help or "").replace("%%", "%"),
+                "takes_value": action.nargs != 0,
+                "values": [str(value) for value in action.choices or ()],
+            }
+        )
+    return found

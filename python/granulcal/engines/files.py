@@ -1,0 +1,60 @@
+"""Grains as engines write them: LAMMPS dumps, CSV, npy."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["read_grains"]
+
+Array = NDArray[np.float64]
+NAMES = ("grains.npy", "grains.csv", "grains.dump")
+"""Where grains may stand, the first that is there."""
+
+
+def read_grains(folder: Path, radius: float | None = None) -> tuple[Array, Array] | None:
+    """Returns centres [m] (n, 3) and radii [m] (n,) in a folder, None if there is no such file.
+
+    Args:
+        folder: with one of grains.npy (x, y, z and perhaps radius), grains.csv (the same, with a
+            head) or grains.dump (of LAMMPS, columns id, x, y, z, radius).
+        radius: of all grains, where the file states none [m].
+
+    Raises:
+        ValueError: a file of another form.
+    """
+    for name in NAMES:
+        path = folder / name
+        if path.exists():
+            table = _table(path)
+            if table.ndim != 2 or table.shape[1] not in (3, 4):
+                raise ValueError(f"{path} must have x, y, z and perhaps radius, got {table.shape}")
+            if table.shape[1] == 3 and radius is None:
+                raise ValueError(f"{path} states no radius")
+            radii = table[:, 3] if table.shape[1] == 4 else np.full(len(table), radius)
+            return np.ascontiguousarray(table[:, :3]), np.ascontiguousarray(radii, dtype=float)
+    return None
+
+
+def _table(path: Path) -> Array:
+    if path.suffix == ".npy":
+        return np.asarray(np.load(path), float)
+    if path.suffix == ".csv":
+        return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    return _dump(path)
+
+
+def _dump(path: Path) -> Array:
+    """Returns the last frame of a LAMMPS dump, in the order of the ids."""
+    text = path.read_text(encoding="utf-8")
+    head = text.rfind("ITEM: ATOMS")
+    if head < 0:
+        raise ValueError(f"{path} is no LAMMPS dump: it has no line ITEM: ATOMS")
+    first, *rows = text[head:].splitlines()
+    names = first.split()[2:]
+    missing = {"id", "x", "y", "z", "radius"} - set(names)
+    if missing:
+        raise ValueError(f"{path} must have the columns id, x, y, z, radius; it has {names}")
+    table = np.array([row.split() for row in rows], float).reshape(len(rows), len(names))
+    table = table[np.argsort(table[:, names.index("id")])]
+    return table[:, [names.index(name) for name in ("x", "y", "z", "radius")]]

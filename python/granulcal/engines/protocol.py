@@ -1,0 +1,88 @@
+"""What another simulator must do: take a scene and a seed, leave grains or points."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.scene import Scene
+
+__all__ = ["CallableEngine", "Engine", "Left", "left"]
+
+Array = NDArray[np.float64]
+Left = tuple[Array, Array] | Array
+
+
+class Engine(Protocol):
+    """A simulator that `generate`, `simulate` and `calibrate` may ask in place of ours.
+
+    It is called from several threads at once. The same scene and seed should give the same pour.
+    """
+
+    @property
+    def name(self) -> str:
+        """What it is called, with its version; data sets of two names are never mixed."""
+        ...
+
+    def __call__(self, scene: Scene, seed: int) -> Left:
+        """Returns what is left of a pour.
+
+        Args:
+            scene: with all parameters set; `scene.to_toml()` and `scene.get(path)` tell them.
+            seed: of everything random.
+
+        Returns:
+            Centres [m] of shape (n, 3) and radii [m] of shape (n,), ground at z = 0, for the scene's
+            camera to look at; or points of the surface [m] of shape (n, 3), as a camera of one's own
+            saw them, with the pour axis at x = y = 0.
+        """
+        ...
+
+
+class CallableEngine:
+    """A Python function as an engine.
+
+    Args:
+        function: (scene, seed) to (centres, radii) or points.
+        name: what it is called; the default is its qualified name.
+
+    Example:
+        >>> from granulcal.scene import Scene
+        >>> flat = CallableEngine(lambda scene, seed: scene.start(seed), name="not moved")
+        >>> flat(Scene.drop(0.02, count=5), 1)[0].shape
+        (5, 3)
+    """
+
+    def __init__(self, function: Callable[[Scene, int], Any], *, name: str | None = None) -> None:
+        self.function = function
+        self.name = name or f"{function.__module__}:{getattr(function, '__qualname__', function)}"
+        """What it is called."""
+
+    def __call__(self, scene: Scene, seed: int) -> Left:
+        """Returns what the function left, checked."""
+        return left(self.name, self.function(scene, seed))
+
+
+def left(name: str, found: Any) -> Left:
+    """Returns what an engine left as arrays.
+
+    Raises:
+        ValueError: neither (centres, radii) nor points.
+    """
+    if isinstance(found, tuple):
+        if len(found) != 2:
+            raise ValueError(
+                f"{name} must leave (centres, radii) or points, got {len(found)} things"
+            )
+        centres = _vectors(name, found[0])
+        radii = np.ascontiguousarray(np.broadcast_to(np.asarray(found[1], float), len(centres)))
+        return centres, radii
+    return _vectors(name, found)
+
+
+def _vectors(name: str, values: Any) -> Array:
+    array = np.ascontiguousarray(values, dtype=float)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"{name} must leave arrays of shape (n, 3), got {array.shape}")
+    return array

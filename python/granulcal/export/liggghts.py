@@ -1,0 +1,135 @@
+"""LIGGGHTS 3.8: `pair_style gran model hertz tangential history rolling_friction epsd`.
+
+Rolling: epsd limits the moment to mu R_eff F_n, so mu is our mu_r. Damping: its dashpot may pull a
+parting contact and then gives the e that it is told, whatever the speed.
+"""
+
+from granulcal.export import law
+from granulcal.export.mesh import stl, triangles
+from granulcal.export.setup import Contact, Setup, Stiffness
+
+__all__ = ["ENGINE", "NOTES", "material", "scene"]
+
+ENGINE = "liggghts"
+NOTES = (
+    "torsional_friction has no counterpart: epsd acts on the rotation across the normal alone",
+    "tangential_restitution has no counterpart: its tangential dashpot follows the normal one",
+    "restitution below 0.05 is written as 0.05, the least that LIGGGHTS takes",
+    "round walls are meshes of 64 sides: LIGGGHTS has no cones",
+)
+_WORDS = "model hertz tangential history rolling_friction epsd"
+_LEAST_RESTITUTION = 0.05
+# LIGGGHTS refuses softer grains unless told `soft_particles yes`.
+_LEAST_YOUNG = 5e6
+_LOOK, _SLOW, _RESTING = 0.02, 0.01, 0.995
+
+
+def material(setup: Setup, young: float | None = None) -> str:
+    """Returns the lines of a material: type 1 are grains, type 2 the ground, from 3 on the walls."""
+    stiffness = _stiffness(setup, young)
+    laws = [setup.grains, setup.ground, *(body.law for body in setup.walls)]
+    n = len(laws)
+
+    def pairs(name: str) -> str:
+        # What grains do with wall i stands in row 1 and column i; walls never meet.
+        return " ".join(f"{_value(laws[max(i, j)], name):.9g}" for i in range(n) for j in range(n))
+
+    kinds = " ".join([f"{stiffness.young:.6g}"] * n)
+    ratios = " ".join([f"{law.POISSON}"] * n)
+    damping = " ".join(["0.7"] * (n * n))
+    table = f"peratomtypepair {n}"
+    return f"""\
+fix           m1 all property/global youngsModulus peratomtype {kinds}
+fix           m2 all property/global poissonsRatio peratomtype {ratios}
+fix           m3 all property/global coefficientRestitution {table} {pairs("restitution")}
+fix           m4 all property/global coefficientFriction {table} {pairs("sliding_friction")}
+fix           m5 all property/global coefficientRollingFriction {table} {pairs("rolling_friction")}
+fix           m6 all property/global coefficientRollingViscousDamping {table} {damping}
+pair_style    gran {_WORDS}
+pair_coeff    * *
+timestep      {stiffness.dt:.6g}
+"""
+
+
+def _stiffness(setup: Setup, young: float | None) -> Stiffness:
+    usual = setup.stiffness(young)
+    return usual if usual.young >= _LEAST_YOUNG else setup.stiffness(_LEAST_YOUNG)
+
+
+def _value(of: Contact, name: str) -> float:
+    value = float(getattr(of, name))
+    return max(value, _LEAST_RESTITUTION) if name == "restitution" else value
+
+
+def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
+    """Returns the files of a pour: `liggghts -in in.pour` leaves grains.dump."""
+    stiffness = _stiffness(setup, young)
+    w, largest = setup.half_width, float(setup.radii.max())
+    look = max(1, round(_LOOK / stiffness.dt))
+    files = {f"{body.name}.stl": stl(triangles(body.shape), body.name) for body in setup.walls}
+    meshes = "\n".join(
+        f"fix           {body.name} all mesh/surface file {body.name}.stl type {k}"
+        for k, body in enumerate(setup.walls, start=3)
+    )
+    names = " ".join(body.name for body in setup.walls)
+    walls = (
+        f"fix           walls all wall/gran {_WORDS} mesh n_meshes {len(setup.walls)} meshes {names}"
+        if setup.walls
+        else ""
+    )
+    g = sum(c * c for c in setup.gravity) ** 0.5
+    direction = " ".join(f"{c / g:.9g}" for c in setup.gravity)
+    grains = "\n".join(
+        "create_atoms  1 single {:.9g} {:.9g} {:.9g} units box".format(*centre)
+        for centre in setup.centres
+    )
+    sizes = "\n".join(_sizes(setup))
+    files["in.pour"] = f"""\
+atom_style    granular
+atom_modify   map array
+boundary      f f f
+newton        off
+communicate   single vel yes
+units         si
+region        space block {-w} {w} {-w} {w} {-setup.smallest:g} {setup.top:g} units box
+create_box    {2 + len(setup.walls)} space
+neighbor      {0.25 * largest:.6g} bin
+neigh_modify  delay 0
+{material(setup, young)}
+fix           gravity all gravity {g:.9g} vector {direction}
+{meshes}
+{walls}
+fix           ground all wall/gran {_WORDS} primitive type 2 zplane 0.0
+{grains}
+{sizes}
+fix           motion all nve/sphere
+# Runs until {100 * _RESTING:g} % of the grains are slower than {100 * _SLOW:g} cm/s.
+variable      slow atom "vx*vx + vy*vy + vz*vz < {_SLOW**2:g}"
+compute       resting all reduce ave v_slow
+thermo        {look}
+thermo_style  custom step atoms ke c_resting
+thermo_modify lost ignore norm no
+run           1
+label         again
+run           {look}
+variable      now equal "step * {stiffness.dt:.9g}"
+variable      share equal c_resting
+if            "(${{now}} > {setup.earliest:.4g}) && (${{share}} > {_RESTING})" then "jump SELF done"
+if            "${{now}} > {setup.horizon:g}" then "jump SELF done"
+jump          SELF again
+label         done
+dump          end all custom 1 grains.dump id x y z radius
+run           1
+"""
+    return files
+
+
+def _sizes(setup: Setup) -> list[str]:
+    if float(setup.radii.max() - setup.radii.min()) == 0.0:
+        return [
+            f"set           group all density {setup.density:g} diameter {2 * setup.smallest:.9g}"
+        ]
+    return [
+        f"set           atom {i} density {setup.density:g} diameter {2 * radius:.9g}"
+        for i, radius in enumerate(setup.radii, start=1)
+    ]

@@ -1,0 +1,188 @@
+"""MuJoCo: MJCF with free spheres, elliptic cones of six dimensions, a stiff contact.
+
+Rolling and torsion: friction coefficients 4 to 6 of a contact of condim 6 are lengths [m], mu R_eff. Of two
+geoms the larger counts, so the grains carry mu_r R / 2 and the ground and walls mu_r R. Restitution: a
+direct `solref` (-stiffness, -damping) at impedance one is a unilateral spring and dashpot per unit of
+effective mass, whose dashpot cannot pull: docs/export.md.
+"""
+
+import math
+
+from granulcal.export import law
+from granulcal.export.mesh import triangles
+from granulcal.export.setup import Contact, Setup
+
+__all__ = ["ENGINE", "NOTES", "material", "mjcf", "scene"]
+
+ENGINE = "mujoco"
+NOTES = (
+    "tangential_restitution has no counterpart: friction in MuJoCo never gives back",
+    "a pair takes the larger friction of its two geoms: a wall smoother than the grains is as rough as they are",
+    "friction is regularised: a heap creeps by impratio, which is 10 here",
+    "round walls are rings of 24 boxes: MuJoCo's meshes are convex",
+)
+_DT = 1e-4
+# Time of an impact over the time step: fewer steps would not resolve the dashpot.
+_STEPS = 20
+_SIDES = 24
+_THICKNESS = 2e-3
+
+
+def solref(restitution: float) -> tuple[float, float]:
+    """Returns stiffness [1/s^2] and damping [1/s] of an impact that lasts 20 time steps."""
+    beta = law.damping_ratio(restitution, tension=False, overdamped=True)
+    # Half a period of the undamped spring; an overdamped one lets go later.
+    omega = math.pi / (_STEPS * _DT)
+    return omega**2, 2.0 * beta * omega
+
+
+def _friction(of: Contact, lever: float) -> str:
+    slide = of.sliding_friction
+    return f"{slide:.6g} {of.torsional_length(lever):.6g} {of.rolling_length(lever):.6g}"
+
+
+def material(setup: Setup, young: float | None = None) -> str:
+    """Returns the defaults of the grains' geoms."""
+    del young
+    k, b = solref(setup.grains.restitution)
+    return (
+        f'<default class="grain"><geom type="sphere" condim="6" density="{setup.density:g}" '
+        f'friction="{_friction(setup.grains, setup.effective_radius)}" '
+        f'solref="{-k:.6g} {-b:.6g}" solimp="0.99 0.99 0.001"/></default>'
+    )
+
+
+def mjcf(setup: Setup) -> str:
+    """Returns the whole pour as MJCF."""
+    radius = setup.smallest
+    walls = []
+    for body in setup.walls:
+        k, b = solref(body.law.restitution)
+        words = (
+            f'condim="6" friction="{_friction(body.law, radius)}" '
+            f'solref="{-k:.6g} {-b:.6g}" solimp="0.99 0.99 0.001" rgba=".6 .6 .7 .3"'
+        )
+        walls += [f"    {geom.format(words=words)}" for geom in _boxes(body.shape)]
+    k, b = solref(setup.ground.restitution)
+    grains = []
+    for i, (centre, size) in enumerate(zip(setup.centres, setup.radii, strict=True)):
+        x, y, z = centre
+        grains.append(
+            f'    <body name="grain{i}" pos="{x:.9g} {y:.9g} {z:.9g}"><freejoint/>'
+            f'<geom class="grain" size="{size:.9g}"/></body>'
+        )
+    gravity = " ".join(f"{g:.9g}" for g in setup.gravity)
+    return "\n".join(
+        [
+            f'<mujoco model="{setup.name}">',
+            f'  <option timestep="{_DT:g}" gravity="{gravity}" cone="elliptic" impratio="10" '
+            'integrator="implicitfast" solver="Newton" iterations="20" jacobian="sparse"/>',
+            '  <size memory="512M"/>',
+            f"  <default>{material(setup)}</default>",
+            "  <worldbody>",
+            '    <light pos="0 0 1"/>',
+            f'    <geom name="ground" type="plane" size="1 1 .01" condim="6" '
+            f'friction="{_friction(setup.ground, radius)}" '
+            f'solref="{-k:.6g} {-b:.6g}" solimp="0.99 0.99 0.001"/>',
+            *walls,
+            *grains,
+            "  </worldbody>",
+            "</mujoco>",
+            "",
+        ]
+    )
+
+
+def _boxes(shape: dict) -> list[str]:
+    """Returns a wall as flat boxes, one for each pair of its triangles."""
+    import numpy as np
+
+    mesh = triangles(shape, sides=_SIDES)
+    found = []
+    if shape["kind"] in ("cone", "cylinder"):
+        half = len(mesh.vertices) // 2 if shape.get("closed", "none") == "none" else _SIDES
+        low, high = mesh.vertices[:_SIDES], mesh.vertices[half : half + _SIDES]
+        quads = [
+            (low[i], low[(i + 1) % _SIDES], high[(i + 1) % _SIDES], high[i]) for i in range(_SIDES)
+        ]
+        if shape.get("closed", "none") != "none":
+            raise ValueError(
+                "a closed round wall has no MJCF here; leave its end to a disc of yours"
+            )
+    elif shape["kind"] in ("box", "plane"):
+        quads = [
+            tuple(mesh.vertices[[a[0], a[1], a[2], b[2]]])
+            for a, b in zip(mesh.faces[::2], mesh.faces[1::2], strict=True)
+        ]
+    else:
+        raise ValueError(f"a wall of kind {shape['kind']!r} has no MJCF here")
+    for a, b, c, d in quads:
+        centre = (a + b + c + d) / 4
+        along = (b + c - a - d) / 2
+        up = (c + d - a - b) / 2
+        width = max(np.linalg.norm(b - a), np.linalg.norm(c - d))
+        x = along / np.linalg.norm(along)
+        normal = np.cross(x, up)
+        normal /= np.linalg.norm(normal)
+        # Away from the axis, so that the inner face is the wall.
+        outward = centre * [1, 1, 0]
+        if shape["kind"] in ("cone", "cylinder"):
+            normal = normal if normal @ outward > 0 else -normal
+        y = np.cross(normal, x)
+        at = centre + normal * _THICKNESS if shape["kind"] in ("cone", "cylinder") else centre
+        rotation = np.column_stack([x, y, normal])
+        q = _quaternion(rotation)
+        size = f"{0.5 * width:.6g} {0.5 * np.linalg.norm(up):.6g} {_THICKNESS:g}"
+        where = " ".join(f"{v:.6g}" for v in at)
+        turn = " ".join(f"{v:.9g}" for v in q)
+        found.append(f'<geom type="box" pos="{where}" quat="{turn}" size="{size}" {{words}}/>')
+    return found
+
+
+def _quaternion(rotation) -> tuple[float, float, float, float]:
+    """Returns w, x, y, z of a rotation matrix."""
+    import numpy as np
+
+    # The eigenvector of Bar-Itzhack's matrix of largest eigenvalue.
+    r = rotation
+    k = np.array(
+        [
+            [r[0, 0] - r[1, 1] - r[2, 2], 0, 0, 0],
+            [r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], 0, 0],
+            [r[2, 0] + r[0, 2], r[2, 1] + r[1, 2], r[2, 2] - r[0, 0] - r[1, 1], 0],
+            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], np.trace(r)],
+        ]
+    )
+    x, y, z, w = np.linalg.eigh(k / 3)[1][:, -1]
+    return float(w), float(x), float(y), float(z)
+
+
+_RUN = '''\
+"""Pours pour.xml in MuJoCo and leaves grains.csv: python pour.py"""
+
+import mujoco
+import numpy as np
+
+EARLIEST, HORIZON, LOOK = {earliest:.4g}, {horizon:g}, 0.02
+model = mujoco.MjModel.from_xml_path("pour.xml")
+data = mujoco.MjData(model)
+steps = round(LOOK / model.opt.timestep)
+count = model.nbody - 1
+while data.time < HORIZON:
+    mujoco.mj_step(model, data, steps)
+    speed = np.linalg.norm(data.qvel.reshape(count, 6)[:, :3], axis=1)
+    # MuJoCo's friction creeps: what is slower than 1 cm/s rests.
+    if data.time > EARLIEST and (speed < 0.01).mean() > 0.995:
+        break
+centres = data.qpos.reshape(count, 7)[:, :3]
+radii = model.geom_size[model.geom_bodyid > 0, 0]
+table = np.column_stack([centres, radii])
+np.savetxt("grains.csv", table, delimiter=",", header="x,y,z,radius", comments="", fmt="%.9g")
+'''
+
+
+def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
+    """Returns the files of a pour: `python pour.py` leaves grains.csv."""
+    del young
+    run = _RUN.format(earliest=setup.earliest, horizon=setup.horizon)
+    return {"pour.xml": mjcf(setup), "pour.py": run}

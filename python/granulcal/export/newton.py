@@ -1,0 +1,100 @@
+"""Newton (Warp): bodies of the XPBD solver.
+
+Rolling and torsional friction of a shape are lengths [m], mu R_eff; of two shapes the mean counts, so
+the ground carries 2 mu_r R - mu_r R / 2 = 1.5 mu_r R for a pair limit of mu_r R. Restitution is Newton's
+e, of two shapes the mean, where `enable_restitution` is on.
+"""
+
+import json
+
+from granulcal.export.mesh import triangles
+from granulcal.export.setup import Contact, Setup
+
+__all__ = ["ENGINE", "NOTES", "material", "scene"]
+
+ENGINE = "newton"
+NOTES = (
+    "XPBD solves by a few sweeps: friction and restitution are approached, not met",
+    "tangential_restitution has no counterpart",
+    "round walls are meshes of 64 sides",
+)
+_DT = 5e-4
+
+
+def _config(
+    name: str, of: Contact, lever: float, density: float, grains: "Contact | None", own: float
+) -> str:
+    """Returns the lines of a shape; `grains` and `own` are what the other of the two carries."""
+
+    def partner(value: float, other: float) -> float:
+        # The mean of the two is what the contact must have.
+        return value if grains is None else max(2.0 * value - other, 0.0)
+
+    mu = partner(of.sliding_friction, grains.sliding_friction if grains else 0.0)
+    e = partner(of.restitution, grains.restitution if grains else 0.0)
+    roll = partner(of.rolling_length(lever), grains.rolling_length(own) if grains else 0.0)
+    twist = partner(of.torsional_length(lever), grains.torsional_length(own) if grains else 0.0)
+    return (
+        f"{name} = newton.ModelBuilder.ShapeConfig(density={density:g}, mu={mu:.9g}, restitution={e:.9g},\n"
+        f"    mu_rolling={roll:.9g}, mu_torsional={twist:.9g})\n"
+    )
+
+
+def material(setup: Setup, young: float | None = None) -> str:
+    """Returns the lines of a material."""
+    del young
+    return _config("grain", setup.grains, setup.effective_radius, setup.density, None, 0.0)
+
+
+def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
+    """Returns the files of a pour: `python pour.py` leaves grains.csv."""
+    walls = [
+        {"vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist()}
+        for mesh in (triangles(body.shape) for body in setup.walls)
+    ]
+    table = {"centres": setup.centres.tolist(), "radii": setup.radii.tolist(), "walls": walls}
+    own, wide = setup.effective_radius, setup.smallest
+    laws = _config("ground", setup.ground, wide, 0.0, setup.grains, own)
+    laws += "".join(
+        _config(f"wall_{i}", body.law, wide, 0.0, setup.grains, own)
+        for i, body in enumerate(setup.walls)
+    )
+    names = ", ".join(f"wall_{i}" for i in range(len(setup.walls)))
+    script = f"""\
+\"\"\"Pours {setup.name} in Newton and leaves grains.csv: python pour.py\"\"\"
+
+import json
+
+import newton
+import numpy as np
+import warp as wp
+
+table = json.load(open("pour.json"))
+{material(setup)}{laws}
+builder = newton.ModelBuilder(gravity={setup.gravity})
+builder.rigid_gap = {0.5 * setup.smallest:.6g}
+builder.add_ground_plane(cfg=ground)
+for mesh, law in zip(table["walls"], [{names}]):
+    shape = newton.Mesh(np.array(mesh["vertices"], np.float32), np.array(mesh["faces"], np.int32).ravel())
+    builder.add_shape_mesh(-1, mesh=shape, cfg=law)
+for centre, radius in zip(table["centres"], table["radii"]):
+    body = builder.add_body(xform=wp.transform(wp.vec3(*centre), wp.quat_identity()))
+    builder.add_shape_sphere(body, radius=radius, cfg=grain)
+model = builder.finalize()
+solver = newton.solvers.SolverXPBD(model, iterations=8, enable_restitution=True)
+one, two, control = model.state(), model.state(), model.control()
+contacts, time, dt = model.contacts(), 0.0, {_DT:g}
+while time < {setup.horizon:g}:
+    for _ in range(40):
+        one.clear_forces()
+        model.collide(one, contacts)
+        solver.step(one, two, control, contacts, dt)
+        one, two = two, one
+        time += dt
+    speed = np.linalg.norm(one.body_qd.numpy()[:, :3], axis=1)
+    if time > {setup.earliest:.4g} and (speed < 0.01).mean() > 0.995:
+        break
+out = np.column_stack([one.body_q.numpy()[:, :3], table["radii"]])
+np.savetxt("grains.csv", out, delimiter=",", header="x,y,z,radius", comments="", fmt="%.9g")
+"""
+    return {"pour.py": script, "pour.json": json.dumps(table)}

@@ -1,0 +1,169 @@
+"""Writes the commented files of `granulcal init`, fitted to the lens of a recording where there is one."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from granulcal.files import write_beside
+from granulcal.recording import Recording
+from granulcal.scene import Scene
+from granulcal.starter.texts import CAMERA, DROP_START, FUNNEL_START, LOOP, PRIOR, SCENE
+
+__all__ = ["CONDITIONS", "FILES", "SCENES", "Lens", "lens_of", "write_folder"]
+
+SCENES = ("funnel", "drop")
+"""Built-in scenes."""
+FILES = ("scene.toml", "prior.toml", "camera.toml", "loop.toml")
+"""What a folder begins with."""
+CONDITIONS = {"low": 0.06, "high": 0.12}
+"""Conditions of loop.toml and what their one number is [m]."""
+_POURS = 2
+# Width of a pixel on the ground that images are compared at, over a grain's diameter.
+_PIXEL = 1.25
+_LEAST_THRESHOLD = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lens:
+    """A depth camera that looks down.
+
+    Attributes:
+        width, height: of its image [px].
+        fx, fy, cx, cy: focal lengths and principal point, the first pixel's centre at 0 [px].
+        unit: metres per count of its 16-bit images.
+        distance: from the ground, along the axis [m].
+        noise: robust standard deviation of the ground about its plane [m].
+        origin: where the numbers come from, a sentence.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    unit: float
+    distance: float
+    noise: float
+    origin: str
+
+    @property
+    def pixels(self) -> int:
+        """Side of the largest square in the image [px]."""
+        return min(self.width, self.height)
+
+    @property
+    def field_width(self) -> float:
+        """Side of the ground that this square sees [m]."""
+        return self.pixels * self.distance / min(self.fx, self.fy)
+
+    @property
+    def threshold(self) -> float:
+        """Height from which a pixel counts as grain [m]."""
+        return round(max(3.0 * self.noise, _LEAST_THRESHOLD), 4)
+
+
+D435 = Lens(
+    width=640, height=480, fx=390.43, fy=390.43, cx=319.5, cy=239.5, unit=1e-4,
+    distance=0.4, noise=3.3e-4,
+    origin="A RealSense D435 at 640 x 480, 40 cm above the ground: replace all of it by your own,\n"
+    "# or let `granulcal init FOLDER --recording FILE` read it.",
+)  # fmt: skip
+"""A camera to begin with."""
+
+
+def lens_of(path: Path, camera: Path | None = None) -> Lens:
+    """Returns the lens of a recording, and what its ground tells of distance and noise.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: it is a height map, which has no lens, or shows no ground.
+    """
+    recording = Recording.open(path, camera=camera)
+    lens = recording.lens
+    if lens is None:
+        raise ValueError(f"{path} is a height map and has no lens; give a depth recording")
+    levelled = recording.level()
+    return Lens(
+        width=int(lens["width"]),
+        height=int(lens["height"]),
+        fx=lens["fx"],
+        fy=lens["fy"],
+        cx=lens["cx"],
+        cy=lens["cy"],
+        unit=recording.depth_unit or D435.unit,
+        distance=round(abs(levelled.plane.offset), 4),
+        noise=levelled.ground_sd,
+        origin=f"Read from {path.name}.",
+    )
+
+
+def write_folder(
+    folder: Path, *, scene: str = "funnel", lens: Lens = D435, force: bool = False
+) -> Scene:
+    """Writes scene, prior, camera and task into `folder` and returns the scene.
+
+    Args:
+        folder: made if it does not exist.
+        scene: `funnel` or `drop`.
+        lens: of the camera that will look.
+        force: overwrite files of these names.
+
+    Raises:
+        ValueError: no built-in scene has this name.
+        FileExistsError: a file is there already.
+    """
+    if scene not in SCENES:
+        raise ValueError(f"scene must be one of {', '.join(SCENES)}, got {scene!r}")
+    there = [name for name in FILES if (folder / name).exists()]
+    if there and not force:
+        raise FileExistsError(f"{folder} has {', '.join(there)} already; --force writes them anew")
+    write_beside(folder / "scene.toml", scene_text(scene, lens))
+    write_beside(folder / "prior.toml", PRIOR)
+    write_beside(folder / "camera.toml", camera_text(lens))
+    path = "funnel.height" if scene == "funnel" else "start.height"
+    names = {
+        name: json.dumps([f"pours/{name}-{i}.png" for i in range(_POURS)]) for name in CONDITIONS
+    }
+    write_beside(
+        folder / "loop.toml",
+        LOOP.format(path=path, **CONDITIONS, low_names=names["low"], high_names=names["high"]),
+    )
+    return Scene.load(folder / "scene.toml")
+
+
+def scene_text(name: str, lens: Lens) -> str:
+    """Returns the commented TOML of a built-in scene under this camera."""
+    built_in = Scene.built_in(name)
+    diameter = built_in.get("grains.diameter")
+    paths = {
+        "jitter": "start.jitter",
+        "tip": "funnel.height" if name == "funnel" else "start.height",
+    }
+    start, wanted = DROP_START, paths
+    if name == "funnel":
+        start, wanted = FUNNEL_START, paths | {"spacing": "start.spacing", "base": "start.base"}
+    width = lens.field_width / lens.pixels
+    downsample = max(1, round(_PIXEL * diameter / width))
+    return SCENE.format(
+        name=name,
+        preset=built_in.preset,
+        count=int(built_in.get("grains.count")),
+        diameter=diameter,
+        start=start.format(**{key: built_in.get(path) for key, path in wanted.items()}),
+        height=lens.distance,
+        field_width=round(lens.field_width, 4),
+        pixels=lens.pixels,
+        downsample=downsample,
+        threshold=lens.threshold,
+        resolution_mm=1e3 * width * downsample,
+    )
+
+
+def camera_text(lens: Lens) -> str:
+    """Returns the commented TOML of a camera."""
+    shown = {
+        key: getattr(lens, key)
+        for key in ("width", "height", "fx", "fy", "cx", "cy", "unit", "threshold", "origin")
+    }
+    return CAMERA.format(**shown)

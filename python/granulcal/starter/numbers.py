@@ -1,0 +1,54 @@
+"""Changes numbers of a scene's file and leaves its comments where they are."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from granulcal.files import write_beside
+from granulcal.scene import Scene
+
+__all__ = ["set_numbers"]
+
+
+def set_numbers(path: Path, changes: Mapping[str, float | str]) -> Scene:
+    """Writes other values into a scene's file and returns the scene; comments stay.
+
+    Args:
+        path: TOML of a scene, one key a line.
+        changes: values by path, as `Scene.with_` takes them.
+
+    Raises:
+        ValueError: a value does not fit the scene, or the file does not state this number.
+    """
+    wanted = Scene.load(path).with_(changes)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    for name, value in changes.items():
+        table, _, key = name.rpartition(".")
+        lines = _set(path, lines, table, key, value)
+    text = "\n".join(lines) + "\n"
+    if Scene.from_toml(text) != wanted:
+        raise ValueError(f"{path} cannot be changed by line: set {', '.join(changes)} by hand")
+    write_beside(path, text)
+    return wanted
+
+
+def _set(path: Path, lines: list[str], table: str, key: str, value: float | str) -> list[str]:
+    here, result, is_done = "", [], False
+    for line in lines:
+        bare = line.strip()
+        if bare.startswith("[") and not bare.startswith("[["):
+            here = bare.strip("[]").strip()
+        name, mark, rest = line.partition("=")
+        if here == table and mark and name.strip() == key and not bare.startswith("#"):
+            comment = rest.find("#")
+            tail = "" if comment < 0 else "    " + rest[comment:]
+            line, is_done = f"{key} = {_toml(value)}{tail}", True
+        result.append(line)
+    if not is_done:
+        raise ValueError(f"{path} states no {key} in [{table}]; add it there")
+    return result
+
+
+def _toml(value: float | str) -> str:
+    if isinstance(value, str):
+        return f'"{value}"'
+    return str(int(value)) if float(value).is_integer() else repr(float(value))

@@ -1,0 +1,164 @@
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.cli import main
+from granulcal.engines import CallableEngine, CommandEngine, ExportedEngine, engine_named, installed
+from granulcal.engines.files import read_grains
+
+# A simulator of one's own in a dozen lines: a pile that is the steeper, the rougher the grains are.
+SIMULATOR = """\
+import json, pathlib, sys
+import numpy as np
+folder = pathlib.Path(sys.argv[-1])
+request = json.loads((folder / "request.json").read_text())
+rng = np.random.default_rng(request["seed"])
+count, diameter = int(request["grains"]["count"]), request["grains"]["diameter"]
+slope = 0.2 + 0.5 * request["material"]["sliding_friction"]
+r = 0.03 * np.sqrt(rng.random(count))
+angle = 2 * np.pi * rng.random(count)
+z = diameter / 2 + slope * (0.03 - r)
+centres = np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
+np.savetxt(folder / "grains.csv", centres, delimiter=",", header="x,y,z", comments="")
+"""
+
+
+@pytest.fixture(scope="module")
+def command(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("own") / "simulator.py"
+    path.write_text(SIMULATOR)
+    return f"{sys.executable} {path}"
+
+
+def cone(scene: gc.Scene, seed: int) -> np.ndarray:
+    """Points of a cone, as a camera of one's own would see them."""
+    rng = np.random.default_rng(seed)
+    r, angle = 0.05 * np.sqrt(rng.random(300)), 2 * np.pi * rng.random(300)
+    slope = scene.get("material.sliding_friction")
+    return np.column_stack([r * np.cos(angle), r * np.sin(angle), 0.03 - slope * 0.5 * r])
+
+
+def test_a_command_makes_a_pour_with_the_scenes_camera(command: str, small_scene: gc.Scene) -> None:
+    engine = CommandEngine(command)
+    rough = small_scene.with_({"material.sliding_friction": 0.9})
+    pour, again = (
+        gc.simulate(rough, seed=4, engine=engine),
+        gc.simulate(rough, seed=4, engine=engine),
+    )
+    assert pour.status == "at_rest" and pour.state_hash == again.state_hash
+    assert pour.positions.shape == (60, 3) and np.all(pour.radii == 0.002)
+    smooth = gc.simulate(
+        small_scene.with_({"material.sliding_friction": 0.1}), seed=4, engine=engine
+    )
+    assert pour.statistics()["max_z"] > smooth.statistics()["max_z"]
+    assert np.isnan(pour.health["worst_penetration"])
+
+
+def test_rows_of_an_engine_are_a_data_set_and_are_not_mixed_with_ours(
+    small_scene: gc.Scene, small_prior: gc.Prior, tmp_path: Path
+) -> None:
+    engine = CallableEngine(cone, name="cones")
+    data = gc.generate(small_scene, small_prior, 6, out=tmp_path, progress=False, engine=engine)
+    assert data.version == f"{gc.__version__}, pours by cones"
+    assert data.is_usable.all() and np.isfinite(data.x).all()
+    friction = data.theta[:, data.theta_names.index("material.sliding_friction")]
+    expected = [gc.statistics(cone(small_scene.with_({"material.sliding_friction": f}), int(s)))
+                ["max_z"] for f, s in zip(friction, data.seed, strict=True)]  # fmt: skip
+    assert np.allclose(data.paper16[:, 0], expected)
+    more = gc.generate(small_scene, small_prior, 8, out=tmp_path, progress=False, engine=engine)
+    assert np.array_equal(more.x[:6], data.x)
+    with pytest.raises(ValueError, match="version of granulcal"):
+        gc.generate(small_scene, small_prior, 8, out=tmp_path, progress=False)
+
+
+def test_the_error_of_a_function_is_the_callers(
+    small_scene: gc.Scene, small_prior: gc.Prior, tmp_path: Path
+) -> None:
+    def broken(scene: gc.Scene, seed: int) -> np.ndarray:
+        raise RuntimeError("out of sand")
+
+    with pytest.raises(RuntimeError, match="out of sand"):
+        gc.generate(
+            small_scene, small_prior, 2, out=tmp_path, progress=False, engine=CallableEngine(broken)
+        )
+    with pytest.raises(ValueError, match=r"shape \(n, 3\), got \(4,\)"):
+        CallableEngine(lambda scene, seed: np.zeros(4), name="flat")(small_scene, 1)
+    with pytest.raises(ValueError, match="points of a surface and no grains"):
+        gc.simulate(small_scene, engine=CallableEngine(cone))
+
+
+def test_a_command_that_fails_says_why(small_scene: gc.Scene, tmp_path: Path) -> None:
+    failing = tmp_path / "fails.py"
+    failing.write_text("raise SystemExit('no licence')")
+    with pytest.raises(ValueError, match="ended with 1: no licence"):
+        CommandEngine(f"{sys.executable} {failing}")(small_scene, 0)
+    failing.write_text("")
+    with pytest.raises(ValueError, match="left no grains.npy"):
+        CommandEngine(f"{sys.executable} {failing}")(small_scene, 0)
+    with pytest.raises(ValueError, match="nonesuch"):
+        CommandEngine("nonesuch-engine")(small_scene, 0)
+
+
+def test_engines_are_named(command: str) -> None:
+    assert engine_named(command).name == command
+    assert engine_named("granulcal.scene:Scene").name == "granulcal.scene:Scene"
+    with pytest.raises(ValueError, match="no attribute 'sand'"):
+        engine_named("granulcal.scene:sand")
+    with pytest.raises(ValueError, match="engine must be one of lammps"):
+        ExportedEngine("sandbox")
+
+
+def test_grains_are_read_from_a_dump(tmp_path: Path) -> None:
+    dump = "ITEM: TIMESTEP\n0\nITEM: ATOMS id x y z radius\n9 9 9 9 9\n"
+    dump += "ITEM: TIMESTEP\n5\nITEM: ATOMS id x y z radius\n2 0.1 0 0 0.002\n1 0 0 0.002 0.001\n"
+    (tmp_path / "grains.dump").write_text(dump)
+    found = read_grains(tmp_path)
+    assert found is not None
+    assert found[0].tolist() == [[0, 0, 0.002], [0.1, 0, 0]] and found[1].tolist() == [0.001, 0.002]
+
+
+def test_the_words_simulate_and_generate_take_an_engine(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene, prior = tmp_path / "scene.toml", tmp_path / "prior.toml"
+    scene.write_text(gc.Scene.drop(0.02, count=30).to_toml())
+    prior.write_text(gc.Prior.default().to_toml())
+    assert main(["simulate", str(scene), "--engine", command, "--json"]) == 0
+    assert '"status": "at_rest"' in capsys.readouterr().out
+    words = ["generate", str(scene), str(prior), "-n", "3", "-o", str(tmp_path / "pours")]
+    assert main([*words, f"--engine={command}", "--quiet"]) == 0
+    assert len(gc.Dataset.load(tmp_path / "pours")) == 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["lammps", "liggghts", "yade", "mujoco", "newton"])
+def test_an_engine_that_is_installed_pours_what_we_pour(name: str) -> None:
+    if not installed(name):
+        pytest.skip(f"{name} is not installed")
+    scene = gc.Scene.funnel(0.06, count=120, preset="fast")
+    theirs = gc.simulate(scene, seed=1, engine=ExportedEngine(name))
+    ours = gc.simulate(scene, seed=1)
+    assert theirs.positions.shape == ours.positions.shape
+    near = [np.median(np.hypot(*p.positions[:, :2].T)) for p in (theirs, ours)]
+    assert near[0] == pytest.approx(near[1], rel=0.5)
+
+
+def test_calibration_pours_in_the_engine(
+    small_scene: gc.Scene, small_prior: gc.Prior, tmp_path: Path
+) -> None:
+    from granulcal.within_budget import KeptPours
+
+    engine = CallableEngine(lambda scene, seed: scene.start(seed), name="not moved")
+    theta = small_prior.sample(2, seed=1)
+    pours = KeptPours(small_scene, small_prior, tmp_path / "pours.json", engine=engine)
+    # Grains that hang where they began: a ball of 60 grains whose lowest point is at 2 cm.
+    found = pours(theta, 0)
+    assert found.shape == (2, 16) and (found[:, 0] > 0.02).all()
+    points = CallableEngine(cone, name="cones")
+    with pytest.raises(ValueError, match="another scene, prior or seed"):
+        KeptPours(small_scene, small_prior, tmp_path / "pours.json", engine=points)
+    seen = KeptPours(small_scene, small_prior, tmp_path / "cones.json", engine=points)(theta, 0)
+    assert np.isfinite(seen).all()

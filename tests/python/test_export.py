@@ -1,0 +1,194 @@
+import json
+import math
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.cli import main
+from granulcal.export import ENGINES, export_bed, export_material, export_scene
+from granulcal.export.law import damping_ratio, nominal_restitution, restitution_of
+from granulcal.export.mesh import triangles
+from granulcal.export.mujoco import solref
+from granulcal.export.setup import Setup
+
+MATERIAL = gc.Material(sliding_friction=0.4, rolling_friction=0.12, restitution=0.6)
+RADIUS = 0.002
+
+
+@pytest.fixture(scope="module")
+def scene() -> gc.Scene:
+    return gc.Scene.funnel(0.06, count=20, material=MATERIAL, preset="fast")
+
+
+def rebound(beta: float, *, tension: bool) -> float:
+    """Returns e of x'' = -x - 2 beta x' from x = 0 at speed 1, by small steps."""
+    x, v, dt = 0.0, 1.0, 1e-3
+    while True:
+        force = -x - 2 * beta * v
+        over = x < 0 if tension else force > 0 and x > 0
+        if over:
+            return -v
+        v += dt * force
+        x += dt * v
+
+
+@pytest.mark.parametrize("e", [0.05, 0.3, 0.6, 0.9])
+def test_the_dashpot_gives_the_restitution(e: float) -> None:
+    pulling = damping_ratio(e, tension=True)
+    assert rebound(pulling, tension=True) == pytest.approx(e, rel=6e-3)
+    assert nominal_restitution(pulling) == pytest.approx(e)
+    free = damping_ratio(e, tension=False, overdamped=True)
+    assert rebound(free, tension=False) == pytest.approx(e, rel=6e-3)
+    assert (free > 1) == (e < math.exp(-2))
+
+
+def test_the_restitution_is_continuous_at_critical_damping() -> None:
+    assert restitution_of(1.0) == math.exp(-2)
+    assert restitution_of(1 - 1e-6) == pytest.approx(restitution_of(1 + 1e-6), rel=1e-5)
+
+
+def words(text: str, name: str, count: int) -> list[float]:
+    """Returns the numbers that follow a word."""
+    found = re.search(rf"{name}((?:\s*[-+.\deE]+){{{count}}})", text)
+    assert found is not None, (name, text)
+    return [float(word) for word in found.group(1).split()]
+
+
+def test_lammps_has_the_rolling_ratio_and_the_torsional_length(scene: gc.Scene) -> None:
+    text = ENGINES["lammps"].material(Setup.of(scene))
+    pair, wall = text.splitlines()[2:4]
+    assert words(pair, "rolling sds", 3)[2] == words(wall, "rolling sds", 3)[2] == 0.12
+    assert words(pair, "twisting sds", 3)[2] == pytest.approx(0.02 * RADIUS / 2)
+    assert words(wall, "twisting sds", 3)[2] == pytest.approx(0.02 * RADIUS)
+    young, nominal, _ = words(pair, "hertz/material", 3)
+    beta = -math.log(nominal) / math.hypot(math.pi, math.log(nominal))
+    assert young == 3e6 and restitution_of(beta) == pytest.approx(0.6)
+    assert "limit_damping" in pair
+    inelastic = Setup.of(scene.with_({"material.restitution": 0.1}))
+    assert "limit_damping" not in ENGINES["lammps"].material(inelastic)
+
+
+def test_the_other_engines_have_their_own_rolling(scene: gc.Scene) -> None:
+    setup = Setup.of(scene)
+    text = ENGINES["liggghts"].material(setup)
+    assert words(text, "coefficientRollingFriction peratomtypepair", 2)[1] == 0.12
+    assert words(text, "coefficientRestitution peratomtypepair", 2)[1] == 0.6
+    # The mean of the reference radii is R, ours is R / 2.
+    assert "eta=0.06)" in ENGINES["yade"].material(setup)
+    slide, twist, roll = words(ENGINES["mujoco"].material(setup), 'friction="', 3)
+    assert (slide, twist, roll) == pytest.approx((0.4, 0.02 * RADIUS / 2, 0.12 * RADIUS / 2))
+    chrono = ENGINES["chrono"].material(setup)
+    assert f"SetRollingFriction({0.12 * RADIUS / 2:.9g})" in chrono
+    newton = ENGINES["newton"].scene(setup)["pour.py"]
+    # Of two shapes the mean: the ground's 1.5 mu_r R and a grain's 0.5 mu_r R give mu_r R.
+    assert f"mu_rolling={1.5 * 0.12 * RADIUS:.9g}" in newton
+    gazebo = ENGINES["gazebo"].material(setup)
+    twist = float(re.findall("<coefficient>([^<]+)", gazebo)[0])
+    assert 3 * math.pi / 16 * RADIUS * twist == pytest.approx(0.02 * RADIUS / 2)
+
+
+def test_mujocos_contact_is_the_spring_that_rebounds_so() -> None:
+    k, b = solref(0.6)
+    assert restitution_of(b / (2 * math.sqrt(k))) == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_material_says_what_has_no_counterpart(
+    engine: str, scene: gc.Scene, tmp_path: Path
+) -> None:
+    text = export_material(scene, engine, tmp_path).read_text()
+    assert "material.rolling_friction = 0.12" in text and "R_eff = 0.001 m" in text
+    for note in ENGINES[engine].NOTES:
+        assert note in text
+    if text.startswith("<!--"):
+        ET.fromstring(text)
+
+
+@pytest.mark.parametrize("engine", [name for name in ENGINES if name != "isaac"])
+def test_a_scene_is_a_folder_that_says_how_to_run_it(
+    engine: str, scene: gc.Scene, tmp_path: Path
+) -> None:
+    files = {path.name: path.read_text() for path in export_scene(scene, engine, tmp_path, seed=2)}
+    assert files["README.txt"].startswith("Run: ")
+    for name, text in files.items():
+        if name.endswith((".xml", ".sdf")):
+            ET.fromstring(text)
+        elif name.endswith(".py"):
+            compile(text, name, "exec")
+        elif name.endswith(".json"):
+            json.loads(text)
+    # Every grain stands where our pour begins.
+    x = scene.start(2)[0][7, 0]
+    assert any(f"{x:.7g}"[:8] in text for text in files.values())
+
+
+def test_lammps_data_has_every_grain(scene: gc.Scene, tmp_path: Path) -> None:
+    export_scene(scene, "lammps", tmp_path, seed=3)
+    rows = (tmp_path / "pour.data").read_text().splitlines()[11:]
+    table = np.array([row.split() for row in rows], float)
+    centres, radii = scene.start(3)
+    assert np.allclose(table[:, 4:], centres, atol=1e-9) and np.allclose(table[:, 2], 2 * radii)
+    assert set(table[:, 3]) == {1300.0}
+
+
+def test_walls_are_triangles_of_the_right_size(scene: gc.Scene) -> None:
+    cone = next(body for body in Setup.of(scene).walls if body.name == "cone")
+    mesh = triangles(cone.shape)
+    corners = mesh.vertices[mesh.faces]
+    edges = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * np.linalg.norm(edges, axis=1).sum()
+    # The frustum of the paper's funnel, 64 sides of it.
+    slant = math.hypot(0.07, 0.06 - 0.016)
+    assert area == pytest.approx(math.pi * (0.06 + 0.016) * slant, rel=6e-3)
+    box = {"kind": "box", "min": [0, 0, 0], "max": [1, 2, 3], "open": ["z_max"]}
+    assert len(triangles(box).faces) == 10
+
+
+def test_beds_are_read_by_others(scene: gc.Scene, tmp_path: Path) -> None:
+    centres, radii = scene.start(0)
+    for kind, mark in {
+        "vtk": "POINTS 20 double",
+        "ply": "element vertex 20",
+        "csv": "x,y,z",
+    }.items():
+        text = export_bed(scene, centres, radii, kind, tmp_path / f"bed.{kind}").read_text()
+        assert mark in text and text.count("\n") > 20
+    urdf = ET.parse(export_bed(scene, centres, None, "urdf", tmp_path / "bed.urdf"))
+    masses = [float(each.attrib["value"]) for each in urdf.iter("mass")]
+    assert masses == pytest.approx([1300 * 4 / 3 * math.pi * RADIUS**3] * 20, rel=1e-5)
+    with pytest.raises(ValueError, match="shape"):
+        export_bed(scene, centres[:, :2], None, "csv", tmp_path / "bed.csv")
+
+
+def test_what_cannot_be_exported_is_named(tmp_path: Path) -> None:
+    drum = gc.Scene.load(Path(__file__).parents[2] / "examples/drum.toml")
+    with pytest.raises(ValueError, match=r"walls\.\d: motion 'spin' is not exported"):
+        export_scene(drum, "lammps", tmp_path)
+    with pytest.raises(ValueError, match="engines are lammps"):
+        export_material(gc.Scene.built_in("drop"), "sandbox", tmp_path)
+
+
+def test_a_posterior_is_a_mode_and_draws(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = ["material.sliding_friction", "material.restitution"]
+    document = {
+        "parameters": {name: {"mode": mode} for name, mode in zip(names, (0.3, 0.5), strict=True)},
+        "samples": [[0.2, 0.4], [0.25, 0.45], [0.3, 0.5]],
+    }
+    posterior = tmp_path / "posterior.json"
+    posterior.write_text(json.dumps(document))
+    out = tmp_path / "materials"
+    command = ["export", "posterior", str(posterior), "drop", "--to", "mujoco", "-o", str(out)]
+    assert main([*command, "--draws", "2"]) == 0
+    capsys.readouterr()
+    assert words((out / "mode.xml").read_text(), 'friction="', 1) == [0.3]
+    assert words((out / "draw-001.xml").read_text(), 'friction="', 1) == [0.25]
+    table = json.loads((out / "draws.json").read_text())
+    assert table[1] == {"file": "draw-001.xml", names[0]: 0.25, names[1]: 0.45}
+    assert main([*command, "--draws", "4"]) == 2
+    assert "at most 3" in capsys.readouterr().err

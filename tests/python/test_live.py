@@ -1,0 +1,129 @@
+"""Recording from a camera: a fake librealsense and a source of one's own stand for the hardware."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.live import RealSense, _frame_of, record
+from granulcal.ros_files import DepthFrame
+
+pytest.importorskip("rosbags")
+LENS = {"width": 64, "height": 48, "fx": 60.0, "fy": 61.0, "cx": 31.5, "cy": 23.5}
+
+
+def depth(frame: int) -> np.ndarray:
+    """A tilted plane, half a metre away, with a hole."""
+    v, u = np.mgrid[:48, :64]
+    z = 0.5 + 1e-4 * u + 2e-4 * v + 1e-4 * frame
+    z[10:12, 20:22] = 0.0
+    return z
+
+
+class OwnSource:
+    lens, depth_unit = LENS, 1e-4
+
+    def __init__(self) -> None:
+        self.is_closed = False
+
+    def frames(self) -> Iterator[DepthFrame]:
+        try:
+            for i in range(100):
+                yield DepthFrame(depth(i), 1_000_000_000 + i * 33_000_000)
+        finally:
+            self.is_closed = True
+
+
+class FakeRealSense:
+    """What `record` needs of pyrealsense2."""
+
+    stream = SimpleNamespace(depth="depth")
+    format = SimpleNamespace(z16="z16")
+
+    def __init__(self, *, answers: bool = True) -> None:
+        self.answers, self.waited, self.is_stopped, self.asked = answers, 0, False, ()
+
+    def config(self) -> Any:
+        return SimpleNamespace(enable_stream=lambda *words: setattr(self, "asked", words))
+
+    def pipeline(self) -> Any:
+        return SimpleNamespace(start=self.start, stop=self.stop, wait_for_frames=self.wait)
+
+    def start(self, config: Any) -> Any:
+        if not self.answers:
+            raise RuntimeError("No device connected")
+        sensor = SimpleNamespace(get_depth_scale=lambda: 1e-4)
+        lens = SimpleNamespace(width=64, height=48, fx=60.0, fy=61.0, ppx=31.5, ppy=23.5)
+        video = SimpleNamespace(get_intrinsics=lambda: lens)
+        return SimpleNamespace(
+            get_device=lambda: SimpleNamespace(first_depth_sensor=lambda: sensor),
+            get_stream=lambda kind: SimpleNamespace(as_video_stream_profile=lambda: video),
+        )
+
+    def stop(self) -> None:
+        self.is_stopped = True
+
+    def wait(self) -> Any:
+        self.waited += 1
+        counts = np.round(depth(self.waited) / 1e-4).astype(np.uint16)
+
+        class Frame:
+            def get_data(self) -> np.ndarray:
+                return counts
+
+            def get_timestamp(self) -> float:
+                return 1000.0
+
+        return SimpleNamespace(get_depth_frame=Frame)
+
+
+@pytest.mark.parametrize("name", ["own.bag", "own.mcap"])
+def test_frames_of_a_source_are_read_back(name: str, tmp_path: Path) -> None:
+    source = OwnSource()
+    assert record(source, tmp_path / name, frames=3) == 3
+    assert source.is_closed
+    recording = gc.Recording.open(tmp_path / name)
+    assert recording.frames == 3 and recording.lens == pytest.approx(LENS)
+    assert recording.depth is not None
+    # The mean of three frames; the hole stays one.
+    assert recording.depth[0, 0] == pytest.approx(0.5001, abs=6e-5)
+    assert recording.depth[10, 20] == 0.0
+
+
+def test_a_realsense_is_asked_warmed_up_and_stopped(tmp_path: Path) -> None:
+    fake = FakeRealSense()
+    source = RealSense(width=64, height=48, module=fake)
+    assert fake.asked == ("depth", 64, 48, "z16", 30) and source.depth_unit == 1e-4
+    assert record(source, tmp_path / "live.bag", frames=2) == 2
+    assert fake.is_stopped and fake.waited >= 32
+    recording = gc.Recording.open(tmp_path / "live.bag")
+    assert recording.depth_unit == pytest.approx(1e-4) and recording.lens == pytest.approx(LENS)
+    with pytest.raises(OSError, match="no RealSense camera answers: No device"):
+        RealSense(module=FakeRealSense(answers=False))
+
+
+def test_messages_of_ros_become_metres() -> None:
+    header = SimpleNamespace(stamp=SimpleNamespace(sec=2, nanosec=5))
+    counts = np.array([[500, 0], [501, 502]], "<u2")
+    # Rows may be longer than the image.
+    rows = np.hstack([counts.view(np.uint8), np.zeros((2, 2), np.uint8)])
+    message = SimpleNamespace(
+        header=header, encoding="16UC1", width=2, height=2, step=6, data=rows.tobytes()
+    )
+    frame = _frame_of(message)
+    assert frame.time_ns == 2_000_000_005
+    assert np.allclose(frame.depth, [[0.5, 0.0], [0.501, 0.502]])
+    message.encoding = "rgb8"
+    with pytest.raises(ValueError, match="got 'rgb8'"):
+        _frame_of(message)
+
+
+def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="must end in .bag or .mcap"):
+        record(OwnSource(), tmp_path / "x.png")
+    with pytest.raises(ValueError, match="frames must be at least 1"):
+        record(OwnSource(), tmp_path / "x.bag", frames=0)
