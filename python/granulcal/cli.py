@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from granulcal import _native, design_command, loop_command
+from granulcal import _native, design_command, loop_command, predict_command
 from granulcal.files import write_beside
 from granulcal.one_thread import one_thread
 
@@ -30,6 +30,7 @@ Calibrates a granular simulator from depth images.
   granulcal calibrate scene.toml prior.toml couscous.png --camera camera.toml --budget 100 -o run
                                                               one recording, few pours
   granulcal close-loop loop.toml -o loop                      what does the model lack?
+  granulcal predict loop --at funnel.height=0.07 --corrected  and where it was not measured?
   granulcal design rings scene.toml --ring 0.04 0.073 -o plan  from which height to pour a ring
   granulcal design spill bowl.toml --grains 10 -o spill       how probably a height spills 10 grains
 
@@ -83,7 +84,7 @@ def _guarded(command: Callable[[], int]) -> int:
 
 
 def _commands() -> tuple[str, ...]:
-    words = "train check infer calibrate report close-loop design reproduce demo"
+    words = "train check infer calibrate report close-loop predict design reproduce demo"
     return tuple(words.split())
 
 
@@ -103,6 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_calibrate(commands)
     _add_report(commands)
     loop_command.add(commands)
+    predict_command.add(commands)
     design_command.add(commands)
     _add_reproduce(commands)
     commands.add_parser("demo", help="the whole job on a recording with a known truth")

@@ -32,6 +32,7 @@ from granulcal.loop.image_rows import ImageRows
 from granulcal.loop.images import require_image
 from granulcal.loop.library import LibraryEffect, fingerprint
 from granulcal.loop.measures import Measures
+from granulcal.loop.series import require_series, reread
 from granulcal.loop.tolerance import Tolerances
 from granulcal.prior import Parameter, Prior
 from granulcal.scene import Scene
@@ -168,6 +169,7 @@ class Archive:
     def __init__(self, folder: Path, plan: Plan) -> None:
         """Opens or begins it."""
         require_image(plan.scene, (effect.name for effect in plan.library if effect.image))
+        require_series(plan.scene, ((e.name, e.series) for e in plan.library if e.series))
         self.folder, self.plan = folder, plan
         path = folder / _RECORD
         mine = plan.record()
@@ -278,7 +280,7 @@ class Archive:
         paths = [path for path, _, _ in self.plan.conditions]
         found = []
         for k, effect in enumerate(self.plan.library):
-            if not (effect.camera or effect.shift) or (
+            if not (effect.camera or effect.shift or effect.series) or (
                 effect.shift and (effect.path not in paths or self.plan.places)
             ):
                 continue
@@ -287,7 +289,9 @@ class Archive:
             strength = random.uniform(-1.0 if effect.is_two_sided else 0.0, 1.0, len(rows))
             theta, condition, psi, x = (part[rows].copy() for part in base)
             psi[:, k] = strength
-            if effect.camera:
+            if effect.series:
+                x = reread(self._names, x, {effect.series: effect.full * strength})
+            elif effect.camera:
                 if powers is None:
                     continue
                 x *= (1.0 + effect.full * strength[:, None]) ** powers
@@ -298,6 +302,10 @@ class Archive:
             inside = ((condition >= 0.0) & (condition <= 1.0)).all(axis=1)
             found.append((theta[inside], condition[inside], psi[inside], x[inside]))
         return found
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return Measures.of(self.plan.scene).names
 
     def _image_rows(self) -> ImageRows:
         plan = self.plan

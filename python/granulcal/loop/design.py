@@ -94,6 +94,10 @@ class Design:
         """Indices of the declared tolerances."""
         return tuple(k for k, effect in enumerate(self.effects) if effect.nuisance_sd is not None)
 
+    def none(self) -> Array:
+        """Returns strengths without any effect, shape (K,)."""
+        return np.zeros(len(self.effects))
+
     def family(self, k: int) -> str:
         """Returns the family of effect `k`: its own name if it declares none."""
         return self.effects[k].family or self.effects[k].name

@@ -13,7 +13,8 @@ Reference:
     Plumlee, Bayesian calibration of inexact computer models, JASA 112, 2017 (orthogonality).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,6 +66,19 @@ class Discrepancy:
         kernel = bare._kernel(local.conditions, local.conditions)
         precision = np.asarray(np.linalg.inv(kernel + covariance), dtype=np.float64)
         return cls(local.conditions, variances, constraint, precision @ residual, precision)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns it for JSON."""
+        return {field.name: getattr(self, field.name).tolist() for field in fields(self)}
+
+    @classmethod
+    def from_dict(cls, document: dict[str, Any]) -> "Discrepancy":
+        """Returns what `to_dict` wrote."""
+        rows = {name: np.array(value, dtype=np.float64) for name, value in document.items()}
+        count = len(document["conditions"])
+        rows["conditions"] = rows["conditions"].reshape(count, -1)
+        rows["constraint"] = rows["constraint"].reshape(len(rows["weights"]), -1)
+        return cls(**rows)
 
     def predict(self, condition: ArrayLike) -> tuple[Array, Array]:
         """Returns the correction of z at a condition (q,) and its standard deviation, each (m,).

@@ -103,7 +103,7 @@ class Local:
 
     def none(self) -> Array:
         """Returns strengths of 0, shape (K,)."""
-        return np.zeros(len(self.surrogate.design.effects))
+        return self.surrogate.design.none()
 
     def mean(self, v: Array, psi: Array) -> Array:
         """Returns the stacked mean, shape (H m,)."""

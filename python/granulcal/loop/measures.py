@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from granulcal.dataset import Dataset
 from granulcal.errors import ObservationError
 from granulcal.loop.images import Frame
+from granulcal.loop.series import reread
 from granulcal.recording import Formation, Recording
 from granulcal.scene import Scene
 from granulcal.simulate import Pour
@@ -69,13 +70,14 @@ class Measures:
     def of_pour(self, pour: Pour, faults: Mapping[str, float] | None = None) -> Array:
         """Returns the statistics of a pour, shape (s,).
 
-        `faults` are those of the image, by kind; see `images.py`.
+        `faults` are those of the image, or of what is observed, by kind: `images.py`, `series.py`.
 
         Raises:
             ValueError: too few grains are in view.
         """
         if self.observes:
-            return np.asarray(pour.observed())
+            plain = np.asarray(pour.observed())
+            return reread(self.names, plain[None], faults)[0] if faults else plain
         if faults:
             frame = Frame.of(pour).with_(faults, pour.seed)
             points, spacing = frame.points(), frame.spacing
