@@ -366,6 +366,7 @@ class Recording:
         width: float | None = None,
         fps: float | None = None,
         series: str | None = None,
+        camera: int | None = None,
     ) -> ObservedStatistics:
         """Returns what a measurement that is no depth image says of a scene's own statistics.
 
@@ -379,6 +380,7 @@ class Recording:
             width: width of a drum's picture [m]; needed there.
             fps: frames a second of a run-out file's video; 240 unless told otherwise.
             series: name of a discharge curve, where the file has several.
+            camera: 1 or 2 for what this camera of a run-out file saw; the mean of both otherwise.
 
         Raises:
             FileNotFoundError: there is no such file.
@@ -386,20 +388,27 @@ class Recording:
                 argument does not go with it.
         """
         kind = Path(path).suffix.lower()
-        given = {"width": width, "fps": fps, "series": series}
-        takes = {".bmp": "width", ".png": "width", ".txt": "fps", ".csv": "series"}
+        given = {"width": width, "fps": fps, "series": series, "camera": camera}
+        takes = {
+            ".bmp": ("width",),
+            ".png": ("width",),
+            ".txt": ("fps", "camera"),
+            ".csv": ("series",),
+        }
         if kind not in takes:
             raise ValueError(f"{path} must be one of {', '.join(takes)}")
-        wrong = [name for name in given if given[name] is not None and name != takes[kind]]
+        wrong = [name for name in given if given[name] is not None and name not in takes[kind]]
         if wrong:
-            raise ValueError(f"a {kind} file takes {takes[kind]}, not {', '.join(wrong)}")
-        if takes[kind] == "width":
+            raise ValueError(
+                f"a {kind} file takes {' and '.join(takes[kind])}, not {', '.join(wrong)}"
+            )
+        if "width" in takes[kind]:
             if width is None:
                 raise ValueError(f"{path}: width, the drum's inner diameter [m], is needed")
             return DrumImage.open(path, width=width).observed(scene)
-        if takes[kind] == "fps":
+        if "fps" in takes[kind]:
             run_out = RunOut.open(path) if fps is None else RunOut.open(path, fps=fps)
-            return run_out.observed(scene)
+            return run_out.observed(scene, camera=camera)
         return DischargeCurve.open(path, series).observed(scene)
 
     def __repr__(self) -> str:
