@@ -221,6 +221,10 @@ def _add_reproduce(commands: Any) -> None:
     parser.add_argument("study", nargs="?", help="name of the study")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder (default: out)")
     parser.add_argument("--data", type=Path, help="measured data (default: $GRANULCAL_DATA)")
+    parser.add_argument(
+        "--maps", type=Path, help="kinect_mounds: folder of other maps compacted_*.npz"
+    )
+    parser.add_argument("--json", type=Path, help="kinect_mounds: file for what each map gave")
     parser.set_defaults(run=_reproduce)
 
 
@@ -428,9 +432,13 @@ def _reproduce(options: argparse.Namespace) -> int:
         raise ValueError(f"no study {options.study!r}; there are {', '.join(studies)}")
     module = importlib.import_module(f"granulcal.experiments.{options.study}")
     data = options.data or measured_data()
-    if data is None:
+    extra = {"maps_dir": options.maps, "json_path": options.json}
+    given = {name: value for name, value in extra.items() if value is not None}
+    if given and options.study != "kinect_mounds":
+        raise ValueError(f"--maps and --json are of kinect_mounds, not of {options.study}")
+    if data is None and options.maps is None:
         raise FileNotFoundError("no measured data: give --data or set $GRANULCAL_DATA")
-    module.reproduce(options.out, data)
+    module.reproduce(options.out, data, **given)
     return _DONE
 
 

@@ -26,6 +26,7 @@ from granulcal.statistics import (
 __all__ = [
     "Camera",
     "DamagedRecordingWarning",
+    "EdgePixelsWarning",
     "Formation",
     "Levelled",
     "Lost",
@@ -42,6 +43,10 @@ FRAMES = 10
 
 class DamagedRecordingWarning(UserWarning):
     """A recording is cut off or damaged; the frames that are whole were used."""
+
+
+class EdgePixelsWarning(UserWarning):
+    """Pixels at the edge of a height map, apart from the formation, are taken for grains."""
 
 
 @dataclass(frozen=True)
@@ -300,9 +305,14 @@ class Recording:
         Raises:
             ValueError: no pixel belongs to a grain, an image without data, a setting out of range,
                 or both a fixed threshold and a floor.
+
+        Warns:
+            EdgePixelsWarning: pixels at the edge of a height map are taken for grains.
         """
         _refuse_two_thresholds(settings)
         found = self._native.formation(**settings)
+        if self.depth is None and settings.get("border_px") is None and found.edge is not None:
+            self._tell_edge(*found.edge, found.downsample)
         return Formation(
             points=found.points,
             mask=found.mask,
@@ -319,6 +329,17 @@ class Recording:
             downsample=found.downsample,
             resolution=found.resolution,
             spacing=float("nan") if found.spacing is None else found.spacing,
+        )
+
+    def _tell_edge(self, count: int, frame: int, downsample: int) -> None:
+        """Warns of pixels at the edge of a height map that are taken for grains."""
+        width = frame * downsample
+        warnings.warn(
+            f"{self.path}: {count} pixels at the edge of the map, apart from the formation, are "
+            f"taken for grains; border_px={width} (--border {width}) leaves them out, "
+            "border_px=0 keeps them without a word",
+            EdgePixelsWarning,
+            stacklevel=3,
         )
 
     def level(self, **settings: Unpack[SegmentationSettings]) -> Levelled:

@@ -27,9 +27,10 @@ __all__ = ["Measures", "formation_of"]
 
 Array = NDArray[np.float64]
 
-# Of the diagnostics: a slope that few formations have, and rings of which the 16 statistics hold
-# the sum: twenty more numbers to a pour blunt every test of the others.
-_LEFT_OUT = ("tail_index", "height_ring")
+# Of the diagnostics: a slope that few formations have, rings of which the 16 statistics hold the
+# sum (twenty more numbers to a pour blunt every test of the others), and patches, which repeat
+# isolated grains and clusters.
+_LEFT_OUT = ("tail_index", "height_ring", "patches")
 # Volume under the measured surface over that of the scene's grains: beyond this a unit is wrong.
 _VOLUME_RANGE = (0.1, 10.0)
 
