@@ -7,6 +7,7 @@ import pytest
 
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.archive import Archive, Plan
+from granulcal.loop.law import LAW, law_numbers
 from granulcal.loop.library import by_name
 from granulcal.loop.nuisances import declared_nuisances
 from granulcal.loop.series import KINDS, require_series, reread
@@ -105,6 +106,20 @@ def test_tolerances_that_cannot_be_are_named() -> None:
         declared_nuisances({"observe.front.level": -0.1}, scene)
     with pytest.raises(ObservationError, match="must be a number or { sd"):
         declared_nuisances({"clock.offset": {"size": 0.1}}, scene)
+
+
+def test_numbers_of_the_law_are_free_where_the_scene_has_them() -> None:
+    scene = Scene.funnel(height=0.1)
+    (torsion,) = law_numbers(["torsional_friction"], scene)
+    assert torsion.path == "material.torsional_friction" and torsion.bounds == (0.01, 0.4)
+    every = law_numbers(True, scene)
+    assert torsion in every and set(every) <= set(LAW) and law_numbers(False, scene) == ()
+    for one in every:
+        low, high = one.bounds
+        assert scene.with_({one.path: low}).get(one.path) == low
+        assert scene.with_({one.path: high}).get(one.path) == high
+    with pytest.raises(ObservationError, match="law has no magnetism; there are touching_exponent"):
+        law_numbers(["magnetism"], scene)
 
 
 def test_a_number_that_every_fit_has_is_no_candidate() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from granulcal.errors import ObservationError
+from granulcal.loop import Design, Effect
 from granulcal.loop.definition import Definition, check_definitions, definition_inputs
 from granulcal.loop.look import Look, hypercube
 from granulcal.loop.misfit import compare
@@ -175,6 +176,6 @@ def test_random_draws_fill_the_prior_and_the_best_come_first() -> None:
     cells = np.sort((drawn * 24).astype(int), axis=0)
     assert np.array_equal(cells, np.tile(np.arange(24)[:, None], (1, 3)))
     seen = Look(("tilt",), None, np.array([[0.5], [0.2]]), np.array([[0.3], [0.9]]), np.ones(2))
-    starts = seen.starts(["drag", "tilt"])
+    starts = seen.starts(Design(("a",), (), (Effect("drag"), Effect("tilt"))))
     assert [start.psi.tolist() for start in starts] == [[0.0, 0.3], [0.0, 0.9]]
     assert starts[0].v == pytest.approx([0.0]) and starts[1].v == pytest.approx([-0.8416], abs=1e-3)

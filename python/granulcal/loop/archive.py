@@ -249,7 +249,9 @@ class Archive:
                 own = effect.at(plan.scene)
                 if part.effect != effect.name:
                     continue
-                if effect.whole:
+                if effect.held is not None:
+                    psi[:, k] = 1.0
+                elif effect.whole:
                     # A whole number may lie half a grain beyond full strength.
                     strength = own.strength(np.full(n, scene.get(effect.path)))
                     psi[:, k] = np.clip(strength, -1.0, 1.0)
@@ -364,7 +366,9 @@ class Archive:
     def _parts(self) -> list["_Part"]:
         """The data sets, the base model's first."""
         plan = self.plan
-        drawn = [] if plan.places else plan.conditions
+        # At the conditions alone their numbers are set, and definitions still drawn.
+        placed = plan.places[0] if plan.places else {}
+        drawn = [condition for condition in plan.conditions if condition[0] not in placed]
         inputs = [
             Parameter(path=path, distribution="uniform", low=low, high=high)
             for path, low, high in drawn
@@ -377,6 +381,9 @@ class Archive:
             effect, seed = entry.at(plan.scene), plan.seed + _SEED_STEP * k
             name = f"effect-{effect.name}"
             there = plan.scene.with_(dict(effect.also)) if effect.also else plan.scene
+            if effect.held is not None:
+                parts.append(_Part(name, there, Prior(common), plan.each, seed, effect.name))
+                continue
             if effect.whole:
                 share = -(-plan.each // len(_WHOLE_STRENGTHS))
                 for number, psi in enumerate(_WHOLE_STRENGTHS):

@@ -64,7 +64,7 @@ def calibrated(
             scene = scene_of(task, condition, theta, {name: psi})
             first = _PAIR_SEED + seed + _PAIR_STEP * b
             seeds = range(first, first + len(condition.recordings))
-            rows = forward.pours(scene, seeds, faults_of(task, {name: psi}))
+            rows = forward.limit(scene, seeds, faults_of(task, {name: psi}), task.coarse)
             if len(rows) == 0:
                 return None
             observed.append(Observation.of(condition.name, plan.unit(condition.at), rows))
@@ -130,7 +130,8 @@ def nearer(
     rows = []
     for condition in task.of(FIT):
         scene = scene_of(task, condition, seen.theta[0], strengths)
-        x = forward.pours(scene, seeds_of_replicates(seed), faults_of(task, strengths))
+        seeds, faults = seeds_of_replicates(seed), faults_of(task, strengths)
+        x = forward.limit(scene, seeds, faults, task.coarse)
         at_fit = simulated[condition.name][1]
         if min(len(x), len(at_fit)) < FEWEST:
             return None

@@ -343,9 +343,12 @@ def planned(
 
 def _needed(task: Task, pairs: int, draws: int) -> int:
     """Pours besides the archive: both models under every condition, the look, placebo and pairs."""
-    measured = sum(len(c.recordings) for c in task.of(FIT))
-    look = (draws + REPLICATES if draws else 0) * len(task.of(FIT))
-    return 2 * REPLICATES * len(task.conditions) + (1 + pairs) * measured + look
+    fitted = task.of(FIT)
+    measured = sum(len(c.recordings) for c in fitted)
+    # A pour in the limit of the grains' size is several of two sizes.
+    each, sizes = (1, 1) if task.coarse is None else (2 * task.coarse.repeats, 2)
+    look = (sizes * draws + each * REPLICATES if draws else 0) * len(fitted)
+    return each * (2 * REPLICATES * len(task.conditions) + (1 + pairs) * measured) + look
 
 
 def _candidates(plan: Plan) -> list[tuple[str, Array]]:

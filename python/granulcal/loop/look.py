@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from granulcal.loop.archive import Plan
 from granulcal.loop.baseline import Start
-from granulcal.loop.design import normal_from_cube
+from granulcal.loop.design import Design, normal_from_cube
 from granulcal.loop.forward import Forward
 from granulcal.loop.refine import Rows
 from granulcal.loop.scenes import faults_of, scene_of
@@ -58,11 +58,11 @@ class Look:
     strengths: Array
     squares: Array
 
-    def starts(self, names: list[str]) -> tuple[Start, ...]:
-        """Returns where fits begin as well; `names` are of all effects."""
-        found = []
+    def starts(self, design: Design) -> tuple[Start, ...]:
+        """Returns where fits begin as well."""
+        found, names = [], [effect.name for effect in design.effects]
         for theta, strengths in zip(self.theta[:_STARTS], self.strengths[:_STARTS], strict=True):
-            psi = np.zeros(len(names))
+            psi = design.none()
             for name, value in zip(self.effects, strengths, strict=True):
                 psi[names.index(name)] = value
             found.append(Start(normal_from_cube(theta), psi))
@@ -110,19 +110,27 @@ def look(
     theta, strengths = drawn[:, :p], low + drawn[:, p:] * (1 - low)
     kept: list[tuple[Array, Array, Array, Array]] = []
     poured: list[tuple[int, list[Array]]] = []
+    coarse = task.coarse
+    held = np.array([effect.held is not None for effect in plan.design.effects], dtype=bool)
     indices = [[e.name for e in plan.design.effects].index(n) for n in names]
     for i in range(count):
         own = dict(zip(names, strengths[i].tolist(), strict=True))
         rows = []
         for condition in conditions:
-            scene = scene_of(task, condition, theta[i], own)
-            x = forward.pours(scene, [first + i], faults_of(task, own))
-            if len(x) == 0:
-                continue
-            rows.append(x[0])
-            psi = plan.design.none()
-            psi[indices] = strengths[i]
-            kept.append((theta[i], plan.unit(condition.at), psi, x[0]))
+            scene, faults = scene_of(task, condition, theta[i], own), faults_of(task, own)
+            sizes = {0.0: scene} | ({1.0: scene.with_(coarse.numbers)} if coarse else {})
+            seen = []
+            for size, sized in sizes.items():
+                x = forward.pours(sized, [first + i], faults)
+                if len(x) == 0:
+                    continue
+                psi = np.where(held, size, 0.0)
+                psi[indices] = strengths[i]
+                kept.append((theta[i], plan.unit(condition.at), psi, x[0]))
+                seen.append(x[0])
+            if len(seen) == len(sizes):
+                fine, other = seen[0], seen[-1]
+                rows.append(fine + (coarse.held if coarse else 0.0) * (other - fine))
         if len(rows) == len(conditions):
             poured.append((i, rows))
     whole = _rows(kept)

@@ -59,7 +59,6 @@ def look_over(
 ) -> Seen:
     """Returns the trace after random draws of its winner were poured; `more` grows by the pours."""
     spread = surrogate.raw_spread[: Measures.of(task.scene).head]
-    names = [effect.name for effect in store.plan.design.effects]
     draws, best = 0, None
     for number in range(LOOKS if rules.look else 0):
         winner = found.best.effects
@@ -79,7 +78,7 @@ def look_over(
             break
         more.append(best.rows)
         surrogate = fit_surrogate(store, seed=seed, say=say, more=more)
-        found = trace(surrogate, observed, rules, seed=seed, starts=best.starts(names))
+        found = trace(surrogate, observed, rules, seed=seed, starts=best.starts(store.plan.design))
         say(
             f"after a look at {rules.look} random draws of "
             f"{' + '.join(winner) or 'the base model'}, "

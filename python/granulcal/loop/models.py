@@ -30,7 +30,7 @@ from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.definition import is_definition
 from granulcal.loop.fallback import Discrepancy
-from granulcal.loop.forward import Forward
+from granulcal.loop.forward import Coarse, Forward
 from granulcal.loop.transform import Transform
 from granulcal.loop.trivial import line_weights, nearest_weights
 from granulcal.scene import Scene
@@ -114,6 +114,7 @@ class Models:
         means: measured, shape (H, s).
         scatter: standard deviation of one pour under each, shape (H, s).
         pours: measured under each, shape (H,).
+        coarse: the second size of grains; None without.
     """
 
     scene: Scene
@@ -129,6 +130,7 @@ class Models:
     means: Array
     scatter: Array
     pours: Array
+    coarse: Coarse | None = None
 
     def write(self, folder: Path) -> Path:
         """Writes `models.json` into a folder and returns its path."""
@@ -146,6 +148,7 @@ class Models:
             "means": self.means.tolist(),
             "scatter": self.scatter.tolist(),
             "pours": self.pours.tolist(),
+            "coarse": None if self.coarse is None else asdict(self.coarse),
         }
         path = folder / _NAME
         write_beside(path, json.dumps(document) + "\n")
@@ -178,6 +181,7 @@ class Models:
             means=np.array(d["means"], dtype=float),
             scatter=np.array(d["scatter"], dtype=float),
             pours=np.array(d["pours"], dtype=float),
+            coarse=Coarse(**d["coarse"]) if d["coarse"] else None,
         )
 
     def predict(
@@ -234,7 +238,7 @@ class Models:
     ) -> Array:
         there = {path: value + maker.shifts.get(path, 0.0) for path, value in at.items()}
         scene = self.scene.with_({**maker.numbers, **there})
-        return forward.pours(scene, seeds, maker.faults)
+        return forward.limit(scene, seeds, maker.faults, self.coarse)
 
     def _of_rows(self, model: str, rows: Array, level: float) -> Prediction:
         if len(rows) < _FEWEST:

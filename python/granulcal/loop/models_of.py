@@ -64,6 +64,7 @@ def models_of(
         means=np.array([measured[c.name].mean(axis=0) for c in fitted]),
         scatter=np.array(scatter),
         pours=np.array([float(len(measured[c.name])) for c in fitted]),
+        coarse=task.coarse,
     )
 
 

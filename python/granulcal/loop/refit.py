@@ -206,7 +206,7 @@ def _joint(local: Local, target: Array, start: Fit, active: tuple[int, ...]) -> 
 
 def _root(local: Local, base: Fit, best: Fit) -> Array:
     """Root of V: pours of the base fit, the surrogate's error at the best strengths."""
-    none = np.zeros_like(best.psi)
+    none = local.none()
     total = local.pour_covariance(base.v, none) + local.nuisance
     covariance = total + local.error_covariance(base.v, best.psi)
     return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)

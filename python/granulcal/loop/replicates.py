@@ -55,11 +55,12 @@ def both(
 ) -> tuple[Array, Array]:
     """Returns pours of the base and of the augmented model under a condition."""
     seeds = seeds_of_replicates(seed)
-    before = forward.pours(model_scene(task, condition, found.base), seeds)
+    before = forward.limit(model_scene(task, condition, found.base), seeds, None, task.coarse)
     if found.best is found.base:
         return before, before
     after = model_scene(task, condition, found.best)
-    return before, forward.pours(after, seeds, model_faults(task, found.best))
+    faults = model_faults(task, found.best)
+    return before, forward.limit(after, seeds, faults, task.coarse)
 
 
 def placebo_of(
@@ -67,7 +68,7 @@ def placebo_of(
 ) -> Array:
     """Returns as many pours of the base model at its fit as were measured."""
     seeds = [_SEED + seed + REPLICATES + i for i in range(len(condition.recordings))]
-    return forward.pours(model_scene(task, condition, found.base), seeds)
+    return forward.limit(model_scene(task, condition, found.base), seeds, None, task.coarse)
 
 
 def error_of(

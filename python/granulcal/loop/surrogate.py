@@ -187,8 +187,9 @@ class Surrogate:
             on = psi_[:, k] != 0
             moved[on] += psi_[on, k, None] * shift.move(u[on], k)
         z = z - moved
-        design_matrix, blocks = _features(basis, u, psi_)
-        scale_matrix = _scale_features(scale_basis, u, psi_)
+        bent = np.array([effect.held is None for effect in design.effects], dtype=bool)
+        design_matrix, blocks = _features(basis, u, psi_, bent)
+        scale_matrix = _scale_features(scale_basis, u, psi_, bent)
         coefficients = np.empty((size, design_matrix.shape[1]))
         roots = np.empty((size, design_matrix.shape[1], design_matrix.shape[1]))
         scale_coefficients = np.empty((size, scale_matrix.shape[1]))
@@ -282,7 +283,12 @@ class Surrogate:
 
     def features(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns the features at rows of (theta, condition, psi), shape (n, d)."""
-        return _features(self.basis, np.column_stack([theta, condition]), psi)[0]
+        return _features(self.basis, np.column_stack([theta, condition]), psi, self._bent)[0]
+
+    @property
+    def _bent(self) -> NDArray[np.bool_]:
+        """Effects whose square was learnt, shape (K,)."""
+        return np.array([effect.held is None for effect in self.design.effects], dtype=bool)
 
     def effect_features(self, theta: Array, condition: Array, k: int) -> tuple[Array, Array]:
         """Returns features of psi_k and of psi_k^2 at rows of (theta, condition), each (n, d)."""
@@ -292,7 +298,8 @@ class Surrogate:
         start = width + k * step
         linear, square = np.zeros((2, len(u), self.coefficients.shape[1]))
         linear[:, start : start + first.shape[1]] = first
-        square[:, start + first.shape[1] : start + step] = second
+        if self._bent[k]:
+            square[:, start + first.shape[1] : start + step] = second
         return linear, square
 
     def effect_move(self, theta: Array, condition: Array, k: int) -> Array:
@@ -312,7 +319,8 @@ class Surrogate:
         step = first.shape[1] + second.shape[1]
         for k in active:
             strength, start = psi[:, k : k + 1], width + k * step
-            columns = np.concatenate([strength * first, strength**2 * second], axis=1)
+            bend = strength**2 if self._bent[k] else 0.0 * strength
+            columns = np.concatenate([strength * first, bend * second], axis=1)
             total += columns @ self.coefficients[:, start : start + step].T
             total += strength * self.shift.move(u, int(k))
         return total
@@ -320,7 +328,8 @@ class Surrogate:
     def scale(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns s at rows of (theta, condition, psi), shape (n, m)."""
         u = np.column_stack([theta, condition])
-        return np.exp(_scale_features(self.scale_basis, u, psi) @ self.scale_coefficients.T)
+        features = _scale_features(self.scale_basis, u, psi, self._bent)
+        return np.exp(features @ self.scale_coefficients.T)
 
     def weights_near(self, theta: Array, condition: Array, width: float) -> Array:
         """Returns how near each archive row is to a point, in (0, 1], shape (n,)."""
@@ -413,7 +422,9 @@ def _usable(x: Array, labels: tuple[str, ...]) -> tuple[NDArray[np.intp], dict[s
     return np.array(kept, dtype=np.intp), dropped
 
 
-def _features(basis: Basis, u: Array, psi: Array) -> tuple[Array, list[slice]]:
+def _features(
+    basis: Basis, u: Array, psi: Array, bent: NDArray[np.bool_]
+) -> tuple[Array, list[slice]]:
     first, second = _effect_columns(u)
     main = basis(u)
     waves = 2 * len(basis.frequencies)
@@ -421,7 +432,7 @@ def _features(basis: Basis, u: Array, psi: Array) -> tuple[Array, list[slice]]:
     parts = [main]
     for k in range(psi.shape[1]):
         strength = psi[:, k : k + 1]
-        parts += [strength * first, strength**2 * second]
+        parts += [strength * first, bent[k] * strength**2 * second]
         widths += [first.shape[1], second.shape[1]]
     stops = np.cumsum(widths)
     blocks = [slice(int(b - w), int(b)) for b, w in zip(stops, widths, strict=True)]
@@ -438,8 +449,10 @@ def _effect_columns(u: Array) -> tuple[Array, Array]:
     return first, first[:, : dimension + 1] * _SLOPE
 
 
-def _scale_features(basis: Basis, u: Array, psi: Array) -> Array:
-    return np.concatenate([basis(u), np.abs(psi)], axis=1)
+def _scale_features(basis: Basis, u: Array, psi: Array, bent: NDArray[np.bool_]) -> Array:
+    # A held strength may lie beyond what was poured: the noise there is that of the nearer size.
+    strength = np.where(bent, np.abs(psi), np.clip(psi, 0.0, 1.0))
+    return np.concatenate([basis(u), strength], axis=1)
 
 
 def _correlation(noise: Array, weights: Array) -> Array:

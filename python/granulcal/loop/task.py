@@ -25,6 +25,11 @@ one that the verdict is of, and a verdict that another overturns is none; see `d
 that are never a finding: free numbers of the contact law, a drive's speed. Every pour of the
 archive has a value of its own, and every fit has them free.
 
+`law = ["softness"]` is short for such a table of a free number of the contact law; see `law.py`.
+
+`[resolution]` names the real grains' diameter and a coarser one to extrapolate from: see
+`resolution.py`.
+
 `averaged = true` of a condition: each recording is a mean over a time in which the grains forgot
 themselves many times (a drum's picture), so that one is enough.
 
@@ -43,10 +48,13 @@ from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
 from granulcal.loop.definition import Definition, check_definitions, definition_inputs
+from granulcal.loop.forward import Coarse
 from granulcal.loop.images import require_image
+from granulcal.loop.law import law_numbers
 from granulcal.loop.library import FUNNEL, LibraryEffect, by_name
 from granulcal.loop.measures import Measures
 from granulcal.loop.nuisances import declared_nuisances
+from granulcal.loop.resolution import Resolution
 from granulcal.loop.series import require_series
 from granulcal.loop.tolerance import Tolerances
 from granulcal.prior import Prior
@@ -208,7 +216,7 @@ class Task:
             document,
             {"scene", "prior", "conditions"},
             {"effects", "camera", "nuisances", "tolerances", "reading", "between"}
-            | {"definitions", "nuisance"},
+            | {"definitions", "nuisance", "resolution", "law"},
         )
         folder = file.parent
         shared = {key: document[key] for key in ("camera", "reading") if key in document}
@@ -217,13 +225,17 @@ class Task:
         declared = declared_nuisances(document.get("nuisances", {}), scene)
         names = {effect.name for effect in declared}
         library = (*(effect for effect in library if effect.name not in names), *declared)
+        if "resolution" in document:
+            library = (*library, Resolution.of(document["resolution"]).effect(scene))
         known = Prior.load(folder / document["prior"])
         unknown = (
             Prior.from_tables(document["nuisance"]).parameters if "nuisance" in document else ()
         )
         return cls(
             scene=scene,
-            prior=Prior([*known.parameters, *unknown]),
+            prior=Prior(
+                [*known.parameters, *law_numbers(document.get("law", False), scene), *unknown]
+            ),
             conditions=tuple(
                 _condition(file, {**shared, **table}) for table in document["conditions"]
             ),
@@ -247,7 +259,7 @@ class Task:
             ObservationError: the effect and the number.
         """
         for effect in self.library:
-            if effect.path in self.prior.names and not effect.is_free:
+            if effect.path in self.prior.names and not effect.is_free and effect.held is None:
                 raise ObservationError(
                     f"{effect.name} is the number {effect.path}, which the prior has free in every "
                     "fit: it can be no finding; leave it out of effects"
@@ -297,6 +309,12 @@ class Task:
     def _told_apart(self, paths: list[str]) -> int:
         """Number of conditions that the numbers `paths` tell apart."""
         return len({tuple(c.at[path] for path in paths) for c in self.conditions})
+
+    @property
+    def coarse(self) -> Coarse | None:
+        """The second size of grains, if the task names one."""
+        held = next((effect for effect in self.library if effect.held is not None), None)
+        return None if held is None else Coarse(dict(held.also), held.held or 0.0)
 
     def effect(self, name: str) -> LibraryEffect:
         """Returns an effect of the library with the scene's own numbers put in."""
