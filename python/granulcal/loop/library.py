@@ -138,6 +138,9 @@ class LibraryEffect:
         """Returns the numbers of the scene at strength `psi`, by path; none of a free effect."""
         if self.is_free:
             return {}
+        if self.held is not None:
+            # Two sizes were poured, and no others.
+            return dict(self.also) if psi == 1 else {}
         return {self.path: self.value(psi), **dict(self.also)}
 
     def design(self) -> Effect:
@@ -148,6 +151,7 @@ class LibraryEffect:
             family=self.family,
             nuisance_sd=self.nuisance_sd,
             is_shared=self.is_shared,
+            held=self.held,
         )
 
 
@@ -359,6 +363,13 @@ LIBRARY: tuple[LibraryEffect, ...] = (
             ("effects.fluid.crowding", 1.0),
         ),
         doc="grains stand in a thin fluid that goes with them where they are dense",
+    ),
+    LibraryEffect(
+        name="fluid.lubrication",
+        path="effects.lubrication.viscosity",
+        full=0.2,
+        unit="Pa s",
+        doc="a fluid film resists surfaces that come together or part",
     ),
     LibraryEffect(
         name="ground.layer",
