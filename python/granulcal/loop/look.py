@@ -101,8 +101,9 @@ def look(
         number: of this look, from 0.
         seed: of the draws and the pours.
     """
-    names = found.best.effects
-    effects = [plan.design.effects[[e.name for e in plan.design.effects].index(n)] for n in names]
+    names, known = found.best.effects, [effect.name for effect in plan.design.effects]
+    indices = [known.index(name) for name in names]
+    effects = [plan.design.effects[k] for k in indices]
     p, conditions = len(plan.prior.names), task.of(FIT)
     first = _SEED + seed + _LOOK_STEP * number
     drawn = hypercube(count, p + len(effects), first)
@@ -112,7 +113,6 @@ def look(
     poured: list[tuple[int, list[Array]]] = []
     coarse = task.coarse
     held = np.array([effect.held is not None for effect in plan.design.effects], dtype=bool)
-    indices = [[e.name for e in plan.design.effects].index(n) for n in names]
     for i in range(count):
         own = dict(zip(names, strengths[i].tolist(), strict=True))
         rows = []
