@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from granulcal import _native, design_command, loop_command
+from granulcal import _native, design_command, loop_command, predict_command
 from granulcal.commands import engine_command, export, film, init, model, record
 from granulcal.commands.program import Parser, describe
 from granulcal.files import write_beside
@@ -35,6 +35,7 @@ From a recording to a material:
                                                               one recording, few pours, no model
   granulcal export posterior posterior.json scene.toml --to lammps -o pour
   granulcal close-loop loop.toml -o loop                      what does the model lack?
+  granulcal predict loop --at funnel.height=0.07 --corrected  and where it was not measured?
 
 Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy, some frames of a
 recording lost, or a model that fails its check, 130 stopped."""
@@ -108,6 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_calibrate(commands)
     _add_report(commands)
     loop_command.add(commands)
+    predict_command.add(commands)
     design_command.add(commands)
     export.add(commands)
     film.add(commands)
@@ -231,6 +233,10 @@ def _add_reproduce(commands: Any) -> None:
     parser.add_argument("study", nargs="?", help="name of the study")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder (default: out)")
     parser.add_argument("--data", type=Path, help="measured data (default: $GRANULCAL_DATA)")
+    parser.add_argument(
+        "--maps", type=Path, help="kinect_mounds: folder of other maps compacted_*.npz"
+    )
+    parser.add_argument("--json", type=Path, help="kinect_mounds: file for what each map gave")
     parser.set_defaults(run=_reproduce)
 
 
@@ -467,9 +473,13 @@ def _reproduce(options: argparse.Namespace) -> int:
         raise ValueError(f"no study {options.study!r}; there are {', '.join(studies)}")
     module = importlib.import_module(f"granulcal.experiments.{options.study}")
     data = options.data or measured_data()
-    if data is None:
+    extra = {"maps_dir": options.maps, "json_path": options.json}
+    given = {name: value for name, value in extra.items() if value is not None}
+    if given and options.study != "kinect_mounds":
+        raise ValueError(f"--maps and --json are of kinect_mounds, not of {options.study}")
+    if data is None and options.maps is None:
         raise FileNotFoundError("no measured data: give --data or set $GRANULCAL_DATA")
-    module.reproduce(options.out, data)
+    module.reproduce(options.out, data, **given)
     return _DONE
 
 

@@ -27,8 +27,12 @@ TASK is a TOML file: a scene, a prior of the material, and recordings under at l
 Written to the folder -o: preregistration.json (before any data is looked at), verdict.json,
 report.html, and the tables conditions, candidates and residuals.parquet. The archive of pours may
 serve many tasks of one scene; all of it is resumed after an interruption. Verdicts: NONE, RESIDUAL
-(not sure enough for a name), EFFECT, SET (not told apart), EFFECTS (two), UNEXPLAINED.
+(not sure enough for a name), EFFECT, SET (not told apart), EFFECTS (two), UNEXPLAINED; and, with
+exit code 3, UNCONFIRMED (the surrogate is wrong at the fit) and OVERTURNED (by another definition
+of what is looked at, [[definitions]] of the task).
 """
+# The exit code of what is done and does not stand.
+_FALLEN = 3
 
 
 def add(commands: Any) -> None:
@@ -107,4 +111,4 @@ def _close(options: argparse.Namespace) -> int:
         f"--budget {options.budget} --seed {options.seed}",
         title=f"Closing the loop on {path}",
     )
-    return 0
+    return 0 if closed.standing.stands else _FALLEN

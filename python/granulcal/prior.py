@@ -129,7 +129,15 @@ class Prior:
         unknown = sorted(set(document) - {"parameter"})
         if unknown:
             raise PriorError(f"unknown key {', '.join(unknown)}: a prior holds [[parameter]] only")
-        tables = document.get("parameter", [])
+        return cls.from_tables(document.get("parameter", []))
+
+    @classmethod
+    def from_tables(cls, tables: Any) -> "Prior":
+        """Returns the prior of TOML tables, one for each parameter.
+
+        Raises:
+            PriorError: no list of tables, an unknown key, or numbers that do not fit.
+        """
         if not isinstance(tables, list) or not all(isinstance(t, dict) for t in tables):
             raise PriorError("parameter must be a list of tables, written [[parameter]]")
         return cls(_parameter_from_table(table, i) for i, table in enumerate(tables, start=1))

@@ -26,6 +26,7 @@ from granulcal.statistics import (
 __all__ = [
     "Camera",
     "DamagedRecordingWarning",
+    "EdgePixelsWarning",
     "Formation",
     "Levelled",
     "Lost",
@@ -42,6 +43,10 @@ FRAMES = 10
 
 class DamagedRecordingWarning(UserWarning):
     """A recording is cut off or damaged; the frames that are whole were used."""
+
+
+class EdgePixelsWarning(UserWarning):
+    """Pixels at the edge of a height map, apart from the formation, are taken for grains."""
 
 
 @dataclass(frozen=True)
@@ -315,9 +320,14 @@ class Recording:
         Raises:
             ValueError: no pixel belongs to a grain, an image without data, a setting out of range,
                 or both a fixed threshold and a floor.
+
+        Warns:
+            EdgePixelsWarning: pixels at the edge of a height map are taken for grains.
         """
         _refuse_two_thresholds(settings)
         found = self._native.formation(**settings)
+        if self.depth is None and settings.get("border_px") is None and found.edge is not None:
+            self._tell_edge(*found.edge, found.downsample)
         return Formation(
             points=found.points,
             mask=found.mask,
@@ -334,6 +344,17 @@ class Recording:
             downsample=found.downsample,
             resolution=found.resolution,
             spacing=float("nan") if found.spacing is None else found.spacing,
+        )
+
+    def _tell_edge(self, count: int, frame: int, downsample: int) -> None:
+        """Warns of pixels at the edge of a height map that are taken for grains."""
+        width = frame * downsample
+        warnings.warn(
+            f"{self.path}: {count} pixels at the edge of the map, apart from the formation, are "
+            f"taken for grains; border_px={width} (--border {width}) leaves them out, "
+            "border_px=0 keeps them without a word",
+            EdgePixelsWarning,
+            stacklevel=3,
         )
 
     def level(self, **settings: Unpack[SegmentationSettings]) -> Levelled:
@@ -381,6 +402,7 @@ class Recording:
         width: float | None = None,
         fps: float | None = None,
         series: str | None = None,
+        camera: int | None = None,
     ) -> ObservedStatistics:
         """Returns what a measurement that is no depth image says of a scene's own statistics.
 
@@ -394,6 +416,7 @@ class Recording:
             width: width of a drum's picture [m]; needed there.
             fps: frames a second of a run-out file's video; 240 unless told otherwise.
             series: name of a discharge curve, where the file has several.
+            camera: 1 or 2 for what this camera of a run-out file saw; the mean of both otherwise.
 
         Raises:
             FileNotFoundError: there is no such file.
@@ -401,20 +424,27 @@ class Recording:
                 argument does not go with it.
         """
         kind = Path(path).suffix.lower()
-        given = {"width": width, "fps": fps, "series": series}
-        takes = {".bmp": "width", ".png": "width", ".txt": "fps", ".csv": "series"}
+        given = {"width": width, "fps": fps, "series": series, "camera": camera}
+        takes = {
+            ".bmp": ("width",),
+            ".png": ("width",),
+            ".txt": ("fps", "camera"),
+            ".csv": ("series",),
+        }
         if kind not in takes:
             raise ValueError(f"{path} must be one of {', '.join(takes)}")
-        wrong = [name for name in given if given[name] is not None and name != takes[kind]]
+        wrong = [name for name in given if given[name] is not None and name not in takes[kind]]
         if wrong:
-            raise ValueError(f"a {kind} file takes {takes[kind]}, not {', '.join(wrong)}")
-        if takes[kind] == "width":
+            raise ValueError(
+                f"a {kind} file takes {' and '.join(takes[kind])}, not {', '.join(wrong)}"
+            )
+        if "width" in takes[kind]:
             if width is None:
                 raise ValueError(f"{path}: width, the drum's inner diameter [m], is needed")
             return DrumImage.open(path, width=width).observed(scene)
-        if takes[kind] == "fps":
+        if "fps" in takes[kind]:
             run_out = RunOut.open(path) if fps is None else RunOut.open(path, fps=fps)
-            return run_out.observed(scene)
+            return run_out.observed(scene, camera=camera)
         return DischargeCurve.open(path, series).observed(scene)
 
     def _repr_html_(self) -> str:

@@ -3,8 +3,9 @@
 use std::f64::consts::PI;
 
 use granulcal::dem::{
-    Adhesion, Capillary, Fluid, FunnelPose, GRAVITY, Grains, GroundUnlike, Motion, Polydispersity,
-    RestitutionSpeed, Scene, Shape, Start, Status, Tilt, Vibration, Wall, WallMaterial,
+    Adhesion, Capillary, Fluid, FunnelPose, GRAVITY, Grains, GroundUnlike, Lubrication, Motion,
+    Polydispersity, RestitutionSpeed, Scene, Shape, Start, Status, Tilt, Vibration, Wall,
+    WallMaterial,
 };
 use nalgebra::Vector3;
 
@@ -116,6 +117,40 @@ fn a_bridge_does_not_pull_before_grains_have_touched() {
     scene.effects.capillary = Capillary { bond: 5.0, volume: 1e-2, ..Capillary::default() };
     let at = after(&scene, 0.05).positions();
     assert_eq!(at[1].x - at[0].x, 2.0 * RADIUS + gap);
+}
+
+/// Two grains that fall side by side, `gap` apart and sent along x at `speeds`, with a film of 0.05 Pa s between them:
+/// their gap and their speeds along x.
+fn in_a_film(gap: f64, speeds: [f64; 2], seconds: f64) -> (f64, [f64; 2]) {
+    let mut scene = one_grain(0.1, material(0.5, 0.1, 0.5));
+    scene.grains = Grains { count: 2, diameter: 2.0 * RADIUS, density: 2500.0 };
+    scene.start =
+        Start::Positions { positions: vec![[0.0, 0.0, 0.1], [2.0 * RADIUS + gap, 0.0, 0.1]] };
+    scene.effects.lubrication = Lubrication { viscosity: 0.05, ..Lubrication::default() };
+    let mut simulation = start(&scene);
+    for (grain, &speed) in speeds.iter().enumerate() {
+        simulation.set_motion(grain, Vector3::new(speed, 0.0, 0.0), Vector3::zeros()).unwrap();
+    }
+    simulation.advance(seconds);
+    let (at, v) = (simulation.positions(), simulation.velocities());
+    (at[1].x - at[0].x - 2.0 * RADIUS, [v[0].x, v[1].x])
+}
+
+#[test]
+fn a_film_takes_speed_from_what_comes_together_and_none_from_what_moves_as_one() {
+    let mass = 2500.0 * 4.0 / 3.0 * PI * RADIUS.powi(3);
+    let gap = 0.4 * RADIUS;
+    let (left, v) = in_a_film(gap, [0.1, -0.1], 2e-3);
+    // dv/dt = -2 (3/2) pi mu a^2 v / (m h) and dh/dt = -v.
+    let lost = 3.0 * PI * 0.05 * RADIUS.powi(2) / mass * (gap / left).ln();
+    assert!(left < 0.95 * gap && left > 0.02 * RADIUS);
+    assert!((0.2 - (v[0] - v[1]) - lost).abs() < 0.03 * lost, "{} {lost}", 0.2 - (v[0] - v[1]));
+    assert!((v[0] + v[1]).abs() < 1e-12);
+    let (still, v) = in_a_film(gap, [0.1, 0.1], 2e-3);
+    assert!((still - gap).abs() < 1e-12 && (v[0] - 0.1).abs() < 1e-15 && v[0] == v[1]);
+    // However thick the film and close the grains, nothing turns round.
+    let (_, v) = in_a_film(1e-3 * RADIUS, [0.1, -0.1], 5e-3);
+    assert!(v[0] >= 0.0 && v[1] <= 0.0 && v[0] < 0.05, "{v:?}");
 }
 
 #[test]

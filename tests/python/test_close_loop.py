@@ -101,7 +101,7 @@ def test_a_tilted_table_is_found_named_and_removed(
     words = ["close-loop", str(tilted), "-o", str(out), "--budget", "1250", "--pairs", "19"]
     assert main(words) == 0
     told = capsys.readouterr().out
-    assert told.index("registered before any data") < told.index("kappa") < told.index("verdict")
+    assert told.index("registered before any data") < told.index("kappa") < told.index("verdict E")
     verdict = json.loads((out / "verdict.json").read_text())
     assert verdict["verdict"] == "EFFECT" and verdict["named"] == ["tilt.y"]
     low, middle, high = verdict["strength"]["tilt.y"]
@@ -109,12 +109,28 @@ def test_a_tilted_table_is_found_named_and_removed(
     assert verdict["misfit"]["fit"]["after"] < 0.5 * verdict["misfit"]["fit"]["before"]
     assert verdict["fit"]["is_improved"] and verdict["sealed"]["is_at_floor"]
     assert verdict["calibrated"]["pairs"] == 19 and verdict["calibrated"]["stretch"] >= 1
-    assert verdict["confirmed_p"] > 1e-3
+    assert verdict["stands"] and verdict["confirmed_p"] > 0.01
+    assert verdict["verdict_before_checks"] == "EFFECT" and verdict["random_draws"] >= 24
+    assert verdict["fit_less_best_draw"] < 0
+    rows = [row["name"] for row in verdict["sealed_rows"]]
+    assert rows == ["nearest condition", "straight line", "base + its own interpolated residual"]
     assert len(verdict["correction"]) == 3
+    assert "after a look at 24 random draws of tilt.y, EFFECT" in told
     assert "of 19 simulated pairs held" in told
     page = (out / "report.html").read_text()
+    assert "What needs no physics, at the sealed conditions" in page
     assert "tilt.y" in page and "data:image/png" in page
     assert "Of 19 simulated pairs" in page and "A correction without physics" in page
+    # Between the measured heights, where the sealed pours are: both kinds of prediction hold them.
+    sealed = np.mean(Task.load(tilted).of("sealed")[0].statistics(Task.load(tilted).scene), axis=0)
+    for extra in ([], ["--corrected"]):
+        asked = ["predict", str(out), "--at", "start.base=0.04", "--level", "0.95", "--json"]
+        assert main([*asked, *extra]) == 0
+        rows = json.loads(capsys.readouterr().out)["statistics"]
+        held = [
+            row["low"] <= y <= row["high"] for row, y in zip(rows.values(), sealed, strict=True)
+        ]
+        assert np.mean(held) > 0.8
     # Again: nothing is run twice, and the same comes out.
     before = (out / "verdict.json").read_text()
     assert main(words) == 0
@@ -195,7 +211,7 @@ def test_a_budget_that_is_too_small_says_what_is_enough(
 ) -> None:
     words = ["close-loop", str(tilted), "-o", str(tmp_path / "out"), "--budget", "100"]
     assert main(words) == 2
-    assert "446 would be enough" in capsys.readouterr().err
+    assert "562 would be enough" in capsys.readouterr().err
     assert main([*words, "--pairs", "7"]) == 2
     assert "pairs must be 0, or at least 19 to read 95 % from, got 7" in capsys.readouterr().err
 

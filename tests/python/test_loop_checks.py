@@ -19,7 +19,9 @@ from granulcal.loop.library import by_name
 from granulcal.loop.misfit import compare
 from granulcal.loop.pairs import Calibrated, calibrate, needed_stretch
 from granulcal.loop.refit import interval
+from granulcal.loop.standing import stand
 from granulcal.loop.tables import candidates, conditions, residuals, write_tables
+from granulcal.loop.trivial import LINE, TrivialRow
 
 Array = NDArray[np.float64]
 
@@ -155,6 +157,9 @@ def test_the_correction_takes_out_what_no_effect_explains(
     assert far[0].after is None and "outside the tested conditions" in far[0].refused
 
 
+ROW = TrivialRow(LINE, ("1",), np.array([3.0]), 3.0, 2.0, (1.0, 3.0))
+
+
 def closed(linear: Linear, surrogate: Surrogate, psi: float) -> Any:
     """What the tables need of a closed loop."""
     found = trace(surrogate, linear.observe(0.4, psi, 1), RULES)
@@ -177,6 +182,8 @@ def closed(linear: Linear, surrogate: Surrogate, psi: float) -> Any:
     return SimpleNamespace(
         task=task,
         trace=found,
+        verdict=found.verdict,
+        standing=stand(found.verdict, RULES, confirmed=0.5, trivial=[ROW]),
         power=found.power,
         fit=fit,
         sealed=None,
@@ -191,6 +198,8 @@ def test_the_tables_say_what_the_report_says(linear: Linear, surrogate: Surrogat
     assert (first["condition"], first["height"], first["use"], first["pours"]) == ("0", 0, "fit", 4)
     assert first["square_before"] == told.fit.before[0].square
     assert first["square_after_low"] <= first["square_after"] <= first["square_after_high"]
+    assert (first["square_line"], last["square_line"]) == (None, 3.0)
+    assert first["square_nearest"] is None
     assert first["scaled_square_corrected"] == 0.5 and last["scaled_square_corrected"] is None
     (row,) = candidates(told)
     assert row["effect"] == "tilt.x" and row["is_named"] and row["is_calibrated"]

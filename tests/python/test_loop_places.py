@@ -8,7 +8,7 @@ import pytest
 
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
-from granulcal.experiments import loop_drum, loop_rings
+from granulcal.experiments import loop_column, loop_drum, loop_rings
 from granulcal.loop.archive import Archive, Plan
 from granulcal.loop.baseline import Fit
 from granulcal.loop.close import planned
@@ -16,6 +16,7 @@ from granulcal.loop.design import Design, Effect, normal_from_cube
 from granulcal.loop.draws import draw
 from granulcal.loop.library import LibraryEffect, by_name
 from granulcal.loop.task import FIT, SEALED, Condition, Task
+from granulcal.recording import EdgePixelsWarning
 
 SCENE = """
 name = "small"
@@ -137,7 +138,10 @@ def test_how_a_recording_is_read_is_the_tasks_to_say(tmp_path: Path) -> None:
 
     assert largest(border_px=6, height_threshold=1e-3) == pytest.approx(0.012, rel=0.05)
     # The faults are no grains of this scene.
-    with pytest.raises(ObservationError, match="times that: is the recording of this scene"):
+    with (
+        pytest.warns(EdgePixelsWarning, match="border_px=. .* leaves them out"),
+        pytest.raises(ObservationError, match="times that: is the recording of this scene"),
+    ):
         largest()
 
 
@@ -149,17 +153,44 @@ def test_the_drums_walls_turn_together_and_its_effects_fit_the_scene(tmp_path: P
         (folder / f"gd_nature_{rpm}rpm_averaged.bmp").write_bytes(struct.pack("<2s", b"BM"))
     asked = loop_drum.task(tmp_path, (15,))
     assert [c.use for c in asked.conditions] == [FIT, SEALED]
-    assert [path for path, _, _ in asked.inputs] == ["walls.0.motion.rate"]
+    assert [path for path, _, _ in asked.inputs] == ["walls.0.motion.rate", "observe.surface.level"]
     slow, fast = asked.places
     assert slow["walls.0.motion.rate"] == slow["walls.1.motion.rate"] == pytest.approx(np.pi / 2)
     assert fast["walls.1.motion.rate"] == pytest.approx(3 * np.pi / 2)
     scene = asked.at_first()
-    assert len(asked.library) == 7
+    named = [effect.name for effect in asked.library if not effect.nuisance_sd and not effect.held]
+    assert len(named) == 6 and not {"fill", "frame.x", "resolution"} & set(named)
+    (fill,) = (effect for effect in asked.library if effect.name == "fill")
+    assert fill.nuisance_sd == pytest.approx(0.5)
+    assert asked.coarse is not None and asked.coarse.held == pytest.approx(-5 / 7)
+    # Equal solid volume: as many grains of 2.4 mm as stood there before.
+    assert asked.coarse.numbers["grains.count"] == 3648
+    assert asked.coarse.numbers["start.spacing"] == pytest.approx(2.6e-3, rel=1e-3)
+    scene.with_(asked.coarse.numbers)
     for entry in asked.library:
         effect = entry.at(scene)
+        if effect.is_free or effect.held is not None:
+            continue
         changed = scene.with_(effect.numbers(1.0))
         assert changed.get(effect.path) == effect.value(1.0)
         assert effect.strength(np.array([effect.value(0.5)]))[0] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_the_columns_are_read_by_their_outline_and_their_own_errors_have_no_name(
+    tmp_path: Path,
+) -> None:
+    asked = loop_column.task(tmp_path)
+    assert [path for path, _, _ in asked.inputs] == ["gravity.2", "observe.front.link"]
+    assert asked.at_first().get("observe.front.link") == 1.5
+    (one, *_) = asked.under(asked.definitions[3], FIT)
+    assert one.reading == {"camera": 1} and one.at["observe.front.link"] == 1.5
+    named = {effect.name for effect in asked.library if not effect.nuisance_sd}
+    assert {"tension.capillary", "tension.dry", "fluid.saturated"} <= named
+    assert not {"clock.offset", "clock.scale", "length.scale"} & named
+    scene = asked.at_first()
+    for entry in asked.library:
+        if not entry.is_free:
+            assert scene.with_(entry.at(scene).numbers(1.0)).get(entry.path) == entry.full
 
 
 def test_draws_around_a_fit_have_its_spread_and_stay_in_the_prior() -> None:

@@ -101,19 +101,64 @@ def test_a_run_out_file_gives_the_fronts_of_the_scene(scene: gc.Scene, tmp_path:
         rows.append(f"{frame} {radius + 0.01} 0 {radius} 0 {radius + 0.01} 0 {second} nan")
     path.write_text("\n".join(rows) + "\n")
     observed = gc.Recording.observed(path, scene)
-    # Frame 24 of 240 a second, mean of two cameras.
+    # Frame 24 of 240 a second, mean of two cameras, which differ by less than a grain.
     assert observed["front_radius[0.1]"] == pytest.approx(0.05 + 0.024 + 0.001)
     assert observed["front_radius[end]"] == pytest.approx(0.05 + 0.059 + 0.001)
     assert np.isnan(observed["discharged[0.1]"])
     assert gc.Recording.observed(path, scene, fps=120.0)["front_radius[0.1]"] == pytest.approx(
         0.05 + 0.012 + 0.001
     )
-    assert RunOut.open(path).front_radius()[3] == pytest.approx(0.053)
+    # Where one camera sees nothing yet there is no mean.
+    assert np.isnan(RunOut.open(path).front_radius()[3])
+    assert RunOut.open(path).disagreement() == pytest.approx(0.002)
+    alone = gc.Recording.observed(path, scene, camera=2)
+    assert alone["front_radius[0.1]"] == pytest.approx(0.05 + 0.024 + 0.002)
     path.write_text("Frame\n1 2 3\n")
     with pytest.raises(ValueError, match="line 2 must have 9 numbers, got 3"):
         gc.Recording.observed(path, scene)
-    with pytest.raises(ValueError, match="takes fps, not width"):
+    with pytest.raises(ValueError, match="takes fps and camera, not width"):
         gc.Recording.observed(path, scene, width=0.1)
+
+
+def run_out(particles: np.ndarray) -> RunOut:
+    """Fronts of two cameras at 100 frames a second, the fluid 10 mm ahead."""
+    time = 0.01 * np.arange(len(particles))
+    return RunOut(time=time, particles=particles, fluid=particles + 0.01, source="run.txt")
+
+
+def test_a_camera_that_stops_makes_no_jump(scene: gc.Scene) -> None:
+    steps = np.arange(41)[:, None]
+    # Two cameras 3 mm apart; the second stops at 0.3 s.
+    particles = 0.05 + 0.001 * steps + np.array([0.0, 0.003])
+    particles[31:, 1] = np.nan
+    found = run_out(particles)
+    front = found.front_radius()
+    assert np.diff(front[:31]) == pytest.approx(np.full(30, 0.001))
+    assert np.isnan(front[31:]).all()
+    # Each camera's own end: 90 and 83 mm.
+    assert found.observed(scene)["front_radius[end]"] == pytest.approx(0.0865)
+    assert found.observed(scene, camera=1)["front_radius[end]"] == pytest.approx(0.09)
+    assert found.fluid_radius()[:31] == pytest.approx(front[:31] + 0.01)
+    with pytest.raises(ValueError, match="camera must be 1 or 2, got 3"):
+        found.observed(scene, camera=3)
+
+
+def test_cameras_that_differ_by_more_than_a_grain_are_told(scene: gc.Scene) -> None:
+    particles = 0.05 + 0.001 * np.arange(41)[:, None] + np.array([0.0, 0.006])
+    with pytest.warns(UserWarning, match="run.txt: the cameras' fronts differ by up to 6 mm"):
+        run_out(particles).observed(scene)
+    # One that never saw a front differs from nothing, and is left out.
+    particles[:, 1] = np.nan
+    assert run_out(particles).observed(scene)["front_radius[0.1]"] == pytest.approx(0.06)
+
+
+def test_a_file_without_a_front_is_named(scene: gc.Scene) -> None:
+    nothing = np.full((20, 2), np.nan)
+    with pytest.raises(ValueError, match="run.txt: no front of particles was tracked$"):
+        run_out(nothing).observed(scene)
+    nothing[:, 0] = 0.05
+    with pytest.raises(ValueError, match="no front of particles was tracked by camera 2"):
+        run_out(nothing).observed(scene, camera=2)
 
 
 def test_a_discharge_curve_gives_shares_and_rate(scene: gc.Scene, tmp_path: Path) -> None:

@@ -331,7 +331,7 @@ def test_diagnostic_statistics_of_a_pour_and_of_its_recording_agree(small_scene,
 
 
 def test_a_data_set_holds_the_diagnostic_statistics(small_data):
-    assert small_data.diagnostics.shape == (80, 40)
+    assert small_data.diagnostics.shape == (80, 43)
     assert np.isfinite(small_data.diagnostics).all()
     assert small_data.diagnostic_names == DIAGNOSTIC_NAMES
     pour = gc.simulate(

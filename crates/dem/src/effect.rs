@@ -2,6 +2,8 @@
 //! (docs/theory/effects.md). Their numbers are in `scene/effects/`.
 
 mod drag;
+mod film;
+mod near;
 mod pad;
 mod pore_surface;
 mod pull;
@@ -10,6 +12,7 @@ use nalgebra::Vector3;
 
 use crate::scene::{Effect, RestitutionSpeed, Scene, Vibration};
 use drag::Drag;
+use film::Film;
 pub(crate) use pad::Pad;
 pub(crate) use pull::{Bridges, Pull};
 
@@ -21,6 +24,7 @@ pub(crate) struct Acting {
     pub vibration: Option<Vibration>,
     pub drag: Option<Drag>,
     pub pull: Option<Pull>,
+    pub film: Option<Film>,
     pub restitution: Option<RestitutionSpeed>,
     pub pad: Option<Pad>,
     /// See [`RollingForm::speed`].
@@ -41,10 +45,12 @@ impl Acting {
         if let Some(drag) = &drag {
             gravity *= drag.weight;
         }
+        let inverse_inertia = drag.as_ref().map_or(1.0, |drag| drag.inverse_inertia);
         Self {
             gravity,
             vibration: effects.vibration.is_on().then_some(effects.vibration),
-            pull: Pull::of(scene, drag.as_ref().map_or(1.0, |drag| drag.inverse_inertia)),
+            pull: Pull::of(scene, inverse_inertia),
+            film: Film::of(scene, inverse_inertia),
             drag,
             restitution: effects.restitution_speed.is_on().then_some(effects.restitution_speed),
             pad: effects.layer.is_on().then(|| Pad::of(scene)),
@@ -60,9 +66,10 @@ impl Acting {
         }
     }
 
-    /// How far the longest pull reaches `[m]`; 0 without one.
+    /// How far the longest force across a gap reaches `[m]`; 0 without one.
     pub fn reach(&self) -> f64 {
-        self.pull.as_ref().map_or(0.0, Pull::reach)
+        let film = self.film.as_ref().map_or(0.0, Film::reach);
+        self.pull.as_ref().map_or(0.0, Pull::reach).max(film)
     }
 
     /// The restitution of an impact at `speed` `[m/s]` that would be `restitution` at the speed of reference.

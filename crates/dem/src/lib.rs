@@ -81,8 +81,8 @@ pub use preset::{
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
     Adhesion, BoxSide, CameraSpec, Capillary, Clump, Effect, Effects, EndRule, Ends, Fluid, Funnel,
-    FunnelPose, GRAVITY, Grains, Ground, GroundUnlike, Layer, Mask, Mesh, MeshFile, Motion,
-    NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill,
+    FunnelPose, GRAVITY, Grains, Ground, GroundUnlike, Layer, Lubrication, Mask, Mesh, MeshFile,
+    Motion, NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill,
     ObserveSurface, Outflow, Outlet, Periodic, PeriodicAxis, Polydispersity, Projection,
     RestitutionSpeed, RollingForm, Scene, SensorSpec, Shape, Start, StereoSpec, Tilt,
     TimeOfFlightSpec, Vibration, ViewSpec, Wall,

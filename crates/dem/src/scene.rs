@@ -24,8 +24,8 @@ use serde::{Deserialize, Serialize};
 pub use camera::{CameraSpec, Mask, Projection};
 pub(crate) use effects::ClumpShape;
 pub use effects::{
-    Adhesion, Capillary, Clump, Effect, Effects, Fluid, FunnelPose, GroundUnlike, Layer, Outlet,
-    Polydispersity, RestitutionSpeed, RollingForm, Tilt, Vibration,
+    Adhesion, Capillary, Clump, Effect, Effects, Fluid, FunnelPose, GroundUnlike, Layer,
+    Lubrication, Outlet, Polydispersity, RestitutionSpeed, RollingForm, Tilt, Vibration,
 };
 pub use grains::Grains;
 pub use gravity::GRAVITY;

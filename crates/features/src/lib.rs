@@ -64,8 +64,8 @@ pub use raster::{height_map, render, render_grid};
 pub use region::Region;
 pub use register::register_colour;
 pub use segment::{
-    Formation, Kind, Levelled, Segmentation, Shape, Threshold, grain_points, level_depth,
-    level_height_map, segment_depth, segment_height_map,
+    EdgePixels, Formation, Kind, Levelled, Segmentation, Shape, Threshold, grain_points,
+    level_depth, level_height_map, segment_depth, segment_height_map,
 };
 pub use sensor::{DepthSensor, NoiseField, SensorNoise, StereoSensor, TimeOfFlightSensor};
 pub use stats::{

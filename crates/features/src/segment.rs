@@ -5,6 +5,7 @@
 //! For a noise-free simulated image the plane is known and [`grain_points`] skips the fit.
 
 mod component;
+mod edge;
 mod flying;
 mod formation;
 mod levelled;
@@ -14,6 +15,7 @@ mod spacing;
 
 use nalgebra::Vector3;
 
+pub use edge::EdgePixels;
 pub use formation::Formation;
 pub use levelled::Levelled;
 pub use settings::{Segmentation, Threshold};

@@ -2,9 +2,11 @@
 //! observes, and when, is said elsewhere. docs/theory/statistics.md, "Observations over time".
 
 pub mod front;
+pub mod outline;
 pub mod percentile;
 pub mod silhouette;
 
 pub use front::front_radius;
+pub use outline::outline_radius;
 pub use percentile::mass_percentiles;
 pub use silhouette::Silhouette;

@@ -86,6 +86,12 @@ impl Formation {
         self.inner.spacing()
     }
 
+    /// Pixels of grain at the edge of the image, apart from the formation, and the frame that holds them [px].
+    #[getter]
+    fn edge(&self) -> Option<(usize, usize)> {
+        self.inner.edge().map(|edge| (edge.count, edge.frame))
+    }
+
     #[getter]
     fn centroid(&self) -> (f64, f64) {
         (self.inner.centroid.x, self.inner.centroid.y)

@@ -6,10 +6,11 @@ which the ball of sand was let go and the width of the camera's point spread are
 inferred with the material.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +18,30 @@ from numpy.typing import NDArray
 from granulcal.calibrate import Calibrated, calibrate
 from granulcal.compare import Scale, nearest_row, standardised_distance
 from granulcal.dataset import Dataset, generate
+from granulcal.files import write_beside
 from granulcal.forward import pours_at, scene_at
 from granulcal.prior import Prior
 from granulcal.recording import Recording
 from granulcal.scene import Scene
+from granulcal.simulate import Pour
+from granulcal.statistics import diagnostic_statistics
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
 
-__all__ = ["MapResult", "demo", "measured_maps", "reproduce"]
+__all__ = [
+    "SHAPE",
+    "MapResult",
+    "demo",
+    "maps_in",
+    "measured_maps",
+    "reproduce",
+    "shape_of_map",
+    "shape_of_pour",
+]
+
+SHAPE = ("patches", "roughness", "shoulder")
+"""Statistics that see clods, terraces and a steep edge."""
 
 _FOLDER = Path("granular-impact-kinect") / "data"
 _HERE = Path(__file__).parent
@@ -63,6 +79,9 @@ class MapResult:
         mode_distance: mean over pours at the posterior's mode.
         mean_distance: mean over pours at the posterior's mean.
         warnings: what the posterior warned of.
+        is_inside: whether any parameters explain the 16 statistics (`BayesSim.misfit`).
+        measured: `patches`, `roughness` [m] and `shoulder` of the map.
+        simulated: the same of each pour at the posterior's mode, shape (k, 3).
     """
 
     name: str
@@ -73,26 +92,79 @@ class MapResult:
     mode_distance: float
     mean_distance: float
     warnings: tuple[str, ...]
+    is_inside: bool
+    measured: NDArray[np.float64]
+    simulated: NDArray[np.float64]
+
+    def to_dict(self, names: Sequence[str]) -> dict[str, Any]:
+        """Returns it for JSON; `names` are those of the parameters."""
+        shape = {
+            name: {"measured": float(seen), "simulated": made.tolist()}
+            for name, seen, made in zip(SHAPE, self.measured, self.simulated.T, strict=True)
+        }
+        return {
+            "map": self.name,
+            "L2": {
+                "posterior_mode": self.mode_distance,
+                "posterior_mean": self.mean_distance,
+                "best_of_training": self.training_distance,
+                "prior_mean": self.prior_distance,
+            },
+            **shape,
+            "is_inside": self.is_inside,
+            "mode": dict(zip(names, self.mode.tolist(), strict=True)),
+            "interval_90": dict(zip(names, self.interval.tolist(), strict=True)),
+            "warnings": list(self.warnings),
+        }
 
 
 def measured_maps(data_dir: Path) -> list[Path]:
-    """Returns the mound maps in the order of their numbers.
+    """Returns the mound maps of the study in the order of their numbers.
 
     Raises:
         FileNotFoundError: there is none.
     """
-    maps = (data_dir / _FOLDER).glob("compacted_*.npz")
+    return maps_in(data_dir / _FOLDER)
+
+
+def maps_in(folder: Path) -> list[Path]:
+    """Returns the mound maps of a folder, `compacted_*.npz`, in the order of their numbers.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
+    maps = folder.glob("compacted_*.npz")
     ordered = sorted(maps, key=lambda path: int(path.stem.rpartition("_")[2]))
     if not ordered:
-        raise FileNotFoundError(f"no compacted_*.npz in {data_dir / _FOLDER}")
+        raise FileNotFoundError(f"no compacted_*.npz in {folder}")
     return ordered
 
 
-def reproduce(out_dir: Path, data_dir: Path) -> list[MapResult]:
-    """Runs the line on every mound map and writes reports, a table and a picture to `out_dir`."""
+def reproduce(
+    out_dir: Path,
+    data_dir: Path | None,
+    *,
+    maps_dir: Path | None = None,
+    json_path: Path | None = None,
+) -> list[MapResult]:
+    """Runs the line on every mound map and writes reports, a table and a picture to `out_dir`.
+
+    Args:
+        out_dir: folder of pours, model, reports, table and picture.
+        data_dir: the measured data; not needed with `maps_dir`.
+        maps_dir: folder of other maps `compacted_*.npz`, in place of those of `data_dir`.
+        json_path: file for what each map gave: distances, shape measured and simulated, inside or
+            outside of the model.
+
+    Raises:
+        FileNotFoundError: there is no map.
+    """
     from granulcal.bayessim import BayesSim
 
-    maps = measured_maps(data_dir)
+    folder = maps_dir if data_dir is None or maps_dir is not None else data_dir / _FOLDER
+    if folder is None:
+        raise FileNotFoundError("neither a folder of maps nor the measured data were given")
+    maps = maps_in(folder)
     data = _training_pours(out_dir, _POURS)
     model = BayesSim.fit(data, seed=_SEED)
     model.save(out_dir / "model")
@@ -100,12 +172,16 @@ def reproduce(out_dir: Path, data_dir: Path) -> list[MapResult]:
     for path in maps:
         recording = Recording.open(path)
         calibrated = _calibrate_map(model, data, recording, out_dir / f"{path.stem}.html")
-        results.append(_judge(path.stem, calibrated, model.prior, data))
+        results.append(_judge(path.stem, recording, calibrated, model, data))
         clouds.append((recording.formation(**_SEGMENTATION).points, calibrated.pours[0].points()))
         print(_row(results[-1]), flush=True)
     (out_dir / "results.md").write_text(_table(results, model.prior.names), encoding="utf-8")
     _picture(out_dir / "formations.png", [path.stem for path in maps], clouds)
     print(f"table and picture in {out_dir}")
+    if json_path is not None:
+        rows = [result.to_dict(model.prior.names) for result in results]
+        write_beside(json_path, json.dumps({"maps": rows}, indent=1) + "\n")
+        print(json_path)
     return results
 
 
@@ -117,7 +193,7 @@ def demo(out_dir: Path, data_dir: Path) -> Calibrated:
     model = BayesSim.fit(data, seed=_SEED)
     path = data_dir / _FOLDER / f"{_DEMO_MAP}.npz"
     calibrated = _calibrate_map(model, data, Recording.open(path), out_dir / "report.html")
-    print(_row(_judge(path.stem, calibrated, model.prior, data)))
+    print(_row(_judge(path.stem, Recording.open(path), calibrated, model, data)))
     print(f"    report: {calibrated.report}")
     return calibrated
 
@@ -145,7 +221,10 @@ def _calibrate_map(
     )
 
 
-def _judge(name: str, calibrated: Calibrated, prior: Prior, data: Dataset) -> MapResult:
+def _judge(
+    name: str, recording: Recording, calibrated: Calibrated, model: "BayesSim", data: Dataset
+) -> MapResult:
+    prior = model.prior
     observed = calibrated.observed[0]
     scale = Scale.of(data)
 
@@ -167,7 +246,32 @@ def _judge(name: str, calibrated: Calibrated, prior: Prior, data: Dataset) -> Ma
         mode_distance=distance(calibrated.pours),
         mean_distance=distance(at_mean),
         warnings=tuple(str(warning) for warning in posterior.warnings),
+        is_inside=model.misfit(observed).is_inside,
+        measured=shape_of_map(recording, data.scene),
+        simulated=np.array([shape_of_pour(pour) for pour in calibrated.pours]),
     )
+
+
+def shape_of_map(recording: Recording, scene: Scene) -> NDArray[np.float64]:
+    """Returns `SHAPE` of a measured map, its pixels as wide as those of the scene's images."""
+    settings = {**_SEGMENTATION, "ground_resolution": scene.ground_resolution}
+    found = recording.formation(**settings).diagnostic_statistics(
+        grain_diameter=scene.get("grains.diameter")
+    )
+    return np.array([found[name] for name in SHAPE])
+
+
+def shape_of_pour(pour: Pour) -> NDArray[np.float64]:
+    """Returns `SHAPE` of a pour about the centroid of its points, as maps are read."""
+    points = pour.points()
+    centred = points - np.array([*points[:, :2].mean(axis=0), 0.0])
+    found = diagnostic_statistics(
+        centred,
+        grain_diameter=2 * float(pour.radii.mean()),
+        spacing=pour.scene.ground_resolution,
+        pour_axis=None,
+    )
+    return np.array([found[name] for name in SHAPE])
 
 
 def _row(result: MapResult) -> str:

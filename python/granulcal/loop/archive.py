@@ -32,6 +32,7 @@ from granulcal.loop.image_rows import ImageRows
 from granulcal.loop.images import require_image
 from granulcal.loop.library import LibraryEffect, fingerprint
 from granulcal.loop.measures import Measures
+from granulcal.loop.series import require_series, reread
 from granulcal.loop.tolerance import Tolerances
 from granulcal.prior import Parameter, Prior
 from granulcal.scene import Scene
@@ -168,6 +169,7 @@ class Archive:
     def __init__(self, folder: Path, plan: Plan) -> None:
         """Opens or begins it."""
         require_image(plan.scene, (effect.name for effect in plan.library if effect.image))
+        require_series(plan.scene, ((e.name, e.series) for e in plan.library if e.series))
         self.folder, self.plan = folder, plan
         path = folder / _RECORD
         mine = plan.record()
@@ -247,7 +249,9 @@ class Archive:
                 own = effect.at(plan.scene)
                 if part.effect != effect.name:
                     continue
-                if effect.whole:
+                if effect.held is not None:
+                    psi[:, k] = 1.0
+                elif effect.whole:
                     # A whole number may lie half a grain beyond full strength.
                     strength = own.strength(np.full(n, scene.get(effect.path)))
                     psi[:, k] = np.clip(strength, -1.0, 1.0)
@@ -278,7 +282,7 @@ class Archive:
         paths = [path for path, _, _ in self.plan.conditions]
         found = []
         for k, effect in enumerate(self.plan.library):
-            if not (effect.camera or effect.shift) or (
+            if not (effect.camera or effect.shift or effect.series) or (
                 effect.shift and (effect.path not in paths or self.plan.places)
             ):
                 continue
@@ -287,7 +291,9 @@ class Archive:
             strength = random.uniform(-1.0 if effect.is_two_sided else 0.0, 1.0, len(rows))
             theta, condition, psi, x = (part[rows].copy() for part in base)
             psi[:, k] = strength
-            if effect.camera:
+            if effect.series:
+                x = reread(self._names, x, {effect.series: effect.full * strength})
+            elif effect.camera:
                 if powers is None:
                     continue
                 x *= (1.0 + effect.full * strength[:, None]) ** powers
@@ -298,6 +304,10 @@ class Archive:
             inside = ((condition >= 0.0) & (condition <= 1.0)).all(axis=1)
             found.append((theta[inside], condition[inside], psi[inside], x[inside]))
         return found
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return Measures.of(self.plan.scene).names
 
     def _image_rows(self) -> ImageRows:
         plan = self.plan
@@ -356,7 +366,9 @@ class Archive:
     def _parts(self) -> list["_Part"]:
         """The data sets, the base model's first."""
         plan = self.plan
-        drawn = [] if plan.places else plan.conditions
+        # At the conditions alone their numbers are set, and definitions still drawn.
+        placed = plan.places[0] if plan.places else {}
+        drawn = [condition for condition in plan.conditions if condition[0] not in placed]
         inputs = [
             Parameter(path=path, distribution="uniform", low=low, high=high)
             for path, low, high in drawn
@@ -369,6 +381,9 @@ class Archive:
             effect, seed = entry.at(plan.scene), plan.seed + _SEED_STEP * k
             name = f"effect-{effect.name}"
             there = plan.scene.with_(dict(effect.also)) if effect.also else plan.scene
+            if effect.held is not None:
+                parts.append(_Part(name, there, Prior(common), plan.each, seed, effect.name))
+                continue
             if effect.whole:
                 share = -(-plan.each // len(_WHOLE_STRENGTHS))
                 for number, psi in enumerate(_WHOLE_STRENGTHS):

@@ -11,6 +11,7 @@ Reference:
     Biometrika 61, 1974.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,7 @@ from granulcal.loop.local import Local
 from granulcal.loop.observation import Stack
 from granulcal.loop.surrogate import Surrogate
 
-__all__ = ["Fit", "fit_base", "improve"]
+__all__ = ["Fit", "Start", "fit_base", "improve"]
 
 Array = NDArray[np.float64]
 
@@ -56,12 +57,27 @@ class Fit:
     log_density: float
 
 
-def fit_base(surrogate: Surrogate, stack: Stack, seed: int) -> tuple[Local, Fit]:
+@dataclass(frozen=True)
+class Start:
+    """Where a fit begins besides where the surrogate says.
+
+    Attributes:
+        v: prior z-scores of theta, shape (p,).
+        psi: strengths of all effects, shape (K,).
+    """
+
+    v: Array
+    psi: Array
+
+
+def fit_base(
+    surrogate: Surrogate, stack: Stack, seed: int, starts: Sequence[Start] = ()
+) -> tuple[Local, Fit]:
     """Returns the best fit without effects, and the surrogate around it."""
-    starts = _starts(surrogate, stack, seed)
+    places = [*_starts(surrogate, stack, seed), *(start.v for start in starts)]
     best: tuple[Local, Fit] | None = None
-    local = Local.at(surrogate, stack.conditions, stack.counts, starts[0])
-    for start in starts:
+    local = Local.at(surrogate, stack.conditions, stack.counts, places[0])
+    for start in places:
         fit = improve(local, stack.means.ravel(), start, local.none(), ())
         if best is None or fit.log_density > best[1].log_density:
             best = local, fit

@@ -7,21 +7,24 @@ from granulcal.loop.archive import Plan
 from granulcal.loop.confirm import confirm
 from granulcal.loop.correction import Correction, corrections
 from granulcal.loop.forward import Forward
+from granulcal.loop.look import Look
 from granulcal.loop.measures import Measures
+from granulcal.loop.misfit import Improvement, compare
 from granulcal.loop.observation import Observation
 from granulcal.loop.pairs import Calibrated, calibrate
+from granulcal.loop.replicates import FEWEST, seeds_of_replicates
 from granulcal.loop.scenes import faults_of, scene_of
+from granulcal.loop.standing import Moved
 from granulcal.loop.surrogate import Surrogate
-from granulcal.loop.task import FIT, Condition, Task
+from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.thresholds import Thresholds
-from granulcal.loop.trace import Trace
+from granulcal.loop.trace import Trace, trace
+from granulcal.loop.trivial import Group, TrivialRow, trivial_rows
 
-__all__ = ["calibrated", "confirmed", "corrected"]
+__all__ = ["calibrated", "confirmed", "corrected", "moved", "nearer", "trivial"]
 
 Array = NDArray[np.float64]
 
-# Fewest pours that have a mean and a scatter.
-_FEWEST = 2
 # Seeds of pairs, apart from those of the archive and of the replicates; of one pair to the next.
 _PAIR_SEED, _PAIR_STEP = 9_000_011, 1000
 
@@ -35,7 +38,7 @@ def confirmed(
 ) -> float:
     """Returns p of fresh pours of the verdict's model at its fit; NaN where too few are usable."""
     rows = [(c, simulated[c.name][1]) for c in fitted]
-    fresh = [Observation.of(c.name, plan.unit(c.at), x) for c, x in rows if len(x) >= _FEWEST]
+    fresh = [Observation.of(c.name, plan.unit(c.at), x) for c, x in rows if len(x) >= FEWEST]
     return confirm(surrogate, found.fit_of(found.best), fresh) if fresh else float("nan")
 
 
@@ -61,7 +64,7 @@ def calibrated(
             scene = scene_of(task, condition, theta, {name: psi})
             first = _PAIR_SEED + seed + _PAIR_STEP * b
             seeds = range(first, first + len(condition.recordings))
-            rows = forward.pours(scene, seeds, faults_of(task, {name: psi}))
+            rows = forward.limit(scene, seeds, faults_of(task, {name: psi}), task.coarse)
             if len(rows) == 0:
                 return None
             observed.append(Observation.of(condition.name, plan.unit(condition.at), rows))
@@ -86,6 +89,84 @@ def corrected(
     rows = [
         (c.name, plan.unit(c.at), measured[c.name], simulated[c.name][0])
         for c in task.conditions
-        if len(simulated[c.name][0]) >= _FEWEST
+        if len(simulated[c.name][0]) >= FEWEST
     ]
     return corrections(surrogate, found, rows, measures.names[: measures.head])
+
+
+def moved(
+    task: Task, plan: Plan, surrogate: Surrogate, rules: Thresholds, seed: int
+) -> tuple[Moved, ...]:
+    """Returns the verdicts of the pours to fit, looked at in every other way that was declared."""
+    found = []
+    for definition in task.definitions[1:]:
+        observed = [
+            Observation.of(c.name, plan.unit(c.at), c.statistics(task.scene))
+            for c in task.under(definition, FIT)
+        ]
+        there = trace(surrogate, observed, rules, seed=seed)
+        found.append(Moved(definition.name, there.verdict))
+    return tuple(found)
+
+
+def nearer(
+    forward: Forward,
+    task: Task,
+    found: Trace,
+    seen: Look | None,
+    measured: dict[str, Array],
+    simulated: dict[str, tuple[Array, Array]],
+    surrogate: Surrogate,
+    seed: int,
+) -> Improvement | None:
+    """Returns the error of the best random draw, poured anew (before), and of the fit (after).
+
+    None where nothing was looked at, or too few pours are usable.
+    """
+    if seen is None:
+        return None
+    strengths = dict(zip(seen.effects, seen.strengths[0].tolist(), strict=True))
+    size = Measures.of(task.scene).head
+    rows = []
+    for condition in task.of(FIT):
+        scene = scene_of(task, condition, seen.theta[0], strengths)
+        seeds, faults = seeds_of_replicates(seed), faults_of(task, strengths)
+        x = forward.limit(scene, seeds, faults, task.coarse)
+        at_fit = simulated[condition.name][1]
+        if min(len(x), len(at_fit)) < FEWEST:
+            return None
+        rows.append((condition.name, measured[condition.name], x, at_fit))
+    return compare(
+        [name for name, _, _, _ in rows],
+        [y[:, :size] for _, y, _, _ in rows],
+        [x[:, :size] for _, _, x, _ in rows],
+        [x[:, :size] for _, _, _, x in rows],
+        surrogate.raw_spread[:size],
+        seed=seed,
+    )
+
+
+def trivial(
+    task: Task,
+    plan: Plan,
+    measured: dict[str, Array],
+    simulated: dict[str, tuple[Array, Array]],
+    surrogate: Surrogate,
+    seed: int,
+) -> tuple[TrivialRow, ...]:
+    """Returns what needs no physics under the sealed conditions; none without any."""
+    size = Measures.of(task.scene).head
+
+    def groups(use: str) -> list[Group]:
+        return [
+            Group(
+                c.name,
+                plan.unit(c.at),
+                measured[c.name][:, :size],
+                *(rows[:, :size] for rows in simulated[c.name]),
+            )
+            for c in task.of(use)
+            if min(len(rows) for rows in simulated[c.name]) >= FEWEST
+        ]
+
+    return trivial_rows(groups(FIT), groups(SEALED), surrogate.raw_spread[:size], seed=seed)

@@ -1,13 +1,14 @@
 """`close_loop`: from recordings to a verdict, with the error before and after.
 
 The steps are those of docs/theory/loop.md: register what is fixed; fill the archive; say what could
-be seen; fit and test; refit the library; decide; simulate the base and the augmented model; open
-the sealed conditions once; run the placebo; write the report.
+be seen; fit and test; refit the library; decide; look over the prior; simulate the base and the
+augmented model; move every definition; open the sealed conditions once, beside rows that need no
+physics; say the verdict; run the placebo; write the report.
 """
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,22 +19,35 @@ from numpy.typing import NDArray
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.archive import Archive, Plan
-from granulcal.loop.checks import calibrated, confirmed, corrected
+from granulcal.loop.checks import calibrated, confirmed, corrected, moved, nearer, trivial
 from granulcal.loop.correction import Correction
 from granulcal.loop.cube import from_cube
+from granulcal.loop.definition import is_definition
 from granulcal.loop.experiment import Experiment, next_experiment
 from granulcal.loop.forward import Forward
+from granulcal.loop.look_over import LOOKS, look_over
 from granulcal.loop.measures import Measures
-from granulcal.loop.misfit import Improvement, compare
+from granulcal.loop.misfit import Improvement
+from granulcal.loop.models_of import models_of
 from granulcal.loop.observation import Observation
 from granulcal.loop.pairs import FEWEST_PAIRS, Calibrated
 from granulcal.loop.preregistration import register
 from granulcal.loop.refine import ROUND, Rows, further
-from granulcal.loop.scenes import faults_of, scene_of
+from granulcal.loop.replicates import (
+    REPLICATES,
+    both,
+    error_of,
+    model_faults,
+    model_scene,
+    placebo_of,
+)
+from granulcal.loop.standing import Standing, stand
+from granulcal.loop.store_surrogate import fit_surrogate
 from granulcal.loop.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.thresholds import Thresholds
 from granulcal.loop.trace import Explanation, Power, Trace, power, trace
+from granulcal.loop.verdict import Verdict
 from granulcal.one_thread import one_thread
 from granulcal.scene import Scene
 
@@ -41,16 +55,10 @@ __all__ = ["Closed", "close_loop", "fit_surrogate", "planned"]
 
 Array = NDArray[np.float64]
 
-# Simulated pours of each model under each condition.
-_REPLICATES = 10
-# Fewest of them that say something of an error.
-_FEWEST = 2
 # Fewest pours of the base and of each effect from which a surrogate is any use.
 _LEAST_BASE, _LEAST_EACH = 300, 40
 # Shares of a budget: the base model has more directions than any one effect.
 _BASE_SHARE = 0.4
-# Seeds of replicates, apart from those of the archive.
-_SEED = 7_000_003
 
 
 @dataclass(frozen=True)
@@ -59,6 +67,7 @@ class Closed:
 
     Attributes:
         task: what was asked.
+        standing: the verdict, and what may have overturned that of the fits.
         trace: fit, gate, refits and verdict on the conditions to fit.
         power: what could be seen, before the data.
         fit: error before and after, conditions to fit.
@@ -70,11 +79,11 @@ class Closed:
         measured: statistics of every condition's pours, by name.
         simulated: of the base and of the augmented model, by condition's name.
         corrections: what the correction without physics leaves; none where nothing was detected.
-        confirmed: p that the surrogate is right at the verdict's model, by fresh pours of it.
         calibrated: the interval of the named effect's strength by simulated pairs; None without.
     """
 
     task: Task
+    standing: Standing
     trace: Trace
     power: Power
     fit: Improvement
@@ -86,16 +95,20 @@ class Closed:
     measured: dict[str, Array]
     simulated: dict[str, tuple[Array, Array]]
     corrections: tuple[Correction, ...] = ()
-    confirmed: float = float("nan")
     calibrated: Calibrated | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """What may be said, once the checks are through."""
+        return self.standing.verdict
 
     def scene(self, condition: Condition, one: Explanation) -> Scene:
         """Returns the scene of a model at its best fit under a condition."""
-        return _scene(self.task, condition, one)
+        return model_scene(self.task, condition, one)
 
     def faults(self, one: Explanation) -> dict[str, float]:
         """Returns the faults of the image of a model at its best fit, by kind."""
-        return _faults(self.task, one)
+        return model_faults(self.task, one)
 
     def parameters(self) -> dict[str, dict[str, float]]:
         """Returns the parameters before and after, in their own units.
@@ -131,7 +144,7 @@ class Closed:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns everything for JSON."""
-        verdict = self.trace.verdict
+        verdict = self.verdict
 
         def squares(improvement: Improvement | None) -> dict[str, float] | None:
             if improvement is None:
@@ -147,7 +160,7 @@ class Closed:
             "reason": verdict.reason,
             "strength": self.strengths(),
             "misfit": {"fit": squares(self.fit), "sealed": squares(self.sealed)},
-            "confirmed_p": None if np.isnan(self.confirmed) else self.confirmed,
+            **self.standing.to_dict(),
             "calibrated": None if self.calibrated is None else self.calibrated.to_dict(),
             "correction": [one.to_dict() for one in self.corrections],
             "pours": self.pours,
@@ -205,7 +218,7 @@ def close_loop(
         )
     folder, rules = Path(out), thresholds or Thresholds()
     workers = threads or os.cpu_count() or 1
-    plan = planned(task, budget, seed, pairs, rounds)
+    plan = planned(task, budget, seed, pairs, rounds, LOOKS * rules.look)
     names = Measures.of(plan.scene).names
     registration = register(folder, task, plan, rules, seed, names, pairs, rounds)
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
@@ -222,7 +235,7 @@ def close_loop(
     measured = {c.name: c.statistics(task.scene) for c in fitted}
     observed = [Observation.of(c.name, store.plan.unit(c.at), measured[c.name]) for c in fitted]
     found = trace(surrogate, observed, rules, seed=seed)
-    say(f"verdict {found.verdict.kind}: {found.verdict.reason}")
+    say(f"the fits say {found.verdict.kind}: {found.verdict.reason}")
 
     forward, more = Forward(folder / "pours", workers), list[Rows]()
     for number in range(rounds):
@@ -232,20 +245,38 @@ def close_loop(
         surrogate = fit_surrogate(store, seed=seed, say=say, more=more)
         found = trace(surrogate, observed, rules, seed=seed)
         say(f"after pours where the fits are, {found.verdict.kind}: {found.verdict.reason}")
-    simulated = {c.name: _both(forward, task, c, found, seed) for c in task.conditions}
+    rounded = sum(len(rows.x) for rows in more)
+    seen = look_over(
+        forward, task, store, found, observed, measured, surrogate, rules, more, seed=seed, say=say
+    )
+    found, surrogate = seen.trace, seen.surrogate
+    simulated = {c.name: both(forward, task, c, found, seed) for c in task.conditions}
     right = confirmed(surrogate, store.plan, fitted, found, simulated)
     say(f"fresh pours of the verdict's model: the surrogate is right there with p = {right:.3g}")
+    elsewhere = moved(task, store.plan, surrogate, rules, seed)
+    for one in elsewhere:
+        say(f"looked at as {one.definition}: {one.verdict.kind}, p = {one.verdict.p:.3g}")
     wide = calibrated(forward, task, store.plan, surrogate, found, rules, pairs, seed)
     if wide is not None:
         held = f"{wide.held} of {wide.pairs} simulated pairs held by the plain interval"
         say(f"{held}; stretched by {wide.stretch:.3g}")
-    fit = _compare(task, fitted, measured, simulated, surrogate, seed)
+    fit = error_of(task, fitted, measured, simulated, surrogate, seed)
     hidden = task.of(SEALED)
     # Opened here, once, after everything that could be chosen has been.
     measured |= {c.name: c.statistics(task.scene) for c in hidden}
-    sealed = _compare(task, hidden, measured, simulated, surrogate, seed) if hidden else None
+    sealed = error_of(task, hidden, measured, simulated, surrogate, seed) if hidden else None
+    standing = stand(
+        found.verdict,
+        rules,
+        confirmed=right,
+        draws=seen.draws,
+        nearer=nearer(forward, task, found, seen.best, measured, simulated, surrogate, seed),
+        moved=elsewhere,
+        trivial=trivial(task, store.plan, measured, simulated, surrogate, seed),
+    )
+    say(f"verdict {standing.verdict.kind}: {standing.verdict.reason}")
 
-    pretended = [(c, _placebo(forward, task, c, found, seed)) for c in fitted]
+    pretended = [(c, placebo_of(forward, task, c, found, seed)) for c in fitted]
     blank = [
         Observation.of(c.name, store.plan.unit(c.at), rows) for c, rows in pretended if len(rows)
     ]
@@ -254,54 +285,37 @@ def close_loop(
     experiments = next_experiment(surrogate, found, _candidates(store.plan))
     closed = Closed(
         task=task,
+        standing=standing,
         trace=found,
         power=sights,
         fit=fit,
         sealed=sealed,
         placebo=placebo,
         experiments=tuple(experiments),
-        pours=plan.pours
-        + _needed(task, pairs if wide is not None else 0)
-        + sum(len(rows.x) for rows in more),
+        pours=plan.pours + _needed(task, pairs if wide is not None else 0, seen.draws) + rounded,
         registration=registration,
         measured=measured,
         simulated=simulated,
         corrections=corrected(task, store.plan, surrogate, found, measured, simulated),
-        confirmed=right,
         calibrated=wide,
     )
+    said = {"kind": standing.verdict.kind, "named": list(standing.verdict.named)}
+    models_of(task, store.plan, surrogate, found, said, measured, simulated).write(folder)
     write_beside(folder / "verdict.json", json.dumps(closed.to_dict(), indent=1) + "\n")
     return closed
 
 
 @one_thread()
-def fit_surrogate(
-    store: Archive,
-    *,
-    seed: int,
-    say: Callable[[str], None] = print,
-    more: Sequence[Rows] = (),
-) -> Surrogate:
-    """Returns the surrogate of all pours of an archive, and of `more`."""
-    rows, design = store.pours(), store.plan.design
-    whole = [rows, *more]
-    theta = np.concatenate([part.theta for part in whole])
-    condition = np.concatenate([part.condition for part in whole])
-    psi = np.concatenate([part.psi for part in whole])
-    x = np.concatenate([part.x for part in whole])
-    say(f"surrogate of {len(x)} pours ({rows.left_out} left out: jammed, unhealthy, unseen)")
-    return Surrogate.fit(design, theta, condition, psi, x, names=rows.names, seed=seed)
-
-
-@one_thread()
-def planned(task: Task, budget: int, seed: int, pairs: int = 0, rounds: int = 0) -> Plan:
-    """Returns the archive that a budget affords, `pairs` and `rounds` of pours kept back.
+def planned(
+    task: Task, budget: int, seed: int, pairs: int = 0, rounds: int = 0, draws: int = 0
+) -> Plan:
+    """Returns the archive that a budget affords; `pairs`, `rounds` and `draws` are kept back.
 
     Raises:
         ObservationError: it affords too little, with what would be enough.
     """
     own = sum(not effect.is_free for effect in task.library)
-    kept = _needed(task, pairs) + rounds * ROUND
+    kept = _needed(task, pairs, draws) + rounds * ROUND
     spare = budget - kept
     # A small budget has fewer pours to share than the base model needs.
     base = max(int(_BASE_SHARE * spare), min(_LEAST_BASE, spare - _LEAST_EACH * own))
@@ -327,70 +341,14 @@ def planned(task: Task, budget: int, seed: int, pairs: int = 0, rounds: int = 0)
     )
 
 
-def _needed(task: Task, pairs: int) -> int:
-    """Pours besides the archive: both models under every condition, the placebo, and pairs."""
-    measured = sum(len(c.recordings) for c in task.of(FIT))
-    return 2 * _REPLICATES * len(task.conditions) + (1 + pairs) * measured
-
-
-def _scene(task: Task, condition: Condition, one: Explanation) -> Scene:
-    """The scene of a model at its best fit under a condition."""
-    strengths = dict(zip(one.effects, one.best_strengths.tolist(), strict=True))
-    return scene_of(task, condition, one.theta, strengths)
-
-
-def _faults(task: Task, one: Explanation) -> dict[str, float]:
-    return faults_of(task, dict(zip(one.effects, one.best_strengths.tolist(), strict=True)))
-
-
-def _both(
-    forward: Forward, task: Task, condition: Condition, found: Trace, seed: int
-) -> tuple[Array, Array]:
-    """Pours of the base and of the augmented model."""
-    seeds = [_SEED + seed + i for i in range(_REPLICATES)]
-    before = forward.pours(_scene(task, condition, found.base), seeds)
-    if found.best is found.base:
-        return before, before
-    after = _scene(task, condition, found.best)
-    return before, forward.pours(after, seeds, _faults(task, found.best))
-
-
-def _placebo(forward: Forward, task: Task, condition: Condition, found: Trace, seed: int) -> Array:
-    seeds = [_SEED + seed + _REPLICATES + i for i in range(len(condition.recordings))]
-    return forward.pours(_scene(task, condition, found.base), seeds)
-
-
-def _compare(
-    task: Task,
-    conditions: tuple[Condition, ...],
-    measured: dict[str, Array],
-    simulated: dict[str, tuple[Array, Array]],
-    surrogate: Surrogate,
-    seed: int,
-) -> Improvement:
-    """The paper's 16 statistics, or all that the scene observes, over the archive's spread.
-
-    Conditions under which a model's pours jam or leave the view have no error to tell: left out.
-
-    Raises:
-        ObservationError: no condition is left.
-    """
-    size = Measures.of(task.scene).head
-    spread = surrogate.raw_spread[:size]
-    told = [c for c in conditions if min(len(rows) for rows in simulated[c.name]) >= _FEWEST]
-    if not told:
-        raise ObservationError(
-            f"fewer than {_FEWEST} of {_REPLICATES} pours at the fit are usable under every one of "
-            f"{', '.join(c.name for c in conditions)}: grains jam, leave the view or are unhealthy"
-        )
-    return compare(
-        [c.name for c in told],
-        [measured[c.name][:, :size] for c in told],
-        [simulated[c.name][0][:, :size] for c in told],
-        [simulated[c.name][1][:, :size] for c in told],
-        spread,
-        seed=seed,
-    )
+def _needed(task: Task, pairs: int, draws: int) -> int:
+    """Pours besides the archive: both models under every condition, the look, placebo and pairs."""
+    fitted = task.of(FIT)
+    measured = sum(len(c.recordings) for c in fitted)
+    # A pour in the limit of the grains' size is several of two sizes.
+    each, sizes = (1, 1) if task.coarse is None else (2 * task.coarse.repeats, 2)
+    look = (sizes * draws + each * REPLICATES if draws else 0) * len(fitted)
+    return each * (2 * REPLICATES * len(task.conditions) + (1 + pairs) * measured) + look
 
 
 def _candidates(plan: Plan) -> list[tuple[str, Array]]:
@@ -405,6 +363,8 @@ def _candidates(plan: Plan) -> list[tuple[str, Array]]:
     if found:
         return found
     for i, (path, low, high) in enumerate(plan.conditions):
+        if is_definition(path):
+            continue
         for share in (0.0, 0.25, 0.5, 0.75, 1.0):
             at = np.full(len(plan.conditions), 0.5)
             at[i] = share

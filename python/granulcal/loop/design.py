@@ -38,6 +38,8 @@ class Effect:
             is a random effect of every fit and never a finding. None for a candidate.
         is_shared: for a nuisance, whether one value holds for all conditions (a camera's scale) or
             each condition has its own (the height of a funnel that is set each time).
+        held: strength that every fit has, outside what was poured as well (a limit of the grains'
+            size); neither fitted nor named, and linear. None otherwise.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Effect:
     family: str = ""
     nuisance_sd: float | None = None
     is_shared: bool = True
+    held: float | None = None
 
     @property
     def low(self) -> float:
@@ -87,12 +90,20 @@ class Design:
     @property
     def candidates(self) -> tuple[int, ...]:
         """Indices of the effects that may be named."""
-        return tuple(k for k, effect in enumerate(self.effects) if effect.nuisance_sd is None)
+        return tuple(
+            k
+            for k, effect in enumerate(self.effects)
+            if effect.nuisance_sd is None and effect.held is None
+        )
 
     @property
     def nuisances(self) -> tuple[int, ...]:
         """Indices of the declared tolerances."""
         return tuple(k for k, effect in enumerate(self.effects) if effect.nuisance_sd is not None)
+
+    def none(self) -> Array:
+        """Returns strengths without any effect but those that are held, shape (K,)."""
+        return np.array([effect.held or 0.0 for effect in self.effects], dtype=np.float64)
 
     def family(self, k: int) -> str:
         """Returns the family of effect `k`: its own name if it declares none."""

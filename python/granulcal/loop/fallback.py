@@ -1,19 +1,28 @@
-r"""An empirical correction when no effect explains a residual: no physics, tested conditions only.
+r"""An empirical correction of the base model: no physics, tested conditions only.
 
-For each statistic a discrepancy $\delta_i(c) \sim GP(0, t_i^2 e^{-|c - c'|^2 / 2 l^2})$ is added to
-the base model at $\hat\theta$. It may not repeat what the parameters can do: it is conditioned on
-$B^T \delta = 0$ with $B = V^{-1} J$,
+To the base model at its fit $\hat\theta$ a discrepancy is added for each statistic,
 
-$$ k_\perp(x, x') = k(x, x') - k(x, \cdot) B (B^T K B)^{-1} B^T k(\cdot, x'), \qquad
-   \hat\delta = K_\perp (K_\perp + V)^{-1} r, \qquad
-   t_i^2 = \max\Big(0, \tfrac1H \sum_h r_{hi}^2 - (M V)_{hi,hi} \Big) $$
+$$ \delta_i(c) \sim GP\big(0, t_i^2 (\tfrac12 + \tfrac12 e^{-|c - c'|^2 / 2 l^2})\big), \qquad
+   \hat\delta(c) = K_c (K + V)^{-1} r, $$
+
+half of whose variance is the same under all conditions: what a model lacks it mostly lacks
+everywhere. Its size is by moments, of the statistic itself and of all of them in equal parts,
+
+$$ t_i^2 = \tfrac12 q_i + \tfrac1{2 m} \sum_j q_j, \qquad
+   q_i = \max\Big(0, \tfrac1H \sum_h r_{hi}^2 - (M V)_{hi,hi} \Big) $$
+
+A statistic whose residual happens to be small at the tested conditions is not known to be right.
+The parameters stay where they are, so the correction may well repeat what they could have done: a
+constraint to the contrary (Plumlee) is for whoever wants the parameters, and made predictions worse
+(docs/theory/loop.md).
 
 Reference:
     Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63, 2001.
     Plumlee, Bayesian calibration of inexact computer models, JASA 112, 2017 (orthogonality).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +38,8 @@ Array = NDArray[np.float64]
 
 # Nothing is predicted farther than this from the tested conditions, in length scales.
 _REACH = 0.5
+# Share of the variance that all conditions have in common, and that all statistics share.
+_COMMON, _POOLED = 0.5, 0.5
 
 
 @dataclass(frozen=True)
@@ -38,14 +49,12 @@ class Discrepancy:
     Attributes:
         conditions: tested, shape (H, q).
         variances: t^2, shape (m,).
-        constraint: B, shape (H m, p).
-        weights: (K_perp + V)^-1 r, shape (H m,).
-        precision: (K_perp + V)^-1, shape (H m, H m).
+        weights: (K + V)^-1 r, shape (H m,).
+        precision: (K + V)^-1, shape (H m, H m).
     """
 
     conditions: Array
     variances: Array
-    constraint: Array
     weights: Array
     precision: Array
 
@@ -56,15 +65,28 @@ class Discrepancy:
         root, slopes = local.in_statistics(fit.root), local.in_statistics(fit.slopes)
         residual = local.in_statistics(fit.residual)
         covariance = root @ root.T
-        constraint = np.asarray(np.linalg.solve(covariance, slopes), dtype=np.float64)
-        normal = slopes.T @ constraint + np.eye(len(fit.v))
+        solved = np.asarray(np.linalg.solve(covariance, slopes), dtype=np.float64)
+        normal = slopes.T @ solved + np.eye(len(fit.v))
         expected = covariance - slopes @ np.linalg.solve(normal, slopes.T)
         excess = residual**2 - np.diag(expected)
-        variances = np.maximum(excess.reshape(count, size).mean(axis=0), 0.0)
-        bare = cls(local.conditions, variances, constraint, np.empty(0), np.empty((0, 0)))
+        own = np.maximum(excess.reshape(count, size).mean(axis=0), 0.0)
+        variances = (1 - _POOLED) * own + _POOLED * own.mean()
+        bare = cls(local.conditions, variances, np.empty(0), np.empty((0, 0)))
         kernel = bare._kernel(local.conditions, local.conditions)
         precision = np.asarray(np.linalg.inv(kernel + covariance), dtype=np.float64)
-        return cls(local.conditions, variances, constraint, precision @ residual, precision)
+        return cls(local.conditions, variances, precision @ residual, precision)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns it for JSON."""
+        return {field.name: getattr(self, field.name).tolist() for field in fields(self)}
+
+    @classmethod
+    def from_dict(cls, document: dict[str, Any]) -> "Discrepancy":
+        """Returns what `to_dict` wrote."""
+        rows = {name: np.array(value, dtype=np.float64) for name, value in document.items()}
+        count = len(document["conditions"])
+        rows["conditions"] = rows["conditions"].reshape(count, -1)
+        return cls(**rows)
 
     def predict(self, condition: ArrayLike) -> tuple[Array, Array]:
         """Returns the correction of z at a condition (q,) and its standard deviation, each (m,).
@@ -85,12 +107,7 @@ class Discrepancy:
         return across @ self.weights, np.sqrt(np.maximum(variance, 0.0))
 
     def _kernel(self, a: Array, b: Array) -> Array:
-        """k_perp between conditions, shape (A m, B m)."""
-        plain, left = self._plain(a, b), self._plain(a, self.conditions) @ self.constraint
-        right = self.constraint.T @ self._plain(self.conditions, b)
-        own = self.constraint.T @ self._plain(self.conditions, self.conditions) @ self.constraint
-        return plain - left @ np.linalg.pinv(own, hermitian=True) @ right
-
-    def _plain(self, a: Array, b: Array) -> Array:
+        """K between conditions, shape (A m, B m)."""
         gap = np.sum((a[:, None] - b[None]) ** 2, axis=2)
-        return np.kron(np.exp(-0.5 * gap / DISCREPANCY_LENGTH**2), np.diag(self.variances))
+        shape = _COMMON + (1 - _COMMON) * np.exp(-0.5 * gap / DISCREPANCY_LENGTH**2)
+        return np.kron(shape, np.diag(self.variances))

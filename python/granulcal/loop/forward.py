@@ -4,6 +4,8 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +16,12 @@ from granulcal.loop.measures import Measures
 from granulcal.scene import Scene
 from granulcal.simulate import simulate
 
-__all__ = ["UNUSABLE", "Forward"]
+__all__ = ["UNUSABLE", "Coarse", "Forward"]
 
 Array = NDArray[np.float64]
+
+# From one of the pours that are averaged to the next.
+_REPEAT_STEP = 1_000_000_007
 
 UNUSABLE = ("unhealthy", "jammed")
 """Statuses of pours that nothing is learnt from."""
@@ -58,6 +63,48 @@ class Forward:
         np.save(beside, found)
         beside.replace(path)
         return found
+
+    def limit(
+        self,
+        scene: Scene,
+        seeds: Sequence[int],
+        faults: Mapping[str, float] | None = None,
+        coarse: "Coarse | None" = None,
+    ) -> Array:
+        """Returns the pours in the limit of the real grains' size, shape (n <= len(seeds), s).
+
+        Pours at the scene's size and at the coarse one, `x_1 + psi (x_2 - x_1)`, each the mean of
+        so many that it scatters as one pour does; with no coarse size those of the scene.
+        """
+        if coarse is None:
+            return self.pours(scene, seeds, faults)
+        repeated = [seed + _REPEAT_STEP * i for seed in seeds for i in range(coarse.repeats)]
+        fine = self.pours(scene, repeated, faults)
+        other = self.pours(scene.with_(coarse.numbers), repeated, faults)
+        count = min(len(fine), len(other)) // coarse.repeats
+        fine, other = (
+            rows[: count * coarse.repeats].reshape(count, coarse.repeats, -1).mean(axis=1)
+            for rows in (fine, other)
+        )
+        return fine + coarse.held * (other - fine)
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """The second size of grains, and where the real ones lie.
+
+    Attributes:
+        numbers: of the scene with coarse grains, by path.
+        held: psi of the real size, 0 at the scene's and 1 at the coarse one.
+    """
+
+    numbers: dict[str, float]
+    held: float
+
+    @property
+    def repeats(self) -> int:
+        """Pours at each size whose mean, taken to the limit, scatters no more than one pour."""
+        return ceil((1 - self.held) ** 2 + self.held**2)
 
 
 def _row(scene: Scene, seed: int, faults: Mapping[str, float] | None) -> Array | None:

@@ -23,6 +23,9 @@ __all__ = ["FUNNEL", "LIBRARY", "LibraryEffect", "by_name", "described", "finger
 
 Array = NDArray[np.float64]
 
+# Fields that archives of before do not have in their record.
+_LATER = ("image", "series", "held")
+
 
 @dataclass(frozen=True, kw_only=True)
 class LibraryEffect:
@@ -45,6 +48,9 @@ class LibraryEffect:
         shift: the condition input `path` is not what was stated, by `full`: base pours, read anew.
         image: kind of a fault of the image (`images.py`), in place of a number of the scene: base
             pours whose images are read anew.
+        series: kind of a fault of what was read off a series or profile (`series.py`): base pours,
+            read anew.
+        held: psi that every fit has, and that is neither fitted nor named; None otherwise.
         nuisance_sd: of a declared tolerance, in psi; None for a candidate.
         is_shared: of a tolerance: one value for all conditions.
     """
@@ -64,6 +70,8 @@ class LibraryEffect:
     camera: bool = False
     shift: bool = False
     image: str = ""
+    series: str = ""
+    held: float | None = None
     nuisance_sd: float | None = None
     is_shared: bool = True
 
@@ -119,16 +127,20 @@ class LibraryEffect:
     @property
     def is_free(self) -> bool:
         """Whether base pours show the effect, without pours of its own."""
-        return self.camera or self.shift or bool(self.image)
+        return self.camera or self.shift or bool(self.image or self.series)
 
     def faults(self, psi: float) -> dict[str, float]:
-        """Returns the faults of the image at strength `psi`, by kind; none of another effect."""
-        return {self.image: self.value(psi)} if self.image else {}
+        """Returns faults of image or series at strength `psi`, by kind; none of another effect."""
+        kind = self.image or self.series
+        return {kind: self.value(psi)} if kind else {}
 
     def numbers(self, psi: float) -> dict[str, float]:
         """Returns the numbers of the scene at strength `psi`, by path; none of a free effect."""
         if self.is_free:
             return {}
+        if self.held is not None:
+            # Two sizes were poured, and no others.
+            return dict(self.also) if psi == 1 else {}
         return {self.path: self.value(psi), **dict(self.also)}
 
     def design(self) -> Effect:
@@ -139,6 +151,7 @@ class LibraryEffect:
             family=self.family,
             nuisance_sd=self.nuisance_sd,
             is_shared=self.is_shared,
+            held=self.held,
         )
 
 
@@ -352,6 +365,13 @@ LIBRARY: tuple[LibraryEffect, ...] = (
         doc="grains stand in a thin fluid that goes with them where they are dense",
     ),
     LibraryEffect(
+        name="fluid.lubrication",
+        path="effects.lubrication.viscosity",
+        full=0.2,
+        unit="Pa s",
+        doc="a fluid film resists surfaces that come together or part",
+    ),
+    LibraryEffect(
         name="ground.layer",
         path="effects.layer.thickness",
         full=2e-3,
@@ -400,6 +420,63 @@ LIBRARY: tuple[LibraryEffect, ...] = (
         doc="the outlet is an ellipse, long along x",
     ),
     LibraryEffect(
+        name="clock.offset",
+        family="clock",
+        path="series.clock_offset",
+        series="clock_offset",
+        full=0.05,
+        unit="s",
+        is_two_sided=True,
+        doc="the measured series began this much earlier than it says",
+    ),
+    LibraryEffect(
+        name="clock.scale",
+        family="clock",
+        path="series.clock_scale",
+        series="clock_scale",
+        full=0.1,
+        is_two_sided=True,
+        doc="the measured clock is slow by this share",
+    ),
+    LibraryEffect(
+        name="length.scale",
+        path="series.length_scale",
+        series="length_scale",
+        full=0.05,
+        is_two_sided=True,
+        doc="measured lengths are too large by this share",
+    ),
+    LibraryEffect(
+        name="frame.x",
+        family="frame",
+        path="series.frame_x",
+        series="frame_x",
+        full=2e-3,
+        unit="m",
+        is_two_sided=True,
+        doc="the middle of the picture lies this far from that of the drum, along x",
+    ),
+    LibraryEffect(
+        name="frame.z",
+        family="frame",
+        path="series.frame_z",
+        series="frame_z",
+        full=2e-3,
+        unit="m",
+        is_two_sided=True,
+        doc="heights of the profile are too large by this",
+    ),
+    LibraryEffect(
+        name="frame.turn",
+        family="frame",
+        path="series.frame_turn",
+        series="frame_turn",
+        full=0.05,
+        unit="rad",
+        is_two_sided=True,
+        doc="the camera is turned about its axis, to a steeper slope",
+    ),
+    LibraryEffect(
         name="clump",
         path="effects.clump.aspect",
         off=1.0,
@@ -434,4 +511,4 @@ def fingerprint(library: Sequence[LibraryEffect]) -> str:
 
 def described(effect: LibraryEffect) -> dict[str, Any]:
     """Returns all that an entry says; fields that came later only where they say something."""
-    return {k: v for k, v in asdict(effect).items() if k != "image" or v}
+    return {k: v for k, v in asdict(effect).items() if k not in _LATER or v not in ("", None)}

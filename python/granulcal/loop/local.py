@@ -39,6 +39,7 @@ class Local:
         correlations: R_h times the Hotelling factor, shape (H, m, m).
         error_roots: of the mean's uncertainty: without effects, then for each effect the part that
             psi multiplies and the part that psi^2 does, shape (1 + 2 K, H, m, d).
+        shift_roots: of the shifts of theta that effects are in part, shape (K, H m, r).
         nuisance: covariance of the declared nuisances, shape (H m, H m).
     """
 
@@ -48,6 +49,7 @@ class Local:
     v: Array
     correlations: Array
     error_roots: Array
+    shift_roots: Array
     nuisance: Array
 
     @classmethod
@@ -71,7 +73,10 @@ class Local:
         for k in surrogate.design.nuisances:
             effect = surrogate.design.effects[k]
             linear = surrogate.effect_features(rows, conditions, k)[0]
-            along = (effect.nuisance_sd or 0.0) * (linear @ surrogate.coefficients.T)
+            along = linear @ surrogate.coefficients.T
+            along = (effect.nuisance_sd or 0.0) * (
+                along + surrogate.effect_move(rows, conditions, k)
+            )
             if effect.is_shared:
                 nuisance += np.outer(along.ravel(), along.ravel())
             else:
@@ -86,6 +91,14 @@ class Local:
             correlations,
             np.ascontiguousarray(
                 roots.reshape(size, count, 1 + 2 * len(effects), -1).transpose(2, 1, 0, 3)
+            ),
+            np.array(
+                [
+                    surrogate.shift.root(np.column_stack([rows, conditions]), k).reshape(
+                        count * size, -1
+                    )
+                    for k in range(len(effects))
+                ]
             ),
             nuisance,
         )
@@ -103,7 +116,7 @@ class Local:
 
     def none(self) -> Array:
         """Returns strengths of 0, shape (K,)."""
-        return np.zeros(len(self.surrogate.design.effects))
+        return self.surrogate.design.none()
 
     def mean(self, v: Array, psi: Array) -> Array:
         """Returns the stacked mean, shape (H m,)."""
@@ -154,7 +167,12 @@ class Local:
 
     def error_covariance(self, v: Array, psi: Array) -> Array:
         """Returns U and what the features cannot follow, shape (H m, H m)."""
-        total = self._error(self.error_root(psi)) if psi.any() else self._base_error.copy()
+        if psi.any():
+            total = self._error(self.error_root(psi))
+            shift = np.tensordot(psi, self.shift_roots, axes=1)
+            total += shift @ shift.T
+        else:
+            total = self._base_error.copy()
         lack = self.surrogate.lack * self._scales(v, psi) ** 2
         total[np.diag_indices_from(total)] += lack.ravel()
         return total
@@ -178,7 +196,8 @@ class Local:
             root = self.error_roots[1 + 2 * k]
             if not effect.is_two_sided:
                 root = root + 0.5 * self.error_roots[2 + 2 * k]
-            found.append(self._error(root))
+            shift = self.shift_roots[k]
+            found.append(self._error(root) + shift @ shift.T)
         return found
 
     @cached_property

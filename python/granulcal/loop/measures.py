@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from granulcal.dataset import Dataset
 from granulcal.errors import ObservationError
 from granulcal.loop.images import Frame
+from granulcal.loop.series import reread
 from granulcal.recording import Formation, Recording
 from granulcal.scene import Scene
 from granulcal.simulate import Pour
@@ -26,9 +27,10 @@ __all__ = ["Measures", "formation_of"]
 
 Array = NDArray[np.float64]
 
-# Of the diagnostics: a slope that few formations have, and rings of which the 16 statistics hold
-# the sum: twenty more numbers to a pour blunt every test of the others.
-_LEFT_OUT = ("tail_index", "height_ring")
+# Of the diagnostics: a slope that few formations have, rings of which the 16 statistics hold the
+# sum (twenty more numbers to a pour blunt every test of the others), and patches, which repeat
+# isolated grains and clusters.
+_LEFT_OUT = ("tail_index", "height_ring", "patches")
 # Volume under the measured surface over that of the scene's grains: beyond this a unit is wrong.
 _VOLUME_RANGE = (0.1, 10.0)
 
@@ -69,13 +71,14 @@ class Measures:
     def of_pour(self, pour: Pour, faults: Mapping[str, float] | None = None) -> Array:
         """Returns the statistics of a pour, shape (s,).
 
-        `faults` are those of the image, by kind; see `images.py`.
+        `faults` are those of the image, or of what is observed, by kind: `images.py`, `series.py`.
 
         Raises:
             ValueError: too few grains are in view.
         """
         if self.observes:
-            return np.asarray(pour.observed())
+            plain = np.asarray(pour.observed())
+            return reread(self.names, plain[None], faults)[0] if faults else plain
         if faults:
             frame = Frame.of(pour).with_(faults, pour.seed)
             points, spacing = frame.points(), frame.spacing

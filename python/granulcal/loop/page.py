@@ -26,6 +26,8 @@ _SENTENCES = {
     "SET": "The grains do something that this model lacks; several effects would account for it.",
     "EFFECTS": "The grains do something that this model lacks; it takes two effects.",
     "UNEXPLAINED": "The grains do something that neither this model nor any known effect does.",
+    "UNCONFIRMED": "Nothing may be said: the fits rest where the surrogate of the pours is wrong.",
+    "OVERTURNED": "Nothing may be said: the verdict hangs on how the pours are looked at.",
 }
 # Share of an effect that the parameters must not mimic for its interval to hold what it says.
 _QUOTABLE = 0.5
@@ -38,7 +40,7 @@ _SHOWN = 24
 
 def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
     """Writes the page of a closed loop."""
-    verdict = closed.trace.verdict
+    verdict = closed.verdict
     named = ", ".join(verdict.named)
     page = template("loop.html.j2").render(
         title=title,
@@ -53,7 +55,8 @@ def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
         placebo=closed.placebo.verdict,
         errors=_errors(closed),
         corrections=closed.corrections,
-        confirmed=closed.confirmed,
+        standing=closed.standing,
+        sealed_model=closed.sealed.total_after.square if closed.sealed else None,
         calibrated=closed.calibrated,
         held=_HELD,
         residuals=_residuals(closed),

@@ -38,12 +38,13 @@ def predict(
     trace = closed.trace
     design = trace.local.surrogate.design
     seeds = [_SEED + i for i in range(draws)]
-    at_fit = forward.pours(closed.scene(condition, one), seeds, closed.faults(one))
+    coarse = closed.task.coarse
+    at_fit = forward.limit(closed.scene(condition, one), seeds, closed.faults(one), coarse)
     rows = []
     for seed, theta, psi in zip(
         seeds, *draw(trace.fit_of(one), design, draws, seed=_SEED), strict=True
     ):
         strengths = dict(zip(one.effects, psi, strict=True))
         scene = scene_of(closed.task, condition, theta, strengths)
-        rows.append(forward.pours(scene, [seed], faults_of(closed.task, strengths)))
+        rows.append(forward.limit(scene, [seed], faults_of(closed.task, strengths), coarse))
     return at_fit, np.concatenate(rows)

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,7 @@ def register(
         }
         | ({"pairs": pairs} if pairs else {})
         | ({"rounds": rounds} if rounds else {})
+        | ({"definitions": [asdict(one) for one in task.definitions]} if task.definitions else {})
     )
     text = json.dumps(document, indent=1) + "\n"
     path = folder / _NAME

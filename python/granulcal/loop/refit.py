@@ -19,13 +19,14 @@ Reference:
     MacKay, Information theory, inference and learning algorithms, 2003, chapters 27 and 28.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.baseline import Fit, improve
+from granulcal.loop.baseline import Fit, Start, improve
 from granulcal.loop.local import Local
 from granulcal.loop.thresholds import Thresholds
 
@@ -79,21 +80,36 @@ def fit_none(fit: Fit, thresholds: Thresholds) -> Model:
     )
 
 
-def fit_single(local: Local, target: Array, base: Fit, k: int, thresholds: Thresholds) -> Model:
-    """Returns the model with effect `k` alone."""
+def fit_single(
+    local: Local,
+    target: Array,
+    base: Fit,
+    k: int,
+    thresholds: Thresholds,
+    starts: Sequence[Start] = (),
+) -> Model:
+    """Returns the model with effect `k` alone.
+
+    The best theta of each strength is sought from that of its neighbour, and from `starts`: those
+    with this effect from their own strength outwards, those without any from no effect.
+    """
     effect = local.surrogate.design.effects[k]
     nodes = np.linspace(effect.low, 1.0, 2 * _NODES - 1 if effect.is_two_sided else _NODES)
     fits: list[Fit | None] = [None] * len(nodes)
-    start = int(np.abs(nodes).argmin())
     root = _root(local, base, _joint(local, target, base, (k,)))
-    # Outwards from no effect, each node from its neighbour.
-    for path in (range(start, len(nodes)), range(start, -1, -1)):
-        v = base.v
-        for i in path:
-            psi = local.none()
-            psi[k] = nodes[i]
-            found = improve(local, target, v, psi, (), root=root, steps=4)
-            fits[i], v = found, found.v
+    alone = [s for s in starts if not np.delete(s.psi - local.none(), k).any()]
+    for begin in (Start(base.v, local.none()), *alone):
+        # Outwards, each node from its neighbour.
+        start = int(np.abs(nodes - begin.psi[k]).argmin())
+        for path in (range(start, len(nodes)), range(start, -1, -1)):
+            v = begin.v
+            for i in path:
+                psi = local.none()
+                psi[k] = nodes[i]
+                found = improve(local, target, v, psi, (), root=root, steps=4)
+                v, before = found.v, fits[i]
+                if before is None or found.log_density > before.log_density:
+                    fits[i] = found
     known = [fit for fit in fits if fit is not None]
     logs = np.array([_laplace(fit) for fit in known])
     fine = np.linspace(effect.low, 1.0, _FINE)
@@ -190,7 +206,7 @@ def _joint(local: Local, target: Array, start: Fit, active: tuple[int, ...]) -> 
 
 def _root(local: Local, base: Fit, best: Fit) -> Array:
     """Root of V: pours of the base fit, the surrogate's error at the best strengths."""
-    none = np.zeros_like(best.psi)
+    none = local.none()
     total = local.pour_covariance(base.v, none) + local.nuisance
     covariance = total + local.error_covariance(base.v, best.psi)
     return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)

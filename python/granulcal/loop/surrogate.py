@@ -6,11 +6,12 @@ surrogate's errors on different axes are independent, and an axis that many stat
 as well known as it deserves. On the axes
 
 $$ m(\theta, c, \psi) = f_0(\theta, c)
-   + \sum_k \psi_k g_k(\theta, c) + \psi_k^2 h_k(\theta, c), \qquad
+   + \sum_k \psi_k (J a_k + \tilde g_k)(\theta, c) + \psi_k^2 h_k(\theta, c), \qquad
    y = m + s(\theta, c, \psi) \epsilon, \quad \epsilon \sim (0, R) $$
 
-$f_0$ is a quadratic and random features of a Matern kernel; $g_k$ a quadratic, $h_k$ a linear
-function, each with a prior width learnt for every statistic and effect (`blocks.py`). log s is a
+$f_0$ is a quadratic and random features of a Matern kernel; $J a_k$ the part of an effect that is a
+shift of theta (`shift.py`), $\tilde g_k$ a quadratic and $h_k$ a linear function, each with a prior
+width learnt for every statistic and effect (`blocks.py`). log s is a
 function of the same coordinates and of the strengths. What the archive leaves unknown about m is
 the posterior of the coefficients, the same for all pours of a condition and correlated between
 conditions; nothing about it averages away with more measured pours. What the features cannot follow
@@ -38,6 +39,7 @@ from granulcal.bayessim.noise import fit_log_scale
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.blocks import fit_blocks
 from granulcal.loop.design import Design
+from granulcal.loop.shift import Shift
 from granulcal.loop.transform import Transform
 
 if TYPE_CHECKING:
@@ -80,6 +82,7 @@ class Surrogate:
         raw_spread: standard deviation of each of these over the base pours, own unit, shape (s,).
         raw_range: smallest and largest value of each, shape (2, s).
         basis: features of f_0 over (theta, c).
+        shift: the part of each effect that is a shift of theta.
         coefficients: shape (m, d).
         roots: of the coefficients' posterior covariances, shape (m, d, d).
         scale_basis: features of the log scales over (theta, c).
@@ -104,6 +107,7 @@ class Surrogate:
     raw_spread: Array
     raw_range: Array
     basis: Basis
+    shift: Shift
     coefficients: Array
     roots: Array
     scale_basis: Basis
@@ -176,9 +180,16 @@ class Surrogate:
         scale_basis = Basis.draw(
             u, _SCALE_STRETCH * lengths, features=_SCALE_FEATURES, seed=seed + 1, degree=2
         )
-        design_matrix, blocks = _features(basis, u, psi_)
-        scale_matrix = _scale_features(scale_basis, u, psi_)
         count, size = z.shape
+        shift = _shift(design, basis, u, psi_, z, base)
+        moved = np.zeros_like(z)
+        for k in range(psi_.shape[1]):
+            on = psi_[:, k] != 0
+            moved[on] += psi_[on, k, None] * shift.move(u[on], k)
+        z = z - moved
+        bent = np.array([effect.held is None for effect in design.effects], dtype=bool)
+        design_matrix, blocks = _features(basis, u, psi_, bent)
+        scale_matrix = _scale_features(scale_basis, u, psi_, bent)
         coefficients = np.empty((size, design_matrix.shape[1]))
         roots = np.empty((size, design_matrix.shape[1], design_matrix.shape[1]))
         scale_coefficients = np.empty((size, scale_matrix.shape[1]))
@@ -210,6 +221,7 @@ class Surrogate:
             raw_spread=np.nanstd(finite[base], axis=0),
             raw_range=np.stack([np.nanmin(finite, axis=0), np.nanmax(finite, axis=0)]),
             basis=basis,
+            shift=shift,
             coefficients=coefficients,
             roots=roots,
             scale_basis=scale_basis,
@@ -271,7 +283,12 @@ class Surrogate:
 
     def features(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns the features at rows of (theta, condition, psi), shape (n, d)."""
-        return _features(self.basis, np.column_stack([theta, condition]), psi)[0]
+        return _features(self.basis, np.column_stack([theta, condition]), psi, self._bent)[0]
+
+    @property
+    def _bent(self) -> NDArray[np.bool_]:
+        """Effects whose square was learnt, shape (K,)."""
+        return np.array([effect.held is None for effect in self.design.effects], dtype=bool)
 
     def effect_features(self, theta: Array, condition: Array, k: int) -> tuple[Array, Array]:
         """Returns features of psi_k and of psi_k^2 at rows of (theta, condition), each (n, d)."""
@@ -281,8 +298,13 @@ class Surrogate:
         start = width + k * step
         linear, square = np.zeros((2, len(u), self.coefficients.shape[1]))
         linear[:, start : start + first.shape[1]] = first
-        square[:, start + first.shape[1] : start + step] = second
+        if self._bent[k]:
+            square[:, start + first.shape[1] : start + step] = second
         return linear, square
+
+    def effect_move(self, theta: Array, condition: Array, k: int) -> Array:
+        """Returns the shift of theta that psi_k multiplies, at rows of (theta, c), (n, m)."""
+        return self.shift.move(np.column_stack([theta, condition]), k)
 
     def mean(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns m at rows of (theta, condition, psi), axes, shape (n, m)."""
@@ -297,14 +319,17 @@ class Surrogate:
         step = first.shape[1] + second.shape[1]
         for k in active:
             strength, start = psi[:, k : k + 1], width + k * step
-            columns = np.concatenate([strength * first, strength**2 * second], axis=1)
+            bend = strength**2 if self._bent[k] else 0.0 * strength
+            columns = np.concatenate([strength * first, bend * second], axis=1)
             total += columns @ self.coefficients[:, start : start + step].T
+            total += strength * self.shift.move(u, int(k))
         return total
 
     def scale(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns s at rows of (theta, condition, psi), shape (n, m)."""
         u = np.column_stack([theta, condition])
-        return np.exp(_scale_features(self.scale_basis, u, psi) @ self.scale_coefficients.T)
+        features = _scale_features(self.scale_basis, u, psi, self._bent)
+        return np.exp(features @ self.scale_coefficients.T)
 
     def weights_near(self, theta: Array, condition: Array, width: float) -> Array:
         """Returns how near each archive row is to a point, in (0, 1], shape (n,)."""
@@ -322,6 +347,32 @@ class Surrogate:
         share = effective / (effective + 4 * self.size)
         local = _correlation(self.noise, near + 1e-12)
         return share * local + (1 - share) * self.correlation
+
+
+def _shift(
+    design: Design,
+    basis: Basis,
+    u: Array,
+    psi: Array,
+    z: Array,
+    base: NDArray[np.bool_],
+) -> Shift:
+    """Shifts of theta, from slopes that pours without effects have."""
+    plain = basis(u[base])
+    waves = 2 * len(basis.frequencies)
+    blocks = [slice(0, plain.shape[1] - waves), slice(plain.shape[1] - waves, plain.shape[1])]
+    gram, ones = plain.T @ plain, np.ones(len(plain))
+    fits = [fit_blocks(plain, z[base, j], ones, blocks, gram) for j in range(z.shape[1])]
+    coefficients = np.array([fit.coefficients for fit in fits])
+    sizes = np.array([np.sqrt(np.mean(_held(fit.noise) ** 2)) for fit in fits])
+    p = len(design.parameters)
+    return Shift.fit(basis, coefficients, sizes, u[~base], psi[~base], z[~base], p)
+
+
+def _held(noise: Array) -> Array:
+    """Residuals cut where they are no noise any more."""
+    largest = _LARGEST_RESIDUAL * float(np.median(np.abs(noise)) / 0.6745)
+    return np.clip(noise, -largest, largest)
 
 
 def _lack(
@@ -371,7 +422,9 @@ def _usable(x: Array, labels: tuple[str, ...]) -> tuple[NDArray[np.intp], dict[s
     return np.array(kept, dtype=np.intp), dropped
 
 
-def _features(basis: Basis, u: Array, psi: Array) -> tuple[Array, list[slice]]:
+def _features(
+    basis: Basis, u: Array, psi: Array, bent: NDArray[np.bool_]
+) -> tuple[Array, list[slice]]:
     first, second = _effect_columns(u)
     main = basis(u)
     waves = 2 * len(basis.frequencies)
@@ -379,7 +432,7 @@ def _features(basis: Basis, u: Array, psi: Array) -> tuple[Array, list[slice]]:
     parts = [main]
     for k in range(psi.shape[1]):
         strength = psi[:, k : k + 1]
-        parts += [strength * first, strength**2 * second]
+        parts += [strength * first, bent[k] * strength**2 * second]
         widths += [first.shape[1], second.shape[1]]
     stops = np.cumsum(widths)
     blocks = [slice(int(b - w), int(b)) for b, w in zip(stops, widths, strict=True)]
@@ -396,8 +449,10 @@ def _effect_columns(u: Array) -> tuple[Array, Array]:
     return first, first[:, : dimension + 1] * _SLOPE
 
 
-def _scale_features(basis: Basis, u: Array, psi: Array) -> Array:
-    return np.concatenate([basis(u), np.abs(psi)], axis=1)
+def _scale_features(basis: Basis, u: Array, psi: Array, bent: NDArray[np.bool_]) -> Array:
+    # A held strength may lie beyond what was poured: the noise there is that of the nearer size.
+    strength = np.where(bent, np.abs(psi), np.clip(psi, 0.0, 1.0))
+    return np.concatenate([basis(u), strength], axis=1)
 
 
 def _correlation(noise: Array, weights: Array) -> Array:

@@ -1,6 +1,7 @@
 """The loop's report as three Parquet tables.
 
-- conditions, a row each: its numbers, use, pours; E, floor, D^2 with 95 % before and after;
+- conditions, a row each: its numbers, use, pours; E, floor, D^2 with 95 % before and after, and of
+  what needs no physics under sealed ones;
 - candidates, a row for each effect of the library: kappa and the smallest strength seen, before and
   with the data; score and p; of its refit log probability, p of what it leaves, strength psi and
   number of the scene with interval;
@@ -18,10 +19,13 @@ import numpy as np
 
 from granulcal.loop.close import Closed
 from granulcal.loop.trace import Explanation
+from granulcal.loop.trivial import LINE, NEAREST, RESIDUAL
 
 __all__ = ["candidates", "conditions", "residuals", "write_tables"]
 
 Row = dict[str, Any]
+# Columns of the rows that need no physics.
+_COLUMN = {NEAREST: "nearest", LINE: "line", RESIDUAL: "base_and_residual"}
 
 
 def write_tables(closed: Closed, folder: Path) -> list[Path]:
@@ -57,6 +61,10 @@ def conditions(closed: Closed) -> list[Row]:
     """Returns a row for each condition that has an error to tell."""
     at = {condition.name: condition for condition in closed.task.conditions}
     corrected = {one.label: one for one in closed.corrections}
+    trivial: dict[str, Row] = {}
+    for row in closed.standing.trivial:
+        for label, square in zip(row.labels, row.squares, strict=True):
+            trivial.setdefault(label, {})[f"square_{_COLUMN[row.name]}"] = float(square)
     rows = []
     for use, found in (("fit", closed.fit), ("sealed", closed.sealed)):
         if found is None:
@@ -75,6 +83,8 @@ def conditions(closed: Closed) -> list[Row]:
                 | {"square_after_low": after.interval[0], "square_after_high": after.interval[1]}
                 | {"scaled_square_before": correction.before if correction else None}
                 | {"scaled_square_corrected": correction.after if correction else None}
+                | {f"square_{column}": None for column in _COLUMN.values()}
+                | trivial.get(label, {})
             )
     return rows
 
@@ -91,7 +101,7 @@ def candidates(closed: Closed) -> list[Row]:
             "family": (effect.family if effect else "") or name,
             "path": effect.path if effect else "",
             "unit": effect.unit if effect else "-",
-            "is_named": name in trace.verdict.named,
+            "is_named": name in closed.verdict.named,
             "kappa_before": float(sights.kappa[i]),
             "detectable_before": float(sights.detectable[i]),
             "kappa": float(trace.power.kappa[i]),

@@ -18,6 +18,18 @@ a finding. `tolerances = "tolerances.json"` declares in which directions the sta
 out it is looked for beside the recording. `reading = { width = 0.084 }`, likewise, are arguments of
 `Recording.observed`, or of `Recording.formation` where the scene observes nothing.
 
+`[[definitions]]` are ways to look at the same pours, thresholds and levels moved: the first is the
+one that the verdict is of, and a verdict that another overturns is none; see `definition.py`.
+
+`[[nuisance]]` tables, written like those of a prior, are numbers of the model that nobody knows and
+that are never a finding: free numbers of the contact law, a drive's speed. Every pour of the
+archive has a value of its own, and every fit has them free.
+
+`law = ["softness"]` is short for such a table of a free number of the contact law; see `law.py`.
+
+`[resolution]` names the real grains' diameter and a coarser one to extrapolate from: see
+`resolution.py`.
+
 `averaged = true` of a condition: each recording is a mean over a time in which the grains forgot
 themselves many times (a drum's picture), so that one is enough.
 
@@ -26,7 +38,7 @@ condition may then depend on each other (two walls that turn together).
 """
 
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -35,9 +47,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
+from granulcal.loop.definition import Definition, check_definitions, definition_inputs
+from granulcal.loop.forward import Coarse
 from granulcal.loop.images import require_image
+from granulcal.loop.law import law_numbers
 from granulcal.loop.library import FUNNEL, LibraryEffect, by_name
 from granulcal.loop.measures import Measures
+from granulcal.loop.nuisances import declared_nuisances
+from granulcal.loop.resolution import Resolution
+from granulcal.loop.series import require_series
 from granulcal.loop.tolerance import Tolerances
 from granulcal.prior import Prior
 from granulcal.scene import Scene
@@ -77,6 +95,14 @@ class Condition:
     reading: dict[str, Any] = field(default_factory=dict)
     averaged: bool = False
 
+    def under(self, definition: Definition) -> "Condition":
+        """Returns the condition looked at in the way of a definition."""
+        return replace(
+            self,
+            at={**self.at, **definition.at},
+            reading={**self.reading, **definition.reading},
+        )
+
     def statistics(self, scene: Scene) -> Array:
         """Returns the statistics of each pour, shape (n, s).
 
@@ -112,6 +138,8 @@ class Task:
         tolerances: of the statistics.
         between: whether the archive's pours lie between the conditions, their numbers drawn
             independently; if not, they are at the conditions alone.
+        definitions: ways to look at the pours, the first is the verdict's; none: the scene's own.
+        stated: the conditions as they were before the first definition was put in.
     """
 
     scene: Scene
@@ -121,6 +149,8 @@ class Task:
     path: Path | None = None
     tolerances: Tolerances | None = None
     between: bool = True
+    definitions: tuple[Definition, ...] = ()
+    stated: tuple[Condition, ...] = ()
 
     def __post_init__(self) -> None:
         """Checks that the conditions can be asked about.
@@ -130,7 +160,15 @@ class Task:
                 tolerances over a number that does not differ between conditions, effects of the
                 image for a scene that observes statistics of its own.
         """
+        check_definitions(self.definitions)
+        if self.definitions and not self.stated:
+            object.__setattr__(self, "stated", self.conditions)
+            first = self.definitions[0]
+            looked = tuple(condition.under(first) for condition in self.conditions)
+            object.__setattr__(self, "conditions", looked)
         require_image(self.scene, (effect.name for effect in self.library if effect.image))
+        require_series(self.scene, ((e.name, e.series) for e in self.library if e.series))
+        self._refuse_fitted()
         given = set(self.conditions[0].at) if self.conditions else set()
         meant = tuple(e for e in self.library if not e.shift or e.path in given)
         # An effect on a condition that this task does not have.
@@ -177,18 +215,27 @@ class Task:
             file,
             document,
             {"scene", "prior", "conditions"},
-            {"effects", "camera", "nuisances", "tolerances", "reading", "between"},
+            {"effects", "camera", "nuisances", "tolerances", "reading", "between"}
+            | {"definitions", "nuisance", "resolution", "law"},
         )
         folder = file.parent
         shared = {key: document[key] for key in ("camera", "reading") if key in document}
         scene = Scene.load(folder / document["scene"])
         library = by_name(document["effects"]) if "effects" in document else _default(scene)
-        sds = {str(name): float(sd) for name, sd in document.get("nuisances", {}).items()}
-        declared = tuple(effect.declared(sds[effect.name], scene) for effect in by_name(sds))
-        library = (*(effect for effect in library if effect.name not in sds), *declared)
+        declared = declared_nuisances(document.get("nuisances", {}), scene)
+        names = {effect.name for effect in declared}
+        library = (*(effect for effect in library if effect.name not in names), *declared)
+        if "resolution" in document:
+            library = (*library, Resolution.of(document["resolution"]).effect(scene))
+        known = Prior.load(folder / document["prior"])
+        unknown = (
+            Prior.from_tables(document["nuisance"]).parameters if "nuisance" in document else ()
+        )
         return cls(
             scene=scene,
-            prior=Prior.load(folder / document["prior"]),
+            prior=Prior(
+                [*known.parameters, *law_numbers(document.get("law", False), scene), *unknown]
+            ),
             conditions=tuple(
                 _condition(file, {**shared, **table}) for table in document["conditions"]
             ),
@@ -198,7 +245,25 @@ class Task:
             if "tolerances" in document
             else None,
             between=bool(document.get("between", True)),
+            definitions=tuple(Definition.of(table) for table in document.get("definitions", [])),
         )
+
+    def under(self, definition: Definition, use: str) -> tuple[Condition, ...]:
+        """Returns the conditions of one use, looked at in the way of a definition."""
+        return tuple(c.under(definition) for c in self.stated if c.use == use)
+
+    def _refuse_fitted(self) -> None:
+        """Refuses candidates whose number every fit has free.
+
+        Raises:
+            ObservationError: the effect and the number.
+        """
+        for effect in self.library:
+            if effect.path in self.prior.names and not effect.is_free and effect.held is None:
+                raise ObservationError(
+                    f"{effect.name} is the number {effect.path}, which the prior has free in every "
+                    "fit: it can be no finding; leave it out of effects"
+                )
 
     def of(self, use: str) -> tuple[Condition, ...]:
         """Returns the conditions of one use."""
@@ -222,7 +287,7 @@ class Task:
                 [*(p for p, _, _ in found), path]
             ):
                 found.append((path, min(values), max(values)))
-        return tuple(found)
+        return (*found, *definition_inputs(self.definitions))
 
     @property
     def places(self) -> tuple[dict[str, float], ...]:
@@ -244,6 +309,12 @@ class Task:
     def _told_apart(self, paths: list[str]) -> int:
         """Number of conditions that the numbers `paths` tell apart."""
         return len({tuple(c.at[path] for path in paths) for c in self.conditions})
+
+    @property
+    def coarse(self) -> Coarse | None:
+        """The second size of grains, if the task names one."""
+        held = next((effect for effect in self.library if effect.held is not None), None)
+        return None if held is None else Coarse(dict(held.also), held.held or 0.0)
 
     def effect(self, name: str) -> LibraryEffect:
         """Returns an effect of the library with the scene's own numbers put in."""

@@ -21,6 +21,8 @@ class Thresholds:
         replicates_after: of the gate after each fit.
         refits: replicates that are refitted in full to scale the linear ones.
         level: of intervals.
+        confirm: smallest p of fresh pours at which the surrogate counts as right at the fit.
+        look: random draws of the winner that are poured before a verdict is said; 0 for none.
     """
 
     detect: float = 0.05
@@ -34,6 +36,8 @@ class Thresholds:
     replicates_after: int = 600
     refits: int = 32
     level: float = 0.95
+    confirm: float = 0.01
+    look: int = 24
 
     def to_dict(self) -> dict[str, float]:
         """Returns the numbers by name."""

@@ -37,8 +37,10 @@ LIBRARY: tuple[Effect, ...] = (
     Effect("polydispersity"),
     Effect("outflow_speed"),
 )
-# The 20 rings of the radial profile are 20 noisy numbers of one curve; its slope is kept.
-DIAGNOSTICS = tuple(name for name in DIAGNOSTIC_NAMES if not name.startswith("height_ring"))
+# The 20 rings of the radial profile are 20 noisy numbers of one curve; its slope is kept. Points
+# that stand for grains have no surface: what is read off one came later, and is left out.
+_OF_A_SURFACE = ("height_ring", "patches", "roughness", "shoulder")
+DIAGNOSTICS = tuple(name for name in DIAGNOSTIC_NAMES if not name.startswith(_OF_A_SURFACE))
 _KEPT = np.array([name in DIAGNOSTICS for name in DIAGNOSTIC_NAMES])
 HIDDEN: tuple[str, ...] = ("fewer_grains", "slump", "slot")
 

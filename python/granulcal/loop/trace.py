@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from granulcal.loop.baseline import Fit, fit_base
+from granulcal.loop.baseline import Fit, Start, fit_base
 from granulcal.loop.design import cube_from_normal, normal_from_cube
 from granulcal.loop.gate import Gate, open_gate
 from granulcal.loop.local import Local
@@ -16,7 +16,7 @@ from granulcal.loop.refit import Model, fit_none, fit_pair, fit_single
 from granulcal.loop.score import Scores, families
 from granulcal.loop.surrogate import Surrogate
 from granulcal.loop.thresholds import Thresholds
-from granulcal.loop.verdict import Verdict, decide
+from granulcal.loop.verdict import NAMING, Verdict, decide
 
 __all__ = ["Explanation", "Power", "Trace", "power", "trace"]
 
@@ -26,8 +26,6 @@ Array = NDArray[np.float64]
 _HOPELESS = 12.0
 # Forward steps start from so many singles.
 _PARENTS = 2
-
-
 # Effects named beside a residual.
 _NEAREST = 3
 
@@ -151,7 +149,7 @@ class Trace:
     @property
     def best(self) -> Explanation:
         """The explanation that the verdict rests on, or the base model."""
-        if self.verdict.kind in ("EFFECT", "SET", "EFFECTS"):
+        if self.verdict.kind in NAMING:
             for one in self.explanations:
                 if set(one.effects) <= set(self.verdict.named):
                     return one
@@ -211,6 +209,7 @@ def trace(
     thresholds: Thresholds | None = None,
     *,
     seed: int = 0,
+    starts: Sequence[Start] = (),
 ) -> Trace:
     """Returns what measured pours say of the library.
 
@@ -219,6 +218,7 @@ def trace(
         observations: pours of the fit conditions; sealed ones must not be among them.
         thresholds: fixed beforehand.
         seed: of starts and replicates.
+        starts: where fits begin as well, for example the best of pours that were looked at.
 
     Raises:
         ObservationError: pours or conditions that do not fit the archive.
@@ -227,7 +227,7 @@ def trace(
     design = surrogate.design
     stack = Stack.of(surrogate, observations)
     target = stack.means.ravel()
-    local, fit = fit_base(surrogate, stack, seed)
+    local, fit = fit_base(surrogate, stack, seed, starts)
     scores = Scores.of(local, fit, design.candidates)
     gate = open_gate(
         local, fit, scores, replicates=rules.replicates, refits=rules.refits, seed=seed
@@ -235,7 +235,7 @@ def trace(
     none = fit_none(fit, rules)
     tested: list[tuple[Model, float]] = []
     if gate.p <= rules.name and design.candidates:
-        tested = _models(local, target, fit, rules, seed)
+        tested = _models(local, target, fit, rules, seed, starts)
     merged = families(scores)
     verdict = decide(design, gate, none, tested, rules, merged)
     explained = sorted(tested, key=lambda pair: -pair[0].log_probability)
@@ -296,11 +296,16 @@ def fit_at(local: Local, v: Array) -> Fit:
 
 
 def _models(
-    local: Local, target: Array, base: Fit, rules: Thresholds, seed: int
+    local: Local,
+    target: Array,
+    base: Fit,
+    rules: Thresholds,
+    seed: int,
+    starts: Sequence[Start] = (),
 ) -> list[tuple[Model, float]]:
     """All singles, pairs if no single is adequate, each with the p of what it leaves."""
     candidates = local.surrogate.design.candidates
-    singles = [fit_single(local, target, base, k, rules) for k in candidates]
+    singles = [fit_single(local, target, base, k, rules, starts) for k in candidates]
     singles.sort(key=lambda model: -model.log_probability)
     best = singles[0].log_probability
     tested = [

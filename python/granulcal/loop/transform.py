@@ -64,6 +64,15 @@ class Transform:
         """Returns z of `x`, any shape."""
         return (self._t(x) - self.shift) / self.spread
 
+    def inverse(self, z: Array) -> Array:
+        """Returns x of `z`, any shape; what a log had cut off comes back as the cut."""
+        t = np.asarray(z, dtype=np.float64) * self.spread + self.shift
+        if self.kind == "log":
+            return np.exp(t)
+        if self.kind == "asinh":
+            return self.centre + self.width * np.sinh(t)
+        return t
+
     def _t(self, x: Array) -> Array:
         if self.kind == "log":
             return np.log(np.maximum(x, self.centre))

@@ -1,4 +1,4 @@
-"""From p-values and evidences to one of six words.
+"""From p-values and evidences to one of six words; `standing.py` has what may overturn them.
 
 | word | when |
 |---|---|
@@ -17,9 +17,13 @@ from granulcal.loop.gate import Gate
 from granulcal.loop.refit import Model
 from granulcal.loop.thresholds import Thresholds
 
-__all__ = ["Verdict", "decide"]
+__all__ = ["KINDS", "NAMING", "Verdict", "decide"]
 
-KINDS = ("NONE", "RESIDUAL", "EFFECT", "SET", "EFFECTS", "UNEXPLAINED")
+NAMING = ("EFFECT", "SET", "EFFECTS")
+"""Words that come with names."""
+
+KINDS = ("NONE", "RESIDUAL", *NAMING, "UNEXPLAINED", "UNCONFIRMED", "OVERTURNED")
+"""All words; the last two are those of a verdict that a check has taken away."""
 
 
 @dataclass(frozen=True)

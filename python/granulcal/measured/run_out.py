@@ -1,5 +1,7 @@
 """Run-out files: radius of a front against time, as tracked in videos."""
 
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -29,15 +31,21 @@ class RunOut:
     of the fluid's front [m], its velocity, the radius of the particles' front [m] and its velocity;
     `nan` where it was not tracked. A radius is the average over the azimuths that a camera sees.
 
+    The two cameras see other azimuths, and differ by up to some beads. So each is read by itself,
+    and what counts is the mean over what both see: a mean over the cameras that still see the front
+    jumps where one of them stops. A file in which one camera saw nothing is that of the other.
+
     Attributes:
         time: since the release [s], shape (n,).
         particles: radius of the particles' front by camera [m], shape (n, 2).
         fluid: radius of the fluid's front by camera [m], shape (n, 2).
+        source: the file, for messages.
     """
 
     time: Array
     particles: Array
     fluid: Array
+    source: str = "a run-out file"
 
     @classmethod
     def open(cls, path: str | PathLike[str], *, fps: float = 240.0) -> "RunOut":
@@ -75,27 +83,91 @@ class RunOut:
         if not (np.isfinite(frames).all() and (np.diff(frames) > 0).all()):
             raise ValueError(f"{path}: frame numbers must rise")
         return cls(
-            time=frames / fps, particles=table[:, _PARTICLE_RADII], fluid=table[:, _FLUID_RADII]
+            time=frames / fps,
+            particles=table[:, _PARTICLE_RADII],
+            fluid=table[:, _FLUID_RADII],
+            source=str(path),
         )
 
     def front_radius(self) -> Array:
-        """Returns the particles' front [m], the mean of the cameras that saw it, shape (n,)."""
-        seen = np.isfinite(self.particles)
-        total = np.where(seen, self.particles, 0.0).sum(axis=1)
-        count = seen.sum(axis=1)
-        return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+        """Returns the particles' front [m], the mean of both cameras, shape (n,).
 
-    def observed(self, scene: Scene) -> ObservedStatistics:
+        NaN where one of them does not see it, unless it never does.
+        """
+        return _mean(self.particles)
+
+    def fluid_radius(self) -> Array:
+        """Returns the fluid's front [m], as `front_radius` has that of the particles, (n,)."""
+        return _mean(self.fluid)
+
+    def disagreement(self) -> float:
+        """Returns the largest difference of the cameras' particle fronts [m].
+
+        NaN where there is no frame that both see.
+        """
+        both = np.isfinite(self.particles).all(axis=1)
+        gap = np.abs(self.particles[both, 0] - self.particles[both, 1])
+        return float(gap.max()) if len(gap) else float("nan")
+
+    def observed(self, scene: Scene, *, camera: int | None = None) -> ObservedStatistics:
         """Returns the measured `front_radius[t]` of the scene's times; `front_radius[end]` is last.
 
+        The end is the mean of what each camera saw last. `fluid_radius[t]` and `fluid_radius[end]`
+        are those of the fluid.
+
+        Args:
+            scene: the scene whose statistics are asked for.
+            camera: 1 or 2 for what it alone saw; None for the mean of both.
+
         Raises:
-            ValueError: the scene observes no front.
+            ValueError: the scene observes no front, the file has none of its particles, or there is
+                no such camera.
+
+        Warns:
+            UserWarning: the cameras differ by more than a grain.
         """
-        radius = self.front_radius()
-        last = radius[np.isfinite(radius)]
-        end = float(last[-1]) if len(last) else float("nan")
+        if camera not in (None, 1, 2):
+            raise ValueError(f"{self.source}: camera must be 1 or 2, got {camera}")
+        chosen = slice(None) if camera is None else slice(camera - 1, camera)
 
-        def front(at: str | None) -> float:
-            return end if at == "end" else value_at(self.time, radius, float(at or "nan"))
+        def reader(fronts: Array) -> Callable[[str | None], float]:
+            radius, end = _mean(fronts), _end(fronts)
 
-        return observed_of(scene, {"front_radius": front}, "a run-out file")
+            def front(at: str | None) -> float:
+                return end if at == "end" else value_at(self.time, radius, float(at or "nan"))
+
+            return front
+
+        found = observed_of(
+            scene,
+            {
+                "front_radius": reader(self.particles[:, chosen]),
+                "fluid_radius": reader(self.fluid[:, chosen]),
+            },
+            "a run-out file",
+        )
+        if not np.isfinite(self.particles[:, chosen]).any():
+            where = "" if camera is None else f" by camera {camera}"
+            raise ValueError(f"{self.source}: no front of particles was tracked{where}")
+        diameter, gap = scene.get("grains.diameter"), self.disagreement()
+        if camera is None and gap > diameter:
+            warnings.warn(
+                f"{self.source}: the cameras' fronts differ by up to {1e3 * gap:.0f} mm, more than "
+                f"a grain of {1e3 * diameter:.3g} mm; camera=1 and camera=2 read each by itself",
+                stacklevel=2,
+            )
+        return found
+
+
+def _mean(fronts: Array) -> Array:
+    """Mean over the cameras that ever see a front (n, c), where all of them do, shape (n,)."""
+    seeing = np.isfinite(fronts).any(axis=0)
+    if not seeing.any():
+        return np.full(len(fronts), np.nan)
+    return np.asarray(fronts[:, seeing].mean(axis=1), dtype=np.float64)
+
+
+def _end(fronts: Array) -> float:
+    """Mean of the last values that the cameras of (n, c) saw; NaN without any."""
+    last = [front[np.isfinite(front)][-1] for front in fronts.T if np.isfinite(front).any()]
+    return float(np.mean(last)) if last else float("nan")

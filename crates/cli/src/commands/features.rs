@@ -40,6 +40,14 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
         ));
     }
     let formation = recording.formation_of(levelled)?;
+    if let (None, Some(edge)) = (args.border, formation.edge()) {
+        let width = edge.frame * formation.downsample;
+        eprintln!(
+            "{} pixels at the edge of the image, apart from the formation, are taken for grains; --border {width} \
+             leaves them out",
+            edge.count
+        );
+    }
     let mut statistics = vec![named(&PAPER16, &recording.statistics_of(&formation)?)];
     if args.diagnostics {
         let values = diagnostics(&formation.points, &diagnostic_settings(args, &formation)?)

@@ -1,7 +1,7 @@
 //! The radius of the front of grains that spread, against time.
 
 use granulcal_dem::{ObserveFront, Pour};
-use granulcal_features::series::front_radius;
+use granulcal_features::series::{front_radius, outline_radius};
 use nalgebra::Vector2;
 
 use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
@@ -21,13 +21,16 @@ impl Front {
 
 impl Observation for Front {
     fn statistics(&self) -> Vec<ObservedStatistic> {
-        let percent = 100.0 * self.spec.level;
+        let (percent, link) = (100.0 * self.spec.level, self.spec.link);
+        let what = if link > 0.0 {
+            format!("mean radius of the outline of the largest body, links of {link} sums of radii")
+        } else {
+            format!("radius about the axis where grains cover {percent} % of the circle")
+        };
         let statistic = |at: String, when: String| ObservedStatistic {
             name: format!("front_radius[{at}]"),
             unit: "m",
-            doc: format!(
-                "radius about the axis where grains cover {percent} % of the circle, {when}"
-            ),
+            doc: format!("{what}, {when}"),
         };
         let times = self.spec.times.iter();
         let mut all: Vec<_> =
@@ -37,8 +40,12 @@ impl Observation for Front {
     }
 
     fn see(&mut self, frame: &Frame) {
-        let (axis, level) = (Vector2::from(self.spec.axis), self.spec.level);
-        let radius = front_radius(&frame.positions, &frame.radii, axis, level);
+        let (axis, level, link) = (Vector2::from(self.spec.axis), self.spec.level, self.spec.link);
+        let radius = if link > 0.0 {
+            outline_radius(&frame.positions, &frame.radii, axis, link)
+        } else {
+            front_radius(&frame.positions, &frame.radii, axis, level)
+        };
         self.series.push(frame.time, radius.unwrap_or(f64::NAN));
     }
 

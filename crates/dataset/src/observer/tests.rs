@@ -23,7 +23,7 @@ fn scene() -> Scene {
             slope_within: 0.01,
             level: 0.5,
         }),
-        front: Some(ObserveFront { axis: [0.03, 0.0], times: vec![0.05], level: 0.5 }),
+        front: Some(ObserveFront { axis: [0.03, 0.0], times: vec![0.05], level: 0.5, link: 0.0 }),
         discharge: Some(ObserveDischarge {
             below: 0.027,
             times: vec![0.03, 0.1, 0.3],

@@ -11,10 +11,12 @@ mod fluid;
 mod funnel_pose;
 mod ground;
 mod layer;
+mod lubrication;
 mod outlet;
 mod polydispersity;
 mod restitution_speed;
 mod rolling_form;
+mod tension;
 mod tilt;
 mod vibration;
 
@@ -29,6 +31,7 @@ pub use fluid::Fluid;
 pub use funnel_pose::FunnelPose;
 pub use ground::GroundUnlike;
 pub use layer::Layer;
+pub use lubrication::Lubrication;
 pub use outlet::Outlet;
 pub use polydispersity::Polydispersity;
 pub use restitution_speed::RestitutionSpeed;
@@ -91,6 +94,8 @@ effects! {
     rolling_form: RollingForm,
     /// A fluid at rest around the grains.
     fluid: Fluid,
+    /// A fluid film between surfaces.
+    lubrication: Lubrication,
     /// A table that is not level.
     tilt: Tilt,
     /// A funnel that hangs beside its place, leans, or has a friction of its own.

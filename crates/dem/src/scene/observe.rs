@@ -10,6 +10,8 @@ use crate::error::DemError;
 const MAX_SAMPLES: f64 = 1e6;
 /// Widest profile from its centre, in grains' diameters: pictures of it are kept in memory.
 const MAX_WIDTH: f64 = 1000.0;
+/// Longest link between grains of one body, in sums of their radii.
+const MAX_LINK: f64 = 10.0;
 
 /// What is observed, how often and from when on. A kind that is not stated is not observed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,6 +66,10 @@ pub struct ObserveFront {
     /// Share of a circle about the axis that grains cover at the front `[-]`.
     #[serde(default = "half")]
     pub level: f64,
+    /// Grains within so many sums of their radii of each other are one body, and the front is the outline of the
+    /// largest; 0 for a front by `level` `[-]`.
+    #[serde(default)]
+    pub link: f64,
 }
 
 /// The share of the grains' mass that is below a height, against time.
@@ -134,6 +140,10 @@ impl Observe {
             let allowed = "from 0 to end.horizon less observe.begin";
             rising("observe.front.times", &front.times, (0.0, rest), allowed)?;
             share("observe.front.level", front.level)?;
+            if front.link != 0.0 && !(1.0..=MAX_LINK).contains(&front.link) {
+                let allowed = "0, or from 1 to 10 sums of two radii";
+                return Err(DemError::range("observe.front.link", front.link, allowed));
+            }
         }
         if let Some(discharge) = &self.discharge {
             finite("observe.discharge.below", discharge.below)?;
@@ -196,7 +206,7 @@ mod tests {
     use crate::Scene;
 
     fn scene() -> Scene {
-        let front = ObserveFront { axis: [0.0; 2], times: vec![0.1, 0.2], level: 0.5 };
+        let front = ObserveFront { axis: [0.0; 2], times: vec![0.1, 0.2], level: 0.5, link: 1.5 };
         let discharge = ObserveDischarge { below: 0.0, times: vec![1.0], jammed_below: 50.0 };
         let observe = Observe {
             rate: 100.0,
@@ -228,6 +238,7 @@ mod tests {
             ("observe.front.times.1", 0.1),
             ("observe.front.times.1", 3.6),
             ("observe.front.level", 1.0),
+            ("observe.front.link", 0.5),
             ("observe.discharge.jammed_below", 101.0),
             ("observe.radius.percentiles.0", -1.0),
             ("observe.spill.radius", 0.0),

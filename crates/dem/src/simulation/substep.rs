@@ -101,12 +101,16 @@ impl Simulation {
         }
     }
 
-    /// Lets pulls act, after the impacts: what a pull adds in a substep to a closed contact is not an impact.
+    /// Lets pulls and films act, after the impacts: what a pull adds in a substep to a closed contact is not an impact.
     fn act_pulls(&mut self) {
         if let Some(pull) = &self.around.effects.pull {
             let (walls, dt) = (&self.around.walls, self.around.settings.dt);
             let near = [&self.contacts.pairs, &self.contacts.at_walls];
             pull.act(&mut self.bed, near, walls, &mut self.bridges, dt);
+        }
+        if let Some(film) = &self.around.effects.film {
+            let (walls, dt) = (&self.around.walls, self.around.settings.dt);
+            film.act(&mut self.bed, [&self.contacts.pairs, &self.contacts.at_walls], walls, dt);
         }
     }
 

@@ -7,8 +7,11 @@
 
 mod bodies;
 mod modes;
+mod patches;
 mod profile;
+mod roughness;
 mod settings;
+mod shoulder;
 mod survey;
 mod tail;
 
@@ -19,7 +22,7 @@ pub use settings::DiagnosticSettings;
 pub use survey::{Diagnostic, Survey};
 
 /// Number of statistics of the second family.
-pub const DIAGNOSTIC_COUNT: usize = 40;
+pub const DIAGNOSTIC_COUNT: usize = 43;
 
 /// The diagnostic statistics, in the order of every file and table.
 pub const DIAGNOSTICS: [Diagnostic; DIAGNOSTIC_COUNT] = [
@@ -63,6 +66,9 @@ pub const DIAGNOSTICS: [Diagnostic; DIAGNOSTIC_COUNT] = [
     bodies::ISOLATED_GRAINS,
     bodies::CLUSTERS,
     tail::COUNT_IN_VIEW,
+    patches::PATCHES,
+    roughness::ROUGHNESS,
+    shoulder::SHOULDER,
 ];
 
 /// The values of [`DIAGNOSTICS`] for points in metres, ground at z = 0; finite for whatever is accepted.

@@ -87,14 +87,14 @@ def compare_speeds(closed: Closed, folder: Path) -> list[Speed]:
 
 def _after(closed: Closed) -> Explanation:
     """The model of the verdict; where nothing explains the pictures, the most probable one."""
-    if closed.trace.verdict.kind == "UNEXPLAINED":
+    if closed.verdict.kind == "UNEXPLAINED":
         return closed.trace.explanations[0]
     return closed.trace.best
 
 
 def table(closed: Closed, speeds: list[Speed]) -> list[str]:
     """Returns what was found as Markdown."""
-    verdict = closed.trace.verdict
+    verdict = closed.verdict
     x = _places(closed)
     after = " + ".join(_after(closed).effects) or "the base model"
     lines = [f"Verdict: {verdict.kind} {', '.join(verdict.named)}; after: {after}", ""]

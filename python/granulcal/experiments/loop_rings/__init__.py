@@ -44,7 +44,7 @@ def reproduce(out: Path, data: Path) -> None:
 
 
 def _table(group: str, closed: Closed) -> list[str]:
-    verdict = closed.trace.verdict
+    verdict = closed.verdict
     lines = [f"## {group}", "", f"{verdict.kind} {', '.join(verdict.named)}: {verdict.reason}", ""]
     lines += ["| model | log probability over none [nat] | p of what it leaves |", "|---|---|---|"]
     for one in closed.trace.explanations[:6]:

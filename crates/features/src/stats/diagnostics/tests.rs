@@ -233,3 +233,63 @@ fn refuses_settings_that_are_none() {
     let far = [points, vec![Vector3::new(1e12, 0.0, 0.0)]].concat();
     assert!(matches!(diagnostics(&far, &good), Err(FeatureError::OutOfRange { .. })));
 }
+
+#[test]
+fn clods_are_patches_and_a_heap_is_one() {
+    let cone = pixels(0.06, |x, y| 0.4 * (0.05 - x.hypot(y)));
+    assert_eq!(values(&cone, None).get("patches"), 1.0);
+    // Five clods of 6 mm in a crust of 1 mm, less than half a grain of 4 mm: bodies of the mask are one, patches five.
+    let clods = pixels(0.06, |x, y| {
+        let near = |k: i32| {
+            let (sin, cos) = (TAU * f64::from(k) / 5.0).sin_cos();
+            (x - 0.03 * cos).hypot(y - 0.03 * sin) < 0.008
+        };
+        if (0..5).any(near) {
+            0.006
+        } else if x.hypot(y) < 0.05 {
+            0.001
+        } else {
+            0.0
+        }
+    });
+    let got = values(&clods, Some(Vector2::zeros()));
+    assert_eq!((got.get("patches"), got.get("clusters")), (5.0, 0.0));
+    let flat = pixels(0.04, |x, y| if x.hypot(y) < 0.03 { 0.001 } else { 0.0 });
+    assert_eq!(values(&flat, None).get("patches"), 0.0);
+}
+
+#[test]
+fn roughness_is_about_the_mean_over_the_azimuth() {
+    let (height, amplitude) = (0.010, 0.002);
+    // sqrt(1/2) of the amplitude of a wave round the azimuth, whatever the radius.
+    let waves = pixels(0.05, |x, y| {
+        if x.hypot(y) < 0.045 { height + amplitude * (6.0 * y.atan2(x)).cos() } else { 0.0 }
+    });
+    let got = values(&waves, Some(Vector2::zeros())).get("roughness");
+    assert!((got / (amplitude * 0.5_f64.sqrt()) - 1.0).abs() < 0.01, "{got}");
+    // A cone has the slope within a ring: s D / sqrt(12).
+    let cone = pixels(0.06, |x, y| 0.4 * (0.05 - x.hypot(y)));
+    let got = values(&cone, Some(Vector2::zeros())).get("roughness");
+    assert!((got / (0.4 * GRAIN / 12_f64.sqrt()) - 1.0).abs() < 0.03, "{got}");
+    // Two grains far apart take no memory for the rings between.
+    let far: Vec<_> = grain(0.0, 0.0).into_iter().chain(grain(9e5, 0.0)).collect();
+    let settings = DiagnosticSettings { pour_axis: None, grain_diameter: 1e-6, spacing: SPACING };
+    assert!(diagnostics(&far, &settings).is_ok());
+}
+
+#[test]
+fn a_shoulder_is_where_half_of_the_height_is_left() {
+    let at = |points: &[Vector3<f64>]| values(points, Some(Vector2::zeros())).get("shoulder");
+    // Half of a cone's innermost ring, which is a little lower than its tip, over 0.97 R.
+    let cone = at(&pixels(0.06, |x, y| 0.4 * (0.05 - x.hypot(y))));
+    assert!((cone - 0.59).abs() < 0.02, "{cone}");
+    // A terrace of 10 mm that ends at 30 mm, on a crust of 1 mm to 50 mm; 95 % of the points within 48.7 mm.
+    let terrace = at(&pixels(0.06, |x, y| match x.hypot(y) {
+        r if r < 0.03 => 0.010,
+        r if r < 0.05 => 0.001,
+        _ => 0.0,
+    }));
+    assert!((terrace - 0.03 / 0.0487).abs() < 0.03, "{terrace}");
+    let plateau = at(&pixels(0.06, |x, y| if x.hypot(y) < 0.05 { 0.01 } else { 0.0 }));
+    assert_eq!(plateau, 1.0);
+}

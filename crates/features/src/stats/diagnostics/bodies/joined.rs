@@ -48,6 +48,17 @@ impl Bodies {
     }
 }
 
+/// Number of bodies of points, `spacing` being that of their pixels `[m]`; none without points.
+pub(crate) fn count(x: &[f64], y: &[f64], spacing: f64) -> usize {
+    if x.is_empty() {
+        return 0;
+    }
+    let mut names = Cells::new(x, y, REACH * spacing).bodies();
+    names.sort_unstable();
+    names.dedup();
+    names.len()
+}
+
 /// One body: its points, their centroid and the largest squared distance from it.
 #[derive(Debug, Clone, Copy, Default)]
 struct Body {

@@ -1,0 +1,82 @@
+//! A fluid film between surfaces that come near: `scene/effects/lubrication.rs` has its law.
+//!
+//! Implicit in the speed at which a gap closes, one pair after the other: with k = F dt / (m v_n), m a typical mass, and the
+//! inverse masses w of both,
+//!
+//! ```text
+//! J = -k v_n / (1 + k (w_i + w_j)),   v_n -> v_n / (1 + k (w_i + w_j))
+//! ```
+//!
+//! so that no film is too thick for the substep, and none can turn a motion round.
+
+use std::f64::consts::PI;
+
+use super::near::{Near, at_walls, pairs};
+use crate::bed::Bed;
+use crate::contact_set::ContactSet;
+use crate::scene::{Effect, Scene};
+use crate::wall::Walls;
+
+/// The film of a scene.
+#[derive(Clone, Debug)]
+pub(crate) struct Film {
+    /// F max(h, h_0) / (v_n m R^2) with R = 2 R_eff the radius of Derjaguin `[1/(m s)]`.
+    strength: f64,
+    /// h_0 and how far it reaches `[m]`.
+    roughness: f64,
+    range: f64,
+}
+
+impl Film {
+    /// `inverse_inertia`: mass of a grain over its mass with what of the fluid moves with it.
+    pub fn of(scene: &Scene, inverse_inertia: f64) -> Option<Self> {
+        let (film, radius) = (scene.effects.lubrication, scene.grains.radius());
+        let mass = scene.grains.density * 4.0 / 3.0 * PI * radius.powi(3);
+        film.is_on().then(|| Self {
+            strength: 1.5 * PI * film.viscosity / mass * inverse_inertia,
+            roughness: film.roughness * radius,
+            range: film.range * radius,
+        })
+    }
+
+    /// How far it reaches `[m]`.
+    pub fn reach(&self) -> f64 {
+        self.range
+    }
+
+    /// Resists for `dt` `[s]` what comes together and what parts: pairs of grains and grains at walls.
+    pub fn act(
+        &self,
+        bed: &mut Bed,
+        [pair_set, wall_set]: [&ContactSet; 2],
+        walls: &Walls,
+        dt: f64,
+    ) {
+        // Velocities change while the film acts, places do not.
+        let places = bed.places.clone();
+        let between = pairs(pair_set, &places, bed.period);
+        let count = bed.count() as u32;
+        for near in between.chain(at_walls(wall_set, &places, count, walls)) {
+            if near.gap < self.range {
+                self.resist(bed, walls, &near, count, dt);
+            }
+        }
+    }
+
+    fn resist(&self, bed: &mut Bed, walls: &Walls, near: &Near, count: u32, dt: f64) {
+        let (i, j) = (near.pair.0 as usize, near.pair.1 as usize);
+        let (other, inverse_mass) = if near.is_wall {
+            let wall = walls.wall(j - count as usize);
+            (wall.motion_at(&near.point).0, bed.inverse_mass[i])
+        } else {
+            (bed.velocity(j), bed.inverse_mass[i] + bed.inverse_mass[j])
+        };
+        let opening = (bed.velocity(i) - other).dot(&near.normal);
+        let k = self.strength * near.derjaguin.powi(2) / near.gap.max(self.roughness) * dt;
+        let impulse = -k * opening / (1.0 + k * inverse_mass) * near.normal;
+        bed.kick(i, &impulse);
+        if !near.is_wall {
+            bed.kick(j, &-impulse);
+        }
+    }
+}

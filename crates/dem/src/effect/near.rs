@@ -1,0 +1,68 @@
+//! What is near to what: pairs of grains and grains at walls, as forces across a gap see them.
+
+use nalgebra::Vector3;
+
+use crate::contact_set::ContactSet;
+use crate::lanes::Row;
+use crate::period::Period;
+use crate::wall::Walls;
+
+/// Two surfaces.
+pub(super) struct Near {
+    /// First grain, and second grain or the number of grains plus the wall's surface.
+    pub pair: (u32, u32),
+    pub gap: f64,
+    /// Radius of Derjaguin, 2 R_eff `[m]`.
+    pub derjaguin: f64,
+    /// From the second to the first.
+    pub normal: Vector3<f64>,
+    /// The nearest point of the wall; of a pair nothing.
+    pub point: Vector3<f64>,
+    pub is_wall: bool,
+}
+
+/// The pairs that are listed.
+pub(super) fn pairs(
+    set: &ContactSet,
+    places: &[Row],
+    period: Option<Period>,
+) -> impl Iterator<Item = Near> {
+    set.lanes().map(move |(number, lane)| {
+        let batch = &set.batches[number];
+        let (i, j) = (batch.i[lane], batch.j[lane]);
+        let (a, b) = (places[i as usize], places[j as usize]);
+        let (direct, [r_i, r_j]) = (a.vector() - b.vector(), [a.0[3], b.0[3]]);
+        let apart = period.map_or(direct, |period| period.nearest(direct));
+        let distance = apart.norm();
+        Near {
+            pair: (i, j),
+            gap: distance - r_i - r_j,
+            derjaguin: 2.0 * r_i * r_j / (r_i + r_j),
+            normal: if distance > 0.0 { apart / distance } else { Vector3::z() },
+            point: Vector3::zeros(),
+            is_wall: false,
+        }
+    })
+}
+
+/// The grains that are listed at walls.
+pub(super) fn at_walls(
+    set: &ContactSet,
+    places: &[Row],
+    count: u32,
+    walls: &Walls,
+) -> impl Iterator<Item = Near> {
+    set.lanes().map(move |(number, lane)| {
+        let (grain, surface) = (set.batches[number].i[lane], set.at_walls[number].wall[lane]);
+        let place = places[grain as usize];
+        let near = walls.nearest(surface as usize, &place.vector(), 0.0);
+        Near {
+            pair: (grain, count + surface),
+            gap: near.distance - place.0[3],
+            derjaguin: 2.0 * place.0[3],
+            normal: near.normal,
+            point: place.vector() - near.distance * near.normal,
+            is_wall: true,
+        }
+    })
+}

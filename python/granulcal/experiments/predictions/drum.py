@@ -1,0 +1,54 @@
+"""The drum's free surface and slope at speeds that were not measured here."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from granulcal.experiments.loop_drum.task import at_speed
+from granulcal.loop.forward import Forward
+from granulcal.loop.models import MODELS, Models, Prediction
+
+__all__ = ["SPEEDS", "drum_rows"]
+
+SPEEDS = {10: (1.1, 1.5), 20: (0.7, 1.0), 30: (0.6, 0.9), 60: (0.45, 0.75)}
+"""Rounds a minute, and when the mean begins and ends [s]: after turns of 54 to 90 degrees."""
+
+_POURS = 8
+_PLACE = re.compile(r"surface_z\[(?P<x>[^\]]+)\]")
+
+
+def drum_rows(
+    models: Models, pours: Path, *, say: Callable[[str], None]
+) -> tuple[list[tuple[object, ...]], list[tuple[object, ...]]]:
+    """Returns rows (model, rpm, x, z, low, high) in mm and (model, rpm, slope, low, high)."""
+    forward = Forward(pours, 1)
+    profiles: list[tuple[object, ...]] = []
+    slopes: list[tuple[object, ...]] = []
+    for rpm, (begin, end) in SPEEDS.items():
+        for model in MODELS:
+            try:
+                found = models.predict(model, at_speed(rpm, begin, end), forward, pours=_POURS)
+            except ValueError as error:
+                say(f"drum, {model} at {rpm} rpm: no prediction: {error}")
+                continue
+            more, slope = _rows(model, rpm, found)
+            profiles += more
+            slopes.append(slope)
+    return profiles, slopes
+
+
+def _rows(
+    model: str, rpm: int, found: Prediction
+) -> tuple[list[tuple[object, ...]], tuple[object, ...]]:
+    """The profile from left to right, and the slope."""
+    profile, slope = [], ()
+    for name, middle, low, high in zip(
+        found.names, found.middle.tolist(), found.low.tolist(), found.high.tolist(), strict=True
+    ):
+        place = _PLACE.fullmatch(name)
+        if place is not None:
+            x = 1e3 * float(place["x"])
+            profile.append((model, rpm, x, 1e3 * middle, 1e3 * low, 1e3 * high))
+        elif name == "surface_slope":
+            slope = (model, rpm, middle, low, high)
+    return sorted(profile, key=lambda row: float(str(row[2]))), slope

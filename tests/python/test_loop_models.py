@@ -1,0 +1,158 @@
+"""What a closed loop predicts under further conditions: `models.json` and `granulcal predict`."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from granulcal.cli import main
+from granulcal.errors import ObservationError
+from granulcal.loop.fallback import Discrepancy
+from granulcal.loop.forward import Forward
+from granulcal.loop.models import Maker, Models, condition_of
+from granulcal.loop.transform import Transform
+from granulcal.scene import Scene
+
+SCENE = """
+name = "small"
+[grains]
+count = 30
+diameter = 4e-3
+density = 1300.0
+[start]
+kind = "grid"
+counts = [4, 4, 2]
+spacing = 6e-3
+jitter = 5e-4
+base = 0.02
+[end]
+horizon = 1.0
+[observe]
+rate = 100.0
+[observe.radius]
+percentiles = [50.0, 90.0]
+"""
+RESIDUAL = np.array([0.3, -0.2, 0.5, 0.1])
+NUMBERS = {"material.restitution": 0.3}
+
+
+def correction() -> Discrepancy:
+    """A correction without noise: it goes through its residuals."""
+    conditions, variances = np.array([[0.0], [1.0]]), np.array([1.0, 1.0])
+    shape = 0.5 + 0.5 * np.exp(-0.5 * (conditions - conditions.T) ** 2 / 0.25)
+    kernel = np.kron(shape, np.diag(variances))
+    precision = np.asarray(np.linalg.inv(kernel + 1e-8 * np.eye(4)), dtype=np.float64)
+    return Discrepancy(conditions, variances, precision @ RESIDUAL, precision)
+
+
+@pytest.fixture
+def models() -> Models:
+    """Two statistics, measured at two heights; the second is on the scale of its log."""
+    named = {**NUMBERS, "effects.tilt.x": 0.05}
+    return Models(
+        scene=Scene.from_toml(SCENE),
+        verdict={"kind": "EFFECT", "named": ["tilt.x"]},
+        paths=("start.base",),
+        inputs=(("start.base", 0.02, 0.06),),
+        names=("radius[50]", "radius[90]"),
+        makers={
+            "base": tuple(Maker(NUMBERS, {}, {}) for _ in range(3)),
+            "named": tuple(Maker(named, {"start.base": 0.01}, {}) for _ in range(3)),
+        },
+        columns=(0, 1),
+        transforms=(
+            Transform("identity", 0.0, 1.0, 0.02, 0.005),
+            Transform("log", 1e-6, 1.0, -3.0, 0.1),
+        ),
+        correction=correction(),
+        known=np.array([[0.0], [1.0]]),
+        means=np.array([[0.020, 0.03], [0.024, 0.05]]),
+        scatter=np.array([[0.001, 0.002], [0.001, 0.004]]),
+        pours=np.array([4.0, 4.0]),
+    )
+
+
+def test_the_file_holds_everything(models: Models, tmp_path: Path) -> None:
+    path = models.write(tmp_path)
+    again = Models.load(tmp_path)
+    assert again.write(tmp_path / "twice").read_text() == path.read_text()
+    forward = Forward(tmp_path / "pours", 1)
+    at = {"start.base": 0.03}
+    for name in ("base", "named", "corrected", "line", "nearest"):
+        one, two = (m.predict(name, at, forward, pours=4) for m in (models, again))
+        assert np.array_equal(one.middle, two.middle) and np.array_equal(one.low, two.low)
+    with pytest.raises(FileNotFoundError, match="is .* the -o of close-loop"):
+        Models.load(tmp_path / "nowhere")
+
+
+def test_lines_and_neighbours_need_no_pour(models: Models, tmp_path: Path) -> None:
+    forward = Forward(tmp_path, 1)
+    line = models.predict("line", {"start.base": 0.03}, forward, level=0.9)
+    assert line.middle == pytest.approx([0.021, 0.035])
+    # Variance of the line's mean, (.75^2 + .25^2) s^2 / 4, and of one pour.
+    sd = 0.001 * np.sqrt((0.75**2 + 0.25**2) / 4 + 1)
+    assert line.high[0] - line.low[0] == pytest.approx(2 * 1.6449 * sd, rel=1e-3)
+    assert models.predict("nearest", {"start.base": 0.055}, forward).middle[0] == 0.024
+    assert forward.ran == 0
+
+
+def test_the_correction_moves_the_base_model_by_its_residual(
+    models: Models, tmp_path: Path
+) -> None:
+    forward = Forward(tmp_path, 1)
+    at = {"start.base": 0.02}
+    base = models._pours(models.makers["base"][0], at, [8_500_003 + i for i in range(6)], forward)
+    found = models.predict("corrected", at, forward, pours=6)
+    assert found.middle[0] == pytest.approx(base[:, 0].mean() + 0.005 * 0.3, rel=1e-3)
+    assert found.middle[1] == pytest.approx(base[:, 1].mean() * np.exp(0.1 * -0.2), rel=1e-3)
+    # Between the conditions the correction is not known as well.
+    between = models.predict("corrected", {"start.base": 0.04}, forward, pours=6)
+    assert (between.high - between.low)[1] > (found.high - found.low)[1]
+    with pytest.raises(ObservationError, match="the correction holds up to 0.25"):
+        models.predict("corrected", {"start.base": 0.08}, forward)
+
+
+def test_a_named_effect_that_shifts_a_condition_shifts_it(models: Models, tmp_path: Path) -> None:
+    forward = Forward(tmp_path, 1)
+    maker = models.makers["named"][0]
+    shifted = models._pours(maker, {"start.base": 0.02}, [1], forward)
+    scene = models.scene.with_({**maker.numbers, "start.base": 0.03})
+    assert np.array_equal(shifted, forward.pours(scene, [1], {}))
+
+
+def test_what_cannot_be_predicted_is_said(models: Models, tmp_path: Path) -> None:
+    forward = Forward(tmp_path, 1)
+    with pytest.raises(ObservationError, match="must state start.base; it lacks start.base"):
+        models.predict("base", {}, forward)
+    with pytest.raises(ObservationError, match="model must be one of base, named, corrected"):
+        models.predict("cubic", {"start.base": 0.03}, forward)
+    with pytest.raises(ObservationError, match="level must be between 0 and 1, got 90"):
+        models.predict("line", {"start.base": 0.03}, forward, level=90)
+    with pytest.raises(ObservationError, match=r"path=number, .* got 'height'"):
+        condition_of(["height"])
+    assert condition_of(["a.b=0.5", "c=3"]) == {"a.b": 0.5, "c": 3.0}
+
+
+def test_the_command_prints_and_writes_json(
+    models: Models, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    models.write(tmp_path)
+    words = ["predict", str(tmp_path), "--at", "start.base=0.03", "--pours", "3", "--threads", "1"]
+    assert main([*words, "--corrected", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["model"] == "corrected" and found["level"] == 0.9
+    row = found["statistics"]["radius[50]"]
+    assert row["low"] < row["middle"] < row["high"]
+    assert main([*words, "--model", "line"]) == 0
+    told = capsys.readouterr().out
+    assert "EFFECT tilt.x" in told and "radius[90]" in told and "0.035" in told
+    assert main([*words[:3], "start.base=0.2", "--corrected"]) == 2
+    assert "the correction holds up to" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["identity", "log", "asinh"])
+def test_transforms_have_inverses(kind: str) -> None:
+    transform = Transform(kind, 0.4, 2.0, 0.7, 1.5)
+    x = np.linspace(0.5, 9.0, 20)
+    assert transform.inverse(transform(x)) == pytest.approx(x)

@@ -1,0 +1,181 @@
+"""What may overturn a verdict, and the rows without physics that a name has to beat."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from granulcal.errors import ObservationError
+from granulcal.loop import Design, Effect
+from granulcal.loop.definition import Definition, check_definitions, definition_inputs
+from granulcal.loop.look import Look, hypercube
+from granulcal.loop.misfit import compare
+from granulcal.loop.standing import Moved, overturned, stand
+from granulcal.loop.task import FIT, SEALED, Condition, Task
+from granulcal.loop.thresholds import Thresholds
+from granulcal.loop.trivial import LINE, NEAREST, RESIDUAL, Group, line_weights, trivial_rows
+from granulcal.loop.verdict import Verdict
+from granulcal.prior import Parameter, Prior
+from granulcal.scene import Scene
+
+RULES = Thresholds()
+EFFECT = Verdict("EFFECT", ("drag",), ("drag",), 0.001, "why")
+NONE = Verdict("NONE", (), (), 0.4, "nothing is left")
+
+
+def test_a_straight_line_is_carried_on_and_a_plane_needs_three_places() -> None:
+    known = np.array([[0.0], [0.4], [0.4], [1.0]])
+    assert line_weights(known, np.array([0.1])) == pytest.approx([0.75, 0.125, 0.125, 0.0])
+    # Beyond the outermost two: 1.3 is half a gap of 0.6 farther than 1.0.
+    assert line_weights(known, np.array([1.3])) == pytest.approx([0.0, -0.25, -0.25, 1.5])
+    assert line_weights(known[1:3], np.array([0.4])) is None
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    at = np.array([0.3, 0.6])
+    assert line_weights(corners, at) == pytest.approx([0.1, 0.3, 0.6])
+    assert line_weights(corners[:2], at) is None
+
+
+def groups(seed: int, *, offset: float) -> list[Group]:
+    """Five conditions: the truth is 3 + c^2, the base model c^2, the named model 3 + c^2 + offset.
+
+    The first statistic bends with the condition; the second is the same everywhere.
+    """
+    generator = np.random.default_rng(seed)
+
+    def pours(c: float, level: float, count: int) -> np.ndarray:
+        mean = np.array([level + 4 * c**2, 1.0])
+        return mean + 0.1 * generator.standard_normal((count, 2))
+
+    return [
+        Group(
+            f"{c:g}", np.array([c]), pours(c, 3.0, 5), pours(c, 0.0, 10), pours(c, 3 + offset, 10)
+        )
+        for c in (0.0, 0.5, 1.0, 0.25, 0.75)
+    ]
+
+
+def test_rows_without_physics_have_their_known_distance() -> None:
+    mean = {name: np.zeros(3) for name in (NEAREST, LINE, RESIDUAL)}
+    beaten = []
+    for seed in range(30):
+        made = groups(seed, offset=0.0)
+        rows = trivial_rows(made[:3], made[3:], np.ones(2), draws=200, seed=seed)
+        assert [row.name for row in rows] == [NEAREST, LINE, RESIDUAL]
+        for row in rows:
+            mean[row.name] += [row.squares[0] / 30, row.squares[1] / 30, row.gain / 30]
+        beaten.append([row.is_beaten for row in rows])
+    # 4 c^2 at 0.25: both neighbours are as near, 0.5 between them as on the line, 0.25 the truth.
+    assert mean[LINE][:2] == pytest.approx([0.0625, 0.0625], abs=0.02)
+    # At 0.75 the neighbours' mean is 2.5 and the truth 2.25.
+    assert mean[NEAREST][:2] == pytest.approx([0.0625, 0.0625], abs=0.02)
+    # The base model knows the bend and lacks a constant: nothing is left.
+    assert mean[RESIDUAL] == pytest.approx([0.0, 0.0, 0.0], abs=0.02)
+    share = np.mean(beaten, axis=0)
+    assert share[1] > 0.6 and share[2] < 0.15
+
+
+def test_a_name_that_beats_nothing_says_so() -> None:
+    made = groups(1, offset=1.0)
+    rows = trivial_rows(made[:3], made[3:], np.ones(2))
+    found = stand(EFFECT, RULES, confirmed=0.5, trivial=rows)
+    assert found.stands and found.verdict.named == ("drag",)
+    assert found.unbeaten == (NEAREST, LINE, RESIDUAL)
+    assert "does not beat nearest condition nor straight line nor base +" in found.verdict.reason
+    # NONE names nothing, and has nothing to beat.
+    assert stand(NONE, RULES, confirmed=0.5, trivial=rows).unbeaten == ()
+    assert trivial_rows(made[:3], [], np.ones(2)) == ()
+
+
+@pytest.mark.parametrize("before", [EFFECT, NONE])
+def test_a_wrong_surrogate_takes_every_word_away(before: Verdict) -> None:
+    found = stand(before, RULES, confirmed=0.003)
+    assert found.verdict.kind == "UNCONFIRMED" and not found.stands
+    assert found.verdict.named == () and found.before is before
+    assert f"the fits say {before.kind}" in found.verdict.reason and "0.003" in found.verdict.reason
+    assert stand(before, RULES, confirmed=float("nan")).verdict.kind == "UNCONFIRMED"
+    assert stand(before, RULES, confirmed=0.02).verdict is before
+    assert found.to_dict()["verdict_before_checks"] == before.kind
+
+
+def test_a_random_draw_that_is_nearer_than_the_fit_takes_the_word_away() -> None:
+    generator = np.random.default_rng(0)
+    data, near, far = (m + 0.1 * generator.standard_normal((10, 3)) for m in (0.0, 0.05, 1.0))
+    better = compare(["c"], [data], [near], [far], np.ones(3))
+    found = stand(NONE, RULES, confirmed=0.5, draws=24, nearer=better)
+    assert found.verdict.kind == "UNCONFIRMED"
+    assert "a random draw of the model is nearer" in found.verdict.reason
+    worse = compare(["c"], [data], [far], [near], np.ones(3))
+    assert stand(NONE, RULES, confirmed=0.5, draws=24, nearer=worse).verdict is NONE
+
+
+def test_a_verdict_that_a_definition_overturns_is_none() -> None:
+    other = Verdict("EFFECT", ("tilt.x",), ("tilt",), 0.001, "")
+    same = Verdict("SET", ("tilt.x", "drag"), ("tilt", "drag"), 0.001, "")
+    faint = Verdict("RESIDUAL", (), (), 0.03, "")
+    assert overturned(EFFECT, NONE, 0.01) and overturned(EFFECT, other, 0.01)
+    assert overturned(EFFECT, faint, 0.01) and not overturned(EFFECT, same, 0.01)
+    assert overturned(NONE, EFFECT, 0.01) and not overturned(NONE, faint, 0.01)
+    unexplained = Verdict("UNEXPLAINED", (), (), 0.001, "")
+    assert overturned(unexplained, NONE, 0.01) and not overturned(unexplained, EFFECT, 0.01)
+    found = stand(EFFECT, RULES, confirmed=0.5, moved=[Moved("half cover", NONE)])
+    assert found.verdict.kind == "OVERTURNED" and not found.stands
+    assert found.verdict.reason == "the fits say EFFECT drag, but NONE under half cover"
+
+
+def column() -> Scene:
+    text = Scene.funnel(height=0.1).to_toml()
+    return Scene.from_toml(
+        text + "\n[observe]\nrate = 100.0\n[observe.front]\ntimes = [0.1, 0.2]\nlevel = 0.5\n"
+    )
+
+
+def asked(definitions: tuple[Definition, ...], *, between: bool = True) -> Task:
+    prior = Prior(
+        [Parameter(path="material.restitution", distribution="uniform", low=0.2, high=0.6)]
+    )
+    conditions = tuple(
+        Condition(f"{h:g}", {"funnel.height": h}, use, (Path("a"), Path("b"), Path("c")))
+        for h, use in ((0.05, FIT), (0.1, FIT), (0.08, SEALED))
+    )
+    return Task(column(), prior, conditions, (), between=between, definitions=definitions)
+
+
+def test_definitions_are_inputs_of_the_archive_and_the_first_is_the_verdicts() -> None:
+    quarter = Definition("quarter", {"observe.front.level": 0.25})
+    half = Definition("half", {"observe.front.level": 0.5}, {"fps": 120.0})
+    task = asked((quarter, half))
+    assert task.inputs == (("funnel.height", 0.05, 0.1), ("observe.front.level", 0.25, 0.5))
+    assert task.at_first().get("observe.front.level") == 0.25
+    assert [c.at["observe.front.level"] for c in task.of(FIT)] == [0.25, 0.25]
+    (moved, _) = task.under(half, FIT)
+    assert moved.at == {"funnel.height": 0.05, "observe.front.level": 0.5}
+    assert moved.reading == {"fps": 120.0} and task.conditions[0].reading == {}
+    # Copies keep what was stated.
+    assert replace(task, between=False).stated == task.stated
+    # At the places alone: the places do not hold the definition, which is drawn.
+    fixed = asked((quarter, half), between=False)
+    assert fixed.places[0] == {"funnel.height": 0.05}
+    assert fixed.inputs[-1] == ("observe.front.level", 0.25, 0.5)
+    assert definition_inputs((quarter,)) == ()
+
+
+def test_a_definition_changes_nothing_that_is_poured() -> None:
+    with pytest.raises(ObservationError, match="grains.count changes what is poured"):
+        check_definitions((Definition("other", {"grains.count": 10.0}),))
+    with pytest.raises(ObservationError, match="must state the same numbers"):
+        asked((Definition("a"), Definition("b", {"observe.front.level": 0.2})))
+    with pytest.raises(ObservationError, match="names of their own, twice: \\['a'\\]"):
+        asked((Definition("a"), Definition("a")))
+    with pytest.raises(ObservationError, match="has unknown level"):
+        Definition.of({"name": "a", "level": 0.2})
+
+
+def test_random_draws_fill_the_prior_and_the_best_come_first() -> None:
+    drawn = hypercube(24, 3, seed=5)
+    cells = np.sort((drawn * 24).astype(int), axis=0)
+    assert np.array_equal(cells, np.tile(np.arange(24)[:, None], (1, 3)))
+    seen = Look(("tilt",), None, np.array([[0.5], [0.2]]), np.array([[0.3], [0.9]]), np.ones(2))
+    starts = seen.starts(Design(("a",), (), (Effect("drag"), Effect("tilt"))))
+    assert [start.psi.tolist() for start in starts] == [[0.0, 0.3], [0.0, 0.9]]
+    assert starts[0].v == pytest.approx([0.0]) and starts[1].v == pytest.approx([-0.8416], abs=1e-3)
