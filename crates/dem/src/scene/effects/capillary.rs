@@ -105,7 +105,7 @@ mod tests {
         // Water on 4 mm couscous, wetted all around: 0.9 mN, of grains of 1300 kg/m3 about two weights.
         let (radius, mass) = (2e-3, 1300.0 * 4.0 / 3.0 * std::f64::consts::PI * 8e-9);
         let wet = Capillary { tension: 0.0725, ..Capillary::default() };
-        let force = std::f64::consts::TAU * radius * 0.0725;
+        let force = TAU * radius * 0.0725;
         for g in [0.0, 9.81, 45.22] {
             assert!((wet.touch(radius, mass, g) * mass - force).abs() < 1e-15);
         }
