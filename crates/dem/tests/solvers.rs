@@ -155,18 +155,14 @@ fn conjugate_directions_save_sweeps() {
 }
 
 #[test]
-fn over_relaxed_sweeps_meet_the_solution_up_to_a_limit() {
+fn sweeps_that_are_relaxed_a_little_meet_the_solution() {
     let problem = heap();
-    let relative = |relaxation| {
+    // Beyond 1.2 it depends on the heap: with 1.4 and 1.6 some end on circles of 1e-5 to 2e-3, others at the solution.
+    for relaxation in [1.0, 1.2] {
         let settings = SolverSettings { relaxation, ..gauss_seidel(20_000) };
-        solve(&problem, &settings).residual
-    };
-    // Measured: 3e-11 with 1, 3e-17 with 1.2; 1.4e-5 with 1.4 and 1.9e-3 with 1.6, where they circle.
-    let [one, less, more, most] = [1.0, 1.2, 1.4, 1.6].map(relative);
-    println!("{one:.1e} {less:.1e} {more:.1e} {most:.1e}");
-    assert!(one < 1e-10 && less < 1e-10, "{one:e} {less:e}");
-    // What is over-relaxed too far does not end at the solution, and the further the worse.
-    assert!((1e-5..0.1).contains(&most) && more < most, "{more:e} {most:e}");
+        let residual = solve(&problem, &settings).residual;
+        assert!(residual < 1e-10, "{relaxation}: {residual:e}");
+    }
 }
 
 #[test]
