@@ -78,7 +78,7 @@ impl Bed {
     }
 
     /// Takes the grains with their centre below `height` `[m]` out of the scene; whether there were any.
-    pub fn let_out(&mut self, height: f64) -> bool {
+    pub fn remove_below(&mut self, height: f64) -> bool {
         let out: Vec<usize> = self.present().filter(|&i| self.position(i).z < height).collect();
         if !out.is_empty() {
             self.left.resize(self.count(), false);
@@ -91,14 +91,14 @@ impl Bed {
     }
 
     /// Share of the grains' mass that has left `[-]`.
-    pub fn share_out(&self) -> f64 {
+    pub fn outflow_fraction(&self) -> f64 {
         let mass = |grain: usize| 1.0 / self.inverse_mass[grain];
         let out: f64 = (0..self.count()).filter(|&i| self.has_left(i)).map(mass).sum();
         out / (0..self.count()).map(mass).sum::<f64>().max(f64::MIN_POSITIVE)
     }
 
     /// Keeps the grains that have left at rest, whatever has acted on all.
-    pub fn hold_those_out(&mut self) {
+    pub fn freeze_removed(&mut self) {
         for (body, _) in self.bodies.iter_mut().zip(&self.left).filter(|(_, left)| **left) {
             *body = Body::default();
         }

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use crate::contact::Listed;
+use crate::contact::ContactKey;
 
 /// Grains below which one block holds all: they fit the cache.
 const ONE_BLOCK: usize = if cfg!(test) { 200 } else { 4096 };
@@ -84,7 +84,7 @@ impl Blocks {
     }
 
     /// Orders the contacts by their blocks and leaves their order within a block; returns where each begins.
-    pub fn sort(&self, listed: &[Listed], ordered: &mut Vec<Listed>) -> Vec<usize> {
+    pub fn sort(&self, listed: &[ContactKey], ordered: &mut Vec<ContactKey>) -> Vec<usize> {
         ordered.clear();
         if self.of.is_empty() {
             ordered.extend_from_slice(listed);
@@ -97,7 +97,7 @@ impl Blocks {
         for block in 2..starts.len() {
             starts[block] += starts[block - 1];
         }
-        ordered.resize(listed.len(), Listed { i: 0, partner: 0 });
+        ordered.resize(listed.len(), ContactKey { i: 0, partner: 0 });
         for contact in listed {
             let slot = &mut starts[self.of[contact.i as usize] as usize + 1];
             ordered[*slot] = *contact;
@@ -128,8 +128,10 @@ mod tests {
         let near = |&(i, j): &(usize, usize)| (points[i] - points[j]).norm() < longest;
         let pairs =
             (0..points.len()).flat_map(|i| (i + 1..points.len().min(i + 230)).map(move |j| (i, j)));
-        let listed: Vec<Listed> =
-            pairs.filter(near).map(|(i, j)| Listed { i: i as u32, partner: j as u32 }).collect();
+        let listed: Vec<ContactKey> = pairs
+            .filter(near)
+            .map(|(i, j)| ContactKey { i: i as u32, partner: j as u32 })
+            .collect();
         let mut ordered = Vec::new();
         let starts = blocks.sort(&listed, &mut ordered);
         assert!(blocks.phases().any(|phase| phase.len() > 2));
@@ -153,7 +155,8 @@ mod tests {
     fn few_grains_are_one_block_in_their_order() {
         let mut blocks = Blocks::default();
         blocks.place(&points()[..100], 9e-3, 2e-3);
-        let listed: Vec<Listed> = (0..50).rev().map(|i| Listed { i, partner: i + 1 }).collect();
+        let listed: Vec<ContactKey> =
+            (0..50).rev().map(|i| ContactKey { i, partner: i + 1 }).collect();
         let mut ordered = Vec::new();
         assert_eq!(blocks.sort(&listed, &mut ordered), [0, 50]);
         assert_eq!(ordered, listed);

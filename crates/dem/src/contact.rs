@@ -69,7 +69,7 @@ pub(crate) struct WallLanes {
 
 /// A contact before it is put into a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Listed {
+pub(crate) struct ContactKey {
     pub i: u32,
     /// Second grain, or the wall's number.
     pub partner: u32,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::blocks::Blocks;
 use crate::body::Body;
-use crate::contact::{Batch, ContactLaw, LawLanes, Listed, WallLanes};
+use crate::contact::{Batch, ContactKey, ContactLaw, LawLanes, WallLanes};
 use crate::lanes::LANES;
 
 /// Colours that a grain's mask can tell apart; contacts beyond them get a batch of their own.
@@ -21,7 +21,7 @@ const APPEND_LOOK_BACK: usize = 8;
 
 /// What the second body of every contact of a set is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) enum Second {
+pub(crate) enum BodyKind {
     /// A grain.
     #[default]
     Grain,
@@ -46,7 +46,7 @@ pub(crate) struct ContactSet {
     pub at_walls: Vec<WallLanes>,
     /// Grains; every index in a batch is at most this, the resting body's, but for those of moving walls.
     grains: usize,
-    second: Second,
+    second: BodyKind,
     /// Batches that were coloured; those after them hold contacts that were appended.
     coloured: usize,
     /// The contact law behind each entry of `laws`, if all its lanes share one.
@@ -56,7 +56,7 @@ pub(crate) struct ContactSet {
     #[serde(skip)]
     carried_starts: Vec<u32>,
     #[serde(skip)]
-    ordered: Vec<Listed>,
+    ordered: Vec<ContactKey>,
     #[serde(skip)]
     masks: Vec<u64>,
     #[serde(skip)]
@@ -86,12 +86,12 @@ impl ContactSet {
 
     /// Whether each contact has a body of its own that stands for a moving wall.
     pub fn has_wall_bodies(&self) -> bool {
-        self.second == Second::MovingWall
+        self.second == BodyKind::MovingWall
     }
 
     /// Whether its contacts give way.
     pub fn is_soft(&self) -> bool {
-        self.second == Second::SoftLayer
+        self.second == BodyKind::SoftLayer
     }
 
     /// Bodies that stand for moving walls.
@@ -122,14 +122,14 @@ impl ContactSet {
     /// `second` says what `partner` means; `law` gives a contact's coefficients.
     pub fn rebuild(
         &mut self,
-        listed: &[Listed],
+        listed: &[ContactKey],
         blocks: &Blocks,
         grains: usize,
-        second: Second,
-        law: impl Fn(&Listed) -> ContactLaw,
+        second: BodyKind,
+        law: impl Fn(&ContactKey) -> ContactLaw,
     ) {
         self.collect_carried(grains);
-        let at_walls = second != Second::Grain;
+        let at_walls = second != BodyKind::Grain;
         self.second = second;
         self.grains = grains;
         self.masks.resize(grains, 0);
@@ -160,9 +160,9 @@ impl ContactSet {
     /// Appends the batches of one block.
     fn add_part(
         &mut self,
-        contacts: &[Listed],
+        contacts: &[ContactKey],
         at_walls: bool,
-        law: &impl Fn(&Listed) -> ContactLaw,
+        law: &impl Fn(&ContactKey) -> ContactLaw,
     ) {
         let begin = self.batches.len();
         self.colour(contacts, at_walls);
@@ -196,7 +196,7 @@ impl ContactSet {
 
     /// Adds one contact, without impulses, between two lists: into one of the last batches if it shares no
     /// grain with that, else into a new one. Appended contacts are solved after all others.
-    pub fn append(&mut self, contact: Listed, at_wall: bool, law: ContactLaw) {
+    pub fn append(&mut self, contact: ContactKey, at_wall: bool, law: ContactLaw) {
         let (i, j) = (contact.i, contact.partner);
         let fits = |batch: &Batch| {
             let mut lanes = batch.lanes();
@@ -303,8 +303,8 @@ impl ContactSet {
     }
 
     /// Greedy colouring: the lowest colour that neither grain has yet.
-    fn colour(&mut self, contacts: &[Listed], at_walls: bool) {
-        let grains = |contact: &Listed| {
+    fn colour(&mut self, contacts: &[ContactKey], at_walls: bool) {
+        let grains = |contact: &ContactKey| {
             let i = contact.i as usize;
             (i, if at_walls { i } else { contact.partner as usize })
         };

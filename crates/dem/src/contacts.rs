@@ -12,8 +12,8 @@ use crate::assemble::{self, Seen};
 use crate::bed::Bed;
 use crate::blocks::Blocks;
 use crate::body::Body;
-use crate::contact::{Batch, Candidate, Listed};
-use crate::contact_set::{ContactSet, Second};
+use crate::contact::{Batch, Candidate, ContactKey};
+use crate::contact_set::{BodyKind, ContactSet};
 use crate::lanes::Row;
 use crate::neighbor::{Neighbours, PairSearch};
 use crate::partners::Partners;
@@ -40,13 +40,13 @@ pub(crate) struct Contacts {
     #[serde(skip)]
     around_path: Vec<u32>,
     #[serde(skip)]
-    listed: Vec<Listed>,
+    listed: Vec<ContactKey>,
     #[serde(skip)]
-    far: Vec<Listed>,
+    far: Vec<ContactKey>,
     /// Grains, and walls with the number of grains added.
     partners: Partners,
     #[serde(skip)]
-    near_walls: Vec<(Listed, bool)>,
+    near_walls: Vec<(ContactKey, bool)>,
     /// The way of each grain, from the time of the list on.
     paths: Vec<Path>,
     /// Paths that are newer than the list.
@@ -219,10 +219,11 @@ impl Contacts {
         self.listed.clear();
         self.far.clear();
         for &Neighbours { i, j: partner, come_near } in &self.found {
-            if come_near { &mut self.listed } else { &mut self.far }.push(Listed { i, partner });
+            if come_near { &mut self.listed } else { &mut self.far }
+                .push(ContactKey { i, partner });
         }
         self.listed.append(&mut self.far);
-        self.pairs.rebuild(&self.listed, &self.blocks, bed.count(), Second::Grain, |contact| {
+        self.pairs.rebuild(&self.listed, &self.blocks, bed.count(), BodyKind::Grain, |contact| {
             around.pair_law(bed, contact.i as usize, contact.partner as usize)
         });
 
@@ -232,7 +233,8 @@ impl Contacts {
             if is_near { &mut self.listed } else { &mut self.far }.push(contact);
         }
         self.listed.append(&mut self.far);
-        let second = if around.has_moving_walls { Second::MovingWall } else { Second::RestingWall };
+        let second =
+            if around.has_moving_walls { BodyKind::MovingWall } else { BodyKind::RestingWall };
         self.at_walls.rebuild(&self.listed, &self.blocks, bed.count(), second, |contact| {
             around.wall_law(bed, contact.i as usize, contact.partner as usize)
         });
@@ -242,13 +244,13 @@ impl Contacts {
     fn list_walls(&mut self, bed: &Bed, around: &Surroundings, reach: Reach) {
         self.near_walls.clear();
         let (paths, walls) = (&self.paths, &around.walls);
-        let list = |grains: Range<usize>, found: &mut Vec<(Listed, bool)>| {
+        let list = |grains: Range<usize>, found: &mut Vec<(ContactKey, bool)>| {
             for grain in grains.filter(|&grain| !bed.has_left(grain)) {
                 let Path { from, velocity } = &paths[grain];
                 let near = bed.radius(grain) + reach.near + reach.interval * velocity.norm();
                 let range = near + around.margin - reach.near;
                 walls.reached(from, range, |surface| {
-                    let contact = Listed { i: grain as u32, partner: surface as u32 };
+                    let contact = ContactKey { i: grain as u32, partner: surface as u32 };
                     found.push((contact, walls.may_reach(surface, from, near)));
                 });
             }
@@ -298,7 +300,7 @@ impl Contacts {
                 let (i, j) = (grain.min(other), grain.max(other));
                 self.partners.add(i, j as u32);
                 self.partners.add(j, i as u32);
-                let contact = Listed { i: i as u32, partner: j as u32 };
+                let contact = ContactKey { i: i as u32, partner: j as u32 };
                 self.pairs.append(contact, false, around.pair_law(bed, i, j));
             }
         }
@@ -308,7 +310,7 @@ impl Contacts {
             let partner = (bed.count() + surface) as u32;
             if !partners.has(grain, partner) {
                 partners.add(grain, partner);
-                let contact = Listed { i: grain as u32, partner: surface as u32 };
+                let contact = ContactKey { i: grain as u32, partner: surface as u32 };
                 at_walls.append(contact, true, around.wall_law(bed, grain, surface));
             }
         });

@@ -22,13 +22,13 @@ mod velocities;
 pub(crate) mod work;
 
 /// Solves the contacts of `sets` together, from the impulses that they carry and velocities without them;
-/// `still` is the change of an impulse that counts as none in a quiet state, if this is one `[m/s]`, `radius` that of a
+/// `quiet_tolerance` is the change of an impulse that counts as none in a quiet state, if this is one `[m/s]`, `radius` that of a
 /// typical grain `[m]`. The spheres of `clumps` move as one.
 pub(crate) fn solve(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
     settings: &SolverSettings,
-    still: Option<f64>,
+    quiet_tolerance: Option<f64>,
     radius: f64,
     clumps: Option<&mut Clumps>,
     threads: &Threads,
@@ -38,7 +38,9 @@ pub(crate) fn solve(
     }
     let too_fast = settings.closing * radius / settings.dt;
     match settings.method {
-        Method::Nsgs => nsgs::solve(sets, bodies, settings, still, radius, clumps, threads),
+        Method::Nsgs => {
+            nsgs::solve(sets, bodies, settings, quiet_tolerance, radius, clumps, threads)
+        }
         Method::NewtonPcr => newton_pcr::solve(sets, bodies, &settings.newton, too_fast, threads),
         Method::Reference => reference::solve(sets, bodies, &settings.reference, threads),
     }

@@ -1,6 +1,6 @@
 //! Whether contacts that were read from bytes can be solved: the kernels index without looking.
 
-use super::{ContactSet, LANES, Second};
+use super::{BodyKind, ContactSet, LANES};
 
 impl ContactSet {
     /// Whether the contacts are between so many grains and, if they are at walls, so many walls.
@@ -17,7 +17,7 @@ impl ContactSet {
             return Ok(());
         }
         require(self.grains == grains, "contacts of another number of grains")?;
-        let is_at_walls = self.second != Second::Grain;
+        let is_at_walls = self.second != BodyKind::Grain;
         require(is_at_walls == walls.is_some(), "contacts of another kind")?;
         for (number, batch) in self.batches.iter().enumerate() {
             require((batch.law as usize) < self.laws.len(), "a contact without a law")?;

@@ -15,8 +15,10 @@ fn law(number: f64) -> ContactLaw {
 }
 
 /// Every pair of `grains`: the densest list there is.
-fn all_pairs(grains: u32) -> Vec<Listed> {
-    (0..grains).flat_map(|i| (i + 1..grains).map(move |partner| Listed { i, partner })).collect()
+fn all_pairs(grains: u32) -> Vec<ContactKey> {
+    (0..grains)
+        .flat_map(|i| (i + 1..grains).map(move |partner| ContactKey { i, partner }))
+        .collect()
 }
 
 #[test]
@@ -24,7 +26,7 @@ fn lanes_of_a_batch_share_no_grain_and_no_contact_is_lost() {
     // 80 grains that all touch need more colours than a mask holds.
     let listed = all_pairs(80);
     let mut set = ContactSet::default();
-    set.rebuild(&listed, &Blocks::default(), 80, Second::Grain, |_| law(0.5));
+    set.rebuild(&listed, &Blocks::default(), 80, BodyKind::Grain, |_| law(0.5));
     assert_eq!(set.len(), listed.len());
     let mut found = Vec::new();
     for batch in &set.batches {
@@ -42,8 +44,8 @@ fn lanes_of_a_batch_share_no_grain_and_no_contact_is_lost() {
 #[test]
 fn impulses_and_laws_follow_their_contact() {
     let mut set = ContactSet::default();
-    let friction = |contact: &Listed| f64::from(contact.i) + 0.01 * f64::from(contact.partner);
-    set.rebuild(&all_pairs(9), &Blocks::default(), 9, Second::Grain, |contact| {
+    let friction = |contact: &ContactKey| f64::from(contact.i) + 0.01 * f64::from(contact.partner);
+    set.rebuild(&all_pairs(9), &Blocks::default(), 9, BodyKind::Grain, |contact| {
         law(friction(contact))
     });
     for batch in &mut set.batches {
@@ -52,15 +54,15 @@ fn impulses_and_laws_follow_their_contact() {
         }
     }
     // The next list has fewer contacts in another order.
-    let mut fewer: Vec<Listed> = all_pairs(9).into_iter().filter(|c| c.partner != 4).collect();
+    let mut fewer: Vec<ContactKey> = all_pairs(9).into_iter().filter(|c| c.partner != 4).collect();
     fewer.reverse();
-    set.rebuild(&fewer, &Blocks::default(), 9, Second::Grain, |contact| law(friction(contact)));
+    set.rebuild(&fewer, &Blocks::default(), 9, BodyKind::Grain, |contact| law(friction(contact)));
     assert_eq!(set.len(), fewer.len());
     for batch in &set.batches {
         for lane in batch.lanes() {
             let (i, partner) = (batch.i[lane], batch.j[lane]);
             assert_eq!(batch.lambda_n.0[lane], f64::from(i * 100 + partner));
-            let expected = friction(&Listed { i, partner });
+            let expected = friction(&ContactKey { i, partner });
             assert_eq!(set.laws[batch.law as usize].sliding_friction.0[lane], expected);
         }
     }

@@ -18,8 +18,8 @@
 
 use crate::bed::Bed;
 use crate::blocks::Blocks;
-use crate::contact::{ContactLaw, Listed};
-use crate::contact_set::{ContactSet, Second};
+use crate::contact::{ContactKey, ContactLaw};
+use crate::contact_set::{BodyKind, ContactSet};
 use crate::lanes::Lanes;
 use crate::scene::Scene;
 
@@ -62,10 +62,10 @@ impl Pad {
     ) {
         let gap = |grain: usize| bed.position(grain).z - bed.radius(grain);
         let comes = |&grain: &usize| gap(grain) + dt * bed.velocity(grain).z.min(0.0) < 0.0;
-        let listed: Vec<Listed> =
-            bed.present().filter(comes).map(|i| Listed { i: i as u32, partner: 0 }).collect();
+        let listed: Vec<ContactKey> =
+            bed.present().filter(comes).map(|i| ContactKey { i: i as u32, partner: 0 }).collect();
         let give = self.give(dt);
-        set.rebuild(&listed, &Blocks::default(), bed.count(), Second::SoftLayer, |contact| {
+        set.rebuild(&listed, &Blocks::default(), bed.count(), BodyKind::SoftLayer, |contact| {
             ContactLaw { give, ..ground(contact.i as usize) }
         });
         for batch in &mut set.batches {

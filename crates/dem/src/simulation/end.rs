@@ -5,35 +5,35 @@ use nalgebra::Vector3;
 use super::Simulation;
 use crate::pour::Status;
 
-/// Looks at the end rule within which a pour must seem ended twice.
-const REST_LOOKS: usize = 16;
+/// Samples of the end rule within which a pour must seem ended twice.
+const REST_SAMPLES: usize = 16;
 
 impl Simulation {
-    /// How the pour has ended, if it has. It must have looked so twice within [`REST_LOOKS`]: a grain at the
+    /// How the pour has ended, if it has. It must have seemed so twice within [`REST_SAMPLES`]: a grain at the
     /// top of its bounce is slow, too, but once, while a pile whose last grain trembles is slow now and then.
     pub(super) fn end_reached(&mut self) -> Option<Status> {
         let until = self.origin.scene.outflow.and_then(|outflow| outflow.until);
-        if until.is_some_and(|percent| 100.0 * self.bed.share_out() >= percent) {
+        if until.is_some_and(|percent| 100.0 * self.bed.outflow_fraction() >= percent) {
             return Some(Status::RanOut);
         }
         if self.time() < self.origin.scene.moves_until() {
             return None;
         }
         let energies: Vec<f64> = (0..self.bed.count()).map(|i| self.bed.translation(i)).collect();
-        let Some(now) = self.looks_still(&energies) else {
+        let Some(now) = self.at_rest(&energies) else {
             let is_over = self.time() >= self.origin.scene.end.horizon;
             let how =
                 if self.flow_has_stopped(&energies) { Status::Jammed } else { Status::Horizon };
             return is_over.then_some(how);
         };
-        let window = REST_LOOKS * self.around.settings.list_period;
+        let window = REST_SAMPLES * self.around.settings.list_period;
         let seen = self.seemed_ended.replace((now, self.substep));
         let again = seen.is_some_and(|(then, at)| then == now && self.substep - at <= window);
         again.then_some(now)
     }
 
     /// How the pour would end if it stayed as it looks now.
-    fn looks_still(&self, energies: &[f64]) -> Option<Status> {
+    fn at_rest(&self, energies: &[f64]) -> Option<Status> {
         let (scene, threshold) = (&self.origin.scene, self.origin.scene.end.kinetic_energy);
         let jammed_or = |status| {
             let is_jammed = self.in_funnel().next().is_some();

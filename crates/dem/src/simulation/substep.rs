@@ -75,7 +75,7 @@ impl Simulation {
             let given = drag.act(bed, pairs, &around.gravity, around.radius, dt);
             self.watch.see_work(given);
         }
-        bed.hold_those_out();
+        bed.freeze_removed();
     }
 
     /// Gaps, normals and biases of the listed contacts.
@@ -158,7 +158,7 @@ impl Simulation {
     /// Looks at the state between two searches: outflow, health and the end rule.
     fn examine(&mut self) {
         if let Some(outflow) = &self.origin.scene.outflow
-            && self.bed.let_out(outflow.below)
+            && self.bed.remove_below(outflow.below)
         {
             self.contacts.forget_list();
         }

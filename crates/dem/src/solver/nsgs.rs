@@ -41,12 +41,12 @@ impl Progress {
 
 /// Sweeps over all contacts: at least `settings.sweeps` times unless the impulses have settled, and until none
 /// closes too fast, but no more than `settings.max_sweeps` times. In a quiet state at least `settings.quiet_sweeps` times
-/// unless the impulses change by less than `still` `[m/s]`.
+/// unless the impulses change by less than `quiet_tolerance` `[m/s]`.
 pub(super) fn solve(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
     settings: &SolverSettings,
-    still: Option<f64>,
+    quiet_tolerance: Option<f64>,
     radius: f64,
     mut clumps: Option<&mut Clumps>,
     threads: &Threads,
@@ -54,7 +54,7 @@ pub(super) fn solve(
     let too_fast = settings.closing * radius / settings.dt;
     let settled = settings.settled * radius / settings.dt;
     let mut work = Work::default();
-    let (mut has_settled, mut is_still) = (false, false);
+    let (mut has_settled, mut has_stopped) = (false, false);
     let mut join = |bodies: &mut [Body]| {
         if let Some(clumps) = &mut clumps {
             clumps.join(bodies);
@@ -63,18 +63,19 @@ pub(super) fn solve(
     join(bodies);
     for sweeps in 1..=settings.max_sweeps {
         // The last sweeps are plain ones: they leave a contact by itself exactly solved.
-        let asked = if still.is_none() || is_still { 0 } else { settings.quiet_sweeps };
+        let asked =
+            if quiet_tolerance.is_none() || has_stopped { 0 } else { settings.quiet_sweeps };
         let is_enough = has_settled || sweeps >= settings.sweeps.max(asked);
         let relaxation = if is_enough { 1.0 } else { settings.relaxation };
         let Progress { closing, change } =
-            sweep(sets, bodies, Manner::relaxed(relaxation), threads);
+            sweep(sets, bodies, SweepOptions::relaxed(relaxation), threads);
         join(bodies);
         work = Work { sweeps, closing, ..work };
         if is_enough && closing <= too_fast {
             return work;
         }
         has_settled = change <= settled;
-        is_still = still.is_some_and(|still| change <= still);
+        has_stopped = quiet_tolerance.is_some_and(|tolerance| change <= tolerance);
     }
     Work { unconverged: work.closing > too_fast, ..work }
 }
@@ -82,20 +83,20 @@ pub(super) fn solve(
 /// Sweeps `count` times, from velocities that contain the impulses.
 pub(crate) fn sweep_plainly(sets: &mut [&mut ContactSet], bodies: &mut [Body], count: usize) {
     for _ in 0..count {
-        sweep(sets, bodies, Manner::relaxed(1.0), &Threads::default());
+        sweep(sets, bodies, SweepOptions::relaxed(1.0), &Threads::default());
     }
 }
 
 /// How a sweep treats the contacts.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Manner {
+pub(super) struct SweepOptions {
     /// Over-relaxation `[-]`.
     relaxation: f64,
     /// Whether a batch that stays open is passed over.
     passes_over: bool,
 }
 
-impl Manner {
+impl SweepOptions {
     /// Exact local solutions, from impulses that the steps of another method may have taken off their cones.
     pub const EXACT: Self = Self { relaxation: 1.0, passes_over: false };
 
@@ -114,7 +115,7 @@ pub(super) fn is_at_rest(set: &ContactSet) -> bool {
 pub(super) fn sweep(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
-    manner: Manner,
+    options: SweepOptions,
     threads: &Threads,
 ) -> Progress {
     let mut worst = Progress::default();
@@ -125,7 +126,7 @@ pub(super) fn sweep(
             _ => sweep_pairs,
         };
         let sweep = |batches: &mut [Batch], laws: &[LawLanes], bodies: &SharedBodies<'_>| {
-            kernel(batches, laws, bodies, manner)
+            kernel(batches, laws, bodies, options)
         };
         worst = worst.max(for_each_phase(set, bodies, threads, sweep));
     }
@@ -163,9 +164,9 @@ widest! {
         batches: &mut [Batch],
         laws: &[LawLanes],
         bodies: &SharedBodies<'_>,
-        manner: Manner,
+        options: SweepOptions,
     ) -> Progress {
-        sweep_batches::<W, false, false>(batches, laws, bodies, manner)
+        sweep_batches::<W, false, false>(batches, laws, bodies, options)
     }
 }
 
@@ -174,9 +175,9 @@ widest! {
         batches: &mut [Batch],
         laws: &[LawLanes],
         bodies: &SharedBodies<'_>,
-        manner: Manner,
+        options: SweepOptions,
     ) -> Progress {
-        sweep_batches::<W, true, false>(batches, laws, bodies, manner)
+        sweep_batches::<W, true, false>(batches, laws, bodies, options)
     }
 }
 
@@ -185,9 +186,9 @@ widest! {
         batches: &mut [Batch],
         laws: &[LawLanes],
         bodies: &SharedBodies<'_>,
-        manner: Manner,
+        options: SweepOptions,
     ) -> Progress {
-        sweep_batches::<W, true, true>(batches, laws, bodies, manner)
+        sweep_batches::<W, true, true>(batches, laws, bodies, options)
     }
 }
 
@@ -197,12 +198,12 @@ fn sweep_batches<W: Width, const AT_WALLS: bool, const SOFT: bool>(
     batches: &mut [Batch],
     laws: &[LawLanes],
     bodies: &SharedBodies<'_>,
-    manner: Manner,
+    options: SweepOptions,
 ) -> Progress {
     let (mut closing, mut square) = (Reg::<W>::splat(0.0), Reg::<W>::splat(0.0));
     for batch in batches {
         let law = &laws[batch.law as usize];
-        solve_batch::<W, AT_WALLS, SOFT>(batch, law, bodies, manner, &mut closing, &mut square);
+        solve_batch::<W, AT_WALLS, SOFT>(batch, law, bodies, options, &mut closing, &mut square);
     }
     Progress { closing: largest(closing), change: largest(square).sqrt() }
 }
@@ -288,7 +289,7 @@ fn solve_batch<W: Width, const AT_WALLS: bool, const SOFT: bool>(
     batch: &mut Batch,
     law: &LawLanes,
     bodies: &SharedBodies<'_>,
-    manner: Manner,
+    options: SweepOptions,
     fastest: &mut Reg<W>,
     largest_square: &mut Reg<W>,
 ) {
@@ -298,10 +299,10 @@ fn solve_batch<W: Width, const AT_WALLS: bool, const SOFT: bool>(
     // A batch without impulses that stays open is left as it is.
     let zero = Reg::<W>::splat(0.0);
     let acting = W::less_bits(zero.0, old.n.0) | W::less_bits(zero.0, closing.0);
-    if acting == 0 && manner.passes_over {
+    if acting == 0 && options.passes_over {
         return;
     }
-    let relaxation = Reg::splat(manner.relaxation);
+    let relaxation = Reg::splat(options.relaxation);
     let new = local_solution::<W, SOFT>(batch, law, closing, relaxation, old, &mut velocities);
     *fastest = fastest.max(closing);
     *largest_square = largest_square.max(new.square_of_change(&old));

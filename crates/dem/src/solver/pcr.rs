@@ -111,8 +111,8 @@ mod tests {
 
     use super::*;
     use crate::blocks::Blocks;
-    use crate::contact::{ContactLaw, Listed};
-    use crate::contact_set::Second;
+    use crate::contact::{ContactKey, ContactLaw};
+    use crate::contact_set::BodyKind;
     use crate::lanes::LANES;
 
     /// Axis of the normal of each contact of the triangle.
@@ -121,9 +121,9 @@ mod tests {
     /// A triangle of unequal grains, one batch for each contact. The normals are axes, whatever triangle that is, so
     /// that tangential vectors are those without one component.
     fn triangle() -> ContactSet {
-        let listed = [(0, 1), (0, 2), (1, 2)].map(|(i, partner)| Listed { i, partner });
+        let listed = [(0, 1), (0, 2), (1, 2)].map(|(i, partner)| ContactKey { i, partner });
         let mut set = ContactSet::default();
-        set.rebuild(&listed, &Blocks::default(), 3, Second::Grain, |contact| ContactLaw {
+        set.rebuild(&listed, &Blocks::default(), 3, BodyKind::Grain, |contact| ContactLaw {
             inverse_mass: [contact.i, contact.partner].map(|grain| [1.0, 2.0, 0.5][grain as usize]),
             lever: [0.3, 0.7],
             sliding_friction: 0.5,

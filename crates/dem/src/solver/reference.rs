@@ -18,7 +18,7 @@ use crate::preset::ReferenceSettings;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, dot, impulses, put_impulses, scale_and_add, spread,
 };
-use crate::solver::nsgs::{self, Manner};
+use crate::solver::nsgs::{self, SweepOptions};
 use crate::solver::residual::ResidualSums;
 use crate::solver::work::Work;
 
@@ -39,7 +39,7 @@ pub(super) fn solve(
     let mut work = Work { unconverged: true, ..Work::default() };
     let mut before = impulses(sets);
     loop {
-        work.closing = nsgs::sweep(sets, bodies, Manner::EXACT, threads).closing;
+        work.closing = nsgs::sweep(sets, bodies, SweepOptions::EXACT, threads).closing;
         work.sweeps += 1;
         let is_last = work.sweeps >= settings.max_sweeps;
         if (work.sweeps.is_multiple_of(LOOK) || is_last)

@@ -4,8 +4,8 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::blocks::Blocks;
-use crate::contact::{ContactLaw, Listed};
-use crate::contact_set::Second;
+use crate::contact::{ContactKey, ContactLaw};
+use crate::contact_set::BodyKind;
 use crate::lanes::Row;
 use crate::preset::{Complementarity, NewtonSettings, Preset, ReferenceSettings};
 use crate::solver::residual::ResidualSums;
@@ -14,8 +14,8 @@ use crate::{Material, Scene, Simulation};
 /// One contact between grains 0 and 1, or of grain 0 at a wall, with the normal z.
 fn contact(at_wall: bool, bias: f64, law: ContactLaw) -> ContactSet {
     let mut set = ContactSet::default();
-    let listed = [Listed { i: 0, partner: u32::from(!at_wall) }];
-    let second = if at_wall { Second::RestingWall } else { Second::Grain };
+    let listed = [ContactKey { i: 0, partner: u32::from(!at_wall) }];
+    let second = if at_wall { BodyKind::RestingWall } else { BodyKind::Grain };
     set.rebuild(&listed, &Blocks::default(), 2, second, |_| law);
     set.batches[0].normal.set(0, [0.0, 0.0, 1.0]);
     set.batches[0].bias.0[0] = bias;

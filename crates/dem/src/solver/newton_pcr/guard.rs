@@ -12,7 +12,7 @@ use crate::contact_set::ContactSet;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, batches, collect, impulses, put_impulses, spread,
 };
-use crate::solver::nsgs::{self, Manner};
+use crate::solver::nsgs::{self, SweepOptions};
 use crate::solver::residual::ResidualSums;
 
 /// Shares of a step that are tried in turn.
@@ -89,7 +89,7 @@ impl<'a> Guard<'a> {
     }
 
     fn sweep(&mut self, sets: &mut [&mut ContactSet], bodies: &mut [Body]) {
-        nsgs::sweep(sets, bodies, Manner::EXACT, self.threads);
+        nsgs::sweep(sets, bodies, SweepOptions::EXACT, self.threads);
         self.merit = merit(sets, bodies);
         self.acted += 1;
         self.sweeps += 1;
