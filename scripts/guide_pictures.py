@@ -1,9 +1,9 @@
-"""The pictures of docs/guide.md and the film of docs/gallery.md.
+"""The pictures of docs/guide.md.
 
-    python scripts/guide_pictures.py [setup] [steps] [film]
+    python scripts/guide_pictures.py [setup] [steps]
 
 setup: camera, funnel and the lengths to measure. steps: what `features --debug-images` shows of the
-sample recording. film: a pour through the paper's funnel.
+sample recording.
 """
 
 import argparse
@@ -77,17 +77,12 @@ def steps() -> None:
         plt.close(figure)
 
 
-def film() -> None:
-    """Films the paper's pour."""
-    _run("film", "funnel", "--width", "420", "--fps", "12", "-o", str(OUT / "pour.gif"))
-
-
 def _run(*words: str) -> None:
     if granulcal(words) != 0:
         raise SystemExit(f"granulcal {' '.join(words)} failed")
 
 
-PICTURES = {"setup": setup, "steps": steps, "film": film}
+PICTURES = {"setup": setup, "steps": steps}
 
 
 def main() -> None:
