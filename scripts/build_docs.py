@@ -27,10 +27,21 @@ def main() -> int:
     (OUT / "index.md").write_text(linked(readme, OUT), encoding="utf-8")
     for page in OUT.rglob("*.md"):
         page.write_text(linked(page.read_text(encoding="utf-8"), page.parent), encoding="utf-8")
+    add_film(OUT / "gallery.md")
     (OUT / "commands.md").write_text(commands(), encoding="utf-8")
     (OUT / "api.md").write_text(api(), encoding="utf-8")
     write_navigation()
     return 0
+
+
+def add_film(gallery: Path) -> None:
+    """Films a pour of today's simulator and puts it on top of the gallery."""
+    name = "results/pour.gif"
+    told("film", "funnel", "--width", "420", "--fps", "12", "-o", str(OUT / name))
+    text = gallery.read_text(encoding="utf-8")
+    title, rest = text.split("\n", 1)
+    picture = f"![A pour through the paper's funnel, seen from the side]({name})"
+    gallery.write_text(f"{title}\n\n{picture}\n{rest}", encoding="utf-8")
 
 
 def linked(text: str, folder: Path) -> str:

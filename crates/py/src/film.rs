@@ -1,7 +1,7 @@
 //! Function `film`.
 
 use granulcal_dataset::Observer;
-use granulcal_dem::Simulation;
+use granulcal_dem::{DemError, Simulation};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
@@ -20,7 +20,7 @@ pub(crate) fn film(
     see: Py<PyAny>,
 ) -> PyResult<()> {
     let scene = &scene.inner;
-    let start = py.detach(|| {
+    let start = py.detach(|| -> Result<Simulation, DemError> {
         let simulation = Simulation::new(scene, seed)?;
         simulation.check_start()?;
         Ok(simulation)

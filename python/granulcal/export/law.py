@@ -5,7 +5,7 @@ benches/peers/lammps_impact.py.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 __all__ = [
@@ -41,6 +41,9 @@ class Contact:
         restitution: e [-].
         tangential_restitution: e_t [-].
         torsional_friction: mu_t [-]: the moment mu_t R_eff F_n is withstood about the normal.
+        softness, touching_exponent, impact_friction: what an engine's own stiffness and dashpots
+            decide in our impacts [-].
+        rolling_damping: dashpot on rolling over the critical one [-]; 0 is none.
     """
 
     sliding_friction: float
@@ -48,12 +51,18 @@ class Contact:
     restitution: float
     tangential_restitution: float = 0.0
     torsional_friction: float = 0.02
+    softness: float = 0.05
+    touching_exponent: float = 1.0
+    impact_friction: float = 1.0
+    rolling_damping: float = 0.0
 
     @classmethod
     def of(cls, table: dict[str, Any], default: "Contact | None" = None) -> "Contact":
         """Returns the contact in a scene's table, with what it leaves out from `default`."""
         base = {} if default is None else vars(default)
-        return cls(**{**base, **{name: float(value) for name, value in table.items()}})
+        known = {field.name for field in fields(cls)}
+        stated = {name: float(value) for name, value in table.items() if name in known}
+        return cls(**{**base, **stated})
 
     def rolling_length(self, effective_radius: float) -> float:
         """Returns the lever of the rolling moment, mu_r R_eff [m]."""

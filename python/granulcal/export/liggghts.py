@@ -1,7 +1,8 @@
-"""LIGGGHTS 3.8: `pair_style gran model hertz tangential history rolling_friction epsd`.
+"""LIGGGHTS 3.8: `pair_style gran model hertz tangential history` with rolling friction.
 
-Rolling: epsd limits the moment to mu R_eff F_n, so mu is our mu_r. Damping: its dashpot may pull a
-parting contact and then gives the e that it is told, whatever the speed.
+Rolling: `epsd2` limits the moment to mu R_eff F_n, so mu is our mu_r; `epsd` has a dashpot beside it, which
+is our rolling_damping and stops lone grains sooner. Damping: the normal dashpot may pull a parting contact
+and then gives the e that it is told, whatever the speed.
 """
 
 from granulcal.export import law
@@ -12,12 +13,12 @@ __all__ = ["ENGINE", "NOTES", "material", "scene"]
 
 ENGINE = "liggghts"
 NOTES = (
-    "torsional_friction has no counterpart: epsd acts on the rotation across the normal alone",
+    "torsional_friction has no counterpart: epsd2 acts on the rotation across the normal alone",
     "tangential_restitution has no counterpart: its tangential dashpot follows the normal one",
     "restitution below 0.05 is written as 0.05, the least that LIGGGHTS takes",
     "round walls are meshes of 64 sides: LIGGGHTS has no cones",
 )
-_WORDS = "model hertz tangential history rolling_friction epsd"
+_WORDS = "model hertz tangential history rolling_friction"
 _LEAST_RESTITUTION = 0.05
 # LIGGGHTS refuses softer grains unless told `soft_particles yes`.
 _LEAST_YOUNG = 5e6
@@ -36,7 +37,11 @@ def material(setup: Setup, young: float | None = None) -> str:
 
     kinds = " ".join([f"{stiffness.young:.6g}"] * n)
     ratios = " ".join([f"{law.POISSON}"] * n)
-    damping = " ".join(["0.7"] * (n * n))
+    rolling = _rolling(setup)
+    dashpot = ""
+    if rolling == "epsd":
+        name = "coefficientRollingViscousDamping"
+        dashpot = f"fix           m6 all property/global {name} peratomtypepair {n} {pairs('rolling_damping')}\n"
     table = f"peratomtypepair {n}"
     return f"""\
 fix           m1 all property/global youngsModulus peratomtype {kinds}
@@ -44,11 +49,15 @@ fix           m2 all property/global poissonsRatio peratomtype {ratios}
 fix           m3 all property/global coefficientRestitution {table} {pairs("restitution")}
 fix           m4 all property/global coefficientFriction {table} {pairs("sliding_friction")}
 fix           m5 all property/global coefficientRollingFriction {table} {pairs("rolling_friction")}
-fix           m6 all property/global coefficientRollingViscousDamping {table} {damping}
-pair_style    gran {_WORDS}
+{dashpot}pair_style    gran {_WORDS} {rolling}
 pair_coeff    * *
 timestep      {stiffness.dt:.6g}
 """
+
+
+def _rolling(setup: Setup) -> str:
+    laws = (setup.grains, setup.ground, *(body.law for body in setup.walls))
+    return "epsd" if any(each.rolling_damping > 0 for each in laws) else "epsd2"
 
 
 def _stiffness(setup: Setup, young: float | None) -> Stiffness:
@@ -73,7 +82,7 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     )
     names = " ".join(body.name for body in setup.walls)
     walls = (
-        f"fix           walls all wall/gran {_WORDS} mesh n_meshes {len(setup.walls)} meshes {names}"
+        f"fix           walls all wall/gran {_WORDS} {_rolling(setup)} mesh n_meshes {len(setup.walls)} meshes {names}"
         if setup.walls
         else ""
     )
@@ -99,7 +108,7 @@ neigh_modify  delay 0
 fix           gravity all gravity {g:.9g} vector {direction}
 {meshes}
 {walls}
-fix           ground all wall/gran {_WORDS} primitive type 2 zplane 0.0
+fix           ground all wall/gran {_WORDS} {_rolling(setup)} primitive type 2 zplane 0.0
 {grains}
 {sizes}
 fix           motion all nve/sphere

@@ -1,7 +1,7 @@
 """All of a scene that another engine must know, as plain numbers."""
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -155,6 +155,8 @@ def _refuse_motion(name: str, table: dict[str, Any]) -> None:
 
 def _left_out(table: dict[str, Any]) -> list[str]:
     found = [f"effects.{name}" for name in table.get("effects", {})]
+    known = {field.name for field in fields(Contact)}
+    found += [f"material.{name}" for name in table["material"] if name not in known]
     if "observe" in table:
         found.append("observe (what is seen on the way)")
     return found
