@@ -3,7 +3,10 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use granulcal_dataset::{CameraFile, DatasetError, ReadOptions, Recording, Survey};
+use granulcal_bayessim::Model;
+use granulcal_dataset::{
+    CameraFile, DatasetError, Limits, Prior, ReadOptions, Recording, Room, Survey, scene_from_text,
+};
 use peak_alloc::PeakAlloc;
 
 #[global_allocator]
@@ -76,5 +79,48 @@ pub fn png_with_toml(bytes: &[u8]) {
         || Recording::of_frames(Path::new(name), frame(), &camera, camera_name);
     if let Err(error) = bounded(png.len(), read) {
         assert!(error.to_string().contains("fuzz."), "the file is not named: {error}");
+    }
+}
+
+/// Reads a model: its document and, behind the first zero, its tensors; what can be read is asked something.
+pub fn model(bytes: &[u8]) {
+    let at = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());
+    let (document, tensors) = (&bytes[..at], bytes.get(at + 1..).unwrap_or_default());
+    let folder = Path::new("fuzz-model");
+    match bounded(bytes.len(), || Model::read(folder, document, tensors)) {
+        Ok(model) => {
+            let observation = [vec![1.0; model.x_names.len()]];
+            let _ = model.misfit(&observation);
+            if let Ok(posterior) = model.posterior(&observation) {
+                assert!(posterior.mode().len() == posterior.names().len());
+            }
+        }
+        Err(error) => assert!(error.to_string().contains("fuzz-model"), "no file is named: {error}"),
+    }
+}
+
+/// Reads a scene, and asks what it would need.
+pub fn scene(bytes: &[u8]) {
+    let Ok(text) = str::from_utf8(bytes) else { return };
+    // Files of the fuzzer's choice must not be opened.
+    if text.contains("file") {
+        return;
+    }
+    if let Ok(scene) = bounded(text.len(), || scene_from_text(text, Path::new(""))) {
+        let room = Room::of_pour(&scene, Some(60.0));
+        assert!(room.memory > 0.0 && room.disk > 0.0);
+        if scene.grains.count < 1000 {
+            let _ = Limits::of(&scene, &Prior::default());
+        }
+    }
+}
+
+/// Reads a prior, and draws from it.
+pub fn prior(bytes: &[u8]) {
+    let Ok(text) = str::from_utf8(bytes) else { return };
+    if let Ok(prior) = bounded(text.len(), || Prior::from_toml(text)) {
+        let drawn = prior.sample(1, 2);
+        assert!(drawn.len() == prior.parameters().len() && drawn.iter().all(|value| value.is_finite()));
+        assert_eq!(Prior::from_toml(&prior.to_toml().expect("a prior is TOML")).ok(), Some(prior));
     }
 }

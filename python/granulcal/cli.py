@@ -3,24 +3,31 @@
 import argparse
 import contextlib
 import importlib.util
+import io
 import json
+import os
+import shlex
+import signal
 import sys
+import threading
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from granulcal import _native, design_command, loop_command, predict_command
+from granulcal import _native, demo_command, design_command, loop_command, paths, predict_command
 from granulcal.commands import engine_command, export, film, init, model, record
 from granulcal.commands.program import Parser, describe
 from granulcal.files import write_beside
 from granulcal.one_thread import one_thread
+from granulcal.paths import READS, RECORDING, writes
 
 __all__ = ["main"]
 
 _DONE, _FAILED, _BAD_INPUT, _INTERRUPTED = 0, 1, 2, 130
 _UNHEALTHY = 3
 _SAMPLES = 1000
+_TRACEBACK = "GRANULCAL_TRACEBACK"
 _TRAINING = "training.parquet"
 
 _EPILOG = """\
@@ -38,7 +45,7 @@ From a recording to a material:
   granulcal predict loop --at funnel.height=0.07 --corrected  and where it was not measured?
 
 Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy, some frames of a
-recording lost, or a model that fails its check, 130 stopped."""
+recording lost, a recording outside the model, or a model that fails its check, 130 stopped."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -56,7 +63,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         # argparse ends the process; here the exit code is returned like every other.
         return end.code if isinstance(end.code, int) else _BAD_INPUT
     options.words = words
-    return _guarded(lambda: _run_told(options))
+
+    def command() -> int:
+        paths.check(parser, options)
+        return _run_told(options)
+
+    return _guarded(command)
 
 
 def _run_told(options: argparse.Namespace) -> int:
@@ -76,7 +88,7 @@ def _run_told(options: argparse.Namespace) -> int:
 def _guarded(command: Callable[[], int]) -> int:
     """Runs a command; tells what was wrong in one line instead of a traceback."""
     try:
-        with one_thread():
+        with _interruptible(), one_thread():
             return command()
     except KeyboardInterrupt:
         print("granulcal: stopped", file=sys.stderr)
@@ -92,6 +104,52 @@ def _guarded(command: Callable[[], int]) -> int:
     except OSError as error:
         print(f"granulcal: {error}", file=sys.stderr)
         return _FAILED
+    except MemoryError:
+        print("granulcal: the memory is full", file=sys.stderr)
+        return _FAILED
+    except Exception as error:
+        if os.environ.get(_TRACEBACK) == "1":
+            raise
+        text = f"{type(error).__name__}: {error}"
+        print(
+            f"granulcal: an error of its own, {text}; with {_TRACEBACK}=1 it says where",
+            file=sys.stderr,
+        )
+        return _FAILED
+
+
+def console() -> int:
+    """Runs the command line of the process; threads that still pour do not hold up its end."""
+    code = main()
+    if code == _INTERRUPTED:
+        sys.stdout.flush()
+        os._exit(code)
+    return code
+
+
+def _subparsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            return dict(action.choices)
+    return {}
+
+
+@contextlib.contextmanager
+def _interruptible() -> Iterator[None]:
+    """Lets Ctrl-C end the process within a second whatever runs, and at once if asked twice."""
+    if threading.current_thread() is not threading.main_thread() or not Path("/dev/fd").exists():
+        yield
+        return
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+    before = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
+    _native.listen_for_signals(f"/dev/fd/{read}")
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        os.close(write)
+        os.close(read)
 
 
 def _commands(parser: argparse.ArgumentParser) -> set[str]:
@@ -100,7 +158,7 @@ def _commands(parser: argparse.ArgumentParser) -> set[str]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="granulcal")
-    commands = parser.add_subparsers(metavar="COMMAND")
+    commands = parser.add_subparsers(metavar="COMMAND", dest="command")
     init.add(commands)
     model.add(commands)
     _add_train(commands)
@@ -115,15 +173,17 @@ def _parser() -> argparse.ArgumentParser:
     film.add(commands)
     record.add(commands)
     _add_reproduce(commands)
-    _add_demo(commands)
+    demo_command.add(commands)
     return parser
 
 
 def _add_train(commands: Any) -> None:
     text = "train BayesSim on a data set and check its calibration on pours kept aside"
     parser = commands.add_parser("train", help=text, description=text)
-    parser.add_argument("data", type=Path, help="folder of `generate`, or one Parquet file")
-    parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the model")
+    parser.add_argument("data", type=READS, help="folder of `generate`, or one Parquet file")
+    parser.add_argument(
+        "-o", "--out", type=writes("model"), required=True, help="folder of the model"
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of the training (default: 0)")
     parser.add_argument(
         "--method",
@@ -148,13 +208,13 @@ def _add_train(commands: Any) -> None:
 def _add_check(commands: Any) -> None:
     text = "say what a model was made from and whether its posteriors hold the truth"
     parser = commands.add_parser("check", help=text, description=text)
-    parser.add_argument("model", type=Path, help="folder of `train`")
+    parser.add_argument("model", type=READS, help="folder of `train`")
     parser.add_argument(
-        "--data", type=Path, help="pours that the model was not trained on, to check it with"
+        "--data", type=READS, help="pours that the model was not trained on, to check it with"
     )
     parser.add_argument(
         "--plots",
-        type=Path,
+        type=writes("plots"),
         help="write coverage.png, sbc.png and training.png to this folder",
     )
     parser.add_argument("--json", action="store_true", help="print JSON at the end")
@@ -162,20 +222,22 @@ def _add_check(commands: Any) -> None:
 
 
 def _add_recordings(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("model", type=Path, help="folder of `train`, or a scene of `model`")
+    parser.add_argument("model", type=READS, help="folder of `train`, or a scene of `model`")
     _add_reading(parser)
-    parser.add_argument("--scene", type=Path, help="refuse a model of another scene than this TOML")
+    parser.add_argument(
+        "--scene", type=READS, help="refuse a model of another scene than this TOML"
+    )
 
 
 def _add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "recording",
-        type=Path,
+        type=RECORDING,
         nargs="+",
         help=".bag, .mcap, .npz height map, 16-bit depth PNG or folder of PNGs; "
         "several: pours of one material",
     )
-    parser.add_argument("--camera", type=Path, help="TOML of the camera; PNGs need it")
+    parser.add_argument("--camera", type=READS, help="TOML of the camera; PNGs need it")
     parser.add_argument("--topic", help="topic of the depth images, where several fit")
     parser.add_argument("--camera-topic", help="topic of the lens, where several fit")
     parser.add_argument("--colour-topic", help="topic of the colour images, where several fit")
@@ -193,19 +255,23 @@ def _add_infer(commands: Any) -> None:
     parser = commands.add_parser("infer", help=text, description=text)
     _add_recordings(parser)
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
-    parser.add_argument("-o", "--out", type=Path, help="write JSON with samples to this file")
-    parser.add_argument("--plot", type=Path, help="write the pair plot to this file")
+    parser.add_argument(
+        "-o", "--out", type=writes("json"), help="write JSON with samples to this file"
+    )
+    parser.add_argument("--plot", type=writes("figure"), help="write the pair plot to this file")
     parser.set_defaults(run=_infer)
 
 
 def _add_calibrate(commands: Any) -> None:
     text = "infer the parameters from recordings with few pours, made in rounds for them alone"
     parser = commands.add_parser("calibrate", help=text, description=text)
-    parser.add_argument("scene", type=Path, help="scene as TOML, or the word funnel")
-    parser.add_argument("prior", type=Path, help="prior as TOML, or the word default")
+    parser.add_argument("scene", type=READS, help="scene as TOML, or the word funnel")
+    parser.add_argument("prior", type=READS, help="prior as TOML, or the word default")
     _add_reading(parser)
     parser.add_argument("--budget", type=int, default=100, help="pours in all (default: 100)")
-    parser.add_argument("-o", "--out", type=Path, required=True, help="folder; holds the pours")
+    parser.add_argument(
+        "-o", "--out", type=writes("calibration"), required=True, help="folder; holds the pours"
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of the run (default: 0)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
@@ -217,11 +283,11 @@ def _add_report(commands: Any) -> None:
     text = "infer, simulate the result and write one HTML page"
     parser = commands.add_parser("report", help=text, description=text)
     _add_recordings(parser)
-    parser.add_argument("-o", "--out", type=Path, required=True, help="the HTML file")
+    parser.add_argument("-o", "--out", type=writes("html"), required=True, help="the HTML file")
     parser.add_argument("--seeds", type=int, default=3, help="pours to compare (default: 3)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument(
-        "--data", type=Path, help=f"training data (default: {_TRAINING} in the model's folder)"
+        "--data", type=READS, help=f"training data (default: {_TRAINING} in the model's folder)"
     )
     parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_report)
@@ -231,12 +297,16 @@ def _add_reproduce(commands: Any) -> None:
     text = "repeat a study of docs/results; without a name, list them"
     parser = commands.add_parser("reproduce", help=text, description=text)
     parser.add_argument("study", nargs="?", help="name of the study")
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder (default: out)")
-    parser.add_argument("--data", type=Path, help="measured data (default: $GRANULCAL_DATA)")
     parser.add_argument(
-        "--maps", type=Path, help="kinect_mounds: folder of other maps compacted_*.npz"
+        "--out", type=writes("folder"), default=Path("out"), help="folder (default: out)"
     )
-    parser.add_argument("--json", type=Path, help="kinect_mounds: file for what each map gave")
+    parser.add_argument("--data", type=READS, help="measured data (default: $GRANULCAL_DATA)")
+    parser.add_argument(
+        "--maps", type=READS, help="kinect_mounds: folder of other maps compacted_*.npz"
+    )
+    parser.add_argument(
+        "--json", type=writes("json"), help="kinect_mounds: file for what each map gave"
+    )
     parser.set_defaults(run=_reproduce)
 
 
@@ -292,63 +362,32 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _infer(options: argparse.Namespace) -> int:
-    if importlib.util.find_spec("torch") is None:
-        return _infer_without_torch(options)
-    import numpy as np
-
-    from granulcal.identifiability import Identifiability
-
-    model = _model(options)
-    recordings = _recordings(options)
-    matched = {} if model.scene_toml is None else _matched(model.scene_toml)
-    observed = [recording.formation(**matched).statistics() for recording in recordings]
-    statistics = np.array([np.asarray(each) for each in observed])
-    misfit, posterior = model.misfit(statistics), model.posterior(statistics)
-    known = Identifiability.of(posterior)
-    if options.plot is not None:
-        posterior.pair_plot(options.plot)
-    document = {
-        "recordings": [str(path) for path in options.recording],
-        "parameters": _parameters(posterior),
-        "inside_model": {
-            "is_inside": misfit.is_inside,
-            "p_value": misfit.p_value,
-            "joint_p_value": misfit.joint_p_value,
-            "statistics": {
-                s.name: {"residual": s.residual, "p_value": s.p_value} for s in misfit.statistics
-            },
-        },
-        "identifiability": known.as_dict(),
-        "calibrated": model.calibration is not None and model.calibration.is_calibrated,
-        "warnings": [str(warning) for warning in posterior.warnings],
-        "statistics": [each.to_dict() for each in observed],
-    }
-    if options.out is not None:
-        samples = posterior.sample(_SAMPLES).tolist()
-        text = json.dumps({**document, "samples": samples}, indent=1)
-        write_beside(options.out, text + "\n")
-    if options.json:
-        print(json.dumps(document, indent=1))
-        return _outcome(recordings)
-    print(misfit)
-    _print_parameters(document["parameters"])
-    print(known)
-    if model.calibration is None or not model.calibration.is_calibrated:
-        print("note: the model's own check failed: see `granulcal check`", file=sys.stderr)
-    for warning in document["warnings"]:
-        print(f"note: {warning}", file=sys.stderr)
-    return _outcome(recordings)
-
-
-def _infer_without_torch(options: argparse.Namespace) -> int:
-    """Lets the Rust side evaluate the model: the same posterior, without its picture."""
-    if options.plot is not None:
-        raise ModuleNotFoundError("--plot needs PyTorch")
+    """Everything but the plot is by granulcal-cli, so that both say the same."""
     from granulcal.starter.models import model_named
 
-    named = str(options.model)
-    words = [str(model_named(named)) if word == named else word for word in options.words]
-    return _native.run_cli(["granulcal", *words])
+    if options.plot is not None and importlib.util.find_spec("torch") is None:
+        raise ModuleNotFoundError("--plot needs PyTorch")
+    model = model_named(str(options.model))
+    words = ["granulcal", "infer", str(model), *map(str, options.recording)]
+    for name in ("camera", "topic", "camera_topic", "colour_topic", "first_frame", "scene", "out"):
+        value = getattr(options, name)
+        if value is not None:
+            words.append(f"--{name.replace('_', '-')}={value}")
+    words.append(f"--frames={options.frames or 'all'}")
+    if options.json:
+        words.append("--json")
+    code = _native.run_cli(words)
+    if options.plot is not None and code in (_DONE, _UNHEALTHY):
+        import numpy as np
+
+        model = _model(options)
+        matched = {} if model.scene_toml is None else _matched(model.scene_toml)
+        with contextlib.redirect_stderr(io.StringIO()):
+            # What is lost of the recordings is told already.
+            recordings = _recordings(options)
+        observed = [recording.formation(**matched).statistics() for recording in recordings]
+        model.posterior(np.array([np.asarray(each) for each in observed])).pair_plot(options.plot)
+    return code
 
 
 def _calibrate(options: argparse.Namespace) -> int:
@@ -431,13 +470,13 @@ def _report(options: argparse.Namespace) -> int:
     folder = model_named(options.model)
     data = Dataset.load(folder / _TRAINING if options.data is None else options.data)
     names = " ".join(str(path) for path in options.recording)
-    flags = "".join(
-        f" --{name.replace('_', '-')} {getattr(options, name)}"
-        for name in ("camera", "topic", "camera_topic", "colour_topic", "first_frame")
-        if getattr(options, name) is not None
-    )
+    words = ["granulcal", "report", str(options.model), *map(str, options.recording)]
+    for name in ("camera", "topic", "camera_topic", "colour_topic", "first_frame"):
+        if getattr(options, name) is not None:
+            words += [f"--{name.replace('_', '-')}", str(getattr(options, name))]
     if options.frames != FRAMES:
-        flags += f" --frames {options.frames or 'all'}"
+        words += ["--frames", str(options.frames or "all")]
+    words += ["-o", str(options.out), "--seeds", str(options.seeds)]
     recordings = _recordings(options)
     found = calibrate(
         model,
@@ -449,8 +488,7 @@ def _report(options: argparse.Namespace) -> int:
         title=f"Calibration from {names}",
         summary=f"Parameters of the scene {data.scene.name!r}, inferred from {names} "
         f"with a model trained on {len(data)} pours.",
-        command=f"granulcal report {options.model} {names}{flags} "
-        f"-o {options.out} --seeds {options.seeds}",
+        command=shlex.join(words),
     )
     print(found.report)
     options.told["report"] = str(found.report)
@@ -481,25 +519,6 @@ def _reproduce(options: argparse.Namespace) -> int:
         raise FileNotFoundError("no measured data: give --data or set $GRANULCAL_DATA")
     module.reproduce(options.out, data, **given)
     return _DONE
-
-
-def _add_demo(commands: Any) -> None:
-    text = "the whole job on a recording with a known truth"
-    parser = commands.add_parser("demo", help=text, description=text)
-    parser.add_argument("--out", type=Path, default=Path("demo"), help="folder (default: demo)")
-    parser.add_argument("--pours", type=int, help="pours to train on; fewer are less sharp")
-    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
-    parser.set_defaults(run=_demo)
-
-
-def _demo(options: argparse.Namespace) -> int:
-    from granulcal.demo import main as demo
-
-    words = ["--out", str(options.out)]
-    for name in ("pours", "threads"):
-        value = getattr(options, name)
-        words += [] if value is None else [f"--{name}", str(value)]
-    return demo(words)
 
 
 def _model(options: argparse.Namespace) -> Any:
@@ -560,4 +579,4 @@ def _outcome(recordings: Sequence[Any], is_healthy: bool = True) -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(console())

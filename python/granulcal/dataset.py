@@ -1,6 +1,7 @@
 """Data sets: many pours of one scene under a prior, on disk and in memory."""
 
 import tempfile
+import warnings
 from collections import Counter
 from collections.abc import Callable
 from functools import cached_property
@@ -12,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.errors import UnverifiedDataWarning
 from granulcal.prior import Prior
 from granulcal.progress import ProgressLine
 from granulcal.scene import Scene
-from granulcal.simulate import check_whole
+from granulcal.simulate import check_whole, require_scene
 from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES
 
 if TYPE_CHECKING:
@@ -85,7 +87,15 @@ class Dataset:
             FileNotFoundError: there is no such folder or file.
             ValueError: it is there but no data set, or damaged; the message says where.
         """
-        return cls(_native.Dataset.open(path), Path(path))
+        native = _native.Dataset.open(path)
+        if native.unverified:
+            warnings.warn(
+                f"{native.unverified} files of {path} are of an earlier version without hashes of "
+                "their rows: damage in them cannot be found",
+                UnverifiedDataWarning,
+                stacklevel=2,
+            )
+        return cls(native, Path(path))
 
     def save(self, path: str | PathLike[str]) -> None:
         """Writes all rows, with scene, prior and versions, as one Parquet file."""
@@ -194,6 +204,9 @@ def generate(
         >>> data.theta.shape, data.x.shape
         ((4, 3), (4, 16))
     """
+    require_scene(scene)
+    if not isinstance(prior, Prior):
+        raise TypeError(f"prior must be a Prior, as Prior.load reads it, got {prior!r}")
     check_whole("n", n, at_least=1)
     check_whole("seed", seed, at_least=0)
     if threads is not None:

@@ -5,11 +5,10 @@ finer solver settings and another seed than any training pour, seen by a tilted,
 stored as a 16-bit PNG that is then opened like any other.
 """
 
-import argparse
 import importlib
 import os
+import shlex
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -57,8 +56,10 @@ def record(folder: Path, scene: Scene) -> Recording:
         f"downsample = {int(scene.get('camera.downsample'))}\n"
         f"height_threshold = {{ absolute = {scene.get('camera.height_threshold')} }}\n"
     )
-    toml.write_text(toml.read_text(encoding="utf-8") + settings, encoding="utf-8")
-    return Recording.open(image, camera=toml)
+    # A file of its own: the camera's is written anew by every run, unless somebody changed it.
+    segmented = folder / "segmentation.toml"
+    segmented.write_text(toml.read_text(encoding="utf-8") + settings, encoding="utf-8")
+    return Recording.open(image, camera=segmented)
 
 
 def run(out: Path, *, pours: int = _DEFAULT_POURS, threads: int | None = None) -> Calibrated:
@@ -96,28 +97,18 @@ def run(out: Path, *, pours: int = _DEFAULT_POURS, threads: int | None = None) -
             f"{1e3 * _DEPTH_NOISE:g} mm of noise, and stored as a 16-bit PNG. Everything below "
             f"follows from that image and from {len(data)} simulated pours."
         ),
-        command=f"granulcal demo --out {out} --pours {pours}",
+        command=shlex.join(["granulcal", "demo", "--out", str(out), "--pours", str(pours)]),
     )
     _print_table(result, truth)
     return result
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the demo from the command line; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="granulcal demo", description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("demo"), help="folder (default: demo)")
-    parser.add_argument(
-        "--pours",
-        type=int,
-        default=_DEFAULT_POURS,
-        help="pours to train on; fewer are faster and less sharp (default: %(default)s)",
-    )
-    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
-    options = parser.parse_args(argv)
+def main(out: Path, *, pours: int = _DEFAULT_POURS, threads: int | None = None) -> int:
+    """Runs the demo into `out`, measured maps too where they are at hand; returns the exit code."""
     started = time.monotonic()
-    run(options.out, pours=options.pours, threads=options.threads)
-    _measured_demo(options.out)
-    print(f"done in {time.monotonic() - started:.0f} s; open {options.out / 'report.html'}")
+    run(out, pours=pours, threads=threads)
+    _measured_demo(out)
+    print(f"done in {time.monotonic() - started:.0f} s; open {out / 'report.html'}")
     return 0
 
 
@@ -153,7 +144,3 @@ def _print_table(result: Calibrated, truth: np.ndarray) -> None:
 
 def _say(text: str) -> None:
     print(text, flush=True)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

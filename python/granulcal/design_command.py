@@ -2,8 +2,9 @@
 
 import argparse
 import sys
-from pathlib import Path
 from typing import Any
+
+from granulcal.paths import READS, writes
 
 __all__ = ["add"]
 
@@ -48,12 +49,14 @@ def add(commands: Any) -> None:
     """Adds the word to the command line."""
     parser = commands.add_parser("design", help=_TEXT, description=_TEXT)
     parser.set_defaults(run=lambda _: parser.print_help() or 2)
-    words = parser.add_subparsers(title="what to design", metavar="WORD")
+    words = parser.add_subparsers(title="what to design", metavar="WORD", dest="word")
     _add_rings(words)
     _add_spill(words)
 
 
-def _add_common(parser: argparse.ArgumentParser, *, pours: int, heights: tuple[float, ...]) -> None:
+def _add_common(
+    parser: argparse.ArgumentParser, *, kind: str, pours: int, heights: tuple[float, ...]
+) -> None:
     parser.add_argument(
         "--set",
         action="append",
@@ -62,7 +65,7 @@ def _add_common(parser: argparse.ArgumentParser, *, pours: int, heights: tuple[f
         metavar="PATH=VALUE",
         help="another number of the scene, as material.restitution=0.5; may be repeated",
     )
-    parser.add_argument("--posterior", type=Path, help="JSON of `infer -o` or `calibrate`")
+    parser.add_argument("--posterior", type=READS, help="JSON of `infer -o` or `calibrate`")
     parser.add_argument(
         "--heights",
         nargs=2,
@@ -72,7 +75,9 @@ def _add_common(parser: argparse.ArgumentParser, *, pours: int, heights: tuple[f
         help=f"heights of the funnel's tip in metres (default: {heights[0]:g} {heights[1]:g})",
     )
     parser.add_argument("--pours", type=int, default=pours, help=f"how many (default: {pours})")
-    parser.add_argument("-o", "--out", type=Path, required=True, help="folder; holds the pours")
+    parser.add_argument(
+        "-o", "--out", type=writes(kind), required=True, help="folder; holds the pours"
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
@@ -85,7 +90,7 @@ def _add_rings(words: Any) -> None:
         description=_RINGS,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("scene", type=Path, help="TOML, the word funnel, or folder of `train`")
+    parser.add_argument("scene", type=READS, help="TOML, the word funnel, or folder of `train`")
     parser.add_argument(
         "--ring",
         nargs=2,
@@ -118,7 +123,7 @@ def _add_rings(words: Any) -> None:
         metavar="N",
         help="infer the heights of N more pours and say how far they are off",
     )
-    _add_common(parser, pours=400, heights=(0.01, 0.13))
+    _add_common(parser, kind="rings", pours=400, heights=(0.01, 0.13))
     parser.set_defaults(run=_rings)
 
 
@@ -129,7 +134,7 @@ def _add_spill(words: Any) -> None:
         description=_SPILL,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("scene", type=Path, help="TOML with an [observe.spill] table")
+    parser.add_argument("scene", type=READS, help="TOML with an [observe.spill] table")
     parser.add_argument(
         "--grains",
         type=int,
@@ -145,7 +150,7 @@ def _add_spill(words: Any) -> None:
         metavar="P",
         help="say from which height on each K is more probable than P (default: 0.05)",
     )
-    _add_common(parser, pours=200, heights=(0.06, 0.3))
+    _add_common(parser, kind="spill", pours=200, heights=(0.06, 0.3))
     parser.set_defaults(run=_spill)
 
 

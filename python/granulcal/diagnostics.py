@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.arrays import as_matrix
+from granulcal.files import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -256,7 +257,7 @@ def plot_coverage(coverage: Coverage, path: str | PathLike[str] | None = None) -
     axis.set(xlim=(0, 1), ylim=(0, 1), xlabel="nominal level", ylabel="share of truths inside")
     axis.legend(frameon=False, loc="upper left")
     if path is not None:
-        figure.savefig(path, dpi=160)
+        save_figure(figure, path, dpi=160)
     return figure
 
 
@@ -284,7 +285,7 @@ def plot_sbc(
             axis.set(ylabel=f"truths, of {count}")
             axis.legend(frameon=False, loc="upper left", fontsize=8)
     if path is not None:
-        figure.savefig(path, dpi=160)
+        save_figure(figure, path, dpi=160)
     return figure
 
 

@@ -7,6 +7,8 @@ __all__ = [
     "PriorError",
     "TrainingDataError",
     "UnreachableRingError",
+    "UnverifiedDataWarning",
+    "UnverifiedModelWarning",
 ]
 
 
@@ -24,6 +26,14 @@ class ObservationError(ValueError):
 
 class ModelFormatError(ValueError):
     """A saved model that is present but cannot be read: truncated, wrong version, wrong shape."""
+
+
+class UnverifiedModelWarning(UserWarning):
+    """A saved model without hashes, as earlier versions wrote them: damage in it is not found."""
+
+
+class UnverifiedDataWarning(UserWarning):
+    """A data set without hashes of its rows, as earlier versions wrote them."""
 
 
 class ExtrapolationError(ValueError):

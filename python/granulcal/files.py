@@ -1,14 +1,66 @@
-"""Files that are whole or absent."""
+"""Files that are whole or absent, and that replace nothing but files of their own kind."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["write_beside"]
+from granulcal import _native
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["beside", "save_figure", "write_beside"]
+
+_TRIES = 100
 
 
-def write_beside(path: Path, text: str) -> None:
-    """Writes a whole file or none."""
+def write_beside(path: Path, text: str | bytes) -> None:
+    """Writes a whole file or none; the ending of its name says what kind it is.
+
+    Raises:
+        ValueError: a file of another kind stands there, or what is there is no plain file.
+        OSError: it cannot be written.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(text, encoding="utf-8")
-    os.replace(beside, path)
+    data = text.encode("utf-8") if isinstance(text, str) else text
+    _native.write_file(path, path.suffix.removeprefix("."), data)
+
+
+def save_figure(figure: "Figure", path: str | PathLike[str], **options: Any) -> None:
+    """Writes a figure as its ending says, PNG if it has none; whole or not at all."""
+    target = Path(path)
+    if not target.suffix:
+        target = target.with_suffix(".png")
+    buffer = BytesIO()
+    figure.savefig(buffer, format=target.suffix.removeprefix(".").lower(), **options)
+    _native.write_file(target, target.suffix.removeprefix("."), buffer.getvalue())
+
+
+@contextmanager
+def beside(path: Path) -> Iterator[Path]:
+    """A new file beside `path`, which takes its place if the block ends well, else is removed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = _new_file(path)
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _new_file(path: Path) -> Path:
+    """Makes an empty file of a name that nobody has; no link of that name is followed."""
+    for attempt in range(_TRIES):
+        # The ending stays last: some writers add it to names that lack it.
+        name = f".{path.stem}.{os.getpid()}-{attempt}.tmp{path.suffix}"
+        temporary = path.with_name(name)
+        try:
+            os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        except FileExistsError:
+            continue
+        return temporary
+    raise FileExistsError(f"every name for a temporary file beside {path} is taken")

@@ -2,10 +2,13 @@
 
 import argparse
 import contextlib
+import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+from granulcal.paths import KEPT, READS, writes
 
 __all__ = ["add"]
 
@@ -43,11 +46,13 @@ def add(commands: Any) -> None:
         description=_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("task", type=Path, help="TOML file, or the folder with its loop.toml")
-    parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the report")
-    parser.add_argument("--archive", type=Path, help="folder of the pours (default: OUT/archive)")
+    parser.add_argument("task", type=READS, help="TOML file, or the folder with its loop.toml")
     parser.add_argument(
-        "--tolerances", type=Path, help="JSON of directions in which the statistics may be off"
+        "-o", "--out", type=writes("loop"), required=True, help="folder of the report"
+    )
+    parser.add_argument("--archive", type=KEPT, help="folder of the pours (default: OUT/archive)")
+    parser.add_argument(
+        "--tolerances", type=READS, help="JSON of directions in which the statistics may be off"
     )
     parser.add_argument("--budget", type=int, default=4000, help="pours, all told (default: 4000)")
     parser.add_argument(
@@ -99,16 +104,15 @@ def _close(options: argparse.Namespace) -> int:
         pairs=options.pairs,
         rounds=options.rounds,
     )
-    archive = "" if options.archive is None else f" --archive {options.archive}"
-    archive += f" --pairs {options.pairs}" if options.pairs else ""
-    archive += f" --rounds {options.rounds}" if options.rounds else ""
-    if options.tolerances is not None:
-        archive += f" --tolerances {options.tolerances}"
+    words: list[str | Path] = ["granulcal", "close-loop", path, "-o", options.out]
+    for name in ("archive", "tolerances", "pairs", "rounds"):
+        if value := getattr(options, name):
+            words += [f"--{name}", str(value)]
+    words += ["--budget", str(options.budget), "--seed", str(options.seed)]
     write_report(
         closed,
         options.out,
-        command=f"granulcal close-loop {path} -o {options.out}{archive} "
-        f"--budget {options.budget} --seed {options.seed}",
+        command=shlex.join(map(str, words)),
         title=f"Closing the loop on {path}",
     )
     return 0 if closed.standing.stands else _FALLEN

@@ -3,8 +3,9 @@
 import argparse
 import json
 import os
-from pathlib import Path
 from typing import Any
+
+from granulcal.paths import READS
 
 __all__ = ["add"]
 
@@ -32,7 +33,7 @@ def add(commands: Any) -> None:
         description=_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("loop", type=Path, help="folder -o of close-loop")
+    parser.add_argument("loop", type=READS, help="folder -o of close-loop")
     parser.add_argument(
         "--at",
         action="append",

@@ -3,13 +3,13 @@
 import tomllib
 from collections.abc import Iterable, Mapping
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.arrays import as_matrix
+from granulcal.documents import LARGEST_DOCUMENT, read_bytes
 from granulcal.errors import PriorError
 from granulcal.parameter import Parameter
 
@@ -101,7 +101,7 @@ class Prior:
             PriorError: the file is not a prior; the message begins with the file's name.
         """
         try:
-            return cls.from_toml(Path(path).read_text(encoding="utf-8"))
+            return cls.from_toml(read_bytes(path, most=LARGEST_DOCUMENT).decode("utf-8"))
         except (PriorError, UnicodeDecodeError) as error:
             raise PriorError(f"{path}: {error}") from None
 
@@ -124,7 +124,7 @@ class Prior:
         """
         try:
             document = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
+        except (tomllib.TOMLDecodeError, RecursionError) as error:
             raise PriorError(f"not valid TOML: {error}") from None
         unknown = sorted(set(document) - {"parameter"})
         if unknown:

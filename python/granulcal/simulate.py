@@ -216,8 +216,10 @@ def simulate(
             give grains: points alone are for `generate`.
 
     Raises:
-        ValueError: a number is out of its range.
+        TypeError: `scene` is no scene.
+        ValueError: a number is out of its range, or more memory is needed than there is.
     """
+    require_scene(scene)
     check_whole("seed", seed, at_least=0)
     check_whole("threads", threads, at_least=1)
     if material is not None:
@@ -234,6 +236,16 @@ def _left_by(engine: "Engine", scene: Scene, seed: int) -> _native.Pour:
     if not isinstance(left, tuple):
         raise ValueError(f"{engine.name} gave points of a surface and no grains")
     return scene.native.pour_of(*left, seed)
+
+
+def require_scene(scene: object) -> None:
+    """Refuses what is no scene, a file's name above all.
+
+    Raises:
+        TypeError: not a scene.
+    """
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene must be a Scene, as Scene.load reads it, got {scene!r}")
 
 
 def check_whole(name: str, value: int, *, at_least: int) -> None:

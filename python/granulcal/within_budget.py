@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal import _native
+from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, Text, read_json
 from granulcal.files import write_beside
 from granulcal.forward import scene_at
 from granulcal.prior import Prior
@@ -28,6 +30,8 @@ __all__ = ["KeptPours", "calibrate_within"]
 
 Array = NDArray[np.float64]
 
+_POUR = Table({"theta": ListOf(Number(), least=1), "status": Text(), "x": Maybe(ListOf(Number()))})
+_SCHEMA = Table({"key": Text(), "pours": Mapping(_POUR)}, {"names": ListOf(Text()), "hash": Text()})
 _EXCLUDED = ("unhealthy", "jammed")
 # Seeds of pours of one run; data sets' are hashes, and reports' begin at 9000.
 _FIRST_SEED = 40_000_000
@@ -113,18 +117,21 @@ class KeptPours:
         return {"theta": theta.tolist(), "status": status, "x": x}
 
     def _read(self) -> dict[str, dict]:
-        try:
-            document = json.loads(self.path.read_text(encoding="utf-8"))
-            key, rows = document["key"], document["pours"]
-        except (ValueError, KeyError, TypeError):
-            raise ValueError(f"{self.path} is damaged or not a file of pours") from None
+        document = read_json(self.path, _SCHEMA)
+        key, rows = document["key"], document["pours"]
+        if document.get("hash") not in (None, _hash(rows)):
+            raise ValueError(f"{self.path} is damaged: its pours are not those that were written")
         if key != self.key:
             raise ValueError(f"{self.path} has the pours of another scene, prior or seed")
         return rows
 
     def _write(self) -> None:
-        text = json.dumps({"key": self.key, "names": self.prior.names, "pours": self.rows})
-        write_beside(self.path, text)
+        document = {"key": self.key, "names": self.prior.names, "hash": _hash(self.rows)}
+        write_beside(self.path, json.dumps({**document, "pours": self.rows}))
+
+
+def _hash(rows: dict[str, dict]) -> str:
+    return _native.hash_bytes(json.dumps(rows, sort_keys=True).encode())
 
 
 def calibrate_within(

@@ -102,6 +102,22 @@ impl Coordinates {
         self.normal.get_or_init(|| DMatrix::from_vec(self.dimension(), NORMAL_POINTS, points()))
     }
 
+    /// Share of the prior below a coordinate.
+    pub fn prior_quantile(&self, parameter: usize, u: f64) -> f64 {
+        let c = &self.each[parameter];
+        match c.distribution {
+            Distribution::Normal { .. } => {
+                ((normal_cdf(u) - normal_cdf(c.low)) / c.log_mass.exp()).clamp(0.0, 1.0)
+            }
+            _ => u.clamp(0.0, 1.0),
+        }
+    }
+
+    /// Coordinates moved inside the bounds.
+    pub fn clipped(&self, u: impl Iterator<Item = f64>) -> Vec<f64> {
+        self.each.iter().zip(u).map(|(c, u)| u.clamp(c.low, c.high)).collect()
+    }
+
     /// Evenly spread draws of the prior.
     pub fn quasi_prior(&self, count: usize) -> Vec<Vec<f64>> {
         let uniform = QuasiUniform::new(self.dimension());

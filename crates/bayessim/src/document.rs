@@ -13,6 +13,8 @@ const VERSION: u64 = 4;
 /// The emulator's weight in such files is that of an arithmetic average.
 const OLDER_VERSION: u64 = 3;
 const VERSIONS: &str = "3 or 4";
+/// Largest number of components, members or features.
+const LARGEST_COUNT: usize = 1_000_000;
 const FORMAT: &str = "granulcal-bayessim";
 
 #[derive(Debug, Deserialize)]
@@ -40,20 +42,28 @@ pub struct Config {
 #[derive(Debug, Deserialize)]
 pub struct EmulatorScalars {
     pub widening: f64,
+    pub degrees: f64,
     pub leading_degrees: f64,
     pub axis_count: usize,
 }
 
 impl Document {
-    pub fn parse(text: &str, path: &Path) -> Result<Self, ModelError> {
+    pub fn parse(text: &[u8], path: &Path) -> Result<Self, ModelError> {
         let wrong = |source| ModelError::Document { path: path.to_owned(), source };
-        let mut value: Value = serde_json::from_str(text).map_err(wrong)?;
+        let mut value: Value = serde_json::from_slice(text).map_err(wrong)?;
         let content = |what: &str, allowed: String, found: String| ModelError::Content {
             path: path.to_owned(),
             what: what.to_owned(),
             allowed,
             found,
         };
+        if !value.is_object() {
+            return Err(content(
+                "the document",
+                "an object".to_owned(),
+                "something else".to_owned(),
+            ));
+        }
         if value["format"] != FORMAT {
             return Err(content("format", FORMAT.to_owned(), value["format"].to_string()));
         }
@@ -77,6 +87,35 @@ impl Document {
         if let Some((name, weight)) = document.average().wrong(document.has_network) {
             let allowed = "a weight, and the network's 0 where there is none".to_owned();
             return Err(content(name, allowed, weight.to_string()));
+        }
+        let config = &document.config;
+        for (name, found) in [
+            ("components", config.components),
+            ("ensemble", config.ensemble),
+            ("features", config.features),
+            ("emulator_features", config.emulator_features),
+        ] {
+            if !(1..=LARGEST_COUNT).contains(&found) {
+                let allowed = format!("between 1 and {LARGEST_COUNT}");
+                return Err(content(name, allowed, found.to_string()));
+            }
+        }
+        let scalars = &document.emulator;
+        for (name, found, low, high) in [
+            ("widening", scalars.widening, 1e-3, 1e3),
+            ("degrees", scalars.degrees, 0.1, 1e6),
+            ("leading_degrees", scalars.leading_degrees, 0.1, 1e6),
+        ] {
+            if !(low..=high).contains(&found) {
+                return Err(content(
+                    name,
+                    format!("between {low} and {high:e}"),
+                    format!("{found:e}"),
+                ));
+            }
+        }
+        if document.x_names.is_empty() {
+            return Err(content("x_names", "at least one name".to_owned(), "none".to_owned()));
         }
         let axes = document.emulator.axis_count;
         if axes == 0 || axes > document.x_names.len() {

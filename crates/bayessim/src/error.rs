@@ -1,6 +1,5 @@
 //! The one error type of the crate.
 
-use std::io;
 use std::path::PathBuf;
 
 use granulcal_dataset::DatasetError;
@@ -10,13 +9,8 @@ use granulcal_dataset::DatasetError;
 #[non_exhaustive]
 pub enum ModelError {
     /// A file of the model cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    File(DatasetError),
     /// `model.json` is cut off, or is the document of something else.
     #[error("{} is not the document of a model: {source}", path.display())]
     Document {
@@ -46,6 +40,18 @@ pub enum ModelError {
         path: PathBuf,
         /// What the reader said.
         reason: String,
+    },
+    /// What stands in a file is not what was written into it.
+    #[error("{}: {what} is damaged: its hash is {found}, written was {stated}; take a copy, or train again", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// The tensor, or the document.
+        what: String,
+        /// The hash of what is there.
+        found: String,
+        /// The hash that was written.
+        stated: String,
     },
     /// A tensor or a number is missing, of another shape, or not finite.
     #[error("{}: {what} must be {allowed}, got {found}", path.display())]

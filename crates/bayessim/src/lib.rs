@@ -14,6 +14,7 @@
 //! | `network`, `mixture` | density of coordinates given statistics |
 //! | `average`, `tilt` | how much each of both counts, and what the prior is multiplied by |
 //! | `importance` | normaliser and draws of a density known up to a factor |
+//! | [`Misfit`], [`Identifiability`] | whether any parameters explain an observation, and what it tells |
 //! | `waves`, `lanes` | random features and mixtures in wide registers |
 //! | [`Model`], [`Posterior`] | the file, and what it says |
 
@@ -22,14 +23,18 @@
 mod average;
 mod component;
 mod coordinates;
+mod damage;
 mod document;
 mod emulator;
 mod error;
+mod identifiability;
 mod importance;
 mod lanes;
 mod likelihood;
 mod matrix;
+mod misfit;
 mod mixture;
+mod mode;
 mod model;
 mod network;
 mod noise;
@@ -42,5 +47,7 @@ mod tilt;
 mod waves;
 
 pub use error::ModelError;
+pub use identifiability::Identifiability;
+pub use misfit::{Misfit, StatisticMisfit};
 pub use model::Model;
 pub use posterior::{Marginal, Posterior, Warning};

@@ -159,14 +159,19 @@ impl Likelihood {
 
 impl Observed {
     fn share(&self, noise: &[f64]) -> f64 {
-        if self.pours == 1.0 {
-            return 1.0;
-        }
-        let size = noise.len() as f64;
-        let ratios = self.variance.iter().zip(noise).map(|(w, s)| (w / s).min(LARGEST_RATIO));
-        let doubt = 1.0 + 2.0 * (2.0 / (size * (self.pours - 1.0))).sqrt();
-        (doubt * ratios.sum::<f64>() / size).min(1.0)
+        averaging_share(self.pours, &self.variance, noise)
     }
+}
+
+/// The share of the noise that k pours have each for themselves, by their variance on each axis.
+pub fn averaging_share(pours: f64, variance: &[f64], noise: &[f64]) -> f64 {
+    if pours == 1.0 {
+        return 1.0;
+    }
+    let size = noise.len() as f64;
+    let ratios = variance.iter().zip(noise).map(|(w, s)| (w / s).min(LARGEST_RATIO));
+    let doubt = 1.0 + 2.0 * (2.0 / (size * (pours - 1.0))).sqrt();
+    (doubt * ratios.sum::<f64>() / size).min(1.0)
 }
 
 fn points(coordinates: &Coordinates) -> Arc<Matrix> {

@@ -118,7 +118,8 @@ impl TruncatedMixture {
     }
 
     pub fn is_mostly_outside(&self) -> bool {
-        self.log_mass < SMALLEST_MASS.ln()
+        // Not a number is no mass, either.
+        self.log_mass.is_nan() || self.log_mass < SMALLEST_MASS.ln()
     }
 
     pub fn log_prob(&self, coordinates: &Coordinates, u: &[f64]) -> f64 {

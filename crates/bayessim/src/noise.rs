@@ -35,6 +35,12 @@ impl Noise {
         Self { whiten, degrees, constant }
     }
 
+    /// Deviations already divided by their scales, in independent units.
+    pub fn whitened(&self, scaled: &[f64]) -> Vec<f64> {
+        let white = |i: usize| dot(&self.whiten.row(i)[..=i], &scaled[..=i]);
+        (0..scaled.len()).map(white).collect()
+    }
+
     /// Log density of deviations already divided by their scales, less the logarithms of the scales.
     pub fn log_density(&self, scaled: &[f64], log_scales: f64) -> f64 {
         let size = scaled.len();

@@ -3,12 +3,17 @@
 use std::fmt;
 
 use crate::coordinates::Coordinates;
+use crate::identifiability::{self, Identifiability};
 use crate::importance::Importance;
 use crate::likelihood::Scratch;
 use crate::matrix::log_sum_exp;
 use crate::mixture::TruncatedMixture;
+use crate::mode;
 use crate::random::Random;
 use crate::tilt::Tilt;
+
+/// Draws among which the search for the mode begins.
+const MODE_DRAWS: usize = 1000;
 
 /// What a reader must know before trusting the numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +42,11 @@ pub enum Warning {
         /// How many.
         effective: f64,
     },
+    /// One material explains the pours much worse than a material for each would.
+    PoursDisagree {
+        /// Log evidence of one material against several [nat].
+        log_evidence_ratio: f64,
+    },
 }
 
 impl fmt::Display for Warning {
@@ -52,6 +62,10 @@ impl fmt::Display for Warning {
             Self::FewEffectiveDraws { effective } => {
                 write!(f, "the posterior is worth {effective:.0} draws only")
             }
+            Self::PoursDisagree { log_evidence_ratio } => write!(
+                f,
+                "the pours contradict each other: log evidence of one material against several is {log_evidence_ratio:.1}"
+            ),
         }
     }
 }
@@ -159,9 +173,26 @@ impl Posterior<'_> {
         self.values(n, seed, Draws::Walked)
     }
 
+    /// The parameters of highest density in coordinates, in own units; always the same.
+    pub fn mode(&self) -> Vec<f64> {
+        let draws = self.draws(MODE_DRAWS, 0, Draws::Resampled);
+        let best = mode::climb(self.coordinates, |u| self.coordinate_log_prob(u), &draws);
+        self.coordinates.values(&best)
+    }
+
+    /// What it knows of the parameters.
+    pub fn identifiability(&self) -> Identifiability {
+        let draws = self.draws(identifiability::DRAWS, 0, Draws::Walked);
+        Identifiability::of(self.names, self.coordinates, &draws)
+    }
+
     fn values(&self, n: usize, seed: u64, kind: Draws) -> Vec<Vec<f64>> {
+        self.draws(n, seed, kind).iter().map(|u| self.coordinates.values(u)).collect()
+    }
+
+    fn draws(&self, n: usize, seed: u64, kind: Draws) -> Vec<Vec<f64>> {
         let (coordinates, mut random) = (self.coordinates, Random::new(seed));
-        let draws = match &self.belief {
+        match &self.belief {
             Belief::Tilted(tilted) => tilted.sample(coordinates, n, &mut random, kind),
             Belief::Learnt(learnt) => learnt.sample(coordinates, n, &mut random),
             Belief::Sum(tilted, learnt, weight) => {
@@ -170,8 +201,7 @@ impl Posterior<'_> {
                 draws.extend(learnt.sample(coordinates, n - count, &mut random));
                 draws
             }
-        };
-        draws.iter().map(|u| coordinates.values(u)).collect()
+        }
     }
 
     /// Mean, median and central interval of each parameter.

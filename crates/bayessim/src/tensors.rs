@@ -57,6 +57,16 @@ impl<'a> Tensors<'a> {
         Ok(Matrix { data, columns: shape[1] })
     }
 
+    /// A tensor that is there and cannot be used.
+    pub fn unfit(&self, name: &str, allowed: &str, found: &str) -> ModelError {
+        ModelError::Content {
+            path: self.path.clone(),
+            what: name.to_owned(),
+            allowed: allowed.to_owned(),
+            found: found.to_owned(),
+        }
+    }
+
     fn any(
         &self,
         name: &str,

@@ -68,7 +68,7 @@ impl<'a> Tilt<'a> {
                 let at_most = mean(mixtures, Mixture::log_bound);
                 let bound = |u: &[f64], emulated: f64| {
                     let learnt = at_most - coordinates.log_density(u);
-                    average.emulator * emulated + average.network * learnt
+                    average.of(emulated, learnt)
                 };
                 let best = (0..emulated.len()).max_by(|&i, &j| emulated[i].total_cmp(&emulated[j]));
                 let reached = best.map_or(f64::NEG_INFINITY, |i| {
@@ -97,7 +97,7 @@ impl<'a> Tilt<'a> {
     fn with(&self, coordinates: &Coordinates, u: &[f64], emulated: f64) -> f64 {
         self.network.as_ref().map_or(emulated, |(mixtures, average)| {
             let learnt = mean(mixtures, |mixture| mixture.log_prob(u)) - coordinates.log_density(u);
-            average.emulator * emulated + average.network * learnt
+            average.of(emulated, learnt)
         })
     }
 }

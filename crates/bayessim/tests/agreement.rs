@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use granulcal_bayessim::{Model, ModelError, Warning};
+use granulcal_bayessim::{Model, Warning};
 use serde_json::Value;
 
 /// Agreement asked for [nat].
@@ -70,8 +70,15 @@ fn several_pours_are_one_posterior() {
     for (at, expected) in theta.iter().zip(expected) {
         assert!((posterior.log_prob(at) - expected - offset).abs() < TOLERANCE);
     }
-    let refused = Model::load(&data().join("mdrff")).unwrap();
-    assert!(matches!(refused.posterior(&x), Err(ModelError::Observation { .. })));
+    // A network's posteriors are multiplied over the prior: more is known than from each.
+    let network = Model::load(&data().join("mdrff")).unwrap();
+    let spread = |x: &[Vec<f64>]| {
+        let (low, high) = network.posterior(x).unwrap().marginals(10_000, 1)[0].interval90;
+        high - low
+    };
+    let singles: Vec<f64> = x.iter().map(|row| spread(std::slice::from_ref(row))).collect();
+    let widest = singles.iter().copied().fold(0.0, f64::max);
+    assert!(spread(&x) < 0.95 * widest, "{} {singles:?}", spread(&x));
 }
 
 #[test]
@@ -148,4 +155,38 @@ fn damaged_models_are_named() {
     }
     fs::write(&document, &text[..100]).unwrap();
     assert!(refuse().contains("model.json"));
+}
+
+#[test]
+fn a_single_flipped_bit_is_found_where_there_are_hashes() {
+    let place = tempfile::tempdir().unwrap();
+    let read = |name: &str| fs::read(data().join("mdrff").join(name)).unwrap();
+    let (document, weights) = (read("model.json"), read("weights.safetensors"));
+    // As Python writes them.
+    let tensors = safetensors::SafeTensors::deserialize(&weights).unwrap();
+    let hash = |bytes: &[u8]| format!("{:032x}", xxhash_rust::xxh3::xxh3_128(bytes));
+    let mut hashes = std::collections::HashMap::new();
+    hashes.insert("hash.model.json".to_owned(), hash(&document));
+    for (name, tensor) in tensors.tensors() {
+        let head = format!("{name} {:?} {:?}\n", tensor.dtype(), tensor.shape());
+        hashes.insert(format!("hash.{name}"), hash(&[head.as_bytes(), tensor.data()].concat()));
+    }
+    let whole = safetensors::serialize(tensors.tensors(), Some(hashes)).unwrap();
+    let write = |name: &str, bytes: &[u8]| fs::write(place.path().join(name), bytes).unwrap();
+    write("model.json", &document);
+    write("weights.safetensors", &whole);
+    assert!(Model::load(place.path()).unwrap().is_verified);
+    assert!(!Model::load(&data().join("mdrff")).unwrap().is_verified);
+    for (name, bytes) in [("model.json", &document), ("weights.safetensors", &whole)] {
+        for i in 0..200 {
+            let mut flipped = bytes.clone();
+            flipped[i * bytes.len() / 200] ^= 1 << (i % 8);
+            write(name, &flipped);
+            let error = Model::load(place.path()).unwrap_err().to_string();
+            // The hash of the document stands beside the tensors.
+            let is_named = error.contains(name) || error.contains("model.json");
+            assert!(is_named, "bit {i}: {error}");
+        }
+        write(name, bytes);
+    }
 }

@@ -3,20 +3,21 @@
 mod completions;
 mod global;
 mod infer;
+pub mod paths;
 mod read;
 mod sensor;
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
-use granulcal_dataset::Shard;
+use granulcal_dataset::{Form, Product, Shard};
 use granulcal_dem::Preset;
 
 pub use completions::CompletionsArgs;
 pub use global::Global;
 pub use infer::InferArgs;
+use paths::{Reads, Writes, kept, recording, writes};
 pub use read::ReadArgs;
 pub use sensor::{FitSensorArgs, PickColourArgs};
 
@@ -31,7 +32,7 @@ Start here:
   granulcal-cli infer model pile.bag                  its material, by a model of `granulcal train`
 
 Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy or without
-grains in view or some frames of a recording lost, 130 stopped. Results go to stdout, progress and messages to stderr.")]
+grains in view, some frames of a recording lost, or a recording outside the model, 130 stopped. Results go to stdout, progress and messages to stderr.")]
 pub struct Cli {
     #[command(flatten)]
     pub global: Global,
@@ -67,7 +68,7 @@ Example:
 #[derive(Clone, Debug, Args)]
 pub struct SceneArgs {
     /// Scene as TOML, or one of the words `funnel` and `drop` for the scenes that are built in
-    pub scene: PathBuf,
+    pub scene: Reads,
     #[command(flatten)]
     pub with: SceneChanges,
 }
@@ -80,7 +81,7 @@ pub struct SceneChanges {
     pub changes: Vec<(String, f64)>,
     /// Sensor of the camera as `fit-sensor` wrote it, instead of the scene's
     #[arg(long, value_name = "SENSOR.toml")]
-    pub sensor: Option<PathBuf>,
+    pub sensor: Option<Reads>,
     /// Solver preset instead of the scene's
     #[arg(long, value_parser = PossibleValuesParser::new(Preset::ALL.map(Preset::name))
         .try_map(|word| word.parse::<Preset>()))]
@@ -133,30 +134,37 @@ pub struct SimulateArgs {
     #[arg(long)]
     pub diagnostics: bool,
     /// Write the final centres [m] as an array (n, 3)
-    #[arg(long, value_name = "OUT.npy")]
-    pub positions: Option<PathBuf>,
+    #[arg(long, value_name = "OUT.npy", value_parser = writes(Product::File(Form::Npy)))]
+    pub positions: Option<Writes>,
     /// Write the final depth image (16-bit PNG), or the height map of an orthographic camera (.npz)
-    #[arg(long, value_name = "OUT.png")]
-    pub depth: Option<PathBuf>,
+    #[arg(long, value_name = "OUT.png", value_parser = writes(Product::View))]
+    pub depth: Option<Writes>,
     /// Metres per count of the PNG
-    #[arg(long, default_value_t = granulcal_dataset::png::DEPTH_UNIT, value_name = "METRES")]
+    #[arg(long, default_value_t = granulcal_dataset::png::DEPTH_UNIT, value_name = "METRES",
+        value_parser = parse_positive)]
     pub depth_unit: f64,
     /// Write grains and depth image over time, for Foxglove
-    #[arg(long, value_name = "OUT.mcap")]
-    pub mcap: Option<PathBuf>,
+    #[arg(long, value_name = "OUT.mcap", value_parser = writes(Product::File(Form::Mcap)))]
+    pub mcap: Option<Writes>,
     /// Frames per simulated second in the MCAP
-    #[arg(long, default_value_t = 60.0, requires = "mcap")]
+    #[arg(long, default_value_t = 60.0, requires = "mcap", value_parser = parse_positive)]
     pub fps: f64,
     /// Keep the whole state in this file, for --resume
-    #[arg(long, value_name = "FILE", conflicts_with = "mcap")]
-    pub checkpoint: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", conflicts_with = "mcap",
+        value_parser = writes(Product::File(Form::Checkpoint)))]
+    pub checkpoint: Option<Writes>,
     /// Time between two checkpoints on the clock [s]; 0 for as often as possible
     #[arg(long, value_name = "SECONDS", default_value = "60", requires = "checkpoint",
         value_parser = parse_period)]
     pub checkpoint_every: Duration,
     /// Go on from a checkpoint of the same scene, seed and preset, on any number of threads
-    #[arg(long, value_name = "FILE", conflicts_with = "mcap")]
-    pub resume: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", conflicts_with = "mcap", value_parser = kept())]
+    pub resume: Option<Reads>,
+}
+
+fn parse_positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|&number: &f64| number > 0.0 && number.is_finite());
+    number.ok_or_else(|| format!("must be a positive number, got {text:?}"))
 }
 
 fn parse_period(text: &str) -> Result<Duration, String> {
@@ -182,7 +190,7 @@ pub struct GenerateArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Prior as TOML, or the word `default` for the friction, rolling friction and restitution of a dry grain
-    pub prior: PathBuf,
+    pub prior: Reads,
     /// Another simulator in place of ours: lammps, liggghts, yade, mujoco, newton, module:function or a
     /// command; `granulcal` of the Python package only
     #[arg(long, value_name = "ENGINE")]
@@ -191,8 +199,8 @@ pub struct GenerateArgs {
     #[arg(long = "rows", short = 'n', default_value_t = 1000)]
     pub rows: u64,
     /// Folder to write into
-    #[arg(long = "out", short = 'o', value_name = "DIR")]
-    pub out: PathBuf,
+    #[arg(long = "out", short = 'o', value_name = "DIR", value_parser = writes(Product::DATA_SET))]
+    pub out: Writes,
     /// Seed of the data set
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
@@ -205,6 +213,9 @@ pub struct GenerateArgs {
     /// Rows in a part
     #[arg(long, default_value_t = 16)]
     pub chunk: u64,
+    /// Longest time that a finished row is in memory only, and a kill can lose it [s]
+    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = parse_period)]
+    pub flush_every: Duration,
     /// Refuse a folder that holds rows already
     #[arg(long)]
     pub no_resume: bool,
@@ -230,19 +241,20 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
     /// Image to write: .png for a pinhole camera, .npz for an orthographic one
-    #[arg(long = "out", short = 'o')]
-    pub out: PathBuf,
+    #[arg(long = "out", short = 'o', value_parser = writes(Product::View))]
+    pub out: Writes,
     /// What this one of the scene's views sees, a depth image without noise, instead of the scene's camera
     #[arg(long, value_name = "NAME")]
     pub view: Option<String>,
     /// Render these centres [m], an array (n, 3), with the scene's grain diameter, instead of a pour
     #[arg(long, value_name = "IN.npy")]
-    pub positions: Option<PathBuf>,
+    pub positions: Option<Reads>,
     /// Seed of the pour and of the camera's noise
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
     /// Metres per count of the PNG
-    #[arg(long, default_value_t = granulcal_dataset::png::DEPTH_UNIT, value_name = "METRES")]
+    #[arg(long, default_value_t = granulcal_dataset::png::DEPTH_UNIT, value_name = "METRES",
+        value_parser = parse_positive)]
     pub depth_unit: f64,
 }
 
@@ -273,8 +285,8 @@ Example:
   granulcal-cli features --list")]
 pub struct FeaturesArgs {
     /// Recording to describe
-    #[arg(required_unless_present = "list")]
-    pub recording: Option<PathBuf>,
+    #[arg(required_unless_present = "list", value_parser = recording())]
+    pub recording: Option<Reads>,
     #[command(flatten)]
     pub read: ReadArgs,
     /// Height above the ground from which a pixel counts as grain [m]
@@ -289,7 +301,7 @@ pub struct FeaturesArgs {
     /// Down-sample so that a pixel is as wide on the ground as in this scene's images: a TOML, or `funnel`
     /// or `drop`
     #[arg(long, value_name = "SCENE", conflicts_with = "downsample")]
-    pub scene: Option<PathBuf>,
+    pub scene: Option<Reads>,
     /// Height above which a pixel is a fault and no data [m]
     #[arg(long, value_name = "METRES")]
     pub max_height: Option<f64>,
@@ -297,12 +309,12 @@ pub struct FeaturesArgs {
     #[arg(long, value_name = "PIXELS")]
     pub min_component: Option<usize>,
     /// Write the points of the formation [m] as an array (n, 3)
-    #[arg(long, value_name = "OUT.npy")]
-    pub points: Option<PathBuf>,
+    #[arg(long, value_name = "OUT.npy", value_parser = writes(Product::File(Form::Npy)))]
+    pub points: Option<Writes>,
     /// Write pictures of the steps into this folder: residual.png (distance from the fitted plane),
     /// height.png, mask.png
-    #[arg(long, value_name = "DIR")]
-    pub debug_images: Option<PathBuf>,
+    #[arg(long, value_name = "DIR", value_parser = writes(Product::PICTURES))]
+    pub debug_images: Option<Writes>,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
@@ -342,10 +354,11 @@ Example:
   granulcal-cli inspect drop --set grains.count=60 --contact-problem frozen.npz --time 0.2")]
 pub struct InspectArgs {
     /// File or folder
-    pub path: PathBuf,
+    pub path: Reads,
     /// Write the contact problem of a scene's next substep after --time
-    #[arg(long, value_name = "OUT.npz", requires = "time")]
-    pub contact_problem: Option<PathBuf>,
+    #[arg(long, value_name = "OUT.npz", requires = "time",
+        value_parser = writes(Product::File(Form::Npz)))]
+    pub contact_problem: Option<Writes>,
     #[command(flatten)]
     pub substep: SubstepArgs,
     /// Print one JSON object
@@ -377,10 +390,11 @@ Example:
 pub struct MergeArgs {
     /// Folders of `generate`, or Parquet files
     #[arg(required = true)]
-    pub inputs: Vec<PathBuf>,
+    pub inputs: Vec<Reads>,
     /// File to write
-    #[arg(long = "out", short = 'o', value_name = "OUT.parquet")]
-    pub out: PathBuf,
+    #[arg(long = "out", short = 'o', value_name = "OUT.parquet",
+        value_parser = writes(Product::File(Form::Parquet)))]
+    pub out: Writes,
     /// Print the summary as one JSON object
     #[arg(long)]
     pub json: bool,
@@ -388,6 +402,10 @@ pub struct MergeArgs {
 
 #[cfg(test)]
 mod tests {
+    use std::any::TypeId;
+    use std::ffi::OsString;
+    use std::path::PathBuf;
+
     use clap::CommandFactory;
 
     use super::*;
@@ -395,6 +413,29 @@ mod tests {
     #[test]
     fn arguments_are_consistent() {
         Cli::command().debug_assert();
+    }
+
+    /// A path that does not say whether it is read or written escapes the check of [`paths`].
+    #[test]
+    fn every_path_says_whether_it_is_read_or_written() {
+        fn walk(command: &clap::Command, found: &mut Vec<String>) {
+            for argument in command.get_arguments() {
+                let kind = argument.get_value_parser().type_id();
+                if kind == TypeId::of::<PathBuf>() || kind == TypeId::of::<OsString>() {
+                    found.push(format!("{} {}", command.get_name(), argument.get_id()));
+                }
+                // Texts that are no paths are known by name: a new one is to be looked at.
+                let is_text = kind == TypeId::of::<String>();
+                let texts = ["topic", "camera_topic", "colour_topic", "view", "engine"];
+                if is_text && !texts.contains(&argument.get_id().as_str()) {
+                    found.push(format!("{} {}", command.get_name(), argument.get_id()));
+                }
+            }
+            command.get_subcommands().for_each(|below| walk(below, found));
+        }
+        let mut found = Vec::new();
+        walk(&Cli::command(), &mut found);
+        assert!(found.is_empty(), "neither Reads nor Writes: {found:?}");
     }
 
     #[test]

@@ -1,15 +1,13 @@
 //! What every command gets: how loud to be, and whether the user wants to stop.
 
+use std::borrow::Cow;
 use std::io::{self, IsTerminal, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 use tracing_subscriber::filter::LevelFilter;
 
 use crate::args::Global;
-
-/// Set by Ctrl-C and by termination signals. One for the process, as the signals are.
-static STOP: AtomicBool = AtomicBool::new(false);
+use crate::interrupt;
 
 /// Options and state that all commands share.
 #[derive(Debug)]
@@ -38,20 +36,24 @@ impl Context {
             .without_time()
             .with_target(false)
             .try_init();
-        STOP.store(false, Ordering::Relaxed);
-        let _ = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));
+        let _ = ctrlc::set_handler(interrupt::asked);
         Self { quiet: global.quiet, terminal }
     }
 }
 
-/// Whether the user has not asked to stop.
-pub fn keeps_going() -> bool {
-    !STOP.load(Ordering::Relaxed)
+/// A text in which nothing steers a terminal: names in a stranger's file may hold escapes.
+fn plain(text: &str) -> Cow<'_, str> {
+    let steers = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    if !text.contains(steers) {
+        return Cow::Borrowed(text);
+    }
+    let told = |c: char| if steers(c) { c.escape_default().to_string() } else { c.to_string() };
+    Cow::Owned(text.chars().map(told).collect())
 }
 
 /// Prints a line to stderr. If even that is closed there is no one left to tell.
 pub fn note(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = writeln!(io::stderr(), "{}", plain(line));
 }
 
 /// Prints a line of results.
@@ -60,7 +62,7 @@ pub fn note(line: &str) {
 /// What stdout says, a broken pipe above all.
 pub fn print_line(line: &str) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
-    writeln!(out, "{line}")?;
+    writeln!(out, "{}", plain(line))?;
     Ok(out.flush()?)
 }
 
@@ -70,4 +72,15 @@ pub fn print_line(line: &str) -> anyhow::Result<()> {
 /// As [`print_line`].
 pub fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
     print_line(&serde_json::to_string_pretty(value)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_text_steers_the_terminal() {
+        assert_eq!(plain("a\tb\n"), "a\tb\n");
+        assert_eq!(plain("\u{1b}[2Jtopic\u{7}"), "\\u{1b}[2Jtopic\\u{7}");
+    }
 }

@@ -5,18 +5,20 @@
 //! | code | meaning |
 //! |---|---|
 //! | 0 | done; also when whoever read stdout closed it |
-//! | 1 | failed: a disk that is full, a folder in use |
+//! | 1 | failed: a disk that is full, a folder in use; the result is printed even if a file beside it failed |
 //! | 2 | bad arguments or bad input |
-//! | 3 | done, but some pours are unhealthy or show no grains, or a recording is cut off or damaged |
+//! | 3 | done, but some pours are unhealthy or show no grains, a recording is cut off or damaged, or outside the model |
 //! | 130 | stopped by Ctrl-C or a termination signal; finished rows are kept |
 
 mod args;
 mod commands;
 mod context;
+pub mod interrupt;
 mod outcome;
 mod program;
 mod progress;
 mod scene;
+mod sides;
 
 use std::ffi::OsString;
 
@@ -48,16 +50,17 @@ pub fn run_as(program: &Program, args: impl IntoIterator<Item = OsString>) -> u8
     let args: Vec<_> = args.into_iter().collect();
     let mut command = program.command();
     let found = command.try_get_matches_from_mut(args.clone());
-    let parsed = found.and_then(|mut found| {
+    let parsed = found.and_then(|found| {
         // The words of the program's own commands are known for help and completions alone.
         if program.is_further(&args) {
             let text = format!("{} runs this command itself", program.binary());
             return Err(command.error(clap::error::ErrorKind::InvalidSubcommand, text));
         }
-        Cli::from_arg_matches_mut(&mut found).map_err(|refusal| refusal.format(&mut command))
+        let cli = Cli::from_arg_matches(&found).map_err(|refusal| refusal.format(&mut command))?;
+        Ok((cli, found))
     });
-    let cli = match parsed {
-        Ok(cli) => cli,
+    let (cli, matches) = match parsed {
+        Ok(parsed) => parsed,
         Err(refusal) => {
             // Help and version are no failures; if even stderr is closed there is no one to tell.
             let _ = refusal.print();
@@ -65,7 +68,9 @@ pub fn run_as(program: &Program, args: impl IntoIterator<Item = OsString>) -> u8
         }
     };
     let context = Context::new(&cli.global);
-    match commands::dispatch(&context, program, cli.command) {
+    let _armed = interrupt::arm();
+    let checked = args::paths::check(&command, &matches).map_err(anyhow::Error::from);
+    match checked.and_then(|()| commands::dispatch(&context, program, cli.command)) {
         Ok(outcome) => outcome.exit_code(),
         Err(error) => {
             let code = outcome::exit_code_of(&error);

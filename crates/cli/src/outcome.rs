@@ -16,6 +16,10 @@ pub enum Outcome {
     SomeUnhealthy,
     /// As asked, but the input is cut off or damaged and a part of it is lost.
     SomeLost,
+    /// As asked, but the model cannot explain what was recorded.
+    OutsideModel,
+    /// The result is printed, but a file beside it could not be written.
+    SideFileFailed,
     /// The user stopped it.
     Stopped,
 }
@@ -25,7 +29,8 @@ impl Outcome {
     pub fn exit_code(self) -> u8 {
         match self {
             Self::Done => 0,
-            Self::SomeUnhealthy | Self::SomeLost => 3,
+            Self::SideFileFailed => 1,
+            Self::SomeUnhealthy | Self::SomeLost | Self::OutsideModel => 3,
             // As shells report a process that SIGINT ended.
             Self::Stopped => 130,
         }

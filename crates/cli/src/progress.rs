@@ -4,6 +4,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use granulcal_dataset::Progress;
+
 use crate::context::{Context, note};
 
 /// Time between two lines where stderr is no terminal.
@@ -37,20 +39,28 @@ impl RowProgress {
         Self { bar, lines: !context.terminal && !context.quiet, started: now, last_line: now }
     }
 
-    /// Shows `done` of `total`, of which `resumed` were there at the start.
-    pub fn show(&mut self, done: u64, resumed: u64, total: u64, unhealthy: u64) {
+    /// Shows how far the batch is.
+    pub fn show(&mut self, progress: &Progress) {
+        let Progress { total, resumed, made, unhealthy, out_of_view, jammed, .. } = *progress;
+        let done = resumed + made;
         if self.bar.length() != Some(total) {
             self.bar.set_length(total);
             self.bar.set_position(resumed);
             self.bar.reset_eta();
         }
         self.bar.set_position(done);
-        if unhealthy > 0 {
-            self.bar.set_message(format!("({unhealthy} unhealthy or without grains)"));
+        let counts =
+            [(unhealthy, "unhealthy"), (out_of_view, "without grains in view"), (jammed, "jammed")];
+        let told: Vec<_> = counts
+            .iter()
+            .filter(|(count, _)| *count > 0)
+            .map(|(count, what)| format!("{count} {what}"))
+            .collect();
+        if !told.is_empty() {
+            self.bar.set_message(format!("({})", told.join(", ")));
         }
         if self.lines && self.last_line.elapsed() >= PERIOD {
             self.last_line = Instant::now();
-            let made = done - resumed;
             let rate = made as f64 / self.started.elapsed().as_secs_f64();
             let left = if made > 0 {
                 let seconds = Duration::from_secs_f64((total - done) as f64 / rate);

@@ -5,15 +5,17 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use granulcal_dataset::{
-    DatasetError, Observer, Prior, load_prior, load_scene, load_sensor, record_pour,
+    DatasetError, Observer, Prior, Room, load_prior, load_scene, load_sensor, record_pour,
     resume_checkpoint, write_checkpoint,
 };
 use granulcal_dem::{Pour, Scene, Simulation};
 
 use crate::args::{SceneArgs, SceneChanges};
-use crate::context::{Context, keeps_going};
+use crate::context::Context;
+use crate::interrupt::keeps_going;
 use crate::outcome::BadArgument;
 use crate::progress::PourProgress;
+use crate::sides::SideFiles;
 
 /// Height of the funnel's tip of the built-in scene, the paper's `[m]`.
 const FUNNEL_HEIGHT: f64 = 0.12;
@@ -114,6 +116,7 @@ pub fn start(
     threads: usize,
     resume: Option<&Path>,
 ) -> Result<Simulation, DatasetError> {
+    Room::of_pour(scene, None).require(None)?;
     let simulation = Simulation::new(scene, seed)
         .and_then(|simulation| simulation.with_threads(threads))
         .map_err(DatasetError::Simulation)?;
@@ -128,7 +131,8 @@ pub fn start(
 /// Simulates `scene` from where `simulation` is to its end, before the eyes of `observer`; `None` when the user stopped it.
 ///
 /// # Errors
-/// What is wrong with the file that is kept.
+/// What is wrong with the file that is kept, before anything is simulated or when the user stops; later on it is kept
+/// in `sides`.
 pub fn pour(
     context: &Context,
     scene: &Scene,
@@ -136,6 +140,7 @@ pub fn pour(
     simulation: Simulation,
     keep: &Keep,
     observer: &mut Observer,
+    sides: &mut SideFiles,
 ) -> Result<Option<Pour>, DatasetError> {
     let progress = PourProgress::new(context);
     let horizon = scene.end.horizon;
@@ -145,18 +150,39 @@ pub fn pour(
     };
     let pour = match *keep {
         Keep::Film { path, fps } => {
-            record_pour(simulation, scene, seed, fps, path, observer, &mut watch)?
+            let filmed = record_pour(simulation, scene, seed, fps, path, observer, &mut watch)?;
+            filmed.map(|(pour, film)| {
+                sides.keep(film);
+                pour
+            })
         }
         Keep::Nothing => run(simulation, observer, &mut watch, &mut |_, _| Ok(()))?,
         Keep::Checkpoint { path, every } => {
             let mut last = None;
-            run(simulation, observer, &mut watch, &mut |simulation, must| {
+            let mut failed = None;
+            let pour = run(simulation, observer, &mut watch, &mut |simulation, must| {
                 if must || last.is_none_or(|last: Instant| last.elapsed() >= every) {
-                    write_checkpoint(path, simulation)?;
+                    match write_checkpoint(path, simulation) {
+                        Ok(()) => failed = None,
+                        // Nothing is lost yet.
+                        Err(error) if last.is_none() => return Err(error),
+                        Err(error) => {
+                            if failed.is_none() {
+                                tracing::warn!("{error}; the pour goes on without this checkpoint");
+                            }
+                            failed = Some(error);
+                        }
+                    }
                     last = Some(Instant::now());
                 }
                 Ok(())
-            })?
+            })?;
+            match (failed, &pour) {
+                (Some(error), None) => return Err(error),
+                (Some(error), Some(_)) => sides.keep(Err(error)),
+                (None, _) => {}
+            }
+            pour
         }
     };
     progress.finish();

@@ -173,7 +173,11 @@ fn infer_evaluates_a_model_without_python() {
     let model = models.join("pile").display().to_string();
     let place = Place::new();
     copied(&place, BAG);
-    let found = json(&place.expect(0, &["infer", &model, BAG, "--json", "--samples", "50"]));
+    // The model is of made-up statistics: no parameters explain a pile.
+    let found = json(&place.expect(3, &["infer", &model, BAG, "--json", "--samples", "50"]));
+    assert_eq!(found["inside_model"]["is_inside"], false);
+    assert_eq!(found["inside_model"]["statistics"].as_object().unwrap().len(), 16);
+    assert_eq!(found["identifiability"]["names"].as_array().unwrap().len(), 3);
     let described = json(&place.expect(0, &["features", BAG, "--json"]));
     assert_eq!(found["statistics"][0], described["statistics"]);
     assert_eq!(found["samples"].as_array().unwrap().len(), 50);
@@ -181,10 +185,13 @@ fn infer_evaluates_a_model_without_python() {
     let (low, high) = (&friction["interval90"][0], &friction["interval90"][1]);
     assert!(0.0 <= low.as_f64().unwrap() && low.as_f64() < high.as_f64());
     assert!(high.as_f64().unwrap() <= 1.0);
-    let lines = place.expect(0, &["infer", &model, BAG, BAG]);
+    let mode = friction["mode"].as_f64().unwrap();
+    assert!((0.0..=1.0).contains(&mode));
+    let lines = place.expect(3, &["infer", &model, BAG, BAG]);
+    assert!(lines.contains("OUTSIDE THE MODEL"), "{lines}");
     assert!(lines.contains("material.restitution") && lines.contains("90 % interval"), "{lines}");
     let other = models.join("auto").display().to_string();
-    place.refused(&["infer", &other, BAG], &["other statistics", "statistic_0"]);
+    place.refused(&["infer", &other, BAG], &["in this order", "statistic_0"]);
     place.refused(&["infer", "nothing", BAG], &["nothing", "model.json"]);
     place.refused(&["infer", &model, "nothing.bag"], &["nothing.bag"]);
 }

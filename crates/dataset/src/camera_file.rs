@@ -6,7 +6,8 @@ use granulcal_features::{Camera, Intrinsics, Segmentation};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::{DatasetError, files};
+use crate::form::marked;
+use crate::{DatasetError, Form, files};
 
 /// A depth camera as a file states it.
 ///
@@ -132,14 +133,14 @@ impl CameraFile {
         }
     }
 
-    /// Writes the file.
+    /// Writes the file, where there is none or one that was written here and nobody has changed.
     ///
     /// # Errors
-    /// [`DatasetError::Io`] or [`DatasetError::TomlWrite`].
+    /// [`DatasetError::Replaces`], [`DatasetError::Io`] or [`DatasetError::TomlWrite`].
     pub fn save(&self, path: &Path) -> Result<(), DatasetError> {
         let text = toml::to_string(self)
             .map_err(|e| DatasetError::TomlWrite { what: "the camera", source: Box::new(e) })?;
-        files::write_file(path, text.as_bytes())
+        files::write_file(path, Form::CameraToml, marked(&text).as_bytes())
     }
 }
 
@@ -177,6 +178,30 @@ pub(crate) fn camera_of(intrinsics: Intrinsics) -> Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_camera_that_somebody_changed_is_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("camera.toml");
+        let camera = CameraFile::of(&Camera::overhead(0.4, 0.4, 100).unwrap(), 1e-3);
+        let other = CameraFile::of(&Camera::overhead(0.3, 0.4, 100).unwrap(), 1e-3);
+        camera.save(&path).unwrap();
+        other.save(&path).unwrap();
+        assert_eq!(CameraFile::load(&path).unwrap(), other);
+        let text = std::fs::read_to_string(&path).unwrap();
+        for changed in [
+            format!("{text}\n[segmentation]\nborder_px = 8\n"),
+            text.replace("depth_unit = 0.001", "depth_unit = 0.002"),
+            text.split_once('\n').unwrap().1.to_owned(),
+            "name = \"a scene\"\n".to_owned(),
+        ] {
+            assert_ne!(changed, text);
+            std::fs::write(&path, &changed).unwrap();
+            let error = camera.save(&path).unwrap_err().to_string();
+            assert!(error.contains("camera.toml") && error.contains("another name"), "{error}");
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), changed);
+        }
+    }
 
     #[test]
     fn a_lens_is_whole_or_absent() {

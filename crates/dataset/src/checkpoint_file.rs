@@ -4,14 +4,14 @@ use std::path::Path;
 
 use granulcal_dem::{CheckpointHeader, DemError, Simulation};
 
-use crate::{DatasetError, files};
+use crate::{DatasetError, Form, files};
 
 /// Writes the whole state of a simulation; the file that was there before stays until the new one is complete.
 ///
 /// # Errors
 /// [`DatasetError::Io`].
 pub fn write_checkpoint(path: &Path, simulation: &Simulation) -> Result<(), DatasetError> {
-    files::write_file(path, &simulation.checkpoint())
+    files::write_file(path, Form::Checkpoint, &simulation.checkpoint())
 }
 
 /// Takes `simulation`, just made from a scene and a seed, to where the checkpoint at `path` was written.

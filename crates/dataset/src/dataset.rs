@@ -9,6 +9,7 @@ use granulcal_features::{DIAGNOSTICS, PAPER16};
 use crate::header::Header;
 use crate::manifest::{self, Manifest};
 use crate::row::Row;
+use crate::table::Table;
 use crate::{DatasetError, ObservedStatistic, table};
 
 /// All rows of a data set, in order of their index.
@@ -18,18 +19,22 @@ pub struct Dataset {
     pub header: Header,
     /// The rows; an unfinished data set has gaps in the indices.
     pub rows: Vec<Row>,
+    /// Files that do not say what their rows hash to, so that damage in them cannot be found: those of before there
+    /// was a hash.
+    pub unverified: Vec<PathBuf>,
 }
 
 impl Dataset {
     /// Reads a folder that [`crate::generate`] made, or one Parquet file.
     ///
     /// # Errors
-    /// [`DatasetError::Io`], [`DatasetError::Parquet`] or [`DatasetError::Content`] name the file
-    /// and what is wrong with it; [`DatasetError::Differs`] for parts of different data sets.
+    /// [`DatasetError::Io`], [`DatasetError::Parquet`], [`DatasetError::Damaged`] or [`DatasetError::Content`] name the
+    /// file and what is wrong with it; [`DatasetError::Differs`] for parts of different data sets.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
         if !path.is_dir() {
-            let (header, rows) = table::read(path)?;
-            let mut dataset = Self { header, rows };
+            let Table { header, rows, is_verified } = table::read(path)?;
+            let unverified = if is_verified { Vec::new() } else { vec![path.to_owned()] };
+            let mut dataset = Self { header, rows, unverified };
             dataset.sort(path)?;
             return Ok(dataset);
         }
@@ -37,12 +42,16 @@ impl Dataset {
             let allowed = "present in the folder of a data set";
             return Err(DatasetError::content(path, manifest::NAME, "none", allowed));
         };
-        let mut dataset = Self { header: manifest.header, rows: Vec::new() };
+        let header = manifest.header;
+        let mut dataset = Self { header, rows: Vec::new(), unverified: Vec::new() };
         for chunk in manifest::parts(path)? {
             let part = manifest::part_path(path, chunk);
-            let (header, rows) = table::read(&part)?;
+            let Table { header, rows, is_verified } = table::read(&part)?;
             dataset.header.require_same(&part, &header)?;
             dataset.rows.extend(rows);
+            if !is_verified {
+                dataset.unverified.push(part);
+            }
         }
         dataset.sort(path)?;
         Ok(dataset)
@@ -152,7 +161,10 @@ pub fn merge(inputs: &[PathBuf]) -> Result<Dataset, DatasetError> {
         }
         match &mut merged {
             None => merged = Some(dataset),
-            Some(merged) => merged.rows.extend(dataset.rows),
+            Some(merged) => {
+                merged.rows.extend(dataset.rows);
+                merged.unverified.extend(dataset.unverified);
+            }
         }
     }
     let mut merged = merged.ok_or(DatasetError::Argument {

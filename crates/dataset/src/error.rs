@@ -22,6 +22,25 @@ pub enum DatasetError {
         /// What the system said.
         source: io::Error,
     },
+    /// A file of another kind stands where one is to be written.
+    #[error(
+        "{} is left as it is: it is not {allowed}, which would replace it; choose another name, or move it away",
+        path.display()
+    )]
+    Replaces {
+        /// The file that is there.
+        path: PathBuf,
+        /// The kind of file that was to be written.
+        allowed: &'static str,
+    },
+    /// A path of a command that is to be written cannot be, or must not.
+    #[error("{argument}: {reason}")]
+    Output {
+        /// The argument that names it.
+        argument: String,
+        /// Why, and what helps.
+        reason: String,
+    },
     /// What stands in a file is not what must stand there.
     #[error("{}: {what} must be {allowed}, found {found}", path.display())]
     Content {
@@ -86,6 +105,19 @@ pub enum DatasetError {
         value: f64,
         /// What the scene says.
         source: DemError,
+    },
+    /// A run needs more than the machine has.
+    #[error(
+        "this needs about {needed} of {what}, and {available} are free; GRANULCAL_NO_LIMITS=1 in the environment \
+         starts it all the same"
+    )]
+    NoRoom {
+        /// Memory or disk.
+        what: &'static str,
+        /// The estimate.
+        needed: String,
+        /// What is free.
+        available: String,
     },
     /// A number given to a function is out of range.
     #[error("{what} must be {allowed}, got {got}")]
@@ -167,6 +199,21 @@ pub enum DatasetError {
         /// What the writer said.
         source: mcap::McapError,
     },
+    /// The content of a file is not what was written into it.
+    #[error(
+        "{}: {what} hash to {found}, but {stated} was written: the file is damaged; remove it, or take a copy",
+        path.display()
+    )]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is damaged.
+        what: &'static str,
+        /// The hash of what is there.
+        found: String,
+        /// The hash that the file states.
+        stated: String,
+    },
     /// Two things that must be the same differ.
     #[error("{}: {what} is {found}, but {given} is given; use another folder or the same {what}", path.display())]
     Differs {
@@ -202,7 +249,11 @@ impl DatasetError {
     pub fn is_bad_input(&self) -> bool {
         match self {
             Self::Io { action, source, .. } => {
-                matches!(*action, "read" | "list") || source.kind() == io::ErrorKind::NotFound
+                matches!(*action, "read" | "list")
+                    || matches!(
+                        source.kind(),
+                        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+                    )
             }
             Self::TomlWrite { .. }
             | Self::Mcap { .. }

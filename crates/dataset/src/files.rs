@@ -1,32 +1,137 @@
 //! Reading whole files, and writing them so that a file is complete or absent.
+//!
+//! What is read may come from a stranger: only plain files are read, up to a size, so that a name like `/dev/zero`
+//! is refused and does not fill the memory.
 
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
-use crate::DatasetError;
+use crate::{DatasetError, Form};
 
 /// End of the name of a file that is being written.
 pub(crate) const TEMPORARY: &str = ".tmp";
+/// Most bytes of a file that is read as a whole: 4 GiB, which is a data set of four million rows.
+pub(crate) const LARGEST_FILE: u64 = 4 << 30;
+/// Most bytes of a mesh, a trajectory or a picture: 256 MiB.
+pub(crate) const LARGEST_PART: u64 = 256 << 20;
+/// Most bytes of a file of text: 16 MiB.
+pub(crate) const LARGEST_TEXT: u64 = 16 << 20;
+/// Temporary files of this process, to be removed by whoever ends it at once.
+static TEMPORARIES: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// Whole files that are being written at this moment.
+static WRITING: AtomicUsize = AtomicUsize::new(0);
+/// Bytes of an existing file that tell its kind.
+const HEAD: u64 = 512;
+/// Characters of a file's name in that of its temporary file.
+const LONGEST_NAME: usize = 40;
+/// Names that are tried for a temporary file.
+const TRIES: u32 = 100;
 
-/// The bytes of a file.
+/// Opens a plain file to be read; links are followed, devices, pipes and folders are refused.
+pub(crate) fn open(path: &Path) -> Result<File, DatasetError> {
+    let metadata = fs::metadata(path).map_err(DatasetError::io("read", path))?;
+    if !metadata.is_file() {
+        let found = if metadata.is_dir() { "a folder" } else { "a device or pipe" };
+        return Err(DatasetError::content(path, "the file", found, "a plain file"));
+    }
+    File::open(path).map_err(DatasetError::io("read", path))
+}
+
+/// The bytes of a file of at most [`LARGEST_FILE`].
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, DatasetError> {
-    fs::read(path).map_err(DatasetError::io("read", path))
+    read_at_most(path, LARGEST_FILE)
 }
 
-/// The text of a file.
-pub(crate) fn read_text(path: &Path) -> Result<String, DatasetError> {
-    fs::read_to_string(path).map_err(DatasetError::io("read", path))
-}
-
-/// Writes a file beside its place and renames it: whoever looks sees the old file or the whole new one.
+/// The bytes of a plain file of at most 4 GiB.
 ///
 /// # Errors
-/// [`DatasetError::Io`].
-pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), DatasetError> {
-    let mut file = PendingFile::create(path)?;
-    file.write_all(bytes).map_err(DatasetError::io("write", path))?;
-    file.commit()
+/// [`DatasetError::Io`], or [`DatasetError::Content`] for a device, a pipe, a folder or a larger file.
+pub fn read_file(path: &Path) -> Result<Vec<u8>, DatasetError> {
+    read(path)
+}
+
+/// The text of a file of at most [`LARGEST_TEXT`].
+pub(crate) fn read_text(path: &Path) -> Result<String, DatasetError> {
+    String::from_utf8(read_at_most(path, LARGEST_TEXT)?)
+        .map_err(|_| DatasetError::content(path, "the text", "other bytes", "UTF-8"))
+}
+
+/// The bytes of a plain file that has no more than `limit`.
+pub(crate) fn read_at_most(path: &Path, limit: u64) -> Result<Vec<u8>, DatasetError> {
+    let mut bytes = Vec::new();
+    // The size that the system states may be out of date, and is 0 for files of the kernel.
+    open(path)?.take(limit + 1).read_to_end(&mut bytes).map_err(DatasetError::io("read", path))?;
+    if bytes.len() as u64 > limit {
+        let (found, allowed) =
+            (format!("more than {limit} bytes"), format!("at most {limit} bytes"));
+        return Err(DatasetError::content(path, "the size", found, allowed));
+    }
+    Ok(bytes)
+}
+
+/// Writes a file of some form beside its place and renames it: whoever looks sees the old file or the whole new one.
+///
+/// # Errors
+/// [`DatasetError::Replaces`] where a file of another kind stands, [`DatasetError::Io`].
+pub fn write_file(path: &Path, form: Form, bytes: &[u8]) -> Result<(), DatasetError> {
+    WRITING.fetch_add(1, Ordering::SeqCst);
+    let write = || {
+        let mut file = PendingFile::create(path, form)?;
+        file.write_all(bytes).map_err(DatasetError::io("write", path))?;
+        file.commit()
+    };
+    let written = write();
+    WRITING.fetch_sub(1, Ordering::SeqCst);
+    written
+}
+
+/// Whether a whole file is being written at this moment: whoever ends the process waits for it.
+pub fn is_writing() -> bool {
+    WRITING.load(Ordering::SeqCst) > 0
+}
+
+/// Removes what this process has half written; for whoever ends it at once.
+pub fn remove_temporaries() {
+    let mut paths = TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner);
+    for path in paths.drain(..) {
+        let _ = fs::remove_file(path);
+    }
+}
+
+/// Refuses to replace what stands at `place`, unless it is nothing, empty, or of this form; `target` is its name.
+pub(crate) fn require_replaceable(
+    place: &Path,
+    form: Form,
+    target: &Path,
+) -> Result<(), DatasetError> {
+    // Where nothing is, a folder on the way that is missing is told when the file is made.
+    let Ok(metadata) = fs::metadata(place) else { return Ok(()) };
+    if metadata.permissions().readonly() {
+        return Err(DatasetError::content(
+            target,
+            "a file to replace",
+            "read-only",
+            "one that may be changed",
+        ));
+    }
+    if metadata.is_file() && metadata.len() == 0 {
+        return Ok(());
+    }
+    let bytes = if form.needs_all() { read_at_most(place, LARGEST_TEXT)? } else { head(place)? };
+    if form.fits(&bytes) {
+        return Ok(());
+    }
+    Err(DatasetError::Replaces { path: target.to_owned(), allowed: form.name() })
+}
+
+/// The first bytes of a file, which tell its kind.
+fn head(path: &Path) -> Result<Vec<u8>, DatasetError> {
+    let mut bytes = Vec::with_capacity(HEAD as usize);
+    open(path)?.take(HEAD).read_to_end(&mut bytes).map_err(DatasetError::io("read", path))?;
+    Ok(bytes)
 }
 
 /// A file on its way: written beside its place, renamed by [`PendingFile::commit`], removed when dropped before.
@@ -34,30 +139,28 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), DatasetError> {
 pub(crate) struct PendingFile {
     writer: Option<BufWriter<File>>,
     temporary: PathBuf,
+    /// Where the file goes, links resolved.
+    place: PathBuf,
+    /// The same as it was named.
     target: PathBuf,
+    is_committed: bool,
 }
 
 impl PendingFile {
     /// Opens the temporary file of `target`.
-    pub(crate) fn create(target: &Path) -> Result<Self, DatasetError> {
-        let name = target.file_name().ok_or_else(|| {
-            let found = format!("{:?}", target.display().to_string());
-            DatasetError::content(target, "the name of a file to write", found, "a file name")
-        })?;
-        if target.is_dir() {
-            return Err(DatasetError::content(
-                target,
-                "a file to write",
-                "a folder",
-                "a file name",
-            ));
-        }
-        let mut hidden = std::ffi::OsString::from(".");
-        hidden.push(name);
-        hidden.push(format!(".{}{TEMPORARY}", std::process::id()));
-        let temporary = target.with_file_name(hidden);
-        let file = File::create(&temporary).map_err(DatasetError::io("create", target))?;
-        Ok(Self { writer: Some(BufWriter::new(file)), temporary, target: target.to_owned() })
+    pub(crate) fn create(target: &Path, form: Form) -> Result<Self, DatasetError> {
+        let place = place_of(target)?;
+        require_replaceable(&place, form, target)?;
+        let (temporary, file) =
+            create_beside(&place).map_err(DatasetError::io("create", target))?;
+        TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner).push(temporary.clone());
+        Ok(Self {
+            writer: Some(BufWriter::new(file)),
+            temporary,
+            place,
+            target: target.to_owned(),
+            is_committed: false,
+        })
     }
 
     /// Brings the file to the disk and to its place.
@@ -67,15 +170,60 @@ impl PendingFile {
             writer.get_ref().sync_all()
         });
         written.map_err(DatasetError::io("write", &self.target))?;
-        fs::rename(&self.temporary, &self.target)
+        fs::rename(&self.temporary, &self.place)
             .map_err(DatasetError::io("rename", &self.target))?;
-        // Nothing is left under this name; the drop's removal then finds nothing.
+        self.is_committed = true;
         Ok(())
     }
 
     fn writer(&mut self) -> io::Result<&mut BufWriter<File>> {
         self.writer.as_mut().ok_or_else(|| io::Error::other("file is closed"))
     }
+}
+
+/// Where a file of this name goes: where links lead, so that a link stays a link; refuses folders and devices.
+pub(crate) fn place_of(target: &Path) -> Result<PathBuf, DatasetError> {
+    let refuse = |found: &str, allowed: &str| {
+        Err(DatasetError::content(target, "a file to write", found, allowed))
+    };
+    if target.file_name().is_none() {
+        let found = format!("{:?}", target.display().to_string());
+        return Err(DatasetError::content(
+            target,
+            "the name of a file to write",
+            found,
+            "a file name",
+        ));
+    }
+    match fs::symlink_metadata(target) {
+        Err(_) => Ok(target.to_owned()),
+        Ok(metadata) if metadata.is_symlink() => match fs::canonicalize(target) {
+            Ok(place) if place.is_file() => Ok(place),
+            Ok(place) if place.is_dir() => refuse("a folder", "a file name"),
+            Ok(_) => refuse("a link to a device or pipe", "a plain file"),
+            Err(_) => refuse("a link that leads nowhere", "a plain file"),
+        },
+        Ok(metadata) if metadata.is_dir() => refuse("a folder", "a file name"),
+        Ok(metadata) if metadata.is_file() => Ok(target.to_owned()),
+        Ok(_) => refuse("a device or pipe", "a plain file"),
+    }
+}
+
+/// A new file beside `place`, which nobody else has: an existing file or link of that name is never opened.
+pub(crate) fn create_beside(place: &Path) -> io::Result<(PathBuf, File)> {
+    // A name may be as long as the system allows, and this one is longer.
+    let name = place.file_name().unwrap_or_default().to_string_lossy();
+    let name: String = name.chars().take(LONGEST_NAME).collect();
+    for attempt in 0..TRIES {
+        let hidden = format!(".{name}.{}-{attempt}{TEMPORARY}", std::process::id());
+        let temporary = place.with_file_name(hidden);
+        match OpenOptions::new().write(true).create_new(true).open(&temporary) {
+            Ok(file) => return Ok((temporary, file)),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Err(io::Error::new(io::ErrorKind::AlreadyExists, "every name for a temporary file is taken"))
 }
 
 impl Write for PendingFile {
@@ -96,9 +244,17 @@ impl Seek for PendingFile {
 
 impl Drop for PendingFile {
     fn drop(&mut self) {
-        self.writer = None;
-        // After a commit there is nothing to remove, and no one to tell if it fails.
-        let _ = fs::remove_file(&self.temporary);
+        if let Some(writer) = self.writer.take() {
+            // What is buffered is not wanted any more.
+            drop(writer.into_parts().0);
+        }
+        let mut all = TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|path| *path != self.temporary);
+        drop(all);
+        if !self.is_committed {
+            // There is no one to tell if it fails.
+            let _ = fs::remove_file(&self.temporary);
+        }
     }
 }
 
@@ -109,22 +265,117 @@ mod tests {
     #[test]
     fn a_file_is_complete_or_absent() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.bin");
-        let mut pending = PendingFile::create(&path).unwrap();
+        let path = folder.path().join("a.json");
+        let mut pending = PendingFile::create(&path, Form::Json).unwrap();
         pending.write_all(b"half").unwrap();
         assert!(!path.exists());
         drop(pending);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
-        write_file(&path, b"whole").unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"whole");
+        write_file(&path, Form::Json, b"{}").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"{}");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
     #[test]
     fn a_folder_is_no_file_to_write() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(write_file(folder.path(), b"").unwrap_err().to_string().contains("a folder"));
+        let error = write_file(folder.path(), Form::Json, b"").unwrap_err();
+        assert!(error.to_string().contains("a folder"));
         let missing = folder.path().join("no/such/file");
-        assert!(write_file(&missing, b"").unwrap_err().is_bad_input());
+        assert!(write_file(&missing, Form::Json, b"").unwrap_err().is_bad_input());
+    }
+
+    #[test]
+    fn a_file_of_another_kind_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        let scene = "name = \"mine\"\n[grains]\ncount = 3\n";
+        for form in [
+            Form::Npy,
+            Form::Npz,
+            Form::Png,
+            Form::Mcap,
+            Form::Checkpoint,
+            Form::Parquet,
+            Form::Safetensors,
+            Form::ManifestToml,
+            Form::CameraToml,
+            Form::SensorToml,
+            Form::Json,
+            Form::Html,
+            Form::Csv,
+            Form::Pdf,
+            Form::Svg,
+            Form::Gif,
+            Form::Bag,
+            Form::Export,
+        ] {
+            fs::write(&path, scene).unwrap();
+            let error = write_file(&path, form, b"x").unwrap_err();
+            assert!(matches!(error, DatasetError::Replaces { .. }), "{form:?}: {error}");
+            assert!(error.is_bad_input());
+            assert_eq!(fs::read_to_string(&path).unwrap(), scene);
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_links_and_devices_devices() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let (real, link) = (folder.path().join("real.json"), folder.path().join("link.json"));
+        fs::write(&real, "{}").unwrap();
+        symlink(&real, &link).unwrap();
+        write_file(&link, Form::Json, b"[1]").unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read(&real).unwrap(), b"[1]");
+        let lost = folder.path().join("lost.json");
+        symlink(folder.path().join("nowhere"), &lost).unwrap();
+        let error = write_file(&lost, Form::Json, b"").unwrap_err().to_string();
+        assert!(error.contains("leads nowhere"), "{error}");
+        let error = write_file(Path::new("/dev/null"), Form::Json, b"").unwrap_err().to_string();
+        assert!(error.contains("a device"), "{error}");
+        let error = read(Path::new("/dev/zero")).unwrap_err().to_string();
+        assert!(error.contains("a device") && error.contains("plain file"), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_temporary_file_of_somebody_else_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let secret = folder.path().join("secret");
+        fs::write(&secret, "s").unwrap();
+        let pid = std::process::id();
+        let planted = folder.path().join(format!(".a.json.{pid}-0{TEMPORARY}"));
+        std::os::unix::fs::symlink(&secret, &planted).unwrap();
+        write_file(&folder.path().join("a.json"), Form::Json, b"{}").unwrap();
+        assert_eq!(fs::read_to_string(&secret).unwrap(), "s");
+        assert!(fs::symlink_metadata(&planted).unwrap().is_symlink());
+    }
+
+    #[test]
+    fn a_file_that_is_read_only_stays_and_long_names_are_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("kept.json");
+        fs::write(&path, "{}").unwrap();
+        let mut permissions = fs::metadata(&path).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&path, permissions).unwrap();
+        let error = write_file(&path, Form::Json, b"[]").unwrap_err().to_string();
+        assert!(error.contains("read-only"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"{}");
+        let long = folder.path().join(format!("{}.json", "n".repeat(250)));
+        write_file(&long, Form::Json, b"[]").unwrap();
+        assert_eq!(fs::read(&long).unwrap(), b"[]");
+    }
+
+    #[test]
+    fn what_is_too_large_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("large");
+        File::create(&path).unwrap().set_len(LARGEST_TEXT + 1).unwrap();
+        let error = read_text(&path).unwrap_err().to_string();
+        assert!(error.contains("at most"), "{error}");
     }
 }

@@ -1,18 +1,21 @@
 //! Batches: a scene and a prior to a folder of Parquet parts, stopped and resumed at will.
 //!
 //! Row i depends on the scene, the prior, the seed and i, and on nothing else: not on the number of
-//! threads, of shards, of interruptions. Rows are written in chunks; a part is complete on disk or
-//! absent, so a run that was killed loses the rows in flight and nothing else.
+//! threads, of shards, of interruptions. Rows are written in chunks, and every half minute what there is of chunks that
+//! are not complete; a part is whole on disk or absent, so a run that was killed loses the rows in flight and those that
+//! were finished in the last half minute.
 
 mod chunk;
 mod folder;
 mod options;
+mod queue;
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use cpu_time::ThreadTime;
 use granulcal_dem::{Pour, Simulation, Status};
@@ -25,11 +28,12 @@ use crate::observe::observe;
 use crate::observer::Observer;
 use crate::random::pour_seed;
 use crate::row::{Row, RowStatus};
-use crate::{DatasetError, Prior, table};
+use crate::{DatasetError, Prior, Room, table};
 use chunk::OpenChunk;
 pub use chunk::Progress;
-use folder::Folder;
+use folder::{Folder, Plan};
 pub use options::{GenerateOptions, Shard};
+use queue::Queue;
 
 /// How long the caller goes unasked at most while pours run.
 const PATIENCE: Duration = Duration::from_millis(100);
@@ -82,10 +86,18 @@ pub fn generate_with(
     if let Some(engine) = &engine {
         header.version = engine.version();
     }
+    let threads = options.threads.min(most_threads());
+    Room::of_batch(scene, options.rows, threads, options.chunk).require(Some(out))?;
     let folder = Folder::open(out, header, options)?;
-    let plan = folder.plan(options)?;
-    let batch = Batch { folder: &folder, engine, chunks: plan.chunks, progress: plan.progress };
-    batch.run(options, watch)
+    let Plan { missing, open, progress } = folder.plan(options)?;
+    let queue = Mutex::new(Queue::new(missing, options, folder.chunk));
+    let batch = Batch { rows: options.rows, folder: &folder, engine, chunks: open, progress };
+    batch.run(options, &queue, threads, watch)
+}
+
+/// More pours at once than this gain nothing: the cores, or enough to test many.
+fn most_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from).max(64)
 }
 
 fn check(options: &GenerateOptions) -> Result<(), DatasetError> {
@@ -101,6 +113,9 @@ fn check(options: &GenerateOptions) -> Result<(), DatasetError> {
     if options.chunk == 0 {
         return refuse("the rows in a part", 0, "at least 1");
     }
+    if options.rows > MAX_SEED || options.chunk > MAX_SEED {
+        return refuse("the number of rows", options.rows.max(options.chunk), "below 2^63");
+    }
     if options.seed > MAX_SEED {
         return refuse("the seed", options.seed, "below 2^63");
     }
@@ -112,6 +127,7 @@ fn check(options: &GenerateOptions) -> Result<(), DatasetError> {
 
 /// The collecting side of a batch.
 struct Batch<'a> {
+    rows: u64,
     folder: &'a Folder,
     engine: Option<Engine<'a>>,
     chunks: BTreeMap<u64, OpenChunk>,
@@ -122,25 +138,24 @@ impl Batch<'_> {
     fn run(
         mut self,
         options: &GenerateOptions,
+        queue: &Mutex<Queue>,
+        threads: usize,
         watch: &mut dyn FnMut(&Progress) -> bool,
     ) -> Result<Summary, DatasetError> {
-        let queue: Vec<u64> =
-            self.chunks.values().flat_map(|c| c.missing.iter().copied()).collect();
-        let next = AtomicUsize::new(0);
+        let left = self.progress.total - self.progress.resumed;
         let stop = AtomicBool::new(!watch(&self.progress));
         let (sender, finished) = channel();
         let (header, engine) = (&self.folder.header, self.engine);
 
         let outcome = std::thread::scope(|scope| {
-            for _ in 0..options.threads.min(queue.len()) {
-                let sender = sender.clone();
-                let (queue, next, stop) = (&queue, &next, &stop);
+            for _ in 0..threads.min(usize::try_from(left).unwrap_or(usize::MAX)) {
+                let (sender, stop) = (sender.clone(), &stop);
                 scope.spawn(move || {
                     let keep_going = || !stop.load(Ordering::Relaxed);
                     while keep_going() {
-                        let Some(&row) = queue.get(next.fetch_add(1, Ordering::Relaxed)) else {
-                            break;
-                        };
+                        // Nobody panics while the queue is locked.
+                        let row = queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+                        let Some(row) = row else { break };
                         let Some(made) = make_row(header, engine, row, &keep_going).transpose()
                         else {
                             break;
@@ -154,6 +169,7 @@ impl Batch<'_> {
             }
             drop(sender);
             let mut outcome = Ok(());
+            let mut flushed = Instant::now();
             loop {
                 let result = match finished.recv_timeout(PATIENCE) {
                     Ok((row, made)) => {
@@ -164,11 +180,20 @@ impl Batch<'_> {
                     Err(RecvTimeoutError::Timeout) => Ok(()),
                     Err(RecvTimeoutError::Disconnected) => break,
                 };
+                let is_due = flushed.elapsed() >= options.flush_every;
+                let result = if is_due { result.and_then(|()| self.flush()) } else { result };
+                if is_due {
+                    flushed = Instant::now();
+                }
                 if let (true, Err(error)) = (outcome.is_ok(), result) {
                     outcome = Err(error);
                 }
                 if outcome.is_err() || !watch(&self.progress) {
-                    stop.store(true, Ordering::Relaxed);
+                    let is_first = !stop.swap(true, Ordering::Relaxed);
+                    // Before the pours in flight notice: whoever asks twice ends the process.
+                    if is_first && outcome.is_ok() {
+                        outcome = self.flush();
+                    }
                 }
             }
             outcome
@@ -184,14 +209,17 @@ impl Batch<'_> {
     fn accept(&mut self, row: Row) -> Result<(), DatasetError> {
         let index = row.row / self.folder.chunk;
         self.progress.made += 1;
-        self.progress.unhealthy += u64::from(!row.status.is_healthy());
-        self.progress.jammed += u64::from(row.status.is_jammed());
-        let Some(chunk) = self.chunks.get_mut(&index) else { return Ok(()) };
-        chunk.missing.retain(|&missing| missing != row.row);
+        self.progress.count(row.status);
+        let first = index * self.folder.chunk;
+        let wanted = self.folder.chunk.min(self.rows - first);
+        let empty = || OpenChunk { rows: Vec::new(), left: wanted, changed: false };
+        let chunk = self.chunks.entry(index).or_insert_with(empty);
         chunk.rows.push(row);
+        chunk.left -= 1;
         chunk.changed = true;
-        if chunk.missing.is_empty() {
+        if chunk.left == 0 {
             self.write(index)?;
+            self.chunks.remove(&index);
         }
         Ok(())
     }
@@ -204,13 +232,12 @@ impl Batch<'_> {
     }
 
     fn write(&mut self, index: u64) -> Result<(), DatasetError> {
-        let Some(mut chunk) = self.chunks.remove(&index) else { return Ok(()) };
+        let Some(chunk) = self.chunks.get_mut(&index) else { return Ok(()) };
         chunk.rows.sort_by_key(|row| row.row);
-        table::write(
-            &manifest::part_path(&self.folder.path, index),
-            &self.folder.header,
-            &chunk.rows,
-        )
+        let path = manifest::part_path(&self.folder.path, index);
+        table::write(&path, &self.folder.header, &chunk.rows)?;
+        chunk.changed = false;
+        Ok(())
     }
 }
 

@@ -63,7 +63,14 @@ impl Header {
         }
         Ok(Self {
             scene,
-            prior: Prior::from_toml(prior_toml)?,
+            prior: Prior::from_toml(prior_toml).map_err(|error| match error {
+                DatasetError::PriorToml(source) => {
+                    DatasetError::Toml { path: path.to_owned(), what: "prior", source }
+                }
+                other => {
+                    DatasetError::content(path, "the prior", other.to_string(), "one that can be")
+                }
+            })?,
             version,
             seed,
             scene_toml: scene_toml.to_owned(),

@@ -1,10 +1,9 @@
 //! The bytes of a recording: a file, or anything else that can be read and sought.
 
-use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use crate::DatasetError;
+use crate::{DatasetError, files};
 
 /// Least size `[B]` that unpacked data may have, however small the file is.
 const UNPACK_FLOOR: u64 = 32 << 20;
@@ -28,8 +27,7 @@ pub(crate) struct Input<'a> {
 impl<'a> Input<'a> {
     /// Opens a file.
     pub(crate) fn open(path: &Path) -> Result<Self, DatasetError> {
-        let file = File::open(path).map_err(DatasetError::io("read", path))?;
-        Self::new(path, file)
+        Self::new(path, files::open(path)?)
     }
 
     /// Reads from `reader`; `path` is its name in messages.

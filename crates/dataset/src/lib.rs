@@ -19,9 +19,11 @@
 //! | [`png`], [`npy`] | 16-bit depth PNG, arrays |
 //! | [`record_pour`] | a pour over time as MCAP |
 //! | [`write_checkpoint`], [`resume_checkpoint`] | a pour that is stopped and goes on |
+//! | [`Claims`] | what a command reads and writes, checked before it runs |
 
 mod camera_file;
 mod checkpoint_file;
+mod claims;
 mod contact_problem_file;
 mod dataset;
 mod depth_frame;
@@ -30,6 +32,7 @@ mod engine;
 mod error;
 mod fault;
 mod files;
+mod form;
 mod generate;
 mod header;
 mod image_file;
@@ -46,10 +49,12 @@ mod npz;
 mod observe;
 mod observer;
 mod pictures;
+mod plausible;
 pub mod png;
 mod prior;
 mod random;
 mod recording;
+mod room;
 mod row;
 mod scene_file;
 mod sensor_file;
@@ -59,12 +64,14 @@ mod trajectory_file;
 
 pub use camera_file::CameraFile;
 pub use checkpoint_file::{read_checkpoint_header, resume_checkpoint, write_checkpoint};
+pub use claims::{Claims, Input, Product};
 pub use contact_problem_file::write_contact_problem;
 pub use dataset::{Dataset, merge};
 pub use distribution::Distribution;
 pub use engine::{Engine, Outcome, foreign_pour};
 pub use error::DatasetError;
-pub use files::write_file;
+pub use files::{is_writing, read_file, remove_temporaries, write_file};
+pub use form::Form;
 pub use generate::{GenerateOptions, Progress, Shard, Summary, generate, generate_with};
 pub use header::{Header, VERSION};
 pub use input::ReadSeek;
@@ -74,8 +81,10 @@ pub use npz::{Npz, write_height_map};
 pub use observe::{Observation, TooFewGrains, View, look, look_from, observe, overhead};
 pub use observer::{Observed, ObservedStatistic, Observer, Series, observed_statistics};
 pub use pictures::{Pictures, write_mask, write_pictures};
+pub use plausible::Limits;
 pub use prior::{Parameter, Prior};
 pub use recording::{FRAMES, Folder, Frame, ReadOptions, Recording, Source, measured_data};
+pub use room::Room;
 pub use row::{Row, RowStatus};
 pub use scene_file::{load_prior, load_scene, scene_from_text};
 pub use sensor_file::{load_sensor, save_sensor, sensor_of, spec_of};

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::header::Header;
-use crate::{DatasetError, files};
+use crate::{DatasetError, Form, files};
 
 /// Name of the manifest in its folder.
 pub(crate) const NAME: &str = "manifest.toml";
@@ -68,7 +68,7 @@ impl Manifest {
         };
         let text = toml::to_string_pretty(&contents)
             .map_err(|e| DatasetError::TomlWrite { what: "the manifest", source: Box::new(e) })?;
-        files::write_file(&folder.join(NAME), text.as_bytes())
+        files::write_file(&folder.join(NAME), Form::ManifestToml, text.as_bytes())
     }
 }
 

@@ -34,7 +34,7 @@ use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 use stamp::{WORLD, nanoseconds, timestamp};
 
 use crate::files::PendingFile;
-use crate::{DatasetError, Observer, VERSION, View, look, look_from};
+use crate::{DatasetError, Form, Observer, VERSION, View, look, look_from};
 
 const CAMERA: &str = "camera";
 /// Bytes of one grain in `/grains`: x, y, z, radius.
@@ -45,10 +45,12 @@ const STRIDE: u32 = 16;
 ///
 /// `observer` sees what the scene observes.
 /// `watch` is called with the simulated time before each frame and returns whether to go on; when it
-/// says no the result is `None` and no file is left.
+/// says no the result is `None` and no file is left. A file that fails on the way, on a full disk above all, does not
+/// stop the pour: it is returned with what was wrong, and no file is left.
 ///
 /// # Errors
-/// [`DatasetError::Argument`] for a rate that is not positive, [`DatasetError::Io`] or [`DatasetError::Mcap`] if the file cannot be written.
+/// [`DatasetError::Argument`] for a rate that is not positive, [`DatasetError::Io`] or [`DatasetError::Mcap`] if the
+/// file cannot be begun.
 pub fn record_pour(
     mut simulation: Simulation,
     scene: &Scene,
@@ -57,7 +59,7 @@ pub fn record_pour(
     path: &Path,
     observer: &mut Observer,
     watch: &mut dyn FnMut(f64) -> bool,
-) -> Result<Option<Pour>, DatasetError> {
+) -> Result<Option<(Pour, Result<(), DatasetError>)>, DatasetError> {
     if !(rate > 0.0 && rate.is_finite()) {
         let (what, got) = ("the frames per second", rate.to_string());
         return Err(DatasetError::Argument { what, got, allowed: "positive and finite" });
@@ -66,11 +68,12 @@ pub fn record_pour(
     let failed = |source| DatasetError::Mcap { path: path.to_owned(), source };
     let mut recorder = Recorder::create(path)?;
     recorder.attach_scene(&scene_toml).map_err(failed)?;
+    let mut film = Ok(recorder);
     for frame in 1u64.. {
         if !watch(simulation.time()) {
             return Ok(None);
         }
-        recorder.frame(scene, seed, &simulation)?;
+        film = film.and_then(|recorder| recorder.with_frame(scene, seed, &simulation));
         if simulation.ended().is_some() {
             break;
         }
@@ -86,8 +89,7 @@ pub fn record_pour(
         ("status", pour.status.name().to_owned()),
         ("simulated_s", pour.simulated_s.to_string()),
     ];
-    recorder.finish(&outcome)?;
-    Ok(Some(pour))
+    Ok(Some((pour, film.and_then(|recorder| recorder.finish(&outcome)))))
 }
 
 /// An MCAP file being written, with the sequence number of each topic.
@@ -102,7 +104,7 @@ impl<'a> Recorder<'a> {
     fn create(path: &'a Path) -> Result<Self, DatasetError> {
         let options = WriteOptions::new().library(format!("granulcal {VERSION}")).compression(None);
         let writer = options
-            .create(PendingFile::create(path)?)
+            .create(PendingFile::create(path, Form::Mcap)?)
             .map_err(|source| DatasetError::Mcap { path: path.to_owned(), source })?;
         Ok(Self { writer, path, sequences: BTreeMap::new(), has_walls: false })
     }
@@ -117,13 +119,13 @@ impl<'a> Recorder<'a> {
         })
     }
 
-    /// Everything that there is to see at one time.
-    fn frame(
-        &mut self,
+    /// Adds everything that there is to see at one time.
+    fn with_frame(
+        mut self,
         scene: &Scene,
         seed: u64,
         simulation: &Simulation,
-    ) -> Result<(), DatasetError> {
+    ) -> Result<Self, DatasetError> {
         let time = simulation.time();
         let failed = |source| DatasetError::Mcap { path: self.path.to_owned(), source };
         let (positions, radii) = (simulation.positions(), simulation.radii());
@@ -160,7 +162,8 @@ impl<'a> Recorder<'a> {
             }
             Ok(())
         };
-        messages(self).map_err(failed)
+        messages(&mut self).map_err(failed)?;
+        Ok(self)
     }
 
     /// A depth image on the first topic, its camera on the second and where it stands.

@@ -17,7 +17,7 @@ type Soup = (Vec<[f64; 3]>, Vec<[u32; 3]>);
 /// [`DatasetError::Io`]; [`DatasetError::Content`] for what is neither STL nor OBJ; [`DatasetError::Simulation`] for
 /// triangles that cannot be a wall.
 pub(crate) fn read(path: &Path) -> Result<(Mesh, String), DatasetError> {
-    let bytes = files::read(path)?;
+    let bytes = files::read_at_most(path, files::LARGEST_PART)?;
     let is_obj = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("obj"));
     let is_stl = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("stl"));
     let unreadable = |what: &str, why: String| {

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 
 use self::header::{MAGIC, Source};
 use crate::input::Input;
-use crate::{DatasetError, files};
+use crate::{DatasetError, Form, files};
 
 /// Bytes that are turned into numbers at a time; a multiple of all sizes of a number.
 const BUFFER: usize = 8 << 10;
@@ -244,7 +244,7 @@ pub fn read_points(path: &Path) -> Result<Vec<Vector3<f64>>, DatasetError> {
 /// [`DatasetError::Io`].
 pub fn write_points(path: &Path, points: &[Vector3<f64>]) -> Result<(), DatasetError> {
     let values = points.iter().flat_map(|point| [point.x, point.y, point.z]);
-    files::write_file(path, &encode(&[points.len(), 3], values))
+    files::write_file(path, Form::Npy, &encode(&[points.len(), 3], values))
 }
 
 #[cfg(test)]

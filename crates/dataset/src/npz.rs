@@ -9,7 +9,7 @@ use zip::{ZipArchive, ZipWriter};
 
 use crate::input::{Input, ReadSeek};
 use crate::npy::{self, Array};
-use crate::{DatasetError, files};
+use crate::{DatasetError, Form, files};
 
 /// Arrays beyond which an archive is no recording.
 const MAX_ARRAYS: usize = 1 << 12;
@@ -167,5 +167,5 @@ pub(crate) fn write_arrays(path: &Path, arrays: &[(&str, Vec<u8>)]) -> Result<()
         archive.finish()
     };
     let bytes = pack().map_err(|source| DatasetError::Npz { path: path.to_owned(), source })?;
-    files::write_file(path, &bytes.into_inner())
+    files::write_file(path, Form::Npz, &bytes.into_inner())
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use granulcal_features::{ColourImage, Levelled};
 use image::{ImageBuffer, ImageFormat, Rgb};
 
-use crate::{DatasetError, files};
+use crate::{DatasetError, Form, files};
 
 /// Pixels that the shorter side of a picture has at least; small images are enlarged.
 const LEAST_SIDE: usize = 400;
@@ -119,7 +119,7 @@ fn write(path: &Path, pixels: &[[u8; 3]], width: usize) -> Result<(), DatasetErr
     enlarged
         .write_to(&mut bytes, ImageFormat::Png)
         .map_err(|source| DatasetError::Png { path: path.to_owned(), source })?;
-    files::write_file(path, &bytes.into_inner())
+    files::write_file(path, Form::Png, &bytes.into_inner())
 }
 
 #[cfg(test)]

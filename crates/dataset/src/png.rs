@@ -9,7 +9,7 @@ use image::{ImageBuffer, ImageFormat, Luma};
 use crate::image_file::{self, Unreadable};
 use crate::input::unpack_limit;
 use crate::mean::Mean;
-use crate::{DatasetError, files};
+use crate::{DatasetError, Form, files};
 
 /// Metres per count that depth is written with unless told otherwise: 0.1 mm, up to 6.5 m.
 pub const DEPTH_UNIT: f64 = 1e-4;
@@ -27,7 +27,7 @@ pub(crate) fn unreadable(path: &Path, error: Unreadable) -> DatasetError {
 /// # Errors
 /// [`DatasetError::Io`], [`DatasetError::Png`], or [`DatasetError::Content`] for other pixels.
 pub fn read_depth(path: &Path, depth_unit: f64) -> Result<DepthImage, DatasetError> {
-    let bytes = files::read(path)?;
+    let bytes = files::read_at_most(path, files::LARGEST_PART)?;
     image_file::depth(&bytes, unpack_limit(bytes.len() as u64))
         .map_err(|error| unreadable(path, error))
         .and_then(|frame| Mean::new(frame).finish(depth_unit).map_err(|fault| fault.in_file(path)))
@@ -38,7 +38,7 @@ pub fn read_depth(path: &Path, depth_unit: f64) -> Result<DepthImage, DatasetErr
 /// # Errors
 /// As [`read_depth`].
 pub fn read_colour(path: &Path) -> Result<ColourImage, DatasetError> {
-    let bytes = files::read(path)?;
+    let bytes = files::read_at_most(path, files::LARGEST_PART)?;
     image_file::colour(&bytes, unpack_limit(bytes.len() as u64))
         .map_err(|error| unreadable(path, error))
 }
@@ -59,7 +59,7 @@ pub fn write_depth(path: &Path, image: &DepthImage, depth_unit: f64) -> Result<(
     buffer
         .write_to(&mut bytes, ImageFormat::Png)
         .map_err(|source| DatasetError::Png { path: path.to_owned(), source })?;
-    files::write_file(path, &bytes.into_inner())
+    files::write_file(path, Form::Png, &bytes.into_inner())
 }
 
 /// Depth in counts of `depth_unit`, rounded; no data is 0.

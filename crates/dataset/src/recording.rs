@@ -80,7 +80,9 @@ impl Recording {
             Folder::Frames(frames) => {
                 let window = options.window(path, frames.len() as u64)?;
                 let chosen = &frames[window.start as usize..window.end as usize];
-                let open = |frame: &PathBuf| Ok((frame.clone(), files::read(frame)?));
+                let open = |frame: &PathBuf| {
+                    Ok((frame.clone(), files::read_at_most(frame, files::LARGEST_PART)?))
+                };
                 let recording = Self::take_frames(path, chosen.iter().map(open), options)?;
                 let whole_frames = frames.len() as u64 - recording.damage.len() as u64;
                 Ok(Self { window, whole_frames, ..recording })

@@ -6,7 +6,7 @@ use granulcal_dem::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 use granulcal_features::{DepthSensor, NoiseField, StereoSensor, TimeOfFlightSensor};
 use serde::{Deserialize, Serialize};
 
-use crate::{DatasetError, files};
+use crate::{DatasetError, Form, files};
 
 /// The file that `fit-sensor` writes: the tables that belong under a scene's camera.
 #[derive(Serialize, Deserialize)]
@@ -29,7 +29,7 @@ pub fn save_sensor(path: &Path, sensor: &DepthSensor) -> Result<(), DatasetError
     let file = SensorToml { camera: CameraToml { sensor: spec_of(sensor) } };
     let text = toml::to_string(&file)
         .map_err(|e| DatasetError::TomlWrite { what: "the sensor", source: Box::new(e) })?;
-    files::write_file(path, text.as_bytes())
+    files::write_file(path, Form::SensorToml, text.as_bytes())
 }
 
 /// Reads what [`save_sensor`] wrote.

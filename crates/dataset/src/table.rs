@@ -12,15 +12,16 @@ use granulcal_features::stats::DIAGNOSTIC_COUNT;
 use parquet::basic::Compression;
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::KeyValue;
+use parquet::file::metadata::{KeyValue, RowGroupMetaData};
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
+use xxhash_rust::xxh3::Xxh3;
 
 use crate::header::Header;
 use crate::row::{Row, RowStatus};
-use crate::{DatasetError, files};
+use crate::{DatasetError, Form, files};
 use columns::{Access, Column, columns};
 
 /// Keys of the file's metadata.
@@ -28,6 +29,9 @@ const SCENE_KEY: &str = "granulcal.scene";
 const PRIOR_KEY: &str = "granulcal.prior";
 const VERSION_KEY: &str = "granulcal.version";
 const SEED_KEY: &str = "granulcal.seed";
+const HASH_KEY: &str = "granulcal.hash";
+/// Bytes that one byte of a packed column may become: a column of one value packs well.
+const MOST_PACKED: i64 = 4096;
 
 /// Writes rows as one complete file, one row group.
 ///
@@ -36,7 +40,47 @@ const SEED_KEY: &str = "granulcal.seed";
 pub(crate) fn write(path: &Path, header: &Header, rows: &[Row]) -> Result<(), DatasetError> {
     let bytes = encode(header, rows, &columns(&header.prior.names(), &header.observed()))
         .map_err(|source| DatasetError::Parquet { path: path.to_owned(), source })?;
-    files::write_file(path, &bytes)
+    files::write_file(path, Form::Parquet, &bytes)
+}
+
+/// A file of rows.
+#[derive(Debug)]
+pub(crate) struct Table {
+    pub(crate) header: Header,
+    pub(crate) rows: Vec<Row>,
+    /// Whether the file says what its rows hash to; files of before there was a hash do not.
+    pub(crate) is_verified: bool,
+}
+
+/// Hash of the header and of every value, column by column.
+fn hash(header: &Header, rows: &[Row], columns: &[Column]) -> String {
+    let mut hash = Xxh3::new();
+    // Each text with its length: what is moved from one to the next is another text.
+    let mut take = |bytes: &[u8]| {
+        hash.update(&(bytes.len() as u64).to_le_bytes());
+        hash.update(bytes);
+    };
+    for text in [&header.scene_toml, &header.prior_toml, &header.version] {
+        take(text.as_bytes());
+    }
+    take(&header.seed.to_le_bytes());
+    take(&(rows.len() as u64).to_le_bytes());
+    for column in columns {
+        take(column.name.as_bytes());
+        for row in rows {
+            match &column.access {
+                Access::Count { get, .. } => take(&get(row).to_le_bytes()),
+                // Every NaN is one NaN.
+                Access::Number { get, .. } => {
+                    let value = get(row);
+                    let value = if value.is_nan() { f64::NAN } else { value };
+                    take(&value.to_bits().to_le_bytes());
+                }
+                Access::Status => take(row.status.name().as_bytes()),
+            }
+        }
+    }
+    format!("{:032x}", hash.digest128())
 }
 
 fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, ParquetError> {
@@ -47,6 +91,7 @@ fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, 
         (PRIOR_KEY, header.prior_toml.clone()),
         (VERSION_KEY, header.version.clone()),
         (SEED_KEY, header.seed.to_string()),
+        (HASH_KEY, hash(header, rows, columns)),
     ];
     let metadata = metadata.into_iter().map(|(key, value)| KeyValue::new(key.to_owned(), value));
     let properties = WriterProperties::builder()
@@ -84,12 +129,14 @@ fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, 
 /// Reads a whole file, every page of it.
 ///
 /// # Errors
-/// [`DatasetError::Parquet`] for a truncated or damaged file, [`DatasetError::Content`] for a
-/// Parquet file that is no data set of granulcal.
-pub(crate) fn read(path: &Path) -> Result<(Header, Vec<Row>), DatasetError> {
+/// [`DatasetError::Parquet`] for a truncated or damaged file, [`DatasetError::Damaged`] for one whose numbers are not
+/// those that were written, [`DatasetError::Content`] for a Parquet file that is no data set of granulcal.
+pub(crate) fn read(path: &Path) -> Result<Table, DatasetError> {
     let bytes = files::read(path)?;
+    let length = bytes.len();
     let parquet = |source| DatasetError::Parquet { path: path.to_owned(), source };
     let file = SerializedFileReader::new(bytes::Bytes::from(bytes)).map_err(parquet)?;
+    check_ranges(path, &file, length)?;
     let header = read_header(path, &file)?;
     let observed = header.observed();
     let mut columns = columns(&header.prior.names(), &observed);
@@ -101,6 +148,13 @@ pub(crate) fn read(path: &Path) -> Result<(Header, Vec<Row>), DatasetError> {
     check_columns(path, &file, &columns)?;
 
     let count = usize::try_from(file.metadata().file_metadata().num_rows()).unwrap_or(0);
+    let in_groups: i64 = file.metadata().row_groups().iter().map(|group| group.num_rows()).sum();
+    // A row has an index of its own, which takes a byte at the very least.
+    if count > length || in_groups != count as i64 {
+        let found = format!("{count}, and {in_groups} in its groups");
+        let allowed = "the same twice, and less than the bytes of the file";
+        return Err(DatasetError::content(path, "the number of rows", found, allowed));
+    }
     let mut rows = vec![blank(header.prior.parameters().len(), observed.len()); count];
     for (index, column) in columns.iter().enumerate() {
         match &column.access {
@@ -127,7 +181,21 @@ pub(crate) fn read(path: &Path) -> Result<(Header, Vec<Row>), DatasetError> {
             }
         }
     }
-    Ok((header, rows))
+    let stated = metadata(&file, HASH_KEY);
+    if let Some(stated) = &stated {
+        let found = hash(&header, &rows, &columns);
+        if *stated != found {
+            let (path, stated) = (path.to_owned(), stated.clone());
+            return Err(DatasetError::Damaged { path, what: "the rows", found, stated });
+        }
+    }
+    Ok(Table { header, rows, is_verified: stated.is_some() })
+}
+
+/// The value of a key in the file's metadata.
+fn metadata(file: &SerializedFileReader<bytes::Bytes>, key: &str) -> Option<String> {
+    let all = file.metadata().file_metadata().key_value_metadata();
+    all.and_then(|all| all.iter().find(|entry| entry.key == key))?.value.clone()
 }
 
 fn blank(parameters: usize, observed: usize) -> Row {
@@ -161,7 +229,18 @@ fn fill<T>(
     Ok(())
 }
 
+/// The values of a column. What the reader itself stumbles over in a damaged file is an error like any other.
 fn read_column<T: parquet::data_type::DataType>(
+    file: &SerializedFileReader<bytes::Bytes>,
+    index: usize,
+) -> Result<Vec<T::T>, ParquetError> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| read_values::<T>(file, index)))
+        .unwrap_or_else(|_| {
+            Err(ParquetError::General(format!("column {index} cannot be unpacked")))
+        })
+}
+
+fn read_values<T: parquet::data_type::DataType>(
     file: &SerializedFileReader<bytes::Bytes>,
     index: usize,
 ) -> Result<Vec<T::T>, ParquetError> {
@@ -180,10 +259,8 @@ fn read_header(
     path: &Path,
     file: &SerializedFileReader<bytes::Bytes>,
 ) -> Result<Header, DatasetError> {
-    let metadata = file.metadata().file_metadata().key_value_metadata();
     let value = |key: &str| {
-        let entry = metadata.and_then(|all| all.iter().find(|entry| entry.key == key));
-        entry.and_then(|entry| entry.value.clone()).ok_or_else(|| {
+        metadata(file, key).ok_or_else(|| {
             let what = format!("metadata {key}");
             DatasetError::content(path, what, "none", "given, as granulcal-cli generate writes it")
         })
@@ -194,6 +271,29 @@ fn read_header(
         DatasetError::content(path, what, format!("{seed:?}"), "a whole number")
     })?;
     Header::parse(path, &value(SCENE_KEY)?, &value(PRIOR_KEY)?, value(VERSION_KEY)?, seed)
+}
+
+/// Refuses columns that lie outside of the file: the reader takes their places for granted, and panics.
+fn check_ranges(
+    path: &Path,
+    file: &SerializedFileReader<bytes::Bytes>,
+    length: usize,
+) -> Result<(), DatasetError> {
+    let length = i64::try_from(length).unwrap_or(i64::MAX);
+    for column in file.metadata().row_groups().iter().flat_map(RowGroupMetaData::columns) {
+        let first = column.dictionary_page_offset().unwrap_or(column.data_page_offset());
+        let sizes = [first, column.data_page_offset(), column.compressed_size()];
+        let is_inside = sizes.iter().all(|&size| (0..=length).contains(&size))
+            && first.checked_add(column.compressed_size()).is_some_and(|end| end <= length)
+            && (0..=length.saturating_mul(MOST_PACKED)).contains(&column.uncompressed_size())
+            && column.num_values() >= 0;
+        if !is_inside {
+            let what = format!("the place of column {}", column.column_path());
+            let found = format!("{} bytes at {first}", column.compressed_size());
+            return Err(DatasetError::content(path, what, found, format!("within {length} bytes")));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses a file whose columns are not those of its prior.
@@ -249,15 +349,17 @@ mod tests {
         let path = folder.path().join("old.parquet");
         files::write_file(
             &path,
+            Form::Parquet,
             &encode(&header, std::slice::from_ref(&written), &listed).unwrap(),
         )
         .unwrap();
-        let (_, rows) = read(&path).unwrap();
+        let Table { rows, .. } = read(&path).unwrap();
         assert_eq!(rows[0].statistics, written.statistics);
         assert!(rows[0].diagnostics.iter().all(|value| value.is_nan()));
         // One column less is a column too few.
         listed.pop();
-        files::write_file(&path, &encode(&header, &[written], &listed).unwrap()).unwrap();
+        files::write_file(&path, Form::Parquet, &encode(&header, &[written], &listed).unwrap())
+            .unwrap();
         assert!(read(&path).unwrap_err().to_string().contains("chi_scale"));
     }
 }

@@ -31,12 +31,13 @@ fn schemas_counts_stamps_and_bytes_are_those_of_the_pour() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("pour.mcap");
     let scene = scene();
-    let pour =
+    let (pour, film) =
         record_pour(simulation(), &scene, 4, 60.0, &path, &mut Observer::new(&scene), &mut |_| {
             true
         })
         .unwrap()
         .unwrap();
+    film.unwrap();
     assert_eq!(pour, simulation().run());
 
     let bytes = std::fs::read(&path).unwrap();
@@ -130,9 +131,10 @@ fn further_views_have_topics_of_their_own() {
     });
     let simulation = Simulation::new(&scene, 4).unwrap();
     let watch = &mut |_| true;
-    let pour = record_pour(simulation, &scene, 4, 60.0, &path, &mut Observer::new(&scene), watch)
-        .unwrap()
-        .unwrap();
+    let mut observer = Observer::new(&scene);
+    let (pour, film) =
+        record_pour(simulation, &scene, 4, 60.0, &path, &mut observer, watch).unwrap().unwrap();
+    film.unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let mut last = BTreeMap::new();
     let mut frames = std::collections::BTreeSet::new();

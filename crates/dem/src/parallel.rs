@@ -11,6 +11,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::DemError;
 
+/// Threads that are made at most, on a machine with fewer cores.
+const MOST_THREADS: usize = 64;
+
 /// The threads of one simulation. Small loops, and all loops of a single thread, stay on the calling thread.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Threads(Option<Arc<ThreadPool>>);
@@ -24,7 +27,9 @@ impl Threads {
         if count == 1 {
             return Ok(Self(None));
         }
-        let pool = ThreadPoolBuilder::new().num_threads(count).build();
+        // More threads than cores gain nothing; some more are of use in tests.
+        let most = std::thread::available_parallelism().map_or(1, usize::from).max(MOST_THREADS);
+        let pool = ThreadPoolBuilder::new().num_threads(count.min(most)).build();
         Ok(Self(Some(Arc::new(pool.map_err(DemError::Threads)?))))
     }
 

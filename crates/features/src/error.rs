@@ -40,6 +40,19 @@ pub enum FeatureError {
         /// Largest value allowed.
         max: f64,
     },
+    /// Frames of a flat surface that show something else.
+    #[error(
+        "the frames must show something flat: {on_surface:.0} % of the pixels lie on one smooth surface (at least 50), \
+         {deviation:.1} % of the {scale} off it on average (at most 5); say with a region where the flat part is"
+    )]
+    NotFlat {
+        /// Pixels with data that lie on the surface [%].
+        on_surface: f64,
+        /// Robust standard deviation of those from the surface [%].
+        deviation: f64,
+        /// What the deviation is a share of.
+        scale: &'static str,
+    },
     /// Two arrays that must be equally long are not.
     #[error("{what} must have length {expected}, got {got}")]
     LengthMismatch {

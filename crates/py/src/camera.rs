@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use granulcal_dataset::{CameraFile, load_sensor, png, sensor_of};
+use granulcal_dataset::{CameraFile, Claims, Form, Product, load_sensor, png, sensor_of};
 use granulcal_features::{DepthImage, Intrinsics, SensorNoise};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -79,6 +79,10 @@ impl Camera {
         let image = Image::borrow("image", image)?;
         let (width, height, depth) = image.parts()?;
         let image = DepthImage::new(width, height, depth.to_vec()).map_err(error::features)?;
+        let mut claims = Claims::default();
+        claims.write("the image", &png_path, Product::File(Form::Png));
+        claims.write("the camera", &camera_path, Product::File(Form::CameraToml));
+        claims.check().map_err(error::dataset)?;
         png::write_depth(&png_path, &image, depth_unit).map_err(error::dataset)?;
         CameraFile::of(&self.inner, depth_unit).save(&camera_path).map_err(error::dataset)
     }

@@ -37,6 +37,12 @@ impl Dataset {
         Ok(Self { inner })
     }
 
+    /// Files that do not say what their rows hash to.
+    #[getter]
+    fn unverified(&self) -> usize {
+        self.inner.unverified.len()
+    }
+
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.inner.write(&path)).map_err(error::dataset)
     }

@@ -9,6 +9,7 @@ mod array;
 mod camera;
 mod dataset;
 mod error;
+mod files;
 mod film;
 mod formation;
 mod generate;
@@ -32,6 +33,8 @@ mod _native {
     #[pymodule_export]
     use crate::dataset::Dataset;
     #[pymodule_export]
+    use crate::files::{check_paths, hash_bytes, write_file};
+    #[pymodule_export]
     use crate::film::film;
     #[pymodule_export]
     use crate::formation::Formation;
@@ -46,7 +49,7 @@ mod _native {
     #[pymodule_export]
     use crate::recording::Recording;
     #[pymodule_export]
-    use crate::run_cli::run_cli;
+    use crate::run_cli::{listen_for_signals, run_cli};
     #[pymodule_export]
     use crate::scene::Scene;
     #[pymodule_export]

@@ -1,7 +1,7 @@
 //! Function `simulate`.
 
 use cpu_time::{ProcessTime, ThreadTime};
-use granulcal_dataset::Observer;
+use granulcal_dataset::{Observer, Room};
 use granulcal_dem::Simulation;
 use pyo3::prelude::*;
 
@@ -14,6 +14,7 @@ use crate::signals::Watch;
 #[pyfunction]
 pub(crate) fn simulate(py: Python<'_>, scene: &Scene, seed: u64, threads: usize) -> PyResult<Pour> {
     let scene = &scene.inner;
+    Room::of_pour(scene, None).require(None).map_err(error::dataset)?;
     let (outcome, interrupted, cpu_seconds) = py.detach(|| {
         let (thread, process) = (ThreadTime::now(), ProcessTime::now());
         let watch = Watch::new();

@@ -4,10 +4,12 @@ import json
 import os
 import shutil
 import tempfile
+import warnings
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict
 
+import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load as read_tensors
 from safetensors.numpy import save as tensor_bytes
@@ -17,12 +19,16 @@ from granulcal.bayessim.amortised import Amortised
 from granulcal.bayessim.average import FORMS, Average
 from granulcal.bayessim.calibration import Calibration
 from granulcal.bayessim.config import Config
+from granulcal.bayessim.damage import hashes, verify
 from granulcal.bayessim.likelihood import Likelihood
 from granulcal.bayessim.misfit import MisfitReference
+from granulcal.bayessim.model_schema import check_model
 from granulcal.bayessim.standardise import Standardiser
 from granulcal.bayessim.summary import TrainingSummary
 from granulcal.bayessim.tensors import Tensors, model_tensors
-from granulcal.errors import ModelFormatError, PriorError
+from granulcal.documents import LARGEST_DOCUMENT, parse_json, read_bytes
+from granulcal.errors import ModelFormatError, UnverifiedModelWarning
+from granulcal.files import write_beside
 from granulcal.identifiability import Identifiability
 from granulcal.prior import Prior
 
@@ -55,12 +61,13 @@ class Parts(TypedDict):
 
 
 def save_model(model: "BayesSim", path: str | PathLike[str]) -> None:
-    """Writes `model` to the folder `path`; a model already there is replaced as a whole.
+    """Writes `model` to the folder `path`; a model already there is replaced, other files stay.
 
     Raises:
         FileExistsError: `path` exists and is not a saved model.
     """
-    target = Path(path)
+    # A link to a folder stays a link.
+    target = Path(path).resolve() if Path(path).is_symlink() else Path(path)
     if target.exists() and not (target / _JSON_NAME).is_file() and not _is_empty(target):
         raise FileExistsError(f"{target} exists and is not a saved model; it is left as it is")
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -68,9 +75,10 @@ def save_model(model: "BayesSim", path: str | PathLike[str]) -> None:
     new, old = workshop / "new", workshop / "old"
     try:
         new.mkdir()
-        text = json.dumps(_document(model), indent=1, allow_nan=False) + "\n"
-        (new / _JSON_NAME).write_text(text, encoding="utf-8")
-        (new / _TENSORS_NAME).write_bytes(tensor_bytes(model_tensors(model)))
+        text = (json.dumps(_document(model), indent=1, allow_nan=False) + "\n").encode()
+        tensors = model_tensors(model)
+        write_beside(new / _JSON_NAME, text)
+        write_beside(new / _TENSORS_NAME, tensor_bytes(tensors, metadata=hashes(text, tensors)))
         if target.exists():
             os.rename(target, old)
         try:
@@ -79,6 +87,7 @@ def save_model(model: "BayesSim", path: str | PathLike[str]) -> None:
             if old.exists():
                 os.rename(old, target)
             raise
+        _keep_others(old, target)
     finally:
         shutil.rmtree(workshop, ignore_errors=True)
 
@@ -90,15 +99,22 @@ def load_parts(path: str | PathLike[str]) -> Parts:
         if not (folder / name).is_file():
             raise FileNotFoundError(f"{folder / name} does not exist: {folder} is no saved model")
     where = folder / _JSON_NAME
-    try:
-        document = json.loads((folder / _JSON_NAME).read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ModelFormatError(f"{where} is truncated or not JSON: {error}") from None
+    text = read_bytes(where, most=LARGEST_DOCUMENT)
+    document = parse_json(text, where, error=ModelFormatError)
     _check_header(document, where)
+    check_model(document, where)
+    data = read_bytes(folder / _TENSORS_NAME)
     try:
-        tensors = read_tensors((folder / _TENSORS_NAME).read_bytes())
-    except SafetensorError as error:
+        tensors = read_tensors(data)
+    except (SafetensorError, ValueError, KeyError) as error:
         raise ModelFormatError(f"{folder / _TENSORS_NAME} is truncated: {error}") from None
+    if not verify(text, where, data, tensors, folder / _TENSORS_NAME):
+        warnings.warn(
+            f"{folder} is a model of an earlier version without hashes: damage in it cannot be "
+            "found; train again to have them",
+            UnverifiedModelWarning,
+            stacklevel=3,
+        )
     try:
         prior = Prior.from_toml(document["prior_toml"])
         config = Config(**document["config"])
@@ -121,8 +137,19 @@ def load_parts(path: str | PathLike[str]) -> Parts:
         )
     except KeyError as error:
         raise ModelFormatError(f"{where} has no entry {error}") from None
-    except (TypeError, PriorError) as error:
+    except ModelFormatError:
+        raise
+    except (TypeError, ValueError, IndexError, OverflowError, np.linalg.LinAlgError) as error:
         raise ModelFormatError(f"{where}: {error}") from None
+
+
+def _keep_others(old: Path, target: Path) -> None:
+    """Moves what else lay in the folder of the model before: plots, reports, notes."""
+    if not old.is_dir():
+        return
+    for entry in old.iterdir():
+        if not (target / entry.name).exists():
+            os.rename(entry, target / entry.name)
 
 
 def _document(model: "BayesSim") -> dict[str, Any]:
@@ -160,7 +187,11 @@ def _check_header(document: Any, where: Path) -> None:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise ModelFormatError(f"{where} is not a {FORMAT} file")
     found = document.get("version")
-    if found not in (*_OLDER_VERSIONS, VERSION):
+    if (
+        isinstance(found, bool)
+        or not isinstance(found, int)
+        or found not in (*_OLDER_VERSIONS, VERSION)
+    ):
         made_by = document.get("made_by", "an earlier granulcal")
         newer = isinstance(found, int) and found > VERSION
         advice = "update granulcal" if newer else "train the model again"

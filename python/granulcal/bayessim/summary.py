@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from granulcal.files import save_figure
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -98,7 +100,7 @@ class TrainingSummary:
             axes.axvline(best, color="0.6", linewidth=0.8, zorder=0, label=label)
         axes.set(xlabel="pass over the pairs", ylabel="mean negative log density [nat]")
         axes.legend(frameon=False)
-        figure.savefig(path, dpi=120)
+        save_figure(figure, path, dpi=120)
         return figure
 
     def __str__(self) -> str:

@@ -4,12 +4,14 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
+from granulcal import paths
 from granulcal.commands.init import assignment
 from granulcal.commands.program import Parser
+from granulcal.files import beside
+from granulcal.paths import READS, writes
 
 __all__ = ["is_asked", "run"]
 
@@ -25,24 +27,26 @@ def is_asked(words: Sequence[str]) -> bool:
 def run(words: Sequence[str]) -> int:
     """Runs `simulate` or `generate` with another engine; returns the exit code."""
     try:
-        options = _parser().parse_args(words)
+        parser = _parser()
+        options = parser.parse_args(words)
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 2
+    paths.check(parser, options)
     return options.run(options)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="granulcal")
-    commands = parser.add_subparsers(required=True)
+    commands = parser.add_subparsers(required=True, dest="command")
     simulate = commands.add_parser("simulate")
     _add_common(simulate)
-    simulate.add_argument("--positions", type=Path)
+    simulate.add_argument("--positions", type=writes("array"))
     simulate.set_defaults(run=_simulate)
     generate = commands.add_parser("generate")
     _add_common(generate)
-    generate.add_argument("prior", type=Path)
+    generate.add_argument("prior", type=READS)
     generate.add_argument("-n", "--rows", type=int, default=1000)
-    generate.add_argument("-o", "--out", type=Path, required=True)
+    generate.add_argument("-o", "--out", type=writes("data_set"), required=True)
     generate.add_argument("--threads", type=int)
     generate.add_argument("--no-resume", action="store_true")
     generate.set_defaults(run=_generate)
@@ -50,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("scene", type=Path)
+    parser.add_argument("scene", type=READS)
     parser.add_argument(_FLAG, required=True)
     parser.add_argument("--set", action="append", default=[], type=assignment)
     parser.add_argument("--seed", type=int, default=0)
@@ -67,7 +71,8 @@ def _simulate(options: argparse.Namespace) -> int:
     pour = simulate(scene, seed=options.seed, engine=engine_named(options.engine))
     statistics = pour.statistics().to_dict()
     if options.positions is not None:
-        np.save(options.positions, pour.positions)
+        with beside(options.positions) as temporary:
+            np.save(temporary, pour.positions)
     document = {
         "scene": scene.name,
         "seed": options.seed,

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from granulcal.commands.init import assignment
+from granulcal.paths import READS, writes
 
 __all__ = ["add"]
 
@@ -34,7 +35,7 @@ def add(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.set_defaults(run=lambda _: parser.print_help() or 2)
-    words = parser.add_subparsers(title="what to export", metavar="WHAT")
+    words = parser.add_subparsers(title="what to export", metavar="WHAT", dest="word")
     _add_material(words)
     _add_posterior(words)
     _add_scene(words)
@@ -42,7 +43,7 @@ def add(commands: Any) -> None:
 
 
 def _add_common(parser: argparse.ArgumentParser, out: str) -> None:
-    parser.add_argument("-o", "--out", type=Path, required=True, help=out)
+    parser.add_argument("-o", "--out", type=writes("export"), required=True, help=out)
     parser.add_argument(
         "--set",
         action="append",
@@ -64,7 +65,7 @@ def _add_engine(parser: argparse.ArgumentParser) -> None:
 def _add_material(words: Any) -> None:
     text = "the material of a scene"
     parser = words.add_parser("material", help=text, description=text)
-    parser.add_argument("scene", type=Path, help="TOML, or the word funnel or drop")
+    parser.add_argument("scene", type=READS, help="TOML, or the word funnel or drop")
     _add_engine(parser)
     _add_common(parser, "the file")
     parser.set_defaults(run=_material)
@@ -73,8 +74,8 @@ def _add_material(words: Any) -> None:
 def _add_posterior(words: Any) -> None:
     text = "the most probable material of a posterior, and draws of it"
     parser = words.add_parser("posterior", help=text, description=text)
-    parser.add_argument("posterior", type=Path, help="JSON of `infer -o` or `calibrate`")
-    parser.add_argument("scene", type=Path, help="TOML, or the word funnel or drop")
+    parser.add_argument("posterior", type=READS, help="JSON of `infer -o` or `calibrate`")
+    parser.add_argument("scene", type=READS, help="TOML, or the word funnel or drop")
     parser.add_argument("--draws", type=int, default=0, help="files of draws (default: none)")
     _add_engine(parser)
     _add_common(parser, "the folder")
@@ -84,8 +85,8 @@ def _add_posterior(words: Any) -> None:
 def _add_scene(words: Any) -> None:
     text = "a whole pour: grains at the start, walls, material, until it rests"
     parser = words.add_parser("scene", help=text, description=text)
-    parser.add_argument("scene", type=Path, help="TOML, or the word funnel or drop")
-    parser.add_argument("--posterior", type=Path, help="take the most probable material of this")
+    parser.add_argument("scene", type=READS, help="TOML, or the word funnel or drop")
+    parser.add_argument("--posterior", type=READS, help="take the most probable material of this")
     parser.add_argument("--seed", type=int, default=0, help="seed of the start (default: 0)")
     _add_engine(parser)
     _add_common(parser, "the folder")
@@ -95,10 +96,10 @@ def _add_scene(words: Any) -> None:
 def _add_bed(words: Any) -> None:
     text = "grains at rest: those of a pour, or of a file"
     parser = words.add_parser("bed", help=text, description=text)
-    parser.add_argument("scene", type=Path, help="TOML, or the word funnel or drop")
+    parser.add_argument("scene", type=READS, help="TOML, or the word funnel or drop")
     parser.add_argument("--to", required=True, choices=_FORMATS, help="the format")
     parser.add_argument(
-        "--positions", type=Path, help="centres [m] of `simulate --positions`, instead of a pour"
+        "--positions", type=READS, help="centres [m] of `simulate --positions`, instead of a pour"
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of the pour (default: 0)")
     _add_common(parser, "the file")

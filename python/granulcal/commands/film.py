@@ -3,10 +3,10 @@
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import Any
 
 from granulcal.commands.init import assignment
+from granulcal.paths import READS, writes
 
 __all__ = ["add"]
 
@@ -29,8 +29,8 @@ def add(commands: Any) -> None:
         description=_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("scene", type=Path, help="TOML, or the word funnel or drop")
-    parser.add_argument("-o", "--out", type=Path, required=True, help="the GIF")
+    parser.add_argument("scene", type=READS, help="TOML, or the word funnel or drop")
+    parser.add_argument("-o", "--out", type=writes("figure"), required=True, help="the GIF")
     parser.add_argument("--seed", type=int, default=0, help="seed of the pour (default: 0)")
     parser.add_argument("--fps", type=float, default=15.0, help="frames a second (default: 15)")
     parser.add_argument(

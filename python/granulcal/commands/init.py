@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from granulcal.paths import READS, RECORDING, writes
+
 __all__ = ["add", "assignment"]
 
 _INIT = """\
@@ -43,10 +45,12 @@ def _add_init(commands: Any) -> None:
         description=_INIT,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("folder", type=Path, help="made if it does not exist")
+    parser.add_argument("folder", type=writes("folder"), help="made if it does not exist")
     parser.add_argument("--scene", choices=("funnel", "drop"), default="funnel", help="built-in")
-    parser.add_argument("--recording", type=Path, help="depth recording to take the lens from")
-    parser.add_argument("--camera", type=Path, help="TOML of the camera, if the recording is a PNG")
+    parser.add_argument("--recording", type=RECORDING, help="depth recording to take the lens from")
+    parser.add_argument(
+        "--camera", type=READS, help="TOML of the camera, if the recording is a PNG"
+    )
     parser.add_argument("--preset", choices=("fast", "default", "accurate"), help="of the solver")
     parser.add_argument(
         "--set",
@@ -69,7 +73,11 @@ def _add_sample(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "folder", type=Path, nargs="?", default=Path(), help="of `init` (default: this one)"
+        "folder",
+        type=writes("folder"),
+        nargs="?",
+        default=Path(),
+        help="of `init` (default: this one)",
     )
     parser.add_argument("--seed", type=int, help="seed of the pours and of the noise")
     parser.add_argument(

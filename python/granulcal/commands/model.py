@@ -2,8 +2,9 @@
 
 import argparse
 import json
-from pathlib import Path
 from typing import Any
+
+from granulcal.paths import writes
 
 __all__ = ["add"]
 
@@ -29,7 +30,9 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("scene", choices=("funnel", "drop"), help="built-in scene")
     parser.add_argument("-n", "--pours", type=int, default=1000, help="pours (default: 1000)")
-    parser.add_argument("-o", "--out", type=Path, help="folder of the model (default: the cache)")
+    parser.add_argument(
+        "-o", "--out", type=writes("model"), help="folder of the model (default: the cache)"
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--json", action="store_true", help="print JSON at the end")

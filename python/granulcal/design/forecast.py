@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
-from granulcal.files import write_beside
+from granulcal.files import save_figure, write_beside
 
 __all__ = ["SpillForecast"]
 
@@ -132,7 +132,7 @@ class SpillForecast:
             chances.plot(heights, self.probability[i], color=colour, label=f"at least {k}")
         chances.set(xlabel="height of the funnel [cm]", ylabel="probability", ylim=(-0.02, 1.02))
         chances.legend(title="spilled grains; 90 % band")
-        figure.savefig(path, dpi=90, format="png")
+        save_figure(figure, path, dpi=90)
 
     def __str__(self) -> str:
         """A table of some heights."""

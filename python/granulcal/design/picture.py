@@ -8,6 +8,7 @@ import numpy as np
 from granulcal.camera import Camera
 from granulcal.design.pattern import Pattern
 from granulcal.design.plan import Plan
+from granulcal.files import save_figure
 
 __all__ = ["plan_picture"]
 
@@ -36,7 +37,7 @@ def plan_picture(plan: Plan, pattern: Pattern, path: str | PathLike[str]) -> Non
     seen, far = figure.subplots(1, 2)
     _draw_heights(seen, plan, pattern, field, figure)
     _draw_distances(far, plan, pattern, field)
-    figure.savefig(path, dpi=80, format="png")
+    save_figure(figure, path, dpi=80)
 
 
 def _draw_heights(axis: Any, plan: Plan, pattern: Pattern, field: float, figure: Any) -> None:

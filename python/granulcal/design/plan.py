@@ -9,12 +9,41 @@ from pathlib import Path
 
 from granulcal import _native
 from granulcal.design.ring import Ring
+from granulcal.documents import Flag, ListOf, Maybe, Number, Table, Text, Whole, read_json
 from granulcal.files import write_beside
 
 __all__ = ["CSV", "JSON", "Plan", "PlannedPour"]
 
 CSV, JSON = "plan.csv", "plan.json"
 _FORMAT = 1
+
+
+_LENGTH = Number(0)
+_POUR = Table(
+    {
+        "order": Whole(0),
+        "height": _LENGTH,
+        "height_low": _LENGTH,
+        "height_high": _LENGTH,
+        "wanted_inner": Maybe(_LENGTH),
+        "wanted_outer": _LENGTH,
+        "expected_inner": _LENGTH,
+        "expected_outer": _LENGTH,
+        "inner_sd": _LENGTH,
+        "outer_sd": _LENGTH,
+        "is_extrapolated": Flag(),
+    }
+)
+_SCHEMA = Table(
+    {
+        "format": Whole(),
+        "trained": Table({"heights": ListOf(Number(), least=2), "pours": Whole()}),
+        "notes": ListOf(Text()),
+        "pours": ListOf(_POUR),
+        "scene": Text(),
+    },
+    open=True,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,21 +139,22 @@ class Plan:
         """
         file = Path(path) / JSON if Path(path).is_dir() else Path(path)
         try:
-            document = json.loads(file.read_text(encoding="utf-8"))
-            found = document["format"]
-            if found != _FORMAT:
-                raise ValueError(f"{file} is a plan of format {found}, this reads {_FORMAT}")
-            low, high = document["trained"]["heights"]
-            return cls(
-                pours=tuple(PlannedPour(**row) for row in document["pours"]),
-                trained_low=low,
-                trained_high=high,
-                pour_count=document["trained"]["pours"],
-                scene_toml=document["scene"],
-                notes=tuple(document["notes"]),
+            document = read_json(file, _SCHEMA)
+        except ValueError as error:
+            raise ValueError(f"{error}: it is damaged or not a pour plan") from None
+        if document["format"] != _FORMAT:
+            raise ValueError(
+                f"{file} is a plan of format {document['format']}, this reads {_FORMAT}"
             )
-        except (KeyError, TypeError, json.JSONDecodeError):
-            raise ValueError(f"{file} is damaged or not a pour plan") from None
+        low, high = document["trained"]["heights"][:2]
+        return cls(
+            pours=tuple(PlannedPour(**row) for row in document["pours"]),
+            trained_low=low,
+            trained_high=high,
+            pour_count=document["trained"]["pours"],
+            scene_toml=document["scene"],
+            notes=tuple(document["notes"]),
+        )
 
     def __str__(self) -> str:
         """A table in centimetres, and the notes."""

@@ -1,18 +1,25 @@
 """Materials from the JSON that `granulcal infer -o` and `granulcal calibrate` write."""
 
-import json
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, read_json
 from granulcal.scene import Scene
 
 __all__ = ["PosteriorDraws"]
 
 Array = NDArray[np.float64]
+
+_SCHEMA = Table(
+    {
+        "parameters": Maybe(Mapping(Table({"mode": Number()}, open=True))),
+        "samples": ListOf(ListOf(Number())),
+    },
+    open=True,
+)
 
 
 @dataclass(frozen=True)
@@ -35,17 +42,17 @@ class PosteriorDraws:
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: it is not such a file.
+            ValueError: it is not a posterior of `granulcal infer -o` or `granulcal calibrate`.
         """
-        try:
-            document = json.loads(Path(path).read_text(encoding="utf-8"))
-            names = tuple(document["parameters"])
-            samples = np.array(document["samples"], dtype=float)
-            mode = np.array([document["parameters"][name]["mode"] for name in names], dtype=float)
-        except (KeyError, TypeError, ValueError):
-            raise ValueError(
-                f"{path} is not a posterior of `granulcal infer -o` or `granulcal calibrate`"
-            ) from None
+        document = read_json(path, _SCHEMA)
+        parameters = document["parameters"]
+        names = tuple(parameters or ())
+        if not names:
+            raise ValueError(f"{path} holds no posterior: the recording was outside the model")
+        if any(len(row) != len(names) for row in document["samples"]):
+            raise ValueError(f"{path}: each of the samples must have {len(names)} numbers")
+        samples = np.array(document["samples"], dtype=float)
+        mode = np.array([parameters[name]["mode"] for name in names], dtype=float)
         if samples.ndim != 2 or samples.shape[1] != len(names) or len(samples) == 0:
             raise ValueError(
                 f"{path} must have samples of shape (n, {len(names)}), got {samples.shape}"

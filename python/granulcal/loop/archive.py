@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from granulcal import _native
 from granulcal.dataset import Dataset, generate
+from granulcal.documents import ListOf, Number, OneOf, Table, Text, read_json
 from granulcal.errors import TrainingDataError
 from granulcal.files import write_beside
 from granulcal.loop.cube import cube
@@ -40,6 +41,13 @@ from granulcal.scene import Scene
 __all__ = ["Archive", "Plan", "Pours"]
 
 Array = NDArray[np.float64]
+
+# A list of lists holds a path and two numbers; the rest is compared and not read.
+_SCHEMA = Table(
+    {"conditions": ListOf(ListOf(OneOf((Text(), Number())), least=3))},
+    {"effects": ListOf(Text()), "each_effect": ListOf(Text())},
+    open=True,
+)
 
 _RECORD = "archive.json"
 # What the record says of the library.
@@ -174,7 +182,10 @@ class Archive:
         path = folder / _RECORD
         mine = plan.record()
         if path.exists():
-            theirs = {"places": [], **json.loads(path.read_text(encoding="utf-8"))}
+            try:
+                theirs = {"places": [], **read_json(path, _SCHEMA)}
+            except ValueError as error:
+                raise TrainingDataError(str(error)) from None
             if _covers(theirs.get("conditions"), mine["conditions"]):
                 # A wider archive serves as well.
                 wider = tuple((p, float(low), float(high)) for p, low, high in theirs["conditions"])

@@ -7,11 +7,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.files import beside
 from granulcal.loop.measures import Measures
 from granulcal.scene import Scene
 from granulcal.simulate import simulate
@@ -51,17 +53,17 @@ class Forward:
         names = Measures.of(scene).names
         of = [_native.__version__, names, scene.to_toml(), list(seeds)]
         text = json.dumps([*of, dict(faults)] if faults else of)
-        path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.npy"
-        if path.exists():
-            return np.load(path)
+        path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
+        kept = _kept(path)
+        if kept is not None:
+            return kept
         with ThreadPoolExecutor(self.threads) as pool:
             made = pool.map(lambda seed: _row(scene, seed, faults), seeds)
             rows = [row for row in made if row is not None]
         self.ran += len(seeds)
         found = np.array(rows).reshape(len(rows), len(names))
-        beside = path.with_suffix(".part.npy")
-        np.save(beside, found)
-        beside.replace(path)
+        with beside(path) as temporary:
+            np.savez(temporary, found=found)
         return found
 
     def limit(
@@ -105,6 +107,19 @@ class Coarse:
     def repeats(self) -> int:
         """Pours at each size whose mean, taken to the limit, scatters no more than one pour."""
         return ceil((1 - self.held) ** 2 + self.held**2)
+
+
+def _kept(path: Path) -> Array | None:
+    """The rows of a file; None where there is none, or a damaged one: it can be made again."""
+    # Of before there was a checksum.
+    older = path.with_suffix(".npy")
+    try:
+        if not path.exists():
+            return np.load(older) if older.exists() else None
+        with np.load(path) as file:
+            return file["found"]
+    except (ValueError, KeyError, EOFError, OSError, BadZipFile):
+        return None
 
 
 def _row(scene: Scene, seed: int, faults: Mapping[str, float] | None) -> Array | None:

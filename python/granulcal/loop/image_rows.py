@@ -10,11 +10,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 from zlib import crc32
+from zlib import error as zlib_error
 
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.files import beside
 from granulcal.loop.cube import from_cube
 from granulcal.loop.forward import UNUSABLE
 from granulcal.loop.library import LibraryEffect
@@ -103,8 +106,12 @@ class ImageRows:
         path = self._path(chunk)
         if not path.exists():
             return None
-        with np.load(path) as file:
-            found = {name: file[name] for name in file.files}
+        try:
+            with np.load(path) as file:
+                found = {name: file[name] for name in file.files}
+        except (ValueError, KeyError, EOFError, OSError, BadZipFile, zlib_error):
+            # Damaged: its pours can be made again.
+            return None
         wanted = min((chunk + 1) * _CHUNK, self.count) - chunk * _CHUNK
         is_whole = all(f"x/{effect.name}" in found for effect in self.effects)
         return (
@@ -115,10 +122,9 @@ class ImageRows:
 
     def _write(self, chunk: int, rows: list[dict[str, Array]]) -> None:
         path = self._path(chunk)
-        beside = path.with_suffix(".part.npz")
         columns: dict[str, Any] = {k: np.array([row[k] for row in rows]) for k in rows[0]}
-        np.savez_compressed(beside, **columns)
-        beside.replace(path)
+        with beside(path) as temporary:
+            np.savez_compressed(temporary, **columns)
 
     def _row(self, row: int) -> dict[str, Array]:
         """One pour: NaN for what it does not show, and under effects that leave it out."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from granulcal import _native
+from granulcal.documents import LARGEST_DOCUMENT, Table, check, parse_json, read_bytes
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.archive import Plan
@@ -60,10 +61,12 @@ def register(
     text = json.dumps(document, indent=1) + "\n"
     path = folder / _NAME
     if path.exists():
-        found = path.read_text(encoding="utf-8")
-        if found != text:
-            theirs = json.loads(found)
-            differing = [k for k, v in json.loads(text).items() if theirs.get(k) != v]
+        found = read_bytes(path, most=LARGEST_DOCUMENT)
+        if found != text.encode():
+            theirs = parse_json(found, path, error=ObservationError)
+            check(theirs, Table({}, open=True), path, error=ObservationError)
+            mine = parse_json(text.encode(), path)
+            differing = [k for k, v in mine.items() if theirs.get(k) != v]
             raise ObservationError(
                 f"{path} was registered for another analysis ({', '.join(differing)} differ); "
                 "what was fixed stays fixed: give another folder with -o"

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from granulcal.files import beside
 from granulcal.loop.close import Closed
 from granulcal.loop.trace import Explanation
 from granulcal.loop.trivial import LINE, NEAREST, RESIDUAL
@@ -48,11 +49,10 @@ def write_tables(closed: Closed, folder: Path) -> list[Path]:
         ("residuals", residuals(closed)),
     ):
         path = folder / f"{name}.parquet"
-        beside = path.with_suffix(".part")
         columns = list(dict.fromkeys(key for row in rows for key in row))
         table = arrow.table({key: [_known(row.get(key)) for row in rows] for key in columns})
-        parquet.write_table(table, beside)
-        beside.replace(path)
+        with beside(path) as temporary:
+            parquet.write_table(table, temporary)
         written.append(path)
     return written
 

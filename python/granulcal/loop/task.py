@@ -37,7 +37,6 @@ themselves many times (a drum's picture), so that one is enough.
 condition may then depend on each other (two walls that turn together).
 """
 
-import tomllib
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -46,6 +45,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.documents import (
+    LARGEST_DOCUMENT,
+    Flag,
+    ListOf,
+    Mapping,
+    Number,
+    OneOf,
+    Table,
+    Text,
+    check,
+    parse_toml,
+    read_bytes,
+)
 from granulcal.errors import ObservationError
 from granulcal.loop.definition import Definition, check_definitions, definition_inputs
 from granulcal.loop.forward import Coarse
@@ -65,6 +77,29 @@ __all__ = ["FIT", "SEALED", "Condition", "Task"]
 Array = NDArray[np.float64]
 
 FIT, SEALED = "fit", "sealed"
+_AT = Mapping(Number())
+_READING = Mapping(OneOf((Text(), Flag(), ListOf(Number()), Number())))
+_CONDITION = Table(
+    {"name": Text(), "at": _AT, "use": Text((FIT, SEALED)), "recordings": ListOf(Text(), least=1)},
+    {"camera": Text(), "known": _AT, "reading": _READING, "averaged": Flag()},
+)
+_TOLERANCE = Table({"sd": Number(0)}, {"shared": Flag()})
+_SCHEMA = Table(
+    {"scene": Text(), "prior": Text(), "conditions": ListOf(_CONDITION, least=1)},
+    {
+        "effects": ListOf(Text(), least=1),
+        "camera": Text(),
+        "nuisances": Mapping(OneOf((_TOLERANCE, Number(0)))),
+        "tolerances": Text(),
+        "reading": _READING,
+        "between": Flag(),
+        "definitions": ListOf(Table({"name": Text()}, {"at": _AT, "reading": _READING})),
+        # As a prior's, which checks them.
+        "nuisance": ListOf(Mapping(OneOf((Text(), Number())))),
+        "resolution": Table({"diameter": Number(0), "coarse": Number(0)}, {"scales": _AT}),
+        "law": OneOf((Flag(), ListOf(Text()))),
+    },
+)
 # Fewest pours over all fit conditions from which something may be said.
 _FEWEST_POURS = 3
 
@@ -112,9 +147,7 @@ class Condition:
         """
         there = scene.with_(self.at)
         measures = Measures.of(there)
-        rows = np.array(
-            [measures.of_recording(p, there, self.camera, self.reading) for p in self.recordings]
-        )
+        rows = np.array([self._read(measures, path, there) for path in self.recordings])
         for path, row in zip(self.recordings, rows, strict=True):
             unseen = [n for n, v in zip(measures.names, row, strict=True) if not np.isfinite(v)]
             if unseen:
@@ -123,6 +156,12 @@ class Condition:
                     "scene observe what every recording shows, or leave this one out"
                 )
         return rows
+
+    def _read(self, measures: Measures, path: Path, there: Scene) -> Array:
+        try:
+            return measures.of_recording(path, there, self.camera, self.reading)
+        except (TypeError, OverflowError) as error:
+            raise ObservationError(f"{path} cannot be read with {self.reading}: {error}") from None
 
 
 @dataclass(frozen=True)
@@ -177,6 +216,7 @@ class Task:
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
             raise ObservationError(f"conditions need names of their own, twice: {repeated}")
+        _require_different(self.conditions)
         pours = sum(len(c.recordings) for c in self.of(FIT))
         # One odd pour of one or two passes for an effect; a mean over time cannot be odd.
         is_steady = pours > 0 and all(c.averaged for c in self.of(FIT))
@@ -207,17 +247,9 @@ class Task:
             ObservationError: unknown or missing keys.
         """
         file = Path(path)
-        try:
-            document = tomllib.loads(file.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ObservationError(f"{file}: not valid TOML: {error}") from None
-        _require(
-            file,
-            document,
-            {"scene", "prior", "conditions"},
-            {"effects", "camera", "nuisances", "tolerances", "reading", "between"}
-            | {"definitions", "nuisance", "resolution", "law"},
-        )
+        data = read_bytes(file, most=LARGEST_DOCUMENT)
+        document = parse_toml(data, file, error=ObservationError)
+        check(document, _SCHEMA, file, error=ObservationError)
         folder = file.parent
         shared = {key: document[key] for key in ("camera", "reading") if key in document}
         scene = Scene.load(folder / document["scene"])
@@ -244,7 +276,7 @@ class Task:
             tolerances=Tolerances.load(folder / document["tolerances"])
             if "tolerances" in document
             else None,
-            between=bool(document.get("between", True)),
+            between=document.get("between", True),
             definitions=tuple(Definition.of(table) for table in document.get("definitions", [])),
         )
 
@@ -337,15 +369,7 @@ def _default(scene: Scene) -> tuple[LibraryEffect, ...]:
 
 
 def _condition(file: Path, table: dict[str, Any]) -> Condition:
-    needed = {"name", "at", "use", "recordings"}
-    _require(file, table, needed, {"camera", "known", "reading", "averaged"})
-    if table["use"] not in (FIT, SEALED):
-        raise ObservationError(
-            f'{file}: use of {table["name"]} must be "{FIT}" or "{SEALED}", got "{table["use"]}"'
-        )
     recordings = tuple(file.parent / name for name in table["recordings"])
-    if not recordings:
-        raise ObservationError(f"{file}: {table['name']} has no recordings")
     for recording in recordings:
         if not recording.exists():
             raise FileNotFoundError(f"{recording} of {file} is not there")
@@ -360,15 +384,19 @@ def _condition(file: Path, table: dict[str, Any]) -> Condition:
         camera,
         known,
         reading=dict(table.get("reading", {})),
-        averaged=bool(table.get("averaged", False)),
+        averaged=table.get("averaged", False),
     )
 
 
-def _require(file: Path, table: dict[str, Any], needed: set[str], optional: set[str]) -> None:
-    missing, unknown = sorted(needed - set(table)), sorted(set(table) - needed - optional)
-    if missing or unknown:
-        what = f"lacks {', '.join(missing)}" if missing else f"has unknown {', '.join(unknown)}"
-        raise ObservationError(
-            f"{file}: a table {what}; it has {', '.join(sorted(needed))} "
-            f"and may have {', '.join(sorted(optional))}"
-        )
+def _require_different(conditions: tuple[Condition, ...]) -> None:
+    """Refuses a recording that is given twice: it would count as two pours."""
+    seen: dict[Path, str] = {}
+    for condition in conditions:
+        for path in condition.recordings:
+            there = path.resolve()
+            if there in seen:
+                raise ObservationError(
+                    f"{path} is a recording of {seen[there]!r} and again of {condition.name!r}: "
+                    "each pour counts once"
+                )
+            seen[there] = condition.name

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.documents import ListOf, Number, Table, Text, read_json
 from granulcal.errors import ObservationError
 from granulcal.loop.design import Effect
 
@@ -23,6 +24,14 @@ __all__ = ["Tolerances"]
 
 Array = NDArray[np.float64]
 
+_SCHEMA = Table(
+    {
+        "names": ListOf(Text(), least=1),
+        "path": Text(),
+        "at": ListOf(Number(), least=1),
+        "directions": ListOf(ListOf(ListOf(Number())), least=1),
+    }
+)
 # Strength 1 stands for this many standard deviations.
 _FULL = 2.0
 
@@ -51,9 +60,15 @@ class Tolerances:
             FileNotFoundError: there is no such file.
             ObservationError: shapes that do not agree.
         """
-        document = json.loads(path.read_text(encoding="utf-8"))
+        try:
+            document = read_json(path, _SCHEMA)
+        except ValueError as error:
+            raise ObservationError(str(error)) from None
         names, at = tuple(document["names"]), np.array(document["at"], dtype=float)
-        directions = np.array(document["directions"], dtype=float)
+        try:
+            directions = np.array(document["directions"], dtype=float)
+        except ValueError:
+            raise ObservationError(f"{path}: directions must have rows of one length") from None
         if directions.ndim != 3 or directions.shape[1:] != (len(at), len(names)):
             raise ObservationError(
                 f"{path}: directions must have shape (D, {len(at)}, {len(names)}), "

@@ -1,9 +1,11 @@
 //! What of a recording is read.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use clap::Args;
 use granulcal_dataset::ReadOptions;
+
+use super::paths::Reads;
 
 /// What of a recording is read.
 #[derive(Clone, Debug, Args)]
@@ -11,7 +13,7 @@ pub struct ReadArgs {
     /// TOML of the camera: lens, depth unit and segmentation. Images as PNG need it; for .bag and .mcap
     /// it replaces what they say, key by key
     #[arg(long, value_name = "CAMERA.toml")]
-    pub camera: Option<PathBuf>,
+    pub camera: Option<Reads>,
     /// Topic of the depth images, where several fit
     #[arg(long)]
     pub topic: Option<String>,
@@ -33,7 +35,7 @@ impl ReadArgs {
     /// The options of the library.
     pub fn options(&self) -> ReadOptions {
         ReadOptions {
-            camera: self.camera.clone(),
+            camera: self.camera.as_deref().map(Path::to_owned),
             topic: self.topic.clone(),
             colour_topic: self.colour_topic.clone(),
             camera_topic: self.camera_topic.clone(),

@@ -1,10 +1,10 @@
 //! Arguments of the commands about the camera itself.
 
-use std::path::PathBuf;
-
 use clap::Args;
+use granulcal_dataset::{Form, Product};
 use granulcal_features::Region;
 
+use super::paths::{Reads, Writes, recording, writes};
 use super::read::ReadArgs;
 
 /// Fit a depth camera's noise, fixed pattern, rounding and holes to frames of a flat surface
@@ -36,8 +36,8 @@ Example:
   granulcal-cli fit-sensor bed_1.npz bed_2.npz bed_3.npz --check bed_4.npz bed_5.npz")]
 pub struct FitSensorArgs {
     /// Recordings of a flat surface
-    #[arg(required = true, value_name = "RECORDING")]
-    pub recordings: Vec<PathBuf>,
+    #[arg(required = true, value_name = "RECORDING", value_parser = recording())]
+    pub recordings: Vec<Reads>,
     #[command(flatten)]
     pub read: ReadArgs,
     /// Distance of the two imagers of a stereo camera [m]
@@ -62,17 +62,18 @@ pub struct FitSensorArgs {
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
     /// Recordings to compare with that the fit does not see [default: those of the fit]
-    #[arg(long, value_name = "RECORDING", num_args = 1..)]
-    pub check: Vec<PathBuf>,
+    #[arg(long, value_name = "RECORDING", num_args = 1.., value_parser = recording())]
+    pub check: Vec<Reads>,
     /// Part of the frames to compare with; repeat as needed [default: as --region]
     #[arg(long = "check-region", value_name = "X,Y,WIDTH,HEIGHT")]
     pub check_regions: Vec<Region>,
     /// Write the sensor as TOML
-    #[arg(long = "out", short = 'o', value_name = "SENSOR.toml")]
-    pub out: Option<PathBuf>,
+    #[arg(long = "out", short = 'o', value_name = "SENSOR.toml",
+        value_parser = writes(Product::File(Form::SensorToml)))]
+    pub out: Option<Writes>,
     /// Write sensor and all covariances as JSON
-    #[arg(long, value_name = "REPORT.json")]
-    pub report: Option<PathBuf>,
+    #[arg(long, value_name = "REPORT.json", value_parser = writes(Product::File(Form::Json)))]
+    pub report: Option<Writes>,
     /// Print that JSON instead of the table
     #[arg(long)]
     pub json: bool,
@@ -96,7 +97,7 @@ Example:
   granulcal-cli pick-colour pile.png --grains 300,220,40,40 --ground 20,20,80,80 --mask mask.png")]
 pub struct PickColourArgs {
     /// 8-bit colour PNG
-    pub image: PathBuf,
+    pub image: Reads,
     /// Rectangle with grains only; repeat as needed
     #[arg(long, value_name = "X,Y,WIDTH,HEIGHT")]
     pub grains: Vec<Region>,
@@ -104,8 +105,8 @@ pub struct PickColourArgs {
     #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", requires = "grains")]
     pub ground: Vec<Region>,
     /// Write the image with the grains outlined
-    #[arg(long, value_name = "OUT.png")]
-    pub mask: Option<PathBuf>,
+    #[arg(long, value_name = "OUT.png", value_parser = writes(Product::File(Form::Png)))]
+    pub mask: Option<Writes>,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,

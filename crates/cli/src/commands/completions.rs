@@ -1,13 +1,36 @@
 //! `completions`: a script that completes the commands in a shell.
 
+use std::any::TypeId;
+
+use clap::{Arg, Command, ValueHint};
+
 use crate::args::CompletionsArgs;
+use crate::args::paths::{Reads, Writes};
 use crate::context::print_line;
 use crate::outcome::Outcome;
 use crate::program::Program;
 
 pub fn run(program: &Program, args: &CompletionsArgs) -> anyhow::Result<Outcome> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut program.command(), program.binary(), &mut script);
+    clap_complete::generate(
+        args.shell,
+        &mut with_path_hints(program.command()),
+        program.binary(),
+        &mut script,
+    );
     print_line(String::from_utf8_lossy(&script).trim_end())?;
     Ok(Outcome::Done)
+}
+
+/// The parser whose paths are completed as paths.
+fn with_path_hints(command: Command) -> Command {
+    let is_path = |argument: &Arg| {
+        let kind = argument.get_value_parser().type_id();
+        kind == TypeId::of::<Reads>() || kind == TypeId::of::<Writes>()
+    };
+    command.mut_subcommands(|below| {
+        below.mut_args(|argument| {
+            if is_path(&argument) { argument.value_hint(ValueHint::AnyPath) } else { argument }
+        })
+    })
 }

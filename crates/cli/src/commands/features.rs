@@ -12,6 +12,7 @@ use crate::args::FeaturesArgs;
 use crate::context::{note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
 use crate::scene;
+use crate::sides::SideFiles;
 
 pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     if args.list {
@@ -29,15 +30,18 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
         note(&format!("warning: {line}"));
     }
     let levelled = recording.level_with(&segmentation(args, &recording.segmentation)?)?;
+    let mut sides = SideFiles::default();
     if let Some(folder) = &args.debug_images {
         // Before the formation: where none is found, the pictures say why.
-        let pictures = write_pictures(folder, &levelled)?;
-        note(&format!(
-            "pictures in {}: residual.png from -{residual:.2} mm (blue) to {residual:.2} mm (red), height.png from 0 (dark) to {:.2} mm (yellow), mask.png",
-            folder.display(),
-            1e3 * pictures.height,
-            residual = 1e3 * pictures.residual,
-        ));
+        let written = write_pictures(folder, &levelled).map(|pictures| {
+            note(&format!(
+                "pictures in {}: residual.png from -{residual:.2} mm (blue) to {residual:.2} mm (red), height.png from 0 (dark) to {:.2} mm (yellow), mask.png",
+                folder.display(),
+                1e3 * pictures.height,
+                residual = 1e3 * pictures.residual,
+            ));
+        });
+        sides.keep(written.context("writing --debug-images"));
     }
     let formation = recording.formation_of(levelled)?;
     if let (None, Some(edge)) = (args.border, formation.edge()) {
@@ -55,14 +59,14 @@ pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
         statistics.push(named(&DIAGNOSTICS, &values));
     }
     if let Some(path) = &args.points {
-        npy::write_points(path, &formation.points)?;
+        sides.keep(npy::write_points(path, &formation.points).context("writing --points"));
     }
     if args.json {
         print_json(&as_json(&recording, &formation, &statistics))?;
     } else {
         print(&recording, &formation, &statistics)?;
     }
-    Ok(Outcome::whole_if(recording.lost.is_none()))
+    Ok(sides.finish(Outcome::whole_if(recording.lost.is_none())))
 }
 
 /// The recording's own segmentation with what the command line changes.

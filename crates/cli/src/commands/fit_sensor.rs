@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use granulcal_dataset::{DatasetError, Recording, Source, save_sensor, write_file};
+use granulcal_dataset::{DatasetError, Form, Recording, Source, save_sensor, write_file};
 use granulcal_features::sensor::fit::{
     Comparison, FitSettings, FlatFrames, SensorFit, compare, fit,
 };
@@ -11,8 +11,10 @@ use granulcal_features::{Camera, DepthImage, DepthSensor, HeightMap, NoiseField}
 use serde_json::{Value, json};
 
 use crate::args::FitSensorArgs;
+use crate::args::paths::Reads;
 use crate::context::{note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
+use crate::sides::SideFiles;
 
 pub fn run(args: &FitSensorArgs) -> anyhow::Result<Outcome> {
     let (frames, mut is_whole) = frames(&args.recordings, args)?;
@@ -40,12 +42,14 @@ pub fn run(args: &FitSensorArgs) -> anyhow::Result<Outcome> {
         };
         Some(compare(&found.sensor, &others, &settings).context("comparing the sensor")?)
     };
+    let mut sides = SideFiles::default();
     if let Some(path) = &args.out {
-        save_sensor(path, &found.sensor)?;
+        sides.keep(save_sensor(path, &found.sensor).context("writing --out"));
     }
     let report = as_json(&found, checked.as_ref());
     if let Some(path) = &args.report {
-        write_file(path, serde_json::to_string_pretty(&report)?.as_bytes())?;
+        let text = serde_json::to_string_pretty(&report)?;
+        sides.keep(write_file(path, Form::Json, text.as_bytes()).context("writing --report"));
     }
     if args.json {
         print_json(&report)?;
@@ -55,12 +59,12 @@ pub fn run(args: &FitSensorArgs) -> anyhow::Result<Outcome> {
     if found.comparison.frames == 1 {
         note("note: one frame does not tell fixed pattern from noise; all is counted as noise");
     }
-    Ok(Outcome::whole_if(is_whole))
+    Ok(sides.finish(Outcome::whole_if(is_whole)))
 }
 
 /// All frames of the recordings: depth images of one camera, or height maps of one rig; and whether
 /// none is lost.
-fn frames(paths: &[PathBuf], args: &FitSensorArgs) -> anyhow::Result<(FlatFrames, bool)> {
+fn frames(paths: &[Reads], args: &FitSensorArgs) -> anyhow::Result<(FlatFrames, bool)> {
     let mut is_whole = true;
     let (mut images, mut maps) = (Vec::<DepthImage>::new(), Vec::<HeightMap>::new());
     let mut taken: Option<(Camera, f64)> = None;
@@ -105,12 +109,12 @@ fn frames(paths: &[PathBuf], args: &FitSensorArgs) -> anyhow::Result<(FlatFrames
 }
 
 /// The recordings: of a folder of height maps each by itself, in the order of their names.
-fn expanded(paths: &[PathBuf]) -> Result<Vec<PathBuf>, DatasetError> {
+fn expanded(paths: &[Reads]) -> Result<Vec<PathBuf>, DatasetError> {
     let mut recordings = Vec::new();
     for path in paths {
         let maps = if path.is_dir() { height_maps(path)? } else { Vec::new() };
         if maps.is_empty() {
-            recordings.push(path.clone());
+            recordings.push(path.to_path_buf());
         } else {
             recordings.extend(maps);
         }

@@ -6,7 +6,8 @@ use granulcal_dem::Scene;
 use serde_json::json;
 
 use crate::args::GenerateArgs;
-use crate::context::{Context, keeps_going, print_json, print_line};
+use crate::context::{Context, print_json, print_line};
+use crate::interrupt::keeps_going;
 use crate::outcome::Outcome;
 use crate::progress::RowProgress;
 use crate::scene::{self, Keep};
@@ -25,6 +26,7 @@ pub fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
         shard: args.shard,
         threads: args.threads.unwrap_or(defaults.threads),
         chunk: args.chunk,
+        flush_every: args.flush_every,
         resume: !args.no_resume,
     };
     if args.dry_run {
@@ -32,7 +34,7 @@ pub fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
     }
     let mut progress = RowProgress::new(context);
     let summary = generate(&scene, &prior, &options, &args.out, &mut |p| {
-        progress.show(p.resumed + p.made, p.resumed, p.total, p.unhealthy);
+        progress.show(p);
         keeps_going()
     });
     progress.finish();
@@ -93,16 +95,27 @@ fn report(args: &GenerateArgs, summary: &Summary) -> anyhow::Result<Outcome> {
             "made": progress.made,
             "resumed": progress.resumed,
             "unhealthy": progress.unhealthy,
+            "out_of_view": progress.out_of_view,
             "jammed": progress.jammed,
             "stopped": stopped,
         }))?;
     } else {
         let folder = args.out.display();
         print_line(&format!(
-            "{folder}: {complete} of {} rows complete, {} made now, {} unhealthy or without grains, \
+            "{folder}: {complete} of {} rows complete, {} made now, {} unhealthy, {} without grains in view, \
              {} jammed",
-            progress.total, progress.made, progress.unhealthy, progress.jammed
+            progress.total,
+            progress.made,
+            progress.unhealthy,
+            progress.out_of_view,
+            progress.jammed
         ))?;
+    }
+    if progress.unverified > 0 {
+        tracing::warn!(
+            "{} parts of an earlier version have no hash of their rows: damage in them cannot be found",
+            progress.unverified
+        );
     }
     if progress.beyond > 0 {
         tracing::info!("{} further rows of an earlier, larger run are kept", progress.beyond);
@@ -111,5 +124,5 @@ fn report(args: &GenerateArgs, summary: &Summary) -> anyhow::Result<Outcome> {
         tracing::warn!("stopped; the same command makes the remaining rows");
         return Ok(Outcome::Stopped);
     }
-    Ok(Outcome::healthy_if(progress.unhealthy == 0))
+    Ok(Outcome::healthy_if(progress.unhealthy + progress.out_of_view == 0))
 }

@@ -1,111 +1,113 @@
-//! `infer`: recordings to the posterior of a trained model.
+//! `infer`: recordings to the posterior of a trained model, and whether the model can say anything of them.
+
+mod report;
 
 use std::path::Path;
-use std::time::Instant;
 
 use anyhow::Context as _;
-use granulcal_bayessim::{Marginal, Model, Posterior};
-use granulcal_dataset::{Recording, scene_from_text};
+use granulcal_bayessim::Model;
+use granulcal_dataset::{Form, Limits, Recording, scene_from_text, write_file};
+use granulcal_dem::Scene;
 use granulcal_features::PAPER16;
-use serde_json::{Map, Value, json};
+use serde_json::json;
 
 use crate::args::InferArgs;
-use crate::context::{note, print_json, print_line};
+use crate::context::{note, print_json};
 use crate::outcome::{BadArgument, Outcome};
+use crate::scene;
+use crate::sides::SideFiles;
+use report::Report;
 
-/// Draws behind means and intervals.
-const SUMMARY_DRAWS: usize = 10_000;
+/// Draws in the file of `--out`.
+const KEPT_DRAWS: usize = 1000;
 
 pub fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
     let model = Model::load(&args.model)?;
-    if !model.x_names.iter().map(String::as_str).eq(PAPER16.iter().map(|s| s.name)) {
-        let found = model.x_names.join(", ");
-        return Err(BadArgument(format!("the model has other statistics: {found}")).into());
+    if !model.is_verified {
+        note(
+            "note: the model is of an earlier version without hashes: damage in it cannot be found",
+        );
     }
-    let ground_resolution = match &model.scene_toml {
-        // The scene may name meshes that are not here; the camera does not need them.
-        Some(text) => {
-            scene_from_text(text, Path::new("")).ok().map(|scene| scene.camera.ground_resolution())
-        }
-        None => None,
-    };
-    let mut is_whole = true;
+    if !model.x_names.iter().map(String::as_str).eq(PAPER16.iter().map(|s| s.name)) {
+        let (names, found) = (PAPER16.map(|s| s.name).join(", "), model.x_names.join(", "));
+        let refusal =
+            format!("the model must be of the statistics {names}, in this order; it is of {found}");
+        return Err(BadArgument(refusal).into());
+    }
+    // The scene may name meshes that are not here; the camera does not need them.
+    let trained =
+        model.scene_toml.as_deref().and_then(|text| scene_from_text(text, Path::new("")).ok());
+    if let Some(name) = &args.scene {
+        require_same(trained.as_ref(), &scene::named(name)?)?;
+    }
+    let limits = trained.as_ref().and_then(|scene| Limits::of(scene, &model.prior));
+    let ground_resolution = trained.map(|scene| scene.camera.ground_resolution());
+    let (mut is_whole, mut impossible) = (true, Vec::new());
     let mut observed = Vec::with_capacity(args.recordings.len());
     for path in &args.recordings {
         let recording = Recording::open(path, &args.read.options())?;
         for line in &recording.damage {
             note(&format!("warning: {line}"));
         }
-        is_whole &= recording.lost.is_none();
+        if let Some(lost) = &recording.lost {
+            note(&format!("warning: {}: {lost}", path.display()));
+            is_whole = false;
+        }
         let mut segmentation = recording.segmentation.clone();
         segmentation.ground_resolution = ground_resolution.or(segmentation.ground_resolution);
         let formation = recording.formation_with(&segmentation)?;
-        let statistics = recording
-            .statistics_of(&formation)
-            .with_context(|| format!("describing {}", path.display()))?;
-        observed.push(statistics.to_vec());
-    }
-    let started = Instant::now();
-    let posterior = model.posterior(&observed)?;
-    let marginals = posterior.marginals(SUMMARY_DRAWS, args.seed);
-    let seconds = started.elapsed().as_secs_f64();
-    if args.json {
-        print_json(&as_json(args, &model, &posterior, &marginals, &observed, seconds))?;
-    } else {
-        print(&marginals)?;
-        for warning in &posterior.warnings {
-            note(&format!("note: {warning}"));
+        if let Some(limits) = &limits {
+            let name = path.display();
+            let found = limits.violations(&formation).into_iter();
+            impossible.extend(found.map(|reason| format!("{name}: {reason}")));
         }
+        let statistics = recording.statistics_of(&formation);
+        observed.push(match statistics.with_context(|| format!("describing {}", path.display())) {
+            Ok(statistics) => statistics.to_vec(),
+            // What cannot be of the scene need not be described.
+            Err(_) if !impossible.is_empty() => Vec::new(),
+            Err(error) => return Err(error),
+        });
+    }
+    let paths: Vec<_> = args.recordings.iter().map(|path| path.display().to_string()).collect();
+    let report = if impossible.is_empty() {
+        Report::of(&model, &paths, &observed, args.seed)?
+    } else {
+        Report::impossible(&model, &paths, &observed, impossible)
+    };
+    let mut sides = SideFiles::default();
+    if let Some(path) = &args.out {
+        let mut document = report.document();
+        document["samples"] = json!(report.samples(KEPT_DRAWS, args.seed));
+        let text = serde_json::to_string_pretty(&document)? + "\n";
+        sides.keep(write_file(path, Form::Json, text.as_bytes()).context("writing --out"));
+    }
+    if args.json {
+        let mut document = report.document();
+        if args.samples > 0 {
+            document["samples"] = json!(report.samples(args.samples, args.seed));
+        }
+        print_json(&document)?;
+    } else {
+        report.print()?;
     }
     if model.is_calibrated != Some(true) {
         note("note: the model has not passed a check of its own: see `granulcal check`");
     }
-    Ok(Outcome::whole_if(is_whole))
+    let outcome =
+        if report.is_inside() { Outcome::whole_if(is_whole) } else { Outcome::OutsideModel };
+    Ok(sides.finish(outcome))
 }
 
-fn as_json(
-    args: &InferArgs,
-    model: &Model,
-    posterior: &Posterior,
-    marginals: &[Marginal],
-    observed: &[Vec<f64>],
-    seconds: f64,
-) -> Value {
-    let parameters: Map<_, _> = marginals
-        .iter()
-        .map(|m| {
-            let interval = [m.interval90.0, m.interval90.1];
-            let value = json!({ "mean": m.mean, "median": m.median, "interval90": interval });
-            (m.name.clone(), value)
-        })
-        .collect();
-    let statistics = |row: &Vec<f64>| -> Map<String, Value> {
-        model.x_names.iter().cloned().zip(row.iter().map(|&v| Value::from(v))).collect()
+/// Refuses a model of another scene.
+fn require_same(trained: Option<&Scene>, asked: &Scene) -> anyhow::Result<()> {
+    let Some(trained) = trained else {
+        let unknown = "the model does not say which scene it was trained on";
+        return Err(BadArgument(unknown.to_owned()).into());
     };
-    let paths: Vec<_> = args.recordings.iter().map(|path| path.display().to_string()).collect();
-    let warnings: Vec<_> = posterior.warnings.iter().map(ToString::to_string).collect();
-    let mut report = json!({
-        "recordings": paths,
-        "parameters": parameters,
-        "calibrated": model.is_calibrated,
-        "warnings": warnings,
-        "statistics": observed.iter().map(statistics).collect::<Vec<_>>(),
-        "posterior_s": seconds,
-    });
-    if args.samples > 0 {
-        report["samples"] = json!(posterior.sample(args.samples, args.seed));
-    }
-    report
-}
-
-fn print(marginals: &[Marginal]) -> anyhow::Result<()> {
-    print_line(&format!("{:<30}{:>10}{:>10}   90 % interval", "parameter", "median", "mean"))?;
-    for m in marginals {
-        let (low, high) = m.interval90;
-        print_line(&format!(
-            "{:<30}{:>10.4}{:>10.4}   {low:.4} to {high:.4}",
-            m.name, m.median, m.mean
-        ))?;
+    if let Some((key, there, here)) = trained.first_difference(asked)? {
+        let found = format!("scene.{key} is {there} there, {here} is asked for");
+        return Err(BadArgument(format!("the model was trained on another scene: {found}")).into());
     }
     Ok(())
 }

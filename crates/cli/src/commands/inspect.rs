@@ -77,6 +77,7 @@ fn dataset_facts(dataset: &Dataset) -> Value {
         "rows": dataset.rows.len(),
         "missing": dataset.gaps(NAMED_GAPS),
         "status": dataset.status_counts(),
+        "files without a hash": dataset.unverified.len(),
         "seed": dataset.header.seed,
         "version": dataset.header.version,
         "cpu_s": dataset.rows.iter().map(|row| row.cpu_s).sum::<f64>(),

@@ -11,7 +11,14 @@ use crate::outcome::Outcome;
 const NAMED_GAPS: usize = 5;
 
 pub fn run(args: &MergeArgs) -> anyhow::Result<Outcome> {
-    let dataset = merge(&args.inputs)?;
+    let dataset = merge(&args.inputs.iter().map(|input| input.to_path_buf()).collect::<Vec<_>>())?;
+    if !dataset.unverified.is_empty() {
+        tracing::warn!(
+            "{} files of an earlier version have no hash of their rows, {} the first: damage in them cannot be found",
+            dataset.unverified.len(),
+            dataset.unverified[0].display()
+        );
+    }
     dataset.write(&args.out)?;
     let gaps = dataset.gaps(NAMED_GAPS);
     if !gaps.is_empty() {

@@ -1,5 +1,6 @@
 //! `pick-colour`: an image to the range of colours that marks its grains.
 
+use anyhow::Context as _;
 use granulcal_dataset::{png, write_mask};
 use granulcal_features::pick_range;
 use serde_json::json;
@@ -7,6 +8,7 @@ use serde_json::json;
 use crate::args::PickColourArgs;
 use crate::context::{note, print_json, print_line};
 use crate::outcome::Outcome;
+use crate::sides::SideFiles;
 
 /// Share of the ground's sample in the range from which the two cannot be told apart by colour.
 const MUCH_GROUND: f64 = 0.05;
@@ -14,8 +16,10 @@ const MUCH_GROUND: f64 = 0.05;
 pub fn run(args: &PickColourArgs) -> anyhow::Result<Outcome> {
     let image = png::read_colour(&args.image)?;
     let picked = pick_range(&image, &args.grains, &args.ground)?;
+    let mut sides = SideFiles::default();
     if let Some(path) = &args.mask {
-        write_mask(path, &image, &image.mask_of(&picked.range)?)?;
+        let mask = image.mask_of(&picked.range)?;
+        sides.keep(write_mask(path, &image, &mask).context("writing --mask"));
     }
     let range = &picked.range;
     if args.json {
@@ -51,5 +55,5 @@ pub fn run(args: &PickColourArgs) -> anyhow::Result<Outcome> {
             "warning: {share:.0} % of the ground's sample lie in the range; colour does not tell the two apart"
         ));
     }
-    Ok(Outcome::Done)
+    Ok(sides.finish(Outcome::Done))
 }

@@ -9,6 +9,7 @@ use crate::args::RenderArgs;
 use crate::context::{Context, print_line};
 use crate::outcome::{BadArgument, Outcome};
 use crate::scene::{self, Keep};
+use crate::sides::SideFiles;
 
 pub fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
     let scene = scene::load(&args.scene)?;
@@ -30,6 +31,7 @@ pub fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
             simulation,
             &Keep::Nothing,
             &mut Observer::new(&scene),
+            &mut SideFiles::default(),
         )? {
             Some(pour) => (pour.positions, pour.radii),
             None => return Ok(Outcome::Stopped),

@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::Context as _;
 use cpu_time::ProcessTime;
 use granulcal_dataset::{
-    DatasetError, ObservedStatistic, Observer, RowStatus, npy, observe, observed_statistics,
+    DatasetError, ObservedStatistic, Observer, Room, RowStatus, npy, observe, observed_statistics,
 };
 use granulcal_dem::{Health, Pour, Scene};
 use granulcal_features::{DIAGNOSTICS, PAPER16, Statistic};
@@ -17,6 +17,7 @@ use crate::args::SimulateArgs;
 use crate::context::{Context, print_json, print_line};
 use crate::outcome::Outcome;
 use crate::scene::{self, Keep};
+use crate::sides::SideFiles;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -59,9 +60,13 @@ pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
         (None, Some(path)) => Keep::Checkpoint { path, every: args.checkpoint_every },
         (None, None) => Keep::Nothing,
     };
+    if let Keep::Film { path, fps } = keep {
+        Room::of_pour(&scene, Some(fps)).require(Some(path))?;
+    }
     let simulation = scene::start(&scene, args.seed, args.threads, args.resume.as_deref())?;
-    let mut observer = Observer::new(&scene);
-    let pour = scene::pour(context, &scene, args.seed, simulation, &keep, &mut observer)?;
+    let (mut observer, mut sides) = (Observer::new(&scene), SideFiles::default());
+    let pour =
+        scene::pour(context, &scene, args.seed, simulation, &keep, &mut observer, &mut sides)?;
     let Some(pour) = pour else {
         if let Keep::Checkpoint { path, .. } = keep {
             let path = path.display();
@@ -87,14 +92,14 @@ pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
         observed: None,
         series: Map::new(),
     };
-    let status = describe(&scene, &pour, &observer, args, &mut report)?;
+    let status = describe(&scene, &pour, &observer, args, &mut report, &mut sides)?;
     report.cpu_s = clock.elapsed().as_secs_f64();
     report.wall_s = start.elapsed().as_secs_f64();
     if let Some(path) = &args.positions {
-        npy::write_points(path, &pour.positions).context("writing --positions")?;
+        sides.keep(npy::write_points(path, &pour.positions).context("writing --positions"));
     }
     print(&report, &scene, args.json)?;
-    Ok(Outcome::healthy_if(status.is_healthy()))
+    Ok(sides.finish(Outcome::healthy_if(status.is_healthy())))
 }
 
 /// Looks at the pour and fills in the statistics; writes the image if asked.
@@ -104,6 +109,7 @@ fn describe(
     observer: &Observer,
     args: &SimulateArgs,
     report: &mut Report,
+    sides: &mut SideFiles,
 ) -> anyhow::Result<RowStatus> {
     let status = observer.status(pour);
     report.status = status.name();
@@ -117,7 +123,7 @@ fn describe(
         other => other?,
     };
     if let Some(path) = &args.depth {
-        write_view(path, &seen.view, args.depth_unit).context("writing --depth")?;
+        sides.keep(write_view(path, &seen.view, args.depth_unit).context("writing --depth"));
     }
     match &seen.statistics {
         Ok(values) => {

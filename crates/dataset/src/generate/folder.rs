@@ -1,6 +1,6 @@
 //! The folder of a batch: its lock, its manifest, and what it already holds.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
@@ -10,6 +10,7 @@ use crate::header::Header;
 use crate::manifest::{self, Manifest};
 use crate::random::pour_seed;
 use crate::row::Row;
+use crate::table::Table;
 use crate::{DatasetError, table};
 
 /// An open folder; nobody else writes into it while this lives.
@@ -23,10 +24,26 @@ pub(super) struct Folder {
 }
 
 /// What is left to do.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Plan {
-    pub(super) chunks: BTreeMap<u64, OpenChunk>,
+    /// Rows that the chunks with a part lack.
+    pub(super) missing: BTreeMap<u64, Vec<u64>>,
+    /// The chunks with a part that lacks rows.
+    pub(super) open: BTreeMap<u64, OpenChunk>,
     pub(super) progress: Progress,
+}
+
+/// How many rows a shard has.
+fn rows_of_shard(options: &GenerateOptions, chunk: u64) -> u64 {
+    let (chunks, shard) = (options.rows.div_ceil(chunk), options.shard);
+    if shard.index >= chunks {
+        return 0;
+    }
+    let own = (chunks - shard.index).div_ceil(shard.count);
+    let has_last = (chunks - 1) % shard.count == shard.index;
+    // The last chunk may be a short one.
+    let short = if has_last { chunks * chunk - options.rows } else { 0 };
+    own * chunk - short
 }
 
 impl Folder {
@@ -65,38 +82,39 @@ impl Folder {
         Ok(Self { path: path.to_owned(), header, chunk, _lock: lock })
     }
 
-    /// Reads and checks every part, and lists the rows that are missing.
+    /// Reads and checks the parts that are there; what they lack is left to do. The rows of other chunks are not
+    /// listed: there may be billions of them.
     pub(super) fn plan(&self, options: &GenerateOptions) -> Result<Plan, DatasetError> {
-        let mut plan = Plan { chunks: BTreeMap::new(), progress: Progress::default() };
-        let parts = manifest::parts(&self.path)?;
-        let wanted = (0..options.rows.div_ceil(self.chunk))
-            .filter(|chunk| chunk % options.shard.count == options.shard.index);
-        for chunk in wanted {
+        let mut plan = Plan::default();
+        let chunks = options.rows.div_ceil(self.chunk);
+        plan.progress.total = rows_of_shard(options, self.chunk);
+        let is_wanted =
+            |chunk: &u64| *chunk < chunks && chunk % options.shard.count == options.shard.index;
+        for chunk in manifest::parts(&self.path)?.into_iter().filter(is_wanted) {
             let (first, end) = (chunk * self.chunk, ((chunk + 1) * self.chunk).min(options.rows));
-            plan.progress.total += end - first;
-            let rows = match parts.binary_search(&chunk) {
-                Ok(_) => self.read_part(chunk)?,
-                Err(_) => Vec::new(),
-            };
+            let (rows, is_verified) = self.read_part(chunk)?;
+            plan.progress.unverified += u64::from(!is_verified);
             let (kept, beyond): (Vec<_>, Vec<_>) = rows.iter().partition(|row| row.row < end);
             plan.progress.resumed += kept.len() as u64;
             plan.progress.beyond += beyond.len() as u64;
-            plan.progress.unhealthy +=
-                kept.iter().filter(|row| !row.status.is_healthy()).count() as u64;
-            plan.progress.jammed += kept.iter().filter(|row| row.status.is_jammed()).count() as u64;
-            let missing: Vec<_> =
-                (first..end).filter(|&i| kept.iter().all(|row| row.row != i)).collect();
-            if !missing.is_empty() {
-                plan.chunks.insert(chunk, OpenChunk { rows, missing, changed: false });
+            for row in &kept {
+                plan.progress.count(row.status);
+            }
+            let there: HashSet<_> = kept.iter().map(|row| row.row).collect();
+            let missing: Vec<_> = (first..end).filter(|row| !there.contains(row)).collect();
+            let left = missing.len() as u64;
+            plan.missing.insert(chunk, missing);
+            if left > 0 {
+                plan.open.insert(chunk, OpenChunk { rows, left, changed: false });
             }
         }
         Ok(plan)
     }
 
-    /// The rows of a part, each checked against what it must have been made from.
-    fn read_part(&self, chunk: u64) -> Result<Vec<Row>, DatasetError> {
+    /// The rows of a part, each checked against what it must have been made from, and whether the part has a hash.
+    fn read_part(&self, chunk: u64) -> Result<(Vec<Row>, bool), DatasetError> {
         let path = manifest::part_path(&self.path, chunk);
-        let (header, rows) = table::read(&path)?;
+        let Table { header, rows, is_verified } = table::read(&path)?;
         header.require_same(&path, &self.header)?;
         let range = chunk * self.chunk..(chunk + 1) * self.chunk;
         let allowed = format!("rising within {}..{}", range.start, range.end);
@@ -115,7 +133,7 @@ impl Folder {
                 return Err(DatasetError::content(&path, what, found, format!("{expected:?}")));
             }
         }
-        Ok(rows)
+        Ok((rows, is_verified))
     }
 }
 

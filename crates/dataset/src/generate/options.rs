@@ -1,6 +1,7 @@
 //! What a batch is asked for.
 
 use std::str::FromStr;
+use std::time::Duration;
 
 use crate::DatasetError;
 
@@ -45,14 +46,17 @@ pub struct GenerateOptions {
     pub threads: usize,
     /// Rows in a part; a folder keeps the number that it began with.
     pub chunk: u64,
+    /// Longest time that a finished row is in memory only.
+    pub flush_every: Duration,
     /// Whether rows that are in the folder already are kept; else a folder with rows is refused.
     pub resume: bool,
 }
 
 impl Default for GenerateOptions {
-    /// 1000 rows on all cores, in parts of 16.
+    /// 1000 rows on all cores, in parts of 16, on disk within 30 s.
     fn default() -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        Self { rows: 1000, seed: 0, shard: Shard::WHOLE, threads, chunk: 16, resume: true }
+        let (shard, flush_every) = (Shard::WHOLE, Duration::from_secs(30));
+        Self { rows: 1000, seed: 0, shard, threads, chunk: 16, flush_every, resume: true }
     }
 }

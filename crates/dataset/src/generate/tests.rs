@@ -177,7 +177,7 @@ fn rows_out_of_view_are_rows() {
     scene.camera.height_threshold = 0.2;
     let summary =
         generate(&scene, &Prior::default(), &options(2), &place.at("a"), &mut |_| true).unwrap();
-    assert_eq!(summary.progress.unhealthy, 2);
+    assert_eq!((summary.progress.out_of_view, summary.progress.unhealthy), (2, 0));
     let dataset = Dataset::open(&place.at("a")).unwrap();
     assert_eq!(dataset.status_counts().get("no_grains_in_view"), Some(&2));
     assert!(dataset.x().iter().all(|value| value.is_nan()));
@@ -203,4 +203,65 @@ fn shards_are_read_from_text() {
     for text in ["4/4", "1", "a/2", "0/0", "-1/2", "1/2/3"] {
         assert!(text.parse::<Shard>().unwrap_err().to_string().contains("i/k"), "{text}");
     }
+}
+
+#[test]
+fn finished_rows_are_on_disk_before_their_part_is_complete() {
+    let place = Place::new();
+    let options =
+        GenerateOptions { chunk: 100, threads: 1, flush_every: Duration::ZERO, ..options(6) };
+    let path = place.at("flushed");
+    let mut most = 0;
+    let watch = &mut |progress: &Progress| {
+        if progress.made > 0 {
+            let on_disk = table::read(&path.join("part-000000.parquet")).unwrap().rows.len() as u64;
+            assert_eq!(on_disk, progress.made);
+            most = most.max(on_disk);
+        }
+        progress.made < 4
+    };
+    let summary = generate(&small(), &Prior::default(), &options, &path, watch).unwrap();
+    assert!(summary.stopped && most >= 4);
+    assert_eq!(place.make("flushed", &options).progress.resumed, most);
+    place.make("whole", &GenerateOptions { chunk: 4, ..options });
+    let opened = |name: &str| Dataset::open(&place.at(name)).unwrap();
+    assert_same(&opened("flushed"), &opened("whole"));
+}
+
+#[test]
+fn one_flipped_bit_is_found_or_changes_nothing() {
+    let place = Place::new();
+    place.make("whole", &options(4));
+    let part = place.at("whole").join("part-000000.parquet");
+    let bytes = fs::read(&part).unwrap();
+    let rows = table::read(&part).unwrap().rows;
+    let mut refused = 0;
+    for i in 0..400 {
+        let mut flipped = bytes.clone();
+        flipped[i * bytes.len() / 400] ^= 1 << (i % 8);
+        fs::write(&part, flipped).unwrap();
+        match table::read(&part) {
+            Err(error) => {
+                assert!(error.to_string().contains("part-000000"), "{error}");
+                refused += 1;
+            }
+            // Padding, statistics that nobody reads, or the name of the hash.
+            Ok(read) => {
+                assert_eq!(read.rows.len(), rows.len());
+                let same =
+                    |(a, b): (&Row, &Row)| a.same_as(b) && a.cpu_s.to_bits() == b.cpu_s.to_bits();
+                assert!(read.rows.iter().zip(&rows).all(same), "bit {i}");
+            }
+        }
+    }
+    assert!(refused > 100, "{refused} of 400");
+    // What resumes, merges or loads reads by the same function.
+    let mut flipped = bytes.clone();
+    let at = bytes.len() / 10;
+    flipped[at] ^= 4;
+    fs::write(&part, flipped).unwrap();
+    let resumed =
+        generate(&small(), &Prior::default(), &options(4), &place.at("whole"), &mut |_| true);
+    assert!(resumed.is_err() && Dataset::open(&place.at("whole")).is_err());
+    assert!(merge(&[place.at("whole")]).is_err());
 }

@@ -10,6 +10,8 @@ use super::{Funnel, Grains};
 use crate::check::{finite, non_negative, positive};
 use crate::error::DemError;
 
+/// Most places of a lattice of which the lowest are taken.
+const MOST_PLACES: f64 = 1e8;
 /// Solid fraction of the closest packing of equal spheres, pi / sqrt(18).
 const CLOSEST_PACKING: f64 = 0.740_480_489_693_061;
 
@@ -65,7 +67,8 @@ impl Start {
                 finite("start.base", base)?;
                 jitter_fits(jitter, spacing - grains.diameter)?;
                 positive("start.spacing", spacing)?;
-                let capacity = counts.iter().product();
+                let capacity =
+                    counts.iter().fold(1, |all: usize, &count| all.saturating_mul(count));
                 if grains.count > capacity {
                     let count = grains.count;
                     return Err(DemError::StartTooSmall { kind: "grid", capacity, count });
@@ -91,6 +94,13 @@ impl Start {
                 positive("start.radius", radius)?;
                 positive("start.spacing", spacing)?;
                 jitter_fits(jitter, spacing - grains.diameter)?;
+                let places = std::f64::consts::PI * radius * radius * length / spacing.powi(3);
+                if places > MOST_PLACES {
+                    let name = "start (places of the lattice in the cylinder)";
+                    let allowed =
+                        "at most 1e8: a smaller cylinder, or a wider spacing, holds as many grains";
+                    return Err(DemError::range(name, places, allowed));
+                }
                 let capacity = cylinder(grains, from, to, radius, spacing, jitter).len();
                 if grains.count > capacity {
                     let count = grains.count;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Context as _;
-use granulcal_dataset::write_contact_problem;
+use granulcal_dataset::{Room, write_contact_problem};
 use granulcal_dem::Simulation;
 use serde_json::{Value, json};
 
@@ -41,6 +41,7 @@ pub fn write(name: &Path, out: &Path, args: &SubstepArgs) -> anyhow::Result<Valu
         return Err(refuse(format!("--time must be zero or positive, and finite, got {time}")));
     }
     let scene = scene::changed(name, &args.with)?;
+    Room::of_pour(&scene, None).require(None)?;
     let mut simulation = Simulation::new(&scene, args.seed.unwrap_or(0))?;
     simulation.advance(time);
     if let Some(status) = simulation.ended() {

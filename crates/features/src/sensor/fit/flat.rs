@@ -9,7 +9,7 @@ const CLIP: f64 = 4.0;
 /// The same for the first look, about the median of a frame that may be tilted.
 const FIRST_CLIP: f64 = 6.0;
 /// Standard deviation of a Gaussian over its median absolute deviation.
-const SD_PER_MAD: f64 = 1.482_602_218_505_602;
+pub(super) const SD_PER_MAD: f64 = 1.482_602_218_505_602;
 /// Rounds of "fit, leave out, fit again".
 const MAX_ROUNDS: usize = 40;
 /// Pixels for each coefficient below which there is nothing to learn.

@@ -5,7 +5,7 @@ use granulcal_numbers::scatter;
 use super::comparison::Comparison;
 use super::components::Estimator;
 use super::covariance::{self, Split};
-use super::flat::{Patch, detrend};
+use super::flat::{Patch, SD_PER_MAD, detrend, median};
 use super::frames::{FlatFrames, Optics};
 use super::settings::FitSettings;
 use crate::error::FeatureError;
@@ -13,6 +13,39 @@ use crate::region::Region;
 use crate::sensor::DepthSensor;
 use crate::sensor::depth_sensor::round_to;
 use crate::sensor::field::SensorGrid;
+
+/// Least share of the pixels with data that lie on the surface, and largest standard deviation from it over the
+/// distance (of height maps: over the longer side). A depth camera errs by some 2 % of the distance; a room is no wall.
+const LEAST_ON_SURFACE: f64 = 0.5;
+const LARGEST_DEVIATION: f64 = 0.05;
+
+/// Refuses frames of what is not flat: their shape would be taken for the sensor's pattern.
+fn require_flat(optics: &Optics, values: &[f64], patch: &Patch) -> Result<(), FeatureError> {
+    let valid = values.iter().filter(|value| value.is_finite()).count().max(1);
+    let on_surface = patch.count() as f64 / valid as f64;
+    let (scale, relative): (_, Box<dyn Fn(f64, f64) -> f64>) = match *optics {
+        Optics::Stereo { .. } => ("distance", Box::new(|residual, trend| residual / trend)),
+        // The trend is one over the distance.
+        Optics::TimeOfFlight { inverse: true, .. } => {
+            ("distance", Box::new(|residual, trend| residual * trend))
+        }
+        Optics::TimeOfFlight { resolution, .. } => {
+            let side = resolution * patch.width.max(patch.height) as f64;
+            ("longer side", Box::new(move |residual, _| residual / side))
+        }
+    };
+    let pixels = patch.residual.iter().zip(&patch.trend).zip(&patch.mask);
+    let mut off: Vec<f64> = pixels
+        .filter(|(_, mask)| **mask > 0.0)
+        .map(|((residual, trend), _)| relative(*residual, *trend).abs())
+        .collect();
+    let deviation = SD_PER_MAD * median(&mut off);
+    if on_surface >= LEAST_ON_SURFACE && deviation <= LARGEST_DEVIATION {
+        return Ok(());
+    }
+    let (on_surface, deviation) = (100.0 * on_surface, 100.0 * deviation);
+    Err(FeatureError::NotFlat { on_surface, deviation, scale })
+}
 
 /// Frames of one sensor, their trends and residuals.
 pub(super) struct Session<'a> {
@@ -43,7 +76,10 @@ impl<'a> Session<'a> {
         for frame in 0..frames.values.len() {
             let of = |region: &Region| {
                 let values = frames.cut(frame, region);
-                detrend(&values, region.width, degree, |v, t| frames.optics.error(v, t))
+                let error = |v, t| frames.optics.error(v, t);
+                let patch = detrend(&values, region.width, degree, error)?;
+                require_flat(&frames.optics, &values, &patch)?;
+                Ok(patch)
             };
             patches.push(regions.iter().map(of).collect::<Result<Vec<_>, _>>()?);
         }

@@ -183,3 +183,28 @@ fn what_cannot_be_fitted_is_named() {
     let settings = FitSettings { trend_degree: 9, ..Default::default() };
     assert!(matches!(fit(&frames, &settings), Err(FeatureError::OutOfRange { .. })));
 }
+
+#[test]
+fn what_is_not_flat_is_refused() {
+    let camera = Camera::overhead(2.0, 2.0, 80).unwrap();
+    // A floor two metres away with boxes of half a metre.
+    let depth = |i: usize| if (i / 10) % 2 == (i / 800) % 2 { 2.0_f32 } else { 1.5 };
+    let image = DepthImage::new(80, 80, (0..6400).map(depth).collect()).unwrap();
+    let settings = FitSettings { max_lag: 5, sessions: 2, ..FitSettings::default() };
+    for frames in [
+        FlatFrames::from_stereo(&[image.clone()], &camera, 0.05, 1e-3).unwrap(),
+        FlatFrames::from_time_of_flight(&[image.clone()], &camera, 1e-3).unwrap(),
+        FlatFrames::from_height_maps(&[HeightMap::new(
+            80,
+            80,
+            3e-3,
+            3e-3,
+            (0..6400).map(|i| f64::from(depth(i))).collect(),
+        )
+        .unwrap()])
+        .unwrap(),
+    ] {
+        let error = fit(&frames, &settings).unwrap_err();
+        assert!(matches!(error, FeatureError::NotFlat { .. }), "{error}");
+    }
+}

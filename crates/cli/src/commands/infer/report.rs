@@ -1,0 +1,146 @@
+//! What `infer` says, as JSON and as a table.
+
+use granulcal_bayessim::{Identifiability, Marginal, Misfit, Model, ModelError, Posterior};
+use serde_json::{Map, Value, json};
+
+use crate::context::{note, print_line};
+
+/// Draws behind means and intervals.
+const SUMMARY_DRAWS: usize = 10_000;
+
+/// A posterior, or why there is none.
+pub struct Report<'a> {
+    model: &'a Model,
+    recordings: &'a [String],
+    observed: &'a [Vec<f64>],
+    /// Why the recordings cannot be of the model's scene.
+    impossible: Vec<String>,
+    found: Option<Found<'a>>,
+}
+
+/// What a model says of recordings that can be of its scene.
+struct Found<'a> {
+    misfit: Misfit,
+    posterior: Posterior<'a>,
+    marginals: Vec<Marginal>,
+    mode: Vec<f64>,
+    known: Identifiability,
+}
+
+impl<'a> Report<'a> {
+    /// The posterior given the statistics of each recording.
+    pub fn of(
+        model: &'a Model,
+        recordings: &'a [String],
+        observed: &'a [Vec<f64>],
+        seed: u64,
+    ) -> Result<Self, ModelError> {
+        let misfit = model.misfit(observed)?;
+        let posterior = model.posterior(observed)?;
+        let found = Found {
+            misfit,
+            marginals: posterior.marginals(SUMMARY_DRAWS, seed),
+            mode: posterior.mode(),
+            known: posterior.identifiability(),
+            posterior,
+        };
+        Ok(Self { model, recordings, observed, impossible: Vec::new(), found: Some(found) })
+    }
+
+    /// Recordings that cannot be of the model's scene: a posterior would say nothing.
+    pub fn impossible(
+        model: &'a Model,
+        recordings: &'a [String],
+        observed: &'a [Vec<f64>],
+        impossible: Vec<String>,
+    ) -> Self {
+        Self { model, recordings, observed, impossible, found: None }
+    }
+
+    /// Whether the model explains the recordings.
+    pub fn is_inside(&self) -> bool {
+        self.found.as_ref().is_some_and(|found| found.misfit.is_inside())
+    }
+
+    /// Draws of the posterior.
+    pub fn samples(&self, count: usize, seed: u64) -> Vec<Vec<f64>> {
+        self.found.as_ref().map_or_else(Vec::new, |found| found.posterior.sample(count, seed))
+    }
+
+    /// The JSON: the same fields always, null where there is no posterior.
+    pub fn document(&self) -> Value {
+        let found = self.found.as_ref();
+        let statistics = |row: &Vec<f64>| -> Map<String, Value> {
+            let names = self.model.x_names.iter().cloned();
+            names.zip(row.iter().map(|&value| Value::from(value))).collect()
+        };
+        let warnings: Vec<_> = found
+            .map(|found| found.posterior.warnings.iter().map(ToString::to_string).collect())
+            .unwrap_or_default();
+        json!({
+            "recordings": self.recordings,
+            "parameters": found.map(Found::parameters),
+            "inside_model": self.inside_model(),
+            "identifiability": found.map(|found| &found.known),
+            "calibrated": self.model.is_calibrated == Some(true),
+            "warnings": warnings,
+            "statistics": self.observed.iter().map(statistics).collect::<Vec<_>>(),
+        })
+    }
+
+    fn inside_model(&self) -> Value {
+        let misfit = self.found.as_ref().map(|found| &found.misfit);
+        let statistics = misfit.map(|misfit| {
+            let value = |s: &granulcal_bayessim::StatisticMisfit| {
+                (s.name.clone(), json!({ "residual": s.residual, "p_value": s.p_value }))
+            };
+            misfit.statistics.iter().map(value).collect::<Map<_, _>>()
+        });
+        json!({
+            "is_inside": self.is_inside(),
+            "impossible": self.impossible,
+            "p_value": misfit.map(|misfit| misfit.p_value),
+            "joint_p_value": misfit.map(|misfit| misfit.joint_p_value),
+            "statistics": statistics,
+        })
+    }
+
+    /// The table.
+    pub fn print(&self) -> anyhow::Result<()> {
+        let Some(found) = &self.found else {
+            print_line(
+                "OUTSIDE THE MODEL: this cannot be a formation of the model's scene, whatever its material.",
+            )?;
+            for reason in &self.impossible {
+                print_line(&format!("  {reason}"))?;
+            }
+            return print_line("No posterior is given.");
+        };
+        print_line(&found.misfit.to_string())?;
+        print_line(&format!("{:<30}{:>10}{:>10}   90 % interval", "parameter", "mode", "mean"))?;
+        for (m, mode) in found.marginals.iter().zip(&found.mode) {
+            let (low, high) = m.interval90;
+            print_line(&format!(
+                "{:<30}{mode:>10.4}{:>10.4}   {low:.4} to {high:.4}",
+                m.name, m.mean
+            ))?;
+        }
+        print_line(&found.known.to_string())?;
+        for warning in &found.posterior.warnings {
+            note(&format!("note: {warning}"));
+        }
+        Ok(())
+    }
+}
+
+impl Found<'_> {
+    fn parameters(&self) -> Map<String, Value> {
+        let value = |(m, mode): (&Marginal, &f64)| {
+            let interval = [m.interval90.0, m.interval90.1];
+            let value =
+                json!({ "mode": mode, "mean": m.mean, "median": m.median, "interval90": interval });
+            (m.name.clone(), value)
+        };
+        self.marginals.iter().zip(&self.mode).map(value).collect()
+    }
+}

@@ -1,0 +1,108 @@
+//! Whether a recording can be of a scene at all, before its statistics are asked anything: a room is no pile.
+//!
+//! The bounds are wide, so that no formation of the scene is beyond them, whatever its material: grains end no higher
+//! than they began, take no more room than grains can, lie where the camera looks, on a ground that is flat.
+
+use granulcal_dem::{Scene, Simulation};
+use granulcal_features::Formation;
+
+use crate::Prior;
+
+/// Factor on the height in which the grains start.
+const HEIGHT_MARGIN: f64 = 1.5;
+/// Room that grains take over their own volume: twice in the loosest heap, and twice for what hides under a pixel.
+const VOLUME_MARGIN: f64 = 4.0;
+/// Factor on half the diagonal of the field of view.
+const EXTENT_MARGIN: f64 = 1.5;
+/// Grain diameters that the ground's residual may have as standard deviation, and metres that are always allowed.
+const GROUND_DIAMETERS: f64 = 2.0;
+const GROUND_FLOOR: f64 = 5e-3;
+/// Shares of the points below which height and distance are taken: single pixels may be faults.
+const HEIGHT_SHARE: f64 = 0.995;
+const EXTENT_SHARE: f64 = 0.95;
+
+/// What a scene allows, over the whole of a prior.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Greatest height of a grain above the ground `[m]`.
+    pub height: f64,
+    /// Greatest volume under the surface `[m³]`.
+    pub volume: f64,
+    /// Greatest distance of most points from their middle `[m]`.
+    pub extent: f64,
+    /// Greatest standard deviation of the ground about its plane `[m]`.
+    pub ground_sd: f64,
+}
+
+impl Limits {
+    /// Those of a scene whose parameters are drawn from `prior`; `None` for one that cannot begin.
+    pub fn of(scene: &Scene, prior: &Prior) -> Option<Self> {
+        let ends = [0.0, 0.5, 1.0].map(|share| {
+            let draw = |p: &crate::Parameter| p.distribution.quantile(share_inside(share));
+            prior.parameters().iter().map(draw).collect::<Vec<f64>>()
+        });
+        let drawn = ends.iter().filter_map(|values| prior.apply(scene, values).ok());
+        let all: Vec<_> =
+            drawn.chain([scene.clone()]).filter_map(|scene| Self::of_one(&scene)).collect();
+        all.into_iter().reduce(|a, b| Self {
+            height: a.height.max(b.height),
+            volume: a.volume.max(b.volume),
+            extent: a.extent.max(b.extent),
+            ground_sd: a.ground_sd.max(b.ground_sd),
+        })
+    }
+
+    fn of_one(scene: &Scene) -> Option<Self> {
+        let simulation = Simulation::new(scene, 0).ok()?;
+        let (positions, radii) = (simulation.positions(), simulation.radii());
+        let tops = positions.iter().zip(&*radii).map(|(at, radius)| at.z + radius);
+        let grains: f64 = radii.iter().map(|r| 4.0 / 3.0 * std::f64::consts::PI * r.powi(3)).sum();
+        let field = scene.camera.field_width;
+        Some(Self {
+            height: HEIGHT_MARGIN * tops.fold(0.0, f64::max),
+            volume: VOLUME_MARGIN * grains,
+            extent: EXTENT_MARGIN * field * 0.5_f64.sqrt(),
+            ground_sd: (GROUND_DIAMETERS * scene.grains.diameter).max(GROUND_FLOOR),
+        })
+    }
+
+    /// Why a formation cannot be one of the scene, a sentence each; none if it can.
+    pub fn violations(&self, formation: &Formation) -> Vec<String> {
+        let points = || formation.points.iter();
+        let mut found = Vec::new();
+        let mut compare = |what: &str, unit: &str, value: f64, limit: f64| {
+            if value.is_nan() || value > limit {
+                found.push(format!(
+                    "{what} is {value:.3} {unit}, in the scene at most {limit:.3} {unit}"
+                ));
+            }
+        };
+        let height = quantile(points().map(|p| p.z).collect(), HEIGHT_SHARE);
+        compare("the formation's height", "m", height, self.height);
+        let litres = 1e3;
+        compare("the formation's volume", "l", litres * formation.volume, litres * self.volume);
+        let extent = quantile(points().map(|p| p.x.hypot(p.y)).collect(), EXTENT_SHARE);
+        compare("the formation's extent from its middle", "m", extent, self.extent);
+        let millimetres = 1e3;
+        compare(
+            "the ground's deviation from a plane",
+            "mm",
+            millimetres * formation.ground_sd,
+            millimetres * self.ground_sd,
+        );
+        found
+    }
+}
+
+/// The ends of a normal are far out: its 2 % and 98 % stand for them.
+fn share_inside(share: f64) -> f64 {
+    share.clamp(0.02, 0.98)
+}
+
+fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let at = ((values.len() - 1) as f64 * share).round() as usize;
+    *values.select_nth_unstable_by(at, f64::total_cmp).1
+}

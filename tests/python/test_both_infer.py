@@ -1,0 +1,124 @@
+"""`granulcal infer` and `granulcal-cli infer`: one answer, and Python's library says the same."""
+
+import json
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal import _native, cli
+from granulcal.bayessim import BayesSim
+from granulcal.identifiability import Identifiability
+
+SMALL = {"features": 8, "ensemble": 2, "components": 2, "emulator_features": 8, "max_epochs": 15}
+
+
+@pytest.fixture(scope="module")
+def model(small_data, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("both") / "model"
+    made = BayesSim.fit(small_data, quiet=True, seed=1, **SMALL)
+    made.save(folder)
+    return folder, made
+
+
+@pytest.fixture(scope="module")
+def recording(small_scene, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recording")
+    pour = gc.simulate(small_scene, gc.Material(0.5, 0.2, 0.4), seed=11)
+    camera = gc.Camera.overhead(
+        height=small_scene.get("camera.height"),
+        field_width=small_scene.get("camera.field_width"),
+        pixels=int(small_scene.get("camera.pixels")),
+    )
+    image, toml = camera.record(pour.positions, pour.radii, folder)
+    return [str(image), "--camera", str(toml)]
+
+
+def said(capfd, code: int, words: list[str], *, native: bool = False) -> dict:
+    found = _native.run_cli(["granulcal-cli", *words]) if native else cli.main(words)
+    out, err = capfd.readouterr()
+    assert found == code, err
+    return json.loads(out)
+
+
+def test_both_commands_print_the_same_json(model, recording, capfd):
+    words = ["infer", str(model[0]), *recording, "--json"]
+    code = 0 if _is_inside(model[1], recording) else 3
+    ours, theirs = said(capfd, code, words), said(capfd, code, words, native=True)
+    assert ours == theirs
+    assert set(ours) == {
+        "recordings", "parameters", "inside_model", "identifiability", "calibrated", "warnings",
+        "statistics",
+    }  # fmt: skip
+    for values in ours["parameters"].values():
+        assert set(values) == {"mode", "mean", "median", "interval90"}
+
+
+def test_rust_says_what_python_says(model, recording, capfd):
+    folder, made = model
+    x = _statistics(made, recording)
+    code = 0 if _is_inside(made, recording) else 3
+    found = said(capfd, code, ["infer", str(folder), *recording, "--json"])
+    assert found["statistics"][0] == pytest.approx(dict(zip(made.x_names, x, strict=True)))
+    misfit, posterior = made.misfit(x), made.posterior(x)
+    inside = found["inside_model"]
+    # One pour is compared with kept residuals: no draw is random.
+    assert inside["p_value"] == pytest.approx(misfit.p_value, abs=1e-9)
+    assert inside["joint_p_value"] == pytest.approx(misfit.joint_p_value, abs=1e-9)
+    for each in misfit.statistics:
+        assert inside["statistics"][each.name]["residual"] == pytest.approx(each.residual, abs=1e-5)
+    assert inside["is_inside"] == misfit.is_inside
+    spread = posterior.sample(2000, seed=1).std(axis=0)
+    mode, known = posterior.mode(), Identifiability.of(posterior)
+    for i, name in enumerate(posterior.names):
+        values = found["parameters"][name]
+        assert abs(values["mean"] - posterior.mean()[i]) < 0.1 * spread[i]
+        assert abs(values["mode"] - mode[i]) < 0.25 * spread[i]
+    # Gains are of a thousand random draws each.
+    assert np.allclose(found["identifiability"]["gains"], known.gains, atol=0.12)
+    dimension = found["identifiability"]["effective_dimension"]
+    assert dimension == pytest.approx(known.effective_dimension, abs=0.25)
+
+
+def test_several_pours_of_a_network_are_multiplied_in_both(small_data, recording, tmp_path, capfd):
+    made = BayesSim.fit(small_data, quiet=True, seed=2, method="mdrff", **SMALL)
+    made.save(tmp_path / "m")
+    x = _statistics(made, recording)
+    image = recording[0]
+    words = ["infer", str(tmp_path / "m"), image, image, *recording[1:], "--json"]
+    found = json.loads(_printed(capfd, words))
+    posterior = made.posterior(np.array([x, x]))
+    spread = posterior.sample(2000, seed=1).std(axis=0)
+    for i, name in enumerate(posterior.names):
+        assert abs(found["parameters"][name]["mean"] - posterior.mean()[i]) < 0.25 * spread[i]
+
+
+def test_what_is_outside_is_said_with_exit_code_3(model, small_scene, tmp_path, capfd):
+    # A room: a floor with boxes of half a metre, seen from two metres.
+    camera = gc.Camera.overhead(height=2.0, field_width=2.0, pixels=160)
+    generator = np.random.default_rng(0)
+    boxes = np.c_[generator.uniform(-0.6, 0.6, (12, 2)), np.full(12, 0.25)]
+    image, toml = camera.record(boxes, np.full(12, 0.25), tmp_path)
+    words = ["infer", str(model[0]), str(image), "--camera", str(toml), "--json"]
+    for native in (False, True):
+        found = said(capfd, 3, words, native=native)
+        inside = found["inside_model"]
+        assert inside["is_inside"] is False and found["parameters"] is None
+        assert any("height" in reason for reason in inside["impossible"])
+    assert cli.main(words[:-1]) == 3
+    assert "OUTSIDE THE MODEL" in capfd.readouterr().out
+
+
+def _printed(capfd, words: list[str]) -> str:
+    assert cli.main(words) in (0, 3)
+    return capfd.readouterr().out
+
+
+def _statistics(model: BayesSim, recording: list[str]) -> np.ndarray:
+    resolution = gc.Scene.from_toml(model.scene_toml).ground_resolution
+    opened = gc.Recording.open(recording[0], camera=recording[2])
+    return np.asarray(opened.formation(ground_resolution=resolution).statistics())
+
+
+def _is_inside(model: BayesSim, recording: list[str]) -> bool:
+    return model.misfit(_statistics(model, recording)).is_inside

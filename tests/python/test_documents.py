@@ -1,0 +1,129 @@
+"""The schema of documents: what is wrong is named with its place and what is allowed."""
+
+from pathlib import Path
+
+import pytest
+
+import granulcal as gc
+from granulcal.documents import (
+    Flag,
+    ListOf,
+    Mapping,
+    Maybe,
+    Number,
+    OneOf,
+    Table,
+    Text,
+    Whole,
+    check,
+    parse_json,
+    read_bytes,
+)
+from granulcal.errors import ObservationError
+from granulcal.loop.task import Task
+
+SCHEMA = Table(
+    {"name": Text(("a", "b")), "at": Mapping(Number(0, 1))},
+    {"flag": Flag(), "list": ListOf(Whole(1, 5), least=1), "some": Maybe(OneOf((Text(), Flag())))},
+)
+
+
+@pytest.mark.parametrize(
+    ("document", "said"),
+    [
+        ([], "the document must be a table"),
+        ({"at": {}}, "name must be there"),
+        ({"name": "c", "at": {}}, "name must be one of a, b, got 'c'"),
+        ({"name": "a", "at": {"x": 2}}, "at.x must be a number from 0 to 1, got 2"),
+        ({"name": "a", "at": {"x": float("nan")}}, "at.x must be a number"),
+        ({"name": "a", "at": {"x": True}}, "at.x must be a number"),
+        ({"name": "a", "at": {}, "flag": "false"}, "flag must be true or false, got 'false'"),
+        ({"name": "a", "at": {}, "list": []}, "list must be a list of at least 1"),
+        ({"name": "a", "at": {}, "list": [1, 9]}, r"list\[1\] must be a whole number from 1 to 5"),
+        ({"name": "a", "at": {}, "some": 3}, "some must be true or false"),
+        ({"name": "a", "at": {}, "other": 3}, "other must be absent"),
+    ],
+)
+def test_the_first_fault_is_named(document, said):
+    with pytest.raises(ValueError, match=f"file: {said}"):
+        check(document, SCHEMA, "file")
+
+
+def test_what_fits_fits():
+    check(
+        {"name": "a", "at": {"x": 1}, "list": [1, 5], "some": None, "flag": False}, SCHEMA, "file"
+    )
+
+
+@pytest.mark.parametrize("text", [b"[" * 200_000, b"NaN", b"\xff", b"{", b'{"a": Infinity}'])
+def test_what_is_no_json_is_refused_by_name(text):
+    with pytest.raises(ValueError, match="x.json"):
+        parse_json(text, "x.json")
+
+
+def test_devices_and_large_files_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="device or pipe"):
+        read_bytes("/dev/zero")
+    with pytest.raises(ValueError, match="a folder"):
+        read_bytes(tmp_path)
+    (tmp_path / "large").write_bytes(b"x" * 11)
+    with pytest.raises(ValueError, match="at most 10 bytes"):
+        read_bytes(tmp_path / "large", most=10)
+
+
+TASK = """
+scene = "scene.toml"
+prior = "prior.toml"
+effects = ["drag"]
+[[conditions]]
+name = "low"
+at = { "start.height" = 0.01 }
+use = "fit"
+recordings = ["0.png", "1.png", "2.png"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('at = { "start.height" = 0.01 }', "at = 5", r"conditions\[0\].at must be a table"),
+        ('use = "fit"', 'use = "fit"\nknown = 5', r"conditions\[0\].known must be a table"),
+        ("effects =", "nuisances = 5\neffects =", "nuisances must be a table"),
+        ("effects =", 'between = "false"\neffects =', "between must be true or false, got 'false'"),
+        ('effects = ["drag"]', "effects = []", "effects must be a list of at least 1"),
+        ('use = "fit"', 'use = "fit"\naveraged = 1', "averaged must be true or false"),
+        ('"1.png"', '"0.png"', "each pour counts once"),
+        ('"1.png"', '"../PLACE/0.png"', "each pour counts once"),
+        ('scene = "scene.toml"', "scene = 3", "scene must be text"),
+        ("[[conditions]]", "[conditions]", "conditions must be a list"),
+    ],
+)
+def test_tasks_are_refused_by_name(tmp_path, old, new, said):
+    (tmp_path / "scene.toml").write_text(gc.Scene.drop(0.01, count=12).to_toml())
+    (tmp_path / "prior.toml").write_text(gc.Prior.default().to_toml())
+    for i in range(3):
+        (tmp_path / f"{i}.png").write_bytes(b"\x89PNG")
+    path = tmp_path / "loop.toml"
+    path.write_text(TASK)
+    Task.load(path)
+    path.write_text(TASK.replace(old, new.replace("PLACE", tmp_path.name)))
+    with pytest.raises(ObservationError, match=said):
+        Task.load(path)
+
+
+def test_a_file_name_is_no_scene(tmp_path):
+    with pytest.raises(TypeError, match="scene must be a Scene"):
+        gc.simulate("scene.toml")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(TypeError, match="scene must be a Scene"):
+        gc.generate("scene.toml", gc.Prior.default(), 3)  # pyright: ignore[reportArgumentType]
+
+
+def test_every_document_is_read_through_one_place():
+    package = Path(gc.__file__).parent
+    # What these parse is text that this program has just made, or checked beforehand.
+    allowed = {"documents.py", "prior.py", "damage.py", "ring_model.py", "images.py"}
+    allowed |= {"camera.py", "samples.py", "models.py", "setup.py"}
+    for path in package.rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        if path.name not in allowed and "experiments" not in path.parts:
+            assert "json.loads(" not in text and "tomllib.loads(" not in text, path
