@@ -11,6 +11,7 @@ use crate::interrupt::keeps_going;
 use crate::outcome::Outcome;
 use crate::progress::RowProgress;
 use crate::scene::{self, Keep};
+use crate::sides::SideFiles;
 
 /// Pours that a dry run makes.
 const TRIED: u64 = 3;
@@ -57,7 +58,10 @@ fn dry_run(
         let started = ThreadTime::now();
         let simulation = scene::start(&scene, row, 1, None)?;
         let mut observer = Observer::new(&scene);
-        if scene::pour(context, &scene, row, simulation, &Keep::Nothing, &mut observer)?.is_none() {
+        // Nothing is kept beside the pour.
+        let (keep, mut sides) = (Keep::Nothing, SideFiles::default());
+        let pour = scene::pour(context, &scene, row, simulation, &keep, &mut observer, &mut sides)?;
+        if pour.is_none() {
             return Ok(Outcome::Stopped);
         }
         cpu_s += started.elapsed().as_secs_f64();
