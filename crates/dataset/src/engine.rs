@@ -39,11 +39,14 @@ impl Engine<'_> {
     }
 }
 
+/// The paper's statistics of a formation and the diagnostic ones.
+pub(crate) type Described = ([f64; 16], [f64; DIAGNOSTIC_COUNT]);
+
 /// Statistics of a formation's points: the paper's and the diagnostic ones, `None` where there are too few points.
 pub(crate) fn describe(
     scene: &Scene,
     points: &[Vector3<f64>],
-) -> Result<Option<([f64; 16], [f64; DIAGNOSTIC_COUNT])>, DatasetError> {
+) -> Result<Option<Described>, DatasetError> {
     let camera = &scene.camera;
     let settings = DiagnosticSettings {
         pour_axis: Some(Vector2::zeros()),

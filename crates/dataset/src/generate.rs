@@ -21,7 +21,7 @@ use cpu_time::ThreadTime;
 use granulcal_dem::{Pour, Simulation, Status};
 use granulcal_features::stats::DIAGNOSTIC_COUNT;
 
-use crate::engine::{Engine, Outcome, describe, foreign_pour};
+use crate::engine::{Described, Engine, Outcome, describe, foreign_pour};
 use crate::header::Header;
 use crate::manifest;
 use crate::observe::observe;
@@ -253,22 +253,22 @@ fn make_row(
     let scene = header.prior.apply(&header.scene, &parameters)?;
     let seed = pour_seed(header.seed, row);
     let mut observer = Observer::new(&scene);
-    let pour = match engine {
-        Some(engine) => match (engine.pour)(&scene, seed)? {
+    let pour = if let Some(engine) = engine {
+        match (engine.pour)(&scene, seed)? {
             Outcome::Grains { positions, radii } => foreign_pour(&scene, positions, radii)?,
             Outcome::Points(points) => {
                 let seen = describe(&scene, &points)?;
                 let pour = foreign_pour(&scene, Vec::new(), Vec::new())?;
                 let observed = vec![f64::NAN; header.observed().len()];
+                let seen = seen.as_ref();
                 return Ok(Some(finish(row, parameters, seed, start, &pour, None, seen, observed)));
             }
-        },
-        None => {
-            let simulation = Simulation::new(&scene, seed).map_err(DatasetError::Simulation)?;
-            simulation.check_start().map_err(DatasetError::Simulation)?;
-            let Some(pour) = observer.run_while(simulation, keep_going) else { return Ok(None) };
-            pour
         }
+    } else {
+        let simulation = Simulation::new(&scene, seed).map_err(DatasetError::Simulation)?;
+        simulation.check_start().map_err(DatasetError::Simulation)?;
+        let Some(pour) = observer.run_while(simulation, keep_going) else { return Ok(None) };
+        pour
     };
     let status = observer.status(&pour);
     let observed = observer.observed(&pour).statistics;
@@ -284,6 +284,7 @@ fn make_row(
     // The scene may have other eyes than its camera.
     let says_enough = !status.is_healthy() || status.is_jammed() || !observer.is_idle();
     let status = says_enough.then_some(status);
+    let seen = seen.as_ref();
     Ok(Some(finish(row, parameters, seed, start, &pour, status, seen, observed)))
 }
 
@@ -296,14 +297,15 @@ fn finish(
     start: ThreadTime,
     pour: &Pour,
     status: Option<RowStatus>,
-    seen: Option<([f64; 16], [f64; DIAGNOSTIC_COUNT])>,
+    seen: Option<&Described>,
     observed: Vec<f64>,
 ) -> Row {
     let status = status.unwrap_or(match seen {
         Some(_) => RowStatus::Pour(pour.status),
         None => RowStatus::NoGrainsInView,
     });
-    let (statistics, diagnostics) = seen.unwrap_or(([f64::NAN; 16], [f64::NAN; DIAGNOSTIC_COUNT]));
+    let nothing = ([f64::NAN; 16], [f64::NAN; DIAGNOSTIC_COUNT]);
+    let (statistics, diagnostics) = seen.copied().unwrap_or(nothing);
     Row {
         row,
         parameters,
