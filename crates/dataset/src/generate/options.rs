@@ -33,7 +33,7 @@ impl FromStr for Shard {
     }
 }
 
-/// What [`generate`] is asked for.
+/// What [`generate`](fn@crate::generate) is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GenerateOptions {
     /// Rows of the whole data set, over all shards.
