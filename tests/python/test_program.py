@@ -22,7 +22,7 @@ def _told(*words: str) -> subprocess.CompletedProcess[str]:
 def test_help_names_every_command_once_and_the_program() -> None:
     text = _told("--help").stdout
     names = re.findall(r"^  ([a-z][a-z-]*)  ", text.partition("Options:")[0], flags=re.M)
-    assert sorted(names) == sorted([*ALL.split(), "help"])
+    assert len(names) == len(set(names)) and set(ALL.split()) <= set(names)
     assert "Usage: granulcal " in text and "granulcal-cli" not in text
 
 

