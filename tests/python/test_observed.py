@@ -122,7 +122,7 @@ def test_a_run_out_file_gives_the_fronts_of_the_scene(scene: gc.Scene, tmp_path:
 
 def run_out(particles: np.ndarray) -> RunOut:
     """Fronts of two cameras at 100 frames a second, the fluid 10 mm ahead."""
-    time = 0.01 * np.arange(len(particles))
+    time = np.asarray(0.01 * np.arange(len(particles)), dtype=np.float64)
     return RunOut(time=time, particles=particles, fluid=particles + 0.01, source="run.txt")
 
 
