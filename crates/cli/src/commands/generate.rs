@@ -11,6 +11,7 @@ use crate::interrupt::keeps_going;
 use crate::outcome::Outcome;
 use crate::progress::RowProgress;
 use crate::scene::{self, Keep};
+use crate::sides::SideFiles;
 
 /// Pours that a dry run makes.
 const TRIED: u64 = 3;
@@ -51,13 +52,22 @@ fn dry_run(
 ) -> anyhow::Result<Outcome> {
     prior.check(scene)?;
     let tried = options.rows.min(TRIED);
-    let mut cpu_s = 0.0;
+    let (mut cpu_s, mut sides) = (0.0, SideFiles::default());
     for row in 0..tried {
         let scene = prior.apply(scene, &prior.sample(options.seed, row))?;
         let started = ThreadTime::now();
         let simulation = scene::start(&scene, row, 1, None)?;
         let mut observer = Observer::new(&scene);
-        if scene::pour(context, &scene, row, simulation, &Keep::Nothing, &mut observer)?.is_none() {
+        let pour = scene::pour(
+            context,
+            &scene,
+            row,
+            simulation,
+            &Keep::Nothing,
+            &mut observer,
+            &mut sides,
+        )?;
+        if pour.is_none() {
             return Ok(Outcome::Stopped);
         }
         cpu_s += started.elapsed().as_secs_f64();
