@@ -298,6 +298,9 @@ def _add_reproduce(commands: Any) -> None:
     parser = commands.add_parser("reproduce", help=text, description=text)
     parser.add_argument("study", nargs="?", help="name of the study")
     parser.add_argument(
+        "experiment", nargs="?", help="of the study `paper`: its name or number (default: all)"
+    )
+    parser.add_argument(
         "--out", type=writes("folder"), default=Path("out"), help="folder (default: out)"
     )
     parser.add_argument("--data", type=READS, help="measured data (default: $GRANULCAL_DATA)")
@@ -307,6 +310,16 @@ def _add_reproduce(commands: Any) -> None:
     parser.add_argument(
         "--json", type=writes("json"), help="kinect_mounds: file for what each map gave"
     )
+    paper = parser.add_argument_group("only with the study `paper`")
+    paper.add_argument(
+        "--quick", action="store_true", help="few grains and few pours; says so, proves nothing"
+    )
+    paper.add_argument(
+        "--report",
+        action="store_true",
+        help="write one HTML page of all experiments; those that have run are not run again",
+    )
+    paper.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.set_defaults(run=_reproduce)
 
 
@@ -509,6 +522,11 @@ def _reproduce(options: argparse.Namespace) -> int:
         return _DONE
     if options.study not in studies:
         raise ValueError(f"no study {options.study!r}; there are {', '.join(studies)}")
+    if options.study == "paper":
+        return _reproduce_paper(options)
+    for name in ("experiment", "quick", "report", "threads"):
+        if getattr(options, name):
+            raise ValueError(f"{name} belongs to the study 'paper', not to {options.study!r}")
     module = importlib.import_module(f"granulcal.experiments.{options.study}")
     data = options.data or measured_data()
     extra = {"maps_dir": options.maps, "json_path": options.json}
@@ -518,6 +536,20 @@ def _reproduce(options: argparse.Namespace) -> int:
     if data is None and options.maps is None:
         raise FileNotFoundError("no measured data: give --data or set $GRANULCAL_DATA")
     module.reproduce(options.out, data, **given)
+    return _DONE
+
+
+def _reproduce_paper(options: argparse.Namespace) -> int:
+    from granulcal.experiments.paper import reproduce_paper
+    from granulcal.experiments.paper.common.sizes import FULL, QUICK
+
+    reproduce_paper(
+        options.out,
+        options.experiment,
+        size=QUICK if options.quick else FULL,
+        report=options.report,
+        threads=options.threads,
+    )
     return _DONE
 
 

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from os import PathLike
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
 from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, Text, read_json
@@ -30,11 +31,16 @@ __all__ = ["KeptPours", "calibrate_within"]
 
 Array = NDArray[np.float64]
 
-_POUR = Table({"theta": ListOf(Number(), least=1), "status": Text(), "x": Maybe(ListOf(Number()))})
+_POUR = Table(
+    {"theta": ListOf(Number(), least=1), "status": Text(), "x": Maybe(ListOf(Number()))},
+    {"cpu_s": Number()},
+)
 _SCHEMA = Table({"key": Text(), "pours": Mapping(_POUR)}, {"names": ListOf(Text()), "hash": Text()})
 _EXCLUDED = ("unhealthy", "jammed")
 # Seeds of pours of one run; data sets' are hashes, and reports' begin at 9000.
 _FIRST_SEED = 40_000_000
+# Longest time for which finished pours are in memory alone [s].
+_KEEP_EVERY_S = 2.0
 
 
 class KeptPours:
@@ -43,11 +49,13 @@ class KeptPours:
     Args:
         scene: the scene before the prior's parameters are set.
         prior: names the parameters.
-        path: the file; rewritten as a whole after each pour.
+        path: the file; rewritten as a whole at most every two seconds, and when a call ends.
         seed: seed of the run.
         threads: pours at once; the default is one for each core.
         progress: called with the number of pours that are kept, after each.
         observed: keep the statistics that the scene observes in place of the paper's 16.
+        look: what to keep of a pour in place of both: names, and the function that measures them;
+            a ValueError of the function says that too few grains are in view.
         engine: another simulator in place of ours.
 
     Raises:
@@ -64,14 +72,18 @@ class KeptPours:
         threads: int | None = None,
         progress: Callable[[int], None] | None = None,
         observed: bool = False,
+        look: tuple[tuple[str, ...], Callable[[Pour], ArrayLike]] | None = None,
         engine: "Engine | None" = None,
     ) -> None:
         """Reads what is kept already."""
-        self.observed, self.engine = observed, engine
-        self.x_names: tuple[str, ...] = scene.observed_names if observed else NAMES
+        own = (scene.observed_names, Pour.observed) if observed else (NAMES, Pour.statistics)
+        self.x_names, self.look = own if look is None else look
+        self.engine = engine
         self.scene, self.prior, self.path, self.seed = scene, prior, path, seed
         self.threads, self.progress = threads or os.cpu_count() or 1, progress
         text = f"{scene.to_toml()}\n{prior.to_toml()}\n{seed}" + ("\nobserved" if observed else "")
+        if look is not None:
+            text += f"\n{', '.join(self.x_names)}"
         text += "" if engine is None else f"\n{engine.name}"
         self.key = hashlib.sha256(text.encode()).hexdigest()
         self.rows: dict[str, dict] = self._read() if path.exists() else {}
@@ -81,15 +93,21 @@ class KeptPours:
         missing = [i for i in range(len(theta)) if not self._is_kept(first + i, theta[i])]
         with ThreadPoolExecutor(self.threads) as workers:
             jobs = {workers.submit(self._pour, theta[i], first + i): i for i in missing}
+            written = time.monotonic()
             try:
                 for job in as_completed(jobs):
                     self.rows[str(first + jobs[job])] = job.result()
-                    self._write()
+                    if time.monotonic() - written > _KEEP_EVERY_S:
+                        self._write()
+                        written = time.monotonic()
                     if self.progress is not None:
                         self.progress(len(self.rows))
             except BaseException:
                 workers.shutdown(wait=False, cancel_futures=True)
                 raise
+            finally:
+                if missing:
+                    self._write()
         kept = [self.rows[str(first + i)]["x"] for i in range(len(theta))]
         return np.array([[np.nan] * len(self.x_names) if x is None else x for x in kept], float)
 
@@ -111,10 +129,10 @@ class KeptPours:
         status, x = pour.status, None
         if status not in _EXCLUDED:
             try:
-                x = np.asarray(pour.observed() if self.observed else pour.statistics()).tolist()
+                x = np.asarray(self.look(pour), float).tolist()
             except ValueError:
                 status = "no_grains_in_view"
-        return {"theta": theta.tolist(), "status": status, "x": x}
+        return {"theta": theta.tolist(), "status": status, "x": x, "cpu_s": pour.cpu_seconds}
 
     def _read(self) -> dict[str, dict]:
         document = read_json(self.path, _SCHEMA)

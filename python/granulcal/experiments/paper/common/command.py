@@ -1,0 +1,130 @@
+"""`granulcal reproduce paper`: which experiments, how large, where to."""
+
+import importlib
+import os
+import pkgutil
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from granulcal import _native
+from granulcal.experiments.paper.common.outcome import Experiment, Outcome
+from granulcal.experiments.paper.common.page import write_page
+from granulcal.experiments.paper.common.sizes import FULL, Size
+from granulcal.experiments.paper.common.workshop import Workshop
+
+__all__ = ["experiments", "find", "reproduce_paper", "run_one"]
+
+_QUICK_NOTE = (
+    "This is the small version: few grains and few pours. It shows that everything runs; its "
+    "numbers are not to be compared with the paper's."
+)
+
+
+def experiments() -> list[Experiment]:
+    """Returns every experiment, by its number: each module of the package that has one."""
+    from granulcal.experiments import paper
+
+    found = []
+    for module in pkgutil.iter_modules(paper.__path__):
+        if not module.ispkg:
+            loaded = importlib.import_module(f"{paper.__name__}.{module.name}")
+            found.append(loaded.EXPERIMENT)
+    return sorted(found, key=lambda each: each.number)
+
+
+def find(word: str) -> Experiment:
+    """Returns the experiment of a name or number.
+
+    Raises:
+        ValueError: there is none; the message lists them.
+    """
+    known = experiments()
+    for each in known:
+        if word.replace("_", "-") in (each.name, str(each.number)):
+            return each
+    listed = ", ".join(f"{e.number} {e.name}" for e in known)
+    raise ValueError(f"the paper has no experiment {word!r} here; there are {listed}")
+
+
+def reproduce_paper(
+    out: Path,
+    experiment: str | None = None,
+    *,
+    size: Size = FULL,
+    report: bool = False,
+    threads: int | None = None,
+    quiet: bool = False,
+) -> Path | None:
+    """Runs one experiment of the paper, or all, and writes what they found below `out`.
+
+    A run that is stopped goes on where it was: pours and models are kept.
+
+    Args:
+        out: folder; the runs of each size have a folder of their own in it.
+        experiment: name or number; None for all.
+        size: how large.
+        report: write one HTML page of all experiments that have run at this size; alone, without an
+            experiment, nothing is run that has run already.
+        threads: pours at once; the default is one for each core.
+        quiet: print nothing.
+
+    Returns:
+        The page, if one was asked for.
+    """
+    folder = out / ("paper" if size.is_full else f"paper-{size.name}")
+    wanted = experiments() if experiment is None else [find(experiment)]
+    if not size.is_full and not quiet:
+        print(_QUICK_NOTE)
+    for each in wanted:
+        if report and experiment is None and Outcome.load(folder / each.name) is not None:
+            continue
+        run_one(each, folder, size=size, threads=threads, quiet=quiet)
+    if not report:
+        return None
+    page = write_page(folder, experiments(), size)
+    if not quiet:
+        print(f"page: {page}")
+    return page
+
+
+def run_one(
+    experiment: Experiment,
+    folder: Path,
+    *,
+    size: Size,
+    threads: int | None = None,
+    quiet: bool = False,
+) -> Outcome:
+    """Runs an experiment, writes result.json into its folder and prints its rows."""
+    if not quiet:
+        print(f"{experiment.number} {experiment.name}: {experiment.asks}", flush=True)
+    shop = Workshop(folder, experiment.name, size, threads or os.cpu_count() or 1, quiet)
+    began = time.monotonic()
+    outcome = experiment.run(shop)
+    quick = "" if size.is_full else f" --{size.name}"
+    made: dict[str, Any] = {
+        "command": f"granulcal reproduce paper {experiment.name}{quick} --out {folder.parent}",
+        "size": size.name,
+        "seeds": shop.seeds,
+        "pours": shop.pours,
+        "pours_cpu_s": shop.cpu_s,
+        "this_run_s": time.monotonic() - began,
+        "version": _native.__version__,
+        "at": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+    }
+    outcome.save(shop.own, made)
+    if not quiet:
+        _print(outcome, made)
+    return outcome
+
+
+def _print(outcome: Outcome, made: dict[str, Any]) -> None:
+    print(f"  {outcome.answer}")
+    for row in outcome.rows:
+        paper = f"; paper {row.paper}" if row.paper else ""
+        interval = f" [{row.interval}]" if row.interval else ""
+        verdict = f": {row.verdict}" if row.verdict else ""
+        print(f"  {row.quantity}: {row.ours}{interval}, n = {row.count}{paper}{verdict}")
+    print(f"  {made['pours']} pours, {made['this_run_s']:.0f} s in this run\n", flush=True)

@@ -1,0 +1,62 @@
+"""One self-contained HTML page of the experiments that have run, tables and figures."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from granulcal import _native
+from granulcal.experiments.paper.common.outcome import Experiment, Outcome
+from granulcal.experiments.paper.common.sizes import Size
+from granulcal.files import write_beside
+from granulcal.report import data_uri, template
+
+__all__ = ["write_page"]
+
+_TEMPLATE = "paper.html.j2"
+_PAPER = (
+    "C. Matl, Y. Narang, R. Bajcsy, F. Ramos, D. Fox: Inferring the Material Properties of "
+    "Granular Media for Robotic Tasks, ICRA 2020, arXiv:2003.08032"
+)
+
+
+def write_page(folder: Path, known: list[Experiment], size: Size) -> Path:
+    """Writes report.html into `folder`; returns its path. It needs no other file and no network.
+
+    Args:
+        folder: of the results of this size.
+        known: every experiment; those that have not run are named as such.
+        size: of the run.
+    """
+    parts: list[dict[str, Any]] = []
+    for experiment in known:
+        loaded = Outcome.load(folder / experiment.name)
+        part: dict[str, Any] = {"experiment": experiment, "outcome": None}
+        if loaded is not None:
+            outcome, made = loaded
+            pictures = [
+                (data_uri((folder / experiment.name / f.file).read_bytes()), f.caption)
+                for f in outcome.figures
+            ]
+            part |= {"outcome": outcome, "made": made, "pictures": pictures}
+        parts.append(part)
+    page = template(_TEMPLATE).render(
+        parts=parts,
+        is_full=size.is_full,
+        paper=_PAPER,
+        version=_native.__version__,
+        made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        judged=_count(parts),
+    )
+    path = folder / "report.html"
+    write_beside(path, page)
+    return path
+
+
+def _count(parts: list[dict[str, Any]]) -> dict[str, int]:
+    """How many rows have which verdict."""
+    counts = {"better": 0, "not decided": 0, "worse": 0}
+    for part in parts:
+        for row in part["outcome"].rows if part["outcome"] else []:
+            if row.verdict in counts:
+                counts[row.verdict] += 1
+    return counts

@@ -1,0 +1,214 @@
+import json
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.cli import main
+from granulcal.experiments.paper.common.command import experiments, find, reproduce_paper
+from granulcal.experiments.paper.common.eye import BARE, Disturbance, Eye
+from granulcal.experiments.paper.common.measure import (
+    Published,
+    bootstrap,
+    error_row,
+    level_row,
+    share_interval,
+)
+from granulcal.experiments.paper.common.outcome import Outcome
+from granulcal.experiments.paper.common.page import write_page
+from granulcal.experiments.paper.common.sizes import FULL, QUICK, TINY
+from granulcal.experiments.paper.common.workshop import Workshop
+from granulcal.experiments.paper.observation_error import _peaks
+from granulcal.experiments.paper.propagation import _least
+
+pytest.importorskip("torch")
+pytest.importorskip("matplotlib")
+
+
+_QUICKEST = ("noise", "propagation")
+"""Experiments without a fit, which the default tests run."""
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The quickest experiments at the smallest size, once, and the page of them."""
+    out = tmp_path_factory.mktemp("paper")
+    for name in _QUICKEST:
+        reproduce_paper(out, name, size=TINY, quiet=True)
+    folder = out / "paper-tiny"
+    return folder, write_page(folder, experiments(), TINY)
+
+
+def test_every_experiment_is_there_once():
+    known = experiments()
+    assert [each.number for each in known] == sorted({each.number for each in known})
+    assert len({each.name for each in known}) == len(known)
+    for each in known:
+        assert find(each.name) is find(str(each.number)) is find(each.name.replace("-", "_"))
+        assert each.asks.endswith(("?", ".")) and each.section
+    with pytest.raises(ValueError, match="no experiment 'rngs' here; there are 1 noise"):
+        find("rngs")
+
+
+def _check(folder: Path, name: str) -> None:
+    """What every experiment must have told."""
+    loaded = Outcome.load(folder / name)
+    assert loaded is not None, name
+    outcome, made = loaded
+    assert outcome.rows and outcome.answer and outcome.figures, name
+    assert all(row.verdict in ("", "not judged: small version") for row in outcome.rows)
+    assert all(row.count > 0 for row in outcome.rows)
+    for figure in outcome.figures:
+        data = (folder / name / figure.file).read_bytes()
+        assert data.startswith(b"\x89PNG"), figure.file
+    assert made["size"] == "tiny" and name in made["command"] and made["pours"] > 0
+
+
+def test_experiments_run_and_say_what_they_did(ran):
+    for name in _QUICKEST:
+        _check(ran[0], name)
+
+
+@pytest.mark.slow
+def test_every_experiment_runs_to_the_page(tmp_path):
+    page = reproduce_paper(tmp_path, size=TINY, report=True, quiet=True)
+    assert page is not None
+    for each in experiments():
+        _check(tmp_path / "paper-tiny", each.name)
+    assert "Not run" not in page.read_text(encoding="utf-8")
+
+
+def test_a_second_run_makes_nothing_again(ran):
+    folder, _ = ran
+    kept = {
+        path: path.stat().st_mtime_ns for path in (folder / "pours").rglob("*") if path.is_file()
+    }
+    before = json.loads((folder / "noise" / "result.json").read_text())
+    reproduce_paper(folder.parent, "noise", size=TINY, quiet=True)
+    after = json.loads((folder / "noise" / "result.json").read_text())
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept
+    assert after["rows"] == before["rows"]
+
+
+class _Sources(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.sections = 0
+
+    def handle_starttag(self, tag, attrs):
+        self.sections += tag == "section"
+        self.found += [value for name, value in attrs if name in ("src", "href") and value]
+
+
+def test_the_page_needs_nothing_else_and_says_that_it_is_small(ran):
+    _, page = ran
+    text = page.read_text(encoding="utf-8")
+    parser = _Sources()
+    parser.feed(text)
+    assert parser.sections == len(experiments())
+    assert all(source.startswith(("data:image/png", "#")) for source in parser.found)
+    assert "This is the small version" in text
+    assert text.count("Not run at this size") == len(experiments()) - len(_QUICKEST)
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium")
+def test_the_page_opens_in_a_browser(ran, tmp_path):
+    _, page = ran
+    shot = tmp_path / "page.png"
+    words = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", f"--screenshot={shot}"]
+    words += ["--window-size=1100,1600", f"--user-data-dir={tmp_path}", page.as_uri()]
+    subprocess.run(words, check=True, capture_output=True, timeout=120)
+    assert shot.stat().st_size > 20_000
+
+
+def test_command_line_refuses_by_name(capsys):
+    assert main(["reproduce", "paper", "nothing"]) == 2
+    assert "the paper has no experiment 'nothing'" in capsys.readouterr().err
+    assert main(["reproduce", "sensor", "--quick"]) == 2
+    assert "quick belongs to the study 'paper'" in capsys.readouterr().err
+    assert main(["reproduce"]) == 0
+    assert "paper" in capsys.readouterr().out.split()
+
+
+def test_full_size_is_the_papers_or_larger():
+    assert FULL.grains == 2000 and FULL.training >= 1000 and FULL.tests >= 50
+    assert 2 * FULL.repeats >= 1000 and FULL.recordings == (10, 5)
+    assert QUICK.training < FULL.training and not QUICK.is_full
+
+
+def test_an_eye_without_errors_sees_what_the_scene_sees(small_scene, small_pour):
+    eye = Eye.of(small_scene)
+    view = eye.at(small_pour.positions, small_pour.radii, small_pour.seed)
+    threshold = small_scene.get("camera.height_threshold")
+    seen = gc.statistics(view.points(view.clean, threshold))
+    np.testing.assert_allclose(seen.paper16, small_pour.statistics().paper16, rtol=1e-5, atol=1e-7)
+
+
+def test_errors_of_an_image_are_those_asked_for(small_scene, small_pour):
+    view = Eye.of(small_scene).at(small_pour.positions, small_pour.radii, 3)
+    noisy = view.heights(Disturbance(depth_noise=2e-3)) - view.clean
+    assert noisy.std() == pytest.approx(2e-3, rel=0.05)
+    blurred = view.heights(Disturbance(blur=3.0))
+    # A blur moves grains' height to their neighbours and keeps its sum, far from the border.
+    assert np.nansum(blurred) == pytest.approx(np.nansum(view.clean), rel=1e-3)
+    assert np.nanmax(blurred) < 0.5 * np.nanmax(view.clean)
+    fine = view.heights(Disturbance(fine_blur=8.0))
+    assert np.nanmax(fine) < np.nanmax(view.clean)
+    sensor = view.heights(Disturbance(is_d435=True))
+    ground = np.isfinite(sensor) & (view.clean < BARE)
+    assert 1e-5 < np.nanstd(sensor[ground]) < 2e-3
+
+
+def test_rows_have_the_means_intervals_and_verdicts_of_known_numbers():
+    paper = Published(mean=0.3, sd=0.4, count=50)
+    assert paper.rms == pytest.approx(0.5) and str(paper) == "0.3000 ± 0.4000 (n = 50)"
+    errors = np.tile([0.1, -0.1], 25)
+    row = error_row("x", errors, FULL, paper)
+    assert row.ours == "0.0000 ± 0.1010" and row.verdict == "better"
+    assert row.interval.startswith("rms 0.1000 (0.1000 to 0.1000)")
+    assert error_row("x", 10 * errors, FULL, paper).verdict == "worse"
+    assert error_row("x", errors[:20], FULL, paper).verdict == "not decided: too few tests"
+    assert error_row("x", errors, QUICK, paper).verdict == "not judged: small version"
+    spread = np.concatenate([np.full(25, 0.2), np.full(25, 0.4)])
+    assert level_row("x", spread, FULL, paper).verdict == "not decided"
+    assert level_row("x", spread - 0.15, FULL, paper).verdict == "better"
+
+
+def test_a_bootstrap_interval_is_that_of_the_mean():
+    values = np.random.default_rng(1).normal(2.0, 1.0, 400)
+    low, high = bootstrap(values)
+    assert low == pytest.approx(values.mean() - 1.96 * values.std() / 20, abs=0.01)
+    assert high == pytest.approx(values.mean() + 1.96 * values.std() / 20, abs=0.01)
+    assert np.isnan(bootstrap([1.0])).all()
+    # Wilson's interval of 8 of 10.
+    assert share_interval(8, 10) == pytest.approx((0.4901, 0.9433), abs=1e-3)
+
+
+def test_peaks_of_a_posterior_are_counted():
+    grid = np.linspace(0, 1, 200)
+    bump = lambda at: np.exp(-0.5 * ((grid - at) / 0.05) ** 2)  # noqa: E731
+    assert _peaks(bump(0.5)) == 1
+    assert _peaks(bump(0.0)) == 1
+    assert _peaks(bump(0.2) + 0.5 * bump(0.8)) == 2
+    assert _peaks(bump(0.2) + 0.1 * bump(0.8)) == 1
+
+
+def test_the_least_change_that_shows_is_found():
+    values = np.linspace(0, 1, 9)
+    x = np.repeat((3 * values)[:, None, None], 2, axis=1)
+    found = _least(values, x, 0.5, [lambda y: np.full_like(y, 0.6)])
+    assert found == pytest.approx(0.2, abs=2e-3)
+    assert _least(values, x, 0.5, [lambda y: np.full_like(y, 2.0)]) == np.inf
+
+
+def test_tests_are_made_until_enough_are_usable(small_scene, small_prior, tmp_path):
+    shop = Workshop(tmp_path, "x", TINY, threads=1, quiet=True)
+    found = shop.tests("tests", small_scene, small_prior, 5, 3)
+    assert len(found) == 5 and shop.pours >= 5 and shop.seeds == {"tests": 3}
+    part = found.of(found.names[2:4])
+    np.testing.assert_array_equal(part.x, found.x[:, 2:4])
