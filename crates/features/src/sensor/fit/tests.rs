@@ -192,8 +192,8 @@ fn what_is_not_flat_is_refused() {
     let image = DepthImage::new(80, 80, (0..6400).map(depth).collect()).unwrap();
     let settings = FitSettings { max_lag: 5, sessions: 2, ..FitSettings::default() };
     for frames in [
-        FlatFrames::from_stereo(&[image.clone()], &camera, 0.05, 1e-3).unwrap(),
-        FlatFrames::from_time_of_flight(&[image.clone()], &camera, 1e-3).unwrap(),
+        FlatFrames::from_stereo(std::slice::from_ref(&image), &camera, 0.05, 1e-3).unwrap(),
+        FlatFrames::from_time_of_flight(std::slice::from_ref(&image), &camera, 1e-3).unwrap(),
         FlatFrames::from_height_maps(&[HeightMap::new(
             80,
             80,
