@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from granulcal.experiments.predictions import reproduce, write_csv
+from granulcal.experiments.predictions import columns, reproduce, write_csv
 from granulcal.experiments.predictions.columns import column_rows, observing, read_tests, times_of
 from granulcal.experiments.predictions.drum import SPEEDS, drum_rows
 from granulcal.loop.models import Maker, Models
@@ -102,7 +102,10 @@ def test_a_scene_may_be_observed_at_other_times() -> None:
     assert scene.get("observe.front.link") == 1.5
 
 
-def test_fronts_are_poured_and_what_needs_no_physics_is_scaled(tmp_path: Path) -> None:
+def test_fronts_are_poured_and_what_needs_no_physics_is_scaled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(columns, "_POURS", 2)
     data = tmp_path / "measured"
     (data / "column-collapse-webb").mkdir(parents=True)
     (data / "column-collapse-webb" / "Experimental_Conditions.txt").write_text(TABLE)
