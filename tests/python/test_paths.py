@@ -42,10 +42,19 @@ def line(
         value = given.get(action.dest)
         if action.option_strings:
             if value is not None or action.required:
-                result += [action.option_strings[-1], str(value or other)]
+                result += [action.option_strings[-1], str(value or _some(action, other))]
         elif value is not None or action.nargs != "?":
-            result.append(str(value or other))
+            result.append(str(value or _some(action, other)))
     return result
+
+
+def _some(action: argparse.Action, other: Path) -> object:
+    """A value that the parser takes where one must stand."""
+    if action.choices:
+        return next(iter(action.choices))
+    if action.type in (int, float):
+        return 1
+    return other if isinstance(action.type, Reads | Writes) or action.type is None else "a.b=1"
 
 
 def test_every_path_says_whether_it_is_read_or_written():
@@ -64,7 +73,16 @@ def test_every_path_says_whether_it_is_read_or_written():
         if action.type is None and action.nargs != 0
     }
     known = {"method", "topic", "camera_topic", "colour_topic", "study", "engine", "to", "scene"}
-    assert texts <= known | {"material", "kind", "sample", "name", "model", "at", "set"}, texts
+    assert texts <= known | {
+        "material",
+        "kind",
+        "sample",
+        "name",
+        "model",
+        "at",
+        "set",
+        "preset",
+    }, texts
 
 
 def test_no_command_replaces_an_input_or_a_toml_of_another_kind(tmp_path, capsys):
