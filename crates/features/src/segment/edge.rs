@@ -32,7 +32,9 @@ fn edge_pixels(mask: &[bool], width: usize) -> Option<EdgePixels> {
     };
     let mut is_joined = vec![false; mask.len()];
     let mut joined: Vec<usize> = (0..mask.len()).filter(|&i| mask[i] && depth(i) == 0).collect();
-    joined.iter().for_each(|&i| is_joined[i] = true);
+    for &i in &joined {
+        is_joined[i] = true;
+    }
     let mut next = 0;
     while let Some(&i) = joined.get(next) {
         next += 1;
