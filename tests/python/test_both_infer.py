@@ -24,7 +24,11 @@ def model(small_data, tmp_path_factory):
 @pytest.fixture(scope="module")
 def recording(small_scene, tmp_path_factory):
     folder = tmp_path_factory.mktemp("recording")
-    pour = gc.simulate(small_scene, gc.Material(0.5, 0.2, 0.4), seed=11)
+    pour = gc.simulate(
+        small_scene,
+        gc.Material(sliding_friction=0.5, rolling_friction=0.2, restitution=0.4),
+        seed=11,
+    )
     camera = gc.Camera.overhead(
         height=small_scene.get("camera.height"),
         field_width=small_scene.get("camera.field_width"),
