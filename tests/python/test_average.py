@@ -9,6 +9,8 @@ import pytest
 
 pytest.importorskip("torch")
 
+from signed import sign
+
 from granulcal.bayessim import BayesSim
 from granulcal.bayessim.average import EMULATOR_ALONE, NETWORK_ALONE, Average, HeldOut
 from granulcal.bayessim.density import TruncatedMixture, quasi_prior
@@ -255,3 +257,4 @@ def _edit(folder, **changes):
         key: value for key, value in document.items() if key not in changes or value is not None
     }
     path.write_text(json.dumps(kept))
+    sign(folder)

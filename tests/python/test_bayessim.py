@@ -9,6 +9,8 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from signed import sign  # noqa: E402
+
 from granulcal.bayessim import BayesSim, Config  # noqa: E402
 from granulcal.bayessim.features import draw_frequencies, fourier_features  # noqa: E402
 from granulcal.bayessim.network import HeadLayout  # noqa: E402
@@ -187,6 +189,7 @@ def test_save_and_load_are_identical_to_the_bit(quick, toy, tmp_path):
 def _edit_json(folder, **changes):
     path = folder / "model.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
+    sign(folder)
 
 
 def _cut(folder, name):
@@ -198,6 +201,7 @@ def _drop_entry(folder):
     document = json.loads((folder / "model.json").read_text())
     del document["prior_toml"]
     (folder / "model.json").write_text(json.dumps(document))
+    sign(folder)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ const BINS: usize = 20;
 pub struct Identifiability {
     /// Paths of the parameters.
     pub names: Vec<String>,
-    /// Information gained over the prior for each parameter [nat].
+    /// Information gained over the prior for each parameter `[nat]`.
     pub gains: Vec<f64>,
     /// Directions that are known, 0 to the number of parameters.
     pub effective_dimension: f64,

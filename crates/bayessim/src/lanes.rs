@@ -5,7 +5,7 @@ use pulp::{Arch, NullaryFnOnce};
 use crate::component::Component;
 
 const WIDTH: usize = 4;
-/// Parts that much below the largest do not change the last bit of a sum of fewer than a thousand [nat].
+/// Parts that much below the largest do not change the last bit of a sum of fewer than a thousand `[nat]`.
 const NEGLIGIBLE: f64 = 44.0;
 
 /// One number of four components.

@@ -44,7 +44,7 @@ pub enum Warning {
     },
     /// One material explains the pours much worse than a material for each would.
     PoursDisagree {
-        /// Log evidence of one material against several [nat].
+        /// Log evidence of one material against several `[nat]`.
         log_evidence_ratio: f64,
     },
 }

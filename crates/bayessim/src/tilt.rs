@@ -12,7 +12,7 @@ use crate::likelihood::{FEWEST_EFFECTIVE, Likelihood, Observed, Scratch};
 use crate::mixture::Mixture;
 use crate::random::Random;
 
-/// A point whose weight is that much below another's cannot matter [nat].
+/// A point whose weight is that much below another's cannot matter `[nat]`.
 const NEGLIGIBLE: f64 = 30.0;
 
 /// `L(u)` of k pours, or `L^a prod (q_i/p)^(b/k)`.

@@ -75,7 +75,7 @@ pub use form::Form;
 pub use generate::{GenerateOptions, Progress, Shard, Summary, generate, generate_with};
 pub use header::{Header, VERSION};
 pub use input::ReadSeek;
-pub use mcap_file::record_pour;
+pub use mcap_file::{Filmed, record_pour};
 pub use message_file::{Damage, MessageFormat};
 pub use npz::{Npz, write_height_map};
 pub use observe::{Observation, TooFewGrains, View, look, look_from, observe, overhead};

@@ -40,6 +40,9 @@ const CAMERA: &str = "camera";
 /// Bytes of one grain in `/grains`: x, y, z, radius.
 const STRIDE: u32 = 16;
 
+/// A pour, and whether its film could be kept.
+pub type Filmed = (Pour, Result<(), DatasetError>);
+
 /// Runs a simulation of `scene` with `seed` to its end and writes `rate` frames a simulated second, and one
 /// at the end.
 ///
@@ -59,7 +62,7 @@ pub fn record_pour(
     path: &Path,
     observer: &mut Observer,
     watch: &mut dyn FnMut(f64) -> bool,
-) -> Result<Option<(Pour, Result<(), DatasetError>)>, DatasetError> {
+) -> Result<Option<Filmed>, DatasetError> {
     if !(rate > 0.0 && rate.is_finite()) {
         let (what, got) = ("the frames per second", rate.to_string());
         return Err(DatasetError::Argument { what, got, allowed: "positive and finite" });

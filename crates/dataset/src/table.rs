@@ -148,7 +148,7 @@ pub(crate) fn read(path: &Path) -> Result<Table, DatasetError> {
     check_columns(path, &file, &columns)?;
 
     let count = usize::try_from(file.metadata().file_metadata().num_rows()).unwrap_or(0);
-    let in_groups: i64 = file.metadata().row_groups().iter().map(|group| group.num_rows()).sum();
+    let in_groups: i64 = file.metadata().row_groups().iter().map(RowGroupMetaData::num_rows).sum();
     // A row has an index of its own, which takes a byte at the very least.
     if count > length || in_groups != count as i64 {
         let found = format!("{count}, and {in_groups} in its groups");

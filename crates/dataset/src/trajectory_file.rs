@@ -4,6 +4,9 @@ use std::path::Path;
 
 use crate::{DatasetError, files};
 
+/// Characters of a line that cannot be read that a message shows: the file may be a stranger's, or none that was meant.
+const SHOWN: usize = 60;
+
 /// The columns, in this order; a first line of names may be there or not.
 const COLUMNS: &str = "time, x, y, z, qx, qy, qz, qw";
 
@@ -24,7 +27,8 @@ pub(crate) fn read(path: &Path) -> Result<Vec<[f64; 8]>, DatasetError> {
         let knot = numbers.ok().and_then(|numbers| <[f64; 8]>::try_from(numbers).ok());
         knots.push(knot.ok_or_else(|| {
             let what = format!("line {}", number + 1);
-            DatasetError::content(path, what, format!("{line:?}"), format!("{COLUMNS} as numbers"))
+            let shown: String = line.chars().take(SHOWN).collect();
+            DatasetError::content(path, what, format!("{shown:?}"), format!("{COLUMNS} as numbers"))
         })?);
     }
     Ok(knots)

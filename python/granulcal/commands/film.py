@@ -17,7 +17,7 @@ Pour a scene and write an animated GIF: grains as balls, walls at rest as lines,
   granulcal film funnel -o pour.gif
   granulcal film scene.toml --set funnel.height=0.06 --slow 4 -o pour.gif
 
-`simulate --mcap` writes a film for Foxglove, with depth images and walls; examples/foxglove.json is a layout for it.
+`simulate --mcap` writes a film for Foxglove, with depth images and walls.
 """
 
 

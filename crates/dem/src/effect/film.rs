@@ -7,7 +7,7 @@
 //! J = -k v_n / (1 + k (w_i + w_j)),   v_n -> v_n / (1 + k (w_i + w_j))
 //! ```
 //!
-//! so that no film is too thick for the substep, and none can turn a motion round.
+//! the gap being that at the middle of the substep, so that no film is too thick for the substep, and none can turn a motion round.
 
 use std::f64::consts::PI;
 
@@ -72,7 +72,9 @@ impl Film {
             (bed.velocity(j), bed.inverse_mass[i] + bed.inverse_mass[j])
         };
         let opening = (bed.velocity(i) - other).dot(&near.normal);
-        let k = self.strength * near.derjaguin.powi(2) / near.gap.max(self.roughness) * dt;
+        // The gap at the middle of the substep: with that at its begin a film would take a tenth too little.
+        let gap = (near.gap + 0.5 * dt * opening).max(self.roughness);
+        let k = self.strength * near.derjaguin.powi(2) / gap * dt;
         let impulse = -k * opening / (1.0 + k * inverse_mass) * near.normal;
         bed.kick(i, &impulse);
         if !near.is_wall {
