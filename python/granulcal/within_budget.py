@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -132,7 +133,9 @@ class KeptPours:
                 x = np.asarray(self.look(pour), float).tolist()
             except ValueError:
                 status = "no_grains_in_view"
-        return {"theta": theta.tolist(), "status": status, "x": x, "cpu_s": pour.cpu_seconds}
+        row = {"theta": theta.tolist(), "status": status, "x": x}
+        # Nobody knows the time of another engine.
+        return {**row, "cpu_s": pour.cpu_seconds} if math.isfinite(pour.cpu_seconds) else row
 
     def _read(self) -> dict[str, dict]:
         document = read_json(self.path, _SCHEMA)

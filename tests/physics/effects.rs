@@ -148,9 +148,9 @@ fn a_film_takes_speed_from_what_comes_together_and_none_from_what_moves_as_one()
     assert!((v[0] + v[1]).abs() < 1e-12);
     let (still, v) = in_a_film(gap, [0.1, 0.1], 2e-3);
     assert!((still - gap).abs() < 1e-12 && (v[0] - 0.1).abs() < 1e-15 && v[0] == v[1]);
-    // However thick the film and close the grains, nothing turns round.
+    // However thick the film and close the grains, it only takes speed; what is left may bounce.
     let (_, v) = in_a_film(1e-3 * RADIUS, [0.1, -0.1], 5e-3);
-    assert!(v[0] >= 0.0 && v[1] <= 0.0 && v[0] < 0.05, "{v:?}");
+    assert!(v[0].abs() < 0.05 && (v[0] + v[1]).abs() < 1e-12, "{v:?}");
 }
 
 #[test]

@@ -36,9 +36,9 @@ def _run(*words: str) -> subprocess.CompletedProcess:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def test_help_teaches(capsys):
+def test_help_teaches(capfd):
     assert main(["--help"]) == 0
-    text = capsys.readouterr().out
+    text = capfd.readouterr().out
     for word in ("generate", "train", "infer", "report", "reproduce", "demo", "Exit codes"):
         assert word in text
     assert main([]) == 2

@@ -224,7 +224,7 @@ def test_what_a_task_file_lacks_is_named(tilted: Path, tmp_path: Path) -> None:
         file.write_text(changed)
         return Task.load(file)
 
-    with pytest.raises(ObservationError, match="unknown scenes"):
+    with pytest.raises(ObservationError, match="scenes must be absent, for it is unknown"):
         load(
             text.replace("scene =", "scenes =", 1).replace(
                 "prior =", 'scene = "scene.toml"\nprior =', 1

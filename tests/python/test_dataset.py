@@ -16,7 +16,7 @@ def test_shapes_and_names(small_data):
     assert small_data.is_usable.all()
     assert small_data.health["worst_penetration"].shape == (80,)
     assert small_data.health["grains_lost"].sum() == 0
-    assert len(small_data.columns()) == 1 + 3 + 2 + 12 + 16 + 40
+    assert len(small_data.columns()) == 1 + 3 + 2 + 12 + 16 + 43
 
 
 def test_rows_come_from_prior_and_scene(small_data, small_scene, small_prior):

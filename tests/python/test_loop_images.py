@@ -221,10 +221,11 @@ def test_scenes_without_an_image_refuse_by_name(tmp_path: Path) -> None:
     ):
         (tmp_path / "scene.toml").write_text(text)
         (tmp_path / "prior.toml").write_text(PRIOR)
-        (tmp_path / "a.npz").write_bytes(b"")
+        for pour in ("a.npz", "b.npz", "c.npz"):
+            (tmp_path / pour).write_bytes(b"")
         (tmp_path / f"{name}.toml").write_text(
             'scene = "scene.toml"\nprior = "prior.toml"\n[[conditions]]\nname = "one"\n'
-            'at = { "start.base" = 0.04 }\nuse = "fit"\nrecordings = ["a.npz", "a.npz", "a.npz"]\n'
+            'at = { "start.base" = 0.04 }\nuse = "fit"\nrecordings = ["a.npz", "b.npz", "c.npz"]\n'
         )
         library = Task.load(tmp_path / f"{name}.toml").library
         assert [effect.name for effect in library if effect.image] == expected

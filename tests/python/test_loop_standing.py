@@ -135,7 +135,9 @@ def asked(definitions: tuple[Definition, ...], *, between: bool = True) -> Task:
         [Parameter(path="material.restitution", distribution="uniform", low=0.2, high=0.6)]
     )
     conditions = tuple(
-        Condition(f"{h:g}", {"funnel.height": h}, use, (Path("a"), Path("b"), Path("c")))
+        Condition(
+            f"{h:g}", {"funnel.height": h}, use, tuple(Path(f"{h:g}{pour}") for pour in "abc")
+        )
         for h, use in ((0.05, FIT), (0.1, FIT), (0.08, SEALED))
     )
     return Task(column(), prior, conditions, (), between=between, definitions=definitions)

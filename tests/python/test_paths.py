@@ -80,6 +80,7 @@ def test_every_path_says_whether_it_is_read_or_written():
         "name",
         "model",
         "at",
+        "experiment",
         "set",
         "preset",
     }, texts

@@ -43,6 +43,7 @@ name = "drum"
 [grains]
 count = 60
 diameter = 4e-3
+density = 1300.0
 [observe]
 rate = 50.0
 [observe.surface]

@@ -72,5 +72,5 @@ def test_pours_are_kept_and_never_made_twice(tmp_path):
     with pytest.raises(ValueError, match="another scene, prior or seed"):
         KeptPours(scene, prior, file, seed=1)
     file.write_text("{")
-    with pytest.raises(ValueError, match="damaged"):
+    with pytest.raises(ValueError, match="truncated or not JSON"):
         KeptPours(scene, prior, file)

@@ -31,7 +31,8 @@ pub(crate) fn check_paths(
     py.detach(|| claims.check()).map_err(error::dataset)
 }
 
-/// Writes a whole file or none; it may replace a file of its own kind, which `ending` names.
+/// Writes a whole file or none; it may replace a file of its own kind, which `ending` names; one of another ending, anything but
+/// TOML.
 #[pyfunction]
 pub(crate) fn write_file(
     py: Python<'_>,
@@ -39,11 +40,8 @@ pub(crate) fn write_file(
     ending: &str,
     bytes: &[u8],
 ) -> PyResult<()> {
-    let Some(form) = Form::of_ending(ending) else {
-        let (what, got) = ("the ending of a file to write", format!("{ending:?}"));
-        let allowed = "one of a kind that granulcal writes";
-        return Err(error::dataset(DatasetError::Argument { what, got, allowed }));
-    };
+    // Input of other programs has many endings; no TOML that stands there is replaced by it.
+    let form = Form::of_ending(ending).unwrap_or(Form::Export);
     py.detach(|| granulcal_dataset::write_file(&path, form, bytes)).map_err(error::dataset)
 }
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from granulcal import _native
 from granulcal.errors import ModelFormatError
 
-__all__ = ["hashes", "verify"]
+__all__ = ["hashes", "in_order", "verify"]
 
 _PREFIX, _DOCUMENT = "hash.", "hash.model.json"
 _TYPES = {"float64": "F64", "float32": "F32", "uint8": "U8", "int64": "I64", "bool": "BOOL"}
@@ -52,6 +52,16 @@ def verify(
                 f"{stated.get(name, 'none')}; take a copy, or train again"
             )
     return True
+
+
+def in_order(data: bytes) -> bytes:
+    """Returns a file of tensors with its metadata in order: one model, the same bytes."""
+    (length,) = struct.unpack("<Q", data[:8])
+    header = json.loads(data[8 : 8 + length])
+    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 8)
+    return struct.pack("<Q", len(text)) + text + data[8 + length :]
 
 
 def _hash(name: str, array: NDArray[Any]) -> str:

@@ -19,7 +19,7 @@ from granulcal.bayessim.amortised import Amortised
 from granulcal.bayessim.average import FORMS, Average
 from granulcal.bayessim.calibration import Calibration
 from granulcal.bayessim.config import Config
-from granulcal.bayessim.damage import hashes, verify
+from granulcal.bayessim.damage import hashes, in_order, verify
 from granulcal.bayessim.likelihood import Likelihood
 from granulcal.bayessim.misfit import MisfitReference
 from granulcal.bayessim.model_schema import check_model
@@ -78,7 +78,9 @@ def save_model(model: "BayesSim", path: str | PathLike[str]) -> None:
         text = (json.dumps(_document(model), indent=1, allow_nan=False) + "\n").encode()
         tensors = model_tensors(model)
         write_beside(new / _JSON_NAME, text)
-        write_beside(new / _TENSORS_NAME, tensor_bytes(tensors, metadata=hashes(text, tensors)))
+        write_beside(
+            new / _TENSORS_NAME, in_order(tensor_bytes(tensors, metadata=hashes(text, tensors)))
+        )
         if target.exists():
             os.rename(target, old)
         try:
