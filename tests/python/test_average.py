@@ -233,8 +233,8 @@ def test_a_file_of_version_3_is_an_arithmetic_average(averaged, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"average": None}, "no entry 'average'"),
-        ({"network_weight": None}, "no entry 'network_weight'"),
+        ({"average": None}, "average must be there"),
+        ({"network_weight": None}, "network_weight must be there"),
         ({"average": "harmonic"}, "geometric, arithmetic, got 'harmonic'"),
         ({"emulator_weight": -0.1}, "emulator_weight must be .* got -0.1"),
         ({"average": "arithmetic", "network_weight": 1.5}, "network_weight must be .* got 1.5"),
