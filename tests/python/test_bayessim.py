@@ -215,7 +215,7 @@ def _drop_entry(folder):
         (lambda f: _edit_json(f, format="other"), "is not a granulcal-bayessim file"),
         (
             lambda f: _edit_json(f, x_names=["one"]),
-            "axis_count must be at most 1, the number of stat",
+            "axis_count must be at most 1",
         ),
         (lambda f: _edit_json(f, config={"colour": 3}), "config.method must be there"),
         (lambda f: _edit_json(f, prior_toml="[["), "not valid TOML"),
