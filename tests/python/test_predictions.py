@@ -44,12 +44,20 @@ name = "drum"
 count = 60
 diameter = 4e-3
 density = 1300.0
+[start]
+kind = "grid"
+counts = [5, 4, 3]
+spacing = 6e-3
+jitter = 5e-4
+base = 0.02
 [observe]
 rate = 50.0
 [observe.surface]
 centre = [0.0, 0.06]
 x = [-0.004, 0.0, 0.004]
 slope_within = 0.004
+[end]
+horizon = 1.0
 """
 
 
