@@ -1,6 +1,7 @@
 """`granulcal infer` and `granulcal-cli infer`: one answer, and Python's library says the same."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,13 @@ from granulcal import _native, cli
 from granulcal.bayessim import BayesSim
 from granulcal.identifiability import Identifiability
 
-SMALL = {"features": 8, "ensemble": 2, "components": 2, "emulator_features": 8, "max_epochs": 15}
+SMALL: dict[str, Any] = {
+    "features": 8,
+    "ensemble": 2,
+    "components": 2,
+    "emulator_features": 8,
+    "max_epochs": 15,
+}
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +126,7 @@ def _printed(capfd, words: list[str]) -> str:
 
 
 def _statistics(model: BayesSim, recording: list[str]) -> np.ndarray:
-    resolution = gc.Scene.from_toml(model.scene_toml).ground_resolution
+    resolution = gc.Scene.from_toml(model.scene_toml or "").ground_resolution
     opened = gc.Recording.open(recording[0], camera=recording[2])
     return np.asarray(opened.formation(ground_resolution=resolution).statistics())
 

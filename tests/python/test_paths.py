@@ -91,13 +91,14 @@ def test_no_command_replaces_an_input_or_a_toml_of_another_kind(tmp_path, capsys
     outputs = pairs = 0
     for words, parser in commands(cli._parser()):
         arguments = list(paths.actions(parser))
-        for number, output in enumerate(a for a in arguments if isinstance(a.type, Writes)):
+        written = [(a, a.type.kind) for a in arguments if isinstance(a.type, Writes)]
+        for number, (output, kind) in enumerate(written):
             outputs += 1
-            if output.type.kind == "folder" or "--engine" in words:
+            if kind == "folder" or "--engine" in words:
                 continue
             folder = tmp_path / f"{'-'.join(words)}-{number}"
             folder.mkdir()
-            first = FIRST.get(output.type.kind)
+            first = FIRST.get(kind)
             path = folder if first else folder / "mine.toml"
             victim = folder / first if first else path
             victim.write_text(TEXT)

@@ -154,12 +154,15 @@ def check_model(document: Any, where: Path) -> None:
         ("calibration", ("rank_p_values",)),
     ):
         found = document[part]
-        for name in lists if found is not None else ():
+        if found is None:
+            continue
+        for name in lists:
             if len(found[name]) != len(found["names"]):
                 raise ModelFormatError(
                     f"{where}: {part}.{name} must have as many numbers as there are names, "
                     f"{len(found['names'])}, got {len(found[name])}"
                 )
-    for row in (document["calibration"] or {}).get("ranks", []):
-        if len(row) != len(document["calibration"]["names"]):
+    calibration = document["calibration"] or {}
+    for row in calibration.get("ranks", []):
+        if len(row) != len(calibration["names"]):
             raise ModelFormatError(f"{where}: calibration.ranks must have a column for each name")

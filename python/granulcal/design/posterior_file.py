@@ -45,8 +45,8 @@ class PosteriorDraws:
             ValueError: it is not a posterior of `granulcal infer -o` or `granulcal calibrate`.
         """
         document = read_json(path, _SCHEMA)
-        parameters = document["parameters"]
-        names = tuple(parameters or ())
+        parameters: dict[str, dict[str, float]] = document["parameters"] or {}
+        names = tuple(parameters)
         if not names:
             raise ValueError(f"{path} holds no posterior: the recording was outside the model")
         if any(len(row) != len(names) for row in document["samples"]):

@@ -219,7 +219,7 @@ def _calibrate(
     misfit = model.misfit(x)
     words = "can" if misfit.is_inside else "cannot"
     outside = f"the model {words} explain the recordings at 12 cm (p = {misfit.p_value:.2g})."
-    return _Grain(chosen, distances, np.array(pairs), outside)
+    return _Grain(chosen, distances, np.array(pairs, dtype=np.float64), outside)
 
 
 def _table(name: str, found: _Grain) -> Table:
