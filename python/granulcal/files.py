@@ -13,7 +13,7 @@ from granulcal import _native
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["beside", "save_figure", "write_beside"]
+__all__ = ["beside", "replace_text", "save_figure", "write_beside"]
 
 _TRIES = 100
 
@@ -28,6 +28,12 @@ def write_beside(path: Path, text: str | bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     data = text.encode("utf-8") if isinstance(text, str) else text
     _native.write_file(path, path.suffix.removeprefix("."), data)
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Writes a whole document or none in the place of one that is the caller's to change."""
+    with beside(path) as new:
+        new.write_text(text, encoding="utf-8")
 
 
 def save_figure(figure: "Figure", path: str | PathLike[str], **options: Any) -> None:

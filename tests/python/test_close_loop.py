@@ -230,7 +230,7 @@ def test_what_a_task_file_lacks_is_named(tilted: Path, tmp_path: Path) -> None:
                 "prior =", 'scene = "scene.toml"\nprior =', 1
             )
         )
-    with pytest.raises(ObservationError, match='must be "fit" or "sealed", got "test"'):
+    with pytest.raises(ObservationError, match="must be one of fit, sealed, got 'test'"):
         load(text.replace('"sealed"', '"test"'))
     with pytest.raises(ObservationError, match="at least 3 pours in conditions to fit, got 0"):
         load(text.replace('"fit"', '"sealed"'))
