@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use granulcal_dataset::{Claims, DatasetError, Form, Input, Product};
+use granulcal_dataset::{Claims, Form, Input, Product};
 use pyo3::prelude::*;
 
 use crate::error;
