@@ -14,10 +14,8 @@ use std::ops::AddAssign;
 use nalgebra::Vector3;
 
 use crate::contact::ContactLaw;
-use crate::law::TANGENTIAL_INERTIA;
+use crate::law::{INVERSE_INERTIA, TANGENTIAL_INERTIA};
 
-/// Inverse moment of inertia of a sphere times its mass and squared radius.
-const TURNING: f64 = 2.5;
 /// Rounds of both projections where sliding and rolling go on in directions that turn.
 const ROUNDS: usize = 24;
 /// Change of an impulse over its limit below which the rounds have settled `[-]`.
@@ -69,8 +67,8 @@ impl FrictionBlock {
         let ([c_i, c_j], [l_i, l_j]) = (law.inverse_mass, law.lever);
         Self {
             a_t: TANGENTIAL_INERTIA * (c_i + c_j),
-            a_r: TURNING * (l_i * l_i * c_i + l_j * l_j * c_j),
-            kappa: TURNING * (l_j * c_j - l_i * c_i),
+            a_r: INVERSE_INERTIA * (l_i * l_i * c_i + l_j * l_j * c_j),
+            kappa: INVERSE_INERTIA * (l_j * c_j - l_i * c_i),
             sliding: factor * law.sliding_friction,
             rolling: factor * law.rolling_friction,
             torsion: factor * law.torsional_friction,
