@@ -13,7 +13,7 @@ mod queue;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -144,7 +144,8 @@ impl Batch<'_> {
     ) -> Result<Summary, DatasetError> {
         let left = self.progress.total - self.progress.resumed;
         let stop = AtomicBool::new(!watch(&self.progress));
-        let (sender, finished) = channel();
+        // Rows are handed over: when the caller stops, at most one finished row of a worker is still to come.
+        let (sender, finished) = sync_channel(0);
         let (header, engine) = (&self.folder.header, self.engine);
 
         let outcome = std::thread::scope(|scope| {
