@@ -50,8 +50,13 @@ class Pour:
         return self._native.angular_velocities
 
     @cached_property
+    def orientations(self) -> Array:
+        """Turns of grains that are not round, quaternions i, j, k, w, shape (n, 4); else (0, 4)."""
+        return self._native.orientations
+
+    @cached_property
     def radii(self) -> Array:
-        """Radii of the grains [m], shape (n,)."""
+        """Radii of the grains [m], shape (n,); half the diameter if they are not round."""
         return self._native.radii
 
     @cached_property

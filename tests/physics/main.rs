@@ -7,6 +7,7 @@ mod bulk;
 mod bulk_laws;
 mod clump;
 mod collision;
+mod convex;
 mod counters;
 mod determinism;
 mod effect_lists;

@@ -114,6 +114,7 @@ pub fn foreign_pour(
         health: unknown,
         grains_in_funnel,
         simulated_s: f64::NAN,
+        convex: None,
         state_hash: hash.digest128(),
     })
 }

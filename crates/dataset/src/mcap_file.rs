@@ -2,7 +2,7 @@
 //!
 //! | topic | schema | what |
 //! |---|---|---|
-//! | `/grains` | foxglove.PointCloud | centres and radii, f32 `[m]`, frame `world` |
+//! | `/grains` | foxglove.PointCloud | centres and radii, f32 `[m]`, frame `world`; of convex bodies also the quaternion qx, qy, qz, qw |
 //! | `/walls` | foxglove.SceneUpdate | ground, funnel and walls, once, or in every frame where one moves |
 //! | `/depth` | foxglove.RawImage, 32FC1 | what the scene's camera delivers `[m]`, frame `camera`; 0 is no data |
 //! | `/heights` | foxglove.RawImage, 32FC1 | the same for an orthographic camera, instead of `/depth` |
@@ -34,11 +34,13 @@ use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 use stamp::{WORLD, nanoseconds, timestamp};
 
 use crate::files::PendingFile;
-use crate::{DatasetError, Form, Observer, VERSION, View, look, look_from};
+use crate::{DatasetError, Drawn, Form, Observer, VERSION, View, look, look_from};
 
 const CAMERA: &str = "camera";
 /// Bytes of one grain in `/grains`: x, y, z, radius.
 const STRIDE: u32 = 16;
+/// The same of a convex body, with its turn as a quaternion.
+const TURNED_STRIDE: u32 = 32;
 
 /// A pour, and whether its film could be kept.
 pub type Filmed = (Pour, Result<(), DatasetError>);
@@ -132,11 +134,13 @@ impl<'a> Recorder<'a> {
         let time = simulation.time();
         let failed = |source| DatasetError::Mcap { path: self.path.to_owned(), source };
         let (positions, radii) = (simulation.positions(), simulation.radii());
-        let view = look(&scene.camera, &positions, &radii, seed);
+        let convex = simulation.convex();
+        let drawn = Drawn { positions: &positions, radii: &radii, convex: convex.as_ref() };
+        let view = look(&scene.camera, &drawn, seed);
         let further: Vec<_> = scene
             .views
             .iter()
-            .map(|view| (format!("views/{}", view.name), look_from(view, &positions, &radii)))
+            .map(|view| (format!("views/{}", view.name), look_from(view, &drawn)))
             .collect();
         let shows_walls = !self.has_walls || walls::move_ever(scene);
         self.has_walls = true;
@@ -144,7 +148,7 @@ impl<'a> Recorder<'a> {
             if shows_walls {
                 recorder.send("/walls", time, &walls::walls(scene, time))?;
             }
-            recorder.send("/grains", time, &grains(time, simulation))?;
+            recorder.send("/grains", time, &grains(time, &drawn))?;
             match view {
                 Ok(View::Depth(camera, image)) => {
                     recorder.depth_image(time, CAMERA, ["/depth", "/camera"], &camera, &image)?;
@@ -217,13 +221,19 @@ impl<'a> Recorder<'a> {
     }
 }
 
-fn grains(time: f64, simulation: &Simulation) -> PointCloud {
-    let mut data = Vec::with_capacity(simulation.radii().len() * STRIDE as usize);
-    for (position, radius) in simulation.positions().iter().zip(simulation.radii()) {
-        for value in [position.x, position.y, position.z, radius] {
+fn grains(time: f64, drawn: &Drawn<'_>) -> PointCloud {
+    let turned = drawn.convex.map(|convex| &convex.orientations);
+    let stride = if turned.is_some() { TURNED_STRIDE } else { STRIDE };
+    let mut data = Vec::with_capacity(drawn.radii.len() * stride as usize);
+    for (grain, (position, radius)) in drawn.positions.iter().zip(drawn.radii).enumerate() {
+        let place = [position.x, position.y, position.z, *radius];
+        let turn = turned.map(|all| <[f64; 4]>::from(all[grain].coords));
+        for value in place.into_iter().chain(turn.into_iter().flatten()) {
             data.extend((value as f32).to_le_bytes());
         }
     }
+    let names = ["x", "y", "z", "radius", "qx", "qy", "qz", "qw"];
+    let names = &names[..stride as usize / 4];
     let field = |(index, name): (u32, &str)| PackedElementField {
         name: name.to_owned(),
         offset: 4 * index,
@@ -236,8 +246,8 @@ fn grains(time: f64, simulation: &Simulation) -> PointCloud {
             position: Some(Vector3::default()),
             orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
         }),
-        point_stride: STRIDE,
-        fields: (0..).zip(["x", "y", "z", "radius"]).map(field).collect(),
+        point_stride: stride,
+        fields: (0..).zip(names).map(|(index, name)| field((index, *name))).collect(),
         data: data.into(),
     }
 }

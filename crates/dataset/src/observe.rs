@@ -6,11 +6,12 @@ use granulcal_dem::{CameraSpec, Mask, Pour, Projection, ViewSpec};
 use granulcal_features::stats::DIAGNOSTIC_COUNT;
 use granulcal_features::{
     Camera, DepthImage, DiagnosticSettings, FeatureError, HeightMap, SensorNoise, diagnostics,
-    height_map, paper16, render, render_grid,
+    height_map, paper16,
 };
 use nalgebra::{Vector2, Vector3};
 
 use crate::DatasetError;
+use crate::drawn::Drawn;
 use crate::random::{camera_seed, sensor_seed};
 use crate::sensor_file::sensor_of;
 
@@ -118,10 +119,20 @@ pub fn observe(
     pour: &Pour,
     pour_seed: u64,
 ) -> Result<Observation, DatasetError> {
-    let (clean, view) = views(camera, &pour.positions, &pour.radii, pour_seed)?;
+    observe_grains(camera, &Drawn::of(pour), pour_seed)
+}
+
+/// The image and the statistics of grains under a camera, as [`observe`].
+pub(crate) fn observe_grains(
+    camera: &CameraSpec,
+    grains: &Drawn<'_>,
+    pour_seed: u64,
+) -> Result<Observation, DatasetError> {
+    let (clean, view) = views(camera, grains, pour_seed)?;
+    let radii = grains.radii;
     let diagnostic_settings = DiagnosticSettings {
         pour_axis: Some(Vector2::zeros()),
-        grain_diameter: 2.0 * pour.radii.iter().sum::<f64>() / pour.radii.len().max(1) as f64,
+        grain_diameter: 2.0 * radii.iter().sum::<f64>() / radii.len().max(1) as f64,
         spacing: camera.field_width / camera.pixels as f64 * camera.downsample as f64,
     };
     let threshold = camera.height_threshold;
@@ -151,13 +162,8 @@ pub fn observe(
 ///
 /// # Errors
 /// [`DatasetError::Features`] as [`observe`].
-pub fn look(
-    camera: &CameraSpec,
-    positions: &[Vector3<f64>],
-    radii: &[f64],
-    pour_seed: u64,
-) -> Result<View, DatasetError> {
-    views(camera, positions, radii, pour_seed).map(|(_, view)| view)
+pub fn look(camera: &CameraSpec, grains: &Drawn<'_>, pour_seed: u64) -> Result<View, DatasetError> {
+    views(camera, grains, pour_seed).map(|(_, view)| view)
 }
 
 /// What one of the scene's further cameras sees of grains over the ground; without noise, and without data
@@ -165,16 +171,12 @@ pub fn look(
 ///
 /// # Errors
 /// [`DatasetError::Features`] as [`observe`].
-pub fn look_from(
-    view: &ViewSpec,
-    positions: &[Vector3<f64>],
-    radii: &[f64],
-) -> Result<View, DatasetError> {
+pub fn look_from(view: &ViewSpec, grains: &Drawn<'_>) -> Result<View, DatasetError> {
     let [width, height] = view.pixels;
     let farthest = FARTHEST * view.distance();
     Camera::looking_at(view.eye.into(), view.target.into(), view.field_width, (width, height))
         .and_then(|camera| {
-            let mut image = render(&camera, positions, radii)?;
+            let mut image = grains.render(&camera, 1)?;
             let beyond = |depth: &&mut f32| f64::from(**depth) > farthest;
             image.depth.iter_mut().filter(beyond).for_each(|depth| *depth = 0.0);
             Ok(View::Depth(camera, image))
@@ -185,8 +187,7 @@ pub fn look_from(
 /// The noise-free image and the one that the camera delivers.
 fn views(
     camera: &CameraSpec,
-    positions: &[Vector3<f64>],
-    radii: &[f64],
+    grains: &Drawn<'_>,
     pour_seed: u64,
 ) -> Result<(View, View), DatasetError> {
     let noise = SensorNoise { blur_px: camera.blur, depth_sigma: camera.depth_noise };
@@ -196,7 +197,7 @@ fn views(
         Projection::Pinhole => {
             let full = overhead(camera)?;
             let small = full.downsampled(camera.downsample).map_err(DatasetError::Features)?;
-            render_grid(&full, positions, radii, camera.downsample).and_then(|clean| {
+            grains.render(&full, camera.downsample).and_then(|clean| {
                 let mut image = noise.apply(&clean, seed)?;
                 if let Some(sensor) = sensor {
                     image = sensor.observe(&small, &image, sensor_seed(pour_seed))?;
@@ -206,7 +207,8 @@ fn views(
         }
         Projection::Orthographic => {
             let resolution = camera.field_width / camera.pixels as f64;
-            height_map(positions, radii, camera.pixels, resolution, (0.0, 0.0))
+            // A checked scene has no convex grains under this camera.
+            height_map(grains.positions, grains.radii, camera.pixels, resolution, (0.0, 0.0))
                 .and_then(|map| map.downsample(camera.downsample))
                 .and_then(|clean| {
                     let mut map = noise.apply_to_height_map(&clean, seed)?;
@@ -260,6 +262,7 @@ mod tests {
             health: Health::default(),
             grains_in_funnel: 0,
             simulated_s: 1.0,
+            convex: None,
             state_hash: 0,
         }
     }

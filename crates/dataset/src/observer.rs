@@ -6,6 +6,7 @@
 
 mod discharge;
 mod front;
+mod images;
 mod observation;
 mod radius;
 mod spill;
@@ -61,6 +62,9 @@ fn observations(scene: &Scene) -> Vec<Box<dyn Observation>> {
     }
     if let Some(spec) = &observe.spill {
         all.push(Box::new(spill::Spill::new(spec)));
+    }
+    if let Some(spec) = &observe.images {
+        all.push(Box::new(images::Images::new(spec, &scene.camera)));
     }
     all
 }

@@ -12,10 +12,7 @@
 //! does not change any more is the solution for rigid bodies. Source: mass splitting, Tonge et al., ACM Trans. Graph. 31 (2012)
 //! 105, doi:10.1145/2185520.2185601. Angular momentum is what is kept in flight, in a frame that does not turn.
 
-use granulcal_numbers::{box_muller, half_open};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use rand_core::{Rng, SeedableRng};
-use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
 use crate::bed::Bed;
@@ -23,6 +20,7 @@ use crate::body::Body;
 use crate::lanes::Row;
 use crate::law::INVERSE_INERTIA;
 use crate::scene::{ClumpShape, Effect, Scene};
+use crate::turns::turns;
 
 /// Keeps the orientations of a seed apart from its places.
 const STREAM: u64 = 0x6a09_e667_f3bc_c909;
@@ -64,18 +62,7 @@ impl Clumps {
         if !clump.is_on() {
             return None;
         }
-        let mut random = Pcg64::seed_from_u64(seed ^ STREAM);
-        let mut normal = || {
-            let [u, v] = [0; 2].map(|_| half_open(random.next_u64()));
-            // 1 - u is never 0.
-            box_muller(1.0 - u, v)[0]
-        };
-        // Four normal numbers point everywhere alike on the sphere of quaternions.
-        let mut turn = || {
-            let [i, j, k, w] = [0; 4].map(|_| normal());
-            let norm = (i * i + j * j + k * k + w * w).sqrt().max(f64::MIN_POSITIVE);
-            [i, j, k, w].map(|part| part / norm)
-        };
+        let mut turn = turns(seed ^ STREAM);
         let still = |centre: Vector3<f64>| Rigid {
             centre: centre.into(),
             velocity: [0.0; 3],

@@ -145,6 +145,12 @@ pub enum DemError {
         /// The name found.
         got: String,
     },
+    /// Points or a mesh that are no convex body.
+    #[error("grains.shape is no body: {what}")]
+    BadShape {
+        /// What is wrong.
+        what: &'static str,
+    },
     /// Two things that cannot be in one scene.
     #[error("{one} and {other} cannot be in one scene")]
     Exclude {

@@ -32,6 +32,7 @@
 mod assemble;
 mod bed;
 mod blocks;
+mod bodies;
 mod body;
 mod check;
 mod checkpoint;
@@ -42,6 +43,7 @@ mod contacts;
 mod effect;
 mod error;
 mod frozen_search;
+mod grain_shape;
 mod health;
 mod impact;
 mod initial;
@@ -62,18 +64,20 @@ mod scene;
 mod simulation;
 mod solver;
 mod surroundings;
+mod turns;
 mod wall;
 mod wall_load;
 
 pub use checkpoint::CheckpointHeader;
 pub use error::DemError;
 pub use frozen_search::FrozenSearch;
+pub use grain_shape::GrainShape;
 pub use health::{Health, MAX_ENERGY_CREATED};
 pub use impact::ImpactWork;
 pub use material::{
     Material, WallMaterial, rolling_friction_from_length, rolling_friction_to_length,
 };
-pub use pour::{Pour, Status};
+pub use pour::{ConvexGrains, Pour, Status};
 pub use preset::{
     Complementarity, ImpactSettings, Method, NewtonSettings, Preset, ReferenceSettings,
     SolverSettings,
@@ -82,9 +86,9 @@ pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use scene::{
     Adhesion, BoxSide, CameraSpec, Capillary, Clump, Effect, Effects, EndRule, Ends, Fluid, Funnel,
     FunnelPose, GRAVITY, Grains, Ground, GroundUnlike, Layer, Lubrication, Mask, Mesh, MeshFile,
-    Motion, NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill,
-    ObserveSurface, Outflow, Outlet, Periodic, PeriodicAxis, Polydispersity, Projection,
-    RestitutionSpeed, RollingForm, Scene, SensorSpec, Shape, Start, StereoSpec, Tilt,
+    Motion, NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveImages, ObserveRadius,
+    ObserveSpill, ObserveSurface, Outflow, Outlet, Periodic, PeriodicAxis, Polydispersity,
+    Projection, RestitutionSpeed, RollingForm, Scene, SensorSpec, Shape, Start, StereoSpec, Tilt,
     TimeOfFlightSpec, Vibration, ViewSpec, Wall,
 };
 pub use simulation::Simulation;

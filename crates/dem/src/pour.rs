@@ -2,9 +2,10 @@
 
 use std::fmt;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::grain_shape::Solid;
 use crate::health::Health;
 
 /// How a pour ended.
@@ -70,6 +71,35 @@ pub struct Pour {
     pub grains_in_funnel: usize,
     /// Simulated time `[s]`.
     pub simulated_s: f64,
+    /// Shape and orientations of the grains, if they are convex bodies; `radii` are then half of the scene's diameter.
+    pub convex: Option<ConvexGrains>,
     /// [`crate::Simulation::state_hash`] at the end: equal hashes are equal pours, to the last bit.
     pub state_hash: u128,
+}
+
+/// Grains that are convex bodies of one shape: an intersection of half spaces, and of a cylinder about the y axis if it is round.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConvexGrains {
+    /// Outward unit normals and distances from the centre of mass of the flat faces, in the body's axes `[m]`.
+    pub faces: Vec<(Vector3<f64>, f64)>,
+    /// Corners in the body's axes `[m]`; of a cylinder none.
+    pub corners: Vec<Vector3<f64>>,
+    /// Radius of the cylinder, if one bounds it `[m]`.
+    pub round: Option<f64>,
+    /// Radius of the ball about the centre that holds it `[m]`.
+    pub reach: f64,
+    /// Turn of each grain, from its axes to the scene's.
+    pub orientations: Vec<UnitQuaternion<f64>>,
+}
+
+impl ConvexGrains {
+    pub(crate) fn new(solid: &Solid, orientations: Vec<UnitQuaternion<f64>>) -> Self {
+        Self {
+            faces: solid.faces.clone(),
+            corners: solid.corners.clone(),
+            round: solid.round.map(|(radius, _)| radius),
+            reach: solid.reach,
+            orientations,
+        }
+    }
 }

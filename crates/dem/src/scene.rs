@@ -33,7 +33,8 @@ use gravity::standard_gravity;
 pub use mesh::{Mesh, MeshFile};
 pub use motion::Motion;
 pub use observe::{
-    Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill, ObserveSurface,
+    Observe, ObserveDischarge, ObserveFront, ObserveImages, ObserveRadius, ObserveSpill,
+    ObserveSurface,
 };
 pub use outflow::Outflow;
 pub use periodic::{Periodic, PeriodicAxis};
@@ -44,6 +45,7 @@ pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
 
 use crate::check::{finite, positive};
 use crate::error::DemError;
+use crate::grain_shape::Solid;
 use crate::material::Material;
 use crate::preset::Preset;
 
@@ -122,7 +124,7 @@ impl Scene {
             preset: Preset::Default,
             gravity: standard_gravity(),
             material: Material::default(),
-            grains: Grains { count: 2000, diameter: 4e-3, density: 1300.0 },
+            grains: Grains { count: 2000, diameter: 4e-3, density: 1300.0, shape: None },
             start: Start::Grid { counts: [10, 10, 20], spacing: 8e-3, jitter: 1e-4, base: -4e-3 },
             ground: Ground::default(),
             funnel: Some(Funnel { height, ..Funnel::default() }),
@@ -209,7 +211,11 @@ impl Scene {
 
     /// The balls that hold the grains, whichever way they are turned: the grains themselves if they are round.
     pub(crate) fn held_grains(&self) -> Grains {
-        Grains { diameter: self.effects.clump.envelope(&self.grains), ..self.grains }
+        let diameter = match self.grains.solid() {
+            Some(solid) => 2.0 * solid.reach,
+            None => self.effects.clump.envelope(&self.grains),
+        };
+        Grains { diameter, shape: None, ..self.grains }
     }
 
     /// Centres of the grains at time zero `[m]`, one each.
@@ -231,6 +237,30 @@ impl Scene {
         }
     }
 
+    /// What convex bodies cannot be with: they have walls, gravity and the plain law.
+    fn check_shape(&self) -> Result<(), DemError> {
+        let Some(shape) = &self.grains.shape else { return Ok(()) };
+        shape.check()?;
+        Solid::new(shape, self.grains.diameter)?;
+        let Effects { ground, tilt, funnel, outlet, .. } = self.effects.clone();
+        let alone = Effects { ground, tilt, funnel, outlet, ..Effects::default() };
+        let looks = |observe: &Observe| {
+            observe.images.is_some() || observe.surface.is_some() || observe.front.is_some()
+        };
+        let others = [
+            ("effects but ground, tilt, funnel and outlet", self.effects != alone),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+            ("observe.images, surface or front", self.observe.as_ref().is_some_and(looks)),
+            ("an orthographic camera", self.camera.projection == Projection::Orthographic),
+            ("preset paper", self.preset == Preset::Paper),
+        ];
+        match others.into_iter().find(|(_, is_there)| *is_there) {
+            Some((other, _)) => Err(DemError::Exclude { one: "grains.shape", other }),
+            None => Ok(()),
+        }
+    }
+
     /// Checks every number of the scene.
     ///
     /// # Errors
@@ -247,6 +277,7 @@ impl Scene {
         self.ground.check(&self.material)?;
         self.effects.check()?;
         self.check_clump()?;
+        self.check_shape()?;
         self.start.check(&self.held_grains())?;
         self.effects.check_method(self.preset.settings().method)?;
         if let Some(funnel) = &self.funnel {

@@ -12,6 +12,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::bed::Bed;
+use crate::bodies::Bodies;
 use crate::clumps::Clumps;
 use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
@@ -21,7 +22,7 @@ use crate::health::{Health, HealthWatch};
 use crate::impact::{ImpactWork, Impacts};
 use crate::initial;
 use crate::parallel::Threads;
-use crate::pour::{Pour, Status};
+use crate::pour::{ConvexGrains, Pour, Status};
 use crate::preset::SolverSettings;
 use crate::scene::Scene;
 use crate::surroundings::Surroundings;
@@ -42,8 +43,10 @@ pub struct Simulation {
     bridges: Bridges,
     /// Contacts with a soft layer.
     on_layer: ContactSet,
-    /// The bodies that the grains are, if they are not round.
+    /// The bodies that the grains are, if they are not round: several spheres each, or
     clumps: Option<Clumps>,
+    /// convex bodies of one shape, which have a substep of their own; `bed` follows them.
+    bodies: Option<Bodies>,
     origin: Arc<Origin>,
     substep: usize,
     /// Whether the grains hardly moved at the last examination.
@@ -75,7 +78,7 @@ impl Simulation {
         let lift = gravity.norm() * scene.grains.radius();
         let least_scale = (lift + scene.end.kinetic_energy) * bed.count() as f64;
         Ok(Self {
-            watch: HealthWatch::new(bed.count(), energy(&bed, None, &around), least_scale),
+            watch: HealthWatch::new(bed.count(), energy(&bed, (None, None), &around), least_scale),
             contacts: Contacts::default(),
             around,
             bed,
@@ -83,6 +86,7 @@ impl Simulation {
             bridges: Bridges::default(),
             on_layer: ContactSet::default(),
             clumps,
+            bodies: Bodies::of(scene, seed),
             origin: Arc::new(Origin { scene: scene.clone(), seed }),
             substep: 0,
             is_quiet: false,
@@ -174,6 +178,9 @@ impl Simulation {
         }
         let work = if let Some(clumps) = &mut self.clumps {
             clumps.set_motion(&mut self.bed, grain, &velocity, &angular_velocity)
+        } else if let Some(bodies) = &mut self.bodies {
+            self.bed.set_motion(grain, &velocity, &angular_velocity);
+            bodies.set_motion(grain, &velocity, &angular_velocity)
         } else {
             let before = self.bed.kinetic_energy(grain);
             self.bed.set_motion(grain, &velocity, &angular_velocity);
@@ -183,6 +190,12 @@ impl Simulation {
         self.contacts.forget_list();
         (self.seemed_ended, self.ended) = (None, None);
         Ok(())
+    }
+
+    /// Shape and orientations of the grains, if they are convex bodies.
+    pub fn convex(&self) -> Option<ConvexGrains> {
+        let bodies = self.bodies.as_ref()?;
+        Some(ConvexGrains::new(&bodies.solid, bodies.orientations()))
     }
 
     /// What the grains press on every wall with in the last substep: the ground first, then the funnel's cone
@@ -254,14 +267,23 @@ impl Simulation {
             positions: self.positions(),
             radii: self.radii(),
             radii_out: self.radii_out(),
+            convex: self.convex(),
         }
     }
 }
 
 /// Energy of the grains and of what they press in, per typical mass `[m^2/s^2]`.
-fn energy(bed: &Bed, clumps: Option<&Clumps>, around: &Surroundings) -> f64 {
+fn energy(
+    bed: &Bed,
+    (clumps, bodies): (Option<&Clumps>, Option<&Bodies>),
+    around: &Surroundings,
+) -> f64 {
     let gravity = &around.effects.gravity;
-    let energy = clumps.map_or_else(|| bed.energy(gravity), |clumps| clumps.energy(gravity));
+    let energy = match (clumps, bodies) {
+        (Some(clumps), _) => clumps.energy(gravity),
+        (None, Some(bodies)) => bodies.energy(gravity),
+        (None, None) => bed.energy(gravity),
+    };
     around.effects.pad.as_ref().map_or(energy, |pad| energy + pad.energy(bed))
 }
 

@@ -185,7 +185,7 @@ fn scene() -> impl Strategy<Value = Scene> {
                 preset,
                 gravity,
                 material,
-                grains: Grains { count, diameter: 2.0 * radius, density: 1300.0 },
+                grains: Grains { count, diameter: 2.0 * radius, density: 1300.0, shape: None },
                 start: scaled_start(start, radius),
                 ground: Ground::default(),
                 funnel: funnel.map(|funnel| scaled_funnel(funnel, radius)),

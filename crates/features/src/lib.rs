@@ -60,7 +60,7 @@ pub use depth::DepthImage;
 pub use error::FeatureError;
 pub use height_map::HeightMap;
 pub use plane::{Plane, PlaneFit, fit_plane, fit_plane_within};
-pub use raster::{height_map, render, render_grid};
+pub use raster::{ConvexShape, height_map, render, render_convex, render_grid};
 pub use region::Region;
 pub use register::register_colour;
 pub use segment::{

@@ -6,11 +6,13 @@
 //! image has the same bits on every machine and in every order of the grains. See
 //! `docs/theory/features.md` for the equations.
 
+mod convex;
 mod orthographic;
 mod sphere;
 
 use nalgebra::Vector3;
 
+pub use convex::{ConvexShape, render_convex};
 pub use orthographic::height_map;
 
 use crate::camera::{Camera, downsampled_size, sample_offset};

@@ -1,6 +1,6 @@
 //! Class `Pour`.
 
-use granulcal_dataset::{Observed, RowStatus, Series, View};
+use granulcal_dataset::{Drawn, Observed, RowStatus, Series, View};
 use granulcal_dem::{CameraSpec, Health, ViewSpec};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -36,6 +36,14 @@ impl Pour {
     #[getter]
     fn angular_velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         array::from_vectors(py, &self.inner.angular_velocities)
+    }
+
+    /// Quaternions i, j, k, w of grains that are not round, else none of them.
+    #[getter]
+    fn orientations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let turned = self.inner.convex.as_ref().map_or(&[][..], |convex| &convex.orientations);
+        let numbers = turned.iter().flat_map(|turn| <[f64; 4]>::from(turn.coords)).collect();
+        array::matrix(py, numbers, turned.len(), 4)
     }
 
     #[getter]
@@ -125,8 +133,7 @@ impl Pour {
         name: &str,
     ) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
         let Some(view) = self.views.iter().find(|view| view.name == name) else { return Ok(None) };
-        let (positions, radii) = (&self.inner.positions, &self.inner.radii);
-        let seen = py.detach(|| granulcal_dataset::look_from(view, positions, radii));
+        let seen = py.detach(|| granulcal_dataset::look_from(view, &Drawn::of(&self.inner)));
         match seen.map_err(error::dataset)? {
             View::Depth(_, image) => {
                 array::matrix(py, image.depth, image.height, image.width).map(Some)

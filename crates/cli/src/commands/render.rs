@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use granulcal_dataset::{CameraFile, Observer, View, look, look_from, npy, png, write_height_map};
+use granulcal_dataset::{
+    CameraFile, Drawn, Observer, View, look, look_from, npy, png, write_height_map,
+};
 use granulcal_dem::{Projection, Scene, ViewSpec};
 
 use crate::args::RenderArgs;
@@ -18,10 +20,15 @@ pub fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
         Some(_) => check_ending(&args.out, "a view", "png")?,
         None => check_name(&args.out, &scene)?,
     }
-    let (positions, radii) = if let Some(path) = &args.positions {
+    let (positions, radii, convex) = if let Some(path) = &args.positions {
+        if scene.grains.shape.is_some() {
+            let problem =
+                "--positions has no orientations, so it cannot draw grains of a grains.shape";
+            return Err(BadArgument(problem.to_owned()).into());
+        }
         let positions = npy::read_points(path)?;
         let radii = vec![scene.grains.radius(); positions.len()];
-        (positions, radii)
+        (positions, radii, None)
     } else {
         let simulation = scene::start(&scene, args.seed, 1, None)?;
         match scene::pour(
@@ -33,13 +40,14 @@ pub fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
             &mut Observer::new(&scene),
             &mut SideFiles::default(),
         )? {
-            Some(pour) => (pour.positions, pour.radii),
+            Some(pour) => (pour.positions, pour.radii, pour.convex),
             None => return Ok(Outcome::Stopped),
         }
     };
+    let drawn = Drawn { positions: &positions, radii: &radii, convex: convex.as_ref() };
     let view = match further {
-        Some(further) => look_from(further, &positions, &radii)?,
-        None => look(&scene.camera, &positions, &radii, args.seed)?,
+        Some(further) => look_from(further, &drawn)?,
+        None => look(&scene.camera, &drawn, args.seed)?,
     };
     write_view(&args.out, &view, args.depth_unit)?;
     print_line(&match &view {

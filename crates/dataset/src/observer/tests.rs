@@ -1,8 +1,8 @@
 //! The observer against pours whose answers are known.
 
 use granulcal_dem::{
-    Observe, ObserveDischarge, ObserveFront, ObserveRadius, ObserveSpill, ObserveSurface, Outflow,
-    Start,
+    Observe, ObserveDischarge, ObserveFront, ObserveImages, ObserveRadius, ObserveSpill,
+    ObserveSurface, Outflow, Start,
 };
 
 use super::*;
@@ -31,6 +31,7 @@ fn scene() -> Scene {
         }),
         radius: Some(ObserveRadius { axis: [0.0; 2], percentiles: vec![50.0] }),
         spill: Some(ObserveSpill { axis: [0.0; 2], radius: 0.02 }),
+        images: None,
     });
     scene
 }
@@ -145,4 +146,48 @@ fn the_rate_is_that_of_a_steady_flow() {
     let percent: Vec<_> = times.iter().map(|t| (2.0 * (t - 10.0)).clamp(0.0, 100.0)).collect();
     assert!((discharge::rate(&times, &percent) - 2.0).abs() < 1e-12);
     assert!(discharge::rate(&times[..3], &percent[..3]).is_nan());
+}
+
+#[test]
+fn an_image_is_that_of_a_pour_that_ends_then() {
+    let mut scene = Scene::drop(0.03);
+    scene.grains.count = 40;
+    let images = ObserveImages { times: vec![0.1, 0.2, 3.5], below: None };
+    let mut observe = self::scene().observe.unwrap();
+    (observe.begin, observe.images) = (0.0, Some(images));
+    (observe.surface, observe.front, observe.discharge) = (None, None, None);
+    scene.observe = Some(observe);
+    let (pour, observer) = run(&scene);
+    assert_eq!(pour.status, Status::AtRest);
+    let observed = observer.observed(&pour);
+    let of = |pour: &Pour| crate::observe(&scene.camera, pour, 1).unwrap().statistics.unwrap();
+    for (time, ended) in [(0.1, false), (0.2, false), (3.5, true)] {
+        let mut cut = scene.clone();
+        (cut.observe, cut.end.horizon) = (None, if ended { scene.end.horizon } else { time });
+        let expected = of(&Simulation::new(&cut, 1).unwrap().run());
+        for (statistic, expected) in granulcal_features::PAPER16.iter().zip(expected) {
+            let got = value(&scene, &observed, &format!("{}[{time}]", statistic.name));
+            assert_eq!(got.to_bits(), expected.to_bits(), "{} at {time}", statistic.name);
+        }
+    }
+}
+
+#[test]
+fn grains_above_a_height_are_in_no_image() {
+    let mut scene = scene();
+    scene.grains.count = 4;
+    let at = |x: f64, z: f64| [x, 0.0, z];
+    scene.start = Start::Positions {
+        positions: vec![at(0.0, 0.002), at(0.03, 0.002), at(0.06, 0.002), at(0.0, 0.09)],
+    };
+    let of = |below: Option<f64>| {
+        let images = ObserveImages { times: vec![0.0], below };
+        let mut scene = scene.clone();
+        let observe = scene.observe.as_mut().unwrap();
+        (observe.begin, observe.images) = (0.0, Some(images));
+        let (pour, observer) = run(&scene);
+        value(&scene, &observer.observed(&pour), "max_z[0]")
+    };
+    assert!((of(Some(0.05)) - 0.004).abs() < 3e-4, "{}", of(Some(0.05)));
+    assert!((of(None) - 0.092).abs() < 3e-4, "{}", of(None));
 }

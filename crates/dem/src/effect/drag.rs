@@ -202,7 +202,7 @@ fn neighbours(bed: &Bed, pairs: &ContactSet, fall: &Vector3<f64>) -> Vec<Neighbo
 mod tests {
     use super::*;
 
-    const GRAINS: Grains = Grains { count: 1, diameter: 4e-3, density: 2500.0 };
+    const GRAINS: Grains = Grains { count: 1, diameter: 4e-3, density: 2500.0, shape: None };
 
     fn drag(fluid: Fluid) -> Drag {
         Drag::of(fluid, &GRAINS, 9.81)

@@ -37,6 +37,9 @@ pub struct Observe {
     /// Grains that are outside a circle at the end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spill: Option<ObserveSpill>,
+    /// The camera's image while the grains fall.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub images: Option<ObserveImages>,
 }
 
 /// The mean height of the free surface, seen along y from the begin of the observation to the end of the pour.
@@ -107,6 +110,17 @@ pub struct ObserveSpill {
     pub radius: f64,
 }
 
+/// The 16 statistics of the camera's image at several times, without noise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObserveImages {
+    /// When the images are taken, after `begin`, rising `[s]`: each is of the first sample at or after its time.
+    pub times: Vec<f64>,
+    /// Grains with their centre above are in no image, as those that a funnel still hides `[m]`; none are left out if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub below: Option<f64>,
+}
+
 fn half() -> f64 {
     0.5
 }
@@ -164,6 +178,11 @@ impl Observe {
             spill.axis.iter().try_for_each(|&c| finite("observe.spill.axis", c))?;
             positive("observe.spill.radius", spill.radius)?;
         }
+        if let Some(images) = &self.images {
+            let allowed = "from 0 to end.horizon less observe.begin";
+            rising("observe.images.times", &images.times, (0.0, rest), allowed)?;
+            images.below.map_or(Ok(()), |below| positive("observe.images.below", below))?;
+        }
         Ok(())
     }
 }
@@ -216,6 +235,7 @@ mod tests {
             discharge: Some(discharge),
             radius: Some(ObserveRadius { axis: [0.0; 2], percentiles: vec![10.0, 90.0] }),
             spill: Some(ObserveSpill { axis: [0.0; 2], radius: 0.05 }),
+            images: Some(ObserveImages { times: vec![0.3, 0.4], below: Some(0.1) }),
         };
         Scene { observe: Some(observe), ..Scene::drop(0.1) }
     }
@@ -242,6 +262,8 @@ mod tests {
             ("observe.discharge.jammed_below", 101.0),
             ("observe.radius.percentiles.0", -1.0),
             ("observe.spill.radius", 0.0),
+            ("observe.images.times.1", 0.2),
+            ("observe.images.below", -0.1),
         ] {
             let error = scene().with(path, value).unwrap_err().to_string();
             assert!(error.contains(path), "{path}: {error}");

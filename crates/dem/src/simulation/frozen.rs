@@ -16,6 +16,9 @@ impl Simulation {
     /// # Errors
     /// [`DemError::NotInContactProblem`] for a scene with an effect that changes what a contact is.
     pub fn contact_problem(&self) -> Result<ContactProblem, DemError> {
+        if self.bodies.is_some() {
+            return Err(DemError::NotInContactProblem { effect: "grains.shape" });
+        }
         if let Some(effect) = self.origin.scene.effects.of_contacts() {
             return Err(DemError::NotInContactProblem { effect });
         }

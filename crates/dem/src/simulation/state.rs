@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Simulation;
 use crate::bed::Bed;
+use crate::bodies::{Bodies, BodiesState};
 use crate::checkpoint::{self, CheckpointHeader};
 use crate::clumps::{ClumpState, Clumps};
 use crate::contact_set::ContactSet;
@@ -67,7 +68,14 @@ impl Simulation {
         let strange = |what| DemError::CheckpointState { what };
         let (state, rest): (State<'_>, _) =
             postcard::take_from_bytes(state).map_err(|_| strange("bytes that are no state"))?;
-        if !rest.is_empty() {
+        if let Some(bodies) = &mut self.bodies {
+            let (state, rest): (BodiesState, _) =
+                postcard::take_from_bytes(rest).map_err(|_| strange("bytes that are no bodies"))?;
+            if !rest.is_empty() {
+                return Err(strange("more bytes than a state has"));
+            }
+            bodies.take(state).map_err(strange)?;
+        } else if !rest.is_empty() {
             return Err(strange("more bytes than a state has"));
         }
         let State { substep, is_quiet, seemed_ended, ended, watch, .. } = state;
@@ -121,6 +129,11 @@ impl Simulation {
             clumps: self.clumps.as_ref().map(Clumps::state),
             watch: Cow::Borrowed(&self.watch),
         };
-        postcard::to_stdvec(&state).expect("a state in memory")
+        let mut bytes = postcard::to_stdvec(&state).expect("a state in memory");
+        // Behind the rest, so that a state of spheres has the bytes that it had before there were bodies.
+        if let Some(state) = self.bodies.as_ref().map(Bodies::state) {
+            bytes.extend(postcard::to_stdvec(&state).expect("a state in memory"));
+        }
+        bytes
     }
 }

@@ -2,11 +2,14 @@
 
 use super::{Simulation, energy};
 use crate::assemble::Seen;
+use crate::bodies::Sweeps;
 use crate::contacts::Contacts;
+use crate::lanes::Row;
 use crate::pour::Status;
 use crate::rebound::rebound;
 use crate::solver;
 use crate::solver::residual::ResidualSums;
+use crate::solver::work::Work;
 
 /// Mean energy of a grain's translation over that of a fall by its radius below which grains hardly move `[-]`.
 const QUIET: f64 = 0.0025;
@@ -14,6 +17,11 @@ const QUIET: f64 = 0.0025;
 const QUIET_SETTLED: f64 = 1e-2;
 /// Examinations between two looks at the residual, which costs about a sweep.
 const RESIDUAL_PERIOD: usize = 4;
+/// Change of an impulse of convex bodies in a sweep over that by gravity in a substep at which it has settled `[-]`.
+const SETTLED: f64 = 1e-3;
+
+/// How much deeper than a sphere a convex body may be: a corner that no manifold had before enters by the way of a substep.
+const CORNER_SLACK: f64 = 2.0;
 
 /// How much of a substep is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +42,11 @@ impl Simulation {
     /// The box of the substep.
     pub(super) fn substep(&mut self, until: Until) {
         self.around.move_walls(self.time());
+        if self.bodies.is_some() {
+            self.move_bodies();
+            self.count_substep();
+            return;
+        }
         self.follow();
         self.act_forces();
         let seen = self.assemble();
@@ -46,9 +59,39 @@ impl Simulation {
         self.solve();
         self.move_on();
         self.watch.see_penetration(seen.penetration);
+        self.count_substep();
+    }
+
+    /// Examines the state now and then.
+    fn count_substep(&mut self) {
         self.substep += 1;
         if self.substep.is_multiple_of(self.around.settings.list_period) {
             self.examine();
+        }
+    }
+
+    /// The substep of convex bodies (docs/theory/bodies.md); the bed follows their centres.
+    fn move_bodies(&mut self) {
+        let Some(bodies) = &mut self.bodies else { return };
+        let (around, watch) = (&self.around, &mut self.watch);
+        let (dt, most) = (around.settings.dt, around.settings.max_sweeps);
+        let sweeps = Sweeps { most, settled: SETTLED };
+        let step = bodies.step(&around.gravity, &around.walls, &around.material, dt, sweeps);
+        let radius = around.radius;
+        watch.see_penetration(step.deepest / radius);
+        watch.see_residual(step.residual);
+        watch.see_contacts(step.points);
+        watch.see_work(step.work_of_walls);
+        let (sweeps, unconverged) = (step.sweeps, step.unconverged);
+        watch.see_solve(&Work { sweeps, unconverged, ..Work::default() });
+        for (grain, [centre, velocity, omega]) in bodies.motions().enumerate() {
+            self.bed.places[grain] = Row::new(&centre, self.bed.radius(grain));
+            self.bed.set_motion(grain, &velocity, &omega);
+            let mut is_lost = false;
+            around.walls.reached(&centre, radius, |surface| {
+                is_lost |= around.walls.nearest(surface, &centre, 0.0).distance < 0.0;
+            });
+            watch.lost_mut()[grain] |= is_lost;
         }
     }
 
@@ -162,7 +205,8 @@ impl Simulation {
         {
             self.contacts.forget_list();
         }
-        if self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period) {
+        let looks = self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period);
+        if looks && self.bodies.is_none() {
             let Contacts { pairs, at_walls, .. } = &mut self.contacts;
             let sets = [pairs, at_walls, &mut self.on_layer];
             let residual = ResidualSums::of(&sets, &mut self.bed.bodies);
@@ -170,10 +214,14 @@ impl Simulation {
         }
         let fall = self.around.effects.gravity.norm() * self.around.radius;
         self.is_quiet = self.bed.mean_translation() <= QUIET * fall;
-        self.watch.see_contacts(self.contacts.count());
-        self.watch.see_energy(energy(&self.bed, self.clumps.as_ref(), &self.around));
+        if self.bodies.is_none() {
+            self.watch.see_contacts(self.contacts.count());
+        }
+        let grains = (self.clumps.as_ref(), self.bodies.as_ref());
+        self.watch.see_energy(energy(&self.bed, grains, &self.around));
         self.ended = self.end_reached().map(|status| {
-            let trusted = self.watch.is_healthy(self.around.settings.max_penetration);
+            let slack = if self.bodies.is_some() { CORNER_SLACK } else { 1.0 };
+            let trusted = self.watch.is_healthy(slack * self.around.settings.max_penetration);
             if trusted { status } else { Status::Unhealthy }
         });
         if self.ended.is_none() && !self.watch.is_finite() {

@@ -125,7 +125,7 @@ fn integrals(centres: &[f64]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    const GRAINS: Grains = Grains { count: 1, diameter: 4e-3, density: 1300.0 };
+    const GRAINS: Grains = Grains { count: 1, diameter: 4e-3, density: 1300.0, shape: None };
 
     #[test]
     fn an_aspect_of_one_is_the_ball() {

@@ -1,0 +1,118 @@
+//! One rigid body in motion. Its mass is 1, that of every other: impulses are velocities.
+//!
+//! ```text
+//! dx/dt = v,   dq/dt = (0, omega) q / 2,   omega = R I^-1 R^T L,   dL/dt = torque
+//! ```
+//!
+//! What is kept in flight is the angular momentum L in the axes of the scene; that omega changes although L does not is the
+//! gyroscopic term. A step turns the body about the angular velocity of its middle (second order).
+
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::grain_shape::Solid;
+
+/// Place and motion.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct RigidBody {
+    /// Centre of mass `[m]`.
+    pub centre: [f64; 3],
+    /// `[m/s]`
+    pub velocity: [f64; 3],
+    /// From the body's axes to the scene's: i, j, k, w.
+    pub turned: [f64; 4],
+    /// Angular momentum about the centre over the mass `[m^2/s]`.
+    pub momentum: [f64; 3],
+}
+
+impl RigidBody {
+    /// At rest.
+    pub fn still(centre: Vector3<f64>, turned: UnitQuaternion<f64>) -> Self {
+        Self {
+            centre: centre.into(),
+            velocity: [0.0; 3],
+            turned: turned.coords.into(),
+            momentum: [0.0; 3],
+        }
+    }
+
+    pub fn turned(&self) -> UnitQuaternion<f64> {
+        let [i, j, k, w] = self.turned;
+        UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k))
+    }
+
+    /// Kinetic energy over the mass `[m^2/s^2]`.
+    pub fn kinetic_energy(&self, solid: &Solid) -> f64 {
+        let momentum = self.turned().inverse() * Vector3::from(self.momentum);
+        0.5 * Vector3::from(self.velocity).norm_squared() + solid.turning_energy(&momentum)
+    }
+}
+
+/// A body as the contact solve sees it: velocities, and what an impulse does to them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moving {
+    pub centre: Vector3<f64>,
+    pub turned: UnitQuaternion<f64>,
+    pub velocity: Vector3<f64>,
+    /// `[rad/s]`
+    pub omega: Vector3<f64>,
+    /// Of the tensor of inertia over the mass, in the scene's axes `[1/m^2]`.
+    pub inverse_inertia: Matrix3<f64>,
+    /// By how much an impact within the substep moves the body more than its last velocity does `[m]`.
+    pub shift: Vector3<f64>,
+}
+
+impl Moving {
+    pub fn of(body: &RigidBody, solid: &Solid) -> Self {
+        let turned = body.turned();
+        let inverse_inertia = inverse_inertia(&turned, solid);
+        Self {
+            centre: body.centre.into(),
+            turned,
+            velocity: body.velocity.into(),
+            omega: inverse_inertia * Vector3::from(body.momentum),
+            inverse_inertia,
+            shift: Vector3::zeros(),
+        }
+    }
+
+    /// Velocity of its point at `arm` from the centre `[m/s]`.
+    pub fn velocity_at(&self, arm: &Vector3<f64>) -> Vector3<f64> {
+        self.velocity + self.omega.cross(arm)
+    }
+
+    /// Takes an impulse at `arm`.
+    pub fn push(&mut self, arm: &Vector3<f64>, impulse: &Vector3<f64>) {
+        self.velocity += impulse;
+        self.omega += self.inverse_inertia * arm.cross(impulse);
+    }
+
+    /// What a unit impulse at `arm` does to the velocity there: `1 - [arm] I^-1 [arm]`.
+    pub fn response(&self, arm: &Vector3<f64>) -> Matrix3<f64> {
+        let cross = arm.cross_matrix();
+        Matrix3::identity() - cross * self.inverse_inertia * cross
+    }
+
+    /// The body a substep later.
+    pub fn moved(&self, solid: &Solid, dt: f64) -> RigidBody {
+        let local = self.turned.inverse() * self.omega;
+        let momentum = self.turned * local.component_mul(&solid.inertia);
+        let half = UnitQuaternion::new(0.5 * dt * self.omega) * self.turned;
+        let omega = inverse_inertia(&half, solid) * momentum;
+        let turned = UnitQuaternion::new(dt * omega) * self.turned;
+        // Products of unit quaternions stay of unit length to rounding only.
+        let turned = UnitQuaternion::new_normalize(turned.into_inner());
+        RigidBody {
+            centre: (self.centre + dt * self.velocity + self.shift).into(),
+            velocity: self.velocity.into(),
+            turned: turned.coords.into(),
+            momentum: momentum.into(),
+        }
+    }
+}
+
+fn inverse_inertia(turned: &UnitQuaternion<f64>, solid: &Solid) -> Matrix3<f64> {
+    let rotation = turned.to_rotation_matrix();
+    let inverse = Matrix3::from_diagonal(&solid.inertia.map(|moment| 1.0 / moment));
+    rotation.matrix() * inverse * rotation.matrix().transpose()
+}

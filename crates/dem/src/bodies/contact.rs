@@ -1,0 +1,136 @@
+//! One point at which two bodies, or a body and a wall, touch.
+//!
+//! ```text
+//! u = v_i + omega_i x r_i - v_j - omega_j x r_j,    w_n = n . u
+//! W = (1 - [r_i] I_i^-1 [r_i]) + (1 - [r_j] I_j^-1 [r_j]),    u += W lambda
+//! 0 <= w_n + b  _|_  lambda_n >= 0
+//! lambda_t = proj(lambda_t - u_t / W_t,  |.| <= mu_s lambda_n)
+//! ```
+//!
+//! Unlike a ball's, the block W couples the normal to the tangent, so that the two lines are repeated until they stand.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::body::Moving;
+use crate::law::{CORRECTION, CORRECTION_SPEED, SLOP};
+
+/// Repetitions of the two lines at most.
+const ROUNDS: usize = 30;
+/// Change over the impulse at which they stand `[-]`.
+const STANDS: f64 = 1e-10;
+/// No body: a wall.
+pub(super) const WALL: usize = usize::MAX;
+
+/// A point of contact.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Point {
+    pub i: usize,
+    /// [`WALL`] for a wall.
+    pub j: usize,
+    /// The wall's surface, 0 between bodies; with the bodies it names the manifold.
+    pub surface: usize,
+    /// From j to i.
+    pub normal: Vector3<f64>,
+    pub arm_i: Vector3<f64>,
+    pub arm_j: Vector3<f64>,
+    /// Velocity of the wall there `[m/s]`.
+    pub wall_velocity: Vector3<f64>,
+    /// `[m]`
+    pub gap: f64,
+    pub friction: f64,
+    pub restitution: f64,
+    /// Where it is on body i, in its own axes `[m]`: by this it is known again.
+    pub mark: Vector3<f64>,
+    pub block: Matrix3<f64>,
+    pub bias: f64,
+    /// On body i `[m/s]`.
+    pub impulse: Vector3<f64>,
+    /// Reciprocals of the normal element and of the largest tangential eigenvalue of the block.
+    compliance: [f64; 2],
+}
+
+impl Point {
+    /// A point without its numbers for the solve.
+    pub fn new(i: usize, j: usize, surface: usize, normal: Vector3<f64>, gap: f64) -> Self {
+        Self {
+            i,
+            j,
+            surface,
+            normal,
+            arm_i: Vector3::zeros(),
+            arm_j: Vector3::zeros(),
+            wall_velocity: Vector3::zeros(),
+            gap,
+            friction: 0.0,
+            restitution: 0.0,
+            mark: Vector3::zeros(),
+            block: Matrix3::zeros(),
+            bias: 0.0,
+            impulse: Vector3::zeros(),
+            compliance: [0.0; 2],
+        }
+    }
+
+    /// Makes the block and the bias.
+    pub fn assemble(&mut self, bodies: &[Moving], dt: f64) {
+        self.block = bodies[self.i].response(&self.arm_i);
+        if self.j != WALL {
+            self.block += bodies[self.j].response(&self.arm_j);
+        }
+        let n = self.normal;
+        let other = if n.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+        let s = n.cross(&other).normalize();
+        let t = n.cross(&s);
+        let (a, b, c) =
+            (s.dot(&(self.block * s)), s.dot(&(self.block * t)), t.dot(&(self.block * t)));
+        let largest = 0.5 * (a + c) + (0.25 * (a - c) * (a - c) + b * b).sqrt();
+        self.compliance = [1.0 / n.dot(&(self.block * n)), 1.0 / largest];
+        self.bias = if self.gap >= 0.0 {
+            self.gap / dt
+        } else {
+            (CORRECTION * (self.gap + SLOP) / dt).clamp(-CORRECTION_SPEED, 0.0)
+        };
+    }
+
+    /// Velocity of i relative to j there `[m/s]`.
+    pub fn velocity(&self, bodies: &[Moving]) -> Vector3<f64> {
+        let of_i = bodies[self.i].velocity_at(&self.arm_i);
+        match self.j {
+            WALL => of_i - self.wall_velocity,
+            j => of_i - bodies[j].velocity_at(&self.arm_j),
+        }
+    }
+
+    /// Gives both bodies an impulse.
+    pub fn give(&self, bodies: &mut [Moving], impulse: &Vector3<f64>) {
+        bodies[self.i].push(&self.arm_i, impulse);
+        if self.j != WALL {
+            bodies[self.j].push(&self.arm_j, &-impulse);
+        }
+    }
+
+    /// Solves the point by itself under a bias; returns how far its impulse has changed `[m/s]`.
+    pub fn solve(&mut self, bodies: &mut [Moving], bias: f64) -> f64 {
+        let before = self.impulse;
+        let mut u = self.velocity(bodies);
+        let n = self.normal;
+        for _ in 0..ROUNDS {
+            let old = self.impulse;
+            let was = n.dot(&old);
+            let normal = (was - (n.dot(&u) + bias) * self.compliance[0]).max(0.0);
+            u += self.block * n * (normal - was);
+            let sliding = old - was * n;
+            let wanted = sliding - self.compliance[1] * (u - n.dot(&u) * n);
+            let (limit, length) = (self.friction * normal, wanted.norm());
+            let tangent = if length > limit { wanted * (limit / length) } else { wanted };
+            u += self.block * (tangent - sliding);
+            self.impulse = normal * n + tangent;
+            if (self.impulse - old).norm() <= STANDS * self.impulse.norm() {
+                break;
+            }
+        }
+        let change = self.impulse - before;
+        self.give(bodies, &change);
+        change.norm()
+    }
+}

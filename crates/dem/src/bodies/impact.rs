@@ -1,0 +1,114 @@
+//! Impacts of bodies: one manifold after the other, each at its time.
+//!
+//! The plastic impact of a manifold, all its points that meet within the substep together, gives impulses lambda with
+//! lambda . u_0 <= 0 and u_0 = u + W lambda. Restitution gives e lambda more, friction and all. With E the kinetic energy,
+//!
+//! ```text
+//! E_plastic = E + lambda . u_0 - lambda . W lambda / 2
+//! E_after   = E_plastic + e lambda . u_0 + e^2 lambda . W lambda / 2  <=  E_plastic + lambda . W lambda / 2  <=  E:
+//! ```
+//!
+//! no impact creates energy, whatever the shapes, and a single point without friction obeys Newton's law.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
+use super::body::Moving;
+use super::contact::{Point, WALL};
+use crate::law::IMPACT_SPEED;
+
+/// Sweeps over the points of a manifold at most, and the change over the impulse at which they stand.
+const SWEEPS: usize = 300;
+const STANDS: f64 = 1e-11;
+/// Impacts of a substep at most, over its manifolds: a cube between two others may be hit often.
+const ROUNDS: usize = 8;
+
+/// Resolves what meets within the substep faster than an impact must; returns the number of impacts, and what moving walls have put in
+/// over the mass `[m^2/s^2]`.
+pub(super) fn resolve(points: &mut [Point], bodies: &mut [Moving], dt: f64) -> (usize, f64) {
+    let manifolds = manifolds(points);
+    let (mut count, mut work) = (0, 0.0);
+    for _ in 0..ROUNDS {
+        let mut due: Vec<(f64, usize)> = manifolds
+            .iter()
+            .enumerate()
+            .filter_map(|(number, range)| {
+                first_touch(&points[range.clone()], bodies, dt).map(|time| (time, number))
+            })
+            .collect();
+        if due.is_empty() {
+            break;
+        }
+        due.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for (_, number) in due {
+            let group = &mut points[manifolds[number].clone()];
+            // What has been hit meanwhile may be on its way out.
+            if let Some(time) = first_touch(group, bodies, dt) {
+                work += bounce(group, bodies, time, dt);
+                count += 1;
+            }
+        }
+    }
+    (count, work)
+}
+
+/// Consecutive points of one pair, or of one body and one surface.
+fn manifolds(points: &[Point]) -> Vec<Range<usize>> {
+    let name = |p: &Point| (p.i, p.j, p.surface);
+    let mut all: Vec<Range<usize>> = Vec::new();
+    for (number, point) in points.iter().enumerate() {
+        match all.last_mut() {
+            Some(last) if name(&points[last.start]) == name(point) => last.end = number + 1,
+            _ => all.push(number..number + 1),
+        }
+    }
+    all
+}
+
+/// When the first of the points that are fast enough touches, if one does within the substep `[s]`.
+fn first_touch(group: &[Point], bodies: &[Moving], dt: f64) -> Option<f64> {
+    let of = |point: &Point| {
+        let closing = -point.normal.dot(&point.velocity(bodies));
+        let time = point.gap.max(0.0) / closing;
+        (point.restitution > 0.0 && closing > IMPACT_SPEED && time < dt).then_some(time)
+    };
+    group.iter().filter_map(of).min_by(f64::total_cmp)
+}
+
+/// Lets a manifold's bodies bounce; returns what a moving wall has put in.
+fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64 {
+    let (i, j) = (group[0].i, group[0].j);
+    let before = [Some(i), (j != WALL).then_some(j)].map(|k| k.map(|k| bodies[k].velocity));
+    let meets = |point: &Point, bodies: &[Moving]| {
+        point.gap <= -dt * point.normal.dot(&point.velocity(bodies))
+    };
+    let touching: Vec<usize> = (0..group.len()).filter(|&k| meets(&group[k], bodies)).collect();
+    group.iter_mut().for_each(|point| point.impulse = Vector3::zeros());
+    for _ in 0..SWEEPS {
+        let (mut changed, mut largest) = (0.0_f64, 0.0_f64);
+        for &k in &touching {
+            changed = changed.max(group[k].solve(bodies, 0.0));
+            largest = largest.max(group[k].impulse.norm());
+        }
+        if changed <= STANDS * largest {
+            break;
+        }
+    }
+    let mut work = 0.0;
+    for &k in &touching {
+        let again = group[k].restitution * group[k].impulse;
+        group[k].give(bodies, &again);
+        work += (group[k].impulse + again).dot(&group[k].wall_velocity);
+    }
+    // What the bodies went before the impact they went with the velocity before it.
+    for (k, before) in [i, j].into_iter().zip(before) {
+        if let Some(before) = before {
+            let after = bodies[k].velocity;
+            bodies[k].shift += time * (before - after);
+        }
+    }
+    // What was given in an impact is no impulse of a lasting contact.
+    group.iter_mut().for_each(|point| point.impulse = Vector3::zeros());
+    work
+}
