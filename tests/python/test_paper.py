@@ -22,6 +22,7 @@ from granulcal.experiments.paper.common.outcome import Outcome
 from granulcal.experiments.paper.common.page import write_page
 from granulcal.experiments.paper.common.sizes import FULL, QUICK, TINY
 from granulcal.experiments.paper.common.workshop import Workshop
+from granulcal.experiments.paper.heights import SHIPPED as RECORDINGS
 from granulcal.experiments.paper.observation_error import _peaks
 from granulcal.experiments.paper.propagation import _least
 
@@ -74,12 +75,12 @@ def test_experiments_run_and_say_what_they_did(ran):
 
 
 @pytest.mark.slow
-def test_every_experiment_runs_to_the_page(tmp_path):
-    page = reproduce_paper(tmp_path, size=TINY, report=True, quiet=True)
-    assert page is not None
-    for each in experiments():
-        _check(tmp_path / "paper-tiny", each.name)
-    assert "Not run" not in page.read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", [each.name for each in experiments()])
+def test_every_experiment_runs(name, tmp_path):
+    if name == "heights" and not (RECORDINGS / "barley.npz").exists():
+        pytest.skip("the recordings of benches/paper/recordings.py are not here")
+    reproduce_paper(tmp_path, name, size=TINY, quiet=True)
+    _check(tmp_path / "paper-tiny", name)
 
 
 def test_a_second_run_makes_nothing_again(ran):

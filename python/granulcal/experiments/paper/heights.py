@@ -2,8 +2,7 @@
 
 The recordings are pours of another engine, LAMMPS, in place of the camera: grains like couscous
 (spheres of several sizes) and like barley (rigid pairs of spheres), whose model here is equal round
-grains. `benches/paper/recordings.py` makes them; a few of 200 grains come with the package for the
-small version. Each is seen by the scene's camera with the noise of the measured D435, ten frames
+grains. `benches/paper/recordings.py` makes them, also those of 200 grains for the small version. Each is seen by the scene's camera with the noise of the measured D435, ten frames
 averaged, as the paper averages its own.
 
 Two calibrations: the paper's recipe (one estimate a recording, the five of the least error
@@ -32,7 +31,7 @@ from granulcal.statistics import statistics
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
 
-__all__ = ["EXPERIMENT", "Recordings"]
+__all__ = ["EXPERIMENT", "SHIPPED", "Recordings"]
 
 Array = NDArray[np.float64]
 
@@ -42,7 +41,8 @@ _PAPER = {
 }
 _CALIBRATED_AT = 0.12
 _HEIGHTS = (0.02, 0.04, 0.06, 0.08, 0.10)
-_SHIPPED = Path(__file__).parent / "recordings"
+SHIPPED = Path(__file__).parent / "recordings"
+"""Recordings of the small version."""
 _MAKER = "python benches/paper/recordings.py"
 _FRAMES = 10
 _KEPT = 5
@@ -76,7 +76,7 @@ class Recordings:
         Raises:
             FileNotFoundError: they have not been made; the message says how.
         """
-        path = (folder / "recordings" if size.is_full else _SHIPPED) / f"{name}.npz"
+        path = (folder / "recordings" if size.is_full else SHIPPED) / f"{name}.npz"
         if not path.exists():
             raise FileNotFoundError(
                 f"no recordings {path}: make them with `{_MAKER} {path.parent}` in an environment "
