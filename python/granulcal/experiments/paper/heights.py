@@ -2,8 +2,9 @@
 
 The recordings are pours of another engine, LAMMPS, in place of the camera: grains like couscous
 (spheres of several sizes) and like barley (rigid pairs of spheres), whose model here is equal round
-grains. `benches/paper/recordings.py` makes them, also those of 200 grains for the small version. Each is seen by the scene's camera with the noise of the measured D435, ten frames
-averaged, as the paper averages its own.
+grains. `benches/paper/recordings.py` makes them, also those of 200 grains for the small version.
+Each is seen by the scene's camera with the noise of the measured D435, ten frames averaged, as the
+paper averages its own.
 
 Two calibrations: the paper's recipe (one estimate a recording, the five of the least error
 averaged), and the posterior of all recordings together.
