@@ -123,7 +123,7 @@ fn a_bridge_does_not_pull_before_grains_have_touched() {
 /// their gap and their speeds along x.
 fn in_a_film(gap: f64, speeds: [f64; 2], seconds: f64) -> (f64, [f64; 2]) {
     let mut scene = one_grain(0.1, material(0.5, 0.1, 0.5));
-    scene.grains = Grains { count: 2, diameter: 2.0 * RADIUS, density: 2500.0 };
+    scene.grains = Grains { count: 2, diameter: 2.0 * RADIUS, density: 2500.0, shape: None };
     scene.start =
         Start::Positions { positions: vec![[0.0, 0.0, 0.1], [2.0 * RADIUS + gap, 0.0, 0.1]] };
     scene.effects.lubrication = Lubrication { viscosity: 0.05, ..Lubrication::default() };

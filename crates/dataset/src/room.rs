@@ -132,7 +132,7 @@ mod tests {
         Room::of_pour(&scene, Some(60.0)).require(Some(&folder)).unwrap();
         Room::of_batch(&scene, 1000, 4, 16).require(Some(&folder)).unwrap();
         let many = Scene {
-            grains: granulcal_dem::Grains { count: 100_000_000_000, ..scene.grains },
+            grains: granulcal_dem::Grains { count: 100_000_000_000, ..scene.grains.clone() },
             ..scene.clone()
         };
         let error = Room::of_pour(&many, None).require(None).unwrap_err();
