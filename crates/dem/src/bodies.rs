@@ -151,9 +151,13 @@ impl Bodies {
     ) -> Step {
         let solid = Arc::clone(&self.solid);
         let mut moving: Vec<_> = self.all.iter().map(|body| Moving::of(body, &solid)).collect();
-        moving.iter_mut().for_each(|body| body.velocity += dt * gravity);
+        for body in &mut moving {
+            body.velocity += dt * gravity;
+        }
         let mut points = collide::points(&solid, &moving, walls, material, dt);
-        points.iter_mut().for_each(|point| point.assemble(&moving, dt));
+        for point in &mut points {
+            point.assemble(&moving, dt);
+        }
         let mut step = Step { points: points.len(), ..Step::default() };
         step.deepest = points.iter().map(|point| -point.gap).fold(0.0, f64::max);
         (step.impacts, step.work_of_walls) = impact::resolve(&mut points, &mut moving, dt);

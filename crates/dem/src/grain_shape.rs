@@ -108,7 +108,7 @@ fn check_points(points: &[[f64; 3]]) -> Result<(), DemError> {
     }
     let extent = extents(points);
     let most = extent.max();
-    if !(most > 0.0) {
+    if most.is_nan() || most <= 0.0 {
         return Err(DemError::BadShape { what: "all its points are one" });
     }
     // A thin body that is turned against the axes is thin all the same: its inertia tells.
@@ -121,7 +121,7 @@ fn check_points(points: &[[f64; 3]]) -> Result<(), DemError> {
         .sum::<nalgebra::Matrix3<f64>>();
     let eigen = spread.symmetric_eigenvalues();
     let ratio = (eigen.max() / eigen.min().max(0.0)).sqrt();
-    if !(ratio <= 2.0 * MOST_ASPECT) {
+    if ratio.is_nan() || ratio > 2.0 * MOST_ASPECT {
         let what = if ratio.is_finite() && ratio < 1e6 {
             "more than 20 times as long as thick"
         } else {

@@ -21,6 +21,7 @@ struct Exam {
 }
 
 impl Exam {
+    #[allow(clippy::needless_pass_by_value)] // shapes are written where they are asked about
     fn new(shape: GrainShape, sliding_friction: f64, restitution: f64) -> Self {
         let solid = Solid::new(&shape, SIZE).unwrap();
         let material = Material { sliding_friction, restitution, ..Material::default() };

@@ -84,7 +84,9 @@ fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64
         point.gap <= -dt * point.normal.dot(&point.velocity(bodies))
     };
     let touching: Vec<usize> = (0..group.len()).filter(|&k| meets(&group[k], bodies)).collect();
-    group.iter_mut().for_each(|point| point.impulse = Vector3::zeros());
+    for point in group.iter_mut() {
+        point.impulse = Vector3::zeros();
+    }
     for _ in 0..SWEEPS {
         let (mut changed, mut largest) = (0.0_f64, 0.0_f64);
         for &k in &touching {
@@ -109,6 +111,8 @@ fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64
         }
     }
     // What was given in an impact is no impulse of a lasting contact.
-    group.iter_mut().for_each(|point| point.impulse = Vector3::zeros());
+    for point in group.iter_mut() {
+        point.impulse = Vector3::zeros();
+    }
     work
 }

@@ -112,12 +112,12 @@ impl Solid {
     fn hull(points: &[Vector3<f64>]) -> Result<Self, DemError> {
         let flat = |_| DemError::BadShape { what: "no volume: its points lie in a plane" };
         // In units of the largest coordinate: parry's tolerances are absolute.
-        let unit = points.iter().map(|p| p.amax()).fold(f64::MIN_POSITIVE, f64::max);
+        let unit = points.iter().map(Vector3::amax).fold(f64::MIN_POSITIVE, f64::max);
         let scaled: Vec<_> = points.iter().map(|p| parry(&(p / unit))).collect();
         let (corners, triangles) = try_convex_hull(&scaled).map_err(flat)?;
         let corners: Vec<_> = corners.iter().map(|c| unit * Vector3::new(c.x, c.y, c.z)).collect();
         let (volume, centre, second) = moments(&corners, &triangles);
-        if !(volume > 1e-6 * unit.powi(3)) {
+        if volume.is_nan() || volume <= 1e-6 * unit.powi(3) {
             return Err(DemError::BadShape { what: "no volume: its points lie in a plane" });
         }
         let covariance = second / volume - centre * centre.transpose();
@@ -211,6 +211,7 @@ pub(crate) fn parry(v: &Vector3<f64>) -> ParryVector {
 mod tests {
     use super::*;
 
+    #[allow(clippy::needless_pass_by_value)] // shapes are written where they are asked about
     fn of(shape: GrainShape) -> Arc<Solid> {
         Solid::new(&shape, 4e-3).unwrap()
     }
