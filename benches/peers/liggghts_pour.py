@@ -1,11 +1,13 @@
 """Pours rows of rows.py in LIGGGHTS and appends the piles to liggghts.csv; what is there is kept.
 
     python benches/peers/liggghts_pour.py --rows P B --seeds 4
+    python benches/peers/liggghts_pour.py --rows P B --seeds 4 --rolling epsd2
 
 LIGGGHTS' contact is Hertz and Mindlin with a dashpot each: the normal one realises e whatever the
 speed, the tangential one cannot be chosen. Rolling is `epsd`: a spring of stiffness
-2.25 k_n mu_r^2 R_eff^2 up to mu_r R_eff F_n, damped by 0.7 of the critical; no torsion. The funnel
-is a mesh of 64 sides, for LIGGGHTS has no cone.
+2.25 k_n mu_r^2 R_eff^2 up to mu_r R_eff F_n, damped by 0.7 of the critical, or `epsd2`, whose
+spring has the tangential stiffness and no dashpot; no torsion. The funnel is a mesh of 64 sides, for LIGGGHTS has no
+cone.
 """
 
 import argparse
@@ -21,7 +23,8 @@ from pile_file import append, done, is_at_rest, start
 from rows import rows
 
 RESULTS = Path(__file__).parent / "liggghts.csv"
-SETTINGS = "epsd"
+ROLLING = ("epsd", "epsd2")
+"""LIGGGHTS' rolling friction with and without a dashpot beside the moment limit."""
 
 LOOK = 0.02
 """Time between two looks at rest and overlap [s]."""
@@ -44,7 +47,7 @@ def funnel() -> str:
     return "\n".join([*lines, "endsolid funnel", ""])
 
 
-def script(law: Law, elastic: Elastic, seed: int) -> str:
+def script(law: Law, elastic: Elastic, seed: int, rolling_model: str) -> str:
     """Returns the input: type 1 are grains, type 2 is every wall."""
     pairs = "peratomtypepair 2"
     e = max(law.restitution, 0.05)
@@ -53,7 +56,7 @@ def script(law: Law, elastic: Elastic, seed: int) -> str:
         "create_atoms 1 single {:.9g} {:.9g} {:.9g} units box".format(*x) for x in start(seed)
     )
     look = round(LOOK / elastic.dt)
-    law_words = "model hertz tangential history rolling_friction epsd"
+    law_words = f"model hertz tangential history rolling_friction {rolling_model}"
     return f"""
 atom_style granular
 atom_modify map array
@@ -111,7 +114,7 @@ def worst_overlap(looks: list[np.ndarray]) -> float:
     return 1.0 - nearest / (2 * RADIUS)
 
 
-def pour(law: Law, elastic: Elastic, seed: int) -> dict[str, float]:
+def pour(law: Law, elastic: Elastic, seed: int, rolling_model: str) -> dict[str, float]:
     """Returns what a pour ends with: lengths in mm over centres (max z: the top), times in s.
 
     The processor time is the share of the whole run up to the time of rest.
@@ -119,7 +122,7 @@ def pour(law: Law, elastic: Elastic, seed: int) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         (place / "funnel.stl").write_text(funnel())
-        (place / "in.pour").write_text(script(law, elastic, seed))
+        (place / "in.pour").write_text(script(law, elastic, seed, rolling_model))
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(
             ["liggghts", "-in", "in.pour"],
@@ -151,14 +154,15 @@ def main() -> None:
     parser.add_argument("--rows", nargs="+", choices=laws, default=["P", "B"])
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--young", type=float, default=1e7, help="Young's modulus [Pa]")
+    parser.add_argument("--rolling", choices=ROLLING, default="epsd")
     options = parser.parse_args()
     elastic = Elastic(young=options.young)
     for seed in range(1, options.seeds + 1):
         for name in options.rows:
-            key = (name, SETTINGS, f"{options.young:g}", str(seed))
+            key = (name, options.rolling, f"{options.young:g}", str(seed))
             if key in done(RESULTS):
                 continue
-            result = pour(laws[name], elastic, seed)
+            result = pour(laws[name], elastic, seed, options.rolling)
             append(RESULTS, key, result)
 
 
