@@ -179,3 +179,25 @@ fn the_contact_problem_knows_the_walls_motion() {
         assert!(velocity[0] > 0.05 && velocity[0] < 0.3 && problem.residual() < 1e-12);
     }
 }
+
+#[test]
+fn a_grain_that_walls_crush_costs_no_more_than_others() {
+    // A press comes down on a grain on the ground: no impact can let go of it, and that is said once in a substep.
+    let mut scene = one_grain(RADIUS, material(0.5, 0.3, 0.5));
+    let shape = Shape::Plane { point: [0.0, 0.0, 2.0 * RADIUS + 1e-4], normal: [0.0, 0.0, -1.0] };
+    let press =
+        Wall { motion: lift([0.0, 0.0, -0.5]), ..Wall::fixed(shape, WallMaterial::default()) };
+    scene.walls.push(press);
+    for preset in [Preset::Fast, Preset::Default, Preset::Accurate] {
+        scene.preset = preset;
+        let mut simulation = start(&scene);
+        let settings = *simulation.settings();
+        simulation.advance(2e-3);
+        let work = simulation.impact_work();
+        let substeps = simulation.health().substeps as f64;
+        assert!(work.impacts > 0, "{preset}: {work:?}");
+        assert!(work.impacts as f64 <= substeps, "{preset}: {work:?} {substeps}");
+        let most = 400.0 / settings.impact.micro_step * work.impacts as f64;
+        assert!(work.micro_steps as f64 <= most, "{preset}: {work:?}");
+    }
+}

@@ -159,7 +159,8 @@ impl Impacts {
                 if self.counts[grain] == 0 {
                     self.hit.push(number);
                 }
-                self.counts[grain] += 1;
+                // What walls crush is not let go by more of the same in this substep.
+                self.counts[grain] += if outcome.is_cut { MAX_IMPACTS } else { 1 };
                 contacts.follow_after_impact(grain, time, bed, around);
             }
             for &grain in &hit {

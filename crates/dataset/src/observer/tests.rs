@@ -176,9 +176,8 @@ fn an_image_is_that_of_a_pour_that_ends_then() {
 fn grains_above_a_height_are_in_no_image() {
     let mut scene = scene();
     // Two carpets, one on the ground and one in the air, their grains not in step with the pixels.
-    let carpet = |z: f64| {
-        (0..100).map(move |i| [0.0053 * f64::from(i % 10), 0.0053 * f64::from(i / 10), z])
-    };
+    let carpet =
+        |z: f64| (0..100).map(move |i| [0.0053 * f64::from(i % 10), 0.0053 * f64::from(i / 10), z]);
     let positions: Vec<_> = carpet(0.002).chain(carpet(0.09)).collect();
     scene.grains.count = positions.len();
     scene.start = Start::Positions { positions };

@@ -17,8 +17,9 @@ use crate::law::{IMPACT_SPEED, INVERSE_INERTIA};
 use crate::preset::ImpactSettings;
 use crate::surroundings::Surroundings;
 
-/// Micro-steps of an impact, at most; what still closes then is for the contact solve.
-const MAX_MICRO_STEPS: usize = 4000;
+/// How long an impact lasts at most, in 1/omega: walls that close on a grain never let go. What still closes then is for
+/// the contact solve `[-]`.
+const LONGEST: f64 = 400.0;
 /// Time between two turns of friction, in 1/omega: it has the direction of sliding to follow, not the spring `[-]`.
 const FRICTION_PERIOD: f64 = 1.0;
 /// Springs of restitutions that depend on speed are made for each contact; from so many on the old ones go.
@@ -31,6 +32,8 @@ pub(super) struct Outcome {
     pub links: usize,
     /// 0 for a pair that touched nothing.
     pub micro_steps: usize,
+    /// Whether contacts still pressed when the impact had lasted its longest.
+    pub is_cut: bool,
     /// Work of moving walls per typical mass `[m^2/s^2]`.
     pub work_of_walls: f64,
     /// Energy of the grains that were hit, after over before and the walls' work `[-]`.
@@ -72,16 +75,18 @@ impl Cluster {
         let scenery = Scenery { time, bed, contacts, around, fallen };
         self.clear();
         let closing = self.strike(pair, &scenery)?;
-        let micro_steps = if self.links.len() == 1 && self.links[0].rolling_damping == 0.0 {
+        let (micro_steps, is_cut) = if self.links.len() == 1 && self.links[0].rolling_damping == 0.0
+        {
             self.collide_alone(closing);
-            0
+            (0, false)
         } else {
             self.ring(around.settings.impact, &scenery)
         };
         self.give_sliding_back();
         let work_of_walls = if around.has_moving_walls { self.work_of_walls(&fallen) } else { 0.0 };
         let energy_ratio = self.write_back(time, bed, &fallen, work_of_walls);
-        Some(Outcome { links: self.links.len(), micro_steps, work_of_walls, energy_ratio })
+        let links = self.links.len();
+        Some(Outcome { links, micro_steps, is_cut, work_of_walls, energy_ratio })
     }
 
     fn clear(&mut self) {
@@ -205,12 +210,14 @@ impl Cluster {
         self.members.set_hit(j);
     }
 
-    /// Micro-steps, forward and backward through the links in turn, until nothing presses any more; returns their number.
-    fn ring(&mut self, settings: ImpactSettings, scenery: &Scenery) -> usize {
+    /// Micro-steps, forward and backward through the links in turn, until nothing presses any more; returns their number, and
+    /// whether they were cut short.
+    fn ring(&mut self, settings: ImpactSettings, scenery: &Scenery) -> (usize, bool) {
         let enough = settings.stopping_speed;
         let mut rubbed = 0;
         let period = (FRICTION_PERIOD / settings.micro_step).round().max(1.0) as usize;
-        for micro_step in 0..MAX_MICRO_STEPS {
+        let most = (LONGEST / settings.micro_step) as usize;
+        for micro_step in 0..most {
             let begin = self.links.len();
             let (mut strongest, mut turn) = (0.0_f64, 0);
             // Links that are found on the way come last either way.
@@ -236,11 +243,11 @@ impl Cluster {
                 rubbed = micro_step + 1;
             }
             if is_over {
-                return micro_step + 1;
+                return (micro_step + 1, false);
             }
         }
-        self.rub(settings.micro_step);
-        MAX_MICRO_STEPS
+        self.rub(settings.micro_step * (most - rubbed) as f64);
+        (most, true)
     }
 
     /// The normal motion of a link by itself through a micro-step; returns its impulse.
