@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from granulcal.bayessim import BayesSim
-from granulcal.bayessim.pairs import TrainingPairs
-from granulcal.dataset import Dataset
+from granulcal.bayessim.training.pairs import TrainingPairs
+from granulcal.pours.dataset import Dataset
 
 
 def main() -> None:

@@ -2,7 +2,7 @@
 
     python benches/emulator_parts.py --few 150 --many 1000
 
-On `granulcal.toys.PileStandIn` with its noise doubled. Mean log density of 300 other truths under
+On `PileStandIn` with its noise doubled. Mean log density of 300 other truths under
 their posteriors [nat, coordinates].
 """
 
@@ -13,13 +13,13 @@ from unittest.mock import patch
 import numpy as np
 
 from granulcal.bayessim import likelihood
-from granulcal.bayessim.basis import learn_length_scales
-from granulcal.bayessim.emulator import Prediction
-from granulcal.bayessim.likelihood import WIDENINGS, Likelihood
-from granulcal.bayessim.signal import SignalAxes
-from granulcal.bayessim.standardise import Standardiser
+from granulcal.bayessim.check.toys import PileStandIn
+from granulcal.bayessim.emulator.basis import learn_length_scales
+from granulcal.bayessim.emulator.emulator import Prediction
+from granulcal.bayessim.emulator.likelihood import WIDENINGS, Likelihood
+from granulcal.bayessim.emulator.signal import SignalAxes
+from granulcal.bayessim.network.standardise import Standardiser
 from granulcal.one_thread import one_thread
-from granulcal.toys import PileStandIn
 
 TESTS = 300
 

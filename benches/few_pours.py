@@ -3,7 +3,7 @@
     python benches/few_pours.py --recordings 10
     python benches/few_pours.py --recordings 16 --noise 2 --no-filter
 
-On `granulcal.toys.PileStandIn`, whose posterior is known exactly; with its noise doubled one pour
+On `PileStandIn`, whose posterior is known exactly; with its noise doubled one pour
 tells about as little as one of the funnel. The filter is the scheme of Cheng et al., written anew
 from the paper: rounds of 16 simulations, weights by a normal likelihood whose covariance is a
 multiple of the statistics' variances (there: of their squares, which here may be zero), the
@@ -19,13 +19,13 @@ import argparse
 
 import numpy as np
 
-from granulcal.bayessim.likelihood import Likelihood, joint_density
-from granulcal.bayessim.mixture import Mixture
-from granulcal.bayessim.sequential import infer_within_budget
-from granulcal.bayessim.standardise import Standardiser
+from granulcal.bayessim.check.toys import PileStandIn
+from granulcal.bayessim.emulator.likelihood import Likelihood, joint_density
+from granulcal.bayessim.network.mixture import Mixture
+from granulcal.bayessim.network.standardise import Standardiser
+from granulcal.bayessim.posterior.posterior import Posterior
+from granulcal.bayessim.training.sequential import infer_within_budget
 from granulcal.one_thread import one_thread
-from granulcal.posterior import Posterior
-from granulcal.toys import PileStandIn
 
 ROUNDS, SIZE, EFFECTIVE = 5, 16, 0.2
 

@@ -2,26 +2,26 @@
 
     python benches/loop_correction.py --seed 101 --sets 96 --pours 3
 
-The stand-in of `granulcal/loop/toy.py`: sets with something that the library does not have, or one
+The stand-in of `benches/loop_pile.py`: sets with something that the library does not have, or one
 strong effect that it has; a few pours at each of three heights, the misfit at three others, one of
-them outside. Beside the correction of `loop/fallback.py` stand its form that leaves the parameters
-what they could have done (Plumlee 2017), the straight line through the residuals, and the straight
-line through the data.
+them outside. Beside the correction of `loop/check/discrepancy.py` stand its form that leaves the
+parameters what they could have done (Plumlee 2017), the straight line through the residuals, and
+the straight line through the data.
 """
 
 import argparse
 
 import numpy as np
+from loop_pile import HIDDEN, PileLoopToy
 from numpy.typing import NDArray
 
 from granulcal.loop import Discrepancy, Observation, Surrogate
-from granulcal.loop.baseline import Fit, fit_base
-from granulcal.loop.design import cube_from_normal
-from granulcal.loop.local import Local
-from granulcal.loop.observation import Stack
-from granulcal.loop.score import DISCREPANCY_LENGTH
-from granulcal.loop.toy import HIDDEN, PileLoopToy
-from granulcal.loop.trivial import line_weights
+from granulcal.loop.check.trivial import line_weights
+from granulcal.loop.effects.design import cube_from_normal
+from granulcal.loop.surrogate.baseline import Fit, fit_base
+from granulcal.loop.surrogate.linearised import Local
+from granulcal.loop.surrogate.observation import Stack
+from granulcal.loop.test.score import DISCREPANCY_LENGTH
 
 Array = NDArray[np.float64]
 

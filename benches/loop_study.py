@@ -26,15 +26,15 @@ from numpy.typing import NDArray
 
 import granulcal as gc
 from granulcal.loop import Discrepancy, Observation, Surrogate, Thresholds, Trace, compare, trace
-from granulcal.loop.archive import Archive, Plan
-from granulcal.loop.baseline import fit_base
-from granulcal.loop.cube import from_cube
-from granulcal.loop.forward import Forward
-from granulcal.loop.library import FUNNEL, LibraryEffect
-from granulcal.loop.observation import Stack
-from granulcal.loop.pairs import calibrate
-from granulcal.loop.refit import fit_single
-from granulcal.statistics import NAMES
+from granulcal.loop.check.coverage import calibrate
+from granulcal.loop.effects.library import FUNNEL, LibraryEffect
+from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.cube import from_cube
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.surrogate.baseline import fit_base
+from granulcal.loop.surrogate.observation import Stack
+from granulcal.loop.test.refit import fit_single
+from granulcal.pours.statistics import NAMES
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from granulcal.loop.pairs import needed_stretch
-from granulcal.loop.refit import interval
+from granulcal.loop.check.coverage import needed_stretch
+from granulcal.loop.test.refit import interval
 
 __all__ = ["table"]
 

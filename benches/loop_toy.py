@@ -17,15 +17,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from loop_pile import HIDDEN, LIBRARY, PileLoopToy
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from granulcal.loop import Observation, Surrogate, Thresholds, compare, trace
-from granulcal.loop.baseline import fit_base
-from granulcal.loop.fallback import Discrepancy
-from granulcal.loop.observation import Stack
-from granulcal.loop.refit import fit_single
-from granulcal.loop.toy import HIDDEN, LIBRARY, PileLoopToy
+from granulcal.loop.check.discrepancy import Discrepancy
+from granulcal.loop.surrogate.baseline import fit_base
+from granulcal.loop.surrogate.observation import Stack
+from granulcal.loop.test.refit import fit_single
 
 Array = NDArray[np.float64]
 

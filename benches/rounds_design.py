@@ -3,7 +3,7 @@
     python benches/rounds_design.py --recordings 16 --designs even
     python benches/rounds_design.py --recordings 16 --designs even sharp
 
-On `granulcal.toys.PileStandIn` with its noise doubled, whose posterior is known exactly; recordings
+On `PileStandIn` with its noise doubled, whose posterior is known exactly; recordings
 are the same for all rows, so that differences are surer than levels. The form of each emulator is
 looked for more coarsely than by `infer_within_budget`, at a third of the time.
 """
@@ -13,12 +13,12 @@ import argparse
 import numpy as np
 
 from granulcal.bayessim import likelihood, round_fit
-from granulcal.bayessim.likelihood import Likelihood
-from granulcal.bayessim.round_fit import RoundFit, first_design
-from granulcal.bayessim.standardise import Standardiser
+from granulcal.bayessim.check.toys import PileStandIn
+from granulcal.bayessim.emulator.likelihood import Likelihood
+from granulcal.bayessim.network.standardise import Standardiser
+from granulcal.bayessim.posterior.posterior import Posterior
+from granulcal.bayessim.training.round_fit import RoundFit, first_design
 from granulcal.one_thread import one_thread
-from granulcal.posterior import Posterior
-from granulcal.toys import PileStandIn
 
 BUDGET = 150
 # Share of the budget that the first round takes from the prior, powers of the likelihood in the

@@ -16,12 +16,12 @@ import numpy as np
 from rounds_on_pours import judged, show
 
 from granulcal.bayessim import BayesSim
-from granulcal.bayessim.likelihood import Likelihood
-from granulcal.bayessim.sequential import rounds_of
-from granulcal.bayessim.standardise import Standardiser
-from granulcal.dataset import Dataset
+from granulcal.bayessim.emulator.likelihood import Likelihood
+from granulcal.bayessim.network.standardise import Standardiser
+from granulcal.bayessim.posterior.posterior import Posterior
+from granulcal.bayessim.training.sequential import rounds_of
 from granulcal.one_thread import one_thread
-from granulcal.posterior import Posterior
+from granulcal.pours.dataset import Dataset
 from granulcal.prior import Prior
 
 Array = np.ndarray

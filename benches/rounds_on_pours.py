@@ -17,10 +17,10 @@ import numpy as np
 from ten_pours import RANGES, draw
 
 import granulcal as gc
-from granulcal.bayessim.sequential import infer_within_budget
+from granulcal.bayessim.posterior.posterior import Posterior
+from granulcal.bayessim.training.sequential import infer_within_budget
 from granulcal.files import write_beside
 from granulcal.one_thread import one_thread
-from granulcal.posterior import Posterior
 from granulcal.within_budget import KeptPours
 
 RECORDINGS = 4

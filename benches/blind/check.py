@@ -18,7 +18,7 @@ from engine import Pile, Setup, start
 from scene import Bench
 
 import granulcal as gc
-from granulcal.statistics import NAMES
+from granulcal.pours.statistics import NAMES
 
 FALL = 0.2
 """Time of the falls [s]."""

@@ -10,11 +10,11 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from granulcal.loop.archive import Archive
 from granulcal.loop.close import close_loop, fit_surrogate, planned
-from granulcal.loop.report import write_report
+from granulcal.loop.effects.tolerance import Tolerances
+from granulcal.loop.pours.archive import Archive
+from granulcal.loop.report.folder import write_report
 from granulcal.loop.task import Task
-from granulcal.loop.tolerance import Tolerances
 
 TOLERANCES = Path(__file__).with_name("tolerances.json")
 BUDGET, SEED = 3629, 1

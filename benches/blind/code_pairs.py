@@ -19,7 +19,7 @@ from make import CONDITIONS, TRIES
 from scene import PARAMETERS, PRIOR, Bench
 
 import granulcal as gc
-from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES
+from granulcal.pours.statistics import DIAGNOSTIC_NAMES, NAMES
 
 HERE = Path(__file__).parent
 NUMBERS, TABLE = HERE / "code_difference.json", HERE / "code_difference.csv"

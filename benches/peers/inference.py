@@ -26,7 +26,7 @@ import numpy as np
 import torch
 
 from granulcal.bayessim import BayesSim
-from granulcal.bayessim.average import EMULATOR_ALONE
+from granulcal.bayessim.posterior.average import EMULATOR_ALONE
 from granulcal.parameter import Parameter
 from granulcal.prior import Prior
 
@@ -186,8 +186,8 @@ def run_sbibm(options: argparse.Namespace, add: Callable[..., None], done: set[t
 
 def run_pours(options: argparse.Namespace, add: Callable[..., None], done: set[tuple]) -> None:
     """Log density at the truth, error of the posterior mean and coverage on held-out pours."""
-    from granulcal.bayessim.pairs import TrainingPairs
-    from granulcal.dataset import Dataset
+    from granulcal.bayessim.training.pairs import TrainingPairs
+    from granulcal.pours.dataset import Dataset
 
     pairs = TrainingPairs.gather(Dataset.load(options.data))
     prior, count = pairs.prior, len(pairs.theta)

@@ -12,30 +12,30 @@ Torch is loaded when a model is first trained or loaded, matplotlib when somethi
 from typing import TYPE_CHECKING, Any
 
 from granulcal._native import __version__
-from granulcal.camera import Camera
-from granulcal.dataset import Dataset, generate
 from granulcal.design.plan import Plan
 from granulcal.design.ring import Ring
 from granulcal.design.ring_model import RingModel
 from granulcal.design.rings import design_rings
 from granulcal.design.spill import design_spill
-from granulcal.prior import Parameter, Prior
-from granulcal.recording import Formation, Levelled, Plane, Recording
-from granulcal.scene import Material, Scene
-from granulcal.simulate import Pour, simulate
-from granulcal.statistics import (
+from granulcal.measured.recording import Formation, Levelled, Plane, Recording
+from granulcal.pours.camera import Camera
+from granulcal.pours.dataset import Dataset, generate
+from granulcal.pours.scene import Material, Scene
+from granulcal.pours.simulate import Pour, simulate
+from granulcal.pours.statistics import (
     DiagnosticStatistics,
     ObservedStatistics,
     Statistics,
     diagnostic_statistics,
     statistics,
 )
+from granulcal.prior import Parameter, Prior
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
+    from granulcal.bayessim.posterior.posterior import Posterior
     from granulcal.loop.close import close_loop
     from granulcal.loop.task import Task
-    from granulcal.posterior import Posterior
 
 __all__ = [
     "BayesSim",
@@ -70,7 +70,7 @@ __all__ = [
 
 _LAZY = {
     "BayesSim": "granulcal.bayessim",
-    "Posterior": "granulcal.posterior",
+    "Posterior": "granulcal.bayessim.posterior.posterior",
     "Task": "granulcal.loop.task",
     "close_loop": "granulcal.loop.close",
 }

@@ -7,7 +7,7 @@ from typing import Unpack, final
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.segmentation import SegmentationSettings
+from granulcal.measured.segmentation import SegmentationSettings
 
 __version__: str
 

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from granulcal.dataset import Dataset
-from granulcal.forward import pours_at, scene_at
-from granulcal.recording import Recording
+from granulcal.measured.recording import Recording
+from granulcal.pours.dataset import Dataset
+from granulcal.pours.forward import pours_at, scene_at
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import Pour
+from granulcal.pours.statistics import NAMES
 from granulcal.report import write_report
-from granulcal.scene import Scene
-from granulcal.simulate import Pour
-from granulcal.statistics import NAMES
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
-    from granulcal.posterior import Posterior
+    from granulcal.bayessim.posterior.posterior import Posterior
 
 __all__ = ["Calibrated", "calibrate", "require_own_statistics", "require_same_scene"]
 

@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from granulcal.calibrate import Calibrated, calibrate
-from granulcal.camera import Camera
-from granulcal.dataset import generate
+from granulcal.measured.recording import Recording
+from granulcal.pours.camera import Camera
+from granulcal.pours.dataset import generate
+from granulcal.pours.scene import Material, Scene
+from granulcal.pours.simulate import simulate
 from granulcal.prior import Prior
-from granulcal.recording import Recording
-from granulcal.scene import Material, Scene
-from granulcal.simulate import simulate
 
 __all__ = ["HIDDEN", "demo_scene", "main", "record", "run"]
 

@@ -16,17 +16,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
-from granulcal.compare import Scale, comparison_table, nearest_row, standardised_distance
-from granulcal.dataset import Dataset
 from granulcal.files import write_beside
-from granulcal.formation_image import formation_figure
-from granulcal.simulate import Pour
-from granulcal.statistics import DOCS
+from granulcal.pours.compare import Scale, comparison_table, nearest_row, standardised_distance
+from granulcal.pours.dataset import Dataset
+from granulcal.pours.formation_image import formation_figure
+from granulcal.pours.simulate import Pour
+from granulcal.pours.statistics import DOCS
 
 if TYPE_CHECKING:
     from granulcal.bayessim import Calibration
-    from granulcal.bayessim.misfit import Misfit
-    from granulcal.posterior import Posterior
+    from granulcal.bayessim.check.misfit import Misfit
+    from granulcal.bayessim.posterior.posterior import Posterior
 
 __all__ = ["HealthRow", "write_report"]
 

@@ -17,15 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 from granulcal import _native
 from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, Text, read_json
 from granulcal.files import write_beside
-from granulcal.forward import scene_at
+from granulcal.measured.recording import Recording
+from granulcal.pours.forward import scene_at
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import Pour, simulate
+from granulcal.pours.statistics import NAMES, statistics
 from granulcal.prior import Prior
-from granulcal.recording import Recording
-from granulcal.scene import Scene
-from granulcal.simulate import Pour, simulate
-from granulcal.statistics import NAMES, statistics
 
 if TYPE_CHECKING:
-    from granulcal.bayessim.sequential import Round, SequentialFit
+    from granulcal.bayessim.training.sequential import Round, SequentialFit
     from granulcal.engines import Engine
 
 __all__ = ["KeptPours", "calibrate_within"]
@@ -184,7 +184,7 @@ def calibrate_within(
         poured: called with the number of kept pours after each.
         engine: another simulator in place of ours; docs/engines.md says what it must do.
     """
-    from granulcal.bayessim.sequential import infer_within_budget, round_sizes
+    from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
 
     if not recordings:
         raise ValueError("calibrate_within needs at least one recording, got none")

@@ -36,7 +36,7 @@ fn the_page_of_effects_has_a_row_for_each_with_all_its_numbers() {
 
 #[test]
 fn the_library_of_the_loop_names_numbers_that_there_are_and_leaves_no_effect_out() {
-    let library = read("python/granulcal/loop/library.py");
+    let library = read("python/granulcal/loop/effects/library.py");
     let named: BTreeSet<&str> =
         library.split('"').skip(1).filter(|text| text.starts_with("effects.")).collect();
     let paths = Effects::paths().expect("defaults");

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from safetensors.numpy import load_file, save_file
 
-from granulcal.bayessim.damage import hashes
+from granulcal.bayessim.storage.damage import hashes
 
 
 def sign(folder: Path) -> None:

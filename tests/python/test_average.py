@@ -12,15 +12,15 @@ pytest.importorskip("torch")
 from signed import sign
 
 from granulcal.bayessim import BayesSim
-from granulcal.bayessim.average import EMULATOR_ALONE, NETWORK_ALONE, Average, HeldOut
-from granulcal.bayessim.density import TruncatedMixture, quasi_prior
-from granulcal.bayessim.geometric import geometric_density
-from granulcal.bayessim.likelihood import Fold
-from granulcal.bayessim.mixture import Mixture
+from granulcal.bayessim.check.toys import LinearGaussian
+from granulcal.bayessim.emulator.likelihood import Fold
+from granulcal.bayessim.network.mixture import Mixture
+from granulcal.bayessim.posterior.average import EMULATOR_ALONE, NETWORK_ALONE, Average, HeldOut
+from granulcal.bayessim.posterior.density import TruncatedMixture, quasi_prior
+from granulcal.bayessim.posterior.geometric import geometric_density
+from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.errors import ModelFormatError
-from granulcal.posterior import Posterior
 from granulcal.prior import Prior
-from granulcal.toys import LinearGaussian
 
 SMALL: dict[str, Any] = {
     "features": 20,

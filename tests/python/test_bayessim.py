@@ -12,15 +12,15 @@ torch = pytest.importorskip("torch")
 from signed import sign  # noqa: E402
 
 from granulcal.bayessim import BayesSim, Config  # noqa: E402
-from granulcal.bayessim.features import draw_frequencies, fourier_features  # noqa: E402
-from granulcal.bayessim.network import HeadLayout  # noqa: E402
-from granulcal.bayessim.standardise import Standardiser  # noqa: E402
-from granulcal.bayessim.trainer import Progress  # noqa: E402
-from granulcal.diagnostics import binomial_band  # noqa: E402
+from granulcal.bayessim.check.diagnostics import binomial_band  # noqa: E402
+from granulcal.bayessim.check.toys import LinearGaussian, PileStandIn  # noqa: E402
+from granulcal.bayessim.network.features import draw_frequencies, fourier_features  # noqa: E402
+from granulcal.bayessim.network.network import HeadLayout  # noqa: E402
+from granulcal.bayessim.network.standardise import Standardiser  # noqa: E402
+from granulcal.bayessim.network.trainer import Progress  # noqa: E402
+from granulcal.bayessim.posterior.posterior import OutOfRange, Posterior  # noqa: E402
 from granulcal.errors import ModelFormatError, ObservationError, TrainingDataError  # noqa: E402
-from granulcal.posterior import OutOfRange, Posterior  # noqa: E402
 from granulcal.prior import Prior  # noqa: E402
-from granulcal.toys import LinearGaussian, PileStandIn  # noqa: E402
 
 QUICK = {"quiet": True, "method": "mdrff", "max_epochs": 3, "ensemble": 2, "features": 20}
 KERNELS = {

@@ -9,7 +9,7 @@ import pytest
 import granulcal as gc
 from granulcal import _native, cli
 from granulcal.bayessim import BayesSim
-from granulcal.identifiability import Identifiability
+from granulcal.bayessim.check.identifiability import Identifiability
 
 SMALL: dict[str, Any] = {
     "features": 8,

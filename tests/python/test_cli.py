@@ -12,6 +12,7 @@ from signed import sign
 import granulcal as gc
 from granulcal import cli
 from granulcal.cli import main
+from granulcal.commands import check
 
 pytest.importorskip("torch")
 
@@ -208,7 +209,7 @@ def test_an_error_of_its_own_is_one_line(capfd, monkeypatch):
     def broken(*_):
         raise IndexError("list index out of range")
 
-    monkeypatch.setattr(cli, "_check", broken)
+    monkeypatch.setattr(check, "_run", broken)
     assert cli.main(["check", "nothing"]) == 1
     error = capfd.readouterr().err
     assert "IndexError" in error and "GRANULCAL_TRACEBACK" in error and error.count("\n") == 1

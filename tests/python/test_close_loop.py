@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import granulcal as gc
-from granulcal.camera import Camera
 from granulcal.cli import main
 from granulcal.errors import ObservationError, TrainingDataError
-from granulcal.loop.archive import Archive, Plan
 from granulcal.loop.close import planned
-from granulcal.loop.forward import Forward
-from granulcal.loop.library import FUNNEL, by_name, fingerprint
-from granulcal.loop.measures import Measures
-from granulcal.loop.refine import further
+from granulcal.loop.effects.library import FUNNEL, by_name, fingerprint
+from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.pours.measures import Measures
+from granulcal.loop.pours.refine import further
 from granulcal.loop.task import Task
+from granulcal.pours.camera import Camera
 
 SCENE = """
 name = "small"

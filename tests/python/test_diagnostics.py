@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from granulcal.bayessim.mixture import Mixture
-from granulcal.diagnostics import (
+from granulcal.bayessim.check.diagnostics import (
     binomial_band,
     expected_coverage,
     plot_coverage,
     plot_sbc,
     sbc_ranks,
 )
-from granulcal.posterior import Posterior
-from granulcal.toys import LinearGaussian
+from granulcal.bayessim.check.toys import LinearGaussian
+from granulcal.bayessim.network.mixture import Mixture
+from granulcal.bayessim.posterior.posterior import Posterior
 
 TRUTH_COUNT = 300
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from granulcal.bayessim.adam import Adam
-from granulcal.bayessim.basis import Basis, _Evidence, _frequencies, polynomial
-from granulcal.bayessim.noise import Noise
+from granulcal.bayessim.emulator.basis import Basis, _Evidence, _frequencies, polynomial
+from granulcal.bayessim.emulator.noise import Noise
+from granulcal.bayessim.network.adam import Adam
 
 
 def test_adam_moves_as_torch_does() -> None:

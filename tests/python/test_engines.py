@@ -104,9 +104,9 @@ def test_a_command_that_fails_says_why(small_scene: gc.Scene, tmp_path: Path) ->
 
 def test_engines_are_named(command: str) -> None:
     assert engine_named(command).name == command
-    assert engine_named("granulcal.scene:Scene").name == "granulcal.scene:Scene"
+    assert engine_named("granulcal.pours.scene:Scene").name == "granulcal.pours.scene:Scene"
     with pytest.raises(ValueError, match="no attribute 'sand'"):
-        engine_named("granulcal.scene:sand")
+        engine_named("granulcal.pours.scene:sand")
     with pytest.raises(ValueError, match="engine must be one of lammps"):
         ExportedEngine("sandbox")
 

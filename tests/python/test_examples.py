@@ -81,9 +81,9 @@ def test_calibrate(tmp_path, capsys):
         "granulcal",
         "granulcal.design.ring",
         "granulcal.prior",
-        "granulcal.scene",
-        "granulcal.simulate",
-        "granulcal.statistics",
+        "granulcal.pours.scene",
+        "granulcal.pours.simulate",
+        "granulcal.pours.statistics",
     ],
 )
 def test_docstrings(name):
@@ -94,7 +94,11 @@ def test_docstrings(name):
 
 def test_docstrings_that_write(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
-    for name in ("granulcal.dataset", "granulcal.recording", "granulcal.design.rings"):
+    for name in (
+        "granulcal.pours.dataset",
+        "granulcal.measured.recording",
+        "granulcal.design.rings",
+    ):
         found = doctest.testmod(importlib.import_module(name))
         assert (found.attempted > 0, found.failed) == (True, 0), capsys.readouterr().out
 

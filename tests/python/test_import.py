@@ -41,8 +41,8 @@ def test_every_public_name_is_there():
 
 
 def test_functions_are_not_hidden_by_their_modules():
-    import granulcal.simulate
-    import granulcal.statistics  # noqa: F401
+    import granulcal.pours.simulate
+    import granulcal.pours.statistics  # noqa: F401
 
     assert callable(gc.simulate)
     assert callable(gc.statistics)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from granulcal.bayessim.importance import Effort, ImportanceDensity, mix, prior_normal
-from granulcal.bayessim.mixture import Mixture
+from granulcal.bayessim.network.mixture import Mixture
+from granulcal.bayessim.posterior.importance import Effort, ImportanceDensity, mix, prior_normal
 from granulcal.parameter import Parameter
 from granulcal.prior import Prior
 

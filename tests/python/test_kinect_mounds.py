@@ -6,9 +6,9 @@ import pytest
 from granulcal.cli import main
 from granulcal.demo import measured_data
 from granulcal.experiments import kinect_mounds
+from granulcal.measured.recording import Recording
+from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
-from granulcal.recording import Recording
-from granulcal.scene import Scene
 
 _DATA = measured_data()
 _needs_maps = pytest.mark.skipif(

@@ -6,15 +6,15 @@ import pytest
 pytest.importorskip("torch")
 
 from granulcal.bayessim import BayesSim
-from granulcal.bayessim.likelihood import joint_density, pooled_scales
-from granulcal.bayessim.noise import Noise
-from granulcal.bayessim.ridge import Ridge
-from granulcal.diagnostics import binomial_band, tarp
+from granulcal.bayessim.check.diagnostics import binomial_band, tarp
+from granulcal.bayessim.check.identifiability import Identifiability
+from granulcal.bayessim.check.toys import LinearGaussian
+from granulcal.bayessim.emulator.likelihood import joint_density, pooled_scales
+from granulcal.bayessim.emulator.noise import Noise
+from granulcal.bayessim.emulator.ridge import Ridge
 from granulcal.errors import TrainingDataError
-from granulcal.identifiability import Identifiability
 from granulcal.parameter import Parameter
 from granulcal.prior import Prior
-from granulcal.toys import LinearGaussian
 
 
 @pytest.fixture(scope="module")

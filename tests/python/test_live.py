@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import granulcal as gc
-from granulcal.live import RealSense, _frame_of, record
-from granulcal.ros_files import DepthFrame
+from granulcal.measured.live import RealSense, _frame_of, record
+from granulcal.measured.ros_files import DepthFrame
 
 pytest.importorskip("rosbags")
 LENS = {"width": 64, "height": 48, "fx": 60.0, "fy": 61.0, "cx": 31.5, "cy": 23.5}

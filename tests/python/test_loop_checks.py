@@ -12,16 +12,16 @@ import pytest
 from numpy.typing import NDArray
 
 from granulcal.loop import Design, Effect, Observation, Surrogate, Thresholds, trace
-from granulcal.loop.checks import calibrated
-from granulcal.loop.confirm import confirm
-from granulcal.loop.correction import Correction, corrections
-from granulcal.loop.library import by_name
-from granulcal.loop.misfit import compare
-from granulcal.loop.pairs import Calibrated, calibrate, needed_stretch
-from granulcal.loop.refit import interval
-from granulcal.loop.standing import stand
-from granulcal.loop.tables import candidates, conditions, residuals, write_tables
-from granulcal.loop.trivial import LINE, TrivialRow
+from granulcal.loop.check.checks import calibrated
+from granulcal.loop.check.confirm import confirm
+from granulcal.loop.check.correction import Correction, corrections
+from granulcal.loop.check.coverage import Calibrated, calibrate, needed_stretch
+from granulcal.loop.check.standing import stand
+from granulcal.loop.check.trivial import LINE, TrivialRow
+from granulcal.loop.effects.library import by_name
+from granulcal.loop.report.tables import candidates, conditions, residuals, write_tables
+from granulcal.loop.test.misfit import compare
+from granulcal.loop.test.refit import interval
 
 Array = NDArray[np.float64]
 

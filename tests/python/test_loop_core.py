@@ -20,15 +20,15 @@ from granulcal.loop import (
     power,
     trace,
 )
-from granulcal.loop.baseline import fit_base
-from granulcal.loop.blocks import fit_blocks
-from granulcal.loop.design import cube_from_normal, normal_from_cube
-from granulcal.loop.gate import open_gate
-from granulcal.loop.misfit import noise_free_square
-from granulcal.loop.observation import Stack
-from granulcal.loop.refit import fit_single
-from granulcal.loop.score import Scores
-from granulcal.loop.transform import Transform
+from granulcal.loop.effects.design import cube_from_normal, normal_from_cube
+from granulcal.loop.surrogate.baseline import fit_base
+from granulcal.loop.surrogate.blocks import fit_blocks
+from granulcal.loop.surrogate.observation import Stack
+from granulcal.loop.surrogate.transform import Transform
+from granulcal.loop.test.misfit import noise_free_square
+from granulcal.loop.test.refit import fit_single
+from granulcal.loop.test.residual_test import open_gate
+from granulcal.loop.test.score import Scores
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ import pytest
 
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
-from granulcal.loop.archive import Archive, Plan
-from granulcal.loop.forward import Forward
-from granulcal.loop.images import KINDS, Frame, blurred, flying, lost, require_image
-from granulcal.loop.library import FUNNEL, LIBRARY, by_name
-from granulcal.loop.measures import Measures
+from granulcal.loop.effects.image_faults import KINDS, Frame, blurred, flying, lost, require_image
+from granulcal.loop.effects.library import FUNNEL, LIBRARY, by_name
+from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.pours.measures import Measures
 from granulcal.loop.task import FIT, Condition, Task
 
 SCENE = """

@@ -8,11 +8,11 @@ import pytest
 
 from granulcal.cli import main
 from granulcal.errors import ObservationError
-from granulcal.loop.fallback import Discrepancy
-from granulcal.loop.forward import Forward
-from granulcal.loop.models import Maker, Models, condition_of
-from granulcal.loop.transform import Transform
-from granulcal.scene import Scene
+from granulcal.loop.check.discrepancy import Discrepancy
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.report.models import Maker, Models, condition_of
+from granulcal.loop.surrogate.transform import Transform
+from granulcal.pours.scene import Scene
 
 SCENE = """
 name = "small"

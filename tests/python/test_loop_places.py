@@ -9,12 +9,12 @@ import pytest
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.experiments import loop_column, loop_drum, loop_rings
-from granulcal.loop.archive import Archive, Plan
-from granulcal.loop.baseline import Fit
 from granulcal.loop.close import planned
-from granulcal.loop.design import Design, Effect, normal_from_cube
-from granulcal.loop.draws import draw
-from granulcal.loop.library import LibraryEffect, by_name
+from granulcal.loop.effects.design import Design, Effect, normal_from_cube
+from granulcal.loop.effects.library import LibraryEffect, by_name
+from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.surrogate.baseline import Fit
+from granulcal.loop.surrogate.fit_draws import draw
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 
 SCENE = """

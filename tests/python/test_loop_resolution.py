@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
 from granulcal.loop import Design, Effect, Observation, Surrogate, Thresholds, trace
-from granulcal.loop.archive import Archive, Plan
-from granulcal.loop.forward import Coarse, Forward
-from granulcal.loop.resolution import Resolution
+from granulcal.loop.effects.resolution import Resolution
+from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.forward import Coarse, Forward
+from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
-from granulcal.scene import Scene
 
 Array = NDArray[np.float64]
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from granulcal.errors import ObservationError, TrainingDataError
-from granulcal.loop.archive import Archive, Plan
-from granulcal.loop.law import LAW, law_numbers
-from granulcal.loop.library import by_name
-from granulcal.loop.nuisances import declared_nuisances
-from granulcal.loop.series import KINDS, require_series, reread
+from granulcal.loop.effects.law import LAW, law_numbers
+from granulcal.loop.effects.library import by_name
+from granulcal.loop.effects.nuisances import declared_nuisances
+from granulcal.loop.effects.series_faults import KINDS, require_series, reread
+from granulcal.loop.pours.archive import Archive, Plan
 from granulcal.loop.task import FIT, Condition, Task
+from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
-from granulcal.scene import Scene
 
 NAMES = ("front_radius[0.1]", "front_radius[0.3]", "front_radius[0.2]", "front_radius[end]")
 PROFILE = ("surface_z[-0.02]", "surface_z[0]", "surface_z[0.02]", "surface_slope")

@@ -8,16 +8,16 @@ import pytest
 
 from granulcal.errors import ObservationError
 from granulcal.loop import Design, Effect
-from granulcal.loop.definition import Definition, check_definitions, definition_inputs
-from granulcal.loop.look import Look, hypercube
-from granulcal.loop.misfit import compare
-from granulcal.loop.standing import Moved, overturned, stand
+from granulcal.loop.check.prior_pours import Look, hypercube
+from granulcal.loop.check.standing import Moved, overturned, stand
+from granulcal.loop.check.trivial import LINE, NEAREST, RESIDUAL, Group, line_weights, trivial_rows
+from granulcal.loop.effects.definitions import Definition, check_definitions, definition_inputs
 from granulcal.loop.task import FIT, SEALED, Condition, Task
-from granulcal.loop.thresholds import Thresholds
-from granulcal.loop.trivial import LINE, NEAREST, RESIDUAL, Group, line_weights, trivial_rows
-from granulcal.loop.verdict import Verdict
+from granulcal.loop.test.misfit import compare
+from granulcal.loop.test.thresholds import Thresholds
+from granulcal.loop.test.verdict import Verdict
+from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
-from granulcal.scene import Scene
 
 RULES = Thresholds()
 EFFECT = Verdict("EFFECT", ("drag",), ("drag",), 0.001, "why")

@@ -5,7 +5,7 @@ import pytest
 
 from granulcal.demo import measured_data
 from granulcal.experiments import measured_images, sensor
-from granulcal.recording import Recording
+from granulcal.measured.recording import Recording
 
 _DATA = measured_data()
 _needs_data = pytest.mark.skipif(

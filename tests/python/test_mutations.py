@@ -12,8 +12,8 @@ from mutations import mutations
 import granulcal as gc
 from granulcal import cli
 from granulcal.design.posterior_file import PosteriorDraws
+from granulcal.loop.effects.tolerance import Tolerances
 from granulcal.loop.task import Task
-from granulcal.loop.tolerance import Tolerances
 from granulcal.within_budget import KeptPours
 
 REPOSITORY = Path(__file__).parents[2]

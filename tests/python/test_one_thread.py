@@ -7,8 +7,8 @@ from threadpoolctl import ThreadpoolController, threadpool_limits
 torch = pytest.importorskip("torch")
 
 from granulcal.bayessim import BayesSim  # noqa: E402
+from granulcal.bayessim.check.toys import PileStandIn  # noqa: E402
 from granulcal.one_thread import one_thread  # noqa: E402
-from granulcal.toys import PileStandIn  # noqa: E402
 
 
 def blas_threads() -> list[int]:

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from granulcal.bayessim.mixture import Mixture
+from granulcal.bayessim.check.toys import LinearGaussian
+from granulcal.bayessim.network.mixture import Mixture
+from granulcal.bayessim.posterior.posterior import MassOutsidePrior, Posterior, PoursDisagree
 from granulcal.parameter import Parameter
-from granulcal.posterior import MassOutsidePrior, Posterior, PoursDisagree
 from granulcal.prior import Prior
-from granulcal.toys import LinearGaussian
 
 BOX = Prior(
     [

@@ -8,8 +8,8 @@ import pytest
 from granulcal.experiments.predictions import columns, reproduce, write_csv
 from granulcal.experiments.predictions.columns import column_rows, observing, read_tests, times_of
 from granulcal.experiments.predictions.drum import SPEEDS, drum_rows
-from granulcal.loop.models import Maker, Models
-from granulcal.scene import Scene
+from granulcal.loop.report.models import Maker, Models
+from granulcal.pours.scene import Scene
 
 TABLE = """TestCode N rpm G r_0 d_p rho_p IF rho_f mu_f
 a_08g 1 0 9.81 0.054 0.008 2632 w 1000 0.001

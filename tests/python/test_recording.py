@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import granulcal as gc
-from granulcal.compare import Scale, comparison_table, nearest_row, standardised_distance
-from granulcal.recording import DamagedRecordingWarning, Lost
+from granulcal.measured.recording import DamagedRecordingWarning, Lost
+from granulcal.pours.compare import Scale, comparison_table, nearest_row, standardised_distance
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import granulcal as gc
-from granulcal.bayessim.misfit import Misfit, StatisticMisfit
-from granulcal.formation_image import common_field, height_grid
+from granulcal.bayessim.check.misfit import Misfit, StatisticMisfit
+from granulcal.bayessim.check.toys import LinearGaussian
+from granulcal.pours.formation_image import common_field, height_grid
 from granulcal.report import HealthRow, write_report
-from granulcal.toys import LinearGaussian
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("jinja2")

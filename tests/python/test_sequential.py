@@ -5,12 +5,12 @@ import pytest
 
 pytest.importorskip("torch")
 
-from granulcal.bayessim.sequential import infer_within_budget, round_sizes
+from granulcal.bayessim.check.toys import LinearGaussian
+from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.parameter import Parameter
+from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
-from granulcal.scene import Scene
-from granulcal.toys import LinearGaussian
 from granulcal.within_budget import KeptPours
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.cli import main
-from granulcal.film import film
-from granulcal.toys import LinearGaussian
+from granulcal.pours.film import film
 
 
 def test_a_film_shows_the_pour_until_it_rests(

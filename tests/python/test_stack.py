@@ -5,10 +5,10 @@ import pytest
 
 pytest.importorskip("torch")
 
-from granulcal.bayessim.density import TruncatedMixture
-from granulcal.bayessim.likelihood import averaging_share
-from granulcal.bayessim.mixture import Mixture
-from granulcal.bayessim.stack import StackedDensity
+from granulcal.bayessim.emulator.likelihood import averaging_share
+from granulcal.bayessim.network.mixture import Mixture
+from granulcal.bayessim.posterior.arithmetic import StackedDensity
+from granulcal.bayessim.posterior.density import TruncatedMixture
 from granulcal.prior import Prior
 
 

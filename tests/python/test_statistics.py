@@ -10,7 +10,7 @@ from scipy import optimize, stats
 
 import granulcal as gc
 from granulcal.demo import measured_data
-from granulcal.statistics import DIAGNOSTIC_NAMES, NAMES, REGISTRY
+from granulcal.pours.statistics import DIAGNOSTIC_NAMES, NAMES, REGISTRY
 
 _SHAPES = ("heap", "ring", "crater", "lattice", "heavy", "blob", "streak")
 _PER_SHAPE = 150

@@ -8,9 +8,9 @@ import pytest
 pytest.importorskip("torch")
 
 from granulcal.bayessim import BayesSim
-from granulcal.bayessim.config import Config
-from granulcal.bayessim.trainer import train
-from granulcal.toys import PileStandIn
+from granulcal.bayessim.check.toys import PileStandIn
+from granulcal.bayessim.network.trainer import train
+from granulcal.bayessim.training.config import Config
 
 
 def test_many_pairs_take_fewer_passes_and_less_jitter():

@@ -6,20 +6,20 @@ Torch is loaded when a model is first trained, and not before.
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from granulcal.bayessim.calibration import Calibration
-    from granulcal.bayessim.config import Config
-    from granulcal.bayessim.misfit import Misfit
+    from granulcal.bayessim.check.calibration import Calibration
+    from granulcal.bayessim.check.misfit import Misfit
     from granulcal.bayessim.model import BayesSim
-    from granulcal.bayessim.summary import TrainingSummary
+    from granulcal.bayessim.training.config import Config
+    from granulcal.bayessim.training.summary import TrainingSummary
 
 __all__ = ["BayesSim", "Calibration", "Config", "Misfit", "TrainingSummary"]
 
 _HOMES = {
     "BayesSim": "model",
-    "Calibration": "calibration",
-    "Config": "config",
-    "Misfit": "misfit",
-    "TrainingSummary": "summary",
+    "Calibration": "check.calibration",
+    "Config": "training.config",
+    "Misfit": "check.misfit",
+    "TrainingSummary": "training.summary",
 }
 
 

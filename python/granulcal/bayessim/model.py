@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from granulcal.bayessim.amortised import Amortised
 from granulcal.bayessim.arrays import as_real
-from granulcal.bayessim.average import Average
-from granulcal.bayessim.calibration import Calibration
-from granulcal.bayessim.config import Config
-from granulcal.bayessim.likelihood import Likelihood
-from granulcal.bayessim.misfit import Misfit, MisfitReference
-from granulcal.bayessim.pairs import TrainingPairs
-from granulcal.bayessim.standardise import Standardiser
-from granulcal.bayessim.storage import load_parts, save_model
-from granulcal.bayessim.summary import TrainingSummary
-from granulcal.bayessim.trainer import Progress
-from granulcal.bayessim.training import train_model
+from granulcal.bayessim.check.calibration import Calibration
+from granulcal.bayessim.check.identifiability import Identifiability
+from granulcal.bayessim.check.misfit import Misfit, MisfitReference
+from granulcal.bayessim.emulator.likelihood import Likelihood
+from granulcal.bayessim.network.amortised import Amortised
+from granulcal.bayessim.network.standardise import Standardiser
+from granulcal.bayessim.network.trainer import Progress
+from granulcal.bayessim.posterior.average import Average
+from granulcal.bayessim.posterior.posterior import OutOfRange, Posterior
+from granulcal.bayessim.storage.model_folder import load_parts, save_model
+from granulcal.bayessim.training.config import Config
+from granulcal.bayessim.training.fit import train_model
+from granulcal.bayessim.training.pairs import TrainingPairs
+from granulcal.bayessim.training.summary import TrainingSummary
 from granulcal.errors import ObservationError
-from granulcal.identifiability import Identifiability
 from granulcal.one_thread import one_thread
-from granulcal.posterior import OutOfRange, Posterior
 from granulcal.prior import Prior
 
 __all__ = ["BayesSim"]
@@ -61,7 +61,7 @@ class BayesSim:
         for robotics simulators, RSS 2019, arXiv:1906.01728.
 
     Example:
-        >>> from granulcal.toys import LinearGaussian
+        >>> from granulcal.bayessim.check.toys import LinearGaussian
         >>> toy = LinearGaussian.random()
         >>> theta, x = toy.simulate(200)
         >>> model = BayesSim.fit(theta, x, toy.prior, quiet=True, method="emulated")

@@ -64,8 +64,8 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
 
 def _simulate(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named
-    from granulcal.scene import Scene
-    from granulcal.simulate import simulate
+    from granulcal.pours.scene import Scene
+    from granulcal.pours.simulate import simulate
 
     scene = Scene.named(options.scene).with_(dict(options.set))
     pour = simulate(scene, seed=options.seed, engine=engine_named(options.engine))
@@ -93,10 +93,10 @@ def _simulate(options: argparse.Namespace) -> int:
 
 
 def _generate(options: argparse.Namespace) -> int:
-    from granulcal.dataset import generate
     from granulcal.engines import engine_named
+    from granulcal.pours.dataset import generate
+    from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
-    from granulcal.scene import Scene
 
     scene = Scene.named(options.scene).with_(dict(options.set))
     data = generate(

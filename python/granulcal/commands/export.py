@@ -107,7 +107,7 @@ def _add_bed(words: Any) -> None:
 
 
 def _loaded(options: argparse.Namespace) -> Any:
-    from granulcal.scene import Scene
+    from granulcal.pours.scene import Scene
 
     return Scene.named(options.scene).with_(dict(options.set))
 
@@ -164,7 +164,7 @@ def _bed(options: argparse.Namespace) -> int:
     import numpy as np
 
     from granulcal.export import export_bed
-    from granulcal.simulate import simulate
+    from granulcal.pours.simulate import simulate
 
     scene = _loaded(options)
     if options.positions is not None:

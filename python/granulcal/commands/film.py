@@ -46,8 +46,8 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from granulcal.film import film
-    from granulcal.scene import Scene
+    from granulcal.pours.film import film
+    from granulcal.pours.scene import Scene
 
     scene = Scene.named(options.scene).with_(dict(options.set))
     frames = film(

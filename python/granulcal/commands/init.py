@@ -115,7 +115,7 @@ def _init(options: argparse.Namespace) -> int:
 
 
 def _sample(options: argparse.Namespace) -> int:
-    from granulcal.scene import Scene
+    from granulcal.pours.scene import Scene
     from granulcal.starter.folder import CONDITIONS
     from granulcal.starter.samples import HIDDEN, write_samples
 

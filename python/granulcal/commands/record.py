@@ -38,7 +38,7 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from granulcal.live import RealSense, Ros2, record
+    from granulcal.measured.live import RealSense, Ros2, record
 
     if options.topic is not None:
         source = Ros2(options.topic, options.camera_topic)

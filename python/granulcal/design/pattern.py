@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from granulcal.design.plan import Plan
 from granulcal.design.ring import PERCENTILES
 from granulcal.design.ring_model import HEIGHT
-from granulcal.scene import Scene
-from granulcal.simulate import simulate
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import simulate
 
 __all__ = ["Pattern", "simulate_plan"]
 

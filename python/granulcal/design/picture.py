@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from granulcal.camera import Camera
 from granulcal.design.pattern import Pattern
 from granulcal.design.plan import Plan
 from granulcal.files import save_figure
+from granulcal.pours.camera import Camera
 
 __all__ = ["plan_picture"]
 

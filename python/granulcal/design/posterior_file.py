@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, read_json
-from granulcal.scene import Scene
+from granulcal.pours.scene import Scene
 
 __all__ = ["PosteriorDraws"]
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.dataset import Dataset, generate
 from granulcal.design.reach import Reach
 from granulcal.design.ring import PERCENTILES, STATISTICS
 from granulcal.errors import TrainingDataError
+from granulcal.pours.dataset import Dataset, generate
+from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
-from granulcal.scene import Scene
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim

@@ -12,9 +12,9 @@ from granulcal.design.forecast import SpillForecast
 from granulcal.design.posterior_file import PosteriorDraws
 from granulcal.design.ring_model import HEIGHT, height_prior
 from granulcal.errors import TrainingDataError
+from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 from granulcal.progress import ProgressLine
-from granulcal.scene import Scene
 from granulcal.within_budget import KeptPours
 
 __all__ = ["design_spill", "forecast_of"]

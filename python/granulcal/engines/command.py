@@ -10,7 +10,7 @@ import numpy as np
 
 from granulcal.engines.files import read_grains
 from granulcal.engines.protocol import Left, left
-from granulcal.scene import Scene
+from granulcal.pours.scene import Scene
 
 __all__ = ["CommandEngine", "last_words"]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from granulcal.engines.command import last_words
 from granulcal.engines.files import read_grains
 from granulcal.engines.protocol import Left
-from granulcal.scene import Scene
+from granulcal.pours.scene import Scene
 
 __all__ = ["RUNNERS", "ExportedEngine", "installed"]
 

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.scene import Scene
+from granulcal.pours.scene import Scene
 
 __all__ = ["CallableEngine", "Engine", "Left", "left"]
 
@@ -48,7 +48,7 @@ class CallableEngine:
         name: what it is called; the default is its qualified name.
 
     Example:
-        >>> from granulcal.scene import Scene
+        >>> from granulcal.pours.scene import Scene
         >>> flat = CallableEngine(lambda scene, seed: scene.start(seed), name="not moved")
         >>> flat(Scene.drop(0.02, count=5), 1)[0].shape
         (5, 3)

@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.calibrate import Calibrated, calibrate
-from granulcal.compare import Scale, nearest_row, standardised_distance
-from granulcal.dataset import Dataset, generate
 from granulcal.files import write_beside
-from granulcal.forward import pours_at, scene_at
+from granulcal.measured.recording import Recording
+from granulcal.pours.compare import Scale, nearest_row, standardised_distance
+from granulcal.pours.dataset import Dataset, generate
+from granulcal.pours.forward import pours_at, scene_at
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import Pour
+from granulcal.pours.statistics import diagnostic_statistics
 from granulcal.prior import Prior
-from granulcal.recording import Recording
-from granulcal.scene import Scene
-from granulcal.simulate import Pour
-from granulcal.statistics import diagnostic_statistics
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
@@ -319,7 +319,7 @@ def _picture(path: Path, names: Sequence[str], clouds: Sequence) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    from granulcal.formation_image import height_grid
+    from granulcal.pours.formation_image import height_grid
 
     field, pixels, columns = 0.36, 130, 8
     rows = 2 * -(-len(names) // columns)

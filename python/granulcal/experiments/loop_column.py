@@ -7,16 +7,16 @@ glycerol at 1 g and 4.6 g. Thin fluids at 4.6 g were not tracked to their end an
 from pathlib import Path
 
 from granulcal.loop.close import Closed, close_loop
-from granulcal.loop.definition import Definition
-from granulcal.loop.forward import Forward
-from granulcal.loop.law import law_numbers
-from granulcal.loop.library import LibraryEffect, by_name
-from granulcal.loop.nuisances import declared_nuisances
-from granulcal.loop.refine import ROUND
-from granulcal.loop.report import write_report
+from granulcal.loop.effects.definitions import Definition
+from granulcal.loop.effects.law import law_numbers
+from granulcal.loop.effects.library import LibraryEffect, by_name
+from granulcal.loop.effects.nuisances import declared_nuisances
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.pours.refine import ROUND
+from granulcal.loop.report.folder import write_report
 from granulcal.loop.task import FIT, SEALED, Condition, Task
+from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
-from granulcal.scene import Scene
 
 __all__ = ["reproduce", "task"]
 

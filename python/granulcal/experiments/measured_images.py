@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from granulcal.experiments.sensor import write_d435_camera
-from granulcal.recording import Formation, Levelled, Recording
+from granulcal.measured.recording import Formation, Levelled, Recording
 
 __all__ = ["Rig", "Seen", "images", "reproduce", "see"]
 

@@ -13,7 +13,7 @@ from granulcal.export import chrono, gazebo, isaac, lammps, liggghts, mujoco, ne
 from granulcal.export.bed import bed_text
 from granulcal.export.setup import Setup
 from granulcal.files import write_beside
-from granulcal.scene import Scene
+from granulcal.pours.scene import Scene
 
 __all__ = ["ENGINES", "export_bed", "export_material", "export_posterior", "export_scene"]
 

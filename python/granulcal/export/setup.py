@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.export.law import Contact, Stiffness
-from granulcal.scene import Scene
+from granulcal.pours.scene import Scene
 
 __all__ = ["Body", "Contact", "Setup", "Stiffness"]
 

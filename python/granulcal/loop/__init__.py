@@ -3,15 +3,15 @@
 `docs/theory/loop.md` derives what the files do.
 """
 
-from granulcal.loop.design import Design, Effect
+from granulcal.loop.check.discrepancy import Discrepancy
+from granulcal.loop.effects.design import Design, Effect
 from granulcal.loop.experiment import Experiment, next_experiment
-from granulcal.loop.fallback import Discrepancy
-from granulcal.loop.misfit import Improvement, compare
-from granulcal.loop.observation import Observation
-from granulcal.loop.surrogate import Surrogate
-from granulcal.loop.thresholds import Thresholds
-from granulcal.loop.trace import Power, Trace, power, trace
-from granulcal.loop.verdict import Verdict
+from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.surrogate import Surrogate
+from granulcal.loop.test.misfit import Improvement, compare
+from granulcal.loop.test.thresholds import Thresholds
+from granulcal.loop.test.trace import Power, Trace, power, trace
+from granulcal.loop.test.verdict import Verdict
 
 __all__ = [
     "Design",

@@ -18,22 +18,19 @@ from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
-from granulcal.loop.archive import Archive, Plan
-from granulcal.loop.checks import calibrated, confirmed, corrected, moved, nearer, trivial
-from granulcal.loop.correction import Correction
-from granulcal.loop.cube import from_cube
-from granulcal.loop.definition import is_definition
+from granulcal.loop.check.checks import calibrated, confirmed, corrected, moved, nearer, trivial
+from granulcal.loop.check.correction import Correction
+from granulcal.loop.check.coverage import FEWEST_PAIRS, Calibrated
+from granulcal.loop.check.prior_rounds import LOOKS, look_over
+from granulcal.loop.check.standing import Standing, stand
+from granulcal.loop.effects.definitions import is_definition
 from granulcal.loop.experiment import Experiment, next_experiment
-from granulcal.loop.forward import Forward
-from granulcal.loop.look_over import LOOKS, look_over
-from granulcal.loop.measures import Measures
-from granulcal.loop.misfit import Improvement
-from granulcal.loop.models_of import models_of
-from granulcal.loop.observation import Observation
-from granulcal.loop.pairs import FEWEST_PAIRS, Calibrated
-from granulcal.loop.preregistration import register
-from granulcal.loop.refine import ROUND, Rows, further
-from granulcal.loop.replicates import (
+from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.cube import from_cube
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.pours.measures import Measures
+from granulcal.loop.pours.refine import ROUND, Rows, further
+from granulcal.loop.pours.replicates import (
     REPLICATES,
     both,
     error_of,
@@ -41,15 +38,18 @@ from granulcal.loop.replicates import (
     model_scene,
     placebo_of,
 )
-from granulcal.loop.standing import Standing, stand
-from granulcal.loop.store_surrogate import fit_surrogate
-from granulcal.loop.surrogate import Surrogate
+from granulcal.loop.preregistration import register
+from granulcal.loop.report.models_of import models_of
+from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.store_surrogate import fit_surrogate
+from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Condition, Task
-from granulcal.loop.thresholds import Thresholds
-from granulcal.loop.trace import Explanation, Power, Trace, power, trace
-from granulcal.loop.verdict import Verdict
+from granulcal.loop.test.misfit import Improvement
+from granulcal.loop.test.thresholds import Thresholds
+from granulcal.loop.test.trace import Explanation, Power, Trace, power, trace
+from granulcal.loop.test.verdict import Verdict
 from granulcal.one_thread import one_thread
-from granulcal.scene import Scene
+from granulcal.pours.scene import Scene
 
 __all__ = ["Closed", "close_loop", "fit_surrogate", "planned"]
 

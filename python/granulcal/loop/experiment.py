@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from granulcal.loop.local import Local
-from granulcal.loop.score import Scores
-from granulcal.loop.surrogate import Surrogate
-from granulcal.loop.trace import Trace, fit_at
+from granulcal.loop.surrogate.linearised import Local
+from granulcal.loop.surrogate.surrogate import Surrogate
+from granulcal.loop.test.score import Scores
+from granulcal.loop.test.trace import Trace, fit_at
 
 __all__ = ["Experiment", "next_experiment"]
 

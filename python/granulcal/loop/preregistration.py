@@ -10,10 +10,10 @@ from granulcal import _native
 from granulcal.documents import LARGEST_DOCUMENT, Table, check, parse_json, read_bytes
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
-from granulcal.loop.archive import Plan
-from granulcal.loop.library import described, fingerprint
+from granulcal.loop.effects.library import described, fingerprint
+from granulcal.loop.pours.archive import Plan
 from granulcal.loop.task import Task
-from granulcal.loop.thresholds import Thresholds
+from granulcal.loop.test.thresholds import Thresholds
 
 __all__ = ["register"]
 

@@ -19,7 +19,7 @@ out it is looked for beside the recording. `reading = { width = 0.084 }`, likewi
 `Recording.observed`, or of `Recording.formation` where the scene observes nothing.
 
 `[[definitions]]` are ways to look at the same pours, thresholds and levels moved: the first is the
-one that the verdict is of, and a verdict that another overturns is none; see `definition.py`.
+one that the verdict is of, and a verdict that another overturns is none; see `definitions.py`.
 
 `[[nuisance]]` tables, written like those of a prior, are numbers of the model that nobody knows and
 that are never a finding: free numbers of the contact law, a drive's speed. Every pour of the
@@ -59,18 +59,18 @@ from granulcal.documents import (
     read_bytes,
 )
 from granulcal.errors import ObservationError
-from granulcal.loop.definition import Definition, check_definitions, definition_inputs
-from granulcal.loop.forward import Coarse
-from granulcal.loop.images import require_image
-from granulcal.loop.law import law_numbers
-from granulcal.loop.library import FUNNEL, LibraryEffect, by_name
-from granulcal.loop.measures import Measures
-from granulcal.loop.nuisances import declared_nuisances
-from granulcal.loop.resolution import Resolution
-from granulcal.loop.series import require_series
-from granulcal.loop.tolerance import Tolerances
+from granulcal.loop.effects.definitions import Definition, check_definitions, definition_inputs
+from granulcal.loop.effects.image_faults import require_image
+from granulcal.loop.effects.law import law_numbers
+from granulcal.loop.effects.library import FUNNEL, LibraryEffect, by_name
+from granulcal.loop.effects.nuisances import declared_nuisances
+from granulcal.loop.effects.resolution import Resolution
+from granulcal.loop.effects.series_faults import require_series
+from granulcal.loop.effects.tolerance import Tolerances
+from granulcal.loop.pours.forward import Coarse
+from granulcal.loop.pours.measures import Measures
+from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
-from granulcal.scene import Scene
 
 __all__ = ["FIT", "SEALED", "Condition", "Task"]
 

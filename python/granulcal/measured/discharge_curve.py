@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.measured.names import observed_of, value_at
-from granulcal.scene import Scene
-from granulcal.statistics import ObservedStatistics
+from granulcal.pours.scene import Scene
+from granulcal.pours.statistics import ObservedStatistics
 
 __all__ = ["DischargeCurve"]
 

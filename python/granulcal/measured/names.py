@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.scene import Scene
-from granulcal.statistics import ObservedStatistics
+from granulcal.pours.scene import Scene
+from granulcal.pours.statistics import ObservedStatistics
 
 _NAME = re.compile(r"(?P<of>[a-z_]+)(\[(?P<at>[^\]]+)\])?")
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from granulcal.files import replace_text
-from granulcal.recording import Recording
-from granulcal.scene import Scene
+from granulcal.measured.recording import Recording
+from granulcal.pours.scene import Scene
 from granulcal.starter.texts import CAMERA, DROP_START, FUNNEL_START, LOOP, PRIOR, SCENE
 
 __all__ = ["CONDITIONS", "FILES", "SCENES", "Lens", "lens_of", "write_folder"]

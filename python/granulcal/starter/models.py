@@ -9,9 +9,9 @@ from pathlib import Path
 
 from granulcal import _native
 from granulcal.files import write_beside
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import simulate
 from granulcal.prior import Prior
-from granulcal.scene import Scene
-from granulcal.simulate import simulate
 
 __all__ = ["cache_folder", "find_model", "fingerprint", "make_model", "model_named"]
 
@@ -96,7 +96,7 @@ def make_model(
         say: told what is done.
     """
     from granulcal.bayessim import BayesSim
-    from granulcal.dataset import generate
+    from granulcal.pours.dataset import generate
 
     scene, prior = Scene.built_in(name), Prior.default()
     folder = cache_folder() / "models" / name if out is None else out

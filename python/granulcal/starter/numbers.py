@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from granulcal.files import replace_text
-from granulcal.scene import Scene
+from granulcal.pours.scene import Scene
 
 __all__ = ["set_numbers"]
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from granulcal.camera import Camera
 from granulcal.files import write_beside
-from granulcal.ros_files import DepthFrame, write_bag, write_mcap
-from granulcal.scene import Material, Scene
-from granulcal.simulate import simulate
+from granulcal.measured.ros_files import DepthFrame, write_bag, write_mcap
+from granulcal.pours.camera import Camera
+from granulcal.pours.scene import Material, Scene
+from granulcal.pours.simulate import simulate
 
 __all__ = ["HIDDEN", "Samples", "write_samples"]
 

@@ -10,7 +10,7 @@ from granulcal.experiments.loop_drum.report import compare_speeds, table
 from granulcal.experiments.loop_drum.task import task
 from granulcal.files import write_beside
 from granulcal.loop.close import close_loop
-from granulcal.loop.report import write_report
+from granulcal.loop.report.folder import write_report
 
 __all__ = ["reproduce", "task"]
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from granulcal.experiments.loop_drum.task import at_speed
 from granulcal.loop.close import Closed
-from granulcal.loop.forward import Forward
-from granulcal.loop.predict import predict
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.report.predict import predict
 from granulcal.loop.task import SEALED, Condition
-from granulcal.loop.trace import Explanation
+from granulcal.loop.test.trace import Explanation
 
 __all__ = ["Speed", "compare_speeds", "table"]
 

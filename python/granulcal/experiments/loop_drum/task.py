@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
-from granulcal.loop.definition import Definition
-from granulcal.loop.library import LibraryEffect, by_name
-from granulcal.loop.nuisances import declared_nuisances
-from granulcal.loop.resolution import Resolution
+from granulcal.loop.effects.definitions import Definition
+from granulcal.loop.effects.library import LibraryEffect, by_name
+from granulcal.loop.effects.nuisances import declared_nuisances
+from granulcal.loop.effects.resolution import Resolution
 from granulcal.loop.task import FIT, SEALED, Condition, Task
+from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
-from granulcal.scene import Scene
 
 __all__ = ["EFFECTS", "SPEEDS", "at_speed", "task"]
 

@@ -9,7 +9,7 @@ from granulcal.experiments.loop_rings.picture import picture
 from granulcal.experiments.loop_rings.task import GROUPS, task
 from granulcal.files import write_beside
 from granulcal.loop.close import Closed, close_loop
-from granulcal.loop.report import write_report
+from granulcal.loop.report.folder import write_report
 
 __all__ = ["GROUPS", "reproduce", "task"]
 

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.formation_image import height_grid
 from granulcal.loop.close import Closed
 from granulcal.loop.task import FIT
-from granulcal.recording import Recording
-from granulcal.simulate import simulate
+from granulcal.measured.recording import Recording
+from granulcal.pours.formation_image import height_grid
+from granulcal.pours.simulate import simulate
 
 __all__ = ["picture"]
 

@@ -8,10 +8,10 @@ grain, and there is nothing to compare it with.
 
 from pathlib import Path
 
-from granulcal.loop.library import LibraryEffect, by_name
+from granulcal.loop.effects.library import LibraryEffect, by_name
 from granulcal.loop.task import FIT, SEALED, Condition, Task
+from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
-from granulcal.scene import Scene
 
 __all__ = ["EFFECTS", "GROUPS", "task"]
 

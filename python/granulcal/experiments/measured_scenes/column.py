@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.measured import RunOut
-from granulcal.scene import Scene
-from granulcal.simulate import simulate
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import simulate
 
 __all__ = ["compare", "reproduce"]
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.dataset import Dataset, generate
-from granulcal.forward import scene_at
+from granulcal.measured.recording import Recording
+from granulcal.pours.dataset import Dataset, generate
+from granulcal.pours.forward import scene_at
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import simulate
 from granulcal.prior import Prior
-from granulcal.recording import Recording
-from granulcal.scene import Scene
-from granulcal.simulate import simulate
 
 __all__ = ["Drum", "drums", "reproduce", "training"]
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from granulcal.measured import DischargeCurve
-from granulcal.scene import Scene
-from granulcal.simulate import simulate
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import simulate
 
 __all__ = ["reproduce"]
 

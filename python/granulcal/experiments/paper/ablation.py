@@ -16,7 +16,7 @@ from granulcal.experiments.paper.common.draw import SECOND, bars, new_figure, sa
 from granulcal.experiments.paper.common.measure import bootstrap, share_interval
 from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
-from granulcal.statistics import NAMES
+from granulcal.pours.statistics import NAMES
 
 __all__ = ["EXPERIMENT"]
 

@@ -24,10 +24,10 @@ from granulcal.experiments.paper.common.measure import Published, level_row
 from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
-from granulcal.forward import scene_at
-from granulcal.scene import Scene
-from granulcal.simulate import simulate
-from granulcal.statistics import statistics
+from granulcal.pours.forward import scene_at
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import simulate
+from granulcal.pours.statistics import statistics
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim

@@ -11,8 +11,8 @@ import numpy as np
 from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, save
 from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
 from granulcal.experiments.paper.common.workshop import Workshop
+from granulcal.pours.statistics import NAMES, UNITS
 from granulcal.prior import Parameter, Prior
-from granulcal.statistics import NAMES, UNITS
 
 __all__ = ["EXPERIMENT"]
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, save
 from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row
 from granulcal.experiments.paper.common.workshop import Workshop
+from granulcal.pours.statistics import NAMES
 from granulcal.prior import Parameter, Prior
-from granulcal.statistics import NAMES
 
 __all__ = ["EXPERIMENT"]
 

@@ -20,8 +20,8 @@ from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, 
 from granulcal.experiments.paper.common.measure import Published, error_row
 from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
 from granulcal.experiments.paper.common.workshop import Workshop
-from granulcal.scene import Scene
-from granulcal.simulate import simulate
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import simulate
 
 __all__ = ["COUSCOUS", "EXPERIMENT"]
 

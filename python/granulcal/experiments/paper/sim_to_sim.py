@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import ACCENT, formations, new_figure, save
 from granulcal.experiments.paper.common.eye import Eye
@@ -21,9 +22,8 @@ from granulcal.experiments.paper.common.measure import (
 )
 from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
-from granulcal.forward import scene_at
-from granulcal.posterior import Posterior
-from granulcal.simulate import simulate
+from granulcal.pours.forward import scene_at
+from granulcal.pours.simulate import simulate
 
 __all__ = ["EXPERIMENT"]
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from granulcal.experiments.predictions.columns import column_rows
 from granulcal.experiments.predictions.drum import drum_rows
 from granulcal.files import write_beside
-from granulcal.loop.models import Models
+from granulcal.loop.report.models import Models
 
 __all__ = ["reproduce", "write_csv"]
 

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
-from granulcal.loop.forward import Forward
-from granulcal.loop.models import Models, Prediction
-from granulcal.scene import Scene
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.report.models import Models, Prediction
+from granulcal.pours.scene import Scene
 
 __all__ = ["Test", "column_rows", "observing", "read_tests", "times_of"]
 

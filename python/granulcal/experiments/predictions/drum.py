@@ -5,8 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from granulcal.experiments.loop_drum.task import at_speed
-from granulcal.loop.forward import Forward
-from granulcal.loop.models import MODELS, Models, Prediction
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.report.models import MODELS, Models, Prediction
 
 __all__ = ["SPEEDS", "drum_rows"]
 

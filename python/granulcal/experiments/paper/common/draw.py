@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.formation_image import height_grid
+from granulcal.pours.formation_image import height_grid
 
 __all__ = ["ACCENT", "SECOND", "bars", "formations", "new_figure", "posterior_image", "save"]
 

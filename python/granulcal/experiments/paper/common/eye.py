@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.camera import Camera
-from granulcal.loop.images import blurred
-from granulcal.scene import Scene
-from granulcal.simulate import Pour
-from granulcal.statistics import NAMES, statistics
+from granulcal.loop.effects.image_faults import blurred
+from granulcal.pours.camera import Camera
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import Pour
+from granulcal.pours.statistics import NAMES, statistics
 
 __all__ = ["BARE", "SENSOR", "Disturbance", "Eye", "View"]
 

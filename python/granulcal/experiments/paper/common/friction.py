@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from granulcal.experiments.paper.common.eye import Disturbance, Eye
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
+from granulcal.pours.statistics import NAMES
 from granulcal.prior import Parameter, Prior
-from granulcal.statistics import NAMES
 
 __all__ = ["BLURS", "NOISES", "PRIOR", "even_tests", "tests", "training", "view"]
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from granulcal.scene import Scene
+from granulcal.pours.scene import Scene
 
 __all__ = ["FULL", "QUICK", "TINY", "Size"]
 

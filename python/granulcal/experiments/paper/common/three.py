@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
-from granulcal.posterior import Posterior
+from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
-from granulcal.scene import Scene
 
 __all__ = ["VARIANTS", "Variant", "estimate", "in_ln", "training_and_tests"]
 

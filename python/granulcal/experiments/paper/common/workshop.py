@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from granulcal.dataset import Dataset, generate
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.files import write_beside
+from granulcal.pours.dataset import Dataset, generate
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import Pour
 from granulcal.prior import Prior
 from granulcal.progress import ProgressLine
-from granulcal.scene import Scene
-from granulcal.simulate import Pour
 from granulcal.within_budget import KeptPours
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""May a posterior be trusted: calibration, misfit, what an observation can tell, exact toys."""

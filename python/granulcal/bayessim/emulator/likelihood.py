@@ -1,0 +1,478 @@
+r"""Likelihood of the parameters by an emulator of the leading signal axes.
+
+The statistics are rotated to their signal axes (`signal.py`); the first r of them are emulated, and
+k pours with the mean $\bar y$ have
+
+$$ L(u) = t_\nu(\bar y; m(u), V_k), \qquad
+   V_k = c^2 (s^2 + h^2) - (1 - 1/k) \eta s^2 $$
+
+(axis by axis, with one correlation R), s the scale of what the emulator leaves of a pour, h that of
+what the pairs leave unknown about the mean, and $c \ge 1$ a widening. For one pour this is the
+widened noise. Of many, only what differs between them averages away: pairs of which no two share
+their parameters cannot tell noise from errors of the emulator, but several pours of one material
+can, and $\eta$ is the share of $s^2$ by which they differ. The rest, the widening and h are errors
+that all pours share.
+
+Which r and c, and whether the noise changes over the parameters, is chosen by held-out pairs: the
+parameters of pairs that an emulator has not seen are to be most probable under its posterior, among
+those choices whose highest-density regions hold them as often as they claim.
+
+Reference:
+    Wood, Statistical inference for noisy nonlinear ecological dynamic systems, Nature 466, 2010
+    (synthetic likelihood).
+    Grunwald and van Ommen, Inconsistency of Bayesian inference for misspecified linear models, and
+    a proposal for repairing it, Bayesian Analysis 12, 2017 (widening by held-out prediction).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.bayessim.check.diagnostics import uniform_p_value
+from granulcal.bayessim.emulator.basis import learn_length_scales
+from granulcal.bayessim.emulator.emulator import Emulator, Prediction
+from granulcal.bayessim.emulator.noise import Noise
+from granulcal.bayessim.emulator.signal import SignalAxes
+from granulcal.bayessim.network.mixture import Mixture
+from granulcal.bayessim.posterior.density import quasi_prior
+from granulcal.bayessim.posterior.importance import (
+    DEFENSIVE_SHARE,
+    FEWEST_EFFECTIVE,
+    Effort,
+    ImportanceDensity,
+    kernel_estimate,
+    mix,
+    prior_normal,
+)
+from granulcal.prior import Prior
+
+__all__ = ["EmulatorChoice", "Fold", "Likelihood", "density_over_prior", "joint_density"]
+
+Array = NDArray[np.float64]
+
+# Numbers of leading axes and factors on their noise among which held-out pairs choose.
+AXIS_COUNTS = (3, 4, 6, 9, 12, 16)
+WIDENINGS = (1.0, 1.12, 1.25, 1.4, 1.6, 1.8, 2.0, 2.5, 3.2, 4.0)
+_FOLDS = 4
+# Held-out pairs that choose, and that the fit is checked on afterwards.
+_HELD_OUT = 240
+_CELLS = 4096
+# Points of the prior that a posterior is made of, unless too few of them carry weight.
+_POOL = 16_384
+# Levels of held-out truths must be uniform with at least this Kolmogorov-Smirnov p-value.
+_LEAST_P_VALUE = 0.1
+# One axis alone does not say that all noise is the pours' own.
+_LARGEST_RATIO = 2.0
+_EFFORT = Effort(pool=2000, draws=1000, rounds=6, effective=150.0, good_share=0.25)
+
+
+@dataclass(frozen=True)
+class EmulatorChoice:
+    """What held-out pairs say of the emulator.
+
+    Attributes:
+        axis_count: leading signal axes emulated, r.
+        widening: factor on their noise, c.
+        varying_scale: whether the scale of the noise changes over the parameters.
+        score: mean log posterior density at held-out parameters, coordinates [nat].
+        linear_score: the same by a linear regression of the parameters on the statistics.
+    """
+
+    axis_count: int
+    widening: float
+    varying_scale: bool
+    score: float
+    linear_score: float
+
+    def __str__(self) -> str:
+        """One line."""
+        noise = "varying" if self.varying_scale else "constant"
+        return (
+            f"{self.axis_count} signal axes, {noise} noise widened {self.widening:g} times; "
+            f"log density of held-out pairs {self.score:.2f} (linear regression "
+            f"{self.linear_score:.2f})"
+        )
+
+
+class _Form(NamedTuple):
+    """One choice of the emulator's form; among equals the first is taken."""
+
+    varying_scale: bool
+    axis_count: int
+    heavy_tails: bool
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """Density of standardised statistics given coordinates.
+
+    Attributes:
+        prior: the prior, over whose range the emulator holds.
+        axes: rotation of the statistics.
+        emulator: of all axes.
+        leading: of the first r axes.
+        widening: c.
+    """
+
+    prior: Prior
+    axes: SignalAxes
+    emulator: Emulator
+    leading: Emulator
+    widening: float
+
+    @classmethod
+    def fit(
+        cls,
+        u: Array,
+        z: Array,
+        prior: Prior,
+        *,
+        features: int,
+        seed: int,
+        order: NDArray[np.intp] | None = None,
+    ) -> tuple["Likelihood", list["Fold"], EmulatorChoice]:
+        """Returns the likelihood, the same fitted without each fold, and how it was chosen.
+
+        Args:
+            u: coordinates of the parameters, shape (n, p).
+            z: standardised statistics, shape (n, s).
+            prior: the prior of u.
+            features: random frequencies of the emulator.
+            seed: seed of the folds and the frequencies.
+            order: rows in the order in which they are held out, shape (n,); None: at random.
+        """
+        everything = np.arange(len(u))
+        lengths = learn_length_scales(
+            u, SignalAxes.fit(_spread_one(u), z).apply(z), features=features, seed=seed
+        )
+        if order is None:
+            order = np.random.default_rng((seed, 2)).permutation(len(u))
+        parts = [order[start::_FOLDS] for start in range(_FOLDS)]
+        counts = sorted({min(count, z.shape[1]) for count in AXIS_COUNTS})
+        scores: dict[_Form, Array] = {}
+        levels: dict[_Form, Array] = {}
+        fits: dict[_Form, list[Likelihood]] = {}
+        for varying in (False, True):
+            for part in parts:
+                train = np.setdiff1d(everything, part)
+                held = part[: _HELD_OUT // _FOLDS]
+                grown = _Growing.fit(u[train], z[train], prior, lengths, features, varying, seed)
+                at_cells = grown.emulator.predict(quasi_prior(prior, _CELLS))
+                for heavy, count in product((False, True), counts):
+                    found = grown.leading(count, heavy=heavy)
+                    score, level = found.held_out_scores(u[held], z[held], at_cells.first(count))
+                    key = _Form(varying, count, heavy)
+                    scores[key] = np.column_stack([scores[key], score]) if key in scores else score
+                    levels[key] = np.column_stack([levels[key], level]) if key in levels else level
+                    fits.setdefault(key, []).append(found)
+        best, chosen = _most_probable_of_the_honest(scores, levels)
+        widening = WIDENINGS[chosen]
+        linear = [
+            linear_scores(u, z, np.setdiff1d(everything, part), part[: _HELD_OUT // _FOLDS])
+            for part in parts
+        ]
+        choice = EmulatorChoice(
+            best.axis_count,
+            widening,
+            best.varying_scale,
+            float(scores[best][chosen].mean()),
+            float(np.concatenate(linear).mean()),
+        )
+        folds = [
+            Fold(fit.widened(widening), part[: _HELD_OUT // _FOLDS])
+            for fit, part in zip(fits[best], parts, strict=True)
+        ]
+        grown = _Growing.fit(u, z, prior, lengths, features, best.varying_scale, seed)
+        whole = grown.leading(best.axis_count, heavy=best.heavy_tails)
+        return whole.widened(widening), folds, choice
+
+    def widened(self, widening: float) -> "Likelihood":
+        """Returns the same with another c."""
+        return Likelihood(self.prior, self.axes, self.emulator, self.leading, widening)
+
+    @property
+    def axis_count(self) -> int:
+        """Number r of leading axes."""
+        return len(self.leading.shift)
+
+    @cached_property
+    def cells(self) -> Array:
+        """Evenly spread draws of the prior, shape (c, p)."""
+        return quasi_prior(self.prior, _CELLS)
+
+    @cached_property
+    def at_cells(self) -> Prediction:
+        """What the leading emulator expects there."""
+        return self.leading.predict(self.cells)
+
+    @cached_property
+    def everything_at_cells(self) -> Prediction:
+        """What the emulator of all axes expects there."""
+        return self.emulator.predict(self.cells)
+
+    @cached_property
+    def pool(self) -> Array:
+        """More evenly spread draws of the prior, shape (m, p)."""
+        return quasi_prior(self.prior, _POOL)
+
+    @cached_property
+    def at_pool(self) -> Prediction:
+        """What the leading emulator expects there."""
+        return self.leading.predict(self.pool)
+
+    def log_prob(self, z: Array, u: Array, *, quick: bool = False) -> Array:
+        """Returns the log likelihood of k pours `z` (k, s) at `u` (n, p), shape (n,).
+
+        Args:
+            z: standardised statistics.
+            u: coordinates.
+            quick: as in `Basis`.
+        """
+        return self.of_prediction(z, self.leading.predict(u, quick=quick))
+
+    @cached_property
+    def scales_at_pool(self) -> Array:
+        """Square root of V_1 there, shape (m, r)."""
+        return pooled_scales(self.at_pool, 1, self.widening)
+
+    def start(self, z: Array) -> Array:
+        """Returns the log likelihood of k pours `z` (k, s) at `pool`, shape (m,)."""
+        return self.of_prediction(z, self.at_pool, self.scales_at_pool if len(z) == 1 else None)
+
+    def of_prediction(self, z: Array, prediction: Prediction, scales: Array | None = None) -> Array:
+        """Returns the log likelihood where the leading emulator expects `prediction`, shape (n,).
+
+        Args:
+            z: standardised statistics of k pours, shape (k, s).
+            prediction: at n points.
+            scales: square root of V_k there, if known already.
+        """
+        y = self.axes.apply(z)[:, : self.axis_count]
+        if scales is not None:
+            return self.leading.noise.log_density(y[0] - prediction.means, scales)
+        share = averaging_share(y, prediction.scales)
+        scales = pooled_scales(prediction, len(z), self.widening, share)
+        return self.leading.noise.log_density(y.mean(axis=0) - prediction.means, scales)
+
+    def held_out_scores(
+        self, u: Array, z: Array, at_cells: Prediction | None = None
+    ) -> tuple[Array, Array]:
+        """Returns what the posteriors given `z` (n, s) say of the true `u` (n, p).
+
+        Args:
+            u: true coordinates.
+            z: standardised statistics.
+            at_cells: what is expected of the leading axes at `cells`, if known already.
+
+        Returns:
+            Log density and level of the smallest highest-density region that holds it, each of
+            shape (widenings, n).
+        """
+        y = self.axes.apply(z)[:, : self.axis_count]
+        noise, here = self.leading.noise, self.leading.predict(u)
+        cells = self.at_cells if at_cells is None else at_cells
+        # The truth is one of the cells, so that none can be more probable than all.
+        squares = np.column_stack(
+            [
+                noise.squares(y, cells.means, np.hypot(cells.scales, cells.unknown)),
+                noise.square(y - here.means, np.hypot(here.scales, here.unknown)),
+            ]
+        )
+        sizes = np.log(np.hypot(cells.scales, cells.unknown)).sum(axis=1)
+        sizes_here = np.log(np.hypot(here.scales, here.unknown)).sum(axis=1)
+        offsets = np.column_stack([np.tile(sizes, (len(u), 1)), sizes_here])
+        prior_here = self.prior.coordinate_log_prob(u)
+        prior_cells = self.prior.coordinate_log_prob(self.cells)
+        prior = np.column_stack([np.tile(prior_cells, (len(u), 1)), prior_here])
+        half = np.float32(0.5 * (noise.degrees + self.axis_count))
+        # Single precision: logarithms of a thousandth of a nat are enough, and there are millions.
+        squares, offsets, prior = (a.astype(np.float32) for a in (squares, offsets, prior))
+        scores, levels = np.empty((2, len(WIDENINGS), len(u)))
+        for i, widening in enumerate(WIDENINGS):
+            scale = np.float32(1 / (widening**2 * noise.degrees))
+            fits = -half * np.log(1 + scale * squares) - offsets
+            largest = fits.max(axis=1, keepdims=True)
+            shares = np.exp(fits - largest)
+            total = shares.sum(axis=1)
+            evidence = np.log(total / shares.shape[1]) + largest[:, 0]
+            scores[i] = fits[:, -1] - evidence + prior_here
+            heights = fits + prior
+            denser = heights[:, :-1] > heights[:, -1:]
+            levels[i] = np.sum(shares[:, :-1] * denser, axis=1) / total
+        return scores, levels
+
+    def simulate(self, u: Array, generator: np.random.Generator) -> Array:
+        """Returns one draw of the leading axes at each row of `u` (n, p), shape (n, r)."""
+        return self.leading.simulate(u, generator, widening=self.widening)
+
+
+@dataclass(frozen=True)
+class Fold:
+    """A likelihood and pairs that it has not seen.
+
+    Attributes:
+        likelihood: fitted without them.
+        held: their rows, shape (h,).
+    """
+
+    likelihood: Likelihood
+    held: NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class _Growing:
+    """An emulator of all axes, of which any number of leading ones can be taken."""
+
+    prior: Prior
+    axes: SignalAxes
+    emulator: Emulator
+    white: Array
+
+    @classmethod
+    def fit(
+        cls,
+        u: Array,
+        z: Array,
+        prior: Prior,
+        lengths: Array,
+        features: int,
+        varying: bool,
+        seed: int,
+    ) -> "_Growing":
+        axes = SignalAxes.fit(_spread_one(u), z)
+        emulator, white = Emulator.fit(
+            u, axes.apply(z), lengths, features=features, varying_scale=varying, seed=seed
+        )
+        return cls(prior, axes, emulator, white)
+
+    def leading(self, count: int, *, heavy: bool) -> Likelihood:
+        leading = self.emulator.first(count, Noise.fit(self.white[:, :count], heavy=heavy))
+        return Likelihood(self.prior, self.axes, self.emulator, leading, 1.0)
+
+
+def averaging_share(y: Array, scales: Array) -> Array:
+    r"""Returns the share of the noise that k pours have each for themselves, shape (n,).
+
+    $$ \eta = \min(1, (1 + 2 \sqrt{2 / r (k-1)}) \, \mathrm{mean}_j \min(w_j^2 / s_j^2, 2)) $$
+
+    with $w_j$ the standard deviation between the pours: what the emulator calls noise and pours of
+    one material do not differ by is an error of the emulator. The factor is two standard deviations
+    of such a mean of $r (k-1)$ squares, so that noise that is all the pours' own counts as that.
+
+    Args:
+        y: signal axes of the pours, shape (k, r).
+        scales: what the emulator calls noise, shape (n, r).
+    """
+    pours, axes = y.shape
+    if pours == 1:
+        return np.ones(len(scales))
+    ratios = np.minimum(y.var(axis=0, ddof=1) / scales**2, _LARGEST_RATIO)
+    doubt = 1 + 2 * np.sqrt(2 / (axes * (pours - 1)))
+    return np.minimum(1.0, doubt * ratios.mean(axis=1))
+
+
+def pooled_scales(
+    prediction: Prediction, pours: int, widening: float, share: Array | float = 1.0
+) -> Array:
+    """Returns the square root of V_k at each predicted point, shape (n, s).
+
+    Args:
+        prediction: what is expected there.
+        pours: k.
+        widening: c.
+        share: of the noise that averages away, shape (n,) or a number.
+    """
+    noise, unknown = prediction.scales**2, prediction.unknown**2
+    own = noise * np.reshape(share, (-1, 1))
+    return np.sqrt(widening**2 * (noise + unknown) - (1 - 1 / pours) * own)
+
+
+def joint_density(prior: Prior, conditions: list[tuple[Likelihood, Array]]) -> ImportanceDensity:
+    """Returns the posterior of one material poured under one or several conditions.
+
+    Args:
+        prior: the prior, the same for all conditions.
+        conditions: for each the likelihood and its pours, standardised, shape (k, s).
+    """
+
+    def log_likelihood(u: Array, quick: bool) -> Array:
+        return np.sum([part.log_prob(z, u, quick=quick) for part, z in conditions], axis=0)
+
+    log_weights = np.sum([likelihood.start(z) for likelihood, z in conditions], axis=0)
+    return density_over_prior(prior, log_likelihood, conditions[0][0].pool, log_weights)
+
+
+def density_over_prior(
+    prior: Prior,
+    log_likelihood: Callable[[Array, bool], Array],
+    pool: Array,
+    log_weights: Array,
+    *,
+    mixtures: tuple[Mixture, ...] = (),
+) -> ImportanceDensity:
+    """Returns prior times likelihood, normalised; a proposal is adapted if few draws carry weight.
+
+    Args:
+        prior: the prior.
+        log_likelihood: up to a constant, of points inside the bounds, shape (n, p); the second
+            argument says whether the exactness of a weight will do.
+        pool: draws of the prior, shape (m, p).
+        log_weights: the log likelihood at them, shape (m,).
+        mixtures: kept with the result; where there are some, adaptation starts from them too.
+    """
+
+    def log_target(u: Array) -> Array:
+        return log_likelihood(u, False) + prior.coordinate_log_prob(u)
+
+    def weigh(u: Array) -> Array:
+        return log_likelihood(u, True) + prior.coordinate_log_prob(u)
+
+    found = ImportanceDensity.of_prior_draws(
+        prior, log_target, pool, log_weights, weigh=weigh, mixtures=mixtures
+    )
+    if found.effective_sample_size >= FEWEST_EFFECTIVE:
+        return found
+    # A few draws alone have no covariance.
+    weights = found.pool_weights + 1e-6
+    wide = prior_normal(prior)
+    first = kernel_estimate(pool, weights / weights.sum(), np.random.default_rng(0))
+    if mixtures:
+        first = mix(first, Mixture.pooled(list(mixtures)), 0.5)
+    start = mix(first, wide, DEFENSIVE_SHARE)
+    return ImportanceDensity.of(
+        prior, log_target, start, wide, effort=_EFFORT, weigh=weigh, mixtures=mixtures
+    )
+
+
+def linear_scores(u: Array, z: Array, train: NDArray[np.intp], held: NDArray[np.intp]) -> Array:
+    """Returns log densities of held parameters by linear regression on the statistics, (h,)."""
+    rows = np.column_stack([z, np.ones(len(z))])
+    gram = rows[train].T @ rows[train] + np.eye(rows.shape[1])
+    errors = u - rows @ np.linalg.solve(gram, rows[train].T @ u[train])
+    covariance = errors[train].T @ errors[train] / len(train) + 1e-9 * np.eye(u.shape[1])
+    white = np.linalg.solve(np.linalg.cholesky(covariance), errors[held].T)
+    return -0.5 * (np.sum(white**2, axis=0) + np.linalg.slogdet(2 * np.pi * covariance)[1])
+
+
+def _most_probable_of_the_honest(
+    scores: dict[_Form, Array], levels: dict[_Form, Array]
+) -> tuple[_Form, int]:
+    """Key and index of the highest mean score among those whose levels may be uniform."""
+    ranked = sorted(
+        ((float(row.mean()), key, i) for key, rows in scores.items() for i, row in enumerate(rows)),
+        reverse=True,
+    )
+    for _, key, i in ranked:
+        if uniform_p_value(levels[key][i]) >= _LEAST_P_VALUE:
+            return key, i
+    return ranked[0][1:]
+
+
+def _spread_one(u: Array) -> Array:
+    spread = u.std(axis=0)
+    return (u - u.mean(axis=0)) / np.where(spread > 0, spread, 1.0)

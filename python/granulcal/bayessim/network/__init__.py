@@ -1,0 +1,1 @@
+"""The network: a mixture density on random Fourier features, trained by PyTorch alone here."""

@@ -1,0 +1,1 @@
+"""The posterior of an observation: densities, their averages and products, draws and pictures."""

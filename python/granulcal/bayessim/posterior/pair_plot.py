@@ -1,0 +1,177 @@
+"""Figure of a posterior: marginals on the diagonal, pairs below it."""
+
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from granulcal.bayessim.arrays import as_matrix
+from granulcal.files import save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from granulcal.bayessim.posterior.posterior import Posterior
+
+__all__ = ["pair_plot"]
+
+Array = NDArray[np.float64]
+
+_COLOUR, _EXTRA_COLOUR, _TRUTH_COLOUR = "#1f5f8b", "#c8742b", "#b3202a"
+_LEVELS = (0.9, 0.5)
+_BINS = 50
+# Spread, in bins, of the smoothing of the two-dimensional histograms.
+_SMOOTHING = 1.5
+_DRAWS = 20_000
+_PANEL_INCHES = 2.3
+
+
+def pair_plot(
+    posterior: "Posterior",
+    *,
+    path: str | PathLike[str] | None = None,
+    truth: ArrayLike | None = None,
+    extra: "Posterior | None" = None,
+) -> "Figure":
+    """Returns the figure; axes span the prior's bounds, log parameters have log axes.
+
+    Contours hold 50 % and 90 % of the draws; a white-edged dot marks the mode, a red cross and
+    lines the truth.
+
+    Args:
+        posterior: what to draw.
+        path: where to save the figure, or None.
+        truth: true parameters, own units, shape (p,).
+        extra: another posterior of the same parameters, drawn in a second colour.
+
+    Raises:
+        ValueError: `truth` has another shape, or `extra` other parameters.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    names = posterior.names
+    if extra is not None and extra.names != names:
+        raise ValueError(f"extra must have the parameters {names}, got {extra.names}")
+    true_values = None if truth is None else as_matrix("truth", truth, columns=len(names))[0]
+    count = len(names)
+    side = _PANEL_INCHES * count + 0.6
+    figure = Figure(figsize=(side, side), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(count, count, squeeze=False)
+    for row in range(count):
+        for column in range(count):
+            _frame(axes[row][column], posterior, row, column)
+    shown = [(posterior, _COLOUR)] + ([(extra, _EXTRA_COLOUR)] if extra is not None else [])
+    for each, colour in shown:
+        _draw(axes, each, colour)
+    if true_values is not None:
+        _mark_truth(axes, true_values)
+    if path is not None:
+        save_figure(figure, path, dpi=160)
+    return figure
+
+
+def _frame(axis: Any, posterior: "Posterior", row: int, column: int) -> None:
+    """Sets limits, scales and labels of one panel, or hides it above the diagonal."""
+    if column > row:
+        axis.set_visible(False)
+        return
+    from matplotlib.ticker import NullFormatter
+
+    parameters = posterior.prior.free
+    if parameters[column].is_log:
+        axis.set_xscale("log")
+        axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_xlim(_limits(posterior, column))
+    if row != column:
+        if parameters[row].is_log:
+            axis.set_yscale("log")
+            axis.yaxis.set_minor_formatter(NullFormatter())
+        axis.set_ylim(_limits(posterior, row))
+    else:
+        axis.set_yticks([])
+        axis.spines[["left", "right", "top"]].set_visible(False)
+    is_last = row == len(parameters) - 1
+    axis.tick_params(labelsize=8, labelbottom=is_last, labelleft=column == 0 and row != column)
+    if is_last:
+        axis.set_xlabel(_label(parameters[column].path), fontsize=9)
+    if column == 0 and row != 0:
+        axis.set_ylabel(_label(parameters[row].path), fontsize=9)
+
+
+def _draw(axes: Any, posterior: "Posterior", colour: str) -> None:
+    mode = posterior.mode()
+    draws = posterior.prior.to_unconstrained(posterior.sample(_DRAWS, seed=0))
+    for i, marginal in enumerate(posterior.marginals().values()):
+        axis = axes[i][i]
+        axis.plot(marginal.grid, marginal.density, color=colour, linewidth=1.6)
+        axis.fill_between(marginal.grid, marginal.density, color=colour, alpha=0.15, linewidth=0)
+        axis.axvline(mode[i], color=colour, linewidth=1, linestyle=":")
+        axis.set_ylim(bottom=0)
+    for row in range(1, len(mode)):
+        for column in range(row):
+            axis = axes[row][column]
+            _contours(axis, posterior, draws, column, row, colour)
+            axis.plot(
+                mode[column], mode[row], "o", color=colour, markeredgecolor="white", markersize=6
+            )
+
+
+def _contours(
+    axis: Any, posterior: "Posterior", draws: Array, column: int, row: int, colour: str
+) -> None:
+    """Fills the regions of highest smoothed histogram density that hold the levels."""
+    parameters = posterior.prior.free
+    ranges = []
+    for i in (column, row):
+        values = np.array(_limits(posterior, i))
+        ranges.append(tuple(parameters[i].to_coordinate(values)))
+    counts, x_edges, y_edges = np.histogram2d(
+        draws[:, column], draws[:, row], bins=_BINS, range=ranges
+    )
+    smooth = _smoothed(counts)
+    order = np.sort(smooth.ravel())[::-1]
+    held = np.cumsum(order) / order.sum()
+    thresholds = [order[np.searchsorted(held, level)] for level in _LEVELS]
+    x = parameters[column].from_coordinate(0.5 * (x_edges[1:] + x_edges[:-1]))
+    y = parameters[row].from_coordinate(0.5 * (y_edges[1:] + y_edges[:-1]))
+    for low, alpha in zip(thresholds, (0.25, 0.45), strict=True):
+        top = max(smooth.max(), low) * 1.0001
+        axis.contourf(x, y, smooth.T, levels=[low, top], colors=[colour], alpha=alpha)
+    axis.contour(x, y, smooth.T, levels=sorted(set(thresholds)), colors=[colour], linewidths=0.8)
+
+
+def _smoothed(counts: Array) -> Array:
+    """Gaussian smoothing along both axes, mirrored at the edges."""
+    reach = int(4 * _SMOOTHING)
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / _SMOOTHING) ** 2)
+    kernel /= kernel.sum()
+    for axis in (0, 1):
+        width = [(reach, reach) if i == axis else (0, 0) for i in (0, 1)]
+        padded = np.pad(counts, width, mode="symmetric")
+        counts = np.apply_along_axis(np.convolve, axis, padded, kernel, mode="valid")
+    return counts
+
+
+def _mark_truth(axes: Any, truth: Array) -> None:
+    for row in range(len(truth)):
+        axes[row][row].axvline(truth[row], color=_TRUTH_COLOUR, linewidth=1.2)
+        for column in range(row):
+            axis = axes[row][column]
+            axis.plot(truth[column], truth[row], "x", color=_TRUTH_COLOUR, markersize=8)
+
+
+def _limits(posterior: "Posterior", i: int) -> tuple[float, float]:
+    """The prior's bounds, or its central 99.8 % where it has none."""
+    low, high = posterior.prior.free[i].bounds
+    near = posterior.prior.free[i].quantile(np.array([0.001, 0.999]))
+    return (
+        low if np.isfinite(low) else float(near[0]),
+        high if np.isfinite(high) else float(near[1]),
+    )
+
+
+def _label(path: str) -> str:
+    return path.rsplit(".", 1)[-1].replace("_", " ")

@@ -1,0 +1,234 @@
+"""A trained model as a folder: model.json and weights.safetensors, never pickle."""
+
+import json
+import os
+import shutil
+import tempfile
+import warnings
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypedDict
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load as read_tensors
+from safetensors.numpy import save as tensor_bytes
+
+from granulcal import _native
+from granulcal.bayessim.check.calibration import Calibration
+from granulcal.bayessim.check.identifiability import Identifiability
+from granulcal.bayessim.check.misfit import MisfitReference
+from granulcal.bayessim.emulator.likelihood import Likelihood
+from granulcal.bayessim.network.amortised import Amortised
+from granulcal.bayessim.network.standardise import Standardiser
+from granulcal.bayessim.posterior.average import FORMS, Average
+from granulcal.bayessim.storage.damage import hashes, in_order, verify
+from granulcal.bayessim.storage.model_schema import check_model
+from granulcal.bayessim.storage.tensors import Tensors, model_tensors
+from granulcal.bayessim.training.config import Config
+from granulcal.bayessim.training.summary import TrainingSummary
+from granulcal.documents import LARGEST_DOCUMENT, parse_json, read_bytes
+from granulcal.errors import ModelFormatError, UnverifiedModelWarning
+from granulcal.files import write_beside
+from granulcal.prior import Prior
+
+if TYPE_CHECKING:
+    from granulcal.bayessim.model import BayesSim
+
+__all__ = ["Parts", "load_parts", "save_model"]
+
+FORMAT, VERSION = "granulcal-bayessim", 4
+# Of these the emulator's weight is that of an arithmetic average.
+_OLDER_VERSIONS = (3,)
+_JSON_NAME, _TENSORS_NAME = "model.json", "weights.safetensors"
+
+
+class Parts(TypedDict):
+    """What a saved model is joined from: the arguments of `BayesSim`."""
+
+    prior: Prior
+    config: Config
+    standardiser: Standardiser
+    likelihood: Likelihood
+    amortised: Amortised | None
+    average: Average
+    x_names: tuple[str, ...]
+    misfit_reference: MisfitReference
+    summary: TrainingSummary
+    calibration: Calibration | None
+    identifiability: Identifiability | None
+    scene_toml: str | None
+
+
+def save_model(model: "BayesSim", path: str | PathLike[str]) -> None:
+    """Writes `model` to the folder `path`; a model already there is replaced, other files stay.
+
+    Raises:
+        FileExistsError: `path` exists and is not a saved model.
+    """
+    # A link to a folder stays a link.
+    target = Path(path).resolve() if Path(path).is_symlink() else Path(path)
+    if target.exists() and not (target / _JSON_NAME).is_file() and not _is_empty(target):
+        raise FileExistsError(f"{target} exists and is not a saved model; it is left as it is")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    workshop = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+    new, old = workshop / "new", workshop / "old"
+    try:
+        new.mkdir()
+        text = (json.dumps(_document(model), indent=1, allow_nan=False) + "\n").encode()
+        tensors = model_tensors(model)
+        write_beside(new / _JSON_NAME, text)
+        write_beside(
+            new / _TENSORS_NAME, in_order(tensor_bytes(tensors, metadata=hashes(text, tensors)))
+        )
+        if target.exists():
+            os.rename(target, old)
+        try:
+            os.rename(new, target)
+        except OSError:
+            if old.exists():
+                os.rename(old, target)
+            raise
+        _keep_others(old, target)
+    finally:
+        shutil.rmtree(workshop, ignore_errors=True)
+
+
+def load_parts(path: str | PathLike[str]) -> Parts:
+    """Returns what the model in the folder `path` is joined from; see `BayesSim.load`."""
+    folder = Path(path)
+    for name in (_JSON_NAME, _TENSORS_NAME):
+        if not (folder / name).is_file():
+            raise FileNotFoundError(f"{folder / name} does not exist: {folder} is no saved model")
+    where = folder / _JSON_NAME
+    text = read_bytes(where, most=LARGEST_DOCUMENT)
+    document = parse_json(text, where, error=ModelFormatError)
+    _check_header(document, where)
+    check_model(document, where)
+    data = read_bytes(folder / _TENSORS_NAME)
+    try:
+        tensors = read_tensors(data)
+    except (SafetensorError, ValueError, KeyError) as error:
+        raise ModelFormatError(f"{folder / _TENSORS_NAME} is truncated: {error}") from None
+    if not verify(text, where, data, tensors, folder / _TENSORS_NAME):
+        warnings.warn(
+            f"{folder} is a model of an earlier version without hashes: damage in it cannot be "
+            "found; train again to have them",
+            UnverifiedModelWarning,
+            stacklevel=3,
+        )
+    try:
+        prior = Prior.from_toml(document["prior_toml"])
+        config = Config(**document["config"])
+        x_names = tuple(document["x_names"])
+        tensors = Tensors(tensors, folder / _TENSORS_NAME, len(prior.names), len(x_names))
+        calibration, known = document["calibration"], document["identifiability"]
+        return Parts(
+            prior=prior,
+            config=config,
+            standardiser=tensors.standardiser(),
+            likelihood=tensors.likelihood(prior, config, document["emulator"]),
+            amortised=tensors.amortised(config) if document["has_network"] else None,
+            average=_average(document, where),
+            x_names=x_names,
+            misfit_reference=tensors.misfit(),
+            identifiability=None if known is None else Identifiability.from_dict(known),
+            summary=TrainingSummary.from_dict(document["summary"]),
+            calibration=None if calibration is None else Calibration.from_dict(calibration),
+            scene_toml=document["scene_toml"],
+        )
+    except KeyError as error:
+        raise ModelFormatError(f"{where} has no entry {error}") from None
+    except ModelFormatError:
+        raise
+    except (TypeError, ValueError, IndexError, OverflowError, np.linalg.LinAlgError) as error:
+        raise ModelFormatError(f"{where}: {error}") from None
+
+
+def _keep_others(old: Path, target: Path) -> None:
+    """Moves what else lay in the folder of the model before: plots, reports, notes."""
+    if not old.is_dir():
+        return
+    for entry in old.iterdir():
+        if not (target / entry.name).exists():
+            os.rename(entry, target / entry.name)
+
+
+def _document(model: "BayesSim") -> dict[str, Any]:
+    likelihood = model.likelihood
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "made_by": f"granulcal {_native.__version__}",
+        "prior_toml": model.prior.to_toml(),
+        "theta_names": model.prior.names,
+        "x_names": list(model.x_names),
+        "config": model.config.as_dict(),
+        "scene_toml": model.scene_toml,
+        "scene_hash": model.scene_hash,
+        "has_network": model.amortised is not None,
+        "average": model.average.form,
+        "emulator_weight": model.average.emulator,
+        "network_weight": model.average.network,
+        "emulator": {
+            "widening": likelihood.widening,
+            "degrees": likelihood.emulator.noise.degrees,
+            "leading_degrees": likelihood.leading.noise.degrees,
+            "axis_count": likelihood.axis_count,
+        },
+        "is_calibrated": None if model.calibration is None else model.calibration.is_calibrated,
+        "summary": model.summary.as_dict(),
+        "identifiability": None
+        if model.identifiability is None
+        else model.identifiability.as_dict(),
+        "calibration": None if model.calibration is None else model.calibration.as_dict(),
+    }
+
+
+def _check_header(document: Any, where: Path) -> None:
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise ModelFormatError(f"{where} is not a {FORMAT} file")
+    found = document.get("version")
+    if (
+        isinstance(found, bool)
+        or not isinstance(found, int)
+        or found not in (*_OLDER_VERSIONS, VERSION)
+    ):
+        made_by = document.get("made_by", "an earlier granulcal")
+        newer = isinstance(found, int) and found > VERSION
+        advice = "update granulcal" if newer else "train the model again"
+        raise ModelFormatError(
+            f"{where}: version must be {_versions()} (granulcal {_native.__version__}), "
+            f"got {found!r} (made by {made_by}): {advice}"
+        )
+
+
+def _versions() -> str:
+    """The versions that can be read, in words."""
+    return " or ".join(str(version) for version in (*_OLDER_VERSIONS, VERSION))
+
+
+def _average(document: dict[str, Any], where: Path) -> Average:
+    weight = document["emulator_weight"]
+    if document["version"] in _OLDER_VERSIONS:
+        found = Average(weight, 1 - weight, "arithmetic")
+    else:
+        found = Average(weight, document["network_weight"], document["average"])
+    if found.form not in FORMS:
+        raise ModelFormatError(
+            f"{where}: average must be one of {', '.join(FORMS)}, got {found.form!r}"
+        )
+    weights = {"emulator_weight": found.emulator, "network_weight": found.network}
+    for name, value in weights.items():
+        if not 0 <= value < float("inf") or (found.form == "arithmetic" and value > 1):
+            raise ModelFormatError(f"{where}: {name} must be a weight, got {value!r}")
+    if found.emulator + found.network == 0 or (found.network > 0 and not document["has_network"]):
+        raise ModelFormatError(
+            f"{where}: one weight must be positive, and the network's 0 without a network, got "
+            f"{found.emulator!r} and {found.network!r}"
+        )
+    return found
+
+
+def _is_empty(path: Path) -> bool:
+    return path.is_dir() and not any(path.iterdir())

@@ -1,0 +1,1 @@
+"""Training: pairs, settings, one fit, and rounds of pours for one observation."""

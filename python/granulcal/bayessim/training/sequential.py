@@ -1,0 +1,214 @@
+r"""One observation, few simulations: rounds of pours where the posterior may still be.
+
+A round fits the emulator to all pours so far and asks it where the observation can come from. The
+next parameters are drawn from
+
+$$ \tilde p(u) \propto (1 - d) p(u) L(u)^{1/2} + d p(u) $$
+
+with L the emulated likelihood and a share d of the prior; of twice as many draws of the first part
+as needed those are poured that lie farthest from all others, in spreads of the draws. The root
+keeps rounds wider than the posterior while the emulator is poor; the prior's share finds what it
+missed.
+
+The posterior needs no correction for the proposal: the emulator is a regression of the statistics
+on the parameters, which does not mind where the parameters came from, and the prior enters as
+itself. Every pour counts, also those that fail.
+
+Reference:
+    Deistler, Goncalves and Macke, Truncated proposals for scalable and hassle-free simulation-based
+    inference, NeurIPS 2022 (rounds without importance weights).
+    Kennard and Stone, Computer aided design of experiments, Technometrics 11, 1969 (farthest next).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from granulcal.bayessim.arrays import as_matrix
+from granulcal.bayessim.check.misfit import Misfit
+from granulcal.bayessim.emulator.likelihood import EmulatorChoice
+from granulcal.bayessim.posterior.posterior import Posterior
+from granulcal.bayessim.training.round_fit import RoundFit, first_design
+from granulcal.errors import ObservationError, TrainingDataError
+from granulcal.one_thread import one_thread
+from granulcal.prior import Prior
+
+__all__ = ["Round", "SequentialFit", "infer_within_budget", "round_sizes", "rounds_of"]
+
+Array = NDArray[np.float64]
+
+FEWEST_PAIRS = 20
+_FEWEST_BUDGET = 60
+_FIRST_SHARE = 0.4
+# Power of the likelihood that each later round is drawn by.
+_POWERS = (0.5, 0.5, 0.5)
+
+
+@dataclass(frozen=True)
+class Round:
+    """What is known after a round.
+
+    Attributes:
+        number: from 1.
+        rounds: rounds in all.
+        pours: poured so far.
+        usable: of them, with statistics.
+        budget: pours in all.
+        spread: standard deviations of the posterior over those of the prior, shape (p,).
+    """
+
+    number: int
+    rounds: int
+    pours: int
+    usable: int
+    budget: int
+    spread: Array
+
+    def __str__(self) -> str:
+        """One line."""
+        spread = ", ".join(f"{each:.2f}" for each in self.spread)
+        return (
+            f"round {self.number} of {self.rounds}: {self.pours} of {self.budget} pours, "
+            f"{self.usable} usable; spread of the posterior over the prior's: {spread}"
+        )
+
+
+@dataclass(frozen=True)
+class SequentialFit:
+    """The posterior of one observation within a budget.
+
+    Attributes:
+        posterior: of the parameters.
+        misfit: whether the observation is inside the model.
+        choice: what held-out pours say of the emulator.
+        theta: parameters of all pours, own units, shape (n, p).
+        x: their statistics, NaN where there are none, shape (n, s).
+        rounds: what was known after each.
+    """
+
+    posterior: Posterior
+    misfit: Misfit
+    choice: EmulatorChoice
+    theta: Array
+    x: Array
+    rounds: tuple[Round, ...]
+
+
+def round_sizes(budget: int) -> list[int]:
+    """Returns the pours of each round: two fifths from the prior, then three equal rounds.
+
+    Raises:
+        ValueError: a budget below 60.
+    """
+    if isinstance(budget, bool) or not isinstance(budget, int) or budget < _FEWEST_BUDGET:
+        raise ValueError(
+            f"budget must be a whole number of at least {_FEWEST_BUDGET} pours, got {budget!r}"
+        )
+    first = round(_FIRST_SHARE * budget)
+    ends = np.linspace(first, budget, len(_POWERS) + 1).round().astype(int)
+    return [first, *np.diff(ends).tolist()]
+
+
+@one_thread()
+def infer_within_budget(
+    simulate: Callable[[Array, int], Array],
+    prior: Prior,
+    x_obs: ArrayLike,
+    *,
+    budget: int = 100,
+    seed: int = 0,
+    x_names: tuple[str, ...] | None = None,
+    progress: Callable[[Round], None] | None = None,
+) -> SequentialFit:
+    """Returns the posterior given an observation, from `budget` simulations made for it.
+
+    The same arguments and simulations give the same parameters, so that a simulator which
+    remembers its rows makes a run resumable.
+
+    Args:
+        simulate: takes parameters in own units, shape (b, p), and the index of the first of them
+            among all; returns their statistics, shape (b, s), a row of NaN for a pour without.
+        prior: the prior.
+        x_obs: one pour, shape (s,), or k of one material, shape (k, s).
+        budget: simulations in all.
+        seed: seed of every random choice.
+        x_names: names of the statistics.
+        progress: called after each round.
+
+    Raises:
+        ObservationError: an observation that is not finite.
+        TrainingDataError: fewer than 20 pours of the first round can be used.
+        ValueError: a budget below 60.
+    """
+
+    def pour(design: Array, first: int) -> tuple[Array, Array]:
+        return design, as_matrix(
+            "simulated statistics", simulate(prior.from_unconstrained(design), first)
+        )
+
+    return rounds_of(
+        pour, prior, x_obs, budget=budget, seed=seed, x_names=x_names, progress=progress
+    )
+
+
+def rounds_of(
+    pour: Callable[[Array, int], tuple[Array, Array]],
+    prior: Prior,
+    x_obs: ArrayLike,
+    *,
+    budget: int,
+    seed: int = 0,
+    x_names: tuple[str, ...] | None = None,
+    progress: Callable[[Round], None] | None = None,
+) -> SequentialFit:
+    """Returns the same from pours that need not be where they were asked for.
+
+    Args:
+        pour: takes coordinates, shape (b, p), and the index of the first of them among all;
+            returns the coordinates that were poured, shape (b, p), and their statistics, (b, s).
+        prior: the prior.
+        x_obs: as in `infer_within_budget`, like the rest.
+        budget: pours in all.
+        seed: seed of every random choice.
+        x_names: names of the statistics.
+        progress: called after each round.
+    """
+    sizes = round_sizes(budget)
+    observed = np.atleast_2d(np.asarray(x_obs, dtype=float))
+    if observed.ndim != 2 or not np.all(np.isfinite(observed)):
+        raise ObservationError(f"x_obs must be finite, shape (s,) or (k, s), got {observed.shape}")
+    names = x_names or tuple(f"statistic_{i}" for i in range(observed.shape[1]))
+    u, x = np.empty((0, len(prior.names))), np.empty((0, observed.shape[1]))
+    rounds: list[Round] = []
+    fit: RoundFit | None = None
+    for number, size in enumerate(sizes, start=1):
+        design = (
+            first_design(prior, size, seed)
+            if fit is None
+            else fit.next(u, size, seed + number, _POWERS[number - 2])
+        )
+        poured, statistics = pour(design, len(u))
+        if statistics.shape != (size, observed.shape[1]):
+            raise TrainingDataError(
+                f"simulate must return shape {(size, observed.shape[1])}, got {statistics.shape}"
+            )
+        u, x = np.concatenate([u, poured]), np.concatenate([x, statistics])
+        usable = np.all(np.isfinite(x), axis=1)
+        if usable.sum() < FEWEST_PAIRS:
+            raise TrainingDataError(
+                f"at least {FEWEST_PAIRS} pours must be usable, {usable.sum()} of {len(u)} are: "
+                "a larger budget or a narrower prior is needed"
+            )
+        fit = RoundFit.of(prior, u[usable], x[usable], observed, seed)
+        draws = prior.to_unconstrained(fit.posterior.sample(2000))
+        spread = draws.std(axis=0) / fit.likelihood.pool.std(axis=0)
+        rounds.append(Round(number, len(sizes), len(u), int(usable.sum()), budget, spread))
+        if progress is not None:
+            progress(rounds[-1])
+    assert fit is not None
+    z = fit.standardiser.apply(observed, clip=False)
+    misfit = fit.reference().test(fit.likelihood, z, names)
+    theta = prior.from_unconstrained(u)
+    return SequentialFit(fit.posterior, misfit, fit.choice, theta, x, tuple(rounds))

@@ -1,0 +1,101 @@
+"""The word `calibrate`: a material from recordings with few pours, made for them alone."""
+
+import argparse
+import json
+import sys
+from typing import Any
+
+from granulcal.commands.reading import add_reading, exit_code_of, open_recordings
+from granulcal.files import write_beside
+from granulcal.paths import READS, writes
+
+__all__ = ["add"]
+
+
+_SAMPLES = 1000
+
+
+def add(commands: Any) -> None:
+    """Adds the word to the command line."""
+    text = "infer the parameters from recordings with few pours, made in rounds for them alone"
+    parser = commands.add_parser("calibrate", help=text, description=text)
+    parser.add_argument("scene", type=READS, help="scene as TOML, or the word funnel")
+    parser.add_argument("prior", type=READS, help="prior as TOML, or the word default")
+    add_reading(parser)
+    parser.add_argument("--budget", type=int, default=100, help="pours in all (default: 100)")
+    parser.add_argument(
+        "-o", "--out", type=writes("calibration"), required=True, help="folder; holds the pours"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of the run (default: 0)")
+    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from granulcal.engines import engine_named
+    from granulcal.pours.scene import Scene
+    from granulcal.prior import Prior
+    from granulcal.progress import ProgressLine
+    from granulcal.within_budget import calibrate_within
+
+    scene = Scene.named(options.scene)
+    prior = Prior.named(options.prior)
+    recordings = open_recordings(options)
+    line, first = ProgressLine(), []
+
+    def poured(kept: int) -> None:
+        # What was kept before the first pour of this run is not counted in the time that is left.
+        first.append(kept - 1)
+        line(options.budget, first[0], kept - first[0], 0)
+
+    found = calibrate_within(
+        scene,
+        prior,
+        recordings,
+        budget=options.budget,
+        out=options.out,
+        seed=options.seed,
+        threads=options.threads,
+        progress=lambda each: print(each, file=sys.stderr, flush=True),
+        poured=poured,
+        engine=None if options.engine is None else engine_named(options.engine),
+    )
+    line.close()
+    posterior = found.posterior
+    document = {
+        "recordings": [str(path) for path in options.recording],
+        "parameters": _parameters(posterior),
+        "inside_model": {"is_inside": found.misfit.is_inside, "p_value": found.misfit.p_value},
+        "pours": len(found.x),
+        "usable": found.rounds[-1].usable,
+        "warnings": [str(warning) for warning in posterior.warnings],
+        "samples": posterior.sample(_SAMPLES).tolist(),
+    }
+    write_beside(options.out / "posterior.json", json.dumps(document, indent=1) + "\n")
+    if options.json:
+        del document["samples"]
+        print(json.dumps(document, indent=1))
+        return exit_code_of(recordings)
+    print(found.misfit)
+    _print_parameters(document["parameters"])
+    print(f"{found.rounds[-1]}; {found.choice}")
+    for warning in document["warnings"]:
+        print(f"note: {warning}", file=sys.stderr)
+    return exit_code_of(recordings)
+
+
+def _parameters(posterior: Any) -> dict[str, dict[str, Any]]:
+    mode, mean, region = posterior.mode(), posterior.mean(), posterior.credible_region(0.9)
+    return {
+        name: {"mode": float(mode[i]), "mean": float(mean[i]), "interval90": list(region[name])}
+        for i, name in enumerate(posterior.names)
+    }
+
+
+def _print_parameters(parameters: dict[str, Any]) -> None:
+    print(f"{'parameter':<30}{'mode':>10}{'mean':>10}   90 % interval")
+    for name, values in parameters.items():
+        low, high = values["interval90"]
+        print(f"{name:<30}{values['mode']:>10.4g}{values['mean']:>10.4g}   {low:.4g} to {high:.4g}")

@@ -1,0 +1,59 @@
+"""The word `check`: what a model was made from, and whether its posteriors hold the truth."""
+
+import argparse
+from typing import Any
+
+from granulcal.commands.exit_code import DONE, UNHEALTHY
+from granulcal.paths import READS, writes
+
+__all__ = ["add"]
+
+
+def add(commands: Any) -> None:
+    """Adds the word to the command line."""
+    text = "say what a model was made from and whether its posteriors hold the truth"
+    parser = commands.add_parser("check", help=text, description=text)
+    parser.add_argument("model", type=READS, help="folder of `train`")
+    parser.add_argument(
+        "--data", type=READS, help="pours that the model was not trained on, to check it with"
+    )
+    parser.add_argument(
+        "--plots",
+        type=writes("plots"),
+        help="write coverage.png, sbc.png and training.png to this folder",
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON at the end")
+    parser.set_defaults(run=_run, tells=True)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from granulcal.bayessim import BayesSim
+    from granulcal.bayessim.training.pairs import TrainingPairs
+    from granulcal.pours.dataset import Dataset
+    from granulcal.starter.models import model_named
+
+    model = BayesSim.load(model_named(options.model))
+    print(model.summary)
+    calibration = model.calibration
+    if options.data is not None:
+        pairs = TrainingPairs.gather(Dataset.load(options.data), prior=model.prior, fewest=10)
+        if pairs.x_names != model.x_names:
+            raise ValueError(
+                f"{options.data} has the statistics {pairs.x_names}, the model {model.x_names}"
+            )
+        print(f"on the {len(pairs.theta)} usable pours of {options.data}:")
+        calibration = model.check(pairs.theta, pairs.x)
+    options.told["model"] = str(options.model)
+    options.told["calibrated"] = None if calibration is None else calibration.is_calibrated
+    if calibration is None:
+        print("  not checked: too few pours to keep some aside; give some with --data")
+        return UNHEALTHY
+    print(calibration)
+    if model.identifiability is not None:
+        print(model.identifiability)
+    if options.plots is not None:
+        calibration.plot(options.plots)
+        if model.summary.plot(options.plots / "training.png") is None:
+            print("no training.png: the posterior is the emulator's alone, no network was kept")
+        print(f"plots written to {options.plots}")
+    return DONE if calibration.is_calibrated else UNHEALTHY

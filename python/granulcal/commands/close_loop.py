@@ -1,0 +1,118 @@
+"""The word `close-loop` of the command line; the loop itself needs torch and is imported late."""
+
+import argparse
+import contextlib
+import shlex
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from granulcal.paths import KEPT, READS, writes
+
+__all__ = ["add"]
+
+_TEXT = "find what the model lacks, add it, and report the error before and after"
+_DESCRIPTION = """\
+Find what the model lacks, add it, and report the error before and after.
+
+TASK is a TOML file: a scene, a prior of the material, and recordings under at least one condition
+(pour heights, fluids, drum speeds), each condition to `fit` or `sealed`:
+
+    scene = "scene.toml"
+    prior = "prior.toml"
+    [[conditions]]
+    name = "4 cm"
+    at = { "funnel.height" = 0.04 }
+    use = "fit"
+    recordings = ["04cm/pour-0.png", "04cm/pour-1.png"]
+
+Written to the folder -o: preregistration.json (before any data is looked at), verdict.json,
+report.html, and the tables conditions, candidates and residuals.parquet. The archive of pours may
+serve many tasks of one scene; all of it is resumed after an interruption. Verdicts: NONE, RESIDUAL
+(not sure enough for a name), EFFECT, SET (not told apart), EFFECTS (two), UNEXPLAINED; and, with
+exit code 3, UNCONFIRMED (the surrogate is wrong at the fit) and OVERTURNED (by another definition
+of what is looked at, [[definitions]] of the task).
+"""
+# The exit code of what is done and does not stand.
+_FALLEN = 3
+
+
+def add(commands: Any) -> None:
+    """Adds the word to the command line."""
+    parser = commands.add_parser(
+        "close-loop",
+        help=_TEXT,
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("task", type=READS, help="TOML file, or the folder with its loop.toml")
+    parser.add_argument(
+        "-o", "--out", type=writes("loop"), required=True, help="folder of the report"
+    )
+    parser.add_argument("--archive", type=KEPT, help="folder of the pours (default: OUT/archive)")
+    parser.add_argument(
+        "--tolerances", type=READS, help="JSON of directions in which the statistics may be off"
+    )
+    parser.add_argument("--budget", type=int, default=4000, help="pours, all told (default: 4000)")
+    parser.add_argument(
+        "--pairs",
+        type=int,
+        default=0,
+        help="simulated pairs that calibrate the interval of a named effect's strength, of the "
+        "budget; at least 19 (default: none)",
+    )
+    parser.add_argument(
+        "--rounds",
+        type=int,
+        default=0,
+        help="rounds of further pours where the fits are, once a residual is found, after each of "
+        "which everything is asked again; 96 pours of the budget each (default: none)",
+    )
+    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
+    parser.add_argument("--json", action="store_true", help="print the verdict as JSON at the end")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    if not options.json:
+        return _close(options)
+    with contextlib.redirect_stdout(sys.stderr):
+        code = _close(options)
+    print((options.out / "verdict.json").read_text(encoding="utf-8"), end="")
+    return code
+
+
+def _close(options: argparse.Namespace) -> int:
+    from granulcal.loop.close import close_loop
+    from granulcal.loop.effects.tolerance import Tolerances
+    from granulcal.loop.report.folder import write_report
+    from granulcal.loop.task import Task
+
+    path = options.task / "loop.toml" if options.task.is_dir() else options.task
+    task = Task.load(path)
+    if options.tolerances is not None:
+        task = replace(task, tolerances=Tolerances.load(options.tolerances))
+    closed = close_loop(
+        task,
+        options.out,
+        archive=options.archive,
+        budget=options.budget,
+        threads=options.threads,
+        seed=options.seed,
+        pairs=options.pairs,
+        rounds=options.rounds,
+    )
+    words: list[str | Path] = ["granulcal", "close-loop", path, "-o", options.out]
+    for name in ("archive", "tolerances", "pairs", "rounds"):
+        if value := getattr(options, name):
+            words += [f"--{name}", str(value)]
+    words += ["--budget", str(options.budget), "--seed", str(options.seed)]
+    write_report(
+        closed,
+        options.out,
+        command=shlex.join(map(str, words)),
+        title=f"Closing the loop on {path}",
+    )
+    return 0 if closed.standing.stands else _FALLEN

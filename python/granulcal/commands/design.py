@@ -1,0 +1,250 @@
+"""The words `design rings` and `design spill` of the command line."""
+
+import argparse
+import sys
+from typing import Any
+
+from granulcal.paths import READS, writes
+
+__all__ = ["add"]
+
+_TEXT = "plan pours: the height of the funnel for a wanted ring, or the grains that a height spills"
+_RINGS = """\
+Find the height of the funnel for wanted rings and piles about one axis, and write a pour plan.
+
+A ring is two radii in metres: within the inner one lie 5 % of a pour's grains, within the outer one
+half. A pile is its outer radius alone. SCENE holds the grains and their material:
+
+  granulcal design rings couscous.toml --ring 0.136 0.223 --ring 0.040 0.073 --pile 0.034 -o plan
+  granulcal design rings funnel --posterior couscous.json --ring 0.040 0.073 -o plan
+
+--posterior takes the most probable material of that file, made by `infer -o` or `calibrate`.
+The first call simulates --pours pours from heights drawn between --heights and trains a model; it
+goes on after an interruption, and later calls with the same scene, heights, pours and seed use
+what is there. Or give the folder of `granulcal train`, of pours that vary funnel.height alone and
+observe radius[5] and radius[50].
+
+Written to -o: plan.csv and plan.json (height with its 90 % interval, expected radii with the spread
+between pours), plan.png (all pours simulated one after another). A ring beyond the heights of the
+training is refused unless --extrapolate, radii that no height gives together always.
+"""
+_SPILL = """\
+Find the probability that a pour spills grains, against the height of the funnel.
+
+SCENE has a funnel, something to pour into, and an [observe.spill] table (examples/bowl.toml).
+Pours from heights between --heights are simulated (it goes on after an interruption) and the number
+of spilled grains is modelled, so that each --grains k has its P(spilled >= k) with a 90 % band:
+
+  granulcal design spill examples/bowl.toml --grains 1 10 50 --heights 0.06 0.3 -o spill
+  granulcal design spill bowl.toml --posterior couscous.json --grains 10 -o spill
+
+With --posterior every pour has a material of its own from that file, and the band holds what is not
+known of the material; without it the scene's material is taken as known.
+Written to -o: pours.json, spill.csv, spill.json, spill.png.
+"""
+_UNHEALTHY = 3
+
+
+def add(commands: Any) -> None:
+    """Adds the word to the command line."""
+    parser = commands.add_parser("design", help=_TEXT, description=_TEXT)
+    parser.set_defaults(run=lambda _: parser.print_help() or 2)
+    words = parser.add_subparsers(title="what to design", metavar="WORD", dest="word")
+    _add_rings(words)
+    _add_spill(words)
+
+
+def _add_common(
+    parser: argparse.ArgumentParser, *, kind: str, pours: int, heights: tuple[float, ...]
+) -> None:
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        type=_assignment,
+        metavar="PATH=VALUE",
+        help="another number of the scene, as material.restitution=0.5; may be repeated",
+    )
+    parser.add_argument("--posterior", type=READS, help="JSON of `infer -o` or `calibrate`")
+    parser.add_argument(
+        "--heights",
+        nargs=2,
+        type=float,
+        metavar=("LOW", "HIGH"),
+        default=heights,
+        help=f"heights of the funnel's tip in metres (default: {heights[0]:g} {heights[1]:g})",
+    )
+    parser.add_argument("--pours", type=int, default=pours, help=f"how many (default: {pours})")
+    parser.add_argument(
+        "-o", "--out", type=writes(kind), required=True, help="folder; holds the pours"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
+    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+
+
+def _add_rings(words: Any) -> None:
+    parser = words.add_parser(
+        "rings",
+        help="heights for wanted rings and piles, as a pour plan",
+        description=_RINGS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("scene", type=READS, help="TOML, the word funnel, or folder of `train`")
+    parser.add_argument(
+        "--ring",
+        nargs=2,
+        type=float,
+        action="append",
+        default=[],
+        metavar=("INNER", "OUTER"),
+        help="radii [m] within which 5 %% and 50 %% of the grains lie; may be repeated",
+    )
+    parser.add_argument(
+        "--pile",
+        type=float,
+        action="append",
+        default=[],
+        metavar="OUTER",
+        help="radius [m] within which half of the grains lie; may be repeated",
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        default=0.1,
+        help="how far a radius may be off, over the outer radius (default: 0.1)",
+    )
+    parser.add_argument(
+        "--extrapolate", action="store_true", help="flag what lies beyond the training's heights"
+    )
+    parser.add_argument(
+        "--held-out",
+        type=int,
+        metavar="N",
+        help="infer the heights of N more pours and say how far they are off",
+    )
+    _add_common(parser, kind="rings", pours=400, heights=(0.01, 0.13))
+    parser.set_defaults(run=_rings)
+
+
+def _add_spill(words: Any) -> None:
+    parser = words.add_parser(
+        "spill",
+        help="probability of spilling k grains against the height",
+        description=_SPILL,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("scene", type=READS, help="TOML with an [observe.spill] table")
+    parser.add_argument(
+        "--grains",
+        type=int,
+        nargs="+",
+        default=[1, 10, 50],
+        metavar="K",
+        help="numbers of grains whose spilling is asked for (default: 1 10 50)",
+    )
+    parser.add_argument(
+        "--at-most",
+        type=float,
+        default=0.05,
+        metavar="P",
+        help="say from which height on each K is more probable than P (default: 0.05)",
+    )
+    _add_common(parser, kind="spill", pours=200, heights=(0.06, 0.3))
+    parser.set_defaults(run=_spill)
+
+
+def _rings(options: argparse.Namespace) -> int:
+    from granulcal.design.pattern import simulate_plan
+    from granulcal.design.picture import plan_picture
+    from granulcal.design.ring import Ring
+    from granulcal.design.rings import design_rings
+
+    rings = [Ring(outer=outer, inner=inner) for inner, outer in options.ring]
+    rings += [Ring(outer=outer) for outer in options.pile]
+    if not rings and options.held_out is None:
+        raise ValueError("nothing is wanted: give --ring INNER OUTER, --pile OUTER or --held-out N")
+    model = _ring_model(options)
+    print(model, file=sys.stderr if options.json else sys.stdout)
+    if options.held_out is not None:
+        # Seeds of the training and of its check must differ.
+        held_out = model.held_out(
+            options.held_out, seed=options.seed + 1, out=options.out, threads=options.threads
+        )
+        print(held_out, file=sys.stderr if options.json else sys.stdout)
+    if not rings:
+        return 0
+    plan = design_rings(model, rings, tolerance=options.tolerance, extrapolate=options.extrapolate)
+    plan.save(options.out)
+    pattern = simulate_plan(plan, seed=options.seed)
+    plan_picture(plan, pattern, options.out / "plan.png")
+    if options.json:
+        print((options.out / "plan.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(plan)
+        print(pattern)
+        print(f"written to {options.out}: plan.csv, plan.json, plan.png")
+    for note in pattern.notes:
+        print(f"note: {note}", file=sys.stderr)
+    return 0 if pattern.is_whole else _UNHEALTHY
+
+
+def _ring_model(options: argparse.Namespace) -> Any:
+    from granulcal.design.posterior_file import PosteriorDraws
+    from granulcal.design.ring_model import HEIGHT, RingModel
+
+    if options.scene.is_dir():
+        if options.set or options.posterior is not None:
+            raise ValueError("--set and --posterior need a scene; a trained model has its material")
+        return RingModel.load(options.scene)
+    scene = _scene(options)
+    if options.posterior is not None:
+        scene = PosteriorDraws.load(options.posterior).without(HEIGHT).at_mode(scene)
+    return RingModel.train(
+        scene,
+        heights=tuple(options.heights),
+        pours=options.pours,
+        out=options.out,
+        seed=options.seed,
+        threads=options.threads,
+    )
+
+
+def _spill(options: argparse.Namespace) -> int:
+    from granulcal.design.posterior_file import PosteriorDraws
+    from granulcal.design.spill import design_spill
+
+    draws = None if options.posterior is None else PosteriorDraws.load(options.posterior)
+    forecast = design_spill(
+        _scene(options),
+        heights=tuple(options.heights),
+        grains=options.grains,
+        pours=options.pours,
+        posterior=draws,
+        out=options.out,
+        seed=options.seed,
+        threads=options.threads,
+    )
+    forecast.save(options.out)
+    if options.json:
+        print((options.out / "spill.json").read_text(encoding="utf-8"), end="")
+        return 0
+    print(forecast)
+    for k in forecast.grains:
+        print(forecast.advice(k, options.at_most))
+    print(f"written to {options.out}: spill.csv, spill.json, spill.png")
+    return 0
+
+
+def _scene(options: argparse.Namespace) -> Any:
+    from granulcal.pours.scene import Scene
+
+    scene = Scene.named(options.scene)
+    return scene.with_(dict(options.set))
+
+
+def _assignment(text: str) -> tuple[str, float]:
+    path, mark, value = text.partition("=")
+    if not mark:
+        raise argparse.ArgumentTypeError(f"must be PATH=VALUE, got {text!r}")
+    return path, float(value)

@@ -1,0 +1,63 @@
+"""The word `infer`: the parameters of recordings, by granulcal-cli; the plot is drawn here."""
+
+import argparse
+import contextlib
+import importlib.util
+import io
+from typing import Any
+
+from granulcal import _native
+from granulcal.commands.exit_code import DONE, UNHEALTHY
+from granulcal.commands.reading import add_recordings, open_model, open_recordings
+from granulcal.paths import writes
+
+__all__ = ["add"]
+
+
+def add(commands: Any) -> None:
+    """Adds the word to the command line."""
+    text = "infer the parameters from recordings"
+    parser = commands.add_parser("infer", help=text, description=text)
+    add_recordings(parser)
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.add_argument(
+        "-o", "--out", type=writes("json"), help="write JSON with samples to this file"
+    )
+    parser.add_argument("--plot", type=writes("figure"), help="write the pair plot to this file")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Everything but the plot is by granulcal-cli, so that both say the same."""
+    from granulcal.starter.models import model_named
+
+    if options.plot is not None and importlib.util.find_spec("torch") is None:
+        raise ModuleNotFoundError("--plot needs PyTorch")
+    model = model_named(str(options.model))
+    words = ["granulcal", "infer", str(model), *map(str, options.recording)]
+    for name in ("camera", "topic", "camera_topic", "colour_topic", "first_frame", "scene", "out"):
+        value = getattr(options, name)
+        if value is not None:
+            words.append(f"--{name.replace('_', '-')}={value}")
+    words.append(f"--frames={options.frames or 'all'}")
+    if options.json:
+        words.append("--json")
+    code = _native.run_cli(words)
+    if options.plot is not None and code in (DONE, UNHEALTHY):
+        import numpy as np
+
+        model = open_model(options)
+        matched = {} if model.scene_toml is None else _matched(model.scene_toml)
+        with contextlib.redirect_stderr(io.StringIO()):
+            # What is lost of the recordings is told already.
+            recordings = open_recordings(options)
+        observed = [recording.formation(**matched).statistics() for recording in recordings]
+        model.posterior(np.array([np.asarray(each) for each in observed])).pair_plot(options.plot)
+    return code
+
+
+def _matched(scene_toml: str) -> dict[str, float]:
+    """Options with which a pixel is as wide on the ground as in the scene's images."""
+    from granulcal.pours.scene import Scene
+
+    return {"ground_resolution": Scene.from_toml(scene_toml).ground_resolution}

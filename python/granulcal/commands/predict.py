@@ -1,0 +1,84 @@
+"""The word `predict` of the command line: what a closed loop says of a condition not measured."""
+
+import argparse
+import json
+import os
+from typing import Any
+
+from granulcal.paths import READS
+
+__all__ = ["add"]
+
+_TEXT = "what the models of a closed loop say of a condition that was not measured"
+_DESCRIPTION = """\
+What the models of a closed loop say of a condition that was not measured, with intervals.
+
+LOOP is the folder -o of close-loop. The condition states the numbers in which the measured ones
+differ:
+
+    granulcal predict loop --at funnel.height=0.07               the verdict's model
+    granulcal predict loop --at funnel.height=0.07 --corrected   base model + its own residual
+    granulcal predict loop --at funnel.height=0.07 --model line  straight line through the means
+
+The correction knows no physics and holds between and near the measured conditions alone; farther
+away it is refused. Intervals are those of one pour.
+"""
+
+
+def add(commands: Any) -> None:
+    """Adds the word to the command line."""
+    parser = commands.add_parser(
+        "predict",
+        help=_TEXT,
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("loop", type=READS, help="folder -o of close-loop")
+    parser.add_argument(
+        "--at",
+        action="append",
+        required=True,
+        metavar="PATH=NUMBER",
+        help="a number of the condition; once for each",
+    )
+    kinds = parser.add_mutually_exclusive_group()
+    kinds.add_argument(
+        "--corrected",
+        action="store_const",
+        const="corrected",
+        dest="model",
+        help="the base model and its own interpolated residual; no physics, named nothing",
+    )
+    kinds.add_argument(
+        "--model",
+        choices=("base", "named", "corrected", "line", "nearest"),
+        help="which model predicts (default: named, the verdict's)",
+    )
+    parser.add_argument("--level", type=float, default=0.9, help="of the interval (default: 0.9)")
+    parser.add_argument("--pours", type=int, default=20, help="simulated pours (default: 20)")
+    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--json", action="store_true", help="everything as JSON on stdout")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from granulcal.loop.pours.forward import Forward
+    from granulcal.loop.report.models import Models, condition_of
+
+    models = Models.load(options.loop)
+    forward = Forward(options.loop / "pours", options.threads or os.cpu_count() or 1)
+    at = condition_of(options.at)
+    found = models.predict(
+        options.model or "named", at, forward, level=options.level, pours=options.pours
+    )
+    if options.json:
+        print(json.dumps({"at": at, "verdict": models.verdict, **found.to_dict()}, indent=1))
+        return 0
+    word = " ".join([models.verdict["kind"], *models.verdict["named"]])
+    print(f"{found.model} at {', '.join(options.at)}; the loop's verdict: {word}")
+    print(f"{'statistic':<24}{'middle':>12}{f'{100 * found.level:g} % from':>14}{'to':>12}")
+    for name, middle, low, high in zip(
+        found.names, found.middle, found.low, found.high, strict=True
+    ):
+        print(f"{name:<24}{middle:>12.5g}{low:>14.5g}{high:>12.5g}")
+    return 0

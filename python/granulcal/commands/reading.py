@@ -1,0 +1,106 @@
+"""Arguments and opening of recordings and models, which several words share."""
+
+import argparse
+import sys
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+from granulcal.commands.exit_code import DONE, UNHEALTHY
+from granulcal.paths import READS, RECORDING
+
+__all__ = [
+    "TRAINING",
+    "add_reading",
+    "add_recordings",
+    "exit_code_of",
+    "open_model",
+    "open_recordings",
+]
+
+# The data set that a model was trained on, in the model's folder.
+TRAINING = "training.parquet"
+
+
+def add_recordings(parser: argparse.ArgumentParser) -> None:
+    """Adds a model, recordings for it and the scene that it has to be of."""
+    parser.add_argument("model", type=READS, help="folder of `train`, or a scene of `model`")
+    add_reading(parser)
+    parser.add_argument(
+        "--scene", type=READS, help="refuse a model of another scene than this TOML"
+    )
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Adds recordings and how they are read."""
+    parser.add_argument(
+        "recording",
+        type=RECORDING,
+        nargs="+",
+        help=".bag, .mcap, .npz height map, 16-bit depth PNG or folder of PNGs; "
+        "several: pours of one material",
+    )
+    parser.add_argument("--camera", type=READS, help="TOML of the camera; PNGs need it")
+    parser.add_argument("--topic", help="topic of the depth images, where several fit")
+    parser.add_argument("--camera-topic", help="topic of the lens, where several fit")
+    parser.add_argument("--colour-topic", help="topic of the colour images, where several fit")
+    parser.add_argument(
+        "--frames",
+        type=_frames,
+        default=10,
+        help="frames to average, or all (default: the last 10)",
+    )
+    parser.add_argument("--first-frame", type=int, help="index of the first of them, from 0")
+
+
+def open_model(options: argparse.Namespace) -> Any:
+    """Returns the model that `add_recordings` names, if it is of the scene that is asked."""
+    from granulcal.starter.models import model_named
+
+    # Before PyTorch is loaded: a name that leads nowhere is told at once.
+    folder = model_named(options.model)
+    from granulcal.bayessim import BayesSim
+    from granulcal.calibrate import require_own_statistics, require_same_scene
+    from granulcal.pours.scene import Scene
+
+    model = BayesSim.load(folder)
+    require_own_statistics(model)
+    if options.scene is not None:
+        require_same_scene(model, Scene.load(options.scene))
+    return model
+
+
+def open_recordings(options: argparse.Namespace) -> list[Any]:
+    """Returns the recordings of `add_reading`; what is lost of them is told on stderr."""
+    from granulcal.measured.recording import DamagedRecordingWarning, Recording
+
+    opened: list[Any] = []
+    for path in options.recording:
+        with warnings.catch_warnings():
+            # Told below in the manner of a command line.
+            warnings.simplefilter("ignore", DamagedRecordingWarning)
+            recording = Recording.open(
+                path,
+                camera=options.camera,
+                topic=options.topic,
+                camera_topic=options.camera_topic,
+                colour_topic=options.colour_topic,
+                frames=options.frames,
+                first_frame=options.first_frame,
+            )
+        for line in recording.damage:
+            print(f"warning: {line}", file=sys.stderr)
+        if recording.lost is not None:
+            print(f"warning: {path}: {recording.lost}", file=sys.stderr)
+        opened.append(recording)
+    return opened
+
+
+def exit_code_of(recordings: Sequence[Any], is_healthy: bool = True) -> int:
+    """Returns the exit code: are all frames and pours as they should be?"""
+    is_whole = all(recording.lost is None for recording in recordings)
+    return DONE if is_healthy and is_whole else UNHEALTHY
+
+
+def _frames(text: str) -> int | None:
+    return None if text == "all" else int(text)

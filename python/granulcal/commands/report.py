@@ -1,0 +1,69 @@
+"""The word `report`: infer, simulate the result and write one HTML page."""
+
+import argparse
+import shlex
+from typing import Any
+
+from granulcal.commands.reading import (
+    TRAINING,
+    add_recordings,
+    exit_code_of,
+    open_model,
+    open_recordings,
+)
+from granulcal.paths import READS, writes
+
+__all__ = ["add"]
+
+
+def add(commands: Any) -> None:
+    """Adds the word to the command line."""
+    text = "infer, simulate the result and write one HTML page"
+    parser = commands.add_parser("report", help=text, description=text)
+    add_recordings(parser)
+    parser.add_argument("-o", "--out", type=writes("html"), required=True, help="the HTML file")
+    parser.add_argument("--seeds", type=int, default=3, help="pours to compare (default: 3)")
+    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument(
+        "--data", type=READS, help=f"training data (default: {TRAINING} in the model's folder)"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON at the end")
+    parser.set_defaults(run=_run, tells=True)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from granulcal.calibrate import calibrate
+    from granulcal.measured.recording import FRAMES
+    from granulcal.pours.dataset import Dataset
+    from granulcal.starter.models import model_named
+
+    if options.seeds < 1:
+        raise ValueError(f"--seeds must be at least 1, got {options.seeds}")
+    model = open_model(options)
+    folder = model_named(options.model)
+    data = Dataset.load(folder / TRAINING if options.data is None else options.data)
+    names = " ".join(str(path) for path in options.recording)
+    words = ["granulcal", "report", str(options.model), *map(str, options.recording)]
+    for name in ("camera", "topic", "camera_topic", "colour_topic", "first_frame"):
+        if getattr(options, name) is not None:
+            words += [f"--{name.replace('_', '-')}", str(getattr(options, name))]
+    if options.frames != FRAMES:
+        words += ["--frames", str(options.frames or "all")]
+    words += ["-o", str(options.out), "--seeds", str(options.seeds)]
+    recordings = open_recordings(options)
+    found = calibrate(
+        model,
+        data,
+        recordings,
+        report=options.out,
+        seeds=options.seeds,
+        threads=options.threads,
+        title=f"Calibration from {names}",
+        summary=f"Parameters of the scene {data.scene.name!r}, inferred from {names} "
+        f"with a model trained on {len(data)} pours.",
+        command=shlex.join(words),
+    )
+    print(found.report)
+    options.told["report"] = str(found.report)
+    is_healthy = all(p.status != "unhealthy" for p in [*found.pours, *found.prior_pours])
+    return exit_code_of(recordings, is_healthy)

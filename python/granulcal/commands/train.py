@@ -1,0 +1,57 @@
+"""The word `train`: BayesSim on a data set, checked on pours kept aside."""
+
+import argparse
+from typing import Any
+
+from granulcal.commands.exit_code import DONE
+from granulcal.commands.reading import TRAINING
+from granulcal.paths import READS, writes
+
+__all__ = ["add"]
+
+
+def add(commands: Any) -> None:
+    """Adds the word to the command line."""
+    text = "train BayesSim on a data set and check its calibration on pours kept aside"
+    parser = commands.add_parser("train", help=text, description=text)
+    parser.add_argument("data", type=READS, help="folder of `generate`, or one Parquet file")
+    parser.add_argument(
+        "-o", "--out", type=writes("model"), required=True, help="folder of the model"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of the training (default: 0)")
+    parser.add_argument(
+        "--method",
+        choices=("auto", "emulated", "distilled", "mdrff", "plain"),
+        default="auto",
+        help="emulated: learn the statistics of a material; mdrff: learn the material of "
+        "statistics; auto (default): the average of these two that says most about held-out "
+        "pours; distilled: a network that imitates the emulator; plain: the paper's recipe",
+    )
+    parser.add_argument(
+        "--components",
+        type=int,
+        nargs="+",
+        metavar="K",
+        help="Gaussians in the mixture of each of the network's five members (default: 5); of "
+        "several numbers the one of the best validation loss is kept",
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON at the end")
+    parser.set_defaults(run=_run, tells=True)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from granulcal.bayessim import BayesSim
+    from granulcal.pours.dataset import Dataset
+
+    data = Dataset.load(options.data)
+    told = options.told
+    settings: dict[str, Any] = {}
+    if options.components:
+        settings["components"] = tuple(options.components)
+    model = BayesSim.fit(data, seed=options.seed, method=options.method, **settings)
+    model.save(options.out)
+    data.save(options.out / TRAINING)
+    print(f"model written to {options.out}")
+    checked = None if model.calibration is None else model.calibration.is_calibrated
+    told |= {"model": str(options.out), "pours": len(data), "calibrated": checked}
+    return DONE

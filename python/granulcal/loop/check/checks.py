@@ -1,0 +1,172 @@
+"""What is checked once a verdict stands: its model, its interval, and the correction beside it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.loop.check.confirm import confirm
+from granulcal.loop.check.correction import Correction, corrections
+from granulcal.loop.check.coverage import Calibrated, calibrate
+from granulcal.loop.check.prior_pours import Look
+from granulcal.loop.check.standing import Moved
+from granulcal.loop.check.trivial import Group, TrivialRow, trivial_rows
+from granulcal.loop.pours.archive import Plan
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.pours.measures import Measures
+from granulcal.loop.pours.replicates import FEWEST, seeds_of_replicates
+from granulcal.loop.pours.scenes import faults_of, scene_of
+from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.surrogate import Surrogate
+from granulcal.loop.task import FIT, SEALED, Condition, Task
+from granulcal.loop.test.misfit import Improvement, compare
+from granulcal.loop.test.thresholds import Thresholds
+from granulcal.loop.test.trace import Trace, trace
+
+__all__ = ["calibrated", "confirmed", "corrected", "moved", "nearer", "trivial"]
+
+Array = NDArray[np.float64]
+
+# Seeds of pairs, apart from those of the archive and of the replicates; of one pair to the next.
+_PAIR_SEED, _PAIR_STEP = 9_000_011, 1000
+
+
+def confirmed(
+    surrogate: Surrogate,
+    plan: Plan,
+    fitted: tuple[Condition, ...],
+    found: Trace,
+    simulated: dict[str, tuple[Array, Array]],
+) -> float:
+    """Returns p of fresh pours of the verdict's model at its fit; NaN where too few are usable."""
+    rows = [(c, simulated[c.name][1]) for c in fitted]
+    fresh = [Observation.of(c.name, plan.unit(c.at), x) for c, x in rows if len(x) >= FEWEST]
+    return confirm(surrogate, found.fit_of(found.best), fresh) if fresh else float("nan")
+
+
+def calibrated(
+    forward: Forward,
+    task: Task,
+    plan: Plan,
+    surrogate: Surrogate,
+    found: Trace,
+    rules: Thresholds,
+    pairs: int,
+    seed: int,
+) -> Calibrated | None:
+    """Returns the interval of the named effect by simulated pairs; None if none were asked for."""
+    best = found.best
+    if pairs == 0 or len(best.effects) != 1:
+        return None
+    (name,) = best.effects
+
+    def pour(b: int, theta: Array, psi: float) -> list[Observation] | None:
+        observed = []
+        for condition in task.of(FIT):
+            scene = scene_of(task, condition, theta, {name: psi})
+            first = _PAIR_SEED + seed + _PAIR_STEP * b
+            seeds = range(first, first + len(condition.recordings))
+            rows = forward.limit(scene, seeds, faults_of(task, {name: psi}), task.coarse)
+            if len(rows) == 0:
+                return None
+            observed.append(Observation.of(condition.name, plan.unit(condition.at), rows))
+        return observed
+
+    model = found.model_of(best)
+    return calibrate(surrogate, model, pour, rules, count=pairs, seed=seed)
+
+
+def corrected(
+    task: Task,
+    plan: Plan,
+    surrogate: Surrogate,
+    found: Trace,
+    measured: dict[str, Array],
+    simulated: dict[str, tuple[Array, Array]],
+) -> tuple[Correction, ...]:
+    """Returns what the correction without physics leaves; none where nothing was detected."""
+    if found.verdict.kind == "NONE":
+        return ()
+    measures = Measures.of(task.scene)
+    rows = [
+        (c.name, plan.unit(c.at), measured[c.name], simulated[c.name][0])
+        for c in task.conditions
+        if len(simulated[c.name][0]) >= FEWEST
+    ]
+    return corrections(surrogate, found, rows, measures.names[: measures.head])
+
+
+def moved(
+    task: Task, plan: Plan, surrogate: Surrogate, rules: Thresholds, seed: int
+) -> tuple[Moved, ...]:
+    """Returns the verdicts of the pours to fit, looked at in every other way that was declared."""
+    found = []
+    for definition in task.definitions[1:]:
+        observed = [
+            Observation.of(c.name, plan.unit(c.at), c.statistics(task.scene))
+            for c in task.under(definition, FIT)
+        ]
+        there = trace(surrogate, observed, rules, seed=seed)
+        found.append(Moved(definition.name, there.verdict))
+    return tuple(found)
+
+
+def nearer(
+    forward: Forward,
+    task: Task,
+    found: Trace,
+    seen: Look | None,
+    measured: dict[str, Array],
+    simulated: dict[str, tuple[Array, Array]],
+    surrogate: Surrogate,
+    seed: int,
+) -> Improvement | None:
+    """Returns the error of the best random draw, poured anew (before), and of the fit (after).
+
+    None where nothing was looked at, or too few pours are usable.
+    """
+    if seen is None:
+        return None
+    strengths = dict(zip(seen.effects, seen.strengths[0].tolist(), strict=True))
+    size = Measures.of(task.scene).head
+    rows = []
+    for condition in task.of(FIT):
+        scene = scene_of(task, condition, seen.theta[0], strengths)
+        seeds, faults = seeds_of_replicates(seed), faults_of(task, strengths)
+        x = forward.limit(scene, seeds, faults, task.coarse)
+        at_fit = simulated[condition.name][1]
+        if min(len(x), len(at_fit)) < FEWEST:
+            return None
+        rows.append((condition.name, measured[condition.name], x, at_fit))
+    return compare(
+        [name for name, _, _, _ in rows],
+        [y[:, :size] for _, y, _, _ in rows],
+        [x[:, :size] for _, _, x, _ in rows],
+        [x[:, :size] for _, _, _, x in rows],
+        surrogate.raw_spread[:size],
+        seed=seed,
+    )
+
+
+def trivial(
+    task: Task,
+    plan: Plan,
+    measured: dict[str, Array],
+    simulated: dict[str, tuple[Array, Array]],
+    surrogate: Surrogate,
+    seed: int,
+) -> tuple[TrivialRow, ...]:
+    """Returns what needs no physics under the sealed conditions; none without any."""
+    size = Measures.of(task.scene).head
+
+    def groups(use: str) -> list[Group]:
+        return [
+            Group(
+                c.name,
+                plan.unit(c.at),
+                measured[c.name][:, :size],
+                *(rows[:, :size] for rows in simulated[c.name]),
+            )
+            for c in task.of(use)
+            if min(len(rows) for rows in simulated[c.name]) >= FEWEST
+        ]
+
+    return trivial_rows(groups(FIT), groups(SEALED), surrogate.raw_spread[:size], seed=seed)

@@ -1,0 +1,175 @@
+"""Whether a verdict stands: what may overturn it once it has been found.
+
+| check | what it asks | if it fails |
+|---|---|---|
+| surrogate | fresh pours of the model are where the surrogate says, p > `confirm` | UNCONFIRMED |
+| look | no random draw of the model is nearer to the data than its fit | UNCONFIRMED |
+| definitions | the same verdict with every threshold and definition moved | OVERTURNED |
+| sealed rows | the named effect beats what needs no physics (`trivial.py`) | said beside the name |
+
+The first two hold for every word, NONE as well: nothing may be said from a fit that rests where the
+surrogate is wrong. The last takes no word away, for a name may be right and yet predict no better
+than a straight line; but it is said wherever the name is.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from granulcal.loop.check.trivial import TrivialRow
+from granulcal.loop.test.misfit import Improvement
+from granulcal.loop.test.thresholds import Thresholds
+from granulcal.loop.test.verdict import NAMING, Verdict
+
+__all__ = ["FALLEN", "Moved", "Standing", "overturned", "stand"]
+
+FALLEN = ("UNCONFIRMED", "OVERTURNED")
+"""Words of a verdict that does not stand."""
+
+
+@dataclass(frozen=True)
+class Moved:
+    """The verdict under another definition.
+
+    Attributes:
+        definition: its name.
+        verdict: what the same pours say, looked at that way.
+    """
+
+    definition: str
+    verdict: Verdict
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns it for JSON."""
+        return {
+            "definition": self.definition,
+            "verdict": self.verdict.kind,
+            "named": list(self.verdict.named),
+            "p": self.verdict.p,
+        }
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What the checks said.
+
+    Attributes:
+        verdict: the final one.
+        before: the verdict before the checks.
+        confirmed: p of fresh pours; NaN where none was usable.
+        draws: random draws of the model that were poured.
+        nearer: D^2 of the best draw less that of the fit, with 95 %; None where neither was poured.
+        moved: verdicts under the other definitions.
+        trivial: rows of sealed conditions that need no physics.
+    """
+
+    verdict: Verdict
+    before: Verdict
+    confirmed: float
+    draws: int
+    nearer: Improvement | None
+    moved: tuple[Moved, ...]
+    trivial: tuple[TrivialRow, ...]
+
+    @property
+    def stands(self) -> bool:
+        """Whether no check has taken the word away."""
+        return self.verdict.kind not in FALLEN
+
+    @property
+    def unbeaten(self) -> tuple[str, ...]:
+        """Rows without physics that the named effect does not beat at the sealed conditions."""
+        if self.before.kind not in NAMING:
+            return ()
+        return tuple(row.name for row in self.trivial if not row.is_beaten)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns it for JSON."""
+        return {
+            "stands": self.stands,
+            "verdict_before_checks": self.before.kind,
+            "confirmed_p": None if self.confirmed != self.confirmed else self.confirmed,
+            "random_draws": self.draws,
+            "fit_less_best_draw": None if self.nearer is None else -self.nearer.gain,
+            "definitions": [one.to_dict() for one in self.moved],
+            "sealed_rows": [row.to_dict() for row in self.trivial],
+            "not_beaten": list(self.unbeaten),
+        }
+
+
+def overturned(verdict: Verdict, other: Verdict, name: float) -> bool:
+    """Returns whether `other`, of the same pours looked at otherwise, contradicts `verdict`.
+
+    Args:
+        verdict: the registered one.
+        other: under a moved definition.
+        name: largest p at which something may be named.
+    """
+    if verdict.kind in NAMING:
+        return not set(verdict.families) & set(other.families)
+    if verdict.kind == "NONE":
+        return other.p <= name
+    return other.kind == "NONE"
+
+
+def stand(
+    before: Verdict,
+    rules: Thresholds,
+    *,
+    confirmed: float,
+    draws: int = 0,
+    nearer: Improvement | None = None,
+    moved: Sequence[Moved] = (),
+    trivial: Sequence[TrivialRow] = (),
+) -> Standing:
+    """Returns the final verdict.
+
+    Args:
+        before: the verdict of the fits.
+        rules: what was fixed beforehand.
+        confirmed: p of fresh pours of the verdict's model; NaN counts as failed.
+        draws: random draws that were poured.
+        nearer: from the best of them (before) to the fit (after), conditions to fit.
+        moved: verdicts under other definitions.
+        trivial: rows of the sealed conditions.
+    """
+    verdict = before
+    against = [one for one in moved if overturned(before, one.verdict, rules.name)]
+    if against:
+        words = ", ".join(f"{one.verdict.kind} under {one.definition}" for one in against)
+        verdict = _fallen("OVERTURNED", before, f"{_said(before)}, but {words}")
+    if nearer is not None and nearer.gain_interval[1] < 0:
+        off, best = nearer.total_after.square, nearer.total_before.square
+        why = (
+            "a random draw of the model is nearer to the data than its fit "
+            f"(D² {best:.3g}, {off:.3g})"
+        )
+        verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
+    if not confirmed > rules.confirm:
+        why = (
+            "no fresh pour of its model is usable"
+            if confirmed != confirmed
+            else f"the surrogate is wrong at its fit (p = {confirmed:.3g} of fresh pours)"
+        )
+        verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
+    found = Standing(verdict, before, confirmed, draws, nearer, tuple(moved), tuple(trivial))
+    if found.stands and found.unbeaten:
+        rows = " nor ".join(found.unbeaten)
+        said = Verdict(
+            verdict.kind,
+            verdict.named,
+            verdict.families,
+            verdict.p,
+            f"{verdict.reason}; at the sealed conditions it does not beat {rows}",
+        )
+        return Standing(said, before, confirmed, draws, nearer, tuple(moved), tuple(trivial))
+    return found
+
+
+def _fallen(kind: str, before: Verdict, why: str) -> Verdict:
+    return Verdict(kind, (), (), before.p, why)
+
+
+def _said(verdict: Verdict) -> str:
+    named = f" {', '.join(verdict.named)}" if verdict.named else ""
+    return f"the fits say {verdict.kind}{named}"

@@ -1,0 +1,1 @@
+"""Pours of the loop: scenes under conditions, the archive of all, and what is measured of them."""

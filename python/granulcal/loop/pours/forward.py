@@ -1,0 +1,134 @@
+"""Pours of one model under every condition: what a verdict is held against. None is run twice."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal import _native
+from granulcal.files import beside
+from granulcal.loop.pours.measures import Measures
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import simulate
+
+__all__ = ["UNUSABLE", "Coarse", "Forward"]
+
+Array = NDArray[np.float64]
+
+# From one of the pours that are averaged to the next.
+_REPEAT_STEP = 1_000_000_007
+
+UNUSABLE = ("unhealthy", "jammed")
+"""Statuses of pours that nothing is learnt from."""
+
+
+class Forward:
+    """Runs pours and keeps their statistics, by scene and seed.
+
+    Args:
+        folder: of the kept ones.
+        threads: pours at once.
+    """
+
+    def __init__(self, folder: Path, threads: int) -> None:
+        """Begins or goes on with a folder."""
+        self.folder, self.threads = folder, threads
+        self.ran = 0
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def pours(
+        self, scene: Scene, seeds: Sequence[int], faults: Mapping[str, float] | None = None
+    ) -> Array:
+        """Returns the statistics of usable pours, shape (n <= len(seeds), s).
+
+        `faults` are those of the image, by kind.
+        """
+        names = Measures.of(scene).names
+        of = [_native.__version__, names, scene.to_toml(), list(seeds)]
+        text = json.dumps([*of, dict(faults)] if faults else of)
+        path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
+        kept = _kept(path)
+        if kept is not None:
+            return kept
+        with ThreadPoolExecutor(self.threads) as pool:
+            made = pool.map(lambda seed: _row(scene, seed, faults), seeds)
+            rows = [row for row in made if row is not None]
+        self.ran += len(seeds)
+        found = np.array(rows).reshape(len(rows), len(names))
+        with beside(path) as temporary:
+            np.savez(temporary, found=found)
+        return found
+
+    def limit(
+        self,
+        scene: Scene,
+        seeds: Sequence[int],
+        faults: Mapping[str, float] | None = None,
+        coarse: "Coarse | None" = None,
+    ) -> Array:
+        """Returns the pours in the limit of the real grains' size, shape (n <= len(seeds), s).
+
+        Pours at the scene's size and at the coarse one, `x_1 + psi (x_2 - x_1)`, each the mean of
+        so many that it scatters as one pour does; with no coarse size those of the scene.
+        """
+        if coarse is None:
+            return self.pours(scene, seeds, faults)
+        repeated = [seed + _REPEAT_STEP * i for seed in seeds for i in range(coarse.repeats)]
+        fine = self.pours(scene, repeated, faults)
+        other = self.pours(scene.with_(coarse.numbers), repeated, faults)
+        count = min(len(fine), len(other)) // coarse.repeats
+        fine, other = (
+            rows[: count * coarse.repeats].reshape(count, coarse.repeats, -1).mean(axis=1)
+            for rows in (fine, other)
+        )
+        return fine + coarse.held * (other - fine)
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """The second size of grains, and where the real ones lie.
+
+    Attributes:
+        numbers: of the scene with coarse grains, by path.
+        held: psi of the real size, 0 at the scene's and 1 at the coarse one.
+    """
+
+    numbers: dict[str, float]
+    held: float
+
+    @property
+    def repeats(self) -> int:
+        """Pours at each size whose mean, taken to the limit, scatters no more than one pour."""
+        return ceil((1 - self.held) ** 2 + self.held**2)
+
+
+def _kept(path: Path) -> Array | None:
+    """The rows of a file; None where there is none, or a damaged one: it can be made again."""
+    # Of before there was a checksum.
+    older = path.with_suffix(".npy")
+    try:
+        if not path.exists():
+            return np.load(older) if older.exists() else None
+        with np.load(path) as file:
+            return file["found"]
+    except (ValueError, KeyError, EOFError, OSError, BadZipFile):
+        return None
+
+
+def _row(scene: Scene, seed: int, faults: Mapping[str, float] | None) -> Array | None:
+    pour = simulate(scene, seed=seed)
+    if pour.status in UNUSABLE:
+        return None
+    try:
+        found = Measures.of(scene).of_pour(pour, faults)
+    except ValueError:
+        # Too few grains in view.
+        return None
+    return found if np.isfinite(found).all() else None

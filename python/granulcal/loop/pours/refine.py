@@ -1,0 +1,96 @@
+r"""Further pours where the fits are, so that the surrogate is right at the models that matter.
+
+An archive is spread over the whole prior and thin at any one place; where its error is as large as
+what is left of a fit, a model looks adequate for want of pours. Once the gate has opened, pours at
+
+$$ w \sim N(\hat w, (J^T V^{-1} J + \Lambda)^{-1}) $$
+
+of the base model and of the most probable ones, under the conditions to fit, join the archive's
+rows, and everything is asked again of the new surrogate. A set without any effect has to pass the
+gate twice to be named: false alarms can only become fewer.
+
+Reference:
+    docs/theory/loop.md; sequential design at the posterior: Kandasamy et al., Query efficient
+    posterior estimation in scientific experiments via Bayesian active learning, Artificial
+    Intelligence 243, 2017.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.loop.pours.archive import Plan
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.pours.scenes import faults_of, scene_of
+from granulcal.loop.surrogate.baseline import Fit
+from granulcal.loop.surrogate.fit_draws import draw
+from granulcal.loop.task import FIT, Task
+from granulcal.loop.test.trace import Trace
+
+__all__ = ["ROUND", "Rows", "further"]
+
+Array = NDArray[np.float64]
+
+# Models besides the base one, and pours of each, in a round.
+_MODELS, _EACH = 3, 24
+ROUND = (1 + _MODELS) * _EACH
+"""Most pours in a round."""
+# Seeds of these pours, apart from those of the archive and of the replicates; of a round, a model.
+_SEED, _ROUND_STEP, _MODEL_STEP = 9_500_021, 10_000, 100
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Pours in unit coordinates, as `archive.Pours` has them.
+
+    Attributes:
+        theta: shape (n, p).
+        condition: shape (n, q).
+        psi: shape (n, K).
+        x: shape (n, s).
+    """
+
+    theta: Array
+    condition: Array
+    psi: Array
+    x: Array
+
+
+def further(
+    forward: Forward, task: Task, plan: Plan, found: Trace, number: int, seed: int
+) -> list[Rows]:
+    """Runs the pours of round `number`; those of effects on the camera's lengths need none."""
+    free = {effect.name for effect in task.library if effect.camera}
+    fits = [found.base_fit, *(model.fit for model in found.models)]
+    effects = [[plan.design.effects[k].name for k in fit.active] for fit in fits]
+    asked = [(f, e) for f, e in zip(fits, effects, strict=True) if not free & set(e)]
+    first = _SEED + seed + _ROUND_STEP * number
+    made = []
+    for i, (fit, names) in enumerate(asked[: 1 + _MODELS]):
+        rows = _of_model(forward, task, plan, fit, names, first + _MODEL_STEP * i)
+        if rows is not None:
+            made.append(rows)
+    return made
+
+
+def _of_model(
+    forward: Forward, task: Task, plan: Plan, fit: Fit, names: list[str], seed: int
+) -> Rows | None:
+    conditions = task.of(FIT)
+    kept: list[tuple[Array, Array, Array, Array]] = []
+    for i, (theta, strengths) in enumerate(
+        zip(*draw(fit, plan.design, _EACH, seed=seed), strict=True)
+    ):
+        condition = conditions[i % len(conditions)]
+        own = dict(zip(names, strengths.tolist(), strict=True))
+        scene = scene_of(task, condition, theta, own)
+        found = forward.pours(scene, [seed + i], faults_of(task, own))
+        if len(found):
+            psi = np.zeros(len(plan.design.effects))
+            psi[list(fit.active)] = strengths
+            kept.append((theta, plan.unit(condition.at), psi, found[0]))
+    if not kept:
+        return None
+    theta, where, psi, x = (np.array(column) for column in zip(*kept, strict=True))
+    return Rows(theta, where.reshape(len(kept), -1), psi, x)

@@ -1,0 +1,105 @@
+"""Pours of the base and of the verdict's model at their fits, and their distance to the data."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.errors import ObservationError
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.pours.measures import Measures
+from granulcal.loop.pours.scenes import faults_of, scene_of
+from granulcal.loop.surrogate.surrogate import Surrogate
+from granulcal.loop.task import Condition, Task
+from granulcal.loop.test.misfit import Improvement, compare
+from granulcal.loop.test.trace import Explanation, Trace
+from granulcal.pours.scene import Scene
+
+__all__ = [
+    "FEWEST",
+    "REPLICATES",
+    "both",
+    "error_of",
+    "model_faults",
+    "model_scene",
+    "placebo_of",
+    "seeds_of_replicates",
+]
+
+Array = NDArray[np.float64]
+
+REPLICATES = 10
+"""Simulated pours of each model under each condition."""
+FEWEST = 2
+"""Fewest of them that say something of an error."""
+# Seeds of replicates, apart from those of the archive.
+_SEED = 7_000_003
+
+
+def seeds_of_replicates(seed: int) -> list[int]:
+    """Returns the seeds of a model's pours at its fit."""
+    return [_SEED + seed + i for i in range(REPLICATES)]
+
+
+def model_scene(task: Task, condition: Condition, one: Explanation) -> Scene:
+    """Returns the scene of a model at its best fit under a condition."""
+    strengths = dict(zip(one.effects, one.best_strengths.tolist(), strict=True))
+    return scene_of(task, condition, one.theta, strengths)
+
+
+def model_faults(task: Task, one: Explanation) -> dict[str, float]:
+    """Returns the faults of the image of a model at its best fit, by kind."""
+    return faults_of(task, dict(zip(one.effects, one.best_strengths.tolist(), strict=True)))
+
+
+def both(
+    forward: Forward, task: Task, condition: Condition, found: Trace, seed: int
+) -> tuple[Array, Array]:
+    """Returns pours of the base and of the augmented model under a condition."""
+    seeds = seeds_of_replicates(seed)
+    before = forward.limit(model_scene(task, condition, found.base), seeds, None, task.coarse)
+    if found.best is found.base:
+        return before, before
+    after = model_scene(task, condition, found.best)
+    faults = model_faults(task, found.best)
+    return before, forward.limit(after, seeds, faults, task.coarse)
+
+
+def placebo_of(
+    forward: Forward, task: Task, condition: Condition, found: Trace, seed: int
+) -> Array:
+    """Returns as many pours of the base model at its fit as were measured."""
+    seeds = [_SEED + seed + REPLICATES + i for i in range(len(condition.recordings))]
+    return forward.limit(model_scene(task, condition, found.base), seeds, None, task.coarse)
+
+
+def error_of(
+    task: Task,
+    conditions: tuple[Condition, ...],
+    measured: dict[str, Array],
+    simulated: dict[str, tuple[Array, Array]],
+    surrogate: Surrogate,
+    seed: int,
+) -> Improvement:
+    """Returns the error before and after over the archive's spread.
+
+    Of the paper's 16 statistics, or of all that the scene observes.
+    Conditions under which a model's pours jam or leave the view have no error to tell: left out.
+
+    Raises:
+        ObservationError: no condition is left.
+    """
+    size = Measures.of(task.scene).head
+    spread = surrogate.raw_spread[:size]
+    told = [c for c in conditions if min(len(rows) for rows in simulated[c.name]) >= FEWEST]
+    if not told:
+        raise ObservationError(
+            f"fewer than {FEWEST} of {REPLICATES} pours at the fit are usable under every one of "
+            f"{', '.join(c.name for c in conditions)}: grains jam, leave the view or are unhealthy"
+        )
+    return compare(
+        [c.name for c in told],
+        [measured[c.name][:, :size] for c in told],
+        [simulated[c.name][0][:, :size] for c in told],
+        [simulated[c.name][1][:, :size] for c in told],
+        spread,
+        seed=seed,
+    )

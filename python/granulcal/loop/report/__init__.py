@@ -1,0 +1,1 @@
+"""What a closed loop leaves: page, tables, models, and predictions from them."""

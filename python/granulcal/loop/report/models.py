@@ -1,0 +1,309 @@
+r"""What a closed loop predicts where nothing was measured, from one file: `models.json`.
+
+| model | prediction under a condition c |
+|---|---|
+| `base` | pours of the base model at draws of its fit |
+| `named` | pours of the verdict's model at draws of its fit; the base model where none is named |
+| `corrected` | pours of the base model at its fit, moved by the correction without physics |
+| `line` | the straight line through the measured means of the conditions to fit |
+| `nearest` | the mean of the nearest of these |
+
+The interval of a prediction is that of one pour. Of simulated models it is the spread of pours at
+draws of the fit; of `corrected` that of pours at the fit and of $\hat\delta(c)$ (`discrepancy.py`)
+together, on the scale z of the surrogate; of `line` and `nearest` the scatter of pours and, where
+three conditions or more were fitted, the error with which the row tells each from the others.
+`corrected` is refused farther from the tested conditions than its equation holds.
+"""
+
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.errors import ObservationError
+from granulcal.files import write_beside
+from granulcal.loop.check.discrepancy import Discrepancy
+from granulcal.loop.check.trivial import line_weights, nearest_weights
+from granulcal.loop.effects.definitions import is_definition
+from granulcal.loop.pours.forward import Coarse, Forward
+from granulcal.loop.surrogate.transform import Transform
+from granulcal.pours.scene import Scene
+
+__all__ = ["MODELS", "Maker", "Models", "Prediction", "condition_of"]
+
+Array = NDArray[np.float64]
+
+MODELS = ("base", "named", "corrected", "line", "nearest")
+"""What may predict."""
+
+_NAME = "models.json"
+# Seeds of pours, apart from those of the archive and of the replicates.
+_SEED = 8_500_003
+# Draws of the correction for each pour.
+_EACH = 40
+_FEWEST = 2
+
+
+@dataclass(frozen=True)
+class Maker:
+    """Numbers of the scene that make one pour of a model.
+
+    Attributes:
+        numbers: by path.
+        shifts: added to the condition's own numbers, by path.
+        faults: of the image, by kind.
+    """
+
+    numbers: dict[str, float]
+    shifts: dict[str, float]
+    faults: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Statistics under a condition.
+
+    Attributes:
+        model: one of `MODELS`.
+        names: of the statistics, s of them.
+        middle: mean, shape (s,).
+        low, high: ends of the interval, shape (s,).
+        level: of the interval.
+    """
+
+    model: str
+    names: tuple[str, ...]
+    middle: Array
+    low: Array
+    high: Array
+    level: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns it for JSON."""
+        return {
+            "model": self.model,
+            "level": self.level,
+            "statistics": {
+                name: {"middle": float(m), "low": float(a), "high": float(b)}
+                for name, m, a, b in zip(self.names, self.middle, self.low, self.high, strict=True)
+            },
+        }
+
+
+@dataclass(frozen=True)
+class Models:
+    """The models of a closed loop.
+
+    Attributes:
+        scene: without a condition's numbers.
+        verdict: the word and the names.
+        paths: numbers that a condition states.
+        inputs: path, least and largest value of each input of the archive.
+        names: of the statistics, s of them.
+        makers: of `base` and `named`: at the fit first, then draws of it.
+        columns: statistics that the surrogate has, m of them.
+        transforms: of these.
+        correction: the discrepancy of the base fit; None where it was not made.
+        known: unit coordinates of the conditions to fit, shape (H, q).
+        means: measured, shape (H, s).
+        scatter: standard deviation of one pour under each, shape (H, s).
+        pours: measured under each, shape (H,).
+        coarse: the second size of grains; None without.
+    """
+
+    scene: Scene
+    verdict: dict[str, Any]
+    paths: tuple[str, ...]
+    inputs: tuple[tuple[str, float, float], ...]
+    names: tuple[str, ...]
+    makers: dict[str, tuple[Maker, ...]]
+    columns: tuple[int, ...]
+    transforms: tuple[Transform, ...]
+    correction: Discrepancy | None
+    known: Array
+    means: Array
+    scatter: Array
+    pours: Array
+    coarse: Coarse | None = None
+
+    def write(self, folder: Path) -> Path:
+        """Writes `models.json` into a folder and returns its path."""
+        document = {
+            "scene": self.scene.to_toml(),
+            "verdict": self.verdict,
+            "paths": self.paths,
+            "inputs": self.inputs,
+            "names": self.names,
+            "makers": {k: [asdict(one) for one in v] for k, v in self.makers.items()},
+            "columns": self.columns,
+            "transforms": [asdict(one) for one in self.transforms],
+            "correction": None if self.correction is None else self.correction.to_dict(),
+            "known": self.known.tolist(),
+            "means": self.means.tolist(),
+            "scatter": self.scatter.tolist(),
+            "pours": self.pours.tolist(),
+            "coarse": None if self.coarse is None else asdict(self.coarse),
+        }
+        path = folder / _NAME
+        write_beside(path, json.dumps(document) + "\n")
+        return path
+
+    @classmethod
+    def load(cls, folder: Path) -> "Models":
+        """Returns the models in the folder of a report.
+
+        Raises:
+            FileNotFoundError: there is no `models.json`.
+        """
+        path = folder / _NAME
+        if not path.exists():
+            raise FileNotFoundError(f"{path} is not there: is {folder} the -o of close-loop?")
+        d = json.loads(path.read_text(encoding="utf-8"))
+        inputs = tuple((str(p), float(a), float(b)) for p, a, b in d["inputs"])
+        known = np.array(d["known"], dtype=float).reshape(len(d["means"]), len(inputs))
+        return cls(
+            scene=Scene.from_toml(d["scene"]),
+            verdict=d["verdict"],
+            paths=tuple(d["paths"]),
+            inputs=inputs,
+            names=tuple(d["names"]),
+            makers={k: tuple(Maker(**one) for one in v) for k, v in d["makers"].items()},
+            columns=tuple(d["columns"]),
+            transforms=tuple(Transform(**one) for one in d["transforms"]),
+            correction=Discrepancy.from_dict(d["correction"]) if d["correction"] else None,
+            known=known,
+            means=np.array(d["means"], dtype=float),
+            scatter=np.array(d["scatter"], dtype=float),
+            pours=np.array(d["pours"], dtype=float),
+            coarse=Coarse(**d["coarse"]) if d["coarse"] else None,
+        )
+
+    def predict(
+        self,
+        model: str,
+        at: Mapping[str, float],
+        forward: Forward,
+        *,
+        level: float = 0.9,
+        pours: int = 20,
+    ) -> Prediction:
+        """Returns what a model says of a condition.
+
+        Args:
+            model: one of `MODELS`.
+            at: numbers that the condition states; those that it leaves out are the scene's own.
+            forward: runs and keeps the pours.
+            level: of the interval.
+            pours: of a simulated model.
+
+        Raises:
+            ObservationError: an unknown model, a condition that lacks an input of the archive, a
+                correction too far from the tested conditions, or too few usable pours.
+        """
+        if model not in MODELS:
+            raise ObservationError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
+        if not 0 < level < 1:
+            raise ObservationError(f"level must be between 0 and 1, got {level}")
+        # How a pour is looked at goes without saying.
+        looked = {p: self.scene.get(p) for p, _, _ in self.inputs if is_definition(p)}
+        at = {**looked, **at}
+        missing = [path for path, _, _ in self.inputs if path not in at]
+        if missing:
+            raise ObservationError(
+                f"the condition must state {', '.join(p for p, _, _ in self.inputs)}; "
+                f"it lacks {', '.join(missing)}"
+            )
+        if model in ("line", "nearest"):
+            return self._row(model, self._unit(at), level)
+        if model == "corrected":
+            return self._corrected(at, forward, level, pours)
+        makers = self.makers[model]
+        rows = [
+            self._pours(makers[1 + i % (len(makers) - 1)], at, [_SEED + i], forward)
+            for i in range(pours)
+        ]
+        return self._of_rows(model, np.concatenate(rows), level)
+
+    def _unit(self, at: Mapping[str, float]) -> Array:
+        return np.array([(at[p] - low) / (high - low) for p, low, high in self.inputs])
+
+    def _pours(
+        self, maker: Maker, at: Mapping[str, float], seeds: Sequence[int], forward: Forward
+    ) -> Array:
+        there = {path: value + maker.shifts.get(path, 0.0) for path, value in at.items()}
+        scene = self.scene.with_({**maker.numbers, **there})
+        return forward.limit(scene, seeds, maker.faults, self.coarse)
+
+    def _of_rows(self, model: str, rows: Array, level: float) -> Prediction:
+        if len(rows) < _FEWEST:
+            raise ObservationError(
+                f"{model}: {len(rows)} usable pours under this condition, at least {_FEWEST} are "
+                "needed: grains jam, leave the view or are unhealthy"
+            )
+        low, high = np.quantile(rows, [(1 - level) / 2, (1 + level) / 2], axis=0)
+        return Prediction(model, self.names, rows.mean(axis=0), low, high, level)
+
+    def _corrected(
+        self, at: Mapping[str, float], forward: Forward, level: float, pours: int
+    ) -> Prediction:
+        """Statistics that the surrogate does not have are those of the base model."""
+        if self.correction is None:
+            raise ObservationError("this loop has no correction: its base fit leaves nothing")
+        delta, sd = self.correction.predict(self._unit(at))
+        seeds = [_SEED + i for i in range(pours)]
+        rows = self._pours(self.makers["base"][0], at, seeds, forward)
+        generator = np.random.default_rng(_SEED)
+        drawn = np.repeat(rows, _EACH, axis=0)
+        shift = delta + sd * generator.standard_normal((len(drawn), len(delta)))
+        for j, (column, transform) in enumerate(zip(self.columns, self.transforms, strict=True)):
+            z = transform(drawn[:, column]) + shift[:, j]
+            drawn[:, column] = transform.inverse(z)
+        return self._of_rows("corrected", drawn, level)
+
+    def _row(self, model: str, at: Array, level: float) -> Prediction:
+        of = {"line": line_weights, "nearest": nearest_weights}[model]
+        weights = of(self.known, at)
+        if weights is None:
+            raise ObservationError(
+                "no straight line: the conditions that were measured differ in fewer places than "
+                "it needs; ask for nearest"
+            )
+        own = self.scatter**2
+        variance = (weights**2 / self.pours) @ own + own.mean(axis=0) + self._left_out(of)
+        half = NormalDist().inv_cdf((1 + level) / 2) * np.sqrt(variance)
+        middle = weights @ self.means
+        return Prediction(model, self.names, middle, middle - half, middle + half, level)
+
+    def _left_out(self, of: Any) -> Array:
+        """Mean square error with which each condition is told from the others, (s,)."""
+        squares = []
+        for h in range(len(self.known)):
+            rest = np.arange(len(self.known)) != h
+            weights = of(self.known[rest], self.known[h]) if rest.sum() > 1 else None
+            if weights is not None:
+                squares.append((self.means[h] - weights @ self.means[rest]) ** 2)
+        return np.mean(squares, axis=0) if squares else np.zeros(self.means.shape[1])
+
+
+def condition_of(words: Sequence[str]) -> dict[str, float]:
+    """Returns numbers of a condition written `path=value`.
+
+    Raises:
+        ObservationError: a word that is not.
+    """
+    found = {}
+    for word in words:
+        path, _, value = word.partition("=")
+        try:
+            found[path] = float(tomllib.loads(f"x = {value}")["x"])
+        except (tomllib.TOMLDecodeError, TypeError, ValueError):
+            raise ObservationError(
+                f"a condition is written path=number, for example funnel.height=0.07; got {word!r}"
+            ) from None
+    return found

@@ -1,0 +1,163 @@
+"""The loop's report: one self-contained HTML page."""
+
+from datetime import UTC, datetime
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from granulcal import _native
+from granulcal.files import write_beside
+from granulcal.loop.close import Closed
+from granulcal.loop.effects.image_faults import Frame
+from granulcal.loop.pours.measures import Measures, formation_of
+from granulcal.loop.task import Condition
+from granulcal.pours.formation_image import formation_figure
+from granulcal.pours.simulate import simulate
+from granulcal.report import data_uri, template
+
+__all__ = ["write_page"]
+
+_SENTENCES = {
+    "NONE": "The model explains these pours: no residual was found.",
+    "RESIDUAL": "The grains do something that this model does not, too faintly to be named.",
+    "EFFECT": "The grains do something that this model lacks, and one effect accounts for it.",
+    "SET": "The grains do something that this model lacks; several effects would account for it.",
+    "EFFECTS": "The grains do something that this model lacks; it takes two effects.",
+    "UNEXPLAINED": "The grains do something that neither this model nor any known effect does.",
+    "UNCONFIRMED": "Nothing may be said: the fits rest where the surrogate of the pours is wrong.",
+    "OVERTURNED": "Nothing may be said: the verdict hangs on how the pours are looked at.",
+}
+# Share of an effect that the parameters must not mimic for its interval to hold what it says.
+_QUOTABLE = 0.5
+# Named effects of the self study whose plain 95 % interval held the truth, of how many
+# (docs/results/loop-self.md).
+_HELD = (93, 133)
+# Statistics that the picture of residuals shows, the largest ones.
+_SHOWN = 24
+
+
+def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
+    """Writes the page of a closed loop."""
+    verdict = closed.verdict
+    named = ", ".join(verdict.named)
+    page = template("loop.html.j2").render(
+        title=title,
+        headline=f"{verdict.kind}: {named}" if named else verdict.kind,
+        sentence=_SENTENCES[verdict.kind],
+        reason=verdict.reason[:1].upper() + verdict.reason[1:],
+        made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        version=_native.__version__,
+        registration=closed.registration,
+        p=verdict.p,
+        totals=[("fit", closed.fit)] + ([("sealed", closed.sealed)] if closed.sealed else []),
+        placebo=closed.placebo.verdict,
+        errors=_errors(closed),
+        corrections=closed.corrections,
+        standing=closed.standing,
+        sealed_model=closed.sealed.total_after.square if closed.sealed else None,
+        calibrated=closed.calibrated,
+        held=_HELD,
+        residuals=_residuals(closed),
+        nearest=closed.trace.nearest,
+        strengths=_strengths(closed),
+        parameters=closed.parameters(),
+        pictures=_pictures(closed),
+        picture_of=f"A pour at {closed.task.conditions[0].name}",
+        rivals=closed.trace.explanations[:8],
+        hidden=_hidden(closed),
+        experiments=closed.experiments[:5],
+        pours=closed.pours,
+        command=command,
+        number=_number,
+    )
+    write_beside(path, page)
+
+
+def _errors(closed: Closed) -> list[dict[str, Any]]:
+    rows = []
+    for use, improvement in (("fit", closed.fit), ("sealed", closed.sealed)):
+        if improvement is not None:
+            triples = zip(improvement.labels, improvement.before, improvement.after, strict=True)
+            rows += [dict(label=n, use=use, before=b, after=a) for n, b, a in triples]
+    return rows
+
+
+def _residuals(closed: Closed) -> str:
+    """Residuals of the base fit: conditions down, the statistics with the largest ones across."""
+    from matplotlib.figure import Figure
+
+    values = closed.trace.residuals
+    order = np.sort(np.argsort(-np.abs(values).max(axis=0))[:_SHOWN])
+    figure = Figure(figsize=(9.5, 2.4 + 0.35 * len(values)), layout="constrained")
+    axes = figure.subplots()
+    image = axes.imshow(values[:, order], cmap="RdBu_r", vmin=-5, vmax=5, aspect="auto")
+    axes.set_yticks(range(len(values)), closed.trace.labels)
+    names = [closed.trace.statistics[i] for i in order]
+    axes.set_xticks(range(len(order)), names, rotation=60, ha="right", fontsize=8)
+    figure.colorbar(image, label="measured less model\n[standard deviations]")
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=110)
+    return data_uri(buffer.getvalue())
+
+
+def _strengths(closed: Closed) -> list[dict[str, Any]]:
+    sights = closed.trace.power
+    known = zip(sights.effects, sights.kappa, strict=True)
+    # NaN, an effect too weak to say, is mimicked as well.
+    mimicked = [name for name, kappa in known if not kappa >= _QUOTABLE]
+    rows = []
+    for name, (low, middle, high) in closed.strengths().items():
+        effect = closed.task.effect(name)
+        rows.append(
+            dict(name=name, path=effect.path, unit=effect.unit if effect.unit != "-" else "")
+            | dict(low=low, middle=middle, high=high, doc=effect.doc)
+            | dict(is_mimicked=name in mimicked)
+        )
+    return rows
+
+
+def _hidden(closed: Closed) -> list[dict[str, str]]:
+    rows, sights = [], closed.power
+    for name, kappa, least in zip(sights.effects, sights.kappa, sights.detectable, strict=True):
+        effect = closed.task.effect(name)
+        is_seen = least <= 1
+        value = f"{_number(effect.value(float(least)))} {effect.unit}".removesuffix(" -")
+        rows.append(
+            {
+                "name": name,
+                "path": effect.path,
+                "kappa": "-" if np.isnan(kappa) else _number(float(kappa)),
+                "strength": _number(float(least)) if is_seen else "not seen",
+                "value": value if is_seen and not effect.camera else "-",
+            }
+        )
+    return rows
+
+
+def _pictures(closed: Closed) -> str:
+    """A measured pour, the base model and the augmented one, of the first condition."""
+    condition = closed.task.conditions[0]
+    if Measures.of(closed.task.scene).observes:
+        return ""
+    clouds = {"measured": _measured_points(closed, condition)}
+    models = {"base model": closed.trace.base}
+    if closed.trace.best is not closed.trace.base:
+        models["with " + " + ".join(closed.trace.best.effects)] = closed.trace.best
+    for label, one in models.items():
+        pour, faults = simulate(closed.scene(condition, one), seed=0), closed.faults(one)
+        points = Frame.of(pour).with_(faults, 0).points() if faults else pour.points()
+        clouds[label] = points - np.array([*points[:, :2].mean(axis=0), 0.0])
+    return data_uri(formation_figure(clouds))
+
+
+def _measured_points(closed: Closed, condition: Condition) -> Any:
+    there = closed.task.scene.with_(condition.at)
+    return formation_of(condition.recordings[0], there, condition.camera, condition.reading)[
+        1
+    ].points
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}"

@@ -1,0 +1,1 @@
+"""One emulator of all pours, linearised at an experiment, and fits on it."""

@@ -1,0 +1,226 @@
+r"""The surrogate at the conditions of one experiment, and the covariance of its mean pours there.
+
+$$ V(\theta, \psi) = \mathrm{diag}_h \frac{s R_h s}{n_h} \frac{\nu}{\nu - m - 1}
+   + U(\psi) + \lambda s^2 + \sum_{k\ \mathrm{nuisance}} \gamma_k^2 N_k N_k^T $$
+
+$R_h$ is the correlation of archive rows near the point; U is the posterior covariance of the
+surrogate's mean, shared by all pours of a condition and correlated between conditions; it is a
+polynomial in $\psi$ whose coefficients are taken at one theta. $N_k$ is the direction of a declared
+nuisance. Vectors stack the conditions: entry h m + i is axis i under condition h.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.loop.effects.design import cube_from_normal
+from granulcal.loop.surrogate.surrogate import Surrogate
+
+__all__ = ["Local"]
+
+Array = NDArray[np.float64]
+
+# Width of "near" in unit coordinates of parameters and conditions.
+NEAR = 0.35
+_STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class Local:
+    """What does not change while theta moves a little.
+
+    Attributes:
+        surrogate: the emulator.
+        conditions: shape (H, q).
+        counts: pours of each condition, shape (H,).
+        v: prior z-scores of the point around which this holds, shape (p,).
+        correlations: R_h times the Hotelling factor, shape (H, m, m).
+        error_roots: of the mean's uncertainty: without effects, then for each effect the part that
+            psi multiplies and the part that psi^2 does, shape (1 + 2 K, H, m, d).
+        shift_roots: of the shifts of theta that effects are in part, shape (K, H m, r).
+        nuisance: covariance of the declared nuisances, shape (H m, H m).
+    """
+
+    surrogate: Surrogate
+    conditions: Array
+    counts: Array
+    v: Array
+    correlations: Array
+    error_roots: Array
+    shift_roots: Array
+    nuisance: Array
+
+    @classmethod
+    def at(cls, surrogate: Surrogate, conditions: Array, counts: Array, v: Array) -> "Local":
+        """Returns what holds around `v` (p,)."""
+        theta = cube_from_normal(v)
+        count, size = len(conditions), surrogate.size
+        rows = np.tile(theta, (count, 1))
+        effects = surrogate.design.effects
+        features = [surrogate.features(rows, conditions, np.zeros((count, len(effects))))]
+        for k in range(len(effects)):
+            features += surrogate.effect_features(rows, conditions, k)
+        stacked = np.stack(features, axis=1).reshape(-1, features[0].shape[1])
+        roots = np.stack([stacked @ root for root in surrogate.roots])
+        dof = surrogate.dof * np.mean(~surrogate.is_donor)
+        factor = dof / max(dof - size - 1, 1.0)
+        correlations = np.stack(
+            [factor * surrogate.correlation_near(theta, c, NEAR) for c in conditions]
+        )
+        nuisance = np.zeros((count * size, count * size))
+        for k in surrogate.design.nuisances:
+            effect = surrogate.design.effects[k]
+            linear = surrogate.effect_features(rows, conditions, k)[0]
+            along = linear @ surrogate.coefficients.T
+            along = (effect.nuisance_sd or 0.0) * (
+                along + surrogate.effect_move(rows, conditions, k)
+            )
+            if effect.is_shared:
+                nuisance += np.outer(along.ravel(), along.ravel())
+            else:
+                for h in range(count):
+                    part = slice(h * size, (h + 1) * size)
+                    nuisance[part, part] += np.outer(along[h], along[h])
+        return cls(
+            surrogate,
+            conditions,
+            counts,
+            v,
+            correlations,
+            np.ascontiguousarray(
+                roots.reshape(size, count, 1 + 2 * len(effects), -1).transpose(2, 1, 0, 3)
+            ),
+            np.array(
+                [
+                    surrogate.shift.root(np.column_stack([rows, conditions]), k).reshape(
+                        count * size, -1
+                    )
+                    for k in range(len(effects))
+                ]
+            ),
+            nuisance,
+        )
+
+    @property
+    def size(self) -> int:
+        """H m."""
+        return len(self.conditions) * self.surrogate.size
+
+    def in_statistics(self, columns: Array) -> Array:
+        """Returns stacked `columns` (H m, any) on axes as those of standardised statistics."""
+        count, size = len(self.conditions), self.surrogate.size
+        cube = columns.reshape(count, size, -1)
+        return np.matmul(self.surrogate.from_axes, cube).reshape(columns.shape)
+
+    def none(self) -> Array:
+        """Returns strengths of 0, shape (K,)."""
+        return self.surrogate.design.none()
+
+    def mean(self, v: Array, psi: Array) -> Array:
+        """Returns the stacked mean, shape (H m,)."""
+        return self._means(v[None], psi[None])[0]
+
+    def slopes(self, v: Array, psi: Array, active: tuple[int, ...]) -> tuple[Array, Array]:
+        """Returns the stacked mean and its derivatives in v and psi[active], (H m, p + |A|)."""
+        p, a = len(v), len(active)
+        moved_v = np.tile(v, (1 + 2 * (p + a), 1))
+        moved_psi = np.tile(psi, (1 + 2 * (p + a), 1))
+        for i in range(p):
+            moved_v[1 + 2 * i, i] += _STEP
+            moved_v[2 + 2 * i, i] -= _STEP
+        for i, k in enumerate(active):
+            moved_psi[1 + 2 * (p + i), k] += _STEP
+            moved_psi[2 + 2 * (p + i), k] -= _STEP
+        means = self._means(moved_v, moved_psi)
+        return means[0], ((means[1::2] - means[2::2]) / (2 * _STEP)).T
+
+    def direction(self, v: Array, k: int, psi: Array | None = None) -> Array:
+        """Returns what effect k does for a unit of strength, shape (H m,).
+
+        One-sided: half the prior's upper end over 1/2; two-sided: the derivative. `psi` are the
+        strengths of the other effects.
+        """
+        at = self.none() if psi is None else psi
+        low, high = at.copy(), at.copy()
+        if self.surrogate.design.effects[k].is_two_sided:
+            low[k], high[k] = -0.25, 0.25
+        else:
+            low[k], high[k] = 0.0, 0.5
+        means = self._means(np.tile(v, (2, 1)), np.stack([low, high]))
+        return 2 * (means[1] - means[0])
+
+    def covariance(self, v: Array, psi: Array) -> Array:
+        """Returns V, shape (H m, H m)."""
+        return self.pour_covariance(v, psi) + self.error_covariance(v, psi) + self.nuisance
+
+    def pour_covariance(self, v: Array, psi: Array) -> Array:
+        """Returns the covariance of the means of pours, shape (H m, H m)."""
+        scale = self._scales(v, psi) / np.sqrt(self.counts)[:, None]
+        size = self.surrogate.size
+        total = np.zeros((self.size, self.size))
+        for h, correlation in enumerate(self.correlations):
+            part = slice(h * size, (h + 1) * size)
+            total[part, part] = correlation * np.outer(scale[h], scale[h])
+        return total
+
+    def error_covariance(self, v: Array, psi: Array) -> Array:
+        """Returns U and what the features cannot follow, shape (H m, H m)."""
+        if psi.any():
+            total = self._error(self.error_root(psi))
+            shift = np.tensordot(psi, self.shift_roots, axes=1)
+            total += shift @ shift.T
+        else:
+            total = self._base_error.copy()
+        lack = self.surrogate.lack * self._scales(v, psi) ** 2
+        total[np.diag_indices_from(total)] += lack.ravel()
+        return total
+
+    def direction_error(self, k: int) -> Array:
+        """Returns the covariance of `direction(k)`, shape (H m, H m)."""
+        return self._direction_errors[k]
+
+    def error_root(self, psi: Array) -> Array:
+        """Returns the root of the mean's uncertainty, shape (H, m, d)."""
+        root = self.error_roots[0]
+        for k in np.nonzero(psi)[0]:
+            linear, square = self.error_roots[1 + 2 * k], self.error_roots[2 + 2 * k]
+            root = root + psi[k] * linear + psi[k] ** 2 * square
+        return root
+
+    @cached_property
+    def _direction_errors(self) -> list[Array]:
+        found = []
+        for k, effect in enumerate(self.surrogate.design.effects):
+            root = self.error_roots[1 + 2 * k]
+            if not effect.is_two_sided:
+                root = root + 0.5 * self.error_roots[2 + 2 * k]
+            shift = self.shift_roots[k]
+            found.append(self._error(root) + shift @ shift.T)
+        return found
+
+    @cached_property
+    def _base_error(self) -> Array:
+        return self._error(self.error_roots[0])
+
+    def _error(self, roots: Array) -> Array:
+        """Errors on different axes are independent."""
+        count, size = len(self.conditions), self.surrogate.size
+        each = np.matmul(roots.transpose(1, 0, 2), roots.transpose(1, 2, 0))
+        total = np.zeros((count, size, count, size))
+        axis = np.arange(size)
+        total[:, axis, :, axis] = each
+        return total.reshape(count * size, count * size)
+
+    def _means(self, v: Array, psi: Array) -> Array:
+        count, conditions = len(self.conditions), self.conditions
+        theta = np.repeat(cube_from_normal(v), count, axis=0)
+        rows = np.tile(conditions, (len(v), 1))
+        strengths = np.repeat(psi, count, axis=0)
+        return self.surrogate.mean(theta, rows, strengths).reshape(len(v), -1)
+
+    def _scales(self, v: Array, psi: Array) -> Array:
+        count = len(self.conditions)
+        theta = np.tile(cube_from_normal(v), (count, 1))
+        return self.surrogate.scale(theta, self.conditions, np.tile(psi, (count, 1)))

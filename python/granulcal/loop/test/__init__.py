@@ -1,0 +1,1 @@
+"""Tests of an experiment: fit, residual, scores of effects, refits and the verdict."""

@@ -1,0 +1,355 @@
+"""The whole loop on one set of measured pours: fit, gate, refits, adequacy, verdict."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from granulcal.loop.effects.design import cube_from_normal, normal_from_cube
+from granulcal.loop.surrogate.baseline import Fit, Start, fit_base
+from granulcal.loop.surrogate.linearised import Local
+from granulcal.loop.surrogate.observation import Observation, Stack
+from granulcal.loop.surrogate.surrogate import Surrogate
+from granulcal.loop.test.refit import Model, fit_none, fit_pair, fit_single
+from granulcal.loop.test.residual_test import Gate, open_gate
+from granulcal.loop.test.score import Scores, families
+from granulcal.loop.test.thresholds import Thresholds
+from granulcal.loop.test.verdict import NAMING, Verdict, decide
+
+__all__ = ["Explanation", "Power", "Trace", "power", "trace"]
+
+Array = NDArray[np.float64]
+
+# Models whose log probability is this far below the best need no test of what they leave [nat].
+_HOPELESS = 12.0
+# Forward steps start from so many singles.
+_PARENTS = 2
+# Effects named beside a residual.
+_NEAREST = 3
+
+
+@dataclass(frozen=True)
+class Power:
+    """What an experiment could see, before its data are looked at.
+
+    Attributes:
+        effects: names of the candidates, K of them.
+        kappa: share of each that theta cannot mimic; NaN if too weak to say.
+        detectable: smallest strength seen in 80 %, in units of its prior's upper end.
+        cosines: c, shape (K, K).
+        families: groups of parallel effects.
+    """
+
+    effects: tuple[str, ...]
+    kappa: Array
+    detectable: Array
+    cosines: Array
+    families: tuple[tuple[str, ...], ...]
+
+    @classmethod
+    def of(cls, surrogate: Surrogate, scores: Scores) -> "Power":
+        """Returns the table of scores at a fit."""
+        names = tuple(surrogate.design.effects[k].name for k in scores.effects)
+        groups = tuple(
+            tuple(surrogate.design.effects[k].name for k in group) for group in families(scores)
+        )
+        return cls(names, scores.kappa, scores.detectable, scores.cosines, groups)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the table for JSON; what is not known is None."""
+        return {
+            "effects": list(self.effects),
+            "kappa": [None if np.isnan(k) else float(k) for k in self.kappa],
+            "detectable_strength": self.detectable.tolist(),
+            "cosines": self.cosines.tolist(),
+            "families": [list(group) for group in self.families],
+        }
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One model and what it leaves.
+
+    Attributes:
+        effects: names.
+        theta: best parameters, unit coordinates, shape (p,).
+        strengths: posterior means, shape (|A|,).
+        intervals: shape (|A|, 2).
+        best_strengths: at the best fit, shape (|A|,).
+        log_probability: relative to the model without effects [nat].
+        p_after: of the gate after its fit; NaN if it was too improbable to be tested.
+        at_end: whether a strength leans on the end of its prior.
+    """
+
+    effects: tuple[str, ...]
+    theta: Array
+    strengths: Array
+    intervals: Array
+    best_strengths: Array
+    log_probability: float
+    p_after: float
+    at_end: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns it for JSON."""
+        return {
+            "effects": list(self.effects),
+            "theta": self.theta.tolist(),
+            "strengths": self.strengths.tolist(),
+            "intervals": self.intervals.tolist(),
+            "best_strengths": self.best_strengths.tolist(),
+            "log_probability": self.log_probability,
+            "p_after": None if np.isnan(self.p_after) else self.p_after,
+            "at_end": self.at_end,
+        }
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Everything that a report shows.
+
+    Attributes:
+        verdict: the word.
+        base: the model without effects; its p_after is that of the gate.
+        explanations: fitted models, most probable first; empty if the gate stayed shut.
+        gate: the test of the base fit.
+        power: kappa, confusion and detectable strengths at the base fit.
+        labels: of the conditions, H of them.
+        statistics: names, m of them.
+        residuals: of the base fit in standard deviations of its covariance, shape (H, m).
+        beyond: statistics that no pour of the archive comes near, with condition and values.
+        nearest: effects whose directions are nearest to the residual, and the cosine of each.
+        thresholds: what was fixed beforehand.
+        seed: of all random numbers.
+        theta_sd: standard deviations of theta's z-scores at the base fit, shape (p,).
+        models: the models themselves, in the order of `explanations` (not in the JSON).
+        base_fit: the fit without effects (not in the JSON).
+        local: the surrogate at the conditions (not in the JSON).
+    """
+
+    verdict: Verdict
+    base: Explanation
+    explanations: tuple[Explanation, ...]
+    gate: Gate
+    power: Power
+    labels: tuple[str, ...]
+    statistics: tuple[str, ...]
+    residuals: Array
+    beyond: tuple[str, ...]
+    nearest: tuple[tuple[str, float], ...]
+    thresholds: Thresholds
+    seed: int
+    theta_sd: Array
+    models: tuple[Model, ...]
+    base_fit: Fit
+    local: Local
+
+    @property
+    def best(self) -> Explanation:
+        """The explanation that the verdict rests on, or the base model."""
+        if self.verdict.kind in NAMING:
+            for one in self.explanations:
+                if set(one.effects) <= set(self.verdict.named):
+                    return one
+        return self.base
+
+    def model_of(self, one: Explanation) -> Model:
+        """Returns the model of an explanation."""
+        return self.models[self.explanations.index(one)]
+
+    def fit_of(self, one: Explanation) -> Fit:
+        """Returns the fit of the base model or of an explanation."""
+        return self.base_fit if one is self.base else self.model_of(one).fit
+
+    def residuals_of(self, one: Explanation) -> Array:
+        """Returns what a model leaves, in standard deviations of its covariance, shape (H, m)."""
+        return _residuals(self.local, self.fit_of(one))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns everything for JSON."""
+        gate = self.gate
+        return {
+            "verdict": {
+                "kind": self.verdict.kind,
+                "named": list(self.verdict.named),
+                "families": list(self.verdict.families),
+                "p": self.verdict.p,
+                "reason": self.verdict.reason,
+            },
+            "gate": {
+                "p": gate.p,
+                "p_library": gate.p_library,
+                "p_any": gate.p_any,
+                "p_smooth": gate.p_smooth,
+                "bartlett": gate.factors.tolist(),
+                "effects": list(self.power.effects),
+                "squares": gate.squares.tolist(),
+                "one_step_strengths": gate.strengths.tolist(),
+                "adjusted_p": gate.adjusted.tolist(),
+            },
+            "base": self.base.to_dict(),
+            "theta_sd": self.theta_sd.tolist(),
+            "explanations": [one.to_dict() for one in self.explanations],
+            "power": self.power.to_dict(),
+            "conditions": list(self.labels),
+            "statistics": list(self.statistics),
+            "residuals": self.residuals.tolist(),
+            "beyond_the_archive": list(self.beyond),
+            "nearest_effects": [{"name": n, "cosine": c} for n, c in self.nearest],
+            "thresholds": self.thresholds.to_dict(),
+            "seed": self.seed,
+        }
+
+
+def trace(
+    surrogate: Surrogate,
+    observations: Sequence[Observation],
+    thresholds: Thresholds | None = None,
+    *,
+    seed: int = 0,
+    starts: Sequence[Start] = (),
+) -> Trace:
+    """Returns what measured pours say of the library.
+
+    Args:
+        surrogate: of the archive.
+        observations: pours of the fit conditions; sealed ones must not be among them.
+        thresholds: fixed beforehand.
+        seed: of starts and replicates.
+        starts: where fits begin as well, for example the best of pours that were looked at.
+
+    Raises:
+        ObservationError: pours or conditions that do not fit the archive.
+    """
+    rules = thresholds or Thresholds()
+    design = surrogate.design
+    stack = Stack.of(surrogate, observations)
+    target = stack.means.ravel()
+    local, fit = fit_base(surrogate, stack, seed, starts)
+    scores = Scores.of(local, fit, design.candidates)
+    gate = open_gate(
+        local, fit, scores, replicates=rules.replicates, refits=rules.refits, seed=seed
+    )
+    none = fit_none(fit, rules)
+    tested: list[tuple[Model, float]] = []
+    if gate.p <= rules.name and design.candidates:
+        tested = _models(local, target, fit, rules, seed, starts)
+    merged = families(scores)
+    verdict = decide(design, gate, none, tested, rules, merged)
+    explained = sorted(tested, key=lambda pair: -pair[0].log_probability)
+    normal = scores.slopes.T @ scores.slopes + np.eye(len(fit.v))
+    return Trace(
+        verdict=verdict,
+        base=_explain(surrogate, none, none, gate.p),
+        explanations=tuple(_explain(surrogate, m, none, p) for m, p in explained),
+        gate=gate,
+        power=Power.of(surrogate, scores),
+        labels=stack.labels,
+        statistics=surrogate.names,
+        residuals=_residuals(local, fit),
+        beyond=surrogate.beyond(observations),
+        nearest=_nearest(surrogate, scores, fit),
+        thresholds=rules,
+        seed=seed,
+        theta_sd=np.sqrt(np.diag(np.linalg.inv(normal))),
+        models=tuple(m for m, _ in explained),
+        base_fit=fit,
+        local=local,
+    )
+
+
+def _nearest(surrogate: Surrogate, scores: Scores, fit: Fit) -> tuple[tuple[str, float], ...]:
+    """The largest cosines of effects with the efficient residual, `sqrt(T_k / Q)`."""
+    residual = scores.whiten @ fit.residual
+    whole = max(float(residual @ residual), 1e-300)
+    cosines = np.sqrt(scores.squares(residual[:, None])[:, 0] / whole)
+    order = np.argsort(-cosines)[:_NEAREST]
+    names = [surrogate.design.effects[k].name for k in scores.effects]
+    return tuple((names[i], float(cosines[i])) for i in order)
+
+
+def _residuals(local: Local, fit: Fit) -> Array:
+    spread = np.sqrt(np.sum(local.in_statistics(fit.root) ** 2, axis=1))
+    return (local.in_statistics(fit.residual) / spread).reshape(len(local.counts), -1)
+
+
+def power(
+    surrogate: Surrogate, theta: ArrayLike, conditions: ArrayLike, counts: ArrayLike
+) -> Power:
+    """Returns what `counts` (H,) pours under `conditions` (H, q) could see at `theta` (p,)."""
+    v = normal_from_cube(np.asarray(theta, dtype=np.float64))
+    each = np.asarray(counts, dtype=np.float64)
+    # Repeats of one condition have no inputs: (H, 0) is what no -1 can stand for.
+    where = np.asarray(conditions, dtype=np.float64)
+    where = where.reshape(len(each), len(surrogate.design.conditions))
+    local = Local.at(surrogate, where, each, v)
+    return Power.of(surrogate, Scores.of(local, fit_at(local, v), surrogate.design.candidates))
+
+
+def fit_at(local: Local, v: Array) -> Fit:
+    """Returns the fit of data that are the surrogate's mean at `v` (p,)."""
+    from granulcal.loop.surrogate.baseline import summarise
+
+    return summarise(local, local.mean(v, local.none()), v, local.none(), ())
+
+
+def _models(
+    local: Local,
+    target: Array,
+    base: Fit,
+    rules: Thresholds,
+    seed: int,
+    starts: Sequence[Start] = (),
+) -> list[tuple[Model, float]]:
+    """All singles, pairs if no single is adequate, each with the p of what it leaves."""
+    candidates = local.surrogate.design.candidates
+    singles = [fit_single(local, target, base, k, rules, starts) for k in candidates]
+    singles.sort(key=lambda model: -model.log_probability)
+    best = singles[0].log_probability
+    tested = [
+        (m, _after(local, m, rules, seed) if m.log_probability > best - _HOPELESS else np.nan)
+        for m in singles
+    ]
+    adequate = [m for m, p in tested if p > rules.adequate]
+    if adequate and adequate[0].log_probability > best - rules.rivals:
+        return tested
+    pairs: dict[tuple[int, int], Model] = {}
+    for parent in singles[:_PARENTS]:
+        rest = tuple(k for k in candidates if k not in parent.effects)
+        scores = Scores.of(local, parent.fit, rest)
+        squares = scores.squares((scores.whiten @ parent.fit.residual)[:, None])[:, 0]
+        for i in np.argsort(-squares)[: max(1, rules.pairs // _PARENTS)]:
+            k = rest[int(i)]
+            pair = (min(parent.effects[0], k), max(parent.effects[0], k))
+            if pair not in pairs:
+                pairs[pair] = fit_pair(local, target, base, parent.fit, pair, rules)
+    return tested + [(m, _after(local, m, rules, seed)) for m in pairs.values()]
+
+
+def _after(local: Local, model: Model, rules: Thresholds, seed: int) -> float:
+    rest = tuple(k for k in local.surrogate.design.candidates if k not in model.effects)
+    scores = Scores.of(local, model.fit, rest)
+    gate = open_gate(
+        local,
+        model.fit,
+        scores,
+        replicates=rules.replicates_after,
+        refits=rules.refits // 4,
+        seed=seed + 1,
+    )
+    return gate.p
+
+
+def _explain(surrogate: Surrogate, model: Model, none: Model, p: float) -> Explanation:
+    return Explanation(
+        effects=tuple(surrogate.design.effects[k].name for k in model.effects),
+        theta=cube_from_normal(model.fit.v),
+        strengths=model.strengths,
+        intervals=model.intervals,
+        best_strengths=model.fit.psi[list(model.effects)],
+        log_probability=model.log_probability - none.log_probability,
+        p_after=p,
+        at_end=model.at_end,
+    )

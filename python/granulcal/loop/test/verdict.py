@@ -1,0 +1,116 @@
+"""From p-values and evidences to one of six words; `standing.py` has what may overturn them.
+
+| word | when |
+|---|---|
+| NONE | the gate stays shut: p > `detect`; the table of detectable strengths says what could hide |
+| RESIDUAL | something is left (p <= `detect`), too unsure for a name, or none is the best |
+| EFFECT | every adequate model within `rivals` of the best is of one family |
+| SET | several families are |
+| EFFECTS | the best adequate model needs two effects |
+| UNEXPLAINED | p <= `name`, and no model of one or two effects leaves nothing |
+"""
+
+from dataclasses import dataclass
+
+from granulcal.loop.effects.design import Design
+from granulcal.loop.test.refit import Model
+from granulcal.loop.test.residual_test import Gate
+from granulcal.loop.test.thresholds import Thresholds
+
+__all__ = ["KINDS", "NAMING", "Verdict", "decide"]
+
+NAMING = ("EFFECT", "SET", "EFFECTS")
+"""Words that come with names."""
+
+KINDS = ("NONE", "RESIDUAL", *NAMING, "UNEXPLAINED", "UNCONFIRMED", "OVERTURNED")
+"""All words; the last two are those of a verdict that a check has taken away."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What may be said.
+
+    Attributes:
+        kind: one of `KINDS`.
+        named: effects of the finding; for SET all that are not told apart; else none.
+        families: of `named`, each once.
+        p: of the gate before any effect was fitted.
+        reason: one sentence with the numbers that decided.
+    """
+
+    kind: str
+    named: tuple[str, ...]
+    families: tuple[str, ...]
+    p: float
+    reason: str
+
+
+def decide(
+    design: Design,
+    gate: Gate,
+    none: Model | None,
+    models: list[tuple[Model, float]],
+    thresholds: Thresholds,
+    merged: list[tuple[int, ...]] | None = None,
+) -> Verdict:
+    """Returns the verdict.
+
+    Args:
+        design: names and families.
+        gate: of the fit without effects.
+        none: the model without effects, if any was fitted.
+        models: fitted models, each with the p of what it leaves.
+        thresholds: what was fixed beforehand.
+        merged: groups of effects whose directions are parallel; each counts as one family.
+    """
+    p = gate.p
+    if p > thresholds.detect:
+        why = f"nothing is left of the base fit (p = {p:.3g} > {thresholds.detect:g})"
+        return Verdict("NONE", (), (), p, why)
+    if p > thresholds.name or not models or none is None:
+        why = f"something is left (p = {p:.3g}), not below {thresholds.name:g}: no name"
+        return Verdict("RESIDUAL", (), (), p, why)
+    adequate = [model for model, after in models if after > thresholds.adequate]
+    if not adequate:
+        best = max(after for _, after in models)
+        why = f"no one or two effects of the library explain it (best p after a fit {best:.3g})"
+        return Verdict("UNEXPLAINED", (), (), p, why)
+    best = max(adequate, key=lambda model: model.log_probability)
+    gain = best.log_probability - none.log_probability
+    if gain <= 0:
+        why = f"something is left (p = {p:.3g}), but no effect is more probable than none"
+        return Verdict("RESIDUAL", (), (), p, why)
+    if len(best.effects) == 2:
+        names = tuple(design.effects[k].name for k in best.effects)
+        kin = _families(design, best.effects, merged)
+        if len(kin) == 1:
+            return Verdict("EFFECT", names, kin, p, _gain(gain))
+        return Verdict("EFFECTS", names, kin, p, _gain(gain))
+    near = [
+        model
+        for model in adequate
+        if len(model.effects) == 1
+        and model.log_probability > best.log_probability - thresholds.rivals
+    ]
+    near.sort(key=lambda model: -model.log_probability)
+    effects = tuple(model.effects[0] for model in near)
+    kin = _families(design, effects, merged)
+    names = tuple(design.effects[k].name for k in effects)
+    kind = "EFFECT" if len(kin) == 1 else "SET"
+    return Verdict(kind, names, kin, p, _gain(gain))
+
+
+def _gain(gain: float) -> str:
+    return f"log probability {gain:.1f} nat above that of no effect"
+
+
+def _families(
+    design: Design, effects: tuple[int, ...], merged: list[tuple[int, ...]] | None
+) -> tuple[str, ...]:
+    """Declared families, parallel effects counted with the first of their group."""
+    found: list[str] = []
+    for k in effects:
+        first = next((group[0] for group in merged or [] if k in group), k)
+        if design.family(first) not in found:
+            found.append(design.family(first))
+    return tuple(found)

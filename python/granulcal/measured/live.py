@@ -1,0 +1,176 @@
+"""Depth frames from a camera at this computer: a RealSense, a topic of ROS 2, one's own source."""
+
+import time
+from collections.abc import Iterator
+from os import PathLike
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from granulcal.measured.ros_files import DepthFrame, write_bag, write_mcap
+
+__all__ = ["RealSense", "Ros2", "Source", "record"]
+
+_WARM_UP = 30
+_PATIENCE_S = 5.0
+
+
+class Source(Protocol):
+    """Something that delivers depth frames."""
+
+    @property
+    def lens(self) -> dict[str, float]:
+        """Returns width, height, fx, fy, cx, cy [px], the first pixel's centre at 0."""
+        ...
+
+    @property
+    def depth_unit(self) -> float:
+        """Returns metres per count."""
+        ...
+
+    def frames(self) -> Iterator[DepthFrame]:
+        """Yields frames for as long as it is asked."""
+        ...
+
+
+class RealSense:
+    """A RealSense camera, through librealsense's Python package.
+
+    Args:
+        width, height: of the depth image [px].
+        fps: frames a second.
+        module: librealsense, `pyrealsense2` unless given.
+
+    Raises:
+        ModuleNotFoundError: pyrealsense2 is not installed.
+        OSError: no camera answers.
+    """
+
+    def __init__(
+        self, *, width: int = 640, height: int = 480, fps: int = 30, module: Any = None
+    ) -> None:
+        if module is None:
+            import pyrealsense2 as module  # pyright: ignore[reportMissingImports]
+        self._pipeline = module.pipeline()
+        config = module.config()
+        config.enable_stream(module.stream.depth, width, height, module.format.z16, fps)
+        try:
+            profile = self._pipeline.start(config)
+        except RuntimeError as error:
+            raise OSError(f"no RealSense camera answers: {error}") from None
+        self.depth_unit: float = profile.get_device().first_depth_sensor().get_depth_scale()
+        """Metres per count."""
+        stream = profile.get_stream(module.stream.depth).as_video_stream_profile()
+        lens = stream.get_intrinsics()
+        self.lens: dict[str, float] = {
+            "width": lens.width, "height": lens.height, "fx": lens.fx, "fy": lens.fy,
+            "cx": lens.ppx, "cy": lens.ppy,
+        }  # fmt: skip
+        """Lens [px]."""
+
+    def frames(self) -> Iterator[DepthFrame]:
+        """Yields frames; those of the first second, in which exposure settles, are left out."""
+        try:
+            for _ in range(_WARM_UP):
+                self._pipeline.wait_for_frames()
+            while True:
+                frame = self._pipeline.wait_for_frames().get_depth_frame()
+                if frame:
+                    depth = np.asanyarray(frame.get_data()).astype(float) * self.depth_unit
+                    yield DepthFrame(depth, round(frame.get_timestamp() * 1e6))
+        finally:
+            self._pipeline.stop()
+
+
+class Ros2:
+    """A depth topic of ROS 2 and the camera_info beside it.
+
+    Args:
+        topic: of sensor_msgs/Image, 16UC1 (millimetres) or 32FC1 (metres).
+        info: of sensor_msgs/CameraInfo; the default is `camera_info` beside the topic.
+        node: a node of rclpy; one is made unless given.
+
+    Raises:
+        ModuleNotFoundError: rclpy is not installed: source ROS 2's setup first.
+        OSError: nothing arrives within five seconds.
+    """
+
+    def __init__(self, topic: str, info: str | None = None, *, node: Any = None) -> None:
+        import rclpy  # pyright: ignore[reportMissingImports]
+        from sensor_msgs.msg import CameraInfo, Image  # pyright: ignore[reportMissingImports]
+
+        if node is None:
+            rclpy.init()
+            node = rclpy.create_node("granulcal_record")
+        self._node, self._spin, self._topic = node, rclpy.spin_once, topic
+        self._arrived: list[Any] = []
+        self._infos: list[Any] = []
+        beside = info or f"{topic.rsplit('/', 1)[0]}/camera_info"
+        node.create_subscription(Image, topic, self._arrived.append, 10)
+        node.create_subscription(CameraInfo, beside, self._infos.append, 10)
+        told = self._wait(self._infos, beside)
+        k = told.k
+        self.lens: dict[str, float] = {
+            "width": told.width, "height": told.height, "fx": k[0], "fy": k[4],
+            "cx": k[2], "cy": k[5],
+        }  # fmt: skip
+        """Lens [px]."""
+        self.depth_unit = 1e-3
+        """Metres per count of 16UC1, by REP 118."""
+
+    def frames(self) -> Iterator[DepthFrame]:
+        """Yields frames as they arrive."""
+        while True:
+            yield _frame_of(self._wait(self._arrived, self._topic))
+
+    def _wait(self, arrived: list[Any], topic: str) -> Any:
+        end = time.monotonic() + _PATIENCE_S
+        while not arrived:
+            if time.monotonic() > end:
+                raise OSError(f"nothing arrived on {topic} within {_PATIENCE_S:g} s")
+            self._spin(self._node, timeout_sec=0.1)
+        return arrived.pop(0)
+
+
+def _frame_of(message: Any) -> DepthFrame:
+    kinds = {"16UC1": ("<u2", 1e-3), "mono16": ("<u2", 1e-3), "32FC1": ("<f4", 1.0)}
+    if message.encoding not in kinds:
+        raise ValueError(f"depth must be one of {', '.join(kinds)}, got {message.encoding!r}")
+    kind, unit = kinds[message.encoding]
+    rows = np.frombuffer(bytes(message.data), np.uint8).reshape(message.height, message.step)
+    width = message.width * np.dtype(kind).itemsize
+    depth = np.ascontiguousarray(rows[:, :width]).view(kind).astype(float) * unit
+    stamp = message.header.stamp
+    return DepthFrame(np.nan_to_num(depth), stamp.sec * 1_000_000_000 + stamp.nanosec)
+
+
+def record(source: Source, path: str | PathLike[str], *, frames: int = 10) -> int:
+    """Records depth frames into a .bag or an .mcap and returns their number.
+
+    Args:
+        source: of the frames.
+        path: .bag as the RealSense viewer lays it out, .mcap as `ros2 bag` does.
+        frames: how many.
+
+    Raises:
+        ValueError: another name, or no frames asked for.
+        OSError: the source delivers nothing.
+    """
+    if frames < 1:
+        raise ValueError(f"frames must be at least 1, got {frames}")
+    kind = Path(path).suffix.lower()
+    if kind not in (".bag", ".mcap"):
+        raise ValueError(f"{path} must end in .bag or .mcap")
+    delivered = source.frames()
+    try:
+        taken = [frame for frame, _ in zip(delivered, range(frames), strict=False)]
+    finally:
+        close = getattr(delivered, "close", None)
+        if close is not None:
+            close()
+    if not taken:
+        raise OSError("the source delivered no frame")
+    if kind == ".bag":
+        return write_bag(path, taken, source.lens, depth_unit=source.depth_unit)
+    return write_mcap(path, taken, source.lens)

@@ -1,0 +1,482 @@
+"""Measured depth images and height maps, and other measurements of a scene's statistics."""
+
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Unpack
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal import _native
+from granulcal.measured import DischargeCurve, DrumImage, RunOut
+from granulcal.measured.segmentation import SegmentationSettings
+from granulcal.pours.camera import Camera
+from granulcal.pours.scene import Scene
+from granulcal.pours.statistics import (
+    DiagnosticStatistics,
+    ObservedStatistics,
+    Statistics,
+    diagnostic_statistics,
+    statistics,
+)
+
+__all__ = [
+    "Camera",
+    "DamagedRecordingWarning",
+    "EdgePixelsWarning",
+    "Formation",
+    "Levelled",
+    "Lost",
+    "Plane",
+    "Recording",
+    "SegmentationSettings",
+]
+
+Array = NDArray[np.float64]
+
+# Frames that are averaged unless told otherwise: as many as Matl et al. 2020 average.
+FRAMES = 10
+
+
+class DamagedRecordingWarning(UserWarning):
+    """A recording is cut off or damaged; the frames that are whole were used."""
+
+
+class EdgePixelsWarning(UserWarning):
+    """Pixels at the edge of a height map, apart from the formation, are taken for grains."""
+
+
+@dataclass(frozen=True)
+class Lost:
+    """Frames of a damaged recording that are lost.
+
+    Attributes:
+        frames: their number.
+        how: how well it is known: `exactly`, `about` (by the bytes that are missing) or `at least`.
+    """
+
+    frames: int
+    how: str
+
+    def __str__(self) -> str:
+        """Returns a phrase for messages."""
+        if self.how == "at least" and self.frames == 0:
+            return "an unknown number of frames lost"
+        known = "" if self.how == "exactly" else f"{self.how} "
+        return f"{known}{self.frames} frame{'' if self.frames == 1 else 's'} lost"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plane:
+    """The ground that was fitted, in the frame of the camera or of the height map.
+
+    Attributes:
+        normal: unit normal towards the grains.
+        offset: normal . point for points of the plane [m].
+        tilt_deg: angle between the normal and the vertical of the frame [deg].
+        rms: root mean square distance of the inliers [m].
+        inlier_count: pixels that decided.
+    """
+
+    normal: tuple[float, float, float]
+    offset: float
+    tilt_deg: float
+    rms: float
+    inlier_count: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Levelled:
+    """An image whose ground was found, whether or not there is a grain on it.
+
+    Attributes:
+        heights: heights of all pixels above the fitted ground [m], NaN is no data, shape (h, w)
+            after down-sampling.
+        mask: which pixels are grain, shape (h, w); none on a flat bed.
+        plane: the fitted ground.
+        ground_sd: robust standard deviation of the ground about its plane [m].
+        threshold: height from which a pixel counts as grain [m].
+        valid_count: pixels that carry data.
+        downsample: factor by which the image was down-sampled.
+        resolution: width of a pixel on the ground along x and y [m].
+    """
+
+    heights: Array
+    mask: NDArray[np.bool_]
+    plane: Plane
+    ground_sd: float
+    threshold: float
+    valid_count: int
+    downsample: int
+    resolution: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Formation:
+    """The points of a formation and how they were found.
+
+    Attributes:
+        points: points of the grains [m], ground at z = 0, centroid at x = y = 0, shape (n, 3).
+        mask: which pixels they are, shape (h, w) after down-sampling.
+        heights: heights of all pixels above the fitted ground [m], NaN is no data, shape (h, w).
+        plane: the fitted ground.
+        ground_sd: robust standard deviation of the ground about its plane [m].
+        valid_count: pixels that carry data.
+        threshold: height from which a pixel counts as grain [m].
+        centroid: where the centroid was before it was moved to 0 [m].
+        volume: volume between the ground and the surface of the grains' pixels [m^3].
+        kind: "pile", or "ring" when the middle is lower than the rim around it.
+        half_volume_radius: radius about the volume's centroid that holds half of it [m].
+        profile: mean heights within half of that radius and around it [m], which decide the kind.
+        downsample: factor by which the image was down-sampled.
+        resolution: width of a pixel on the ground along x and y [m].
+        spacing: distance on the ground of points from neighbouring pixels [m]; NaN of one point.
+    """
+
+    points: Array
+    mask: NDArray[np.bool_]
+    heights: Array
+    plane: Plane
+    ground_sd: float
+    valid_count: int
+    threshold: float
+    centroid: tuple[float, float]
+    volume: float
+    kind: str
+    half_volume_radius: float
+    profile: tuple[float, float]
+    downsample: int
+    resolution: tuple[float, float]
+    spacing: float
+
+    def statistics(self) -> Statistics:
+        """Returns the statistics of the points."""
+        return statistics(self.points)
+
+    def diagnostic_statistics(
+        self, *, grain_diameter: float, pour_axis: tuple[float, float] | None = None
+    ) -> DiagnosticStatistics:
+        """Returns the diagnostic statistics of the points.
+
+        Args:
+            grain_diameter: diameter of a grain [m].
+            pour_axis: where the axis of the pour meets the levelled ground [m], in the frame in
+                which `centroid` is told; the centroid if None, which hides modes of order 1.
+
+        Raises:
+            ValueError: fewer than 3 points, or a length out of range.
+        """
+        axis = None
+        if pour_axis is not None:
+            axis = (pour_axis[0] - self.centroid[0], pour_axis[1] - self.centroid[1])
+        return diagnostic_statistics(
+            self.points, grain_diameter=grain_diameter, spacing=self.spacing, pour_axis=axis
+        )
+
+    def height_image(self) -> Array:
+        """Returns heights above the fitted ground [m], NaN where no grain is, shape (h, w)."""
+        image = np.full(self.mask.shape, np.nan)
+        image[self.mask] = self.points[:, 2]
+        return image
+
+
+class Recording:
+    """One measured formation: a height map, or a depth image with its camera.
+
+    Reads ROS 1 .bag files as the RealSense viewer saves them, .mcap files of ROS 2 and of Foxglove,
+    16-bit depth PNGs, folders of such frames, and .npz height maps. Of several frames the mean of
+    each pixel is taken over those that have data there. PNGs need the TOML of their camera.
+
+    Example:
+        >>> import tempfile
+        >>> import granulcal
+        >>> pour = granulcal.simulate(granulcal.Scene.drop(0.02, count=60), seed=1)
+        >>> camera = Camera.overhead(height=0.3, field_width=0.2, pixels=200)
+        >>> folder = tempfile.mkdtemp()
+        >>> image, toml = camera.record(pour.positions, pour.radii, folder)
+        >>> recording = Recording.open(image, camera=toml)
+        >>> 0 < recording.statistics()["max_z"] < 0.02
+        True
+    """
+
+    def __init__(self, native: _native.Recording, path: Path) -> None:
+        self._native = native
+        self.path = path
+        """The file or folder."""
+
+    @classmethod
+    def open(
+        cls,
+        path: str | PathLike[str],
+        camera: str | PathLike[str] | None = None,
+        *,
+        topic: str | None = None,
+        camera_topic: str | None = None,
+        colour_topic: str | None = None,
+        frames: int | None = FRAMES,
+        first_frame: int | None = None,
+    ) -> "Recording":
+        """Returns the recording at `path`.
+
+        A file that is cut off or damaged gives the frames that are whole, with a warning; `lost`
+        says how many are not.
+
+        Args:
+            path: .bag, .mcap, .npz, .png, or a folder of .png.
+            camera: TOML of the camera, which PNGs need and height maps have not; of a .bag or .mcap
+                it replaces lens, depth unit and segmentation, key by key.
+            topic: topic of the depth images, where several fit.
+            camera_topic: topic of the lens, where several fit.
+            colour_topic: topic of the colour images, where several fit; they are read when the
+                camera's TOML marks grains by colour.
+            frames: most frames that are averaged; None for all. The paper averages ten.
+            first_frame: index of the first of them, from 0; by default the last `frames` are taken.
+
+        Raises:
+            FileNotFoundError: a file does not exist.
+            ValueError: a file is no recording, or none or several topics fit; the message says what
+                is wrong and lists the topics.
+        """
+        if frames is not None and frames < 1:
+            raise ValueError(f"frames must be at least 1, got {frames}")
+        if first_frame is not None and first_frame < 0:
+            raise ValueError(f"first_frame must be at least 0, got {first_frame}")
+        native = _native.Recording.open(
+            path,
+            camera,
+            topic=topic,
+            camera_topic=camera_topic,
+            colour_topic=colour_topic,
+            frames=frames,
+            first_frame=first_frame,
+        )
+        recording = cls(native, Path(path))
+        if recording.lost is not None:
+            text = f"{path}: {recording.lost}; {'; '.join(recording.damage)}"
+            warnings.warn(text, DamagedRecordingWarning, stacklevel=2)
+        return recording
+
+    @property
+    def frames(self) -> int:
+        """Number of frames that were averaged."""
+        return self._native.frames
+
+    @property
+    def whole_frames(self) -> int:
+        """Number of frames of the recording that are whole."""
+        return self._native.whole_frames
+
+    @property
+    def topic(self) -> str | None:
+        """Topic of the depth images; None for a recording without topics."""
+        return self._native.topic
+
+    @property
+    def lost(self) -> "Lost | None":
+        """Frames that are lost; None for a whole recording."""
+        found = self._native.lost
+        return None if found is None else Lost(*found)
+
+    @property
+    def damage(self) -> list[str]:
+        """What is cut off or damaged, a line each."""
+        return self._native.damage
+
+    @property
+    def lens(self) -> dict[str, float] | None:
+        """Lens of a depth image: width, height, fx, fy, cx, cy [px]; None for a height map.
+
+        As OpenCV and the RealSense SDK give it: the centre of the first pixel is (0, 0).
+        """
+        found = self._native.lens
+        names = ("width", "height", "fx", "fy", "cx", "cy")
+        return None if found is None else dict(zip(names, found, strict=True))
+
+    @property
+    def depth_unit(self) -> float | None:
+        """Metres per count of a depth image; None for a height map and for depths in metres."""
+        return self._native.depth_unit
+
+    @cached_property
+    def depth(self) -> NDArray[np.float32] | None:
+        """Depth [m], 0 is no data, shape (h, w); None for a height map."""
+        return self._native.depth
+
+    @cached_property
+    def heights(self) -> Array | None:
+        """Heights [m], NaN is no data, shape (h, w); None for a depth image."""
+        return self._native.heights
+
+    def formation(self, **settings: Unpack[SegmentationSettings]) -> Formation:
+        """Returns the points of the formation, levelled and centred.
+
+        Args:
+            settings: what differs from the camera's file, else from the default; see
+                `SegmentationSettings`.
+
+        Raises:
+            ValueError: no pixel belongs to a grain, an image without data, a setting out of range,
+                or both a fixed threshold and a floor.
+
+        Warns:
+            EdgePixelsWarning: pixels at the edge of a height map are taken for grains.
+        """
+        _refuse_two_thresholds(settings)
+        found = self._native.formation(**settings)
+        if self.depth is None and settings.get("border_px") is None and found.edge is not None:
+            self._tell_edge(*found.edge, found.downsample)
+        return Formation(
+            points=found.points,
+            mask=found.mask,
+            heights=found.heights,
+            plane=_plane(found.plane),
+            ground_sd=found.ground_sd,
+            valid_count=found.valid_count,
+            threshold=found.threshold,
+            centroid=found.centroid,
+            volume=found.volume,
+            kind=found.kind,
+            half_volume_radius=found.half_volume_radius,
+            profile=found.profile,
+            downsample=found.downsample,
+            resolution=found.resolution,
+            spacing=float("nan") if found.spacing is None else found.spacing,
+        )
+
+    def _tell_edge(self, count: int, frame: int, downsample: int) -> None:
+        """Warns of pixels at the edge of a height map that are taken for grains."""
+        width = frame * downsample
+        warnings.warn(
+            f"{self.path}: {count} pixels at the edge of the map, apart from the formation, are "
+            f"taken for grains; border_px={width} (--border {width}) leaves them out, "
+            "border_px=0 keeps them without a word",
+            EdgePixelsWarning,
+            stacklevel=3,
+        )
+
+    def level(self, **settings: Unpack[SegmentationSettings]) -> Levelled:
+        """Returns ground, heights and mask, also of a flat bed; settings as `formation`.
+
+        Raises:
+            ValueError: an image without data, a setting out of range, or both a fixed threshold
+                and a floor.
+        """
+        _refuse_two_thresholds(settings)
+        found = self._native.level(**settings)
+        return Levelled(
+            heights=found.heights,
+            mask=found.mask,
+            plane=_plane(found.plane),
+            ground_sd=found.ground_sd,
+            threshold=found.threshold,
+            valid_count=found.valid_count,
+            downsample=found.downsample,
+            resolution=found.resolution,
+        )
+
+    @cached_property
+    def _formation(self) -> Formation:
+        return self.formation()
+
+    def statistics(self) -> Statistics:
+        """Returns the statistics under the recording's own segmentation; see `formation`."""
+        return self._formation.statistics()
+
+    def points(self) -> Array:
+        """Returns the points under the recording's own segmentation [m], shape (n, 3)."""
+        return self._formation.points
+
+    @property
+    def plane(self) -> Plane:
+        """The ground under the recording's own segmentation."""
+        return self._formation.plane
+
+    @staticmethod
+    def observed(
+        path: str | PathLike[str],
+        scene: Scene,
+        *,
+        width: float | None = None,
+        fps: float | None = None,
+        series: str | None = None,
+        camera: int | None = None,
+    ) -> ObservedStatistics:
+        """Returns what a measurement that is no depth image says of a scene's own statistics.
+
+        Time-averaged pictures of a drum (.bmp, .png) give `surface_z[x]` and `surface_slope`,
+        run-out files (.txt) `front_radius[t]`, discharge curves (.csv) `discharged[t]` and
+        `discharge_rate`. What the scene observes besides is NaN.
+
+        Args:
+            path: the file.
+            scene: the scene whose statistics are asked for.
+            width: width of a drum's picture [m]; needed there.
+            fps: frames a second of a run-out file's video; 240 unless told otherwise.
+            series: name of a discharge curve, where the file has several.
+            camera: 1 or 2 for what this camera of a run-out file saw; the mean of both otherwise.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: it is not what its name says, the scene observes nothing of the kind, or an
+                argument does not go with it.
+        """
+        kind = Path(path).suffix.lower()
+        given = {"width": width, "fps": fps, "series": series, "camera": camera}
+        takes = {
+            ".bmp": ("width",),
+            ".png": ("width",),
+            ".txt": ("fps", "camera"),
+            ".csv": ("series",),
+        }
+        if kind not in takes:
+            raise ValueError(f"{path} must be one of {', '.join(takes)}")
+        wrong = [name for name in given if given[name] is not None and name not in takes[kind]]
+        if wrong:
+            raise ValueError(
+                f"a {kind} file takes {' and '.join(takes[kind])}, not {', '.join(wrong)}"
+            )
+        if "width" in takes[kind]:
+            if width is None:
+                raise ValueError(f"{path}: width, the drum's inner diameter [m], is needed")
+            return DrumImage.open(path, width=width).observed(scene)
+        if "fps" in takes[kind]:
+            run_out = RunOut.open(path) if fps is None else RunOut.open(path, fps=fps)
+            return run_out.observed(scene, camera=camera)
+        return DischargeCurve.open(path, series).observed(scene)
+
+    def _repr_html_(self) -> str:
+        from granulcal.html import page, picture, seen_from_above
+
+        rows: dict[str, object] = {"frames": self.frames, "topic": self.topic or "-"}
+        label = "z [m]" if self.depth is None else "depth [m]"
+        image = self.heights if self.depth is None else self.depth
+        if image is not None:
+            rows["size"] = f"{image.shape[1]} x {image.shape[0]}"
+        if self.lost is not None:
+            rows["damage"] = str(self.lost)
+        drawn = "" if image is None else picture(seen_from_above(image, label))
+        return page(f"Recording {self.path.name}", rows, drawn)
+
+    def __repr__(self) -> str:
+        kind = "height map" if self.depth is None else f"depth, {self.frames} frame(s)"
+        return f"Recording({str(self.path)!r}, {kind})"
+
+
+def _plane(parts: tuple[tuple[float, float, float], float, float, float, int]) -> Plane:
+    normal, offset, tilt_rad, rms, inliers = parts
+    return Plane(
+        normal=normal,
+        offset=offset,
+        tilt_deg=float(np.degrees(tilt_rad)),
+        rms=rms,
+        inlier_count=inliers,
+    )
+
+
+def _refuse_two_thresholds(settings: SegmentationSettings) -> None:
+    both = settings.get("height_threshold"), settings.get("threshold_floor")
+    if None not in both:
+        raise ValueError("give height_threshold or threshold_floor, not both")

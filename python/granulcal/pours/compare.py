@@ -1,0 +1,114 @@
+"""How far two formations are from each other, in standard deviations of the training data."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from granulcal.pours.dataset import Dataset
+from granulcal.pours.statistics import NAMES, UNITS
+
+__all__ = ["Scale", "StatisticRow", "comparison_table", "nearest_row", "standardised_distance"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """Standard deviation of each statistic over the usable pours of a data set.
+
+    Attributes:
+        sd: standard deviations, SI units, shape (16,).
+    """
+
+    sd: Array
+
+    @classmethod
+    def of(cls, data: Dataset) -> "Scale":
+        """Returns the scale of a data set.
+
+        Raises:
+            ValueError: fewer than two usable pours.
+        """
+        usable = data.x[data.is_usable]
+        if len(usable) < 2:
+            raise ValueError(f"a scale needs at least 2 usable pours, got {len(usable)}")
+        return cls(usable.std(axis=0, ddof=1))
+
+    def difference(self, a: ArrayLike, b: ArrayLike) -> Array:
+        """Returns (a - b) in standard deviations, shape as `a - b`.
+
+        A statistic that never varied in the data set cannot be scaled and counts as 0 where `a`
+        and `b` are equal, else as infinite.
+        """
+        raw = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scaled = raw / self.sd
+        return np.where(raw == 0, 0.0, scaled)
+
+
+def standardised_distance(a: ArrayLike, b: ArrayLike, scale: Scale) -> float:
+    """Returns the L2 norm of the difference of two vectors of statistics in standard deviations."""
+    return float(np.linalg.norm(scale.difference(a, b)))
+
+
+def nearest_row(observed: ArrayLike, data: Dataset) -> int:
+    """Returns the index of the usable pour of `data` that is nearest to `observed` (16,)."""
+    usable = np.flatnonzero(data.is_usable)
+    scaled = Scale.of(data).difference(data.x[usable], np.asarray(observed))
+    return int(usable[np.linalg.norm(scaled, axis=1).argmin()])
+
+
+@dataclass(frozen=True, kw_only=True)
+class StatisticRow:
+    """One statistic, measured and simulated.
+
+    Attributes:
+        name: its name.
+        unit: its unit, `-` without one.
+        measured: the measured value, SI.
+        simulated: mean over the simulated pours, SI.
+        sd: standard deviation over the simulated pours, SI; NaN for one pour.
+        difference: simulated minus measured, in standard deviations of the training data.
+    """
+
+    name: str
+    unit: str
+    measured: float
+    simulated: float
+    sd: float
+    difference: float
+
+    @property
+    def is_far(self) -> bool:
+        """Whether the difference is beyond two standard deviations of the training data."""
+        return abs(self.difference) > 2
+
+
+def comparison_table(
+    measured: ArrayLike, simulated: Sequence[ArrayLike], scale: Scale
+) -> list[StatisticRow]:
+    """Returns one row for each statistic.
+
+    Args:
+        measured: measured statistics, shape (16,).
+        simulated: statistics of each simulated pour, each of shape (16,), at least one.
+        scale: standard deviations of the training data.
+    """
+    pours = np.array([np.asarray(pour, dtype=float) for pour in simulated])
+    mean = pours.mean(axis=0)
+    sd = pours.std(axis=0, ddof=1) if len(pours) > 1 else np.full(len(NAMES), np.nan)
+    vector = np.asarray(measured, dtype=float)
+    differences = scale.difference(mean, vector)
+    return [
+        StatisticRow(
+            name=name,
+            unit=UNITS[name],
+            measured=float(vector[i]),
+            simulated=float(mean[i]),
+            sd=float(sd[i]),
+            difference=float(differences[i]),
+        )
+        for i, name in enumerate(NAMES)
+    ]

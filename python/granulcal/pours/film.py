@@ -1,0 +1,169 @@
+"""A pour as an animated GIF: shaded balls and the lines of walls, from a little above."""
+
+import itertools
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal import _native
+from granulcal.pours.scene import Scene
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+__all__ = ["film"]
+
+Array = NDArray[np.float64]
+_PAPER, _GROUND, _WALL = (250, 250, 248), (226, 224, 218), (120, 130, 160)
+_GRAIN = (214, 168, 96)
+_RING = 40
+_EASE = 1.08
+_HOLD_MS = 1500
+
+
+class _Eye:
+    """An orthographic look at a box of space.
+
+    Args:
+        low, high: corners of what must be in the picture [m], shape (3,).
+        width: of the picture [px].
+        rise_deg: how far above the horizon the eye stands [deg].
+    """
+
+    def __init__(self, low: Array, high: Array, width: int, rise_deg: float) -> None:
+        rise = np.radians(rise_deg)
+        self.right = np.array([1.0, 0.0, 0.0])
+        self.up = np.array([0.0, np.sin(rise), np.cos(rise)])
+        self.away = np.array([0.0, np.cos(rise), -np.sin(rise)])
+        corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
+        flat = np.stack([corners @ self.right, corners @ self.up], axis=1)
+        centre, span = (flat.max(axis=0) + flat.min(axis=0)) / 2, np.ptp(flat, axis=0) * _EASE
+        self.scale = width / max(span[0], 1e-9)
+        # Even numbers: what makes films of pictures wants them.
+        self.size = (width, max(2, 2 * round(span[1] * self.scale / 2)))
+        self.origin = centre
+
+    def project(self, points: Array) -> tuple[Array, Array]:
+        """Returns places in the picture [px], shape (n, 2), and distances from the eye [m]."""
+        flat = np.stack([points @ self.right, points @ self.up], axis=-1) - self.origin
+        place = flat * self.scale * [1, -1] + np.array(self.size) / 2
+        return place, points @ self.away
+
+
+def film(
+    scene: Scene,
+    path: str | PathLike[str],
+    *,
+    seed: int = 0,
+    fps: float = 15.0,
+    slow: float = 2.0,
+    width: int = 480,
+    rise_deg: float = 20.0,
+    most_frames: int = 120,
+    progress: Callable[[float], object] | None = None,
+) -> int:
+    """Pours a scene, writes an animated GIF and returns the number of its frames.
+
+    Args:
+        scene: what is poured.
+        path: the GIF.
+        seed: of the pour.
+        fps: frames a second of the film.
+        slow: seconds of the film for a second of the pour.
+        width: of the picture [px].
+        rise_deg: how far above the horizon one looks from [deg].
+        most_frames: the film ends there, a long pour with its last frame.
+        progress: called with the simulated time of each frame [s].
+
+    Raises:
+        ModuleNotFoundError: Pillow, which comes with the extra `plot`, is not installed.
+        ValueError: a name that is not .gif, or numbers out of their range.
+    """
+    if Path(path).suffix.lower() != ".gif":
+        raise ValueError(f"{path} must end in .gif")
+    if not (fps > 0 and slow > 0 and width >= 64 and most_frames >= 1):
+        raise ValueError("fps and slow must be positive, width at least 64, most_frames at least 1")
+    lines = _outlines(scene)
+    start, radii = scene.start(seed)
+    everything = np.concatenate([start, *lines, [[-0.1, -0.1, 0.0], [0.1, 0.1, 0.0]]])
+    pad = float(radii.max())
+    eye = _Eye(everything.min(axis=0) - pad, everything.max(axis=0) + pad, width, rise_deg)
+    frames: list[Image.Image] = []
+    last: list[Image.Image] = []
+
+    def see(time: float, centres: Array, sizes: Array) -> None:
+        if progress is not None:
+            progress(time)
+        if len(frames) < most_frames:
+            frames.append(_picture(eye, centres, sizes, lines))
+        else:
+            last[:] = [_picture(eye, centres, sizes, lines)]
+
+    _native.film(scene.native, seed, fps * slow, see)
+    frames += last
+    times = [round(1000 / fps)] * (len(frames) - 1) + [_HOLD_MS]
+    beside = Path(path).with_name(Path(path).name + ".part")
+    options: dict[str, Any] = {"append_images": frames[1:], "duration": times, "loop": 0}
+    frames[0].save(beside, "GIF", save_all=True, optimize=True, **options)
+    beside.replace(path)
+    return len(frames)
+
+
+def _picture(eye: _Eye, centres: Array, radii: Array, lines: list[Array]) -> "Image.Image":
+    from PIL import Image, ImageDraw
+
+    image = Image.new("RGB", eye.size, _PAPER)
+    draw = ImageDraw.Draw(image)
+    reach = 4.0
+    corners = reach * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    draw.polygon([tuple(p) for p in eye.project(corners)[0]], fill=_GROUND)
+    places, away = eye.project(centres)
+    for i in np.argsort(-away):
+        r = max(radii[i] * eye.scale, 1.0)
+        _ball(draw, places[i], r)
+    for line in lines:
+        draw.line([tuple(p) for p in eye.project(line)[0]], fill=_WALL, width=2)
+    return image.quantize(64)
+
+
+def _ball(draw: Any, at: Array, r: float) -> None:
+    """Draws a ball lit from the upper left: its rim dark, its light side bright."""
+    x, y = at
+    for share, shade in ((1.0, 0.55), (0.82, 0.85), (0.45, 1.1)):
+        shift = (1.0 - share) * 0.45 * r
+        rr = r * share
+        colour = tuple(int(min(255, c * shade)) for c in _GRAIN)
+        left, top = x - shift - rr, y - shift - rr
+        draw.ellipse([left, top, left + 2 * rr, top + 2 * rr], fill=colour)
+
+
+def _outlines(scene: Scene) -> list[Array]:
+    """Returns lines along the walls at rest [m], each of shape (k, 3)."""
+    from granulcal.export.setup import Setup
+
+    try:
+        walls = Setup.of(scene).walls
+    except ValueError:
+        # Walls that move are not drawn; the grains show them.
+        return []
+    found: list[Array] = []
+    for body in walls:
+        found += _outline(body.shape)
+    return found
+
+
+def _outline(shape: dict[str, Any]) -> list[Array]:
+    from granulcal.export.mesh import triangles
+
+    if shape["kind"] not in ("cone", "cylinder"):
+        mesh = triangles(shape)
+        return [mesh.vertices[[*face, face[0]]] for face in mesh.faces]
+    open_shape = {key: value for key, value in shape.items() if key != "closed"}
+    rings = triangles(open_shape, sides=_RING).vertices.reshape(2, _RING, 3)
+    closed = [np.concatenate([ring, ring[:1]]) for ring in rings]
+    sides = [rings[:, i] for i in (int(rings[0, :, 0].argmin()), int(rings[0, :, 0].argmax()))]
+    return [*closed, *sides]

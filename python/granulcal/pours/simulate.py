@@ -1,0 +1,266 @@
+"""One pour: from a scene to grains at rest, and what the camera sees of them."""
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal import _native
+from granulcal.pours.scene import Material, Scene
+from granulcal.pours.statistics import DiagnosticStatistics, ObservedStatistics, Statistics
+
+if TYPE_CHECKING:
+    from granulcal.engines import Engine
+
+__all__ = ["Pour", "simulate"]
+
+Array = NDArray[np.float64]
+
+
+class Pour:
+    """Grains at the end of a pour, how it ended and how far it can be trusted.
+
+    Example:
+        >>> pour = simulate(Scene.drop(0.02, count=20), seed=1)
+        >>> pour.positions.shape, pour.status
+        ((20, 3), 'at_rest')
+    """
+
+    def __init__(self, native: _native.Pour, scene: Scene, seed: int) -> None:
+        self._native = native
+        self.scene = scene
+        """The scene, with the material and the preset that were simulated."""
+        self.seed = seed
+        """Seed of the grains' start and of the camera's noise."""
+
+    @cached_property
+    def positions(self) -> Array:
+        """Centres of the grains [m], ground at z = 0, shape (n, 3): of those in the scene."""
+        return self._native.positions
+
+    @cached_property
+    def velocities(self) -> Array:
+        """Velocities of the grains [m/s], shape (n, 3)."""
+        return self._native.velocities
+
+    @cached_property
+    def angular_velocities(self) -> Array:
+        """Angular velocities of the grains [rad/s], shape (n, 3)."""
+        return self._native.angular_velocities
+
+    @cached_property
+    def orientations(self) -> Array:
+        """Turns of grains that are not round, quaternions i, j, k, w, shape (n, 4); else (0, 4)."""
+        return self._native.orientations
+
+    @cached_property
+    def radii(self) -> Array:
+        """Radii of the grains [m], shape (n,); half the diameter if they are not round."""
+        return self._native.radii
+
+    @cached_property
+    def radii_out(self) -> Array:
+        """Radii of the grains that have left through the scene's outflow [m], shape (m,)."""
+        return self._native.radii_out
+
+    @property
+    def status(self) -> str:
+        """How it ended: `at_rest`, `out_of_view`, `ran_out`, `jammed`, `horizon`, `unhealthy`."""
+        return self._native.status
+
+    @property
+    def grains_in_funnel(self) -> int:
+        """Grains whose centre is in the funnel at the end; 0 where the scene has none."""
+        return self._native.grains_in_funnel
+
+    @property
+    def state_hash(self) -> str:
+        """Hash of every bit of the final state, 32 hexadecimal digits: equal for equal pours."""
+        return self._native.state_hash
+
+    @cached_property
+    def health(self) -> dict[str, float]:
+        """Penetration [radii], residuals [-], energy created [-], grains lost, work done."""
+        return self._native.health
+
+    @property
+    def simulated_s(self) -> float:
+        """Simulated time [s]."""
+        return self._native.simulated_s
+
+    @property
+    def cpu_seconds(self) -> float:
+        """Processor time of the simulation [s]."""
+        return self._native.cpu_seconds
+
+    def depth_image(self) -> NDArray[np.float32]:
+        """Returns what the scene's pinhole camera sees: depth [m], 0 is no data, shape (h, w).
+
+        Raises:
+            ValueError: the scene's camera is orthographic; it delivers `height_map`.
+        """
+        image = self._observation.depth
+        if image is None:
+            raise ValueError("the scene's camera is orthographic: ask for height_map()")
+        return image
+
+    def look_from(self, view: str) -> NDArray[np.float32]:
+        """Returns what one of the scene's further views sees: depth [m], shape (h, w).
+
+        0 is no data, and the image is without noise.
+
+        Args:
+            view: its name in the scene (table `views`).
+
+        Raises:
+            KeyError: the scene has no view of this name.
+        """
+        image = self._native.look_from(view)
+        if image is None:
+            raise KeyError(f"this scene has no view {view!r}; views stand in its table `views`")
+        return image
+
+    def height_map(self) -> Array:
+        """Returns what the scene's orthographic camera sees: heights [m], shape (h, w).
+
+        Raises:
+            ValueError: the scene's camera is a pinhole; it delivers `depth_image`.
+        """
+        heights = self._observation.heights
+        if heights is None:
+            raise ValueError("the scene's camera is a pinhole: ask for depth_image()")
+        return heights
+
+    def points(self) -> Array:
+        """Returns the points of the image that were taken for grains [m], shape (k, 3).
+
+        Empty if no grain is in view.
+        """
+        return self._observation.points
+
+    def statistics(self) -> Statistics:
+        """Returns the statistics of the image, the simulated half of every comparison.
+
+        Raises:
+            ValueError: too few grains are in view.
+        """
+        return Statistics(self._observation.statistics())
+
+    def diagnostic_statistics(self) -> DiagnosticStatistics:
+        """Returns the diagnostic statistics of the image, about the scene's vertical axis.
+
+        Isolated grains are seen only by pixels finer than a grain: `camera.downsample` decides.
+
+        Raises:
+            ValueError: too few grains are in view.
+        """
+        return DiagnosticStatistics(self._observation.diagnostics())
+
+    def observed(self) -> ObservedStatistics:
+        """Returns the statistics that the scene observes; there are none if it observes nothing."""
+        return ObservedStatistics(self._native.observed, self.scene.observed_names)
+
+    def series(self, name: str) -> tuple[Array, Array]:
+        """Returns times after the begin of the observation [s] and the samples of what is observed.
+
+        Args:
+            name: `front_radius` [m], `discharged` [%], `surface_slope` [deg] or the height of the
+                surface at a stated x, `surface_z[0.01]` [m].
+
+        Raises:
+            KeyError: the scene does not observe it.
+        """
+        all_series = self._native.series
+        if name not in all_series:
+            known = ", ".join(all_series) or "nothing"
+            raise KeyError(f"this scene has no series {name!r}; it observes {known} over time")
+        return all_series[name]
+
+    @cached_property
+    def _observation(self) -> _native.Observation:
+        return self._native.observe()
+
+    def _repr_html_(self) -> str:
+        from granulcal.html import page, picture, seen_from_above
+
+        rows = {"status": self.status, "grains": len(self.radii)}
+        rows |= {"simulated": f"{self.simulated_s:.2f} s", "seed": self.seed}
+        view = self._observation
+        label = "z [m]" if view.depth is None else "depth [m]"
+        image = view.heights if view.depth is None else view.depth
+        drawn = "" if image is None else picture(seen_from_above(image, label))
+        return page(f"Pour of {self.scene.name}", rows, drawn)
+
+    def __repr__(self) -> str:
+        return f"Pour({len(self.radii)} grains, {self.status}, {self.simulated_s:.2f} s)"
+
+
+def simulate(
+    scene: Scene,
+    material: Material | None = None,
+    seed: int = 0,
+    preset: str | None = None,
+    threads: int = 1,
+    *,
+    engine: "Engine | None" = None,
+) -> Pour:
+    """Returns the pour of a scene; the same arguments give the same bits.
+
+    Other Python threads run meanwhile, and Ctrl-C stops it.
+
+    Args:
+        scene: what is poured.
+        material: the grains' material instead of the scene's.
+        seed: seed of the start's jitter and of the camera's noise.
+        preset: `fast`, `default`, `accurate` or `paper` instead of the scene's, which is `default`
+            unless the scene states another.
+        threads: threads that share this one pour. The bits stay the same; only scenes of some ten
+            thousand grains gain from a second thread, and `generate` runs many pours at once.
+        engine: another simulator in place of ours; docs/engines.md says what it must do. It has to
+            give grains: points alone are for `generate`.
+
+    Raises:
+        TypeError: `scene` is no scene.
+        ValueError: a number is out of its range, or more memory is needed than there is.
+    """
+    require_scene(scene)
+    check_whole("seed", seed, at_least=0)
+    check_whole("threads", threads, at_least=1)
+    if material is not None:
+        scene = scene.with_material(material)
+    if preset is not None:
+        scene = scene.with_(preset=preset)
+    if engine is not None:
+        return Pour(_left_by(engine, scene, seed), scene, seed)
+    return Pour(_native.simulate(scene.native, seed, threads), scene, seed)
+
+
+def _left_by(engine: "Engine", scene: Scene, seed: int) -> _native.Pour:
+    left = engine(scene, seed)
+    if not isinstance(left, tuple):
+        raise ValueError(f"{engine.name} gave points of a surface and no grains")
+    return scene.native.pour_of(*left, seed)
+
+
+def require_scene(scene: object) -> None:
+    """Refuses what is no scene, a file's name above all.
+
+    Raises:
+        TypeError: not a scene.
+    """
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene must be a Scene, as Scene.load reads it, got {scene!r}")
+
+
+def check_whole(name: str, value: int, *, at_least: int) -> None:
+    """Refuses what is not a whole number of at least `at_least`.
+
+    Raises:
+        TypeError: not a whole number.
+        ValueError: too small.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise TypeError(f"{name} must be a whole number, got {value!r}")
+    if value < at_least:
+        raise ValueError(f"{name} must be at least {at_least}, got {value}")
