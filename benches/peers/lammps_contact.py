@@ -106,8 +106,8 @@ SETTINGS = {
     "tangential": replace(RIGID, tangential="mindlin", tangential_damping=1.0),
     "soft_rolling": replace(RIGID, rolling_rate=0.035, rolling_damping=0.2),
 }
-"""Settings by name: `rigid` stands for our law, `stiff_rolling` has half its step and so a rolling spring four
-times stiffer, the last four take one thing back from it."""
+"""Settings by name: `rigid` stands for our law, `stiff_rolling` has half its step and so a rolling
+spring four times stiffer, the last four take one thing back from it."""
 
 
 def damping_ratio(restitution: float, *, tension: bool) -> float:

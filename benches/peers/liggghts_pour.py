@@ -6,8 +6,8 @@
 LIGGGHTS' contact is Hertz and Mindlin with a dashpot each: the normal one realises e whatever the
 speed, the tangential one cannot be chosen. Rolling is `epsd`: a spring of stiffness
 2.25 k_n mu_r^2 R_eff^2 up to mu_r R_eff F_n, damped by 0.7 of the critical, or `epsd2`, whose
-spring has the tangential stiffness and no dashpot; no torsion. The funnel is a mesh of 64 sides, for LIGGGHTS has no
-cone.
+spring has the tangential stiffness and no dashpot; no torsion. The funnel is a mesh of 64 sides,
+for LIGGGHTS has no cone.
 """
 
 import argparse

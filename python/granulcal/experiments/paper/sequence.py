@@ -8,15 +8,15 @@ itself hides nothing.
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.dataset import Dataset
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, save
 from granulcal.experiments.paper.common.measure import bootstrap, error_row, share_interval
 from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
+from granulcal.pours.dataset import Dataset
+from granulcal.pours.scene import Scene
+from granulcal.pours.statistics import NAMES
 from granulcal.prior import Prior
-from granulcal.scene import Scene
-from granulcal.statistics import NAMES
 
 __all__ = ["EXPERIMENT"]
 

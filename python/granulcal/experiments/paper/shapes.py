@@ -11,16 +11,16 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import formations
 from granulcal.experiments.paper.common.measure import Published, level_row
 from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Table
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
-from granulcal.forward import scene_at
-from granulcal.posterior import Posterior
+from granulcal.pours.forward import scene_at
+from granulcal.pours.scene import Scene
+from granulcal.pours.simulate import simulate
 from granulcal.prior import Parameter, Prior
-from granulcal.scene import Scene
-from granulcal.simulate import simulate
 
 __all__ = ["EXPERIMENT", "shaped"]
 
