@@ -63,7 +63,7 @@ pub struct ImpactSettings {
     /// Time that a contact moves by itself, in 1/omega of its spring `[-]`: what is handed on through a chain of grains
     /// needs it small, the rebound of a pair does not depend on it.
     pub micro_step: f64,
-    /// Normal impulse of a micro-step below which an impact is over `[m/s]`.
+    /// Normal impulse in a time of 1/omega below which an impact is over `[m/s]`.
     pub stopping_speed: f64,
 }
 

@@ -213,7 +213,8 @@ impl Cluster {
     /// Micro-steps, forward and backward through the links in turn, until nothing presses any more; returns their number, and
     /// whether they were cut short.
     fn ring(&mut self, settings: ImpactSettings, scenery: &Scenery) -> (usize, bool) {
-        let enough = settings.stopping_speed;
+        // A force, so that it does not depend on how finely time is cut.
+        let enough = settings.stopping_speed * settings.micro_step;
         let mut rubbed = 0;
         let period = (FRICTION_PERIOD / settings.micro_step).round().max(1.0) as usize;
         let most = (LONGEST / settings.micro_step) as usize;
