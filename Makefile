@@ -103,19 +103,24 @@ fuzz: ## fuzz the readers of recordings, FUZZ_SECONDS (600) on each of FUZZ_TARG
 
 # The site has an environment of its own: none of it is needed to use or test granulcal.
 DOCS_VENV := build/docs-venv
+RUST_PAGES := $(or $(CARGO_TARGET_DIR),target)/doc
 
 docs: $(VENV)/.native ## the site in build/site: guide, gallery, commands, Python, theory, results; links are strict
 	test -x $(DOCS_VENV)/bin/mkdocs || { $(PYTHON) -m venv $(DOCS_VENV); \
 		$(DOCS_VENV)/bin/python -m pip install --quiet -r docs/requirements.txt; }
 	$(BIN)/python scripts/build_docs.py
 	$(DOCS_VENV)/bin/mkdocs build --strict --quiet --config-file build/mkdocs.yml
-	cargo doc --workspace --no-deps --locked --target-dir build/rustdoc
-	rm -rf build/site/rust && cp -r build/rustdoc/doc build/site/rust
+	rm -rf $(RUST_PAGES)
+	cargo doc --workspace --no-deps --locked
+	rm -rf build/site/rust && cp -r $(RUST_PAGES) build/site/rust
+	$(BIN)/python scripts/check_site.py build/site
 
 MODEL_POURS ?= 1000
+MODEL_DATA ?= data/funnel
 
-model: $(VENV)/.native ## the model of the built-in funnel that ships with the wheel; MODEL_POURS pours (1000), resumed
-	$(BIN)/granulcal model funnel -n $(MODEL_POURS) -o python/granulcal/models/funnel
+model: $(VENV)/.native ## the model of the built-in funnel that ships with the wheel; MODEL_POURS pours (1000) in MODEL_DATA, resumed
+	$(BIN)/granulcal generate funnel default -n $(MODEL_POURS) -o $(MODEL_DATA)
+	$(BIN)/granulcal model funnel --data $(MODEL_DATA) --compact -o python/granulcal/models/funnel
 
 clean: ## remove what was built, not what was measured
 	rm -rf target $(VENV) python/granulcal/_native.abi3.so

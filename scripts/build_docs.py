@@ -12,10 +12,12 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 OUT = ROOT / "build" / "docs"
+PICTURES = "https://raw.githubusercontent.com/granulcal/granulcal/main/docs"
 REPOSITORY = "https://github.com/granulcal/granulcal/blob/main"
 
 
@@ -23,15 +25,22 @@ def main() -> int:
     """Writes build/docs and build/mkdocs.yml; returns the exit code."""
     shutil.rmtree(OUT, ignore_errors=True)
     shutil.copytree(ROOT / "docs", OUT)
-    readme = (ROOT / "README.md").read_text(encoding="utf-8").replace("](docs/", "](")
-    (OUT / "index.md").write_text(linked(readme, OUT), encoding="utf-8")
+    (OUT / "index.md").write_text(start(), encoding="utf-8")
     for page in OUT.rglob("*.md"):
-        page.write_text(linked(page.read_text(encoding="utf-8"), page.parent), encoding="utf-8")
+        text = linked(named(page.read_text(encoding="utf-8"), page.parent), page.parent)
+        page.write_text(text, encoding="utf-8")
     add_film(OUT / "gallery.md")
     (OUT / "commands.md").write_text(commands(), encoding="utf-8")
     (OUT / "api.md").write_text(api(), encoding="utf-8")
+    (OUT / "rust.md").write_text(rust(), encoding="utf-8")
     write_navigation()
     return 0
+
+
+def start() -> str:
+    """Returns the README as the first page: pictures from here, no table of contents beside it."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8").replace("](docs/", "](")
+    return f"---\nhide:\n  - toc\n---\n\n{readme.replace(f'({PICTURES}/', '(')}"
 
 
 def add_film(gallery: Path) -> None:
@@ -42,6 +51,21 @@ def add_film(gallery: Path) -> None:
     title, rest = text.split("\n", 1)
     picture = f"![A pour through the paper's funnel, seen from the side]({name})"
     gallery.write_text(f"{title}\n\n{picture}\n{rest}", encoding="utf-8")
+
+
+def named(text: str, folder: Path) -> str:
+    """Returns a page on which the name of another page, as docs/guide.md, is a link to it."""
+
+    def lead(match: re.Match[str]) -> str:
+        place = OUT / match.group(1)
+        if not place.exists():
+            return match.group(0)
+        return f"[{match.group(0)}]({os.path.relpath(place, folder)})"
+
+    # Not inside of links and listings.
+    pattern = r"(?<![\w/(\[`])`?docs/([\w/-]+\.md)`?(?![\w\])])"
+    parts = re.split(r"(^```.*?^```|^ {4}.*?$|\[[^\]]*\]\([^)]*\))", text, flags=re.S | re.M)
+    return "".join(part if i % 2 else re.sub(pattern, lead, part) for i, part in enumerate(parts))
 
 
 def linked(text: str, folder: Path) -> str:
@@ -74,7 +98,7 @@ def commands() -> str:
 
 
 def told(*words: str) -> str:
-    """Returns what a command prints, at a width of 100."""
+    """Returns what a command prints, at a width that a page has room for."""
     environment = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
     command = [sys.executable, "-m", "granulcal.cli", *words]
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
@@ -90,6 +114,19 @@ def api() -> str:
     for name, thing in sorted(homes.items(), key=lambda pair: pair[0].lower()):
         lines += [f"::: {thing.__module__}.{name}", ""]
     return "\n".join(lines)
+
+
+def rust() -> str:
+    """Returns a page that leads to the documentation of each crate, which `make docs` adds."""
+    lines = ["# Rust", "", "The simulator, its images and its files, without Python.", ""]
+    lines += ["| crate | what |", "|---|---|"]
+    for manifest in sorted((ROOT / "crates").glob("*/Cargo.toml")):
+        package = tomllib.loads(manifest.read_text(encoding="utf-8"))["package"]
+        name = package["name"]
+        # HTML: the pages are not there yet when the links of Markdown are looked at.
+        place = f"rust/{name.replace('-', '_')}/index.html"
+        lines.append(f'| <a href="{place}">{name}</a> | {package["description"]} |')
+    return "\n".join([*lines, ""])
 
 
 def write_navigation() -> None:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.measured.recording import Recording
 from granulcal.pours.dataset import Dataset
-from granulcal.pours.forward import pours_at, scene_at
+from granulcal.pours.forward import draws_of, pours_at, scene_at
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour
 from granulcal.pours.statistics import NAMES
@@ -81,6 +81,7 @@ def calibrate(
     *,
     report: str | PathLike[str],
     seeds: int = 3,
+    draws: int = 0,
     threads: int | None = None,
     truth: ArrayLike | None = None,
     title: str = "Calibration report",
@@ -98,6 +99,7 @@ def calibrate(
             the first and compares the mean of their statistics.
         report: the HTML file.
         seeds: number of pours at the posterior's mode and at the prior's mean.
+        draws: pours at draws of the posterior, for the band of the page's profile.
         threads: pours at once; the default is one for each core.
         truth: the true parameters, where they are known, shape (p,).
         title: heading of the page.
@@ -123,6 +125,7 @@ def calibrate(
     unfitted = scene_at(data.scene, model.prior, model.prior.mean())
     pours = pours_at(fitted, numbers, threads=threads)
     prior_pours = pours_at(unfitted, numbers, threads=threads)
+    drawn = draws_of(data.scene, posterior, draws, threads=threads)
     page = write_report(
         report,
         observed=observed.mean(axis=0),
@@ -130,6 +133,7 @@ def calibrate(
         posterior=posterior,
         pours=pours,
         prior_pours=prior_pours,
+        drawn=drawn,
         data=data,
         calibration=model.calibration,
         misfit=model.misfit(observed),

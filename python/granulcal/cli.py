@@ -60,20 +60,21 @@ _TRACEBACK = "GRANULCAL_TRACEBACK"
 
 _EPILOG = """\
 From a recording to a material:
-  granulcal init couscous                                     scene, prior, camera and task, commented
-  granulcal sample couscous                                   no camera at hand? recordings of a known truth
-  granulcal generate scene.toml prior.toml -n 1000 -o pours   simulate a training set
-  granulcal train pours -o model                              train BayesSim on it
-  granulcal check model                                       may its intervals be trusted?
-  granulcal infer model couscous.bag                          posterior of the material
-  granulcal calibrate scene.toml prior.toml couscous.bag --budget 100 -o run
-                                                              one recording, few pours, no model
+  granulcal init couscous                             files to begin with
+  granulcal sample couscous                           no camera? a known truth
+  granulcal generate scene.toml prior.toml -o pours   simulate a training set
+  granulcal train pours -o model                      train BayesSim on it
+  granulcal check model                               may it be trusted?
+  granulcal infer model couscous.bag                  posterior of the material
+  granulcal calibrate scene.toml prior.toml couscous.bag -o run
+                                                      few pours, no model
   granulcal export posterior posterior.json scene.toml --to lammps -o pour
-  granulcal close-loop loop.toml -o loop                      what does the model lack?
-  granulcal predict loop --at funnel.height=0.07 --corrected  and where it was not measured?
+  granulcal close-loop loop.toml -o loop              what does the model lack?
+  granulcal predict loop --at funnel.height=0.07      where it was not measured
 
-Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy, some frames of a
-recording lost, a recording outside the model, or a model that fails its check, 130 stopped."""
+Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours
+unhealthy, some frames of a recording lost, a recording outside the model, or a
+model that fails its check, 130 stopped."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -30,6 +30,7 @@ _RECORDING_SEED = 20_231
 _TILT_DEG = (2.5, -1.5)
 _DEPTH_NOISE = 4e-4
 _DEFAULT_POURS = 200
+_DRAWS = 8
 
 
 def demo_scene() -> Scene:
@@ -88,6 +89,7 @@ def run(out: Path, *, pours: int = _DEFAULT_POURS, threads: int | None = None) -
         data,
         [recording],
         report=out / "report.html",
+        draws=_DRAWS,
         threads=threads,
         truth=truth,
         title="Demo: a hidden material, found from one depth image",

@@ -35,7 +35,7 @@ class Prior:
     Raises:
         PriorError: a path is repeated, or no parameter is free.
 
-    Example:
+    Examples:
         >>> prior = Prior.default()
         >>> prior.names
         ['material.sliding_friction', 'material.rolling_friction', 'material.restitution']

@@ -20,6 +20,7 @@ from granulcal.files import write_beside
 from granulcal.pours.compare import Scale, comparison_table, nearest_row, standardised_distance
 from granulcal.pours.dataset import Dataset
 from granulcal.pours.formation_image import formation_figure
+from granulcal.pours.profile_picture import profile_band, profile_figure
 from granulcal.pours.simulate import Pour
 from granulcal.pours.statistics import DOCS
 
@@ -92,6 +93,7 @@ def write_report(
     pours: Sequence[Pour],
     data: Dataset,
     prior_pours: Sequence[Pour] = (),
+    drawn: Sequence[Pour] = (),
     calibration: "Calibration | None" = None,
     misfit: "Misfit | None" = None,
     truth: ArrayLike | None = None,
@@ -110,6 +112,7 @@ def write_report(
         pours: pours at the posterior's mode, one for each seed, at least one.
         data: the pours that the model was trained on.
         prior_pours: pours at the prior's mean, for comparison.
+        drawn: pours at draws of the posterior, for the band of the profile; none leaves it out.
         calibration: the model's check on pairs that it has not seen.
         misfit: whether any parameters explain the measurement.
         truth: the true parameters, where they are known, shape (p,).
@@ -132,6 +135,8 @@ def write_report(
         notes=[*notes, *(str(warning) for warning in posterior.warnings)],
         command=command,
         formations=_formations(np.asarray(observed_points, dtype=float), pours[0]),
+        profile=_profile(np.asarray(observed_points, dtype=float), pours, drawn),
+        drawn_count=len(drawn),
         pairs=_pair_plot(posterior, truth),
         parameters=_parameters(posterior, truth),
         has_truth=truth is not None,
@@ -171,6 +176,14 @@ def _formations(measured: Array, pour: Pour) -> str:
     simulated = pour.points()
     centred = simulated - np.array([*simulated[:, :2].mean(axis=0), 0.0])
     return data_uri(formation_figure({"measured": measured, "simulated": centred}))
+
+
+def _profile(measured: Array, pours: Sequence[Pour], drawn: Sequence[Pour]) -> str | None:
+    seen = [points for pour in drawn if len(points := pour.points())]
+    if not seen:
+        return None
+    band = profile_band(measured, [pour.points() for pour in pours], seen)
+    return data_uri(profile_figure(band))
 
 
 def _pair_plot(posterior: "Posterior", truth: ArrayLike | None) -> str:

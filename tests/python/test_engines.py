@@ -162,3 +162,59 @@ def test_calibration_pours_in_the_engine(
         KeptPours(small_scene, small_prior, tmp_path / "pours.json", engine=points)
     seen = KeptPours(small_scene, small_prior, tmp_path / "cones.json", engine=points)(theta, 0)
     assert np.isfinite(seen).all()
+
+
+def test_the_engine_in_use_pours_for_everything_and_is_told_in_what_is_kept(
+    small_scene: gc.Scene, small_prior: gc.Prior, tmp_path: Path
+) -> None:
+    from granulcal.loop.pours.forward import Forward
+
+    from granulcal.engines import engine_in_use, pouring_with
+
+    hanging = CallableEngine(lambda scene, seed: scene.start(seed), name="not moved")
+    forward = Forward(tmp_path / "pours", threads=2)
+    ours = forward.pours(small_scene, [1, 2])
+    with pouring_with(hanging):
+        assert engine_in_use() is hanging
+        theirs = forward.pours(small_scene, [1, 2])
+        data = gc.generate(small_scene, small_prior, 2, out=tmp_path / "rows", progress=False)
+        with pytest.raises(RuntimeError, match="is in use already"), pouring_with(hanging):
+            pass
+    assert engine_in_use() is None
+    assert data.version == f"{gc.__version__}, pours by not moved"
+    # Nothing fell, and neither took the pours that the other had kept.
+    assert (theirs[:, 0] > 0.02).all() and (ours[:, 0] < 0.02).all()
+    assert np.array_equal(forward.pours(small_scene, [1, 2]), ours)
+    assert len(list((tmp_path / "pours").iterdir())) == 2
+
+
+def test_an_exported_engine_refuses_what_its_files_cannot_say() -> None:
+    engine = ExportedEngine("mujoco", python=sys.executable)
+    scene = gc.Scene.drop(0.02, count=30)
+    assert engine.refuses(scene) is None
+    sticky = scene.with_({"effects.capillary.bond": 2.0})
+    assert engine.refuses(sticky) == "effects.capillary"
+    with pytest.raises(ValueError, match=r"mujoco cannot be told effects\.capillary"):
+        engine(sticky, 0)
+
+
+def test_a_loop_does_not_look_for_what_the_engine_cannot_be_told(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from granulcal.loop.effects.library import by_name
+    from granulcal.commands.close_loop import _told
+
+    from granulcal.engines import pouring_with
+    from granulcal.loop.task import Condition, Task
+
+    pours = tuple(Path(f"{i}.npz") for i in range(3))
+    task = Task(
+        scene=gc.Scene.funnel(0.04, count=50),
+        prior=gc.Prior.default(),
+        conditions=(Condition("4 cm", {"funnel.height": 0.04}, "fit", pours),),
+        library=by_name(["cohesion.capillary", "diameter", "camera.scale"]),
+    )
+    assert _told(task) is task
+    with pouring_with(ExportedEngine("mujoco", python=sys.executable)):
+        assert [effect.name for effect in _told(task).library] == ["diameter", "camera.scale"]
+    assert "cohesion.capillary is not looked for" in capsys.readouterr().out

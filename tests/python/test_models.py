@@ -53,6 +53,61 @@ def test_a_model_is_made_once_and_goes_on_after_a_stop(
     folder = models.make_model("drop", pours=60, say=lambda text: None)
     assert folder == cache / "models" / "drop" and models.find_model("drop") == folder
     assert (folder / "training.parquet").exists()
+    capsys.readouterr()
     assert main(["model", "drop", "-n", "60", "--json"]) == 0
     told = capsys.readouterr()
     assert "is there already" in told.err and str(folder) in json.loads(told.out)["model"]
+
+
+def _pours(folder: Path, seed: int = 0) -> gc.Dataset:
+    scene = gc.Scene.built_in("drop")
+    return gc.generate(scene, gc.Prior.default(), 60, seed=seed, out=folder, progress=False)
+
+
+@pytest.mark.slow
+def test_a_model_is_made_from_pours_that_are_there(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("torch")
+    small = gc.Scene.drop(0.02, count=60, preset="fast")
+    monkeypatch.setattr(gc.Scene, "built_in", lambda name: small)
+    pours = _pours(tmp_path / "pours", seed=3)
+    words = ["model", "drop", "--data", str(tmp_path / "pours"), "--compact"]
+    assert main([*words, "-o", str(tmp_path / "model")]) == 0
+    made = json.loads((tmp_path / "model" / "made.json").read_text())
+    assert made["pours"] == 60 and made["seed"] == 3
+    # Nothing was poured into the cache, and what ships is small.
+    assert not (cache / "pours").exists()
+    sizes = {path.name: path.stat().st_size for path in (tmp_path / "model").iterdir()}
+    assert set(sizes) == {"made.json", "model.json", "weights.safetensors"}
+    assert sum(sizes.values()) < 1_000_000
+    # The small form says what the whole one says.
+    assert main(["model", "drop", "--data", str(tmp_path / "pours")]) == 0
+    whole, compact = (
+        gc.BayesSim.load(folder).posterior(pours.x[0]).mean()
+        for folder in (cache / "models" / "drop", tmp_path / "model")
+    )
+    assert whole == pytest.approx(compact, abs=1e-6)
+    capsys.readouterr()
+
+
+def test_pours_of_another_scene_prior_or_simulator_make_no_model(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = gc.Scene.drop(0.02, count=40, preset="fast")
+    monkeypatch.setattr(gc.Scene, "built_in", lambda name: small)
+    scene, prior = small, gc.Prior.default()
+    good = gc.generate(scene, prior, 2, out=tmp_path / "good", progress=False)
+    models.require_pours_of("drop", good)
+    other = gc.generate(
+        gc.Scene.drop(0.02, count=41, preset="fast"), prior, 2, out=tmp_path / "o", progress=False
+    )
+    with pytest.raises(ValueError, match="another scene than drop"):
+        models.require_pours_of("drop", other)
+    narrow = gc.Prior.from_toml(prior.to_toml().replace("high = 1.0", "high = 0.9", 1))
+    wrong = gc.generate(scene, narrow, 2, out=tmp_path / "prior", progress=False)
+    with pytest.raises(ValueError, match="another prior"):
+        models.require_pours_of("drop", wrong)
+    good.paper16[0, 0] *= 1 + 1e-12
+    with pytest.raises(ValueError, match="another simulator"):
+        models.require_pours_of("drop", good)

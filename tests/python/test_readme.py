@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from granulcal.engines import installed
+
 ROOT = Path(__file__).parents[2]
 # What makes the commands small: the words that are replaced, and by what. Nothing else is changed.
 SMALL = {
     "granulcal init couscous": "granulcal init couscous --set grains.count=120 --preset fast",
-    "-n 1000": "-n 40",
-    "n=1000": "n=40",
+    "-n 1000": "-n 64",
+    "n=1000": "n=64",
     "--budget 100": "--budget 60",
     "-o report.html": "-o report.html --seeds 1",
     "close-loop loop.toml -o loop": "close-loop loop.toml -o loop --budget 200",
@@ -105,6 +107,9 @@ def test_all_commands_run_as_written(place: Path) -> None:
         i for i, line in enumerate(lines) if line.startswith("granulcal generate")
     )  # fmt: skip
     for line in lines[start:]:
+        if "--engine lammps" in line and not installed("lammps"):
+            # The one command that needs another program; the workflow `newcomer` has it.
+            continue
         run(small(line), place)
     folder = place / "couscous"
     for name in ("report.html", "posterior.json", "pair.png", "materials/mode.xml", "pile.vtk"):

@@ -11,6 +11,7 @@ import granulcal as gc
 from granulcal.bayessim.check.misfit import Misfit, StatisticMisfit
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.pours.formation_image import common_field, height_grid
+from granulcal.pours.profile_picture import profile_band, radial_profile
 from granulcal.report import HealthRow, write_report
 
 pytest.importorskip("matplotlib")
@@ -41,6 +42,7 @@ def page(
         posterior=posterior,
         pours=[small_pour, other],
         prior_pours=[other],
+        drawn=[other, small_pour],
         misfit=Misfit(
             pours=2,
             p_value=0.004,
@@ -81,7 +83,7 @@ def test_the_page_needs_nothing_else(page):
     parser.feed(text)
     assert parser.balanced
     assert not parser.open
-    assert len(parser.links) == 2
+    assert len(parser.links) == 3
     assert all(link.startswith("data:image/png;base64,") for link in parser.links)
     assert not re.search(r"https?://|@import|url\(|<script", text)
 
@@ -171,3 +173,34 @@ def test_a_browser_shows_the_page(page, tmp_path):
     assert pixels.shape[:2] == (2400, 1000)
     # Text and pictures, not a blank page.
     assert pixels.std() > 0.05
+
+
+def _cone(height: float) -> np.ndarray:
+    """A cone of radius 5 cm on a grid of 1 mm, about a place off the origin."""
+    y, x = np.mgrid[-0.06:0.06:121j, -0.06:0.06:121j]
+    z = height * (1 - np.hypot(x, y) / 0.05)
+    points = np.column_stack([x.ravel() + 0.02, y.ravel(), z.ravel()])
+    return points[points[:, 2] > 0]
+
+
+def test_a_profile_of_a_cone_is_a_line_and_its_volume_the_cones():
+    points = _cone(0.02) - [0.02, 0.0, 0.0]
+    edges = np.linspace(0.0, 0.05, 11)
+    found = radial_profile(points, edges)
+    middle = (edges[1:] + edges[:-1]) / 2
+    assert found == pytest.approx(0.02 * (1 - middle / 0.05), abs=6e-4)
+    volume = np.sum(found * np.pi * np.diff(edges**2))
+    assert volume == pytest.approx(np.pi * 0.05**2 * 0.02 / 3, rel=0.01)
+    assert np.all(radial_profile(np.zeros((0, 3)), edges) == 0)
+
+
+def test_a_band_holds_the_draws_and_tells_what_is_outside():
+    draws = [_cone(height) for height in np.linspace(0.018, 0.022, 9)]
+    band = profile_band(_cone(0.02), [_cone(0.02)], draws)
+    low, high = band.band
+    assert np.all(low <= high) and band.inside == 1.0
+    assert low[0] == pytest.approx(0.0182 * (1 - band.edges[1] / 0.1), rel=0.05)
+    # Half as high: below the band wherever there is a cone.
+    lower = profile_band(_cone(0.01), [_cone(0.02)], draws)
+    inner = lower.edges[1:] < 0.045
+    assert np.all(lower.measured[inner] < lower.band[0][inner]) and lower.inside < 0.5

@@ -60,7 +60,7 @@ class BayesSim:
         Ramos, Possas and Fox, BayesSim: adaptive domain randomization via probabilistic inference
         for robotics simulators, RSS 2019, arXiv:1906.01728.
 
-    Example:
+    Examples:
         >>> from granulcal.bayessim.check.toys import LinearGaussian
         >>> toy = LinearGaussian.random()
         >>> theta, x = toy.simulate(200)
@@ -241,9 +241,14 @@ class BayesSim:
         posteriors = [self.posterior(row) for row in observed]
         return Calibration.of(self.prior, posteriors, truth, draw_count=draw_count)
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Writes the folder `path`: model.json and weights.safetensors, all or nothing."""
-        save_model(self, path)
+    def save(self, path: str | PathLike[str], *, compact: bool = False) -> None:
+        """Writes the folder `path`: model.json and weights.safetensors, all or nothing.
+
+        Args:
+            path: a folder that is new, empty, or a model.
+            compact: without tables that are worked out again in the first posterior's second.
+        """
+        save_model(self, path, compact=compact)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> "BayesSim":

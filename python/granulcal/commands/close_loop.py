@@ -6,9 +6,12 @@ import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from granulcal.paths import KEPT, READS, writes
+
+if TYPE_CHECKING:
+    from granulcal.loop.task import Task
 
 __all__ = ["add"]
 
@@ -71,15 +74,20 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
+    parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
     parser.add_argument("--json", action="store_true", help="print the verdict as JSON at the end")
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
-    if not options.json:
-        return _close(options)
-    with contextlib.redirect_stdout(sys.stderr):
+    from granulcal.engines import engine_named, pouring_with
+
+    engine = None if options.engine is None else engine_named(options.engine)
+    aside = contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext()
+    with aside, pouring_with(engine):
         code = _close(options)
+    if not options.json:
+        return code
     print((options.out / "verdict.json").read_text(encoding="utf-8"), end="")
     return code
 
@@ -94,6 +102,7 @@ def _close(options: argparse.Namespace) -> int:
     task = Task.load(path)
     if options.tolerances is not None:
         task = replace(task, tolerances=Tolerances.load(options.tolerances))
+    task = _told(task)
     closed = close_loop(
         task,
         options.out,
@@ -105,7 +114,7 @@ def _close(options: argparse.Namespace) -> int:
         rounds=options.rounds,
     )
     words: list[str | Path] = ["granulcal", "close-loop", path, "-o", options.out]
-    for name in ("archive", "tolerances", "pairs", "rounds"):
+    for name in ("archive", "tolerances", "pairs", "rounds", "engine"):
         if value := getattr(options, name):
             words += [f"--{name}", str(value)]
     words += ["--budget", str(options.budget), "--seed", str(options.seed)]
@@ -116,3 +125,21 @@ def _close(options: argparse.Namespace) -> int:
         title=f"Closing the loop on {path}",
     )
     return 0 if closed.standing.stands else _FALLEN
+
+
+def _told(task: "Task") -> "Task":
+    """Returns a task without the effects that the engine in use cannot be told, which it names."""
+    from granulcal.engines import ExportedEngine, engine_in_use
+
+    engine = engine_in_use()
+    if not isinstance(engine, ExportedEngine):
+        # A command or function of one's own gets the whole scene.
+        return task
+    kept = []
+    for effect in task.library:
+        scene = task.scene.with_(effect.at(task.scene).numbers(1.0))
+        if left_out := engine.refuses(scene):
+            print(f"{effect.name} is not looked for: engine {engine.name} has no {left_out}")
+        else:
+            kept.append(effect)
+    return replace(task, library=tuple(kept))

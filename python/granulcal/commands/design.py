@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections.abc import Callable
 from typing import Any
 
 from granulcal.paths import READS, writes
@@ -80,6 +81,7 @@ def _add_common(
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
 
@@ -124,7 +126,7 @@ def _add_rings(words: Any) -> None:
         help="infer the heights of N more pours and say how far they are off",
     )
     _add_common(parser, kind="rings", pours=400, heights=(0.01, 0.13))
-    parser.set_defaults(run=_rings)
+    parser.set_defaults(run=_with_engine(_rings))
 
 
 def _add_spill(words: Any) -> None:
@@ -151,7 +153,21 @@ def _add_spill(words: Any) -> None:
         help="say from which height on each K is more probable than P (default: 0.05)",
     )
     _add_common(parser, kind="spill", pours=200, heights=(0.06, 0.3))
-    parser.set_defaults(run=_spill)
+    parser.set_defaults(run=_with_engine(_spill))
+
+
+def _with_engine(
+    command: Callable[[argparse.Namespace], int],
+) -> Callable[[argparse.Namespace], int]:
+    """Returns a command whose pours are by the engine of its options."""
+
+    def run(options: argparse.Namespace) -> int:
+        from granulcal.engines import engine_named, pouring_with
+
+        with pouring_with(None if options.engine is None else engine_named(options.engine)):
+            return command(options)
+
+    return run
 
 
 def _rings(options: argparse.Namespace) -> int:

@@ -1,10 +1,12 @@
 """The word `model`: a model of a built-in scene, made once and found by its name."""
 
 import argparse
+import contextlib
 import json
+import sys
 from typing import Any
 
-from granulcal.paths import writes
+from granulcal.paths import READS, writes
 
 __all__ = ["add"]
 
@@ -14,6 +16,9 @@ Simulate a built-in scene, train a model on it and keep it where `infer` finds i
 
   granulcal model funnel                      1000 pours, about 35 minutes on 2 cores; it goes on after a stop
   granulcal infer funnel couscous.bag
+
+  granulcal generate funnel default -n 1000 -o pours     the same pours, made elsewhere or long ago
+  granulcal model funnel --data pours                    trained on them
 
 It is kept in the user's cache ($GRANULCAL_CACHE sets another place) with its training data. A model that was made
 by another version of the simulator is not taken, whatever its name.
@@ -33,6 +38,16 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "-o", "--out", type=writes("model"), help="folder of the model (default: the cache)"
     )
+    parser.add_argument(
+        "--data",
+        type=READS,
+        help="folder of `generate` with this scene and the default prior, in place of new pours",
+    )
+    parser.add_argument(
+        "--compact",
+        action="store_true",
+        help="without the training pours, which `report` wants: the form that ships",
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--json", action="store_true", help="print JSON at the end")
@@ -40,17 +55,19 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    import sys
-
     from granulcal.starter.models import make_model
 
-    folder = make_model(
-        options.scene,
-        pours=options.pours,
-        out=options.out,
-        seed=options.seed,
-        threads=options.threads,
-        say=lambda text: print(text, file=sys.stderr, flush=True),
-    )
+    # What is told on the way goes to stderr: stdout has the folder alone.
+    with contextlib.redirect_stdout(sys.stderr):
+        folder = make_model(
+            options.scene,
+            pours=options.pours,
+            out=options.out,
+            data=options.data,
+            compact=options.compact,
+            seed=options.seed,
+            threads=options.threads,
+            say=lambda text: print(text, flush=True),
+        )
     print(json.dumps({"model": str(folder)}) if options.json else folder)
     return 0

@@ -23,6 +23,12 @@ def add(commands: Any) -> None:
     add_recordings(parser)
     parser.add_argument("-o", "--out", type=writes("html"), required=True, help="the HTML file")
     parser.add_argument("--seeds", type=int, default=3, help="pours to compare (default: 3)")
+    parser.add_argument(
+        "--draws",
+        type=int,
+        default=8,
+        help="pours at draws of the posterior, for the band of the profile (default: 8)",
+    )
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument(
         "--data", type=READS, help=f"training data (default: {TRAINING} in the model's folder)"
@@ -39,9 +45,14 @@ def _run(options: argparse.Namespace) -> int:
 
     if options.seeds < 1:
         raise ValueError(f"--seeds must be at least 1, got {options.seeds}")
+    if options.draws < 0:
+        raise ValueError(f"--draws must be at least 0, got {options.draws}")
     model = open_model(options)
     folder = model_named(options.model)
-    data = Dataset.load(folder / TRAINING if options.data is None else options.data)
+    training = folder / TRAINING if options.data is None else options.data
+    if options.data is None and not training.exists():
+        raise FileNotFoundError(f"{folder} came without its training pours: give some with --data")
+    data = Dataset.load(training)
     names = " ".join(str(path) for path in options.recording)
     words = ["granulcal", "report", str(options.model), *map(str, options.recording)]
     for name in ("camera", "topic", "camera_topic", "colour_topic", "first_frame"):
@@ -50,6 +61,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.frames != FRAMES:
         words += ["--frames", str(options.frames or "all")]
     words += ["-o", str(options.out), "--seeds", str(options.seeds)]
+    words += ["--draws", str(options.draws)]
     recordings = open_recordings(options)
     found = calibrate(
         model,
@@ -57,6 +69,7 @@ def _run(options: argparse.Namespace) -> int:
         recordings,
         report=options.out,
         seeds=options.seeds,
+        draws=options.draws,
         threads=options.threads,
         title=f"Calibration from {names}",
         summary=f"Parameters of the scene {data.scene.name!r}, inferred from {names} "

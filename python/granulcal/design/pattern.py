@@ -17,7 +17,6 @@ __all__ = ["Pattern", "simulate_plan"]
 Array = NDArray[np.float64]
 
 # Long enough for one substep, too short to fall.
-_AN_INSTANT = 1e-9
 _UNUSABLE = ("jammed", "unhealthy")
 
 
@@ -82,7 +81,7 @@ def simulate_plan(plan: Plan, *, seed: int = 0) -> Pattern:
     for i, planned in enumerate(plan.pours):
         above = scene.with_({HEIGHT: planned.height})
         # Where the new grains hang before they fall, whatever the scene's start is.
-        new = simulate(above.with_({"end.horizon": _AN_INSTANT}), seed=seed + i).positions
+        new, _ = above.start(seed + i)
         positions = np.concatenate([new, positions])
         owner = np.concatenate([np.full(len(new), i), owner])
         pour = simulate(_starting_at(above, positions), seed=seed + i)

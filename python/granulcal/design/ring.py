@@ -25,7 +25,7 @@ class Ring:
         Matl et al., Inferring the material properties of granular media for robotic tasks, ICRA
         2020, section 'Robotic demonstrations': the 5th and 50th percentile of radial distance.
 
-    Example:
+    Examples:
         >>> Ring(outer=0.073, inner=0.040)
         Ring(outer=0.073, inner=0.04)
     """

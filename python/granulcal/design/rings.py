@@ -40,7 +40,7 @@ def design_rings(
         UnreachableRingError: radii that no height gives together; the message says which come
             closest.
 
-    Example:
+    Examples:
         >>> import granulcal as gc
         >>> scene = gc.Scene.funnel(count=100, preset="fast")
         >>> model = gc.RingModel.train(scene, heights=(0.05, 0.13), pours=60, progress=False)

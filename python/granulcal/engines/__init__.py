@@ -2,6 +2,7 @@
 
 from granulcal.engines.command import CommandEngine
 from granulcal.engines.exported import ExportedEngine, installed
+from granulcal.engines.in_use import engine_in_use, pouring_with
 from granulcal.engines.named import engine_named
 from granulcal.engines.protocol import CallableEngine, Engine
 
@@ -10,6 +11,8 @@ __all__ = [
     "CommandEngine",
     "Engine",
     "ExportedEngine",
+    "engine_in_use",
     "engine_named",
     "installed",
+    "pouring_with",
 ]

@@ -10,6 +10,7 @@ from pathlib import Path
 from granulcal.engines.command import last_words
 from granulcal.engines.files import read_grains
 from granulcal.engines.protocol import Left
+from granulcal.export.setup import Setup
 from granulcal.pours.scene import Scene
 
 __all__ = ["RUNNERS", "ExportedEngine", "installed"]
@@ -86,6 +87,14 @@ class ExportedEngine:
         self.name = engine if young is None else f"{engine} at {young:g} Pa"
         """What it is called."""
 
+    def refuses(self, scene: Scene) -> str | None:
+        """Returns what of a scene the engine cannot be told and would leave out, None if nothing.
+
+        What a scene observes is looked at in the grains at rest, as its camera does.
+        """
+        left_out = [name for name in Setup.of(scene).left_out if name.startswith("effects.")]
+        return ", ".join(left_out) or None
+
     def __call__(self, scene: Scene, seed: int) -> Left:
         """Returns the grains that the engine left.
 
@@ -96,9 +105,15 @@ class ExportedEngine:
             return self.run(scene, seed, Path(place))
 
     def run(self, scene: Scene, seed: int, folder: Path) -> Left:
-        """Exports the pour into `folder`, runs it there and returns the grains."""
+        """Exports the pour into `folder`, runs it there and returns the grains.
+
+        Raises:
+            ValueError: the scene has effects, which no engine's file can be told; or it failed.
+        """
         from granulcal.export.engines import export_scene
 
+        if left_out := self.refuses(scene):
+            raise ValueError(f"engine {self.engine} cannot be told {left_out}")
         export_scene(scene, self.engine, folder, seed=seed, young=self.young)
         done = subprocess.run(
             self.words,

@@ -47,7 +47,7 @@ class CallableEngine:
         function: (scene, seed) to (centres, radii) or points.
         name: what it is called; the default is its qualified name.
 
-    Example:
+    Examples:
         >>> from granulcal.pours.scene import Scene
         >>> flat = CallableEngine(lambda scene, seed: scene.start(seed), name="not moved")
         >>> flat(Scene.drop(0.02, count=5), 1)[0].shape

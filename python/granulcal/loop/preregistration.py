@@ -6,8 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from granulcal import _native
 from granulcal.documents import LARGEST_DOCUMENT, Table, check, parse_json, read_bytes
+from granulcal.engines.in_use import version_of_pours
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.effects.library import described, fingerprint
@@ -37,7 +37,7 @@ def register(
     """
     document: dict[str, Any] = (
         {
-            "version": _native.__version__,
+            "version": version_of_pours(),
             "scene": plan.scene.to_toml(),
             "prior": plan.prior.to_toml(),
             "conditions": [

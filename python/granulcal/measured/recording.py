@@ -190,7 +190,7 @@ class Recording:
     16-bit depth PNGs, folders of such frames, and .npz height maps. Of several frames the mean of
     each pixel is taken over those that have data there. PNGs need the TOML of their camera.
 
-    Example:
+    Examples:
         >>> import tempfile
         >>> import granulcal
         >>> pour = granulcal.simulate(granulcal.Scene.drop(0.02, count=60), seed=1)

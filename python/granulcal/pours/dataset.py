@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.engines.in_use import engine_in_use
 from granulcal.errors import UnverifiedDataWarning
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import check_whole, require_scene
@@ -199,12 +200,13 @@ def generate(
         OSError: the folder cannot be written.
         KeyboardInterrupt: Ctrl-C; finished pours are on disk.
 
-    Example:
+    Examples:
         >>> data = generate(Scene.drop(0.02, count=30), Prior.default(), n=4, progress=False)
         >>> data.theta.shape, data.x.shape
         ((4, 3), (4, 16))
     """
     require_scene(scene)
+    engine = engine or engine_in_use()
     if not isinstance(prior, Prior):
         raise TypeError(f"prior must be a Prior, as Prior.load reads it, got {prior!r}")
     check_whole("n", n, at_least=1)

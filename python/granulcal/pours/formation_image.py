@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["common_field", "formation_figure", "height_grid"]
+__all__ = ["common_field", "formation_figure", "height_grid", "spacing"]
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def height_grid(points: Array, *, field: float, pixels: int = _PIXELS) -> Array:
     grid = np.full((pixels, pixels), -np.inf)
     if len(points):
         cell = field / pixels
-        width = int(np.ceil(_spacing(points) / cell)) + 1
+        width = int(np.ceil(spacing(points) / cell)) + 1
         corner = np.floor((points[:, :2] + field / 2) / cell - (width - 1) / 2).astype(int)
         for right in range(width):
             for up in range(width):
@@ -90,7 +90,7 @@ def formation_figure(clouds: dict[str, Array]) -> bytes:
     return buffer.getvalue()
 
 
-def _spacing(points: Array) -> float:
+def spacing(points: Array) -> float:
     """Median distance between neighbouring points in the horizontal plane [m]."""
     some = points[:: max(1, len(points) // _SPACING_SAMPLE), :2]
     nearest = np.empty(len(some))

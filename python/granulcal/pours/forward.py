@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
@@ -11,7 +12,13 @@ from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour, simulate
 from granulcal.prior import Prior
 
-__all__ = ["pours_at", "scene_at"]
+if TYPE_CHECKING:
+    from granulcal.bayessim.posterior.posterior import Posterior
+
+__all__ = ["draws_of", "pours_at", "scene_at"]
+
+# Seeds of pours at draws: far from those of data sets, which are hashes, and of pours at the mode.
+_FIRST_DRAW = 19_000
 
 
 def scene_at(scene: Scene, prior: Prior, theta: ArrayLike) -> Scene:
@@ -41,3 +48,22 @@ def pours_at(scene: Scene, seeds: Sequence[int], *, threads: int | None = None) 
     workers = threads or os.cpu_count() or 1
     with ThreadPoolExecutor(min(workers, max(len(seeds), 1))) as pool:
         return list(pool.map(lambda seed: simulate(scene, seed=seed), seeds))
+
+
+def draws_of(
+    scene: Scene, posterior: "Posterior", count: int, *, threads: int | None = None
+) -> list[Pour]:
+    """Returns pours at draws of a posterior, one each, simulated side by side; none unhealthy.
+
+    Args:
+        scene: the scene before the prior's parameters are set.
+        posterior: of its parameters.
+        count: number of draws.
+        threads: pours at once; the default is one for each core.
+    """
+    scenes = [scene_at(scene, posterior.prior, theta) for theta in posterior.sample(count)]
+    workers = threads or os.cpu_count() or 1
+    with ThreadPoolExecutor(min(workers, max(count, 1))) as pool:
+        seeds = range(_FIRST_DRAW, _FIRST_DRAW + count)
+        made = pool.map(lambda each, seed: simulate(each, seed=seed), scenes, seeds)
+        return [pour for pour in made if pour.status != "unhealthy"]

@@ -31,7 +31,7 @@ class Material:
         impact_friction: friction cones in impacts over those in lasting contacts [-], in [0, 10].
         rolling_damping: dashpot on rolling in impacts over the critical one [-], in [0, 10].
 
-    Example:
+    Examples:
         >>> Material(sliding_friction=0.5, rolling_friction=0.1, restitution=0.5).restitution
         0.5
     """
@@ -54,7 +54,7 @@ class Material:
 class Scene:
     """A whole experiment but for its seed; immutable, checked when it is made. SI units.
 
-    Example:
+    Examples:
         >>> scene = Scene.funnel(height=0.12)
         >>> scene.get("grains.count")
         2000.0

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.engines.in_use import engine_in_use
 from granulcal.pours.scene import Material, Scene
 from granulcal.pours.statistics import DiagnosticStatistics, ObservedStatistics, Statistics
 
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 class Pour:
     """Grains at the end of a pour, how it ended and how far it can be trusted.
 
-    Example:
+    Examples:
         >>> pour = simulate(Scene.drop(0.02, count=20), seed=1)
         >>> pour.positions.shape, pour.status
         ((20, 3), 'at_rest')
@@ -217,8 +218,8 @@ def simulate(
             unless the scene states another.
         threads: threads that share this one pour. The bits stay the same; only scenes of some ten
             thousand grains gain from a second thread, and `generate` runs many pours at once.
-        engine: another simulator in place of ours; docs/engines.md says what it must do. It has to
-            give grains: points alone are for `generate`.
+        engine: another simulator in place of ours, or of the one in use; docs/engines.md says what
+            it must do. It has to give grains: points alone are for `generate`.
 
     Raises:
         TypeError: `scene` is no scene.
@@ -231,6 +232,7 @@ def simulate(
         scene = scene.with_material(material)
     if preset is not None:
         scene = scene.with_(preset=preset)
+    engine = engine or engine_in_use()
     if engine is not None:
         return Pour(_left_by(engine, scene, seed), scene, seed)
     return Pour(_native.simulate(scene.native, seed, threads), scene, seed)

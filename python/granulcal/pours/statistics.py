@@ -184,7 +184,7 @@ def statistics(points: ArrayLike) -> Statistics:
         TypeError: `points` does not hold real numbers.
         ValueError: another shape, a value that is not finite, or fewer than 3 points.
 
-    Example:
+    Examples:
         >>> ring = [[0.05, 0, 0.004], [0, 0.05, 0.004], [-0.05, 0, 0.004], [0, -0.05, 0.004]]
         >>> round(statistics(ring)["mean_r"], 3)
         0.05
@@ -213,7 +213,7 @@ def diagnostic_statistics(
         ValueError: another shape, a value that is not finite, fewer than 3 points, or a length out
             of range.
 
-    Example:
+    Examples:
         >>> side = np.arange(-0.05, 0.05, 1e-3)
         >>> x, y = (axis.ravel() for axis in np.meshgrid(side, side))
         >>> z = 0.4 * (0.04 - np.hypot(x, y))

@@ -34,7 +34,7 @@ class LinearGaussian:
         matrix: A, shape (statistics, parameters).
         noise_covariance: S, shape (statistics, statistics).
 
-    Example:
+    Examples:
         >>> toy = LinearGaussian.random(seed=1)
         >>> theta, x = toy.simulate(100, seed=2)
         >>> toy.posterior(x[0]).mean().shape

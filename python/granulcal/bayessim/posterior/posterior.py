@@ -185,7 +185,7 @@ class Posterior:
         density: the density over the prior's coordinates.
         warnings: what a reader must know before trusting the numbers; empty if nothing.
 
-    Example:
+    Examples:
         >>> from granulcal.bayessim.check.toys import LinearGaussian
         >>> toy = LinearGaussian.random(bounded=True)
         >>> theta, x = toy.simulate(1)

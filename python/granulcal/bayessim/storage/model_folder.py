@@ -60,7 +60,7 @@ class Parts(TypedDict):
     scene_toml: str | None
 
 
-def save_model(model: "BayesSim", path: str | PathLike[str]) -> None:
+def save_model(model: "BayesSim", path: str | PathLike[str], *, compact: bool = False) -> None:
     """Writes `model` to the folder `path`; a model already there is replaced, other files stay.
 
     Raises:
@@ -76,7 +76,7 @@ def save_model(model: "BayesSim", path: str | PathLike[str]) -> None:
     try:
         new.mkdir()
         text = (json.dumps(_document(model), indent=1, allow_nan=False) + "\n").encode()
-        tensors = model_tensors(model)
+        tensors = model_tensors(model, compact=compact)
         write_beside(new / _JSON_NAME, text)
         write_beside(
             new / _TENSORS_NAME, in_order(tensor_bytes(tensors, metadata=hashes(text, tensors)))

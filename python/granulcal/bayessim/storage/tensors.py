@@ -30,8 +30,13 @@ Array = NDArray[np.float64]
 _X_NAMES = ("shift", "scale", "low", "high")
 
 
-def model_tensors(model: "BayesSim") -> dict[str, NDArray[Any]]:
-    """Returns every array of a model by name."""
+def model_tensors(model: "BayesSim", *, compact: bool = False) -> dict[str, NDArray[Any]]:
+    """Returns every array of a model by name.
+
+    Args:
+        model: what is saved.
+        compact: without what the emulator expects at the pool of draws, which can be worked out.
+    """
     standardiser, likelihood = model.standardiser, model.likelihood
     emulator = likelihood.emulator
     tensors: dict[str, NDArray[Any]] = {
@@ -54,7 +59,7 @@ def model_tensors(model: "BayesSim") -> dict[str, NDArray[Any]]:
         "misfit_residuals": model.misfit_reference.residuals,
         "misfit_noise": model.misfit_reference.noise,
     }
-    if model.average.emulator > 0:
+    if model.average.emulator > 0 and not compact:
         # What the Rust side would have to work out before its first posterior; single precision
         # is enough for the weights of draws.
         at_pool = likelihood.at_pool

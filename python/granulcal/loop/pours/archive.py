@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal import _native
 from granulcal.documents import ListOf, Number, OneOf, Table, Text, read_json
+from granulcal.engines.in_use import version_of_pours
 from granulcal.errors import TrainingDataError
 from granulcal.files import write_beside
 from granulcal.loop.effects.design import Design
@@ -94,7 +94,7 @@ class Plan:
         Sizes may grow, and the library at its end.
         """
         return {
-            "version": _native.__version__,
+            "version": version_of_pours(),
             "scene": self.scene.to_toml(),
             "prior": self.prior.to_toml(),
             "conditions": [list(condition) for condition in self.conditions],

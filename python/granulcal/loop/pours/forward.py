@@ -12,7 +12,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal import _native
+from granulcal.engines.in_use import version_of_pours
 from granulcal.files import beside
 from granulcal.loop.pours.measures import Measures
 from granulcal.pours.scene import Scene
@@ -51,7 +51,7 @@ class Forward:
         `faults` are those of the image, by kind.
         """
         names = Measures.of(scene).names
-        of = [_native.__version__, names, scene.to_toml(), list(seeds)]
+        of = [version_of_pours(), names, scene.to_toml(), list(seeds)]
         text = json.dumps([*of, dict(faults)] if faults else of)
         path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
         kept = _kept(path)

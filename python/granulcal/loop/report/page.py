@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from granulcal import _native
+from granulcal.engines.in_use import version_of_pours
 from granulcal.files import write_beside
 from granulcal.loop.close import Closed
 from granulcal.loop.effects.image_faults import Frame
@@ -48,7 +48,7 @@ def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
         sentence=_SENTENCES[verdict.kind],
         reason=verdict.reason[:1].upper() + verdict.reason[1:],
         made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        version=_native.__version__,
+        version=version_of_pours(),
         registration=closed.registration,
         p=verdict.p,
         totals=[("fit", closed.fit)] + ([("sealed", closed.sealed)] if closed.sealed else []),

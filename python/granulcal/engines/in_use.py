@@ -1,0 +1,46 @@
+"""The engine that pours for a whole job: a loop or a plan asks it wherever it would ask ours."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from granulcal import _native
+
+if TYPE_CHECKING:
+    from granulcal.engines.protocol import Engine
+
+__all__ = ["engine_in_use", "pouring_with", "version_of_pours"]
+
+# Not a context variable: the pours of a job run in threads of their own.
+_in_use: "Engine | None" = None
+
+
+@contextmanager
+def pouring_with(engine: "Engine | None") -> Iterator[None]:
+    """Lets `simulate` and `generate` ask `engine` where they are given none, in all threads.
+
+    Args:
+        engine: None for ours.
+
+    Raises:
+        RuntimeError: another job of this process has an engine in use.
+    """
+    global _in_use
+    if _in_use is not None:
+        raise RuntimeError(f"engine {_in_use.name} is in use already: one engine at a time")
+    _in_use = engine
+    try:
+        yield
+    finally:
+        _in_use = None
+
+
+def engine_in_use() -> "Engine | None":
+    """Returns the engine of the job that runs, None for ours."""
+    return _in_use
+
+
+def version_of_pours() -> str:
+    """Returns what kept pours are of: granulcal's version, and the engine's name where one pours."""
+    name = "" if _in_use is None else f", pours by {_in_use.name}"
+    return f"{_native.__version__}{name}"
