@@ -167,9 +167,8 @@ def test_calibration_pours_in_the_engine(
 def test_the_engine_in_use_pours_for_everything_and_is_told_in_what_is_kept(
     small_scene: gc.Scene, small_prior: gc.Prior, tmp_path: Path
 ) -> None:
-    from granulcal.loop.pours.forward import Forward
-
     from granulcal.engines import engine_in_use, pouring_with
+    from granulcal.loop.pours.forward import Forward
 
     hanging = CallableEngine(lambda scene, seed: scene.start(seed), name="not moved")
     forward = Forward(tmp_path / "pours", threads=2)
@@ -201,10 +200,9 @@ def test_an_exported_engine_refuses_what_its_files_cannot_say() -> None:
 def test_a_loop_does_not_look_for_what_the_engine_cannot_be_told(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    from granulcal.loop.effects.library import by_name
     from granulcal.commands.close_loop import _told
-
     from granulcal.engines import pouring_with
+    from granulcal.loop.effects.library import by_name
     from granulcal.loop.task import Condition, Task
 
     pours = tuple(Path(f"{i}.npz") for i in range(3))
