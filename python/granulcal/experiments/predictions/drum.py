@@ -5,14 +5,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 from granulcal.experiments.loop_drum.task import at_speed
+from granulcal.experiments.predictions.between_speeds import (
+    MODELS as WITHOUT_PHYSICS,
+)
+from granulcal.experiments.predictions.between_speeds import between_speeds, read_pictures
 from granulcal.loop.pours.forward import Forward
-from granulcal.loop.report.models import MODELS, Models, Prediction
+from granulcal.loop.report.models import Models, Prediction
 
-__all__ = ["SPEEDS", "drum_rows"]
+__all__ = ["SPEEDS", "drum_rows", "drum_rows_without_physics"]
 
 SPEEDS = {10: (1.1, 1.5), 20: (0.7, 1.0), 30: (0.6, 0.9), 60: (0.45, 0.75)}
 """Rounds a minute, and when the mean begins and ends [s]: after turns of 54 to 90 degrees."""
 
+# What is poured; the rows without physics have a file of their own.
+_SIMULATED = ("named", "base", "corrected")
 _POURS = 8
 _PLACE = re.compile(r"surface_z\[(?P<x>[^\]]+)\]")
 
@@ -25,13 +31,31 @@ def drum_rows(
     profiles: list[tuple[object, ...]] = []
     slopes: list[tuple[object, ...]] = []
     for rpm, (begin, end) in SPEEDS.items():
-        for model in MODELS:
+        for model in _SIMULATED:
             try:
                 found = models.predict(model, at_speed(rpm, begin, end), forward, pours=_POURS)
             except ValueError as error:
                 say(f"drum, {model} at {rpm} rpm: no prediction: {error}")
                 continue
             more, slope = _rows(model, rpm, found)
+            profiles += more
+            slopes.append(slope)
+    return profiles, slopes
+
+
+def drum_rows_without_physics(
+    data: Path,
+) -> tuple[list[tuple[object, ...]], list[tuple[object, ...]]]:
+    """Returns the same rows of `line` and `nearest`, told from the pictures alone."""
+    speeds, names, values = read_pictures(data)
+    matches = [_PLACE.fullmatch(name) for name in names]
+    places = [None if found is None else float(found["x"]) for found in matches]
+    profiles: list[tuple[object, ...]] = []
+    slopes: list[tuple[object, ...]] = []
+    for rpm in SPEEDS:
+        for model in WITHOUT_PHYSICS:
+            told = between_speeds(model, speeds, values, rpm, places)
+            more, slope = _rows(model, rpm, Prediction(model, names, *told, 0.9))
             profiles += more
             slopes.append(slope)
     return profiles, slopes
