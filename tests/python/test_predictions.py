@@ -17,6 +17,7 @@ from granulcal.experiments.predictions.column_tests import (
 )
 from granulcal.experiments.predictions.columns import column_rows, observing
 from granulcal.experiments.predictions.drum import SPEEDS, drum_rows
+from granulcal.experiments.predictions.drum_base import DrumBase
 from granulcal.loop.report.models import Maker, Models
 from granulcal.pours.scene import Scene
 
@@ -230,6 +231,36 @@ def test_between_two_speeds_stands_a_line_and_its_interval_knows_other_forms() -
     assert near == pytest.approx([0.015, 46.0])
     at_wall, _, high = between_speeds("line", speeds, values * 2, 60, [-0.028, None])
     assert at_wall[0] == high[0] == pytest.approx(np.sqrt(0.042**2 - 0.028**2))
+
+
+class BentDrum(DrumBase):
+    """A drum whose bed bends with the square of the speed, off by a line that it cannot know."""
+
+    def at(self, setting: int, rpm: float, begin: float, end: float) -> np.ndarray:
+        return np.array([0.0, 30.0 + 2.0 * setting + 0.006 * rpm**2])
+
+
+def test_a_base_model_with_its_own_residual_keeps_the_bend_that_a_line_lacks(
+    tmp_path: Path,
+) -> None:
+    def truth(rpm: float) -> np.ndarray:
+        return np.array([0.001 * rpm / 15, 33.0 + 0.1 * rpm + 0.006 * rpm**2])
+
+    drum, speeds = BentDrum.__new__(BentDrum), np.array([15.0, 45.0])
+    values = np.array([truth(15), truth(45)])
+    for rpm in (10, 30, 60):
+        told = drum.tell(rpm, (0.0, 1.0), speeds, values, [0.0, None])
+        middle, low, high = told["corrected"]
+        assert middle == pytest.approx(truth(rpm)) and (low < truth(rpm)).all()
+        assert (high > truth(rpm)).all()
+        line, *_ = between_speeds("line", speeds, values, rpm, [0.0, None])
+        assert abs(line[1] - truth(rpm)[1]) > 0.4
+        base, low, high = told["base"]
+        assert base[1] == pytest.approx(31.0 + 0.006 * rpm**2) and low[1] < base[1] < high[1]
+    # Both settings bend alike, so that each tells the other without an error; a line does not.
+    found = drum.held({rpm: (0.0, 1.0) for rpm in (10, 30)}, speeds, [0.0, None])
+    assert found["corrected"] == pytest.approx((0.0, 0.0, 1.0), abs=1e-9)
+    assert found["line"][1] == pytest.approx(0.006 * np.sqrt((175**2 + 225**2) / 2))
 
 
 def test_drum_models_that_have_nothing_to_say_are_named(tmp_path: Path) -> None:

@@ -6,9 +6,10 @@
 
 Every file has what needs no model at all (`line`, `nearest`, and `between` for columns), told from
 the measurements alone. A loop that has been closed adds the verdict's model (`named`), the base
-model (`base`) and the base model with its own residual (`corrected`). Each row has the 90 %
-interval of one measurement. Where a model has nothing to say it has no row, and the command says
-so.
+model (`base`) and the base model with its own residual (`corrected`); where the drum's has not, the
+last two are of two stated drums (`drum_base.py`: 12 pours, half a minute of one core). Each row has
+the 90 % interval of one measurement. Where a model has nothing to say it has no row, and the
+command says so.
 """
 
 import csv
@@ -17,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from granulcal.experiments.predictions.columns import column_rows, column_rows_without_physics
-from granulcal.experiments.predictions.drum import drum_rows, drum_rows_without_physics
+from granulcal.experiments.predictions.drum import drum_rows, drum_rows_without_loop
 from granulcal.files import write_beside
 from granulcal.loop.report.models import Models
 
@@ -27,8 +28,9 @@ __all__ = ["reproduce", "write_csv"]
 def reproduce(out: Path, data: Path) -> None:
     """Writes `drum.csv`, `drum_slopes.csv` and `columns.csv` to `out`/predictions."""
     folder = out / "predictions"
-    profiles, slopes = drum_rows_without_physics(data)
     drum = _models(out / "loop_drum" / "both", "loop_drum")
+    pours = out / "predictions-pours" if drum is None else None
+    profiles, slopes = drum_rows_without_loop(data, pours, say=print)
     if drum is not None:
         more = drum_rows(drum, out / "loop_drum" / "pours", say=print)
         profiles, slopes = more[0] + profiles, more[1] + slopes

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from granulcal.experiments.loop_drum.task import task
 
-__all__ = ["MODELS", "between_speeds", "read_pictures"]
+__all__ = ["MODELS", "between_speeds", "in_drum", "read_pictures"]
 
 Array = NDArray[np.float64]
 
@@ -68,8 +68,15 @@ def between_speeds(
         reach = np.abs(line - middle) if near.sum() == 1 else 0.5 * np.abs(np.diff(values, axis=0))
         half = np.hypot(np.ravel(reach), _HALF * np.sqrt(2.0) * noise)
         low, high = middle - half, middle + half
+    return in_drum((middle, low, high), places)
+
+
+def in_drum(
+    told: tuple[Array, Array, Array], places: Sequence[float | None]
+) -> tuple[Array, Array, Array]:
+    """Returns heights that are no further out than the drum's wall; places as `between_speeds`."""
     wall = np.array([90.0 if x is None else np.sqrt(_RADIUS**2 - x**2) for x in places])
-    low, middle, high = (np.clip(v, -wall, wall) for v in (low, middle, high))
+    middle, low, high = (np.clip(v, -wall, wall) for v in told)
     return middle, low, high
 
 
