@@ -75,7 +75,7 @@ class Fronts:
     tests: tuple[Test, ...]
     radius: Array
 
-    def where(self, keep: Array) -> "Fronts":
+    def where(self, keep: NDArray[np.bool_]) -> "Fronts":
         """Returns the tests for which `keep` (n,) holds."""
         tests = tuple(test for test, kept in zip(self.tests, keep, strict=True) if kept)
         return Fronts(tests, self.radius[keep])

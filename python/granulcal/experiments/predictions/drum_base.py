@@ -96,7 +96,7 @@ class DrumBase:
         """
         is_slope = np.array([x is None for x in places])
         gaps: dict[str, list[Array]] = {"line": [], "corrected": []}
-        inside: dict[str, list[Array]] = {"line": [], "corrected": []}
+        inside: dict[str, list[NDArray[np.bool_]]] = {"line": [], "corrected": []}
         for truth in range(len(SETTINGS)):
             values = self.pictured(truth, speeds)
             others = [one for one in range(len(SETTINGS)) if one != truth]
