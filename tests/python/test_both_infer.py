@@ -1,6 +1,7 @@
 """`granulcal infer` and `granulcal-cli infer`: one answer, and Python's library says the same."""
 
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -118,6 +119,23 @@ def test_what_is_outside_is_said_with_exit_code_3(model, small_scene, tmp_path, 
         assert any("height" in reason for reason in inside["impossible"])
     assert cli.main(words[:-1]) == 3
     assert "OUTSIDE THE MODEL" in capfd.readouterr().out
+
+
+def test_pixels_at_the_edge_are_told_before_a_map_is_refused(model, tmp_path, capfd):
+    # A mound of 12 mm on a flat bed, and three dead columns 20 cm high.
+    edge = np.linspace(-1, 1, 60)
+    mound = 0.012 * np.maximum(0.0, 1 - 9 * (edge[:, None] ** 2 + edge[None] ** 2))
+    mound[:, :3] = 0.2
+    path = tmp_path / "map.npz"
+    np.savez(path, depthmap=1e3 * mound, xres=3.4, yres=3.4, zres=1.0, scale="mm")
+    words = ["infer", str(model[0]), str(path), "--json"]
+    assert cli.main(words) == 3
+    out, err = capfd.readouterr()
+    assert json.loads(out)["inside_model"]["impossible"]
+    told = re.search(r"pixels at the edge of the image.* --border (\d+) leaves them out", err)
+    assert told is not None, err
+    assert cli.main([*words, "--border", told[1]]) in (0, 3)
+    assert "at the edge" not in capfd.readouterr().err
 
 
 def _printed(capfd, words: list[str]) -> str:

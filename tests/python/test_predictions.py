@@ -5,9 +5,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from granulcal.experiments.predictions import columns, reproduce, write_csv
-from granulcal.experiments.predictions.columns import column_rows, observing, read_tests, times_of
+from granulcal.experiments.predictions import columns, write_csv
+from granulcal.experiments.predictions.between_speeds import between_speeds
+from granulcal.experiments.predictions.between_tests import BetweenTests
+from granulcal.experiments.predictions.column_tests import (
+    Fronts,
+    Test,
+    read_fronts,
+    read_tests,
+    times_of,
+)
+from granulcal.experiments.predictions.columns import column_rows, observing
 from granulcal.experiments.predictions.drum import SPEEDS, drum_rows
+from granulcal.experiments.predictions.drum_base import DrumBase
 from granulcal.loop.report.models import Maker, Models
 from granulcal.pours.scene import Scene
 
@@ -111,9 +121,7 @@ def test_a_scene_may_be_observed_at_other_times() -> None:
     assert scene.get("observe.front.link") == 1.5
 
 
-def test_fronts_are_poured_and_what_needs_no_physics_is_scaled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_fronts_are_poured_for_every_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(columns, "_POURS", 2)
     data = tmp_path / "measured"
     (data / "column-collapse-webb").mkdir(parents=True)
@@ -133,38 +141,139 @@ def test_fronts_are_poured_and_what_needs_no_physics_is_scaled(
     assert tests == {"a_08g", "c_06g", "a_further_08g", "c_further_06g"}
     assert all("corrected" in line for line in told) and len(told) == 4
     table = {(row[0], row[1], row[2]): [float(str(v)) for v in row[3:]] for row in rows}
-    # The nearest condition of 1 g is the second; 0.15 s lie between its times.
-    near = {
-        float(str(t)): row[0]
-        for (m, code, t), row in table.items()
-        if t != "end" and (m, code) == ("nearest", "a_08g")
-    }
-    assert near[min(near, key=lambda t: abs(t - 0.15))] == pytest.approx(65.0)
-    at = next(key for key in table if key[:2] == ("nearest", "c_06g") and key[2] != "end")
-    assert float(str(at[2])) >= 0.05 and table["line", "c_06g", "end"][0] == pytest.approx(80.0)
     for model in ("base", "named"):
         end = table[model, "a_08g", "end"]
         assert 10 < end[1] <= end[0] <= end[2] < 300
         assert sum(key[:2] == (model, "a_08g") for key in table) == 17
 
 
-def test_drum_rows_have_every_speed_and_say_what_is_refused(tmp_path: Path) -> None:
+def campaign(
+    day: int, gravity: float, beads: float, viscosity: float, radius: float
+) -> tuple[Test, list[float]]:
+    """One test, whose front grows to `radius`."""
+    numbers = {"N": gravity, "d_p": beads, "mu_f": viscosity, "G": 9.81 * gravity}
+    return Test(f"2021{day:04d}_x", numbers), [*np.linspace(60.0, radius, 16), radius]
+
+
+def plane(gravity: float, beads: float, viscosity: float) -> float:
+    """A front that is a plane in what `line` knows."""
+    thickness = np.log10(viscosity / np.sqrt(gravity) / 1e-3)
+    return 120 + 20 * (1 - gravity**-0.5) + 10 * (8e-3 - beads) / 2e-3 - 12 * float(thickness)
+
+
+def measured_plane() -> Fronts:
+    """Twelve tests of as many days."""
+    tests, rows = [], []
+    for number in range(12):
+        of = ((1.0, 4.0)[number % 2], (8e-3, 6e-3)[number // 2 % 2], 1e-3 * 3 ** (number // 4))
+        test, row = campaign(101 + number, *of, plane(*of))
+        tests.append(test)
+        rows.append(row)
+    return Fronts(tuple(tests), np.array(rows))
+
+
+def test_a_plane_is_told_by_its_line_also_where_its_test_is_left_out() -> None:
+    rows = BetweenTests(measured_plane())
+    error, end, _ = rows.held("line")
+    assert error < 1e-9 and end < 1e-9
+    assert rows.held("nearest")[1] > 3 and rows.held("between")[1] < rows.held("nearest")[1]
+    # A gravity that was not measured: the line goes on, and knows that it is farther off.
+    test, row = campaign(301, 16.0, 8e-3, 4e-3, plane(16.0, 8e-3, 4e-3))
+    told = rows.tell("line", test)
+    assert told.middle == pytest.approx(row, abs=1e-6)
+    within = rows.tell("line", campaign(302, 4.0, 8e-3, 2e-3, 0.0)[0])
+    assert told.high[-1] - told.low[-1] > within.high[-1] - within.low[-1]
+
+
+def test_intervals_hold_what_they_say() -> None:
+    fronts, generator = measured_plane(), np.random.default_rng(3)
+    # A day shifts all of its front.
+    noisy = Fronts(fronts.tests, fronts.radius + 4.0 * generator.standard_normal((12, 1)))
+    for model in ("nearest", "line", "between"):
+        assert 0.8 < BetweenTests(noisy).held(model)[2] < 1.0, model
+
+
+def test_a_test_has_no_part_in_its_own_prediction_and_none_is_told_out_of_view() -> None:
+    fronts = measured_plane()
+    moved = Fronts(fronts.tests, fronts.radius + 50.0 * (np.arange(12) == 3)[:, None])
+    before, after = (
+        BetweenTests(one).tell("nearest", fronts.tests[3]).middle for one in (fronts, moved)
+    )
+    assert before == pytest.approx(after)
+    far = BetweenTests(Fronts(fronts.tests, fronts.radius + 90.0))
+    assert far.tell("between", fronts.tests[0]).high.max() == 200.0
+
+
+def test_a_front_that_leaves_the_view_goes_on_for_a_while(tmp_path: Path) -> None:
+    folder = tmp_path / "column-collapse-webb"
+    (folder / "runout").mkdir(parents=True)
+    (folder / "Experimental_Conditions.txt").write_text(TABLE)
+    # 0.2 m/s up to 0.25 s, one camera; 240 frames a second.
+    lines = [f"{i} nan nan {0.06 + 0.2 * i / 240:.6f} 0.2 nan nan nan nan" for i in range(61)]
+    (folder / "runout" / "a_08g.txt").write_text("\n".join(["names", *lines]) + "\n")
+    fronts = read_fronts(tmp_path)
+    assert [test.code for test in fronts.tests] == ["a_08g"]
+    row = fronts.radius[0]
+    assert row[:10] == pytest.approx(60 + 5 * np.arange(1, 11), abs=1e-3)
+    assert row[10:13] == pytest.approx([115, 120, 125], abs=0.01)
+    assert np.isnan(row[14:16]).all() and row[16] == pytest.approx(110.0)
+
+
+def test_between_two_speeds_stands_a_line_and_its_interval_knows_other_forms() -> None:
+    speeds, values = np.array([15.0, 45.0]), np.array([[0.01, 40.0], [0.02, 52.0]])
+    for rpm, slope, least in ((10, 38.0, 1.0), (30, 46.0, 1.0), (60, 58.0, 2.0)):
+        middle, low, high = between_speeds("line", speeds, values, rpm, [-0.02, None])
+        assert middle[1] == pytest.approx(slope) and low[1] + least < slope < high[1] - least
+    # n^2 through both gives 65 degrees at 60 rpm, and ln n 55.1.
+    squared, logarithm = 40 + 12 * (3600 - 225) / 1800, 40 + 12 * np.log(4) / np.log(3)
+    assert high[1] > squared > low[1] and high[1] > logarithm > low[1]
+    near, *_ = between_speeds("nearest", speeds, values, 30, [-0.02, None])
+    assert near == pytest.approx([0.015, 46.0])
+    at_wall, _, high = between_speeds("line", speeds, values * 2, 60, [-0.028, None])
+    assert at_wall[0] == high[0] == pytest.approx(np.sqrt(0.042**2 - 0.028**2))
+
+
+class BentDrum(DrumBase):
+    """A drum whose bed bends with the square of the speed, off by a line that it cannot know."""
+
+    def at(self, setting: int, rpm: float, begin: float, end: float) -> np.ndarray:
+        return np.array([0.0, 30.0 + 2.0 * setting + 0.006 * rpm**2])
+
+
+def test_a_base_model_with_its_own_residual_keeps_the_bend_that_a_line_lacks(
+    tmp_path: Path,
+) -> None:
+    def truth(rpm: float) -> np.ndarray:
+        return np.array([0.001 * rpm / 15, 33.0 + 0.1 * rpm + 0.006 * rpm**2])
+
+    drum, speeds = BentDrum.__new__(BentDrum), np.array([15.0, 45.0])
+    values = np.array([truth(15), truth(45)])
+    for rpm in (10, 30, 60):
+        told = drum.tell(rpm, (0.0, 1.0), speeds, values, [0.0, None])
+        middle, low, high = told["corrected"]
+        assert middle == pytest.approx(truth(rpm)) and (low < truth(rpm)).all()
+        assert (high > truth(rpm)).all()
+        line, *_ = between_speeds("line", speeds, values, rpm, [0.0, None])
+        assert abs(line[1] - truth(rpm)[1]) > 0.4
+        base, low, high = told["base"]
+        assert base[1] == pytest.approx(31.0 + 0.006 * rpm**2) and low[1] < base[1] < high[1]
+    # Both settings bend alike, so that each tells the other without an error; a line does not.
+    found = drum.held({rpm: (0.0, 1.0) for rpm in (10, 30)}, speeds, [0.0, None])
+    assert found["corrected"] == pytest.approx((0.0, 0.0, 1.0), abs=1e-9)
+    assert found["line"][1] == pytest.approx(0.006 * np.sqrt((175**2 + 225**2) / 2))
+
+
+def test_drum_models_that_have_nothing_to_say_are_named(tmp_path: Path) -> None:
     rate = 2 * np.pi / 60
     inputs = (("walls.0.motion.rate", 15 * rate, 45 * rate),)
     told: list[str] = []
     means = np.array([[0.01, 0.0, -0.01, 40.0], [0.02, 0.0, -0.02, 52.0]])
     made = models(Scene.from_toml(DRUM), inputs, means)
-    profiles, slopes = drum_rows(made, tmp_path, say=told.append)
-    line = {row[1]: row[2] for row in slopes if row[0] == "line"}
-    assert line == pytest.approx({10: 38.0, 20: 42.0, 30: 46.0, 60: 58.0})
-    assert [row[2] for row in profiles if row[:2] == ("line", 30)] == pytest.approx([-4, 0, 4])
-    # This scene has no walls that turn: models that pour have nothing to say, and it is said.
-    assert {row[0] for row in slopes} == {"line", "nearest"}
+    # This scene has no walls that turn.
+    assert drum_rows(made, tmp_path, say=told.append) == ([], [])
     assert sum("no prediction" in line for line in told) == 3 * len(SPEEDS)
 
 
-def test_loops_that_were_not_closed_are_named(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match="granulcal reproduce loop_drum makes it"):
-        reproduce(tmp_path, tmp_path)
+def test_numbers_of_a_table_have_five_digits(tmp_path: Path) -> None:
     write_csv(tmp_path / "a.csv", ("model", "x"), [("base", 1 / 3), ("line", 2)])
     assert (tmp_path / "a.csv").read_text() == "model,x\nbase,0.33333\nline,2\n"

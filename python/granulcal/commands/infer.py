@@ -19,6 +19,7 @@ def add(commands: Any) -> None:
     text = "infer the parameters from recordings"
     parser = commands.add_parser("infer", help=text, description=text)
     add_recordings(parser)
+    parser.add_argument("--border", type=int, help="ignore a frame of so many pixels")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.add_argument(
         "-o", "--out", type=writes("json"), help="write JSON with samples to this file"
@@ -35,7 +36,16 @@ def _run(options: argparse.Namespace) -> int:
         raise ModuleNotFoundError("--plot needs PyTorch")
     model = model_named(str(options.model))
     words = ["granulcal", "infer", str(model), *map(str, options.recording)]
-    for name in ("camera", "topic", "camera_topic", "colour_topic", "first_frame", "scene", "out"):
+    for name in (
+        "camera",
+        "topic",
+        "camera_topic",
+        "colour_topic",
+        "first_frame",
+        "scene",
+        "border",
+        "out",
+    ):
         value = getattr(options, name)
         if value is not None:
             words.append(f"--{name.replace('_', '-')}={value}")
@@ -48,6 +58,8 @@ def _run(options: argparse.Namespace) -> int:
 
         model = open_model(options)
         matched = {} if model.scene_toml is None else _matched(model.scene_toml)
+        if options.border is not None:
+            matched["border_px"] = options.border
         with contextlib.redirect_stderr(io.StringIO()):
             # What is lost of the recordings is told already.
             recordings = open_recordings(options)
@@ -56,7 +68,7 @@ def _run(options: argparse.Namespace) -> int:
     return code
 
 
-def _matched(scene_toml: str) -> dict[str, float]:
+def _matched(scene_toml: str) -> dict[str, Any]:
     """Options with which a pixel is as wide on the ground as in the scene's images."""
     from granulcal.pours.scene import Scene
 

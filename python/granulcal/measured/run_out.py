@@ -100,6 +100,10 @@ class RunOut:
         """Returns the fluid's front [m], as `front_radius` has that of the particles, (n,)."""
         return _mean(self.fluid)
 
+    def end_radius(self) -> float:
+        """Returns the mean of what each camera saw last of the particles' front [m], or NaN."""
+        return _end(self.particles)
+
     def disagreement(self) -> float:
         """Returns the largest difference of the cameras' particle fronts [m].
 

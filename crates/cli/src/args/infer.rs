@@ -33,6 +33,9 @@ pub struct InferArgs {
     pub recordings: Vec<Reads>,
     #[command(flatten)]
     pub read: ReadArgs,
+    /// Ignore a frame of so many pixels
+    #[arg(long, value_name = "PIXELS")]
+    pub border: Option<usize>,
     /// Print so many draws of the posterior in the JSON
     #[arg(long, value_name = "N", default_value_t = 0, requires = "json")]
     pub samples: usize,

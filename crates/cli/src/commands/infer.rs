@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use granulcal_bayessim::Model;
 use granulcal_dataset::{Form, Limits, Recording, scene_from_text, write_file};
 use granulcal_dem::Scene;
-use granulcal_features::PAPER16;
+use granulcal_features::{Formation, PAPER16};
 use serde_json::json;
 
 use crate::args::InferArgs;
@@ -55,7 +55,12 @@ pub fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
         }
         let mut segmentation = recording.segmentation.clone();
         segmentation.ground_resolution = ground_resolution.or(segmentation.ground_resolution);
+        segmentation.border_px = args.border.unwrap_or(segmentation.border_px);
         let formation = recording.formation_with(&segmentation)?;
+        if args.border.is_none() {
+            // Before the limits: these pixels may be why the extent cannot be the scene's.
+            note_edge(path, &formation);
+        }
         if let Some(limits) = &limits {
             let name = path.display();
             let found = limits.violations(&formation).into_iter();
@@ -97,6 +102,19 @@ pub fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
     let outcome =
         if report.is_inside() { Outcome::whole_if(is_whole) } else { Outcome::OutsideModel };
     Ok(sides.finish(outcome))
+}
+
+/// Tells pixels at the edge of the image that are taken for grains, and what leaves them out.
+fn note_edge(path: &Path, formation: &Formation) {
+    if let Some(edge) = formation.edge() {
+        note(&format!(
+            "warning: {}: {} pixels at the edge of the image, apart from the formation, are taken for grains; \
+             --border {} leaves them out",
+            path.display(),
+            edge.count,
+            edge.frame * formation.downsample
+        ));
+    }
 }
 
 /// Refuses a model of another scene.

@@ -43,7 +43,7 @@ EFFECTS: tuple[LibraryEffect, ...] = (
         full=_SPREAD,
         # Room for the larger grains at the start.
         also=(
-            ("start.spacing", 2.02e-3),
+            ("start.spacing", 2.85e-3),
             ("start.radius", 0.0415),
             ("start.from.1", -9.6e-3),
             ("start.to.1", 9.6e-3),
@@ -72,7 +72,7 @@ FILL = LibraryEffect(
 """The fill is free and no finding: the instrument's nominal one supports more than the authors'."""
 
 RESOLUTION = Resolution(
-    diameter=1.2e-3, coarse=2.4e-3, scales={"start.spacing": 1.0, "start.jitter": 1.0}
+    diameter=1.2e-3, coarse=3.4e-3, scales={"start.spacing": 1.0, "start.jitter": 1.0}
 )
 """The real grains, and the second size of the archive."""
 

@@ -5,14 +5,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 from granulcal.experiments.loop_drum.task import at_speed
+from granulcal.experiments.predictions.between_speeds import (
+    MODELS as WITHOUT_PHYSICS,
+)
+from granulcal.experiments.predictions.between_speeds import between_speeds, read_pictures
+from granulcal.experiments.predictions.drum_base import DrumBase
 from granulcal.loop.pours.forward import Forward
-from granulcal.loop.report.models import MODELS, Models, Prediction
+from granulcal.loop.report.models import Models, Prediction
 
-__all__ = ["SPEEDS", "drum_rows"]
+__all__ = ["SPEEDS", "drum_rows", "drum_rows_without_loop"]
 
 SPEEDS = {10: (1.1, 1.5), 20: (0.7, 1.0), 30: (0.6, 0.9), 60: (0.45, 0.75)}
 """Rounds a minute, and when the mean begins and ends [s]: after turns of 54 to 90 degrees."""
 
+# What is poured; the rows without physics have a file of their own.
+_SIMULATED = ("named", "base", "corrected")
 _POURS = 8
 _PLACE = re.compile(r"surface_z\[(?P<x>[^\]]+)\]")
 
@@ -25,13 +32,43 @@ def drum_rows(
     profiles: list[tuple[object, ...]] = []
     slopes: list[tuple[object, ...]] = []
     for rpm, (begin, end) in SPEEDS.items():
-        for model in MODELS:
+        for model in _SIMULATED:
             try:
                 found = models.predict(model, at_speed(rpm, begin, end), forward, pours=_POURS)
             except ValueError as error:
                 say(f"drum, {model} at {rpm} rpm: no prediction: {error}")
                 continue
             more, slope = _rows(model, rpm, found)
+            profiles += more
+            slopes.append(slope)
+    return profiles, slopes
+
+
+def drum_rows_without_loop(
+    data: Path, pours: Path | None, *, say: Callable[[str], None]
+) -> tuple[list[tuple[object, ...]], list[tuple[object, ...]]]:
+    """Returns the same rows of `line` and `nearest`, told from the pictures alone.
+
+    With a folder of `pours`, those of `base` and `corrected` of two stated drums come first.
+    """
+    speeds, names, values = read_pictures(data)
+    matches = [_PLACE.fullmatch(name) for name in names]
+    places = [None if found is None else float(found["x"]) for found in matches]
+    base = None if pours is None else DrumBase(data, pours)
+    if base is not None:
+        for model, (height, slope, share) in base.held(SPEEDS, speeds, places).items():
+            say(
+                f"drum, {model}: simulated drums told from {speeds[0]:.0f} and {speeds[1]:.0f} rpm "
+                f"with an rms of {1e3 * height:.2f} mm and {slope:.1f} degrees; {share:.0%} in the "
+                "90 % intervals"
+            )
+    profiles: list[tuple[object, ...]] = []
+    slopes: list[tuple[object, ...]] = []
+    for rpm, window in SPEEDS.items():
+        told = {} if base is None else base.tell(rpm, window, speeds, values, places)
+        told |= {m: between_speeds(m, speeds, values, rpm, places) for m in WITHOUT_PHYSICS}
+        for model, found in told.items():
+            more, slope = _rows(model, rpm, Prediction(model, names, *found, 0.9))
             profiles += more
             slopes.append(slope)
     return profiles, slopes
