@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 import granulcal as gc
 
 STIFFNESSES = ((3e6, 0.2), (3e7, 0.05), (3e8, 0.1))
-"""Young's modulus [Pa]; step over the time of a Rayleigh wave [-]. Rolling springs turn 0.25 a step."""
+"""Young's modulus [Pa]; step over the time of a Rayleigh wave [-]; rolling springs: 0.25 a step."""
 PRESETS = ("default", "accurate")
 MATERIAL, HEIGHT = (0.5, 0.3, 0.3), 0.08
 """mu_s, mu_r, e [-] and the height of the tip [m]."""
