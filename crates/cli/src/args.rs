@@ -12,7 +12,7 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use granulcal_dataset::{Form, Product, Shard};
-use granulcal_dem::Preset;
+use granulcal_scene::Preset;
 
 pub use completions::CompletionsArgs;
 pub use global::Global;

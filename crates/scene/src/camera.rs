@@ -1,11 +1,21 @@
-//! The depth camera as a scene states it. Rendering belongs to the features crate; the solver
-//! only needs to know which piece of the ground is in view.
+//! The depth camera as a scene states it. Rendering belongs to `granulcal-features`; a simulation only needs to know which
+//! piece of the ground is in view.
 
 use serde::{Deserialize, Serialize};
 
-use super::sensor::SensorSpec;
-use crate::check::{non_negative, positive};
-use crate::error::DemError;
+use crate::check::{non_negative, within};
+use crate::error::SceneError;
+use crate::sensor::DepthSensor;
+
+/// Largest blur `[px]` that is accepted: the kernel is 8 sigma wide.
+pub const MAX_BLUR: f64 = 1000.0;
+/// Largest depth noise `[m]` that is accepted.
+pub const MAX_DEPTH_NOISE: f64 = 1e3;
+/// Most pixels of a sensor over which a field is drawn.
+pub const MAX_SENSOR_PIXELS: f64 = 1e8;
+/// Heights and widths of a camera that are accepted `[m]`.
+pub(crate) const LENGTHS: (f64, f64) = (1e-6, 1e3);
+pub(crate) const IN_LENGTHS: &str = "in [1e-6, 1000]";
 
 /// How the camera projects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,7 +73,7 @@ pub struct CameraSpec {
     pub mask: Mask,
     /// What the sensor adds to the image, after blur and depth noise; default nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub sensor: Option<SensorSpec>,
+    pub sensor: Option<DepthSensor>,
 }
 
 impl Default for CameraSpec {
@@ -95,22 +105,40 @@ impl CameraSpec {
         self.field_width / self.pixels as f64 * self.downsample as f64
     }
 
-    pub(super) fn check(&self) -> Result<(), DemError> {
-        positive("camera.height", self.height)?;
-        positive("camera.field_width", self.field_width)?;
-        non_negative("camera.blur", self.blur)?;
-        non_negative("camera.depth_noise", self.depth_noise)?;
+    pub(crate) fn check(&self) -> Result<(), SceneError> {
+        within("camera.height", self.height, LENGTHS, IN_LENGTHS)?;
+        within("camera.field_width", self.field_width, LENGTHS, IN_LENGTHS)?;
+        within("camera.blur", self.blur, (0.0, MAX_BLUR), "in [0, 1000]")?;
+        within("camera.depth_noise", self.depth_noise, (0.0, MAX_DEPTH_NOISE), "in [0, 1000]")?;
         non_negative("camera.height_threshold", self.height_threshold)?;
         if self.pixels == 0 || self.pixels > 16_384 {
-            return Err(DemError::range("camera.pixels", self.pixels as f64, "in 1..=16384"));
+            return Err(SceneError::range("camera.pixels", self.pixels as f64, "in 1..=16384"));
         }
         if self.downsample == 0 || self.downsample > self.pixels {
-            return Err(DemError::range(
+            return Err(SceneError::range(
                 "camera.downsample",
                 self.downsample as f64,
                 "in 1..=camera.pixels",
             ));
         }
-        self.sensor.map_or(Ok(()), |sensor| sensor.check())
+        self.sensor.map_or(Ok(()), |sensor| self.check_sensor(&sensor))
+    }
+    /// Checks a sensor, and that this camera can have it.
+    fn check_sensor(&self, sensor: &DepthSensor) -> Result<(), SceneError> {
+        sensor.check("camera.sensor")?;
+        let width = self.ground_resolution();
+        // Pixels of the sensor along one of the down-sampled image.
+        let scale = match (sensor, self.projection) {
+            (DepthSensor::Stereo(_), Projection::Orthographic) => {
+                return Err(SceneError::SensorNeedsPinhole);
+            }
+            (DepthSensor::Stereo(sensor), Projection::Pinhole) => {
+                sensor.focal_length * width / self.height
+            }
+            (DepthSensor::TimeOfFlight(sensor), _) => width / sensor.resolution,
+        };
+        let side = ((self.pixels / self.downsample) as f64 * scale).ceil();
+        within("pixels of camera.sensor", side * side, (1.0, MAX_SENSOR_PIXELS), "in [1, 1e8]")?;
+        within("pixels of camera.sensor in one of the image", scale, (1e-6, 1e6), "in [1e-6, 1e6]")
     }
 }

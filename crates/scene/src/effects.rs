@@ -25,21 +25,21 @@ use serde::{Deserialize, Serialize};
 pub use adhesion::Adhesion;
 pub use capillary::Capillary;
 pub use clump::Clump;
-pub(crate) use clump::ClumpShape;
+pub use clump::ClumpShape;
 pub use effect::Effect;
 pub use fluid::Fluid;
 pub use funnel_pose::FunnelPose;
 pub use ground::GroundUnlike;
 pub use layer::Layer;
 pub use lubrication::Lubrication;
-pub use outlet::Outlet;
+pub use outlet::{Outlet, OutletMesh};
 pub use polydispersity::Polydispersity;
 pub use restitution_speed::RestitutionSpeed;
 pub use rolling_form::RollingForm;
 pub use tilt::Tilt;
 pub use vibration::Vibration;
 
-use crate::error::DemError;
+use crate::error::SceneError;
 use crate::preset::Method;
 
 /// Makes [`Effects`] of the one list of all effects.
@@ -65,8 +65,8 @@ macro_rules! effects {
             /// The path of every number of every effect, for example `effects.capillary.bond`; lists have none.
             ///
             /// # Errors
-            /// [`DemError::TomlWrite`] if a default cannot be written.
-            pub fn paths() -> Result<Vec<String>, DemError> {
+            /// [`SceneError::TomlWrite`] if a default cannot be written.
+            pub fn paths() -> Result<Vec<String>, SceneError> {
                 let (effects, mut paths) = (Self::default(), Vec::new());
                 $(paths.extend(paths_of(&effects.$table)?);)*
                 Ok(paths)
@@ -106,8 +106,8 @@ effects! {
     vibration: Vibration,
 }
 
-fn paths_of<T: Effect + Serialize>(effect: &T) -> Result<Vec<String>, DemError> {
-    let table = toml::Table::try_from(effect).map_err(|e| DemError::TomlWrite(Box::new(e)))?;
+fn paths_of<T: Effect + Serialize>(effect: &T) -> Result<Vec<String>, SceneError> {
+    let table = toml::Table::try_from(effect).map_err(|e| SceneError::TomlWrite(Box::new(e)))?;
     Ok(table.keys().map(|number| format!("{}.{number}", effect.path())).collect())
 }
 
@@ -124,13 +124,13 @@ impl Effects {
     /// Checks every number.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`].
-    pub(crate) fn check(&self) -> Result<(), DemError> {
+    /// [`SceneError::OutOfRange`].
+    pub(crate) fn check(&self) -> Result<(), SceneError> {
         self.all().into_iter().try_for_each(Effect::check)
     }
 
     /// The first effect that is on and changes what a contact is: one that only the method nsgs knows.
-    pub(crate) fn of_contacts(&self) -> Option<&'static str> {
+    pub fn of_contacts(&self) -> Option<&'static str> {
         let mut all = self.all().into_iter();
         all.find(|effect| effect.is_on() && effect.changes_contacts()).map(Effect::path)
     }
@@ -138,11 +138,11 @@ impl Effects {
     /// Refuses a method that does not know an effect.
     ///
     /// # Errors
-    /// [`DemError::EffectNeedsMethod`].
-    pub(crate) fn check_method(&self, got: Method) -> Result<(), DemError> {
+    /// [`SceneError::EffectNeedsMethod`].
+    pub fn check_method(&self, got: Method) -> Result<(), SceneError> {
         match self.of_contacts() {
             Some(effect) if got != Method::Nsgs => {
-                Err(DemError::EffectNeedsMethod { effect, got: got.name() })
+                Err(SceneError::EffectNeedsMethod { effect, got: got.name() })
             }
             _ => Ok(()),
         }

@@ -28,7 +28,7 @@ impl Grains {
     }
 
     /// The body that every grain is, if it has a shape; of a checked scene.
-    pub(crate) fn solid(&self) -> Option<Arc<Solid>> {
+    pub fn solid(&self) -> Option<Arc<Solid>> {
         let solid = |shape| Solid::new(shape, self.diameter).expect("a checked shape");
         self.shape.as_ref().map(solid)
     }

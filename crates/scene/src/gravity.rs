@@ -4,6 +4,6 @@
 pub const GRAVITY: f64 = 9.81;
 
 /// Gravity that points down `[m/s^2]`.
-pub(super) fn standard_gravity() -> [f64; 3] {
+pub(crate) fn standard_gravity() -> [f64; 3] {
     [0.0, 0.0, -GRAVITY]
 }

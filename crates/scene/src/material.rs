@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// Coefficients of a contact between two surfaces of the same kind.
 ///
@@ -94,12 +94,12 @@ impl Material {
     /// A checked material without tangential restitution, with the torsional friction of most grains, 0.02.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`] names the coefficient that is out of range or not finite.
+    /// [`SceneError::OutOfRange`] names the coefficient that is out of range or not finite.
     pub fn new(
         sliding_friction: f64,
         rolling_friction: f64,
         restitution: f64,
-    ) -> Result<Self, DemError> {
+    ) -> Result<Self, SceneError> {
         let material = Self { sliding_friction, rolling_friction, restitution, ..Self::default() };
         material.check("material")?;
         Ok(material)
@@ -108,8 +108,8 @@ impl Material {
     /// Checks every coefficient; `name` prefixes the path in the error.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`].
-    pub fn check(&self, name: &str) -> Result<(), DemError> {
+    /// [`SceneError::OutOfRange`].
+    pub fn check(&self, name: &str) -> Result<(), SceneError> {
         in_range(name, "sliding_friction", self.sliding_friction, 10.0, "in [0, 10]")?;
         in_range(name, "rolling_friction", self.rolling_friction, 1e3, "in [0, 1000]")?;
         in_range(name, "torsional_friction", self.torsional_friction, 1e3, "in [0, 1000]")?;
@@ -196,11 +196,11 @@ fn in_range(
     got: f64,
     max: f64,
     allowed: &'static str,
-) -> Result<(), DemError> {
+) -> Result<(), SceneError> {
     if (0.0..=max).contains(&got) {
         return Ok(());
     }
-    Err(DemError::range(format!("{name}.{field}"), got, allowed))
+    Err(SceneError::range(format!("{name}.{field}"), got, allowed))
 }
 
 #[cfg(test)]

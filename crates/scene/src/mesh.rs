@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::check::positive;
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// Extent of a mesh, in diameters of a grain, beyond which its unit is taken for a mistake.
 const MOST_DIAMETERS: f64 = 20_000.0;
@@ -25,14 +25,14 @@ impl Mesh {
     /// out, as exporters of STL write them.
     ///
     /// # Errors
-    /// [`DemError::Mesh`] for a vertex that is not there or not finite, or if no triangle is left; `file` is for the
+    /// [`SceneError::Mesh`] for a vertex that is not there or not finite, or if no triangle is left; `file` is for the
     /// message.
     pub fn new(
         vertices: &[[f64; 3]],
         triangles: &[[u32; 3]],
         file: &str,
-    ) -> Result<Self, DemError> {
-        let bad = |reason: String| DemError::Mesh { file: file.to_owned(), reason };
+    ) -> Result<Self, SceneError> {
+        let bad = |reason: String| SceneError::Mesh { file: file.to_owned(), reason };
         if let Some(index) = vertices.iter().position(|v| v.iter().any(|c| !c.is_finite())) {
             return Err(bad(format!("vertex {index} is {:?}, must be finite", vertices[index])));
         }
@@ -127,17 +127,17 @@ impl MeshFile {
     /// The triangles, or what to do to have them.
     ///
     /// # Errors
-    /// [`DemError::Mesh`] if the file has not been read.
-    pub fn read(&self) -> Result<&Arc<Mesh>, DemError> {
+    /// [`SceneError::Mesh`] if the file has not been read.
+    pub fn read(&self) -> Result<&Arc<Mesh>, SceneError> {
         let reason = "has not been read: load the scene from its file";
-        let unread = || DemError::Mesh { file: self.file.clone(), reason: reason.to_owned() };
+        let unread = || SceneError::Mesh { file: self.file.clone(), reason: reason.to_owned() };
         self.mesh.as_ref().ok_or_else(unread)
     }
 
-    pub(super) fn check(&self, name: &str, diameter: f64) -> Result<(), DemError> {
+    pub(crate) fn check(&self, name: &str, diameter: f64) -> Result<(), SceneError> {
         positive(&format!("{name}.shape.unit"), self.unit)?;
         let mesh = self.read()?;
-        let bad = |reason: String| DemError::Mesh { file: self.file.clone(), reason };
+        let bad = |reason: String| SceneError::Mesh { file: self.file.clone(), reason };
         let (unit, extent) = (self.unit, mesh.extent() * self.unit);
         if !(LEAST_DIAMETERS..=MOST_DIAMETERS).contains(&(extent / diameter)) {
             let [least, most] = [LEAST_DIAMETERS, MOST_DIAMETERS].map(|n| n * diameter);
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn bad_meshes_are_named() {
-        let message = |error: DemError| error.to_string();
+        let message = |error: SceneError| error.to_string();
         let not_there = message(Mesh::new(&CORNERS, &[[0, 1, 7]], "a.stl").unwrap_err());
         assert!(not_there.contains("a.stl") && not_there.contains("vertex 7 of 4"), "{not_there}");
         let mut corners = CORNERS;

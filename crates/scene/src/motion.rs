@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::check::{finite, non_negative, positive};
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// The motion of a wall from its stated place. Times are simulated times `[s]`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -123,15 +123,15 @@ impl Motion {
     }
 
     /// Refuses a wall that jumps over grains: in a substep of `dt` `[s]` it may go as far as a grain is thick.
-    pub(super) fn check_jumps(&self, name: &str, dt: f64, diameter: f64) -> Result<(), DemError> {
+    pub(crate) fn check_jumps(&self, name: &str, dt: f64, diameter: f64) -> Result<(), SceneError> {
         if self.fastest() * dt <= diameter {
             return Ok(());
         }
         let allowed = "at most a grain's diameter in a substep";
-        Err(DemError::range(format!("{name}.motion (speed) [m/s]"), self.fastest(), allowed))
+        Err(SceneError::range(format!("{name}.motion (speed) [m/s]"), self.fastest(), allowed))
     }
 
-    pub(super) fn check(&self, name: &str) -> Result<(), DemError> {
+    pub(crate) fn check(&self, name: &str) -> Result<(), SceneError> {
         let all_finite = |field: &str, values: &[f64]| {
             values.iter().try_for_each(|&value| finite(&format!("{name}.motion.{field}"), value))
         };
@@ -139,7 +139,7 @@ impl Motion {
             non_negative(&format!("{name}.motion.begin"), begin)?;
             match end {
                 Some(end) if !(end >= begin && end.is_finite()) => {
-                    Err(DemError::range(format!("{name}.motion.end"), end, "at least begin"))
+                    Err(SceneError::range(format!("{name}.motion.end"), end, "at least begin"))
                 }
                 _ => Ok(()),
             }
@@ -188,10 +188,10 @@ fn pose_between(knots: &[[f64; 8]], time: f64) -> Isometry3<f64> {
     Isometry3::from_parts(translation.into(), rotation)
 }
 
-fn check_knots(name: &str, knots: &[[f64; 8]]) -> Result<(), DemError> {
+fn check_knots(name: &str, knots: &[[f64; 8]]) -> Result<(), SceneError> {
     let number = |knot: usize, what: &str| format!("{name}.motion.knots.{knot}.{what}");
     if knots.is_empty() {
-        return Err(DemError::range(format!("{name}.motion.knots (number)"), 0.0, "at least 1"));
+        return Err(SceneError::range(format!("{name}.motion.knots (number)"), 0.0, "at least 1"));
     }
     for (index, knot) in knots.iter().enumerate() {
         knot.iter()
@@ -199,17 +199,17 @@ fn check_knots(name: &str, knots: &[[f64; 8]]) -> Result<(), DemError> {
         let norm = Vector3::new(knot[4], knot[5], knot[6]).norm().hypot(knot[7]);
         if (norm - 1.0).abs() > 1e-3 {
             let allowed = "1 to a thousandth (qx, qy, qz, qw)";
-            return Err(DemError::range(number(index, "quaternion (length)"), norm, allowed));
+            return Err(SceneError::range(number(index, "quaternion (length)"), norm, allowed));
         }
         let Some(before) = index.checked_sub(1).map(|before| &knots[before]) else { continue };
         if knot[0] <= before[0] {
             let allowed = "later than the knot before";
-            return Err(DemError::range(number(index, "time"), knot[0], allowed));
+            return Err(SceneError::range(number(index, "time"), knot[0], allowed));
         }
         let turn = pose_of(before).rotation.angle_to(&pose_of(knot).rotation);
         if turn > 0.9 * std::f64::consts::PI {
             let allowed = "less than 0.9 pi from the knot before";
-            return Err(DemError::range(number(index, "rotation [rad]"), turn, allowed));
+            return Err(SceneError::range(number(index, "rotation [rad]"), turn, allowed));
         }
     }
     Ok(())

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::check::{finite, non_negative, positive};
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// Most samples of a pour: beyond it the rate is a mistake.
 const MAX_SAMPLES: f64 = 1e6;
@@ -126,16 +126,16 @@ fn half() -> f64 {
 }
 
 impl Observe {
-    pub(super) fn check(&self, horizon: f64, diameter: f64) -> Result<(), DemError> {
+    pub(crate) fn check(&self, horizon: f64, diameter: f64) -> Result<(), SceneError> {
         positive("observe.rate", self.rate)?;
         non_negative("observe.begin", self.begin)?;
         if self.begin >= horizon {
-            return Err(DemError::range("observe.begin", self.begin, "less than end.horizon"));
+            return Err(SceneError::range("observe.begin", self.begin, "less than end.horizon"));
         }
         let rest = horizon - self.begin;
         if self.rate * rest > MAX_SAMPLES {
             let allowed = "at most a million samples until end.horizon";
-            return Err(DemError::range("observe.rate", self.rate, allowed));
+            return Err(SceneError::range("observe.rate", self.rate, allowed));
         }
         if let Some(surface) = &self.surface {
             surface.centre.iter().try_for_each(|&c| finite("observe.surface.centre", c))?;
@@ -145,7 +145,7 @@ impl Observe {
             positive("observe.surface.slope_within", surface.slope_within)?;
             if surface.slope_within > wide {
                 let (name, got) = ("observe.surface.slope_within", surface.slope_within);
-                return Err(DemError::range(name, got, allowed));
+                return Err(SceneError::range(name, got, allowed));
             }
             share("observe.surface.level", surface.level)?;
         }
@@ -156,7 +156,7 @@ impl Observe {
             share("observe.front.level", front.level)?;
             if front.link != 0.0 && !(1.0..=MAX_LINK).contains(&front.link) {
                 let allowed = "0, or from 1 to 10 sums of two radii";
-                return Err(DemError::range("observe.front.link", front.link, allowed));
+                return Err(SceneError::range("observe.front.link", front.link, allowed));
             }
         }
         if let Some(discharge) = &self.discharge {
@@ -166,7 +166,7 @@ impl Observe {
             let got = discharge.jammed_below;
             if !(0.0..=100.0).contains(&got) {
                 let name = "observe.discharge.jammed_below";
-                return Err(DemError::range(name, got, "from 0 to 100"));
+                return Err(SceneError::range(name, got, "from 0 to 100"));
             }
         }
         if let Some(radius) = &self.radius {
@@ -187,11 +187,11 @@ impl Observe {
     }
 }
 
-fn share(name: &str, got: f64) -> Result<(), DemError> {
+fn share(name: &str, got: f64) -> Result<(), SceneError> {
     if got > 0.0 && got < 1.0 {
         return Ok(());
     }
-    Err(DemError::range(name, got, "between 0 and 1"))
+    Err(SceneError::range(name, got, "between 0 and 1"))
 }
 
 /// Refuses values that do not rise, or are not within `bounds`.
@@ -200,15 +200,15 @@ fn rising(
     values: &[f64],
     (low, high): (f64, f64),
     allowed: &'static str,
-) -> Result<(), DemError> {
+) -> Result<(), SceneError> {
     let mut last = f64::NEG_INFINITY;
     for (index, &got) in values.iter().enumerate() {
         // NaN is in no range. Times that end with the horizon may miss it by a rounding.
         if !(got >= low && got <= high + 1e-12) {
-            return Err(DemError::range(format!("{name}.{index}"), got, allowed));
+            return Err(SceneError::range(format!("{name}.{index}"), got, allowed));
         }
         if got <= last {
-            return Err(DemError::range(
+            return Err(SceneError::range(
                 format!("{name}.{index}"),
                 got,
                 "more than the one before",

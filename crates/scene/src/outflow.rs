@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::check::finite;
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// Grains whose centre comes below a height leave the scene: nothing touches them and no camera sees them any more.
 ///
@@ -19,11 +19,11 @@ pub struct Outflow {
 }
 
 impl Outflow {
-    pub(super) fn check(&self) -> Result<(), DemError> {
+    pub(crate) fn check(&self) -> Result<(), SceneError> {
         finite("outflow.below", self.below)?;
         match self.until {
             Some(got) if !(got > 0.0 && got <= 100.0) => {
-                Err(DemError::range("outflow.until", got, "more than 0 and at most 100"))
+                Err(SceneError::range("outflow.until", got, "more than 0 and at most 100"))
             }
             _ => Ok(()),
         }

@@ -5,15 +5,15 @@
 
 use toml::{Table, Value};
 
-use super::Scene;
-use crate::error::DemError;
+use crate::error::SceneError;
+use crate::scene::Scene;
 
 impl Scene {
     /// A copy with the number at `path` set to `value`, checked like any scene.
     ///
     /// # Errors
-    /// [`DemError::Path`] if the path names no number of a scene, or what the changed scene's check says.
-    pub fn with(&self, path: &str, value: f64) -> Result<Self, DemError> {
+    /// [`SceneError::Path`] if the path names no number of a scene, or what the changed scene's check says.
+    pub fn with(&self, path: &str, value: f64) -> Result<Self, SceneError> {
         let mut scene = self.clone();
         scene.set(&[(path, value)])?;
         Ok(scene)
@@ -23,7 +23,7 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Scene::with`].
-    pub fn set(&mut self, values: &[(&str, f64)]) -> Result<(), DemError> {
+    pub fn set(&mut self, values: &[(&str, f64)]) -> Result<(), SceneError> {
         let mut tree = self.tree()?;
         for &(path, value) in values {
             insert(&mut tree, path, value)?;
@@ -41,8 +41,8 @@ impl Scene {
     /// The number at `path`.
     ///
     /// # Errors
-    /// [`DemError::Path`] if nothing or no number stands there.
-    pub fn get(&self, path: &str) -> Result<f64, DemError> {
+    /// [`SceneError::Path`] if nothing or no number stands there.
+    pub fn get(&self, path: &str) -> Result<f64, SceneError> {
         let mut found = &Value::Table(self.tree()?);
         for key in keys(path) {
             found = match found {
@@ -67,22 +67,22 @@ impl Scene {
     /// other; `None` if the two are the same scene.
     ///
     /// # Errors
-    /// [`DemError::TomlWrite`] if a number cannot be written.
+    /// [`SceneError::TomlWrite`] if a number cannot be written.
     pub fn first_difference(
         &self,
         other: &Self,
-    ) -> Result<Option<(String, String, String)>, DemError> {
+    ) -> Result<Option<(String, String, String)>, SceneError> {
         let (here, there) = (Value::Table(self.tree()?), Value::Table(other.tree()?));
         Ok(first_difference("", Some(&here), Some(&there)))
     }
 
-    fn tree(&self) -> Result<Table, DemError> {
-        Table::try_from(self).map_err(|e| DemError::TomlWrite(Box::new(e)))
+    fn tree(&self) -> Result<Table, SceneError> {
+        Table::try_from(self).map_err(|e| SceneError::TomlWrite(Box::new(e)))
     }
 }
 
 /// The first thing in which two trees differ, which stand at `path`: its own path and both values.
-pub(crate) fn first_difference(
+pub fn first_difference(
     path: &str,
     left: Option<&Value>,
     right: Option<&Value>,
@@ -114,13 +114,13 @@ fn keys(path: &str) -> impl Iterator<Item = &str> {
     path.strip_prefix("scene.").unwrap_or(path).split('.')
 }
 
-fn path_error(path: &str, reason: &str) -> DemError {
-    DemError::Path { path: path.to_owned(), reason: reason.to_owned() }
+fn path_error(path: &str, reason: &str) -> SceneError {
+    SceneError::Path { path: path.to_owned(), reason: reason.to_owned() }
 }
 
 /// Puts `value` at `path`. A missing number or table of coefficients is created, and whether it may exist
 /// is the scene's to say; other missing tables are not: a height must not conjure up a funnel.
-fn insert(tree: &mut Table, path: &str, value: f64) -> Result<(), DemError> {
+fn insert(tree: &mut Table, path: &str, value: f64) -> Result<(), SceneError> {
     let keys: Vec<&str> = keys(path).collect();
     let Some((last, first)) = keys.split_last() else { return Err(path_error(path, "is empty")) };
     // An entry of a list stands where a number of a table does.
@@ -152,7 +152,7 @@ fn insert(tree: &mut Table, path: &str, value: f64) -> Result<(), DemError> {
 }
 
 /// Replaces a number by another; a whole number stays one.
-fn set_number(path: &str, place: &mut Value, value: f64) -> Result<(), DemError> {
+fn set_number(path: &str, place: &mut Value, value: f64) -> Result<(), SceneError> {
     *place = match place {
         Value::Integer(_) if value.fract() == 0.0 => Value::Integer(value as i64),
         Value::Integer(_) => {
@@ -168,7 +168,7 @@ fn set_number(path: &str, place: &mut Value, value: f64) -> Result<(), DemError>
 }
 
 /// A key as the number of one of `count` entries of a list.
-fn entry(path: &str, key: &str, count: usize) -> Result<usize, DemError> {
+fn entry(path: &str, key: &str, count: usize) -> Result<usize, SceneError> {
     let number = key.parse().ok().filter(|&number| number < count);
     number.ok_or_else(|| {
         path_error(path, &format!("{key:?} must be one of {count} entries, counted from 0"))
@@ -209,7 +209,7 @@ mod tests {
         let stone = scene.with("walls.0.material.restitution", 0.2).unwrap();
         assert_eq!(stone.walls[0].material.restitution, Some(0.2));
         for path in ["walls.1.motion.end", "gravity.3", "gravity.x", "gravity", "walls.0"] {
-            assert!(matches!(scene.with(path, 1.0), Err(DemError::Path { .. })), "{path}");
+            assert!(matches!(scene.with(path, 1.0), Err(SceneError::Path { .. })), "{path}");
             assert!(scene.get(path).is_err(), "{path}");
         }
     }
@@ -245,7 +245,7 @@ mod tests {
             "funnel.height",
         ] {
             let error = scene.with(path, 0.1).unwrap_err();
-            assert!(matches!(error, DemError::Path { .. }), "{path}: {error}");
+            assert!(matches!(error, SceneError::Path { .. }), "{path}: {error}");
         }
         assert!(scene.with("grains.count", 1.5).is_err());
         assert!(scene.with("material.restitution", 1.5).is_err());

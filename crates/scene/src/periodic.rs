@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::check::finite;
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// Diameters that the period must have at least: a grain must not meet itself, nor one grain from two sides.
 const FEWEST_DIAMETERS: f64 = 4.0;
@@ -43,13 +43,13 @@ pub struct Periodic {
 }
 
 impl Periodic {
-    pub(super) fn check(&self, diameter: f64) -> Result<(), DemError> {
+    pub(crate) fn check(&self, diameter: f64) -> Result<(), SceneError> {
         finite("periodic.from", self.from)?;
         finite("periodic.to", self.to)?;
         if self.to - self.from >= FEWEST_DIAMETERS * diameter {
             return Ok(());
         }
         let allowed = "at least 4 grain diameters above periodic.from";
-        Err(DemError::range("periodic.to", self.to, allowed))
+        Err(SceneError::range("periodic.to", self.to, allowed))
     }
 }

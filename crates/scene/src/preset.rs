@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::DemError;
+use crate::error::SceneError;
 pub use method::{Complementarity, Method, NewtonSettings, ReferenceSettings};
 
 /// The name of a set of solver settings.
@@ -47,13 +47,13 @@ impl fmt::Display for Preset {
 }
 
 impl FromStr for Preset {
-    type Err = DemError;
+    type Err = SceneError;
 
-    fn from_str(word: &str) -> Result<Self, DemError> {
+    fn from_str(word: &str) -> Result<Self, SceneError> {
         Self::ALL
             .into_iter()
             .find(|preset| preset.name() == word)
-            .ok_or_else(|| DemError::UnknownPreset { got: word.to_owned() })
+            .ok_or_else(|| SceneError::UnknownPreset { got: word.to_owned() })
     }
 }
 
@@ -103,16 +103,20 @@ pub struct SolverSettings {
 }
 
 impl SolverSettings {
-    pub(crate) fn check(&self) -> Result<(), DemError> {
+    /// Refuses settings that no solver can have.
+    ///
+    /// # Errors
+    /// [`SceneError::OutOfRange`] names the number.
+    pub fn check(&self) -> Result<(), SceneError> {
         let positive = |name, got: f64| {
             let allowed = "positive and finite";
             let fits = got > 0.0 && got.is_finite();
-            if fits { Ok(()) } else { Err(DemError::range(name, got, allowed)) }
+            if fits { Ok(()) } else { Err(SceneError::range(name, got, allowed)) }
         };
         positive("settings.dt", self.dt)?;
         positive("settings.sweeps", self.sweeps as f64)?;
         if !(1.0..2.0).contains(&self.relaxation) {
-            return Err(DemError::range("settings.relaxation", self.relaxation, "in [1, 2)"));
+            return Err(SceneError::range("settings.relaxation", self.relaxation, "in [1, 2)"));
         }
         positive("settings.settled", self.settled)?;
         positive("settings.quiet_sweeps", self.quiet_sweeps as f64)?;

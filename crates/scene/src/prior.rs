@@ -1,7 +1,7 @@
 //! A prior: which numbers of a scene are unknown, and how they are distributed.
 //!
 //! ```
-//! use granulcal_dataset::Prior;
+//! use granulcal_scene::Prior;
 //! let prior = Prior::from_toml(r#"
 //!     [[parameter]]
 //!     path = "material.sliding_friction"
@@ -12,19 +12,19 @@
 //! assert_eq!(prior.names(), ["material.sliding_friction"]);
 //! // A draw depends on the seed and the row only.
 //! assert_eq!(prior.sample(1, 17), prior.sample(1, 17));
-//! # Ok::<(), granulcal_dataset::DatasetError>(())
+//! # Ok::<(), granulcal_scene::SceneError>(())
 //! ```
 
 mod entry;
 mod parameter;
 
-use granulcal_dem::Scene;
-
-use crate::random::Uniforms;
-use crate::{DatasetError, Distribution};
+use crate::distribution::Distribution;
+use crate::error::SceneError;
+use crate::scene::Scene;
+use crate::uniforms::Uniforms;
 use entry::{Entry, File};
-pub use parameter::Parameter;
 use parameter::refuse;
+pub use parameter::{Keys, Parameter};
 
 /// Independent parameters, each named by its path in the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,17 +48,29 @@ impl Default for Prior {
     }
 }
 
+impl Parameter {
+    /// A parameter of the words and numbers that a file has of it.
+    ///
+    /// # Errors
+    /// [`SceneError::Prior`] names the parameter and what cannot be.
+    pub fn of_keys(path: &str, distribution: &str, keys: Keys) -> Result<Self, SceneError> {
+        let parameter = Entry::with(path, distribution, keys).into_parameter()?;
+        parameter.check()?;
+        Ok(parameter)
+    }
+}
+
 impl Prior {
     /// A prior of these parameters, in this order.
     ///
     /// # Errors
-    /// [`DatasetError::Prior`] names the parameter and the number that cannot be.
-    pub fn new(parameters: Vec<Parameter>) -> Result<Self, DatasetError> {
+    /// [`SceneError::Prior`] names the parameter and the number that cannot be.
+    pub fn new(parameters: Vec<Parameter>) -> Result<Self, SceneError> {
         if parameters.is_empty() {
             return Err(refuse("", "parameter", "none".to_owned(), "given at least once"));
         }
         for (index, parameter) in parameters.iter().enumerate() {
-            check_distribution(&parameter.path, &parameter.distribution)?;
+            parameter.check()?;
             if parameters[..index].iter().any(|p| plain(&p.path) == plain(&parameter.path)) {
                 let got = "the same path twice".to_owned();
                 return Err(refuse(&parameter.path, "path", got, "given once"));
@@ -70,9 +82,9 @@ impl Prior {
     /// Reads a prior.
     ///
     /// # Errors
-    /// [`DatasetError::PriorToml`] for what is not TOML of a prior (unknown keys included), else as [`Prior::new`].
-    pub fn from_toml(text: &str) -> Result<Self, DatasetError> {
-        let file: File = toml::from_str(text).map_err(|e| DatasetError::PriorToml(Box::new(e)))?;
+    /// [`SceneError::PriorToml`] for what is not TOML of a prior (unknown keys included), else as [`Prior::new`].
+    pub fn from_toml(text: &str) -> Result<Self, SceneError> {
+        let file: File = toml::from_str(text).map_err(|e| SceneError::PriorToml(Box::new(e)))?;
         let parameters = file.parameter.into_iter().map(Entry::into_parameter);
         Self::new(parameters.collect::<Result<_, _>>()?)
     }
@@ -80,23 +92,22 @@ impl Prior {
     /// The prior as TOML; [`Prior::from_toml`] reads it back unchanged.
     ///
     /// # Errors
-    /// [`DatasetError::TomlWrite`] if it cannot be written.
-    pub fn to_toml(&self) -> Result<String, DatasetError> {
+    /// [`SceneError::PriorTomlWrite`] if it cannot be written.
+    pub fn to_toml(&self) -> Result<String, SceneError> {
         let file = File { parameter: self.parameters.iter().map(Entry::of).collect() };
-        toml::to_string(&file)
-            .map_err(|e| DatasetError::TomlWrite { what: "the prior", source: Box::new(e) })
+        toml::to_string(&file).map_err(|e| SceneError::PriorTomlWrite(Box::new(e)))
     }
 
     /// Checks that every parameter has a place in the scene over its whole range.
     ///
     /// # Errors
-    /// [`DatasetError::PriorDoesNotFit`] names the parameter and the value that does not fit.
-    pub fn check(&self, scene: &Scene) -> Result<(), DatasetError> {
+    /// [`SceneError::PriorDoesNotFit`] names the parameter and the value that does not fit.
+    pub fn check(&self, scene: &Scene) -> Result<(), SceneError> {
         for parameter in &self.parameters {
             for value in parameter.distribution.extremes() {
                 scene.with(&parameter.path, value).map_err(|source| {
                     let parameter = parameter.path.clone();
-                    DatasetError::PriorDoesNotFit { parameter, value, source }
+                    SceneError::PriorDoesNotFit { parameter, value, source: Box::new(source) }
                 })?;
             }
         }
@@ -129,11 +140,11 @@ impl Prior {
     /// The scene with these values of the parameters.
     ///
     /// # Errors
-    /// [`DatasetError::Simulation`] if the scene refuses them.
-    pub fn apply(&self, scene: &Scene, values: &[f64]) -> Result<Scene, DatasetError> {
+    /// [`SceneError`] if the scene refuses them.
+    pub fn apply(&self, scene: &Scene, values: &[f64]) -> Result<Scene, SceneError> {
         let changes: Vec<_> = self.names().into_iter().zip(values.iter().copied()).collect();
         let mut scene = scene.clone();
-        scene.set(&changes).map_err(DatasetError::Simulation)?;
+        scene.set(&changes)?;
         Ok(scene)
     }
 }
@@ -141,38 +152,6 @@ impl Prior {
 /// The path without the optional `scene.` in front.
 fn plain(path: &str) -> &str {
     path.strip_prefix("scene.").unwrap_or(path)
-}
-
-fn check_distribution(path: &str, distribution: &Distribution) -> Result<(), DatasetError> {
-    let finite = |what, value: f64| {
-        let refusal = || refuse(path, what, value.to_string(), "finite");
-        if value.is_finite() { Ok(()) } else { Err(refusal()) }
-    };
-    let ordered = |low: f64, high: f64| {
-        let refusal = || refuse(path, "high", format!("low {low} and high {high}"), "above low");
-        if low < high { Ok(()) } else { Err(refusal()) }
-    };
-    match *distribution {
-        Distribution::Uniform { low, high } => {
-            finite("low", low).and(finite("high", high)).and(ordered(low, high))
-        }
-        Distribution::LogUniform { low, high } => {
-            if low <= 0.0 {
-                return Err(refuse(path, "low", low.to_string(), "positive for log_uniform"));
-            }
-            finite("low", low).and(finite("high", high)).and(ordered(low, high))
-        }
-        Distribution::Normal { mean, sd, low, high } => {
-            finite("mean", mean).and(finite("sd", sd))?;
-            if sd <= 0.0 {
-                return Err(refuse(path, "sd", sd.to_string(), "positive"));
-            }
-            low.map_or(Ok(()), |low| finite("low", low))?;
-            high.map_or(Ok(()), |high| finite("high", high))?;
-            low.zip(high).map_or(Ok(()), |(low, high)| ordered(low, high))
-        }
-        Distribution::Fixed { value } => finite("value", value),
-    }
 }
 
 #[cfg(test)]
@@ -237,6 +216,8 @@ mod tests {
             ("\"fixed\"", "\"constant\"", "one of uniform"),
             ("\"material.restitution\"", "\"material.sliding_friction\"", "given once"),
             ("value = 0.4", "value = nan", "finite"),
+            ("low = 0.05", "low = 0.25", "of the normal's mass"),
+            ("\"material.restitution\"", "\"material restitution\"", "words joined by dots"),
         ];
         for (from, to, expected) in cases {
             assert!(TEXT.contains(from), "{from}");

@@ -3,51 +3,26 @@
 //! The same words stand in Rust, in TOML and in Python. Lengths are metres, angles radians, the
 //! ground is the plane z = 0 and gravity points down unless the scene says otherwise.
 
-mod camera;
-mod effects;
-mod grains;
-mod gravity;
-mod mesh;
-mod motion;
-mod observe;
-mod outflow;
-pub(crate) mod path;
-mod periodic;
-mod sensor;
-mod start;
-mod view;
-mod walls;
-
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-pub use camera::{CameraSpec, Mask, Projection};
-pub(crate) use effects::ClumpShape;
-pub use effects::{
-    Adhesion, Capillary, Clump, Effect, Effects, Fluid, FunnelPose, GroundUnlike, Layer,
-    Lubrication, Outlet, Polydispersity, RestitutionSpeed, RollingForm, Tilt, Vibration,
-};
-pub use grains::Grains;
-pub use gravity::GRAVITY;
-use gravity::standard_gravity;
-pub use mesh::{Mesh, MeshFile};
-pub use motion::Motion;
-pub use observe::{
-    Observe, ObserveDischarge, ObserveFront, ObserveImages, ObserveRadius, ObserveSpill,
-    ObserveSurface,
-};
-pub use outflow::Outflow;
-pub use periodic::{Periodic, PeriodicAxis};
-pub use sensor::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
-pub use start::Start;
-pub use view::ViewSpec;
-pub use walls::{BoxSide, Ends, Funnel, Ground, Shape, Wall};
-
+use crate::camera::{CameraSpec, Projection};
 use crate::check::{finite, positive};
-use crate::error::DemError;
+use crate::effects::{Effect, Effects};
+use crate::error::SceneError;
 use crate::grain_shape::Solid;
+use crate::grains::Grains;
+use crate::gravity::standard_gravity;
 use crate::material::Material;
+use crate::mesh::MeshFile;
+use crate::motion::Motion;
+use crate::observe::Observe;
+use crate::outflow::Outflow;
+use crate::periodic::Periodic;
 use crate::preset::Preset;
+use crate::start::Start;
+use crate::view::{ViewSpec, check_views};
+use crate::walls::{Funnel, Ground, Shape, Wall};
 
 /// A whole experiment but for its seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -152,9 +127,9 @@ impl Scene {
     /// Reads and checks a scene.
     ///
     /// # Errors
-    /// [`DemError::Toml`] for what is not TOML of a scene (unknown keys included),
-    /// [`DemError::OutOfRange`] for numbers that no scene can have.
-    pub fn from_toml(text: &str) -> Result<Self, DemError> {
+    /// [`SceneError::Toml`] for what is not TOML of a scene (unknown keys included),
+    /// [`SceneError::OutOfRange`] for numbers that no scene can have.
+    pub fn from_toml(text: &str) -> Result<Self, SceneError> {
         let scene = Self::parse(text)?;
         scene.check()?;
         Ok(scene)
@@ -163,17 +138,17 @@ impl Scene {
     /// Reads a scene whose files are still to be read, and checks nothing else.
     ///
     /// # Errors
-    /// [`DemError::Toml`] for what is not TOML of a scene.
-    pub fn parse(text: &str) -> Result<Self, DemError> {
-        toml::from_str(text).map_err(|e| DemError::Toml(Box::new(e)))
+    /// [`SceneError::Toml`] for what is not TOML of a scene.
+    pub fn parse(text: &str) -> Result<Self, SceneError> {
+        toml::from_str(text).map_err(|e| SceneError::Toml(Box::new(e)))
     }
 
     /// The scene as TOML; [`Scene::from_toml`] reads it back unchanged.
     ///
     /// # Errors
-    /// [`DemError::TomlWrite`] if a number cannot be written.
-    pub fn to_toml(&self) -> Result<String, DemError> {
-        toml::to_string(self).map_err(|e| DemError::TomlWrite(Box::new(e)))
+    /// [`SceneError::TomlWrite`] if a number cannot be written.
+    pub fn to_toml(&self) -> Result<String, SceneError> {
+        toml::to_string(self).map_err(|e| SceneError::TomlWrite(Box::new(e)))
     }
 
     /// The mesh files that walls name.
@@ -191,7 +166,7 @@ impl Scene {
     }
 
     /// Takes over the meshes that another scene has read from the same files.
-    pub(crate) fn take_meshes(&mut self, other: &Self) {
+    pub fn take_meshes(&mut self, other: &Self) {
         for (mine, theirs) in self.walls.iter_mut().zip(&other.walls) {
             if let (Shape::Mesh(mine), Shape::Mesh(theirs)) = (&mut mine.shape, &theirs.shape)
                 && mine.file == theirs.file
@@ -210,7 +185,7 @@ impl Scene {
     }
 
     /// The balls that hold the grains, whichever way they are turned: the grains themselves if they are round.
-    pub(crate) fn held_grains(&self) -> Grains {
+    pub fn held_grains(&self) -> Grains {
         let diameter = match self.grains.solid() {
             Some(solid) => 2.0 * solid.reach,
             None => self.effects.clump.envelope(&self.grains),
@@ -219,26 +194,26 @@ impl Scene {
     }
 
     /// Centres of the grains at time zero `[m]`, one each.
-    pub(crate) fn starting_positions(&self, seed: u64) -> Vec<Vector3<f64>> {
+    pub fn starting_positions(&self, seed: u64) -> Vec<Vector3<f64>> {
         let pose = self.funnel.as_ref().and_then(|funnel| self.effects.funnel.of(funnel));
         self.start.positions(&self.held_grains(), self.funnel.as_ref(), pose.as_ref(), seed)
     }
 
     /// What grains that are not round cannot be with.
-    fn check_clump(&self) -> Result<(), DemError> {
+    fn check_clump(&self) -> Result<(), SceneError> {
         let others = [
             (self.effects.polydispersity.path(), self.effects.polydispersity.is_on()),
             ("outflow", self.outflow.is_some()),
             ("periodic", self.periodic.is_some()),
         ];
         match others.into_iter().find(|(_, is_there)| *is_there && self.effects.clump.is_on()) {
-            Some((other, _)) => Err(DemError::Exclude { one: "effects.clump", other }),
+            Some((other, _)) => Err(SceneError::Exclude { one: "effects.clump", other }),
             None => Ok(()),
         }
     }
 
     /// What convex bodies cannot be with: they have walls, gravity and the plain law.
-    fn check_shape(&self) -> Result<(), DemError> {
+    fn check_shape(&self) -> Result<(), SceneError> {
         let Some(shape) = &self.grains.shape else { return Ok(()) };
         shape.check()?;
         Solid::new(shape, self.grains.diameter)?;
@@ -256,7 +231,7 @@ impl Scene {
             ("preset paper", self.preset == Preset::Paper),
         ];
         match others.into_iter().find(|(_, is_there)| *is_there) {
-            Some((other, _)) => Err(DemError::Exclude { one: "grains.shape", other }),
+            Some((other, _)) => Err(SceneError::Exclude { one: "grains.shape", other }),
             None => Ok(()),
         }
     }
@@ -264,8 +239,8 @@ impl Scene {
     /// Checks every number of the scene.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`] or [`DemError::StartTooSmall`].
-    pub fn check(&self) -> Result<(), DemError> {
+    /// [`SceneError::OutOfRange`] or [`SceneError::StartTooSmall`].
+    pub fn check(&self) -> Result<(), SceneError> {
         self.material.check("material")?;
         positive("grains.diameter", self.grains.diameter)?;
         positive("grains.density", self.grains.density)?;
@@ -302,7 +277,7 @@ impl Scene {
         if let Some(observe) = &self.observe {
             observe.check(self.end.horizon, self.grains.diameter)?;
         }
-        view::check_views(&self.views)?;
+        check_views(&self.views)?;
         self.camera.check()
     }
 }

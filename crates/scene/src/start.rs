@@ -6,9 +6,10 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use super::{Funnel, Grains};
 use crate::check::{finite, non_negative, positive};
-use crate::error::DemError;
+use crate::error::SceneError;
+use crate::grains::Grains;
+use crate::walls::Funnel;
 
 /// Most places of a lattice of which the lowest are taken.
 const MOST_PLACES: f64 = 1e8;
@@ -61,7 +62,7 @@ pub enum Start {
 }
 
 impl Start {
-    pub(super) fn check(&self, grains: &Grains) -> Result<(), DemError> {
+    pub(crate) fn check(&self, grains: &Grains) -> Result<(), SceneError> {
         match self {
             &Self::Grid { counts, spacing, jitter, base } => {
                 finite("start.base", base)?;
@@ -71,14 +72,14 @@ impl Start {
                     counts.iter().fold(1, |all: usize, &count| all.saturating_mul(count));
                 if grains.count > capacity {
                     let count = grains.count;
-                    return Err(DemError::StartTooSmall { kind: "grid", capacity, count });
+                    return Err(SceneError::StartTooSmall { kind: "grid", capacity, count });
                 }
             }
             &Self::Ball { height, solid_fraction, jitter } => {
                 non_negative("start.height", height)?;
                 if !(solid_fraction > 0.0 && solid_fraction <= CLOSEST_PACKING) {
                     let allowed = "in (0, 0.7404]";
-                    return Err(DemError::range("start.solid_fraction", solid_fraction, allowed));
+                    return Err(SceneError::range("start.solid_fraction", solid_fraction, allowed));
                 }
                 jitter_fits(
                     jitter,
@@ -99,18 +100,18 @@ impl Start {
                     let name = "start (places of the lattice in the cylinder)";
                     let allowed =
                         "at most 1e8: a smaller cylinder, or a wider spacing, holds as many grains";
-                    return Err(DemError::range(name, places, allowed));
+                    return Err(SceneError::range(name, places, allowed));
                 }
                 let capacity = cylinder(grains, from, to, radius, spacing, jitter).len();
                 if grains.count > capacity {
                     let count = grains.count;
-                    return Err(DemError::StartTooSmall { kind: "cylinder", capacity, count });
+                    return Err(SceneError::StartTooSmall { kind: "cylinder", capacity, count });
                 }
             }
             Self::Positions { positions } => {
                 let (got, expected) = (positions.len(), grains.count);
                 if got != expected {
-                    return Err(DemError::Length { name: "start.positions", got, expected });
+                    return Err(SceneError::Length { name: "start.positions", got, expected });
                 }
                 for (grain, position) in positions.iter().enumerate() {
                     for (axis, &value) in ["x", "y", "z"].iter().zip(position) {
@@ -124,7 +125,7 @@ impl Start {
 
     /// Centres of the grains `[m]`, one each. `grains` are the balls that hold them, `pose` is where the funnel hangs beside
     /// its place.
-    pub(super) fn positions(
+    pub(crate) fn positions(
         &self,
         grains: &Grains,
         funnel: Option<&Funnel>,
@@ -167,12 +168,12 @@ impl Start {
 }
 
 /// Two neighbours may move towards each other by `jitter` along every axis, so twice its length must fit the gap.
-fn jitter_fits(jitter: f64, gap: f64) -> Result<(), DemError> {
+fn jitter_fits(jitter: f64, gap: f64) -> Result<(), SceneError> {
     non_negative("start.jitter", jitter)?;
     if 2.0 * jitter * 3f64.sqrt() <= gap + 1e-12 {
         return Ok(());
     }
-    Err(DemError::range("start.jitter", jitter, "small enough that no two grains overlap"))
+    Err(SceneError::range("start.jitter", jitter, "small enough that no two grains overlap"))
 }
 
 fn lattice_spacing(diameter: f64, solid_fraction: f64) -> f64 {
@@ -317,7 +318,7 @@ mod tests {
             assert!(highest < 0.6 * (0.05 + 0.03), "{highest}");
             scene.grains.count = 10_000;
             let error = scene.check().unwrap_err();
-            assert!(matches!(error, DemError::StartTooSmall { kind: "cylinder", .. }), "{error}");
+            assert!(matches!(error, SceneError::StartTooSmall { kind: "cylinder", .. }), "{error}");
         }
     }
 
@@ -348,7 +349,7 @@ mod tests {
         scene.grains.count = 2;
         scene.start = Start::Positions { positions: vec![[0.0; 3]] };
         let error = scene.check().unwrap_err();
-        assert!(matches!(error, DemError::Length { got: 1, expected: 2, .. }), "{error}");
+        assert!(matches!(error, SceneError::Length { got: 1, expected: 2, .. }), "{error}");
         scene.start = Start::Positions { positions: vec![[0.0; 3], [0.0, f64::NAN, 0.0]] };
         assert!(scene.check().unwrap_err().to_string().contains("start.positions.1.y"));
     }
@@ -357,7 +358,7 @@ mod tests {
     fn too_many_grains_or_too_much_jitter_is_refused() {
         let mut scene = Scene::funnel(0.12);
         scene.grains.count = 2001;
-        assert!(matches!(scene.check(), Err(DemError::StartTooSmall { capacity: 2000, .. })));
+        assert!(matches!(scene.check(), Err(SceneError::StartTooSmall { capacity: 2000, .. })));
         let scene = Scene::drop(0.1).with("start.jitter", 1e-3);
         assert!(scene.unwrap_err().to_string().contains("start.jitter"));
     }

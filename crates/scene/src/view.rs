@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::check::{finite, positive};
-use crate::error::DemError;
+use crate::camera::{IN_LENGTHS, LENGTHS};
+use crate::check::{finite, within};
+use crate::error::SceneError;
 
 /// A depth camera at rest anywhere, that looks at a point. Its image is without noise, and no statistics are taken of it.
 ///
@@ -42,16 +43,17 @@ impl ViewSpec {
         self.eye.iter().zip(self.target).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
     }
 
-    fn check(&self, path: &str) -> Result<(), DemError> {
+    fn check(&self, path: &str) -> Result<(), SceneError> {
         for &value in self.eye.iter().chain(&self.target) {
             finite(&format!("{path}.eye, target"), value)?;
         }
-        positive(&format!("{path}.field_width"), self.field_width)?;
-        positive(&format!("{path}: way from eye to target"), self.distance())?;
+        within(&format!("{path}.field_width"), self.field_width, LENGTHS, IN_LENGTHS)?;
+        let way = format!("{path}: way from eye to target");
+        within(&way, self.distance(), LENGTHS, IN_LENGTHS)?;
         for pixels in self.pixels {
             if pixels == 0 || pixels > 16_384 {
                 let name = format!("{path}.pixels");
-                return Err(DemError::range(&name, pixels as f64, "in 1..=16384"));
+                return Err(SceneError::range(&name, pixels as f64, "in 1..=16384"));
             }
         }
         Ok(())
@@ -59,12 +61,12 @@ impl ViewSpec {
 }
 
 /// Checks every view, and that no two have one name.
-pub(super) fn check_views(views: &[ViewSpec]) -> Result<(), DemError> {
+pub(crate) fn check_views(views: &[ViewSpec]) -> Result<(), SceneError> {
     let mut names = BTreeSet::new();
     for (index, view) in views.iter().enumerate() {
         if !view.is_named() || !names.insert(&view.name) {
             let path = format!("views.{index}.name");
-            return Err(DemError::ViewName { path, got: view.name.clone() });
+            return Err(SceneError::ViewName { path, got: view.name.clone() });
         }
         view.check(&format!("views.{index}"))?;
     }

@@ -3,10 +3,12 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::{Grains, MeshFile, Motion};
 use crate::check::{finite, positive};
-use crate::error::DemError;
+use crate::error::SceneError;
+use crate::grains::Grains;
 use crate::material::{Material, WallMaterial};
+use crate::mesh::MeshFile;
+use crate::motion::Motion;
 
 /// The plane z = 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -23,7 +25,7 @@ impl Ground {
         self.material.is_empty()
     }
 
-    pub(super) fn check(&self, grains: &Material) -> Result<(), DemError> {
+    pub(crate) fn check(&self, grains: &Material) -> Result<(), SceneError> {
         self.material.over(grains).check("ground.material")
     }
 }
@@ -111,17 +113,17 @@ impl Funnel {
         rise > 0.0 && centre.x.hypot(centre.y) < radius
     }
 
-    pub(super) fn check(&self, grains: &Material, radius: f64) -> Result<(), DemError> {
+    pub(crate) fn check(&self, grains: &Material, radius: f64) -> Result<(), SceneError> {
         positive("funnel.height", self.height)?;
         positive("funnel.cone_length", self.cone_length)?;
         positive("funnel.stem_length", self.stem_length)?;
         if !(self.stem_radius > radius && self.stem_radius.is_finite()) {
             let allowed = "larger than a grain's radius";
-            return Err(DemError::range("funnel.stem_radius", self.stem_radius, allowed));
+            return Err(SceneError::range("funnel.stem_radius", self.stem_radius, allowed));
         }
         if !(self.rim_radius >= self.stem_radius && self.rim_radius.is_finite()) {
             let allowed = "at least funnel.stem_radius";
-            return Err(DemError::range("funnel.rim_radius", self.rim_radius, allowed));
+            return Err(SceneError::range("funnel.rim_radius", self.rim_radius, allowed));
         }
         self.motion.check("funnel")?;
         self.material.over(grains).check("funnel.material")
@@ -198,7 +200,7 @@ impl BoxSide {
         [Self::XMin, Self::XMax, Self::YMin, Self::YMax, Self::ZMin, Self::ZMax];
 
     /// Its two triangles; bit 0 of a corner's number says whether it is at the largest x, bit 1 y, bit 2 z.
-    pub(crate) fn triangles(self) -> [[u32; 3]; 2] {
+    pub fn triangles(self) -> [[u32; 3]; 2] {
         let [a, b, c, d] = match self {
             Self::XMin => [0, 4, 6, 2],
             Self::XMax => [1, 3, 7, 5],
@@ -277,16 +279,16 @@ impl Wall {
         Self { shape, material, motion: Motion::Still }
     }
 
-    fn check_numbers(name: &str, field: &str, values: [f64; 3]) -> Result<(), DemError> {
+    fn check_numbers(name: &str, field: &str, values: [f64; 3]) -> Result<(), SceneError> {
         values.iter().try_for_each(|&value| finite(&format!("{name}.shape.{field}"), value))
     }
 
-    pub(super) fn check(
+    pub(crate) fn check(
         &self,
         name: &str,
         material: &Material,
         grains: &Grains,
-    ) -> Result<(), DemError> {
+    ) -> Result<(), SceneError> {
         match self.shape.clone() {
             Shape::Plane { point, normal } => {
                 Self::check_numbers(name, "point", point)?;
@@ -325,7 +327,7 @@ impl Wall {
         self.material.over(material).check(&format!("{name}.material"))
     }
 
-    fn check_axis(name: &str, from: [f64; 3], to: [f64; 3]) -> Result<(), DemError> {
+    fn check_axis(name: &str, from: [f64; 3], to: [f64; 3]) -> Result<(), SceneError> {
         Self::check_numbers(name, "from", from)?;
         Self::check_numbers(name, "to", to)?;
         let length = from.iter().zip(to).map(|(a, b)| (b - a) * (b - a)).sum::<f64>().sqrt();

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::effect::Effect;
 use super::tension::either;
 use crate::check::{non_negative, positive};
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// Dry adhesion; prior of `bond`: log-uniform over 0.003 to 0.3.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,7 +40,7 @@ impl Effect for Adhesion {
         "effects.adhesion"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         non_negative("effects.adhesion.bond", self.bond)?;
         either("effects.adhesion.tension", self.tension, self.bond)?;
         positive("effects.adhesion.range", self.range)?;
@@ -54,13 +54,13 @@ impl Effect for Adhesion {
 
 impl Adhesion {
     /// Pull of two touching grains of a `radius` and a `mass` over that mass, at a gravity of `g` `[m/s^2]`.
-    pub(crate) fn touch(&self, radius: f64, mass: f64, g: f64) -> f64 {
+    pub fn touch(&self, radius: f64, mass: f64, g: f64) -> f64 {
         // JKR's pull-off, 3 pi gamma R_eff with R_eff = r / 2 of equal grains.
         self.bond * g + 1.5 * PI * self.tension * radius / mass
     }
 
     /// Pull over that of touching typical grains `[-]`; lengths in radii of a typical grain.
-    pub(crate) fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
+    pub fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
         if gap <= self.range { derjaguin } else { 0.0 }
     }
 }

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use super::effect::Effect;
 use super::tension::either;
 use crate::check::{non_negative, positive};
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// Liquid bridges; prior of `bond`: log-uniform over 0.03 to 3.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,13 +48,13 @@ impl Effect for Capillary {
         "effects.capillary"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         non_negative("effects.capillary.bond", self.bond)?;
         either("effects.capillary.tension", self.tension, self.bond)?;
         positive("effects.capillary.volume", self.volume)?;
         if !(0.0..std::f64::consts::FRAC_PI_2).contains(&self.contact_angle) {
             let allowed = "in [0, pi/2)";
-            return Err(DemError::range(
+            return Err(SceneError::range(
                 "effects.capillary.contact_angle",
                 self.contact_angle,
                 allowed,
@@ -70,17 +70,17 @@ impl Effect for Capillary {
 
 impl Capillary {
     /// Pull of two touching grains of a `radius` and a `mass` over that mass, at a gravity of `g` `[m/s^2]`.
-    pub(crate) fn touch(&self, radius: f64, mass: f64, g: f64) -> f64 {
+    pub fn touch(&self, radius: f64, mass: f64, g: f64) -> f64 {
         self.bond * g + TAU * radius * self.tension * self.contact_angle.cos() / mass
     }
 
     /// Separation at which a bridge ruptures, in radii of a typical grain `[-]`.
-    pub(crate) fn rupture(&self) -> f64 {
+    pub fn rupture(&self) -> f64 {
         (1.0 + 0.5 * self.contact_angle) * self.volume.cbrt()
     }
 
     /// Pull of a bridge over that of touching typical grains `[-]`: `gap` and `derjaguin` (R) in radii of a typical grain.
-    pub(crate) fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
+    pub fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
         let s = gap.max(0.0) * (derjaguin / self.volume).sqrt();
         derjaguin / (1.0 + 1.05 * s + 2.5 * s * s)
     }

@@ -14,8 +14,8 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
-use crate::error::DemError;
-use crate::scene::Grains;
+use crate::error::SceneError;
+use crate::grains::Grains;
 
 /// The shape of every grain.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -35,7 +35,7 @@ impl Default for Clump {
 
 /// A shape of a size.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct ClumpShape {
+pub struct ClumpShape {
     /// Radius of each sphere `[m]`.
     pub radius: f64,
     /// Centres of the spheres from the middle, along the body's x axis `[m]`.
@@ -49,14 +49,14 @@ impl Effect for Clump {
         "effects.clump"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         if !(2..=4).contains(&self.spheres) {
             let got = self.spheres as f64;
-            return Err(DemError::range("effects.clump.spheres", got, "2, 3 or 4"));
+            return Err(SceneError::range("effects.clump.spheres", got, "2, 3 or 4"));
         }
         if !(1.0..=self.spheres as f64).contains(&self.aspect) {
             let allowed = "from 1 to effects.clump.spheres";
-            return Err(DemError::range("effects.clump.aspect", self.aspect, allowed));
+            return Err(SceneError::range("effects.clump.aspect", self.aspect, allowed));
         }
         Ok(())
     }
@@ -72,17 +72,17 @@ impl Effect for Clump {
 
 impl Clump {
     /// Spheres that a grain of the scene is made of.
-    pub(crate) fn members(&self) -> usize {
+    pub fn members(&self) -> usize {
         if self.is_on() { self.spheres } else { 1 }
     }
 
     /// The diameter of the ball that holds a grain, whichever way it is turned `[m]`.
-    pub(crate) fn envelope(&self, grains: &Grains) -> f64 {
+    pub fn envelope(&self, grains: &Grains) -> f64 {
         if self.is_on() { 2.0 * self.aspect * self.shape(grains).radius } else { grains.diameter }
     }
 
     /// Radius, places and inertia of the spheres.
-    pub(crate) fn shape(&self, grains: &Grains) -> ClumpShape {
+    pub fn shape(&self, grains: &Grains) -> ClumpShape {
         let spacing = 2.0 * (self.aspect - 1.0) / (self.spheres as f64 - 1.0);
         let middle = 0.5 * (self.spheres as f64 - 1.0);
         let centres: Vec<f64> = (0..self.spheres).map(|i| spacing * (i as f64 - middle)).collect();

@@ -1,6 +1,6 @@
 //! What every effect can be asked.
 
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// One effect, as all of them are walked over: see [`Effects::all`](super::Effects::all).
 pub trait Effect {
@@ -10,8 +10,8 @@ pub trait Effect {
     /// Checks every number.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`] names the number by its path.
-    fn check(&self) -> Result<(), DemError>;
+    /// [`SceneError::OutOfRange`] names the number by its path.
+    fn check(&self) -> Result<(), SceneError>;
 
     /// Whether it does anything. One that is off changes no bit of a pour.
     fn is_on(&self) -> bool;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
 use crate::check::non_negative;
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// A fluid; known, or a prior of its viscosity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,7 +42,7 @@ impl Effect for Fluid {
         "effects.fluid"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         non_negative("effects.fluid.density", self.density)?;
         non_negative("effects.fluid.viscosity", self.viscosity)?;
         non_negative("effects.fluid.added_mass", self.added_mass)?;
@@ -52,7 +52,7 @@ impl Effect for Fluid {
             ("effects.fluid.saturated", self.saturated),
         ] {
             if !(0.0..=1.0).contains(&got) {
-                return Err(DemError::range(name, got, "in [0, 1]"));
+                return Err(SceneError::range(name, got, "in [0, 1]"));
             }
         }
         Ok(())

@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
 use crate::check::{finite, non_negative};
-use crate::error::DemError;
+use crate::error::SceneError;
 use crate::material::Material;
-use crate::scene::{Funnel, Shape, Wall};
+use crate::walls::{Funnel, Shape, Wall};
 
 /// Steepest lean `[rad]`.
 const STEEPEST: f64 = 0.8;
@@ -44,7 +44,7 @@ impl Effect for FunnelPose {
         "effects.funnel"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         finite("effects.funnel.x", self.x)?;
         finite("effects.funnel.y", self.y)?;
         non_negative("effects.funnel.sliding_friction", self.sliding_friction)?;
@@ -52,7 +52,7 @@ impl Effect for FunnelPose {
             [("effects.funnel.lean_x", self.lean_x), ("effects.funnel.lean_y", self.lean_y)]
         {
             if !(-STEEPEST..=STEEPEST).contains(&got) {
-                return Err(DemError::range(name, got, "in [-0.8, 0.8]"));
+                return Err(SceneError::range(name, got, "in [-0.8, 0.8]"));
             }
         }
         Ok(())
@@ -65,7 +65,7 @@ impl Effect for FunnelPose {
 
 impl FunnelPose {
     /// From the funnel's place to where it hangs; `None` if that is the same.
-    pub(crate) fn of(&self, funnel: &Funnel) -> Option<Isometry3<f64>> {
+    pub fn of(&self, funnel: &Funnel) -> Option<Isometry3<f64>> {
         if [self.x, self.y, self.lean_x, self.lean_y] == [0.0; 4] {
             return None;
         }
@@ -76,12 +76,12 @@ impl FunnelPose {
     }
 
     /// The funnel's material of what it would be without the effect.
-    pub(crate) fn rubbed(&self, plain: Material) -> Material {
+    pub fn rubbed(&self, plain: Material) -> Material {
         Material { sliding_friction: self.sliding_friction * plain.sliding_friction, ..plain }
     }
 
     /// The funnel's walls where it hangs.
-    pub(crate) fn walls(&self, funnel: &Funnel) -> [Wall; 2] {
+    pub fn walls(&self, funnel: &Funnel) -> [Wall; 2] {
         let mut walls = funnel.walls();
         if let Some(pose) = self.of(funnel) {
             for wall in &mut walls {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
 use crate::check::non_negative;
-use crate::error::DemError;
+use crate::error::SceneError;
 use crate::material::Material;
 
 /// Ratios of the ground's coefficients to those it would have `[-]`.
@@ -35,7 +35,7 @@ impl Effect for GroundUnlike {
         "effects.ground"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         non_negative("effects.ground.sliding_friction", self.sliding_friction)?;
         non_negative("effects.ground.rolling_friction", self.rolling_friction)?;
         non_negative("effects.ground.restitution", self.restitution)
@@ -48,7 +48,7 @@ impl Effect for GroundUnlike {
 
 impl GroundUnlike {
     /// The ground's material of what it would be without the effect.
-    pub(crate) fn of(&self, plain: Material) -> Material {
+    pub fn of(&self, plain: Material) -> Material {
         Material {
             sliding_friction: self.sliding_friction * plain.sliding_friction,
             rolling_friction: self.rolling_friction * plain.rolling_friction,

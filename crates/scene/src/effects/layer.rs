@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
 use crate::check::{non_negative, positive};
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// The layer's surface is the plane z = 0, the hard ground lies `thickness` below.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,7 +32,7 @@ impl Effect for Layer {
         "effects.layer"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         non_negative("effects.layer.thickness", self.thickness)?;
         positive("effects.layer.stiffness", self.stiffness)?;
         non_negative("effects.layer.damping", self.damping)

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
 use crate::check::{non_negative, positive};
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// A fluid film between surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,7 +43,7 @@ impl Effect for Lubrication {
         "effects.lubrication"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         non_negative("effects.lubrication.viscosity", self.viscosity)?;
         positive("effects.lubrication.roughness", self.roughness)?;
         positive("effects.lubrication.range", self.range)

@@ -10,8 +10,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
-use crate::error::DemError;
-use crate::scene::Funnel;
+use crate::error::SceneError;
+use crate::walls::Funnel;
 
 /// Facets around the axis. A chord of 48 is 0.2 % of the radius off the circle.
 const AROUND: u32 = 48;
@@ -29,7 +29,7 @@ pub struct Outlet {
 
 /// A funnel of flat facets.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct OutletMesh {
+pub struct OutletMesh {
     /// `[m]`
     pub vertices: Vec<Vector3<f64>>,
     /// Each three of the vertices.
@@ -47,11 +47,11 @@ impl Effect for Outlet {
         "effects.outlet"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         if (1.0..=LONGEST).contains(&self.aspect) {
             return Ok(());
         }
-        Err(DemError::range("effects.outlet.aspect", self.aspect, "in [1, 3]"))
+        Err(SceneError::range("effects.outlet.aspect", self.aspect, "in [1, 3]"))
     }
 
     fn is_on(&self) -> bool {
@@ -61,7 +61,7 @@ impl Effect for Outlet {
 
 impl Outlet {
     /// The funnel if its outlet is not round, turned and moved by `pose`; `None` if it is.
-    pub(crate) fn mesh(self, funnel: &Funnel, pose: Option<&Isometry3<f64>>) -> Option<OutletMesh> {
+    pub fn mesh(self, funnel: &Funnel, pose: Option<&Isometry3<f64>>) -> Option<OutletMesh> {
         if self.aspect == 1.0 {
             return None;
         }

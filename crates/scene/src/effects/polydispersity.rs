@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
 use crate::check::{non_negative, positive};
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// Farthest z of a grain `[-]`.
 const CUT: f64 = 2.5;
@@ -34,14 +34,14 @@ impl Effect for Polydispersity {
         "effects.polydispersity"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         non_negative("effects.polydispersity.cv", self.cv)?;
         for (number, &diameter) in self.diameters.iter().enumerate() {
             positive(&format!("effects.polydispersity.diameters.{number}"), diameter)?;
         }
         if self.cv > 0.0 && !self.diameters.is_empty() {
             let allowed = "0 where diameters are listed";
-            return Err(DemError::range("effects.polydispersity.cv", self.cv, allowed));
+            return Err(SceneError::range("effects.polydispersity.cv", self.cv, allowed));
         }
         Ok(())
     }
@@ -53,7 +53,7 @@ impl Effect for Polydispersity {
 
 impl Polydispersity {
     /// Radii of `count` grains of typical radius `radius` `[m]`; `None` when they are all alike.
-    pub(crate) fn radii(&self, count: usize, radius: f64, seed: u64) -> Option<Vec<f64>> {
+    pub fn radii(&self, count: usize, radius: f64, seed: u64) -> Option<Vec<f64>> {
         let mut random = Pcg64::seed_from_u64(seed ^ STREAM);
         let mut uniform = move || half_open(random.next_u64());
         if !self.diameters.is_empty() {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
 use crate::check::{finite, positive};
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// Restitution and speed; prior of `exponent`: uniform over -0.1 to 0.25.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,7 +31,7 @@ impl Effect for RestitutionSpeed {
         "effects.restitution_speed"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         finite("effects.restitution_speed.exponent", self.exponent)?;
         positive("effects.restitution_speed.reference", self.reference)
     }
@@ -43,7 +43,7 @@ impl Effect for RestitutionSpeed {
 
 impl RestitutionSpeed {
     /// The restitution of an impact at `speed` `[m/s]`.
-    pub(crate) fn at(&self, restitution: f64, speed: f64) -> f64 {
+    pub fn at(&self, restitution: f64, speed: f64) -> f64 {
         (restitution * (speed / self.reference).powf(-self.exponent)).min(1.0)
     }
 }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
 use crate::check::non_negative;
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// The speed that tells the forms apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -27,7 +27,7 @@ impl Effect for RollingForm {
         "effects.rolling_form"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         non_negative("effects.rolling_form.speed", self.speed)
     }
 

@@ -74,7 +74,7 @@ fn an_effect_that_changes_contacts_is_refused_by_the_methods_that_do_not_know_it
         scene.preset = Preset::Paper;
         let refused = matches!(
             scene.check(),
-            Err(DemError::EffectNeedsMethod { effect: named, got: "newton_pcr" }) if named == effect.path()
+            Err(SceneError::EffectNeedsMethod { effect: named, got: "newton_pcr" }) if named == effect.path()
         );
         assert_eq!(refused, effect.changes_contacts(), "{path}");
     }

@@ -7,7 +7,7 @@ use nalgebra::{Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// Steepest tilt `[rad]`: beyond it the words "table" and "ground" lose their sense.
 const STEEPEST: f64 = 0.8;
@@ -27,10 +27,10 @@ impl Effect for Tilt {
         "effects.tilt"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         for (name, got) in [("effects.tilt.x", self.x), ("effects.tilt.y", self.y)] {
             if !(-STEEPEST..=STEEPEST).contains(&got) {
-                return Err(DemError::range(name, got, "in [-0.8, 0.8]"));
+                return Err(SceneError::range(name, got, "in [-0.8, 0.8]"));
             }
         }
         Ok(())
@@ -43,7 +43,7 @@ impl Effect for Tilt {
 
 impl Tilt {
     /// Gravity as it is seen from the table.
-    pub(crate) fn turn(&self, gravity: &Vector3<f64>) -> Vector3<f64> {
+    pub fn turn(&self, gravity: &Vector3<f64>) -> Vector3<f64> {
         let axis = Vector3::new(self.x, self.y, 0.0);
         Rotation3::new(axis).inverse() * gravity
     }

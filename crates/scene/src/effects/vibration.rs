@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::effect::Effect;
 use crate::check::{non_negative, positive};
-use crate::error::DemError;
-use crate::scene::GRAVITY;
+use crate::error::SceneError;
+use crate::gravity::GRAVITY;
 
 /// A shaking table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,7 +36,7 @@ impl Effect for Vibration {
         "effects.vibration"
     }
 
-    fn check(&self) -> Result<(), DemError> {
+    fn check(&self) -> Result<(), SceneError> {
         non_negative("effects.vibration.acceleration", self.acceleration)?;
         positive("effects.vibration.frequency", self.frequency)?;
         non_negative("effects.vibration.begin", self.begin)?;
@@ -55,7 +55,7 @@ impl Vibration {
     }
 
     /// What is added to the vertical component of gravity `[m/s^2]`.
-    pub(crate) fn acceleration_at(&self, time: f64) -> f64 {
+    pub fn acceleration_at(&self, time: f64) -> f64 {
         let since = time - self.begin;
         if (0.0..self.duration).contains(&since) {
             self.acceleration * GRAVITY * (TAU * self.frequency * since).sin()

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// How the contact problem of a substep is solved. All methods solve the same problem.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -41,13 +41,13 @@ impl fmt::Display for Method {
 }
 
 impl FromStr for Method {
-    type Err = DemError;
+    type Err = SceneError;
 
-    fn from_str(word: &str) -> Result<Self, DemError> {
+    fn from_str(word: &str) -> Result<Self, SceneError> {
         Self::ALL
             .into_iter()
             .find(|method| method.name() == word)
-            .ok_or_else(|| DemError::UnknownMethod { got: word.to_owned() })
+            .ok_or_else(|| SceneError::UnknownMethod { got: word.to_owned() })
     }
 }
 

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::parameter::{Parameter, refuse};
-use crate::{DatasetError, Distribution};
+use super::parameter::{Keys, Parameter, refuse};
+use crate::distribution::Distribution;
+use crate::error::SceneError;
 
 /// A prior as it stands in a file.
 #[derive(Deserialize, Serialize)]
@@ -31,6 +32,19 @@ pub(super) struct Entry {
 }
 
 impl Entry {
+    pub(super) fn with(path: &str, distribution: &str, keys: Keys) -> Self {
+        let Keys { low, high, mean, sd, value } = keys;
+        Self {
+            path: path.to_owned(),
+            distribution: distribution.to_owned(),
+            low,
+            high,
+            mean,
+            sd,
+            value,
+        }
+    }
+
     pub(super) fn of(parameter: &Parameter) -> Self {
         let mut entry = Self {
             path: parameter.path.clone(),
@@ -50,7 +64,7 @@ impl Entry {
         entry
     }
 
-    pub(super) fn into_parameter(mut self) -> Result<Parameter, DatasetError> {
+    pub(super) fn into_parameter(mut self) -> Result<Parameter, SceneError> {
         let distribution = match self.distribution.as_str() {
             "uniform" => Distribution::Uniform { low: self.low()?, high: self.high()? },
             "log_uniform" => Distribution::LogUniform { low: self.low()?, high: self.high()? },
@@ -81,11 +95,11 @@ impl Entry {
         Ok(Parameter { path: self.path, distribution })
     }
 
-    fn low(&mut self) -> Result<f64, DatasetError> {
+    fn low(&mut self) -> Result<f64, SceneError> {
         self.needs("low", |entry| entry.low.take())
     }
 
-    fn high(&mut self) -> Result<f64, DatasetError> {
+    fn high(&mut self) -> Result<f64, SceneError> {
         self.needs("high", |entry| entry.high.take())
     }
 
@@ -93,7 +107,7 @@ impl Entry {
         &mut self,
         key: &'static str,
         take: fn(&mut Self) -> Option<f64>,
-    ) -> Result<f64, DatasetError> {
+    ) -> Result<f64, SceneError> {
         let allowed = "given for this distribution";
         take(self).ok_or_else(|| {
             refuse(&self.path, key, format!("none for {}", self.distribution), allowed)

@@ -1,5 +1,7 @@
 //! Images whose errors have a closed form.
 
+use granulcal_scene::{NoiseField, SceneError, StereoSensor, TimeOfFlightSensor};
+
 use super::*;
 use crate::camera::{Camera, Intrinsics};
 use crate::depth::DepthImage;
@@ -206,5 +208,5 @@ fn sensors_are_read_strictly() {
         assert!(serde_json::from_str::<DepthSensor>(&wrong).is_err());
     }
     let negative = DepthSensor::Stereo(StereoSensor::new(-1.0, 0.05));
-    assert!(matches!(negative.require_valid(), Err(FeatureError::OutOfRange { .. })));
+    assert!(matches!(negative.check("sensor"), Err(SceneError::OutOfRange { .. })));
 }

@@ -6,8 +6,8 @@ mod solid;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::error::DemError;
-pub(crate) use solid::{Solid, parry};
+use crate::error::SceneError;
+pub use solid::{Solid, parry};
 
 /// Largest ratio of the longest to the shortest extent `[-]`.
 const MOST_ASPECT: f64 = 10.0;
@@ -51,8 +51,8 @@ impl GrainShape {
     /// Refuses what is no body, by name.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`] for a number, [`DemError::BadShape`] for points without a volume.
-    pub fn check(&self) -> Result<(), DemError> {
+    /// [`SceneError::OutOfRange`] for a number, [`SceneError::BadShape`] for points without a volume.
+    pub fn check(&self) -> Result<(), SceneError> {
         match self {
             Self::Box { aspect } => aspects("grains.shape.aspect", aspect),
             Self::Cylinder { aspect } => aspects("grains.shape.aspect", &[*aspect, 1.0]),
@@ -62,7 +62,7 @@ impl GrainShape {
                 match exponents.iter().find(|e| !(least..=most).contains(*e)) {
                     Some(&got) => {
                         let name = "grains.shape.exponents";
-                        Err(DemError::range(name, got, "from 1.2 to 20"))
+                        Err(SceneError::range(name, got, "from 1.2 to 20"))
                     }
                     None => Ok(()),
                 }
@@ -86,30 +86,30 @@ impl GrainShape {
     }
 }
 
-fn aspects(name: &str, aspect: &[f64]) -> Result<(), DemError> {
+fn aspects(name: &str, aspect: &[f64]) -> Result<(), SceneError> {
     let allowed = "positive, the longest at most 10 times the shortest, and at most 10 diameters";
     let (least, most) = aspect.iter().fold((f64::MAX, 0.0_f64), |(l, m), &a| (l.min(a), m.max(a)));
     match aspect.iter().find(|a| !(**a > 0.0 && a.is_finite())) {
-        Some(&got) => Err(DemError::range(name, got, allowed)),
+        Some(&got) => Err(SceneError::range(name, got, allowed)),
         None if most > MOST_ASPECT * least || most > MOST_ASPECT => {
-            Err(DemError::range(name, most / least.min(1.0), allowed))
+            Err(SceneError::range(name, most / least.min(1.0), allowed))
         }
         None => Ok(()),
     }
 }
 
-fn check_points(points: &[[f64; 3]]) -> Result<(), DemError> {
+fn check_points(points: &[[f64; 3]]) -> Result<(), SceneError> {
     let name = "grains.shape.points";
     if !(4..=MOST_POINTS).contains(&points.len()) {
-        return Err(DemError::range(name, points.len() as f64, "4 to 200 points"));
+        return Err(SceneError::range(name, points.len() as f64, "4 to 200 points"));
     }
     if let Some(&got) = points.iter().flatten().find(|c| !c.is_finite()) {
-        return Err(DemError::range(name, got, "finite"));
+        return Err(SceneError::range(name, got, "finite"));
     }
     let extent = extents(points);
     let most = extent.max();
     if most.is_nan() || most <= 0.0 {
-        return Err(DemError::BadShape { what: "all its points are one" });
+        return Err(SceneError::BadShape { what: "all its points are one" });
     }
     // A thin body that is turned against the axes is thin all the same: its inertia tells.
     let middle =
@@ -127,7 +127,7 @@ fn check_points(points: &[[f64; 3]]) -> Result<(), DemError> {
         } else {
             "no volume: its points lie in a plane"
         };
-        return Err(DemError::BadShape { what });
+        return Err(SceneError::BadShape { what });
     }
     Ok(())
 }

@@ -18,14 +18,14 @@ use parry3d_f64::shape::{ConvexPolyhedron, Cuboid, Cylinder, SharedShape};
 use parry3d_f64::transformation::try_convex_hull;
 
 use super::GrainShape;
-use crate::error::DemError;
+use crate::error::SceneError;
 
 /// Faces nearer than this to one plane are one face, as the scalar product of their unit normals `[-]`.
 const SAME_PLANE: f64 = 1.0 - 1e-9;
 
 /// A convex body in its principal axes, about its centre of mass.
 #[derive(Clone)]
-pub(crate) struct Solid {
+pub struct Solid {
     /// Corners `[m]`; of a cylinder none.
     pub corners: Vec<Vector3<f64>>,
     /// Outward unit normals and distances from the centre of its faces `[m]`; of a cylinder its two ends.
@@ -57,7 +57,7 @@ impl Solid {
     ///
     /// # Errors
     /// What [`GrainShape::check`] says.
-    pub fn new(shape: &GrainShape, diameter: f64) -> Result<Arc<Self>, DemError> {
+    pub fn new(shape: &GrainShape, diameter: f64) -> Result<Arc<Self>, SceneError> {
         shape.check()?;
         Ok(Arc::new(match shape {
             GrainShape::Box { aspect } => Self::cuboid(diameter * Vector3::from(*aspect)),
@@ -109,8 +109,8 @@ impl Solid {
     }
 
     /// The convex hull of points, moved to its centre of mass and turned to its principal axes.
-    fn hull(points: &[Vector3<f64>]) -> Result<Self, DemError> {
-        let flat = |_| DemError::BadShape { what: "no volume: its points lie in a plane" };
+    fn hull(points: &[Vector3<f64>]) -> Result<Self, SceneError> {
+        let flat = |_| SceneError::BadShape { what: "no volume: its points lie in a plane" };
         // In units of the largest coordinate: parry's tolerances are absolute.
         let unit = points.iter().map(Vector3::amax).fold(f64::MIN_POSITIVE, f64::max);
         let scaled: Vec<_> = points.iter().map(|p| parry(&(p / unit))).collect();
@@ -118,7 +118,7 @@ impl Solid {
         let corners: Vec<_> = corners.iter().map(|c| unit * Vector3::new(c.x, c.y, c.z)).collect();
         let (volume, centre, second) = moments(&corners, &triangles);
         if volume.is_nan() || volume <= 1e-6 * unit.powi(3) {
-            return Err(DemError::BadShape { what: "no volume: its points lie in a plane" });
+            return Err(SceneError::BadShape { what: "no volume: its points lie in a plane" });
         }
         let covariance = second / volume - centre * centre.transpose();
         let tensor = Matrix3::from_diagonal_element(covariance.trace()) - covariance;
@@ -131,7 +131,7 @@ impl Solid {
         let reach = corners.iter().map(Vector3::norm).fold(0.0, f64::max);
         let scaled: Vec<_> = corners.iter().map(|c| parry(&(c / reach))).collect();
         let body = ConvexPolyhedron::from_convex_mesh(scaled, &triangles)
-            .ok_or(DemError::BadShape { what: "a hull whose faces do not close" })?;
+            .ok_or(SceneError::BadShape { what: "a hull whose faces do not close" })?;
         Ok(Self {
             faces: faces(&corners, &triangles),
             corners,
@@ -203,7 +203,7 @@ fn faces(corners: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<(Vector3<f64>,
 }
 
 /// Into parry's vector.
-pub(crate) fn parry(v: &Vector3<f64>) -> ParryVector {
+pub fn parry(v: &Vector3<f64>) -> ParryVector {
     ParryVector::new(v.x, v.y, v.z)
 }
 
