@@ -30,12 +30,12 @@ from granulcal.loop.effects.series_faults import require_series, reread
 from granulcal.loop.pours.cube import cube
 from granulcal.loop.pours.image_rows import ImageRows
 from granulcal.loop.pours.measures import Measures
-from granulcal.loop.pours.plan import Plan, Pours
+from granulcal.loop.pours.plan import ArchivePlan, Pours
 from granulcal.pours.dataset import Dataset, generate
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 
-__all__ = ["Archive", "Plan", "Pours"]
+__all__ = ["Archive", "ArchivePlan", "Pours"]
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ class Archive:
         TrainingDataError: the folder holds the archive of something else, or of another version.
     """
 
-    def __init__(self, folder: Path, plan: Plan) -> None:
+    def __init__(self, folder: Path, plan: ArchivePlan) -> None:
         """Opens or begins it."""
         require_image(plan.scene, (effect.name for effect in plan.library if effect.image))
         require_series(plan.scene, ((e.name, e.series) for e in plan.library if e.series))

@@ -12,7 +12,7 @@ from granulcal.loop.effects.tolerance import Tolerances
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
-__all__ = ["Plan", "Pours"]
+__all__ = ["ArchivePlan", "Pours"]
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ _IMAGES, _IMAGES_SHARE = 400, 0.25
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class ArchivePlan:
     """What an archive is of.
 
     Attributes:

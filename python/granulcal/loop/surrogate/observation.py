@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from granulcal.errors import ObservationError
 from granulcal.loop.surrogate.surrogate import Surrogate
 
-__all__ = ["Observation", "Stack"]
+__all__ = ["Observation", "StackedMeans"]
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Observation:
 
 
 @dataclass(frozen=True)
-class Stack:
+class StackedMeans:
     """Means of pours under H conditions.
 
     Attributes:
@@ -58,7 +58,7 @@ class Stack:
     counts: Array
 
     @classmethod
-    def of(cls, surrogate: Surrogate, observations: Sequence[Observation]) -> "Stack":
+    def of(cls, surrogate: Surrogate, observations: Sequence[Observation]) -> "StackedMeans":
         """Returns the means of `observations`.
 
         Raises:
