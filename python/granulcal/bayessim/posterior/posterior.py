@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.arrays import as_matrix
-from granulcal.bayessim.emulator.likelihood import Likelihood, joint_density
+from granulcal.bayessim.emulator.likelihood import Likelihood
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.posterior.arithmetic import StackedDensity
 from granulcal.bayessim.posterior.average import Average
 from granulcal.bayessim.posterior.density import Density, TruncatedMixture
 from granulcal.bayessim.posterior.geometric import geometric_density
 from granulcal.bayessim.posterior.importance import FEWEST_EFFECTIVE, ImportanceDensity
+from granulcal.bayessim.posterior.joint import joint_density
 from granulcal.bayessim.posterior.product import LEAST_LOG_EVIDENCE_RATIO, product_density
 from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
