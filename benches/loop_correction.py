@@ -20,7 +20,7 @@ from granulcal.loop.check.trivial import line_weights
 from granulcal.loop.effects.design import cube_from_normal
 from granulcal.loop.surrogate.baseline import Fit, fit_base
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
-from granulcal.loop.surrogate.observation import StackedMeans
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.test.score import DISCREPANCY_LENGTH
 
 Array = NDArray[np.float64]

@@ -32,7 +32,7 @@ from granulcal.loop.pours.archive import Archive, Plan
 from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.surrogate.baseline import fit_base
-from granulcal.loop.surrogate.observation import StackedMeans
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.test.refit import fit_single
 from granulcal.pours.statistics import NAMES
 

@@ -24,7 +24,7 @@ from scipy.stats import binomtest
 from granulcal.loop import Observation, Surrogate, Thresholds, compare, trace
 from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.surrogate.baseline import fit_base
-from granulcal.loop.surrogate.observation import StackedMeans
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.test.refit import fit_single
 
 Array = NDArray[np.float64]

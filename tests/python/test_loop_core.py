@@ -23,7 +23,7 @@ from granulcal.loop import (
 from granulcal.loop.effects.design import cube_from_normal, normal_from_cube
 from granulcal.loop.surrogate.baseline import fit_base
 from granulcal.loop.surrogate.blocks import fit_blocks
-from granulcal.loop.surrogate.observation import StackedMeans
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.loop.test.distance import noise_free_square
 from granulcal.loop.test.refit import fit_single

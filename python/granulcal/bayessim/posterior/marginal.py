@@ -1,17 +1,22 @@
 """Marginals of a posterior, and its credible regions."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-if TYPE_CHECKING:
-    from granulcal.bayessim.posterior.posterior import Posterior
-
 __all__ = ["CredibleRegion", "Marginal", "kernel_density"]
 
 Array = NDArray[np.float64]
+
+
+class HasDensity(Protocol):
+    """What a region asks of a posterior."""
+
+    def coordinate_log_prob(self, theta: ArrayLike) -> Array:
+        """Returns the log density of the coordinates of `theta`, shape (n,)."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,7 @@ class CredibleRegion:
     names: tuple[str, ...]
     intervals: Array
     log_density_threshold: float
-    posterior: "Posterior"
+    posterior: HasDensity
 
     def contains(self, theta: ArrayLike) -> NDArray[np.bool_]:
         """Returns whether each row of `theta` (n, p) lies in the joint region, shape (n,)."""

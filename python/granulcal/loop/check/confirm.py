@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
-from granulcal.loop.surrogate.observation import Observation, StackedMeans
+from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 
 __all__ = ["confirm"]

@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 
 from granulcal.loop.effects.design import LARGEST_Z, cube_from_normal
 from granulcal.loop.surrogate.baseline import Fit, fit_base
-from granulcal.loop.surrogate.observation import Observation, StackedMeans
+from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.test.refit import Model, fit_single, interval
 from granulcal.loop.test.thresholds import Thresholds

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from granulcal.loop.effects.design import LARGEST_Z
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
-from granulcal.loop.surrogate.observation import StackedMeans
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 
 __all__ = ["Fit", "Start", "fit_base", "improve"]

@@ -29,7 +29,6 @@ Reference:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,12 +38,6 @@ from granulcal.bayessim.emulator.noise import fit_log_scale
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.effects.design import Design
 from granulcal.loop.surrogate.blocks import fit_blocks
-from granulcal.loop.surrogate.shift import Shift
-from granulcal.loop.surrogate.transform import Transform
-
-if TYPE_CHECKING:
-    from granulcal.loop.surrogate.observation import Observation
-
 from granulcal.loop.surrogate.columns import (
     _effect_columns,
     held_residuals,
@@ -55,6 +48,9 @@ from granulcal.loop.surrogate.columns import (
     uncorrelated_axes,
     usable_statistics,
 )
+from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.shift import Shift
+from granulcal.loop.surrogate.transform import Transform
 
 __all__ = ["Surrogate"]
 
@@ -264,7 +260,7 @@ class Surrogate:
         """C^1/2: y times it is z, shape (m, m)."""
         return np.asarray(np.linalg.inv(self.axes), dtype=np.float64)
 
-    def beyond(self, observations: Sequence["Observation"]) -> tuple[str, ...]:
+    def beyond(self, observations: Sequence[Observation]) -> tuple[str, ...]:
         """Returns which observed statistics lie outside the range of all archive pours.
 
         A range is that of the pours, widened by half of itself; statistics that never vary in the

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from granulcal.loop.effects.design import cube_from_normal, normal_from_cube
 from granulcal.loop.surrogate.baseline import Fit, Start, fit_base
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
-from granulcal.loop.surrogate.observation import Observation, StackedMeans
+from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.test.refit import Model, fit_none, fit_pair, fit_single
 from granulcal.loop.test.residual_test import ResidualTest, residual_test
