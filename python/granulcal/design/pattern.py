@@ -18,7 +18,6 @@ __all__ = ["Pattern", "simulate_plan"]
 Array = NDArray[np.float64]
 
 
-
 @dataclass(frozen=True)
 class Pattern:
     """Grains of a plan's pours at the end of the last.
