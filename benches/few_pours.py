@@ -20,9 +20,10 @@ import argparse
 import numpy as np
 
 from granulcal.bayessim.check.toys import PileStandIn
-from granulcal.bayessim.emulator.likelihood import Likelihood, joint_density
+from granulcal.bayessim.emulator.likelihood import Likelihood
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.network.standardise import Standardiser
+from granulcal.bayessim.posterior.joint import joint_density
 from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.bayessim.training.sequential import infer_within_budget
 from granulcal.one_thread import one_thread

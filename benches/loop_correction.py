@@ -19,8 +19,8 @@ from granulcal.loop import Discrepancy, Observation, Surrogate
 from granulcal.loop.check.trivial import line_weights
 from granulcal.loop.effects.design import cube_from_normal
 from granulcal.loop.surrogate.baseline import Fit, fit_base
-from granulcal.loop.surrogate.linearised import Local
-from granulcal.loop.surrogate.observation import Stack
+from granulcal.loop.surrogate.linearised import LinearisedSurrogate
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.test.score import DISCREPANCY_LENGTH
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ FIT, SEALED, MANY = (0.2, 0.6, 1.0), (0.0, 0.4, 0.8), 40
 HEAD = 16
 
 
-def constrained(local: Local, fit: Fit, at: Array) -> Array:
+def constrained(local: LinearisedSurrogate, fit: Fit, at: Array) -> Array:
     """Returns the correction orthogonal to the parameters, of one kernel and no pooled size."""
     count, size = len(local.conditions), local.surrogate.size
     root, slopes = local.in_statistics(fit.root), local.in_statistics(fit.slopes)
@@ -68,7 +68,7 @@ def one_set(toy: PileLoopToy, surrogate: Surrogate, seed: int, index: int, pours
         return toy.simulate(*rows, generator, lacking)
 
     seen = [pour(theta, h, psi, pours, hidden) for h in FIT]
-    stack = Stack.of(
+    stack = StackedMeans.of(
         surrogate, [Observation.of("", [h], x) for h, x in zip(FIT, seen, strict=True)]
     )
     local, fit = fit_base(surrogate, stack, index)

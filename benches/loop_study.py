@@ -32,7 +32,7 @@ from granulcal.loop.pours.archive import Archive, Plan
 from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.surrogate.baseline import fit_base
-from granulcal.loop.surrogate.observation import Stack
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.test.refit import fit_single
 from granulcal.pours.statistics import NAMES
 
@@ -185,7 +185,7 @@ class Study:
             found, [self.observe(h, rows) for h, rows in zip(FIT, fresh, strict=True)]
         )
         if truth.kind == "single":
-            self._grade(row, found, Stack.of(self.surrogate, observed))
+            self._grade(row, found, StackedMeans.of(self.surrogate, observed))
             self._widen(row, found, index)
         is_named = found.verdict.kind in ("EFFECT", "SET", "EFFECTS")
         if (is_named and index % 2 == 0) or found.verdict.kind == "UNEXPLAINED":
@@ -195,7 +195,7 @@ class Study:
     def _delta(self, found: Trace, fresh: list[Observation]) -> float:
         """Distance of fresh pours from the base fit, paper's statistics, noise taken out."""
         local, fit = found.local, found.base_fit
-        stack = Stack.of(self.surrogate, fresh)
+        stack = StackedMeans.of(self.surrogate, fresh)
         shape = stack.means.shape
         none = local.none()
         gap = local.in_statistics((stack.means.ravel() - local.mean(fit.v, none))[:, None])
@@ -206,7 +206,7 @@ class Study:
         chosen = [i for i, name in enumerate(self.surrogate.names) if name in NAMES]
         return sqrt(max(float(left[:, chosen].sum(axis=1).mean()), 0.0))
 
-    def _grade(self, row: dict[str, Any], found: Trace, stack: Stack) -> None:
+    def _grade(self, row: dict[str, Any], found: Trace, stack: StackedMeans) -> None:
         """Adds the strength of the true effect as the loop has it, named or not, and its rank."""
         names = [effect.name for effect in FUNNEL]
         k = names.index(row["effects"][0])
@@ -265,7 +265,9 @@ class Study:
         correction = Discrepancy.of(found.local, found.base_fit)
         was = now = 0.0
         for h, y, x in zip(SEALED, truth, before, strict=True):
-            seen, plain = (Stack.of(self.surrogate, [self.observe(h, rows)]) for rows in (y, x))
+            seen, plain = (
+                StackedMeans.of(self.surrogate, [self.observe(h, rows)]) for rows in (y, x)
+            )
             gap = ((seen.means - plain.means) @ self.surrogate.from_axes)[0]
             left = gap - correction.predict(seen.conditions[0])[0]
             noise = np.array(

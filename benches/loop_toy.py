@@ -24,7 +24,7 @@ from scipy.stats import binomtest
 from granulcal.loop import Observation, Surrogate, Thresholds, compare, trace
 from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.surrogate.baseline import fit_base
-from granulcal.loop.surrogate.observation import Stack
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.test.refit import fit_single
 
 Array = NDArray[np.float64]
@@ -104,7 +104,7 @@ def one_set(toy: PileLoopToy, surrogate: Surrogate, archive: int, index: int) ->
     }
     if truth.kind == "single":
         k = library.index(truth.effects[0])
-        stack = Stack.of(surrogate, observed)
+        stack = StackedMeans.of(surrogate, observed)
         base = fit_base(surrogate, stack, index)
         model = fit_single(base[0], stack.means.ravel(), base[1], k, RULES)
         row["strength"] = [float(model.strengths[0]), *model.intervals[0].tolist()]
@@ -117,7 +117,7 @@ def one_set(toy: PileLoopToy, surrogate: Surrogate, archive: int, index: int) ->
 
 def _delta(surrogate: Surrogate, many: list[Observation]) -> float:
     """Distance that the best base fit leaves, paper's statistics, noise removed."""
-    stack = Stack.of(surrogate, many)
+    stack = StackedMeans.of(surrogate, many)
     local, fit = fit_base(surrogate, stack, 0)
     count = len(stack.counts)
     back = surrogate.from_axes
@@ -154,10 +154,10 @@ def _removed(
     removed = compare(labels, *cut, spread, draws=100).removed
     # The correction lives on the transformed scale.
     local = found.local
-    stack = Stack.of(
+    stack = StackedMeans.of(
         surrogate, [Observation.of("", [h], m) for h, m in zip(SEALED, measured, strict=True)]
     )
-    base = Stack.of(
+    base = StackedMeans.of(
         surrogate, [Observation.of("", [h], m) for h, m in zip(SEALED, before, strict=True)]
     )
     gp = Discrepancy.of(local, found.base_fit)

@@ -1,7 +1,7 @@
 //! granulcal calibrates a granular simulator from depth images.
 //!
-//! This crate is the front door; the rooms are [`dem`] (grains, materials, contact solver,
-//! scenes), [`features`] (camera, depth raster, segmentation, the 16 statistics) and
+//! This crate is the front door; the rooms are [`scene`] (what is asked: scenes, sensors,
+//! priors), [`dem`] (grains, contact law, solver), [`features`] (camera, depth raster, segmentation, the 16 statistics) and
 //! [`dataset`] (recordings, resumable batches, Parquet, MCAP).
 //!
 //! ```
@@ -17,3 +17,4 @@
 pub use granulcal_dataset as dataset;
 pub use granulcal_dem as dem;
 pub use granulcal_features as features;
+pub use granulcal_scene as scene;

@@ -245,6 +245,16 @@ def diagnostics(
     pour_axis: tuple[float, float] | None = None,
 ) -> NDArray[np.float64]: ...
 def statistics_table() -> list[tuple[str, str, str, str, int, str, str]]: ...
+def check_parameter(
+    path: str,
+    distribution: str,
+    *,
+    low: float | None = None,
+    high: float | None = None,
+    mean: float | None = None,
+    sd: float | None = None,
+    value: float | None = None,
+) -> None: ...
 def generate(
     scene: Scene,
     prior_toml: str,

@@ -1,10 +1,11 @@
 """Command line `granulcal`: what needs Python here, every other word by granulcal-cli.
 
-One word is one file in `commands/` with a function `add`, and one line in `_WORDS`.
+A word is one file in `commands/` with a function `add`, and one line in `_WORDS`.
 """
 
 import argparse
 import contextlib
+import importlib
 import json
 import os
 import signal
@@ -14,47 +15,30 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from granulcal import _native, paths
-from granulcal.commands import (
-    calibrate,
-    check,
-    close_loop,
-    demo,
-    design,
-    engine_command,
-    export,
-    film,
-    infer,
-    init,
-    model,
-    predict,
-    record,
-    report,
-    reproduce,
-    train,
-)
+from granulcal.commands import engine_command
 from granulcal.commands.exit_code import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from granulcal.commands.program import Parser, describe
 from granulcal.one_thread import one_thread
 
 __all__ = ["main"]
 
-# In the order of the help.
+# In the order of the help; each is a file of `commands/`.
 _WORDS = (
-    init,
-    model,
-    train,
-    check,
-    infer,
-    calibrate,
-    report,
-    close_loop,
-    predict,
-    design,
-    export,
-    film,
-    record,
-    reproduce,
-    demo,
+    "init",
+    "model",
+    "train",
+    "check",
+    "infer",
+    "calibrate",
+    "report",
+    "close_loop",
+    "predict",
+    "design",
+    "export",
+    "film",
+    "record",
+    "reproduce",
+    "demo",
 )
 _TRACEBACK = "GRANULCAL_TRACEBACK"
 
@@ -189,7 +173,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="granulcal")
     commands = parser.add_subparsers(metavar="COMMAND", dest="command")
     for word in _WORDS:
-        word.add(commands)
+        importlib.import_module(f"granulcal.commands.{word}").add(commands)
     return parser
 
 

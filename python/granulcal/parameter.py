@@ -1,28 +1,22 @@
-"""One parameter of a prior: a path and a distribution, checked once."""
+"""One parameter of a prior: a path and a distribution.
 
-import re
+Which numbers it may have is checked by the simulator, as in files. The coordinates and quantiles
+stay here: training and its plots need them for arrays of parameters.
+"""
+
 from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal import _native
 from granulcal.errors import PriorError
 
 __all__ = ["Parameter"]
 
 Array = NDArray[np.float64]
 
-# Keys that a distribution needs, and keys that it may have besides.
-_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "uniform": (("low", "high"), ()),
-    "log_uniform": (("low", "high"), ()),
-    "normal": (("mean", "sd"), ("low", "high")),
-    "fixed": (("value",), ()),
-}
-_PATH = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*(\.[A-Za-z0-9_-]+)*")
-# A normal cut to less mass than this is a mistake, and its inverse would lose all its digits.
-_SMALLEST_NORMAL_MASS = 1e-6
 _STANDARD_NORMAL = NormalDist()
 
 
@@ -49,51 +43,23 @@ class Parameter:
     value: float | None = None
 
     def __post_init__(self) -> None:
-        """Checks that the keys fit the distribution and the numbers fit each other."""
-        if not isinstance(self.path, str) or not _PATH.fullmatch(self.path):
-            raise PriorError(f"path must be words joined by dots, got {self.path!r}")
-        if self.distribution not in _KEYS:
-            raise PriorError(
-                f"{self.path}: distribution must be one of {', '.join(_KEYS)}, "
-                f"got {self.distribution!r}"
-            )
-        needed, optional = _KEYS[self.distribution]
+        """Checks the types; which numbers may be is the simulator's to say, for files and here."""
+        for key in ("path", "distribution"):
+            if not isinstance(getattr(self, key), str):
+                raise PriorError(f"{key} must be a string, got {getattr(self, key)!r}")
+        numbers: dict[str, float] = {}
         for key in ("low", "high", "mean", "sd", "value"):
-            self._check_key(key, needed=key in needed, allowed=key in needed + optional)
-        if self.low is not None and self.high is not None and not self.low < self.high:
-            raise PriorError(
-                f"{self.path}: low must be less than high, got low = {self.low}, high = {self.high}"
-            )
-        if self.distribution == "log_uniform" and self.low is not None and self.low <= 0:
-            raise PriorError(f"{self.path}: low of log_uniform must be positive, got {self.low}")
-        if self.distribution == "normal":
-            self._check_normal()
-
-    def _check_key(self, key: str, *, needed: bool, allowed: bool) -> None:
-        number = getattr(self, key)
-        if number is None:
-            if needed:
-                raise PriorError(f"{self.path}: {self.distribution} needs {key}")
-            return
-        if not allowed:
-            known = ", ".join(sum(_KEYS[self.distribution], ()))
-            raise PriorError(f"{self.path}: {self.distribution} takes {known}; got {key} besides")
-        if isinstance(number, bool) or not isinstance(number, int | float | np.number):
-            raise PriorError(f"{self.path}: {key} must be a number, got {number!r}")
-        if not np.isfinite(number):
-            raise PriorError(f"{self.path}: {key} must be finite, got {number}")
-        object.__setattr__(self, key, float(number))
-
-    def _check_normal(self) -> None:
-        assert self.sd is not None
-        if self.sd <= 0:
-            raise PriorError(f"{self.path}: sd must be positive, got {self.sd}")
-        first, last = self._normal_cdf_range()
-        if last - first < _SMALLEST_NORMAL_MASS:
-            raise PriorError(
-                f"{self.path}: low and high must hold at least {_SMALLEST_NORMAL_MASS:g} of the "
-                f"normal's mass, got {last - first:.3g}"
-            )
+            number = getattr(self, key)
+            if number is None:
+                continue
+            if isinstance(number, bool) or not isinstance(number, int | float | np.number):
+                raise PriorError(f"{self.path}: {key} must be a number, got {number!r}")
+            numbers[key] = float(number)
+            object.__setattr__(self, key, numbers[key])
+        try:
+            _native.check_parameter(self.path, self.distribution, **numbers)
+        except ValueError as error:
+            raise PriorError(str(error)) from None
 
     @property
     def is_free(self) -> bool:

@@ -22,6 +22,7 @@ from granulcal.pours.forward import scene_at
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour, simulate
 from granulcal.pours.statistics import NAMES, statistics
+from granulcal.pours.status import NO_GRAINS, UNUSABLE
 from granulcal.prior import Prior
 
 if TYPE_CHECKING:
@@ -37,7 +38,6 @@ _POUR = Table(
     {"cpu_s": Number()},
 )
 _SCHEMA = Table({"key": Text(), "pours": Mapping(_POUR)}, {"names": ListOf(Text()), "hash": Text()})
-_EXCLUDED = ("unhealthy", "jammed")
 # Seeds of pours of one run; data sets' are hashes, and reports' begin at 9000.
 _FIRST_SEED = 40_000_000
 # Longest time for which finished pours are in memory alone [s].
@@ -128,11 +128,11 @@ class KeptPours:
         else:
             pour = simulate(scene, seed=seed)
         status, x = pour.status, None
-        if status not in _EXCLUDED:
+        if status not in UNUSABLE:
             try:
                 x = np.asarray(self.look(pour), float).tolist()
             except ValueError:
-                status = "no_grains_in_view"
+                status = NO_GRAINS
         row = {"theta": theta.tolist(), "status": status, "x": x}
         # Nobody knows the time of another engine.
         return {**row, "cpu_s": pour.cpu_seconds} if math.isfinite(pour.cpu_seconds) else row

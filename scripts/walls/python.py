@@ -1,7 +1,7 @@
 """Which file of a Python package imports which, followed to where a name is defined.
 
-An import inside a function counts: it hides a circle, it does not open it. What is imported for
-types alone does not run.
+An import inside a function counts, and one for types alone: they hide a circle, they do not open
+it.
 """
 
 import ast
@@ -35,14 +35,11 @@ def module_of(package: Path, path: Path) -> str:
 
 
 def imports(tree: ast.Module) -> list[str]:
-    """Returns the dotted names that a file imports when it runs."""
+    """Returns the dotted names that a file imports."""
     found = []
     waiting: list[ast.AST] = list(tree.body)
     while waiting:
         node = waiting.pop()
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
-            waiting += node.orelse
-            continue
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:

@@ -1,6 +1,6 @@
 //! Grains of several spheres, as rigid bodies.
 
-use granulcal::dem::{Clump, DemError, Polydispersity, Scene, Simulation, Status};
+use granulcal::dem::{Clump, Polydispersity, Scene, SceneError, Simulation, Status};
 use nalgebra::Vector3;
 
 use crate::scenes::{RADIUS, bits, drop_of, material, one_grain, start};
@@ -113,5 +113,8 @@ fn what_clumps_cannot_be_with_is_named() {
     scene.effects.clump.aspect = 1.5;
     scene.effects.polydispersity = Polydispersity { cv: 0.1, diameters: Vec::new() };
     let error = scene.check().unwrap_err();
-    assert!(matches!(error, DemError::Exclude { other: "effects.polydispersity", .. }), "{error}");
+    assert!(
+        matches!(error, SceneError::Exclude { other: "effects.polydispersity", .. }),
+        "{error}"
+    );
 }

@@ -1,6 +1,6 @@
 //! A soft layer on the ground, against springs and dampers.
 
-use granulcal::dem::{DemError, Layer, Preset, Simulation, Status};
+use granulcal::dem::{Layer, Preset, SceneError, Simulation, Status};
 use nalgebra::Vector3;
 
 use crate::scenes::{RADIUS, bits, drop_of, material, one_grain, start};
@@ -92,7 +92,7 @@ fn a_method_that_does_not_know_a_layer_is_refused() {
     scene.effects.layer = layer(1e-3, 1.0);
     scene.preset = Preset::Paper;
     let error = scene.check().unwrap_err();
-    assert!(matches!(error, DemError::EffectNeedsMethod { effect: "effects.layer", .. }));
+    assert!(matches!(error, SceneError::EffectNeedsMethod { effect: "effects.layer", .. }));
     let text = error.to_string();
     assert!(text.contains("nsgs") && text.contains("newton_pcr"), "{text}");
 }

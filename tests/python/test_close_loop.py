@@ -13,7 +13,7 @@ from granulcal.cli import main
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.close import planned
 from granulcal.loop.effects.library import FUNNEL, by_name, fingerprint
-from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
 from granulcal.loop.pours.refine import further
@@ -259,7 +259,7 @@ def test_a_recording_in_other_units_is_refused(tilted: Path) -> None:
 
 def test_an_archive_of_something_else_is_refused(tmp_path: Path) -> None:
     scene, prior = gc.Scene.from_toml(SCENE), gc.Prior.from_toml(PRIOR)
-    plan = Plan(
+    plan = ArchivePlan(
         scene=scene,
         prior=prior,
         conditions=(("start.base", 0.02, 0.06),),
@@ -272,11 +272,11 @@ def test_an_archive_of_something_else_is_refused(tmp_path: Path) -> None:
     pours = Archive(folder, plan).pours()
     assert len(pours.x) == 8 and pours.left_out == 0
     assert np.all(pours.psi[:4] == 0) and np.all(np.abs(pours.psi[4:]) <= 1)
-    other = Plan(**{**plan.__dict__, "scene": scene.with_({"grains.count": 80})})
+    other = ArchivePlan(**{**plan.__dict__, "scene": scene.with_({"grains.count": 80})})
     # Conditions within its range are its own; beyond it they are another archive's.
-    narrow = Plan(**{**plan.__dict__, "conditions": (("start.base", 0.03, 0.06),)})
+    narrow = ArchivePlan(**{**plan.__dict__, "conditions": (("start.base", 0.03, 0.06),)})
     assert Archive(folder, narrow).plan.unit({"start.base": 0.03}) == pytest.approx([0.25])
-    wide = Plan(**{**plan.__dict__, "conditions": (("start.base", 0.01, 0.06),)})
+    wide = ArchivePlan(**{**plan.__dict__, "conditions": (("start.base", 0.01, 0.06),)})
     with pytest.raises(TrainingDataError, match="is of another conditions"):
         Archive(folder, wide)
     with pytest.raises(TrainingDataError, match="is of another scene"):

@@ -9,9 +9,10 @@ from granulcal.bayessim import BayesSim
 from granulcal.bayessim.check.diagnostics import binomial_band, tarp
 from granulcal.bayessim.check.identifiability import Identifiability
 from granulcal.bayessim.check.toys import LinearGaussian
-from granulcal.bayessim.emulator.likelihood import joint_density, pooled_scales
 from granulcal.bayessim.emulator.noise import Noise
+from granulcal.bayessim.emulator.pooling import pooled_scales
 from granulcal.bayessim.emulator.ridge import Ridge
+from granulcal.bayessim.posterior.joint import joint_density
 from granulcal.errors import TrainingDataError
 from granulcal.parameter import Parameter
 from granulcal.prior import Prior

@@ -15,12 +15,12 @@ from granulcal.loop import Design, Effect, Observation, Surrogate, Thresholds, t
 from granulcal.loop.check.checks import calibrated
 from granulcal.loop.check.confirm import confirm
 from granulcal.loop.check.correction import Correction, corrections
-from granulcal.loop.check.coverage import Calibrated, calibrate, needed_stretch
+from granulcal.loop.check.coverage import Coverage, calibrate, needed_stretch
 from granulcal.loop.check.standing import stand
 from granulcal.loop.check.trivial import LINE, TrivialRow
 from granulcal.loop.effects.library import by_name
 from granulcal.loop.report.tables import candidates, conditions, residuals, write_tables
-from granulcal.loop.test.misfit import compare
+from granulcal.loop.test.distance import compare
 from granulcal.loop.test.refit import interval
 
 Array = NDArray[np.float64]
@@ -188,7 +188,7 @@ def closed(linear: Linear, surrogate: Surrogate, psi: float) -> Any:
         fit=fit,
         sealed=None,
         corrections=(Correction("0", 2.0, 0.5), Correction("1", 2.0, None, "too far")),
-        calibrated=Calibrated(0, np.array([0.4, 0.8]), 1.5, 15, 20, 0.0) if named else None,
+        calibrated=Coverage(0, np.array([0.4, 0.8]), 1.5, 15, 20, 0.0) if named else None,
     )
 
 

@@ -23,11 +23,11 @@ from granulcal.loop import (
 from granulcal.loop.effects.design import cube_from_normal, normal_from_cube
 from granulcal.loop.surrogate.baseline import fit_base
 from granulcal.loop.surrogate.blocks import fit_blocks
-from granulcal.loop.surrogate.observation import Stack
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.transform import Transform
-from granulcal.loop.test.misfit import noise_free_square
+from granulcal.loop.test.distance import noise_free_square
 from granulcal.loop.test.refit import fit_single
-from granulcal.loop.test.residual_test import open_gate
+from granulcal.loop.test.residual_test import residual_test
 from granulcal.loop.test.score import Scores
 
 Array = NDArray[np.float64]
@@ -184,14 +184,14 @@ def test_bad_input_says_what_would_do(toy: Linear, surrogate: Surrogate) -> None
     with pytest.raises(TrainingDataError, match="unit coordinates .0, 1., got 7"):
         Surrogate.fit(toy.design, 7 + 0 * theta, c, psi, x)
     with pytest.raises(ObservationError, match="8.*got .2, 3."):
-        Stack.of(surrogate, [Observation.of("here", [0.5], np.zeros((2, 3)))])
+        StackedMeans.of(surrogate, [Observation.of("here", [0.5], np.zeros((2, 3)))])
     with pytest.raises(ObservationError, match="within the archive's range"):
-        Stack.of(surrogate, [Observation.of("here", [1.5], np.zeros((2, 8)))])
+        StackedMeans.of(surrogate, [Observation.of("here", [1.5], np.zeros((2, 8)))])
 
 
 @pytest.mark.parametrize("pours", [4, 40])
 def test_the_residual_of_a_fit_is_efficient(toy: Linear, surrogate: Surrogate, pours: int) -> None:
-    stack = Stack.of(surrogate, toy.observe(np.array([0.3, 0.6]), np.zeros(3), 0, pours))
+    stack = StackedMeans.of(surrogate, toy.observe(np.array([0.3, 0.6]), np.zeros(3), 0, pours))
     local, fit = fit_base(surrogate, stack, 0)
     scores = Scores.of(local, fit, (0, 1, 2))
     white = scores.whiten @ fit.residual
@@ -231,12 +231,14 @@ def test_false_alarms_and_coverage(toy: Linear, surrogate: Surrogate) -> None:
     sets = 60
     for seed in range(sets):
         theta = generator.uniform(0.1, 0.9, 2)
-        stack = Stack.of(surrogate, toy.observe(theta, np.zeros(3), seed))
+        stack = StackedMeans.of(surrogate, toy.observe(theta, np.zeros(3), seed))
         local, fit = fit_base(surrogate, stack, seed)
         scores = Scores.of(local, fit, (0, 1, 2))
-        p_values.append(open_gate(local, fit, scores, replicates=300, refits=2, seed=seed).p)
+        p_values.append(residual_test(local, fit, scores, replicates=300, refits=2, seed=seed).p)
         strength = generator.uniform(0, 1)
-        stack = Stack.of(surrogate, toy.observe(theta, np.array([strength, 0, 0]), 500 + seed))
+        stack = StackedMeans.of(
+            surrogate, toy.observe(theta, np.array([strength, 0, 0]), 500 + seed)
+        )
         local, fit = fit_base(surrogate, stack, seed)
         model = fit_single(local, stack.means.ravel(), fit, 0, RULES)
         low, high = model.intervals[0]

@@ -10,7 +10,7 @@ import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.effects.image_faults import KINDS, Frame, blurred, flying, lost, require_image
 from granulcal.loop.effects.library import FUNNEL, LIBRARY, by_name
-from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
 from granulcal.loop.task import FIT, Condition, Task
@@ -148,8 +148,8 @@ def test_every_fault_of_the_library_is_one_and_is_off_at_no_strength(pour: gc.Po
     np.testing.assert_array_equal(measures.of_pour(pour, faults), measures.of_pour(pour, faults))
 
 
-def plan(tmp: Path, *names: str) -> Plan:
-    return Plan(
+def plan(tmp: Path, *names: str) -> ArchivePlan:
+    return ArchivePlan(
         scene=scene(),
         prior=gc.Prior.from_toml(PRIOR),
         conditions=(("start.base", 0.03, 0.05),),

@@ -12,7 +12,7 @@ from granulcal.experiments import loop_column, loop_drum, loop_rings
 from granulcal.loop.close import planned
 from granulcal.loop.effects.design import Design, Effect, normal_from_cube
 from granulcal.loop.effects.library import LibraryEffect, by_name
-from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.surrogate.fit_draws import draw
 from granulcal.loop.task import FIT, SEALED, Condition, Task
@@ -88,7 +88,7 @@ def test_pours_at_the_conditions_alone_have_all_their_numbers() -> None:
 
 def test_an_archive_at_the_conditions_alone(tmp_path: Path) -> None:
     asked = task(False, averaged=True, effects=("tilt.y", "count"))
-    plan = Plan(
+    plan = ArchivePlan(
         # Three quarters of 62 grains are 46.5, and 46 are more than the whole effect.
         scene=asked.at_first().with_({"grains.count": 62}),
         prior=asked.prior,
@@ -119,7 +119,7 @@ def test_an_archive_at_the_conditions_alone(tmp_path: Path) -> None:
     assert strengths == pytest.approx([0, 0.25, 0.5, 0.75, 1.0], abs=0.04)
     # The same conditions with pours between them are another archive, and the other way round.
     with pytest.raises(TrainingDataError, match="is of another places"):
-        Archive(tmp_path / "archive", Plan(**{**plan.__dict__, "places": ()}))
+        Archive(tmp_path / "archive", ArchivePlan(**{**plan.__dict__, "places": ()}))
 
 
 def test_how_a_recording_is_read_is_the_tasks_to_say(tmp_path: Path) -> None:
@@ -222,7 +222,7 @@ def test_an_archive_takes_further_effects_and_keeps_its_pours(tmp_path: Path) ->
     tilt, count = sorted(asked.library, key=lambda effect: effect.name, reverse=True)
 
     def archive(*library: LibraryEffect) -> Archive:
-        plan = Plan(
+        plan = ArchivePlan(
             scene=asked.at_first(),
             prior=asked.prior,
             conditions=asked.inputs,

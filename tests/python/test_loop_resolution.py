@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from granulcal.errors import ObservationError
 from granulcal.loop import Design, Effect, Observation, Surrogate, Thresholds, trace
 from granulcal.loop.effects.resolution import Resolution
-from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.pours.forward import Coarse, Forward
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
@@ -122,7 +122,7 @@ def test_an_archive_has_both_sizes_and_forward_pours_their_limit(tmp_path: Path)
     own = scene.get("grains.diameter")
     sizes = Resolution(diameter=0.75 * own, coarse=1.5 * own)
     one = Parameter(path="material.restitution", distribution="uniform", low=0.2, high=0.6)
-    plan = Plan(
+    plan = ArchivePlan(
         scene=scene,
         prior=Prior([one]),
         conditions=(),

@@ -10,7 +10,7 @@ from granulcal.loop.effects.law import LAW, law_numbers
 from granulcal.loop.effects.library import by_name
 from granulcal.loop.effects.nuisances import declared_nuisances
 from granulcal.loop.effects.series_faults import KINDS, require_series, reread
-from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.task import FIT, Condition, Task
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
@@ -82,7 +82,7 @@ def test_a_clock_costs_no_pour_and_a_path_is_a_tolerance(tmp_path: Path) -> None
     assert clock.nuisance_sd == pytest.approx(0.2) and not clock.is_shared
     assert level.nuisance_sd == 0.5 and level.is_shared
     assert [level.value(psi) for psi in (-1, 0, 1)] == pytest.approx([0.4, 0.5, 0.6])
-    plan = Plan(
+    plan = ArchivePlan(
         scene=scene, prior=prior(), conditions=(), library=(clock, level), base=12, each=6, seed=3
     )
     assert plan.pours == 18 and plan.design.candidates == ()

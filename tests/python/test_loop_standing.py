@@ -13,7 +13,7 @@ from granulcal.loop.check.standing import Moved, overturned, stand
 from granulcal.loop.check.trivial import LINE, NEAREST, RESIDUAL, Group, line_weights, trivial_rows
 from granulcal.loop.effects.definitions import Definition, check_definitions, definition_inputs
 from granulcal.loop.task import FIT, SEALED, Condition, Task
-from granulcal.loop.test.misfit import compare
+from granulcal.loop.test.distance import compare
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.verdict import Verdict
 from granulcal.pours.scene import Scene

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("torch")
 
-from granulcal.bayessim.emulator.likelihood import averaging_share
+from granulcal.bayessim.emulator.pooling import averaging_share
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.posterior.arithmetic import StackedDensity
 from granulcal.bayessim.posterior.density import TruncatedMixture

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
-use granulcal_dataset::{Distribution, Prior};
 use granulcal_numbers::normal_cdf;
+use granulcal_scene::{Distribution, Prior};
 use nalgebra::DMatrix;
 
 use crate::quasi::{QuasiUniform, quasi_normal};

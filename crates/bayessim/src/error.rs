@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use granulcal_dataset::DatasetError;
+use granulcal_scene::SceneError;
 
 /// Why a model or an observation was refused.
 #[derive(Debug, thiserror::Error)]
@@ -71,7 +72,7 @@ pub enum ModelError {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: Box<DatasetError>,
+        source: Box<SceneError>,
     },
     /// An observation that the model cannot take.
     #[error("the observation must be {allowed}, got {found}")]

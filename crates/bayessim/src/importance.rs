@@ -284,7 +284,7 @@ fn effective(weights: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use granulcal_dataset::Prior;
+    use granulcal_scene::Prior;
 
     /// A narrow normal in the corner of a cube, whose mass and mean are known.
     #[test]

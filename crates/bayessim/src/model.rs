@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use granulcal_dataset::{Prior, read_file};
+use granulcal_dataset::read_file;
+use granulcal_scene::Prior;
 
 use crate::ModelError;
 use crate::average::{Average, Form};

@@ -1,4 +1,6 @@
 //! The arguments: clap types and nothing else.
+//!
+//! Longer than other files because the help of every command stands in it; groups that several commands share are in `args/`.
 
 mod completions;
 mod global;
@@ -12,7 +14,7 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use granulcal_dataset::{Form, Product, Shard};
-use granulcal_dem::Preset;
+use granulcal_scene::Preset;
 
 pub use completions::CompletionsArgs;
 pub use global::Global;

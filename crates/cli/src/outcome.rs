@@ -6,6 +6,7 @@ use granulcal_bayessim::ModelError;
 use granulcal_dataset::DatasetError;
 use granulcal_dem::DemError;
 use granulcal_features::FeatureError;
+use granulcal_scene::SceneError;
 
 /// How a command ended that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +69,7 @@ pub fn exit_code_of(error: &anyhow::Error) -> u8 {
         if cause.is::<BadArgument>()
             || cause.is::<ModelError>()
             || cause.is::<DemError>()
+            || cause.is::<SceneError>()
             || cause.is::<FeatureError>()
         {
             return 2;

@@ -8,7 +8,8 @@ use granulcal_dataset::{
     DatasetError, Observer, Prior, Room, load_prior, load_scene, load_sensor, record_pour,
     resume_checkpoint, write_checkpoint,
 };
-use granulcal_dem::{Pour, Scene, Simulation};
+use granulcal_dem::{Pour, Simulation};
+use granulcal_scene::Scene;
 
 use crate::args::{SceneArgs, SceneChanges};
 use crate::context::Context;

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use granulcal_dataset::{measured_data, png, write_height_map};
 use granulcal_features::{
-    Camera, DepthSensor, HeightMap, NoiseField, StereoSensor, TimeOfFlightSensor, render,
+    Camera, DepthSensor, HeightMap, NoiseField, Observe, StereoSensor, TimeOfFlightSensor, render,
 };
 use place::{Place, json, text};
 

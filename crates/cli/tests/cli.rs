@@ -1,4 +1,5 @@
-//! The process boundary: exit codes, streams, files. What the numbers mean is tested elsewhere.
+//! The process boundary: exit codes, streams, files. What the numbers mean is tested elsewhere. One file, because every
+//! test of it is one more binary to link.
 
 mod place;
 

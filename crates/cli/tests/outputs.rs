@@ -4,7 +4,7 @@ mod place;
 
 use std::fs;
 
-use granulcal_dem::Scene;
+use granulcal_scene::Scene;
 use place::{Place, json, text};
 
 /// A scene that is over in milliseconds, as a file.

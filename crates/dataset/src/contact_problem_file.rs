@@ -72,7 +72,8 @@ fn six(rows: &[Vector6<f64>]) -> impl Iterator<Item = f64> {
 
 #[cfg(test)]
 mod tests {
-    use granulcal_dem::{Scene, Simulation};
+    use granulcal_dem::Simulation;
+    use granulcal_scene::Scene;
 
     use super::*;
     use crate::Npz;

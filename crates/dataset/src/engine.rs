@@ -1,8 +1,9 @@
 //! Pours of another simulator: what it left, in the words of ours.
 
-use granulcal_dem::{Health, Pour, Scene, Status};
+use granulcal_dem::{Health, Pour, Status};
 use granulcal_features::stats::{DIAGNOSTIC_COUNT, DiagnosticSettings, diagnostics};
 use granulcal_features::{FeatureError, paper16};
+use granulcal_scene::Scene;
 use nalgebra::{Vector2, Vector3};
 use xxhash_rust::xxh3::Xxh3;
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use granulcal_dem::DemError;
 use granulcal_features::FeatureError;
+use granulcal_scene::SceneError;
 
 /// Why a file, a prior or a batch was refused, or could not be written.
 ///
@@ -81,31 +82,6 @@ pub enum DatasetError {
         #[source]
         source: Box<toml::ser::Error>,
     },
-    /// The text of a prior is not the TOML of a prior.
-    #[error("not the TOML of a prior")]
-    PriorToml(#[source] Box<toml::de::Error>),
-    /// A parameter of a prior is wrong.
-    #[error("prior of {parameter:?}: {what} must be {allowed}, got {got}")]
-    Prior {
-        /// Path of the parameter in the scene.
-        parameter: String,
-        /// The key that is wrong.
-        what: &'static str,
-        /// What was got.
-        got: String,
-        /// What is allowed.
-        allowed: &'static str,
-    },
-    /// A value that the prior can draw has no place in the scene.
-    #[error("prior of {parameter:?} does not fit the scene at the value {value}")]
-    PriorDoesNotFit {
-        /// Path of the parameter in the scene.
-        parameter: String,
-        /// The value tried.
-        value: f64,
-        /// What the scene says.
-        source: DemError,
-    },
     /// A run needs more than the machine has.
     #[error(
         "this needs about {needed} of {what}, and {available} are free; GRANULCAL_NO_LIMITS=1 in the environment \
@@ -135,7 +111,18 @@ pub enum DatasetError {
         /// Where the scene stands.
         path: PathBuf,
         /// What is wrong with it.
-        source: DemError,
+        source: SceneError,
+    },
+    /// A prior is wrong, or does not fit the scene.
+    #[error(transparent)]
+    Prior(SceneError),
+    /// A file of a sensor holds numbers that no sensor has.
+    #[error("{}: not a sensor", path.display())]
+    Sensor {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: SceneError,
     },
     /// A simulation was refused.
     #[error("the simulation was refused")]

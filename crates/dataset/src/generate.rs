@@ -28,10 +28,11 @@ use crate::observe::observe;
 use crate::observer::Observer;
 use crate::random::pour_seed;
 use crate::row::{Row, RowStatus};
-use crate::{DatasetError, Prior, Room, table};
+use crate::{DatasetError, Room, table};
 use chunk::OpenChunk;
 pub use chunk::Progress;
 use folder::{Folder, Plan};
+use granulcal_scene::Prior;
 pub use options::{GenerateOptions, Shard};
 use queue::Queue;
 
@@ -251,7 +252,8 @@ fn make_row(
 ) -> Result<Option<Row>, DatasetError> {
     let start = ThreadTime::now();
     let parameters = header.prior.sample(header.seed, row);
-    let scene = header.prior.apply(&header.scene, &parameters)?;
+    let scene = header.prior.apply(&header.scene, &parameters);
+    let scene = scene.map_err(|e| DatasetError::Simulation(e.into()))?;
     let seed = pour_seed(header.seed, row);
     let mut observer = Observer::new(&scene);
     let pour = if let Some(engine) = engine {

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use granulcal_dem::Scene;
+use granulcal_scene::{Prior, Scene, SceneError};
 
-use crate::{DatasetError, ObservedStatistic, Prior, observed_statistics, scene_file};
+use crate::{DatasetError, ObservedStatistic, observed_statistics, scene_file};
 
 /// The version of granulcal that writes.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -30,15 +30,15 @@ impl Header {
     /// # Errors
     /// [`DatasetError::PriorDoesNotFit`] if the prior names what the scene has not.
     pub fn new(scene: &Scene, prior: &Prior, seed: u64) -> Result<Self, DatasetError> {
-        scene.check().map_err(DatasetError::Simulation)?;
-        prior.check(scene)?;
+        scene.check().map_err(|e| DatasetError::Simulation(e.into()))?;
+        prior.check(scene).map_err(DatasetError::Prior)?;
         Ok(Self {
             scene: scene.clone(),
             prior: prior.clone(),
             version: VERSION.to_owned(),
             seed,
-            scene_toml: scene.to_toml().map_err(DatasetError::Simulation)?,
-            prior_toml: prior.to_toml()?,
+            scene_toml: scene.to_toml().map_err(|e| DatasetError::Simulation(e.into()))?,
+            prior_toml: prior.to_toml().map_err(DatasetError::Prior)?,
         })
     }
 
@@ -64,7 +64,7 @@ impl Header {
         Ok(Self {
             scene,
             prior: Prior::from_toml(prior_toml).map_err(|error| match error {
-                DatasetError::PriorToml(source) => {
+                SceneError::PriorToml(source) => {
                     DatasetError::Toml { path: path.to_owned(), what: "prior", source }
                 }
                 other => {
@@ -87,7 +87,9 @@ impl Header {
             Err(DatasetError::Differs { path: path.to_owned(), what, found, given })
         };
         let difference = self.scene.first_difference(&given.scene);
-        if let Some((key, found, given)) = difference.map_err(DatasetError::Simulation)? {
+        if let Some((key, found, given)) =
+            difference.map_err(|e| DatasetError::Simulation(e.into()))?
+        {
             return differs(format!("scene.{key}"), found, given);
         }
         if self.prior != given.prior {
@@ -106,7 +108,7 @@ impl Header {
 }
 
 fn describe(prior: &Prior) -> String {
-    let of = |p: &crate::Parameter| format!("{} {:?}", p.path, p.distribution);
+    let of = |p: &granulcal_scene::Parameter| format!("{} {:?}", p.path, p.distribution);
     prior.parameters().iter().map(of).collect::<Vec<_>>().join("; ")
 }
 

@@ -26,8 +26,9 @@ use foxglove::messages::{
     CameraCalibration, FrameTransform, PackedElementField, PointCloud, Pose, Quaternion, RawImage,
     Vector3,
 };
-use granulcal_dem::{Pour, Scene, Simulation};
+use granulcal_dem::{Pour, Simulation};
 use granulcal_features::{Camera, DepthImage, Intrinsics};
+use granulcal_scene::Scene;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 
@@ -69,7 +70,7 @@ pub fn record_pour(
         let (what, got) = ("the frames per second", rate.to_string());
         return Err(DatasetError::Argument { what, got, allowed: "positive and finite" });
     }
-    let scene_toml = scene.to_toml().map_err(DatasetError::Simulation)?;
+    let scene_toml = scene.to_toml().map_err(|e| DatasetError::Simulation(e.into()))?;
     let failed = |source| DatasetError::Mcap { path: path.to_owned(), source };
     let mut recorder = Recorder::create(path)?;
     recorder.attach_scene(&scene_toml).map_err(failed)?;

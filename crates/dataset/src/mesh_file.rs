@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::io::Cursor;
 use std::path::Path;
 
-use granulcal_dem::Mesh;
+use granulcal_scene::Mesh;
 
 use crate::{DatasetError, files};
 
@@ -32,7 +32,8 @@ pub(crate) fn read(path: &Path) -> Result<(Mesh, String), DatasetError> {
         return Err(DatasetError::content(path, "a mesh's file", found, "named .stl or .obj"));
     };
     let name = path.display().to_string();
-    let mesh = Mesh::new(&vertices, &triangles, &name).map_err(DatasetError::Simulation)?;
+    let mesh =
+        Mesh::new(&vertices, &triangles, &name).map_err(|e| DatasetError::Simulation(e.into()))?;
     Ok((mesh, format!("{:016x}", xxhash_rust::xxh3::xxh3_64(&bytes))))
 }
 

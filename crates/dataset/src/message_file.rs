@@ -4,6 +4,7 @@
 //! is not where the file's index says where, and keeps a note of what it found.
 
 mod bag;
+mod format;
 mod mcap;
 mod mcap_record;
 mod unpack;
@@ -11,36 +12,17 @@ mod visit;
 
 use crate::DatasetError;
 use crate::input::Input;
+pub use format::MessageFormat;
 pub use visit::Damage;
 pub(crate) use visit::{Channel, Message, Visit, Walk};
 
-/// What a file of messages begins with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MessageFormat {
-    /// ROS 1 bag, version 2.0.
-    Bag,
-    /// MCAP.
-    Mcap,
-}
+/// Every format; a new one is a file in `message_file/` and a line here.
+const FORMATS: [&MessageFormat; 2] = [&bag::FORMAT, &mcap::FORMAT];
 
 impl MessageFormat {
     /// The format that a file's first bytes belong to.
     pub(crate) fn of(first: &[u8]) -> Option<Self> {
-        if first.starts_with(bag::MAGIC) {
-            Some(Self::Bag)
-        } else if first.starts_with(::mcap::MAGIC) {
-            Some(Self::Mcap)
-        } else {
-            None
-        }
-    }
-
-    /// Its name, as inspect shows it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Bag => "ROS 1 bag",
-            Self::Mcap => "MCAP",
-        }
+        FORMATS.into_iter().find(|format| first.starts_with(format.magic)).copied()
     }
 }
 
@@ -53,8 +35,5 @@ pub(crate) fn walk(
     input: &mut Input<'_>,
     visit: &mut Visit<'_>,
 ) -> Result<Walk, DatasetError> {
-    match format {
-        MessageFormat::Bag => bag::walk(input, visit),
-        MessageFormat::Mcap => mcap::walk(input, visit),
-    }
+    (format.walk)(input, visit)
 }

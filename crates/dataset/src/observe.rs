@@ -2,18 +2,18 @@
 
 use std::fmt;
 
-use granulcal_dem::{CameraSpec, Mask, Pour, Projection, ViewSpec};
+use granulcal_dem::Pour;
 use granulcal_features::stats::DIAGNOSTIC_COUNT;
 use granulcal_features::{
-    Camera, DepthImage, DiagnosticSettings, FeatureError, HeightMap, SensorNoise, diagnostics,
-    height_map, paper16,
+    Camera, DepthImage, DiagnosticSettings, FeatureError, HeightMap, Observe, SensorNoise,
+    diagnostics, height_map, paper16,
 };
+use granulcal_scene::{CameraSpec, Mask, Projection, ViewSpec};
 use nalgebra::{Vector2, Vector3};
 
 use crate::DatasetError;
 use crate::drawn::Drawn;
 use crate::random::{camera_seed, sensor_seed};
-use crate::sensor_file::sensor_of;
 
 /// Height above the ground `[m]` from which a pixel of a noise-free image shows a grain: the rounding
 /// of an f32 depth.
@@ -191,7 +191,7 @@ fn views(
     pour_seed: u64,
 ) -> Result<(View, View), DatasetError> {
     let noise = SensorNoise { blur_px: camera.blur, depth_sigma: camera.depth_noise };
-    let sensor = camera.sensor.as_ref().map(sensor_of);
+    let sensor = camera.sensor.as_ref();
     let seed = camera_seed(pour_seed);
     let views = match camera.projection {
         Projection::Pinhole => {
@@ -242,7 +242,9 @@ fn is_too_few(error: &FeatureError) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use granulcal_dem::{Health, NoiseSpec, Scene, SensorSpec, Status, StereoSpec};
+    use granulcal_dem::{Health, Status};
+    use granulcal_features::{DepthSensor, NoiseField, StereoSensor};
+    use granulcal_scene::Scene;
 
     use super::*;
 
@@ -311,14 +313,14 @@ mod tests {
     }
 
     /// A D435 as `fit-sensor` finds it on a board, with a pattern.
-    fn d435() -> SensorSpec {
-        let noise = NoiseSpec {
+    fn d435() -> DepthSensor {
+        let noise = NoiseField {
             correlated: 0.1,
             correlation_x: 6.0,
             correlation_y: 5.0,
-            ..NoiseSpec::default()
+            ..NoiseField::default()
         };
-        SensorSpec::Stereo(StereoSpec {
+        DepthSensor::Stereo(StereoSensor {
             focal_length: 390.43,
             baseline: 0.05017,
             quantisation: 1.0 / 32.0,
@@ -329,7 +331,7 @@ mod tests {
             dropout: 0.003,
             pattern_seed: 7,
             noise,
-            fixed_pattern: NoiseSpec::default(),
+            fixed_pattern: NoiseField::default(),
         })
     }
 
@@ -361,9 +363,9 @@ mod tests {
 
     #[test]
     fn colour_finds_the_grains_through_the_noise() {
-        let SensorSpec::Stereo(d435) = d435() else { unreachable!() };
-        let noise = NoiseSpec { correlated: 0.2, ..d435.noise };
-        let sensor = Some(SensorSpec::Stereo(StereoSpec { noise, ..d435 }));
+        let DepthSensor::Stereo(d435) = d435() else { unreachable!() };
+        let noise = NoiseField { correlated: 0.2, ..d435.noise };
+        let sensor = Some(DepthSensor::Stereo(StereoSensor { noise, ..d435 }));
         let by_height = CameraSpec { sensor, ..CameraSpec::default() };
         let by_colour = CameraSpec { mask: Mask::Colour, ..by_height };
         let clean = observe(&CameraSpec::default(), &carpet(0.0), 3).unwrap().points.len();

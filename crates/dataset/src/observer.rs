@@ -12,7 +12,8 @@ mod radius;
 mod spill;
 mod surface;
 
-use granulcal_dem::{Pour, Scene, Simulation, Status};
+use granulcal_dem::{Pour, Simulation, Status};
+use granulcal_scene::Scene;
 
 use crate::row::RowStatus;
 use observation::{Frame, Observation};

@@ -3,10 +3,9 @@
 //! The bounds are wide, so that no formation of the scene is beyond them, whatever its material: grains end no higher
 //! than they began, take no more room than grains can, lie where the camera looks, on a ground that is flat.
 
-use granulcal_dem::{Scene, Simulation};
+use granulcal_dem::Simulation;
 use granulcal_features::Formation;
-
-use crate::Prior;
+use granulcal_scene::{Prior, Scene};
 
 /// Factor on the height in which the grains start.
 const HEIGHT_MARGIN: f64 = 1.5;
@@ -38,7 +37,8 @@ impl Limits {
     /// Those of a scene whose parameters are drawn from `prior`; `None` for one that cannot begin.
     pub fn of(scene: &Scene, prior: &Prior) -> Option<Self> {
         let ends = [0.0, 0.5, 1.0].map(|share| {
-            let draw = |p: &crate::Parameter| p.distribution.quantile(share_inside(share));
+            let draw =
+                |p: &granulcal_scene::Parameter| p.distribution.quantile(share_inside(share));
             prior.parameters().iter().map(draw).collect::<Vec<f64>>()
         });
         let drawn = ends.iter().filter_map(|values| prior.apply(scene, values).ok());

@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::Path;
 
-use granulcal_dem::Scene;
+use granulcal_scene::Scene;
 
 use crate::DatasetError;
 

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use granulcal_dem::{Motion, Scene};
+use granulcal_scene::{Motion, Prior, Scene, SceneError};
 
-use crate::{DatasetError, Prior, files, mesh_file, trajectory_file};
+use crate::{DatasetError, files, mesh_file, trajectory_file};
 
 /// Reads a scene with the meshes and trajectories that it names; their paths are from its folder.
 ///
@@ -25,9 +25,9 @@ pub fn load_scene(path: &Path) -> Result<Scene, DatasetError> {
 /// # Errors
 /// As [`load_scene`], but for [`DatasetError::Io`] of the scene itself; [`DatasetError::Simulation`] for what is no scene.
 pub fn scene_from_text(text: &str, folder: &Path) -> Result<Scene, DatasetError> {
-    let mut scene = Scene::parse(text).map_err(DatasetError::Simulation)?;
+    let mut scene = Scene::parse(text).map_err(|e| DatasetError::Simulation(e.into()))?;
     fill(&mut scene, folder)?;
-    scene.check().map_err(DatasetError::Simulation)?;
+    scene.check().map_err(|e| DatasetError::Simulation(e.into()))?;
     Ok(scene)
 }
 
@@ -65,9 +65,9 @@ pub(crate) fn fill(scene: &mut Scene, folder: &Path) -> Result<(), DatasetError>
 /// TOML of a prior, [`DatasetError::Prior`] for a parameter that cannot be.
 pub fn load_prior(path: &Path) -> Result<Prior, DatasetError> {
     Prior::from_toml(&files::read_text(path)?).map_err(|error| match error {
-        DatasetError::PriorToml(source) => {
+        SceneError::PriorToml(source) => {
             DatasetError::Toml { path: path.to_owned(), what: "prior", source }
         }
-        other => other,
+        other => DatasetError::Prior(other),
     })
 }

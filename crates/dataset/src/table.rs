@@ -329,10 +329,10 @@ fn check_columns(
 
 #[cfg(test)]
 mod tests {
-    use granulcal_dem::Scene;
+    use granulcal_scene::Scene;
 
     use super::*;
-    use crate::Prior;
+    use granulcal_scene::Prior;
 
     #[test]
     fn files_without_diagnostic_statistics_are_read() {

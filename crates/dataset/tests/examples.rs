@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use granulcal_dataset::{CameraFile, Prior, load_prior, load_scene};
-use granulcal_dem::Scene;
+use granulcal_scene::Scene;
 
 fn example(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples").join(name)

@@ -8,7 +8,8 @@ use granulcal_dataset::{
     Drawn, Lost, Observer, ReadOptions, Recording, Source, Survey, View, look, look_from,
     record_pour,
 };
-use granulcal_dem::{Scene, Simulation, ViewSpec};
+use granulcal_dem::Simulation;
+use granulcal_scene::{Scene, ViewSpec};
 
 fn scene() -> Scene {
     let mut scene = Scene::drop(0.02);

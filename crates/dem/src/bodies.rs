@@ -21,13 +21,13 @@ use std::sync::Arc;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::grain_shape::Solid;
-use crate::material::Material;
-use crate::scene::Scene;
 use crate::turns::turns;
 use crate::wall::Walls;
 use body::{Moving, RigidBody};
 use contact::{Point, WALL};
+use granulcal_scene::Material;
+use granulcal_scene::Scene;
+use granulcal_scene::Solid;
 
 /// Keeps the orientations of a seed apart from its places.
 const STREAM: u64 = 0xbb67_ae85_84ca_a73b;

@@ -2,14 +2,12 @@
 //!
 //! docs/theory/checkpoint.md has the layout. What is inside the envelope is in `simulation/state.rs`.
 
+use granulcal_scene::{Scene, SceneError, SolverSettings, first_difference};
 use serde::{Deserialize, Serialize};
 use toml::Value;
 use xxhash_rust::xxh3::xxh3_128;
 
 use crate::error::DemError;
-use crate::preset::SolverSettings;
-use crate::scene::Scene;
-use crate::scene::path::first_difference;
 
 /// What a checkpoint begins with.
 const MAGIC: &[u8] = b"granulcal checkpoint\n";
@@ -88,7 +86,7 @@ impl CheckpointHeader {
             return differs("seed".to_owned(), self.seed.to_string(), given.seed.to_string());
         }
         let (here, there) = (Value::try_from(self.settings), Value::try_from(given.settings));
-        let tree = |value: Result<Value, _>| value.map_err(|e| DemError::TomlWrite(Box::new(e)));
+        let tree = |value: Result<Value, _>| value.map_err(|e| SceneError::TomlWrite(Box::new(e)));
         let difference = first_difference("settings", Some(&tree(here)?), Some(&tree(there)?));
         if let Some((path, found, given)) = difference {
             return differs(path, found, given);

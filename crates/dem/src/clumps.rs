@@ -12,6 +12,7 @@
 //! does not change any more is the solution for rigid bodies. Source: mass splitting, Tonge et al., ACM Trans. Graph. 31 (2012)
 //! 105, doi:10.1145/2185520.2185601. Angular momentum is what is kept in flight, in a frame that does not turn.
 
+use granulcal_scene::{ClumpShape, Effect, Scene};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +20,6 @@ use crate::bed::Bed;
 use crate::body::Body;
 use crate::lanes::Row;
 use crate::law::INVERSE_INERTIA;
-use crate::scene::{ClumpShape, Effect, Scene};
 use crate::turns::turns;
 
 /// Keeps the orientations of a seed apart from its places.

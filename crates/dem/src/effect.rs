@@ -10,9 +10,9 @@ mod pull;
 
 use nalgebra::Vector3;
 
-use crate::scene::{Effect, RestitutionSpeed, Scene, Vibration};
 use drag::Drag;
 use film::Film;
+use granulcal_scene::{Effect, RestitutionSpeed, Scene, Vibration};
 pub(crate) use pad::Pad;
 pub(crate) use pull::{Bridges, Pull};
 

@@ -1,43 +1,14 @@
-//! What can be wrong with a scene, a material or a path.
+//! What can be wrong with a simulation and its checkpoint.
+
+use granulcal_scene::SceneError;
 
 /// Everything that this crate refuses. Each variant names the thing, what was found and what is allowed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DemError {
-    /// A number lies outside its range.
-    #[error("{name} must be {allowed}, got {got}")]
-    OutOfRange {
-        /// Path of the number in the scene, for example `material.restitution`.
-        name: String,
-        /// The value found.
-        got: f64,
-        /// The allowed range in words.
-        allowed: &'static str,
-    },
-    /// The scene's TOML could not be read.
-    #[error("scene is not valid TOML of a scene")]
-    Toml(#[source] Box<toml::de::Error>),
-    /// The scene could not be written as TOML.
-    #[error("scene cannot be written as TOML")]
-    TomlWrite(#[source] Box<toml::ser::Error>),
-    /// A path such as `material.sliding_friction` does not name a number of the scene.
-    #[error("path {path:?} does not name a number of this scene: {reason}")]
-    Path {
-        /// The path asked for.
-        path: String,
-        /// Why it does not fit, with what is allowed there.
-        reason: String,
-    },
-    /// A count of grains does not fit the start that should hold it.
-    #[error("start {kind} holds {capacity} grains, but grains.count is {count}")]
-    StartTooSmall {
-        /// The kind of start.
-        kind: &'static str,
-        /// How many grains it can hold.
-        capacity: usize,
-        /// How many are asked for.
-        count: usize,
-    },
+    /// The scene is wrong, or a number that is asked of it.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// Grains start inside a wall.
     #[error(
         "{grains} grain(s) start in {wall}, the deepest by {depth:.2} of its radius; at most {allowed} is allowed"
@@ -61,24 +32,6 @@ pub enum DemError {
         grains: usize,
         /// The outflow's height `[m]`.
         below: f64,
-    },
-    /// Arrays of a state differ in length.
-    #[error("{name} has {got} entries, expected one for each of the {expected} grains")]
-    Length {
-        /// Name of the array.
-        name: &'static str,
-        /// Its length.
-        got: usize,
-        /// The length it must have.
-        expected: usize,
-    },
-    /// A mesh that cannot be a wall.
-    #[error("mesh {file} {reason}")]
-    Mesh {
-        /// The file that it stands in.
-        file: String,
-        /// What is wrong with it, and what is allowed.
-        reason: String,
     },
     /// The operating system gave no threads.
     #[error("cannot start the threads for a simulation")]
@@ -139,59 +92,17 @@ pub enum DemError {
         /// What is wrong.
         what: &'static str,
     },
-    /// A solver method that does not exist.
-    #[error("method must be one of nsgs, newton_pcr, reference, got {got:?}")]
-    UnknownMethod {
-        /// The name found.
-        got: String,
-    },
-    /// Points or a mesh that are no convex body.
-    #[error("grains.shape is no body: {what}")]
-    BadShape {
-        /// What is wrong.
-        what: &'static str,
-    },
-    /// Two things that cannot be in one scene.
-    #[error("{one} and {other} cannot be in one scene")]
-    Exclude {
-        /// Table of the one.
-        one: &'static str,
-        /// Table of the other.
-        other: &'static str,
-    },
     /// An effect that a contact problem cannot say when it is written by itself.
     #[error("a contact problem cannot be written of a scene with {effect}")]
     NotInContactProblem {
         /// The table of the effect in the scene.
         effect: &'static str,
     },
-    /// An effect that the solver's method does not know.
-    #[error("{effect} needs the method nsgs (every preset but paper), got {got}")]
-    EffectNeedsMethod {
-        /// The table of the effect in the scene.
-        effect: &'static str,
-        /// The method found.
-        got: &'static str,
-    },
-    /// A view without a name of its own.
-    #[error("{path} must be of letters, digits, - and _, and no other view's, got {got:?}")]
-    ViewName {
-        /// Where it stands in the scene.
-        path: String,
-        /// The name found.
-        got: String,
-    },
-    /// A preset that does not exist.
-    #[error("preset must be one of fast, default, accurate, paper, got {got:?}")]
-    UnknownPreset {
-        /// The name found.
-        got: String,
-    },
 }
 
 impl DemError {
-    /// An [`DemError::OutOfRange`] for `name`.
+    /// A [`SceneError::OutOfRange`] for `name`.
     pub(crate) fn range(name: impl Into<String>, got: f64, allowed: &'static str) -> Self {
-        Self::OutOfRange { name: name.into(), got, allowed }
+        Self::Scene(SceneError::range(name, got, allowed))
     }
 }

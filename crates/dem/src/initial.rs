@@ -1,10 +1,11 @@
 //! The grains of a scene at time zero.
 
+use granulcal_scene::Scene;
+
 use crate::bed::Bed;
 use crate::clumps::Clumps;
 use crate::lanes::Row;
 use crate::period::Period;
-use crate::scene::Scene;
 
 /// The grains where they start, as large and as heavy as the scene says: the spheres of `clumps` if they are not round.
 pub(crate) fn bed(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Bed {

@@ -34,7 +34,6 @@ mod bed;
 mod blocks;
 mod bodies;
 mod body;
-mod check;
 mod checkpoint;
 mod clumps;
 mod contact;
@@ -43,13 +42,11 @@ mod contacts;
 mod effect;
 mod error;
 mod frozen_search;
-mod grain_shape;
 mod health;
 mod impact;
 mod initial;
 mod lanes;
 mod law;
-mod material;
 mod neighbor;
 mod parallel;
 mod partners;
@@ -57,10 +54,8 @@ mod path;
 mod period;
 mod placement;
 mod pour;
-mod preset;
 mod problem;
 mod rebound;
-mod scene;
 mod simulation;
 mod solver;
 mod surroundings;
@@ -71,26 +66,21 @@ mod wall_load;
 pub use checkpoint::CheckpointHeader;
 pub use error::DemError;
 pub use frozen_search::FrozenSearch;
-pub use grain_shape::GrainShape;
+/// What is asked, from the crate below; all of it is in [`granulcal_scene`].
+pub use granulcal_scene::{
+    Adhesion, BoxSide, CameraSpec, Capillary, Clump, Complementarity, DepthSensor, Effect, Effects,
+    EndRule, Ends, Fluid, Funnel, FunnelPose, GRAVITY, GrainShape, Grains, Ground, GroundUnlike,
+    ImpactSettings, Layer, Lubrication, Mask, Material, Mesh, MeshFile, Method, Motion,
+    NewtonSettings, NoiseField, Observe, ObserveDischarge, ObserveFront, ObserveImages,
+    ObserveRadius, ObserveSpill, ObserveSurface, Outflow, Outlet, Periodic, PeriodicAxis,
+    Polydispersity, Preset, Projection, ReferenceSettings, RestitutionSpeed, RollingForm, Scene,
+    SceneError, Shape, SolverSettings, Start, StereoSensor, Tilt, TimeOfFlightSensor, Vibration,
+    ViewSpec, Wall, WallMaterial, rolling_friction_from_length, rolling_friction_to_length,
+};
 pub use health::{Health, MAX_ENERGY_CREATED};
 pub use impact::ImpactWork;
-pub use material::{
-    Material, WallMaterial, rolling_friction_from_length, rolling_friction_to_length,
-};
 pub use pour::{ConvexGrains, Pour, Status};
-pub use preset::{
-    Complementarity, ImpactSettings, Method, NewtonSettings, Preset, ReferenceSettings,
-    SolverSettings,
-};
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
-pub use scene::{
-    Adhesion, BoxSide, CameraSpec, Capillary, Clump, Effect, Effects, EndRule, Ends, Fluid, Funnel,
-    FunnelPose, GRAVITY, Grains, Ground, GroundUnlike, Layer, Lubrication, Mask, Mesh, MeshFile,
-    Motion, NoiseSpec, Observe, ObserveDischarge, ObserveFront, ObserveImages, ObserveRadius,
-    ObserveSpill, ObserveSurface, Outflow, Outlet, Periodic, PeriodicAxis, Polydispersity,
-    Projection, RestitutionSpeed, RollingForm, Scene, SensorSpec, Shape, Start, StereoSpec, Tilt,
-    TimeOfFlightSpec, Vibration, ViewSpec, Wall,
-};
 pub use simulation::Simulation;
 pub use solver::frozen::{FrozenSolution, FrozenSolve};
 pub use wall_load::WallLoad;

@@ -4,10 +4,10 @@
 //! lengths apart and the nearest image of one seen from the other is at most one length away (minimum image
 //! convention; Allen and Tildesley, Computer Simulation of Liquids, 1.6.2).
 
+use granulcal_scene::Periodic;
 use nalgebra::Vector3;
 
 use crate::lanes::{Reg, Reg3, Width};
-use crate::scene::Periodic;
 
 /// The axis along which space repeats.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +77,7 @@ impl Period {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::PeriodicAxis;
+    use granulcal_scene::PeriodicAxis;
 
     #[test]
     fn nearest_images_are_at_most_half_a_length_away() {

@@ -1,8 +1,7 @@
 //! Where a moving wall is in a substep, and how fast (docs/theory/contact.md, "Walls that move").
 
+use granulcal_scene::Motion;
 use nalgebra::{Isometry3, Vector3};
-
-use crate::scene::Motion;
 
 /// Pose of a wall at the begin of a substep, and the pose that it has moved by at the end.
 #[derive(Clone, Debug)]

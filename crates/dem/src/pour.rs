@@ -5,8 +5,8 @@ use std::fmt;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::grain_shape::Solid;
 use crate::health::Health;
+use granulcal_scene::Solid;
 
 /// How a pour ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

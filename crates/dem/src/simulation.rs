@@ -9,6 +9,7 @@ mod substep;
 
 use std::sync::Arc;
 
+use granulcal_scene::{Scene, SolverSettings};
 use nalgebra::Vector3;
 
 use crate::bed::Bed;
@@ -23,8 +24,6 @@ use crate::impact::{ImpactWork, Impacts};
 use crate::initial;
 use crate::parallel::Threads;
 use crate::pour::{ConvexGrains, Pour, Status};
-use crate::preset::SolverSettings;
-use crate::scene::Scene;
 use crate::surroundings::Surroundings;
 use crate::wall_load::{self, WallLoad};
 

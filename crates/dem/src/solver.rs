@@ -4,11 +4,12 @@
 //! before, the warm start, and leaves the impulses and velocities of its solution.
 //! docs/theory/solvers.md derives and compares them; each file reads as its box there.
 
+use granulcal_scene::{Method, SolverSettings};
+
 use crate::body::Body;
 use crate::clumps::Clumps;
 use crate::contact_set::ContactSet;
 use crate::parallel::Threads;
-use crate::preset::{Method, SolverSettings};
 use crate::solver::work::Work;
 
 mod components;

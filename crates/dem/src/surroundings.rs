@@ -1,15 +1,13 @@
 //! What the contacts of a simulation are made of: walls, material, effects and settings.
 
+use granulcal_scene::{Material, Scene, SolverSettings};
 use nalgebra::Vector3;
 
 use crate::bed::Bed;
 use crate::contact::ContactLaw;
 use crate::effect::Acting;
-use crate::material::Material;
 use crate::parallel::Threads;
 use crate::path::Reach;
-use crate::preset::SolverSettings;
-use crate::scene::Scene;
 use crate::wall::Walls;
 
 /// Gap below which a contact is listed among those that will act, in radii of a typical grain `[-]`.

@@ -9,10 +9,9 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use crate::material::{Material, WallMaterial};
 use crate::placement::Placement;
-use crate::scene::{self, BoxSide, Motion, Scene, Shape};
 use facets::Facets;
+use granulcal_scene::{BoxSide, Material, Motion, Scene, Shape, WallMaterial};
 pub(crate) use surface::Nearest;
 use surface::{Surface, surfaces};
 
@@ -111,7 +110,7 @@ impl Walls {
             material: material.over(&scene.material),
             placement: Placement::new(motion),
         };
-        let of = |wall: &scene::Wall| resolve(&wall.shape, &wall.material, &wall.motion);
+        let of = |wall: &granulcal_scene::Wall| resolve(&wall.shape, &wall.material, &wall.motion);
         let mut all = vec![resolve(&ground, &scene.ground.material, &Motion::Still)];
         all[0].material = scene.effects.ground.of(all[0].material);
         if let Some(funnel) = &scene.funnel {
@@ -245,7 +244,7 @@ mod tests {
         scene.ground.material.restitution = Some(0.1);
         let open = Vec::new();
         let shape = Shape::Box { min: [0.0; 3], max: [1.0; 3], open };
-        scene.walls.push(scene::Wall::fixed(shape, WallMaterial::default()));
+        scene.walls.push(granulcal_scene::Wall::fixed(shape, WallMaterial::default()));
         let walls = Walls::of(&scene);
         assert_eq!((walls.count(), walls.surfaces()), (4, 3 + 12));
         assert!(matches!(walls.all[0].surfaces[..], [Surface::Plane { .. }]));

@@ -40,6 +40,9 @@ pub enum FeatureError {
         /// Largest value allowed.
         max: f64,
     },
+    /// A number of a sensor that none has.
+    #[error(transparent)]
+    Sensor(#[from] granulcal_scene::SceneError),
     /// Frames of a flat surface that show something else.
     #[error(
         "the frames must show something flat: {on_surface:.0} % of the pixels lie on one smooth surface (at least 50), \

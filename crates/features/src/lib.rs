@@ -67,7 +67,9 @@ pub use segment::{
     EdgePixels, Formation, Kind, Levelled, Segmentation, Shape, Threshold, grain_points,
     level_depth, level_height_map, segment_depth, segment_height_map,
 };
-pub use sensor::{DepthSensor, NoiseField, SensorNoise, StereoSensor, TimeOfFlightSensor};
+pub use sensor::{
+    DepthSensor, Moments, NoiseField, Observe, SensorNoise, StereoSensor, TimeOfFlightSensor,
+};
 pub use stats::{
     DIAGNOSTICS, DiagnosticSettings, PAPER16, Prepared, Statistic, Survey, diagnostics, paper16,
 };

@@ -5,26 +5,22 @@
 //! Derived in `docs/theory/sensor.md`.
 
 mod blur;
-mod depth_sensor;
 mod field;
 pub mod fit;
 mod holes;
 mod observe;
 
-pub use depth_sensor::{DepthSensor, GRAZING_DEG, StereoSensor, TimeOfFlightSensor};
-pub use field::NoiseField;
+pub use field::Moments;
+pub use granulcal_scene::{DepthSensor, GRAZING_DEG, NoiseField, StereoSensor, TimeOfFlightSensor};
+pub use observe::Observe;
 
+use granulcal_scene::{MAX_BLUR, MAX_DEPTH_NOISE};
 use serde::{Deserialize, Serialize};
 
 use crate::depth::{DepthImage, is_valid};
 use crate::error::{FeatureError, require_in};
 use crate::height_map::HeightMap;
 use crate::rng::Stream;
-
-/// Largest blur `[px]` that is accepted: the kernel is 8 σ wide.
-const MAX_BLUR_PX: f64 = 1000.0;
-/// Largest depth noise `[m]` that is accepted.
-const MAX_DEPTH_SIGMA: f64 = 1e3;
 
 /// A depth camera's errors: first the blur, then the noise. The default is none.
 ///
@@ -78,8 +74,8 @@ impl SensorNoise {
 
     /// Blurs and disturbs a row-major field in which NaN is no data.
     fn disturb(&self, field: Vec<f64>, width: usize, seed: u64) -> Result<Vec<f64>, FeatureError> {
-        require_in("blur_px [px]", self.blur_px, 0.0, MAX_BLUR_PX)?;
-        require_in("depth_sigma [m]", self.depth_sigma, 0.0, MAX_DEPTH_SIGMA)?;
+        require_in("blur_px [px]", self.blur_px, 0.0, MAX_BLUR)?;
+        require_in("depth_sigma [m]", self.depth_sigma, 0.0, MAX_DEPTH_NOISE)?;
         let mut field =
             if self.blur_px > 0.0 { blur::normalised(&field, width, self.blur_px) } else { field };
         if self.depth_sigma > 0.0 {

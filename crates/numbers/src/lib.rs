@@ -55,6 +55,16 @@ pub fn scatter(word: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// One word of a seed, a row and what it is for: streams that differ in any of the three are unrelated.
+///
+/// ```
+/// use granulcal_numbers::{mix, scatter};
+/// assert_eq!(mix(1, 2, 3), scatter(scatter(scatter(1) ^ 2) ^ 3));
+/// ```
+pub fn mix(seed: u64, row: u64, purpose: u64) -> u64 {
+    scatter(scatter(scatter(seed) ^ row) ^ purpose)
+}
+
 /// Standard normal distribution function.
 ///
 /// ```

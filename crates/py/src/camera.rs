@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use granulcal_dataset::{CameraFile, Claims, Form, Product, load_sensor, png, sensor_of};
-use granulcal_features::{DepthImage, Intrinsics, SensorNoise};
+use granulcal_dataset::{CameraFile, Claims, Form, Product, load_sensor, png};
+use granulcal_features::{DepthImage, Intrinsics, Observe, SensorNoise};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
@@ -60,7 +60,7 @@ impl Camera {
                 let image = granulcal_features::render(&self.inner, positions, radii)?;
                 let image = SensorNoise { blur_px, depth_sigma }.apply(&image, seed)?;
                 match sensor {
-                    Some(sensor) => sensor_of(&sensor).observe(&self.inner, &image, seed),
+                    Some(sensor) => sensor.observe(&self.inner, &image, seed),
                     None => Ok(image),
                 }
             })

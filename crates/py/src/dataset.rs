@@ -126,7 +126,7 @@ impl Dataset {
 
     #[getter]
     fn prior_toml(&self) -> PyResult<String> {
-        self.inner.header.prior.to_toml().map_err(error::dataset)
+        self.inner.header.prior.to_toml().map_err(error::dem)
     }
 
     #[getter]

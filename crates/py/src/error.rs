@@ -10,8 +10,8 @@ use pyo3::PyErr;
 use pyo3::exceptions::{PyBlockingIOError, PyOSError, PyRuntimeError, PyValueError};
 
 /// A refused scene or simulation: ValueError.
-pub(crate) fn dem(error: DemError) -> PyErr {
-    PyValueError::new_err(chain(&error))
+pub(crate) fn dem(error: impl Into<DemError>) -> PyErr {
+    PyValueError::new_err(chain(&error.into()))
 }
 
 /// A refused image or cloud of points: ValueError.

@@ -16,6 +16,7 @@ mod generate;
 mod levelled;
 mod observation;
 mod pour;
+mod prior;
 mod recording;
 mod run_cli;
 mod scene;
@@ -46,6 +47,8 @@ mod _native {
     use crate::observation::Observation;
     #[pymodule_export]
     use crate::pour::Pour;
+    #[pymodule_export]
+    use crate::prior::check_parameter;
     #[pymodule_export]
     use crate::recording::Recording;
     #[pymodule_export]

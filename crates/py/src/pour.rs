@@ -1,7 +1,8 @@
 //! Class `Pour`.
 
 use granulcal_dataset::{Drawn, Observed, RowStatus, Series, View};
-use granulcal_dem::{CameraSpec, Health, ViewSpec};
+use granulcal_dem::Health;
+use granulcal_scene::{CameraSpec, ViewSpec};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -11,13 +11,11 @@ from granulcal.design.ring import PERCENTILES
 from granulcal.design.ring_model import HEIGHT
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
+from granulcal.pours.status import UNUSABLE
 
 __all__ = ["Pattern", "simulate_plan"]
 
 Array = NDArray[np.float64]
-
-# Long enough for one substep, too short to fall.
-_UNUSABLE = ("jammed", "unhealthy")
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,7 @@ class Pattern:
             if status == "jammed"
             else f"pour {i} is unhealthy: the simulation lost its accuracy, try another seed"
             for i, status in enumerate(self.statuses, start=1)
-            if status in _UNUSABLE
+            if status in UNUSABLE
         )
 
     @property

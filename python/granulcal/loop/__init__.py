@@ -8,7 +8,7 @@ from granulcal.loop.effects.design import Design, Effect
 from granulcal.loop.experiment import Experiment, next_experiment
 from granulcal.loop.surrogate.observation import Observation
 from granulcal.loop.surrogate.surrogate import Surrogate
-from granulcal.loop.test.misfit import Improvement, compare
+from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Power, Trace, power, trace
 from granulcal.loop.test.verdict import Verdict

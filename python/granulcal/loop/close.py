@@ -20,12 +20,12 @@ from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.check.checks import calibrated, confirmed, corrected, moved, nearer, trivial
 from granulcal.loop.check.correction import Correction
-from granulcal.loop.check.coverage import FEWEST_PAIRS, Calibrated
+from granulcal.loop.check.coverage import FEWEST_PAIRS, Coverage
 from granulcal.loop.check.prior_rounds import LOOKS, look_over
 from granulcal.loop.check.standing import Standing, stand
 from granulcal.loop.effects.definitions import is_definition
 from granulcal.loop.experiment import Experiment, next_experiment
-from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
@@ -44,7 +44,7 @@ from granulcal.loop.surrogate.observation import Observation
 from granulcal.loop.surrogate.store_surrogate import fit_surrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Condition, Task
-from granulcal.loop.test.misfit import Improvement
+from granulcal.loop.test.distance import Improvement
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Explanation, Power, Trace, power, trace
 from granulcal.loop.test.verdict import Verdict
@@ -95,7 +95,7 @@ class Closed:
     measured: dict[str, Array]
     simulated: dict[str, tuple[Array, Array]]
     corrections: tuple[Correction, ...] = ()
-    calibrated: Calibrated | None = None
+    calibrated: Coverage | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -308,7 +308,7 @@ def close_loop(
 @one_thread()
 def planned(
     task: Task, budget: int, seed: int, pairs: int = 0, rounds: int = 0, draws: int = 0
-) -> Plan:
+) -> ArchivePlan:
     """Returns the archive that a budget affords; `pairs`, `rounds` and `draws` are kept back.
 
     Raises:
@@ -328,7 +328,7 @@ def planned(
             f"a budget of {budget} pours is too small for {own} effects and "
             f"{len(task.conditions)} conditions; {enough} would be enough"
         )
-    return Plan(
+    return ArchivePlan(
         scene=task.at_first(),
         prior=task.prior,
         conditions=task.inputs,
@@ -351,7 +351,7 @@ def _needed(task: Task, pairs: int, draws: int) -> int:
     return each * (2 * REPLICATES * len(task.conditions) + (1 + pairs) * measured) + look
 
 
-def _candidates(plan: Plan) -> list[tuple[str, Array]]:
+def _candidates(plan: ArchivePlan) -> list[tuple[str, Array]]:
     """Conditions that further pours might have: each input over its range, others in the middle.
 
     Or those of the archive, where it has pours there alone.

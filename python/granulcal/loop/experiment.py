@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from granulcal.loop.surrogate.linearised import Local
+from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.test.score import Scores
 from granulcal.loop.test.trace import Trace, fit_at
@@ -83,7 +83,7 @@ def next_experiment(
     ranked = []
     for label, condition in candidates:
         at = np.atleast_1d(np.asarray(condition, dtype=np.float64))
-        both = Local.at(
+        both = LinearisedSurrogate.at(
             surrogate,
             np.concatenate([local.conditions, at[None]]),
             np.append(local.counts, float(pours)),
@@ -97,7 +97,11 @@ def next_experiment(
 
 
 def _gains(
-    local: Local, v: Array, names: list[str], strengths: dict[str, float], rivals: list[str]
+    local: LinearisedSurrogate,
+    v: Array,
+    names: list[str],
+    strengths: dict[str, float],
+    rivals: list[str],
 ) -> tuple[dict[tuple[str, ...], float], float]:
     """Expected log Bayes factor of each pair of rivals, and half the log determinant of theta."""
     effects = tuple(names.index(name) for name in rivals)

@@ -11,7 +11,7 @@ from granulcal.engines.in_use import version_of_pours
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.effects.library import described, fingerprint
-from granulcal.loop.pours.archive import Plan
+from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.task import Task
 from granulcal.loop.test.thresholds import Thresholds
 
@@ -23,7 +23,7 @@ _NAME = "preregistration.json"
 def register(
     folder: Path,
     task: Task,
-    plan: Plan,
+    plan: ArchivePlan,
     thresholds: Thresholds,
     seed: int,
     statistics: tuple[str, ...],

@@ -18,6 +18,7 @@ from granulcal.errors import UnverifiedDataWarning
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import check_whole, require_scene
 from granulcal.pours.statistics import DIAGNOSTIC_NAMES, NAMES
+from granulcal.pours.status import NO_GRAINS, UNUSABLE
 from granulcal.prior import Prior
 from granulcal.progress import ProgressLine
 
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 __all__ = ["Dataset", "generate"]
 
 Array = NDArray[np.float64]
-
-_UNUSABLE = ("unhealthy", "jammed", "no_grains_in_view")
 
 
 class Dataset:
@@ -115,7 +114,7 @@ class Dataset:
     @property
     def is_usable(self) -> NDArray[np.bool_]:
         """Which pours are healthy, left the funnel and show every statistic of `x`, shape (n,)."""
-        return ~np.isin(self.status, _UNUSABLE) & np.isfinite(self.x).all(axis=1)
+        return ~np.isin(self.status, (*UNUSABLE, NO_GRAINS)) & np.isfinite(self.x).all(axis=1)
 
     def status_counts(self) -> dict[str, int]:
         """Returns how many pours ended in each status."""

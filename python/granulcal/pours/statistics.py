@@ -135,7 +135,7 @@ class DiagnosticStatistics(_Named):
     modes of mass and rim, isolated grains and clusters, the tail, the depth of the middle.
 
     Attributes:
-        values: values in the order of `DIAGNOSTIC_NAMES`, SI units, shape (43,).
+        values: values in the order of `DIAGNOSTIC_NAMES`, SI units, shape (d,).
     """
 
     values: Array

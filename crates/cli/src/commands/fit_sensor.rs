@@ -7,7 +7,7 @@ use granulcal_dataset::{DatasetError, Form, Recording, Source, save_sensor, writ
 use granulcal_features::sensor::fit::{
     Comparison, FitSettings, FlatFrames, SensorFit, compare, fit,
 };
-use granulcal_features::{Camera, DepthImage, DepthSensor, HeightMap, NoiseField};
+use granulcal_features::{Camera, DepthImage, DepthSensor, HeightMap, Moments, NoiseField};
 use serde_json::{Value, json};
 
 use crate::args::FitSensorArgs;

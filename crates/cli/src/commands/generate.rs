@@ -2,7 +2,7 @@
 
 use cpu_time::ThreadTime;
 use granulcal_dataset::{Dataset, GenerateOptions, Observer, Prior, Summary, generate};
-use granulcal_dem::Scene;
+use granulcal_scene::Scene;
 use serde_json::json;
 
 use crate::args::GenerateArgs;

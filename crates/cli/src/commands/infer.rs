@@ -7,8 +7,8 @@ use std::path::Path;
 use anyhow::Context as _;
 use granulcal_bayessim::Model;
 use granulcal_dataset::{Form, Limits, Recording, scene_from_text, write_file};
-use granulcal_dem::Scene;
 use granulcal_features::{Formation, PAPER16};
+use granulcal_scene::Scene;
 use serde_json::json;
 
 use crate::args::InferArgs;

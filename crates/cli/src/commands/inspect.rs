@@ -10,7 +10,7 @@ use granulcal_dataset::{
     CameraFile, Dataset, DatasetError, Folder, Npz, Prior, load_prior, load_scene, npy, png,
     read_checkpoint_header,
 };
-use granulcal_dem::Scene;
+use granulcal_scene::Scene;
 use serde_json::{Map, Value, json};
 
 use crate::args::InspectArgs;

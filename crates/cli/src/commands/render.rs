@@ -5,7 +5,7 @@ use std::path::Path;
 use granulcal_dataset::{
     CameraFile, Drawn, Observer, View, look, look_from, npy, png, write_height_map,
 };
-use granulcal_dem::{Projection, Scene, ViewSpec};
+use granulcal_scene::{Projection, Scene, ViewSpec};
 
 use crate::args::RenderArgs;
 use crate::context::{Context, print_line};

@@ -7,8 +7,9 @@ use cpu_time::ProcessTime;
 use granulcal_dataset::{
     DatasetError, ObservedStatistic, Observer, Room, RowStatus, npy, observe, observed_statistics,
 };
-use granulcal_dem::{Health, Pour, Scene};
+use granulcal_dem::{Health, Pour};
 use granulcal_features::{DIAGNOSTICS, PAPER16, Statistic};
+use granulcal_scene::Scene;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use granulcal_dem::Scene;
+use granulcal_scene::Scene;
 
 use super::*;
 use crate::{Dataset, merge};

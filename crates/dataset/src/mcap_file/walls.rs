@@ -4,7 +4,7 @@ use foxglove::messages::{
     Color, CubePrimitive, CylinderPrimitive, Point3, Pose, Quaternion, SceneEntity, SceneUpdate,
     TriangleListPrimitive, Vector3 as Vector,
 };
-use granulcal_dem::{BoxSide, Funnel, Motion, Scene, Shape};
+use granulcal_scene::{BoxSide, Funnel, Motion, Scene, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::stamp::{WORLD, timestamp};

@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use self::fields::{Cut, Fields};
+use super::format::MessageFormat;
 use super::unpack::unpack;
 use super::visit::{Channel, Message, Visit, Walk};
 use crate::DatasetError;
@@ -21,7 +22,10 @@ use crate::fault::Fault;
 use crate::input::Input;
 
 /// The first line of a bag.
-pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
+const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
+
+/// ROS 1 bag, version 2.0.
+pub(super) const FORMAT: MessageFormat = MessageFormat { name: "ROS 1 bag", magic: MAGIC, walk };
 
 /// A header beyond this `[B]` is a damaged length: it holds a topic's name and some numbers.
 const MAX_HEADER: u64 = 1 << 20;
@@ -35,7 +39,7 @@ const OP_CHUNK: u8 = 5;
 const OP_CHUNK_INFO: u8 = 6;
 const OP_CONNECTION: u8 = 7;
 
-pub(super) fn walk(input: &mut Input<'_>, visit: &mut Visit<'_>) -> Result<Walk, DatasetError> {
+fn walk(input: &mut Input<'_>, visit: &mut Visit<'_>) -> Result<Walk, DatasetError> {
     let (connections, walk) = (BTreeMap::new(), Walk::default());
     let mut bag = Bag { input, connections, is_closed: false, whole_chunks: 0, walk };
     bag.read(visit)?;

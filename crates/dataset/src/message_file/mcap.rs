@@ -12,6 +12,7 @@ use std::ops::ControlFlow;
 use mcap::MAGIC;
 use mcap::records::{Record, op};
 
+use super::format::MessageFormat;
 use super::mcap_record::parse;
 use super::unpack::unpack;
 use super::visit::{Channel, Message, Visit, Walk};
@@ -26,7 +27,10 @@ const FOOTER: u64 = HEAD + 20;
 /// A schema, a channel or an index beyond this `[B]` is a damaged length.
 const MAX_DESCRIPTION: u64 = 4 << 20;
 
-pub(super) fn walk(input: &mut Input<'_>, visit: &mut Visit<'_>) -> Result<Walk, DatasetError> {
+/// MCAP.
+pub(super) const FORMAT: MessageFormat = MessageFormat { name: "MCAP", magic: MAGIC, walk };
+
+fn walk(input: &mut Input<'_>, visit: &mut Visit<'_>) -> Result<Walk, DatasetError> {
     let (names, chunks, walk) = (Names::default(), Vec::new(), Walk::default());
     let mut file = Mcap { input, names, is_closed: false, chunks, walk };
     file.summary()?;

@@ -1,6 +1,7 @@
 //! The share of the grains' mass that has run out, against time.
 
-use granulcal_dem::{ObserveDischarge, Pour};
+use granulcal_dem::Pour;
+use granulcal_scene::ObserveDischarge;
 use nalgebra::Vector3;
 
 use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};

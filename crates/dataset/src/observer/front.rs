@@ -1,7 +1,8 @@
 //! The radius of the front of grains that spread, against time.
 
-use granulcal_dem::{ObserveFront, Pour};
+use granulcal_dem::Pour;
 use granulcal_features::series::{front_radius, outline_radius};
+use granulcal_scene::ObserveFront;
 use nalgebra::Vector2;
 
 use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};

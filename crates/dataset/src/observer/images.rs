@@ -1,7 +1,8 @@
 //! The camera's image at several times while the grains fall.
 
-use granulcal_dem::{CameraSpec, ObserveImages, Pour};
+use granulcal_dem::Pour;
 use granulcal_features::PAPER16;
+use granulcal_scene::{CameraSpec, ObserveImages};
 use nalgebra::Vector3;
 
 use super::observation::{Frame, Observation, ObservedStatistic, holds};

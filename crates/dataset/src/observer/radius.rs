@@ -1,7 +1,8 @@
 //! Percentiles of the grains' distance from an axis at the end.
 
-use granulcal_dem::{ObserveRadius, Pour};
+use granulcal_dem::Pour;
 use granulcal_features::series::mass_percentiles;
+use granulcal_scene::ObserveRadius;
 use nalgebra::Vector2;
 
 use super::observation::{Observation, ObservedStatistic};

@@ -1,6 +1,7 @@
 //! Grains that have come to lie outside a circle.
 
-use granulcal_dem::{ObserveSpill, Pour};
+use granulcal_dem::Pour;
+use granulcal_scene::ObserveSpill;
 use nalgebra::Vector2;
 
 use super::observation::{Observation, ObservedStatistic};

@@ -1,8 +1,9 @@
 //! The free surface of grains that keep moving, from the side: its mean, and frame by frame.
 
-use granulcal_dem::{ObserveSurface, Pour, Scene};
+use granulcal_dem::Pour;
 use granulcal_features::series::Silhouette;
 use granulcal_features::series::silhouette::slope_deg;
+use granulcal_scene::{ObserveSurface, Scene};
 use nalgebra::Vector3;
 
 use super::observation::{Frame, Observation, ObservedStatistic, Series};

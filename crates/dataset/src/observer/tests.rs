@@ -1,6 +1,6 @@
 //! The observer against pours whose answers are known.
 
-use granulcal_dem::{
+use granulcal_scene::{
     Observe, ObserveDischarge, ObserveFront, ObserveImages, ObserveRadius, ObserveSpill,
     ObserveSurface, Outflow, Start,
 };

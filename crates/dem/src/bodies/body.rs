@@ -10,7 +10,7 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::grain_shape::Solid;
+use granulcal_scene::Solid;
 
 /// Place and motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

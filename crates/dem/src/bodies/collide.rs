@@ -7,9 +7,9 @@ use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQuer
 
 use super::body::Moving;
 use super::contact::{Point, WALL};
-use crate::grain_shape::{Solid, parry};
-use crate::material::Material;
 use crate::wall::Walls;
+use granulcal_scene::Material;
+use granulcal_scene::{Solid, parry};
 
 /// Bodies look for each other at least so far, in their reach `[-]`.
 const LEAST_MARGIN: f64 = 0.02;

@@ -4,9 +4,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::body::{Moving, RigidBody};
 use super::{Bodies, Step, Sweeps};
-use crate::grain_shape::{GrainShape, Solid};
 use crate::wall::Walls;
 use crate::{GRAVITY, Material, Scene};
+use granulcal_scene::{GrainShape, Solid};
 
 const DT: f64 = 1.0 / 2000.0;
 const SIZE: f64 = 4e-3;

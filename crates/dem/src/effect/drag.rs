@@ -28,12 +28,12 @@
 //! inert by C_a rho_f / rho; a perfect fluid would not turn. Dimensional screen: drag matters where the terminal
 //! speed is not far above the speed of the fall; for couscous in air at 12 cm it takes 0.6 % of the speed.
 
+use granulcal_scene::{Fluid, Grains};
 use nalgebra::Vector3;
 
 use super::pore_surface::{PACKED, PoreSurface};
 use crate::bed::Bed;
 use crate::contact_set::ContactSet;
-use crate::scene::{Fluid, Grains};
 
 /// Reynolds number from which on the drag coefficient is constant.
 const NEWTON: f64 = 1000.0;

@@ -11,10 +11,11 @@
 
 use std::f64::consts::PI;
 
+use granulcal_scene::{Effect, Scene};
+
 use super::near::{Near, at_walls, pairs};
 use crate::bed::Bed;
 use crate::contact_set::ContactSet;
-use crate::scene::{Effect, Scene};
 use crate::wall::Walls;
 
 /// The film of a scene.

@@ -16,12 +16,13 @@
 //! contact that gives way as in Lacoursiere 2007 (doctoral thesis, Umea), 4.4. The hard ground lies below it and keeps
 //! its own coefficients: no thickness is no layer. Prior of the thickness: uniform over 0 to a radius.
 
+use granulcal_scene::Scene;
+
 use crate::bed::Bed;
 use crate::blocks::Blocks;
 use crate::contact::{ContactKey, ContactLaw};
 use crate::contact_set::{BodyKind, ContactSet};
 use crate::lanes::Lanes;
-use crate::scene::Scene;
 
 /// A layer as the solver sees it, over a typical mass.
 #[derive(Clone, Copy, Debug)]

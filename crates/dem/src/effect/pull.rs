@@ -5,13 +5,13 @@
 
 use std::f64::consts::PI;
 
+use granulcal_scene::{Adhesion, Capillary, Effect, Scene};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::near::{Near, at_walls, pairs};
 use crate::bed::Bed;
 use crate::contact_set::ContactSet;
-use crate::scene::{Adhesion, Capillary, Effect, Scene};
 use crate::wall::Walls;
 
 /// The pairs that a bridge joins, sorted: first grain, then second grain or the number of grains plus the wall's surface.

@@ -4,6 +4,7 @@
 //! Each contact takes its turn with the exact motion of its own spring through a micro-step, and friction under what
 //! that pressed. Every turn takes energy, so the whole does, whatever the coefficients.
 
+use granulcal_scene::ImpactSettings;
 use nalgebra::Vector3;
 
 use super::friction::Friction;
@@ -14,7 +15,6 @@ use crate::bed::Bed;
 use crate::contact::Candidate;
 use crate::contacts::Contacts;
 use crate::law::{IMPACT_SPEED, INVERSE_INERTIA};
-use crate::preset::ImpactSettings;
 use crate::surroundings::Surroundings;
 
 /// How long an impact lasts at most, in 1/omega: walls that close on a grain never let go. What still closes then is for

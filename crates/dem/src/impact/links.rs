@@ -2,12 +2,12 @@
 
 use std::ops::{Index, IndexMut};
 
+use granulcal_scene::Material;
 use nalgebra::Vector3;
 
 use super::friction::{Friction, FrictionBlock};
 use super::rolling_damping::RollingSpring;
 use crate::contact::ContactLaw;
-use crate::material::Material;
 
 /// Cosine of the angle between facets that count as one wall: 30 degrees.
 const ONE_WALL: f64 = 0.866;

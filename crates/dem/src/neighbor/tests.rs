@@ -34,8 +34,8 @@ proptest! {
         interval in 0f64..0.004, far in 0f64..3.0, is_periodic: bool) {
         let mut bed = bed(&points);
         bed.places[0].0[0] += far; // one grain far out stretches the grid
-        bed.period = is_periodic.then(|| Period::of(&crate::scene::Periodic {
-            axis: crate::scene::PeriodicAxis::Y, from: -0.03, to: 0.03,
+        bed.period = is_periodic.then(|| Period::of(&granulcal_scene::Periodic {
+            axis: granulcal_scene::PeriodicAxis::Y, from: -0.03, to: 0.03,
         }));
         let mut pairs = Vec::new();
         let paths: Vec<Path> = (0..bed.count())

@@ -64,8 +64,8 @@ impl Simulation {
 
 #[cfg(test)]
 mod tests {
-    use crate::scene::{Ends, Outflow, Shape, Start, Wall};
     use crate::{DemError, Motion, Scene, Simulation, WallMaterial};
+    use granulcal_scene::{Ends, Outflow, Shape, Start, Wall};
 
     fn check(scene: &Scene) -> Result<(), DemError> {
         Simulation::new(scene, 1).unwrap().check_start()

@@ -2,10 +2,11 @@
 
 use std::sync::atomic::Ordering;
 
+use granulcal_scene::{Ends, Funnel, Shape, Start, Wall};
+
 use super::*;
 use crate::contact_set::ContactSet;
 use crate::lanes::WIDEST;
-use crate::scene::{Ends, Funnel, Shape, Start, Wall};
 use crate::{Preset, WallMaterial};
 
 /// Some hundred grains through a funnel. In tests blocks and shares of loops are so small that threads share them.

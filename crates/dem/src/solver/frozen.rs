@@ -1,12 +1,12 @@
 //! The contact problem of one substep by itself, to compare solvers on.
 
+use granulcal_scene::SolverSettings;
 use nalgebra::Vector3;
 
 use crate::bed::Bed;
 use crate::contact_set::ContactSet;
 use crate::error::DemError;
 use crate::parallel::Threads;
-use crate::preset::SolverSettings;
 use crate::solver;
 use crate::solver::residual::ResidualSums;
 use crate::solver::work::Work;

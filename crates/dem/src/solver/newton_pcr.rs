@@ -10,11 +10,14 @@
 //! lambda <- projection on the cones,  v to match
 //! ```
 
+use granulcal_scene::{Complementarity, NewtonSettings};
+
+use complementarity::Rows;
+
 use crate::body::Body;
 use crate::contact_set::ContactSet;
 use crate::law::TANGENTIAL_INERTIA;
 use crate::parallel::Threads;
-use crate::preset::{Complementarity, NewtonSettings};
 use crate::solver::components::{
     Components, Parts, add_scaled, batches, collect, impulses, scale_and_add, spread,
 };

@@ -13,6 +13,8 @@
 //! between unequal spheres sliding and rolling couple, and the three lines are one pass inside the contact.
 //! Contacts of a batch share no grain: the order within a batch cannot change a bit.
 
+use granulcal_scene::SolverSettings;
+
 use crate::body::{Body, SharedBodies};
 use crate::clumps::Clumps;
 use crate::contact::{Batch, LawLanes};
@@ -20,7 +22,6 @@ use crate::contact_set::ContactSet;
 use crate::lanes::{Lanes, Reg, Reg3, Width, widest};
 use crate::law::{TANGENTIAL_INERTIA, project_ball};
 use crate::parallel::Threads;
-use crate::preset::SolverSettings;
 use crate::solver::velocities::Velocities;
 use crate::solver::work::Work;
 

@@ -11,10 +11,11 @@
 //!     else:      lambda <- lambda + beta p,  p <- beta p - g
 //! ```
 
+use granulcal_scene::ReferenceSettings;
+
 use crate::body::Body;
 use crate::contact_set::ContactSet;
 use crate::parallel::Threads;
-use crate::preset::ReferenceSettings;
 use crate::solver::components::{
     Components, add_scaled, add_velocities, dot, impulses, put_impulses, scale_and_add, spread,
 };

@@ -1,5 +1,6 @@
 //! The methods against closed forms of one contact and against each other.
 
+use granulcal_scene::{Complementarity, NewtonSettings, Preset, ReferenceSettings};
 use proptest::prelude::*;
 
 use super::*;
@@ -7,7 +8,6 @@ use crate::blocks::Blocks;
 use crate::contact::{ContactKey, ContactLaw};
 use crate::contact_set::BodyKind;
 use crate::lanes::Row;
-use crate::preset::{Complementarity, NewtonSettings, Preset, ReferenceSettings};
 use crate::solver::residual::ResidualSums;
 use crate::{Material, Scene, Simulation};
 

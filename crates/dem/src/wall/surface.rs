@@ -3,9 +3,8 @@
 //! A frustum (cone or cylinder) is a thin shell of revolution. In the half plane through its axis and
 //! the grain it is a straight segment, so the nearest point is the nearest point of a segment.
 
+use granulcal_scene::{Ends, Shape};
 use nalgebra::Vector3;
-
-use crate::scene::{Ends, Shape};
 
 /// The surfaces that the solver knows.
 #[derive(Clone, Debug)]

@@ -1,6 +1,7 @@
 //! Images with known formations.
 
 use super::*;
+use crate::Observe;
 use crate::colour::HsvRange;
 use crate::raster::{height_map, render};
 use crate::rng::Stream;

@@ -3,55 +3,15 @@
 //! Equations (3) and (5) of `docs/theory/sensor.md`.
 
 use granulcal_numbers::scatter;
-use serde::{Deserialize, Serialize};
+use granulcal_scene::{MAX_SENSOR_PIXELS, NoiseField};
 
 use crate::error::{FeatureError, require_in};
 use crate::rng::Stream;
 
-/// Largest standard deviation that is accepted, px of disparity or metres.
-const MAX_SD: f64 = 1e3;
-/// Largest correlation length `[px]` that is accepted.
-const MAX_LENGTH: f64 = 1e3;
-/// Most pixels of a sensor over which a field is drawn.
-const MAX_PIXELS: f64 = 1e8;
 /// Half width of the kernel in standard deviations of the kernel.
 const TRUNCATE: f64 = 4.0;
 /// Lengths below this `[px]` correlate neighbours by less than 1e-5: the pixels are independent.
 const SHORTEST: f64 = 0.2;
-
-/// A stationary Gaussian field, the sum of six independent components.
-///
-/// The standard deviations have the unit of the sensor's error: px of disparity for a stereo
-/// camera, metres for a time-of-flight camera. Lengths are standard deviations of the Gaussian
-/// correlation, in pixels of the sensor. The default is no field.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct NoiseField {
-    /// Standard deviation of what each pixel has of its own.
-    pub white: f64,
-    /// Standard deviation of the correlated component.
-    pub correlated: f64,
-    /// Its correlation length along the rows `[px]`.
-    pub correlation_x: f64,
-    /// Its correlation length along the columns `[px]`.
-    pub correlation_y: f64,
-    /// Standard deviation of a second, broader correlated component.
-    pub broad: f64,
-    /// Its correlation length along the rows `[px]`.
-    pub broad_x: f64,
-    /// Its correlation length along the columns `[px]`.
-    pub broad_y: f64,
-    /// Standard deviation of what a column has in common.
-    pub columns: f64,
-    /// Correlation length from column to column `[px]`.
-    pub column_correlation: f64,
-    /// Standard deviation of what a row has in common.
-    pub rows: f64,
-    /// Correlation length from row to row `[px]`.
-    pub row_correlation: f64,
-    /// Height of an alternation from row to row, up in every other one.
-    pub row_alternation: f64,
-}
 
 /// How a component is correlated along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -113,7 +73,7 @@ impl SensorGrid {
     pub(crate) fn under(width: usize, height: usize, scale: f64) -> Result<Self, FeatureError> {
         require_in("sensor pixels per image pixel [-]", scale, 1e-6, 1e6)?;
         let size = [width, height].map(|count| (count as f64 * scale).ceil());
-        require_in("pixels of the sensor", size[0] * size[1], 1.0, MAX_PIXELS)?;
+        require_in("pixels of the sensor", size[0] * size[1], 1.0, MAX_SENSOR_PIXELS)?;
         let along = |count: usize| (0..count).map(|i| ((i as f64 + 0.5) * scale) as usize);
         Ok(Self {
             width: size[0] as usize,
@@ -124,77 +84,54 @@ impl SensorGrid {
     }
 }
 
-impl NoiseField {
-    /// The components in their order; theirs is also the order of the streams.
-    pub(crate) fn components(&self) -> [Component; 6] {
-        use Along::{Alternating, Constant, Length};
-        let component = |sd, x, y| Component { sd, x, y };
-        [
-            component(self.white, Length(0.0), Length(0.0)),
-            component(self.correlated, Length(self.correlation_x), Length(self.correlation_y)),
-            component(self.broad, Length(self.broad_x), Length(self.broad_y)),
-            component(self.columns, Length(self.column_correlation), Constant),
-            component(self.rows, Constant, Length(self.row_correlation)),
-            component(self.row_alternation, Constant, Alternating),
-        ]
-    }
-
+/// Moments of a field.
+pub trait Moments {
     /// The standard deviation of the whole field.
-    pub fn sd(&self) -> f64 {
+    fn sd(&self) -> f64;
+
+    /// The covariance of two pixels that are `x` columns and `y` rows apart.
+    fn covariance(&self, x: usize, y: usize) -> f64;
+}
+
+impl Moments for NoiseField {
+    fn sd(&self) -> f64 {
         self.covariance(0, 0).sqrt()
     }
 
-    /// The covariance of two pixels that are `x` columns and `y` rows apart.
-    pub fn covariance(&self, x: usize, y: usize) -> f64 {
-        self.components()
+    fn covariance(&self, x: usize, y: usize) -> f64 {
+        components(self)
             .iter()
             .filter(|c| c.sd > 0.0)
             .map(|c| c.sd * c.sd * c.x.correlation(x) * c.y.correlation(y))
             .fold(0.0, |sum, part| sum + part)
     }
+}
 
-    /// Whether the field is 0 everywhere.
-    pub fn is_none(&self) -> bool {
-        self.components().iter().all(|c| c.sd == 0.0)
-    }
+/// The components of a field in their order; theirs is also the order of the streams.
+pub(crate) fn components(field: &NoiseField) -> [Component; 6] {
+    use Along::{Alternating, Constant, Length};
+    let component = |sd, x, y| Component { sd, x, y };
+    [
+        component(field.white, Length(0.0), Length(0.0)),
+        component(field.correlated, Length(field.correlation_x), Length(field.correlation_y)),
+        component(field.broad, Length(field.broad_x), Length(field.broad_y)),
+        component(field.columns, Length(field.column_correlation), Constant),
+        component(field.rows, Constant, Length(field.row_correlation)),
+        component(field.row_alternation, Constant, Alternating),
+    ]
+}
 
-    /// The field of `seed` on the grid, row by row; what a pixel of the sensor gets does not depend
-    /// on which others the grid has.
-    pub(crate) fn sample(&self, grid: &SensorGrid, seed: u64) -> Vec<f64> {
-        let mut field = vec![0.0; grid.columns.len() * grid.rows.len()];
-        for (index, component) in self.components().iter().enumerate() {
-            if component.sd > 0.0 {
-                let mut stream = Stream::new(scatter(seed ^ scatter(index as u64)));
-                component.add_to(&mut field, grid, &mut stream);
-            }
+/// The field of `seed` on the grid, row by row; what a pixel of the sensor gets does not depend on which others the grid
+/// has.
+pub(crate) fn sample(field: &NoiseField, grid: &SensorGrid, seed: u64) -> Vec<f64> {
+    let mut values = vec![0.0; grid.columns.len() * grid.rows.len()];
+    for (index, component) in components(field).iter().enumerate() {
+        if component.sd > 0.0 {
+            let mut stream = Stream::new(scatter(seed ^ scatter(index as u64)));
+            component.add_to(&mut values, grid, &mut stream);
         }
-        field
     }
-
-    /// Refuses standard deviations and lengths that mean nothing.
-    pub(crate) fn require_valid(&self) -> Result<(), FeatureError> {
-        for (what, sd) in [
-            ("white", self.white),
-            ("correlated", self.correlated),
-            ("broad", self.broad),
-            ("columns", self.columns),
-            ("rows", self.rows),
-            ("row_alternation", self.row_alternation),
-        ] {
-            require_in(what, sd, 0.0, MAX_SD)?;
-        }
-        for (what, length) in [
-            ("correlation_x [px]", self.correlation_x),
-            ("correlation_y [px]", self.correlation_y),
-            ("broad_x [px]", self.broad_x),
-            ("broad_y [px]", self.broad_y),
-            ("column_correlation [px]", self.column_correlation),
-            ("row_correlation [px]", self.row_correlation),
-        ] {
-            require_in(what, length, 0.0, MAX_LENGTH)?;
-        }
-        Ok(())
-    }
+    values
 }
 
 impl Component {
@@ -310,7 +247,7 @@ mod tests {
         let lags = [(0, 0), (1, 0), (0, 1), (3, 0), (0, 4), (2, 3), (7, 0), (0, 7)];
         let mut sums = [0.0; 8];
         for seed in 0..draws {
-            let field = FULL.sample(&grid, seed);
+            let field = sample(&FULL, &grid, seed);
             for (sum, (x, y)) in sums.iter_mut().zip(lags) {
                 *sum += field[5 * 24 + 6] * field[(5 + y) * 24 + 6 + x];
             }
@@ -328,14 +265,14 @@ mod tests {
     fn what_a_pixel_gets_does_not_depend_on_the_others() {
         let full = SensorGrid::under(40, 32, 1.0).unwrap();
         let quarter = SensorGrid::under(10, 8, 4.0).unwrap();
-        let (full, quarter) = (FULL.sample(&full, 5), FULL.sample(&quarter, 5));
+        let (full, quarter) = (sample(&FULL, &full, 5), sample(&FULL, &quarter, 5));
         for (v, row) in quarter.chunks_exact(10).enumerate() {
             for (u, value) in row.iter().enumerate() {
                 assert!((value - full[(4 * v + 2) * 40 + 4 * u + 2]).abs() < 1e-12);
             }
         }
         // A finer image than the sensor's shows each of its pixels several times.
-        let fine = FULL.sample(&SensorGrid::under(8, 4, 0.5).unwrap(), 5);
+        let fine = sample(&FULL, &SensorGrid::under(8, 4, 0.5).unwrap(), 5);
         assert_eq!(fine[0], fine[1]);
         assert_ne!(fine[1], fine[2]);
     }
@@ -345,22 +282,21 @@ mod tests {
         let grid = SensorGrid::under(6, 5, 1.0).unwrap();
         let without = NoiseField { broad: 0.0, ..FULL };
         let alone = NoiseField { broad: 0.6, broad_x: 6.0, broad_y: 9.0, ..NoiseField::default() };
-        let sum: Vec<f64> = without
-            .sample(&grid, 3)
+        let sum: Vec<f64> = sample(&without, &grid, 3)
             .iter()
-            .zip(alone.sample(&grid, 3))
+            .zip(sample(&alone, &grid, 3))
             .map(|(a, b)| a + b)
             .collect();
-        for (a, b) in sum.iter().zip(FULL.sample(&grid, 3)) {
+        for (a, b) in sum.iter().zip(sample(&FULL, &grid, 3)) {
             assert!((a - b).abs() < 1e-12);
         }
-        assert_ne!(FULL.sample(&grid, 3), FULL.sample(&grid, 4));
+        assert_ne!(sample(&FULL, &grid, 3), sample(&FULL, &grid, 4));
     }
 
     #[test]
     fn nonsense_is_refused() {
-        assert!(NoiseField { white: -1.0, ..FULL }.require_valid().is_err());
-        assert!(NoiseField { broad_x: f64::NAN, ..FULL }.require_valid().is_err());
+        assert!(NoiseField { white: -1.0, ..FULL }.check("noise").is_err());
+        assert!(NoiseField { broad_x: f64::NAN, ..FULL }.check("noise").is_err());
         assert!(SensorGrid::under(1 << 15, 1 << 15, 8.0).is_err());
         assert!(NoiseField::default().is_none() && !FULL.is_none());
     }

@@ -84,7 +84,7 @@ pub fn compare(
     frames: &FlatFrames,
     settings: &FitSettings,
 ) -> Result<Comparison, FeatureError> {
-    sensor.require_valid()?;
+    sensor.check("sensor")?;
     Session::new(frames, settings)?.compare(sensor, settings)
 }
 

@@ -1,8 +1,8 @@
 //! Where a depth camera sees nothing: equation (4) of `docs/theory/sensor.md`.
 
+use granulcal_scene::StereoSensor;
 use nalgebra::Vector3;
 
-use super::depth_sensor::StereoSensor;
 use crate::camera::Camera;
 use crate::depth::{DepthImage, is_valid};
 use crate::height_map::HeightMap;

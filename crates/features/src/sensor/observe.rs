@@ -3,9 +3,9 @@
 //! Equations (1) to (5) of `docs/theory/sensor.md`.
 
 use granulcal_numbers::scatter;
+use granulcal_scene::{DepthSensor, round_to};
 
-use super::depth_sensor::{DepthSensor, round_to};
-use super::field::SensorGrid;
+use super::field::{SensorGrid, sample};
 use super::holes;
 use crate::camera::Camera;
 use crate::depth::{DepthImage, is_valid};
@@ -16,7 +16,8 @@ use crate::rng::Stream;
 /// Separates the stream of the drop-out from those of the fields.
 const DROPOUT_STREAM: u64 = 0x0d0d;
 
-impl DepthSensor {
+/// What a sensor delivers.
+pub trait Observe {
     /// What the camera delivers of a noise-free depth image; the same seed gives the same noise.
     ///
     /// `image` is what `camera` took, at its own resolution or down-sampled (pass
@@ -25,13 +26,28 @@ impl DepthSensor {
     /// # Errors
     /// `OutOfRange` for a number of the sensor that means nothing, `SizeMismatch` for another camera,
     /// and for a time-of-flight sensor `OutOfRange` when the camera is not above the ground.
-    pub fn observe(
+    fn observe(
+        &self,
+        camera: &Camera,
+        image: &DepthImage,
+        seed: u64,
+    ) -> Result<DepthImage, FeatureError>;
+
+    /// What a rig with this sensor delivers of a noise-free height map.
+    ///
+    /// # Errors
+    /// As [`Observe::observe`]; `NeedsPinhole` for a stereo sensor, which has no depth to start from.
+    fn observe_height_map(&self, map: &HeightMap, seed: u64) -> Result<HeightMap, FeatureError>;
+}
+
+impl Observe for DepthSensor {
+    fn observe(
         &self,
         camera: &Camera,
         image: &DepthImage,
         seed: u64,
     ) -> Result<DepthImage, FeatureError> {
-        self.require_valid()?;
+        self.check("sensor")?;
         camera.require_valid()?;
         image.require_valid()?;
         camera.require_size(image.width, image.height)?;
@@ -44,13 +60,13 @@ impl DepthSensor {
             }
         };
         let grid = SensorGrid::under(image.width, image.height, scale)?;
-        let errors = self.errors(&grid, seed);
+        let errors = errors(self, &grid, seed);
         let mut seen: Vec<bool> = image.depth.iter().map(|&d| is_valid(d)).collect();
         holes::clear_grazing(&mut seen, image, camera, self.grazing_deg());
         if let Self::Stereo(sensor) = self {
             holes::clear_occluded(&mut seen, image, sensor, scale);
         }
-        self.drop_out(&mut seen, &grid, seed);
+        drop_out(self, &mut seen, &grid, seed);
         let depth = image.depth.iter().zip(errors).zip(seen).map(|((&depth, error), seen)| {
             if !seen {
                 return 0.0;
@@ -64,16 +80,8 @@ impl DepthSensor {
         DepthImage::new(image.width, image.height, depth.collect())
     }
 
-    /// What a rig with this sensor delivers of a noise-free height map.
-    ///
-    /// # Errors
-    /// As [`DepthSensor::observe`]; `NeedsPinhole` for a stereo sensor, which has no depth to start from.
-    pub fn observe_height_map(
-        &self,
-        map: &HeightMap,
-        seed: u64,
-    ) -> Result<HeightMap, FeatureError> {
-        self.require_valid()?;
+    fn observe_height_map(&self, map: &HeightMap, seed: u64) -> Result<HeightMap, FeatureError> {
+        self.check("sensor")?;
         map.require_valid()?;
         let Self::TimeOfFlight(sensor) = self else {
             return Err(FeatureError::NeedsPinhole);
@@ -81,39 +89,43 @@ impl DepthSensor {
         let grid = SensorGrid::under(map.width, map.height, map.resolution_x / sensor.resolution)?;
         let mut seen: Vec<bool> = map.z.iter().map(|z| z.is_finite()).collect();
         holes::clear_grazing_heights(&mut seen, map, sensor.grazing_deg);
-        self.drop_out(&mut seen, &grid, seed);
-        let z = map.z.iter().zip(self.errors(&grid, seed)).zip(seen).map(|((z, error), seen)| {
+        drop_out(self, &mut seen, &grid, seed);
+        let z = map.z.iter().zip(errors(self, &grid, seed)).zip(seen).map(|((z, error), seen)| {
             if seen { round_to(z + error, sensor.depth_unit) } else { f64::NAN }
         });
         Ok(HeightMap { z: z.collect(), ..*map })
     }
+}
 
-    /// The sum of noise and fixed pattern on the grid.
-    fn errors(&self, grid: &SensorGrid, seed: u64) -> Vec<f64> {
-        let mut errors = self.noise().sample(grid, seed);
-        if !self.fixed_pattern().is_none() {
-            let pattern = self.fixed_pattern().sample(grid, self.pattern_seed());
-            errors.iter_mut().zip(pattern).for_each(|(error, value)| *error += value);
-        }
-        errors
+/// The sum of noise and fixed pattern on the grid.
+fn errors(sensor: &DepthSensor, grid: &SensorGrid, seed: u64) -> Vec<f64> {
+    let mut errors = sample(sensor.noise(), grid, seed);
+    if !sensor.fixed_pattern().is_none() {
+        // A pour may have the same number as a camera; their fields must still differ.
+        let pattern = sample(sensor.fixed_pattern(), grid, scatter(!sensor.pattern_seed()));
+        errors.iter_mut().zip(pattern).for_each(|(error, value)| *error += value);
     }
+    errors
+}
 
-    /// Clears the pixels that fail by chance; the same pixels of the sensor whatever the image.
-    fn drop_out(&self, seen: &mut [bool], grid: &SensorGrid, seed: u64) {
-        let share = match self {
-            Self::Stereo(sensor) => sensor.dropout,
-            Self::TimeOfFlight(sensor) => sensor.dropout,
-        };
-        if share == 0.0 {
-            return;
-        }
-        let width = grid.columns.len();
-        for (row, &v) in seen.chunks_exact_mut(width).zip(&grid.rows) {
-            for (pixel, &u) in row.iter_mut().zip(&grid.columns) {
-                let place = scatter((v as u64) << 32 | u as u64);
-                let mut stream = Stream::new(scatter(seed ^ DROPOUT_STREAM) ^ place);
-                *pixel &= stream.uniform() >= share;
-            }
+/// Clears the pixels that fail by chance; the same pixels of the sensor whatever the image.
+fn drop_out(sensor: &DepthSensor, seen: &mut [bool], grid: &SensorGrid, seed: u64) {
+    let share = match sensor {
+        DepthSensor::Stereo(sensor) => sensor.dropout,
+        DepthSensor::TimeOfFlight(sensor) => sensor.dropout,
+    };
+    if share == 0.0 {
+        return;
+    }
+    let width = grid.columns.len();
+    for (row, &v) in seen.chunks_exact_mut(width).zip(&grid.rows) {
+        for (pixel, &u) in row.iter_mut().zip(&grid.columns) {
+            let place = scatter((v as u64) << 32 | u as u64);
+            let mut stream = Stream::new(scatter(seed ^ DROPOUT_STREAM) ^ place);
+            *pixel &= stream.uniform() >= share;
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -28,7 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.bayessim.emulator.emulator import Prediction
-from granulcal.bayessim.emulator.likelihood import Fold, Likelihood, averaging_share, pooled_scales
+from granulcal.bayessim.emulator.likelihood import Fold, Likelihood
+from granulcal.bayessim.emulator.pooling import averaging_share, pooled_scales
 
 __all__ = ["Misfit", "MisfitReference", "StatisticMisfit"]
 

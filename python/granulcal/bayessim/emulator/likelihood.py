@@ -24,7 +24,6 @@ Reference:
     a proposal for repairing it, Bayesian Analysis 12, 2017 (widening by held-out prediction).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -37,21 +36,12 @@ from granulcal.bayessim.check.diagnostics import uniform_p_value
 from granulcal.bayessim.emulator.basis import learn_length_scales
 from granulcal.bayessim.emulator.emulator import Emulator, Prediction
 from granulcal.bayessim.emulator.noise import Noise
+from granulcal.bayessim.emulator.pooling import averaging_share, linear_scores, pooled_scales
 from granulcal.bayessim.emulator.signal import SignalAxes
-from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.posterior.density import quasi_prior
-from granulcal.bayessim.posterior.importance import (
-    DEFENSIVE_SHARE,
-    FEWEST_EFFECTIVE,
-    Effort,
-    ImportanceDensity,
-    kernel_estimate,
-    mix,
-    prior_normal,
-)
 from granulcal.prior import Prior
 
-__all__ = ["EmulatorChoice", "Fold", "Likelihood", "density_over_prior", "joint_density"]
+__all__ = ["EmulatorChoice", "Fold", "Likelihood"]
 
 Array = NDArray[np.float64]
 
@@ -66,9 +56,6 @@ _CELLS = 4096
 _POOL = 16_384
 # Levels of held-out truths must be uniform with at least this Kolmogorov-Smirnov p-value.
 _LEAST_P_VALUE = 0.1
-# One axis alone does not say that all noise is the pours' own.
-_LARGEST_RATIO = 2.0
-_EFFORT = Effort(pool=2000, draws=1000, rounds=6, effective=150.0, good_share=0.25)
 
 
 @dataclass(frozen=True)
@@ -353,110 +340,6 @@ class _Growing:
     def leading(self, count: int, *, heavy: bool) -> Likelihood:
         leading = self.emulator.first(count, Noise.fit(self.white[:, :count], heavy=heavy))
         return Likelihood(self.prior, self.axes, self.emulator, leading, 1.0)
-
-
-def averaging_share(y: Array, scales: Array) -> Array:
-    r"""Returns the share of the noise that k pours have each for themselves, shape (n,).
-
-    $$ \eta = \min(1, (1 + 2 \sqrt{2 / r (k-1)}) \, \mathrm{mean}_j \min(w_j^2 / s_j^2, 2)) $$
-
-    with $w_j$ the standard deviation between the pours: what the emulator calls noise and pours of
-    one material do not differ by is an error of the emulator. The factor is two standard deviations
-    of such a mean of $r (k-1)$ squares, so that noise that is all the pours' own counts as that.
-
-    Args:
-        y: signal axes of the pours, shape (k, r).
-        scales: what the emulator calls noise, shape (n, r).
-    """
-    pours, axes = y.shape
-    if pours == 1:
-        return np.ones(len(scales))
-    ratios = np.minimum(y.var(axis=0, ddof=1) / scales**2, _LARGEST_RATIO)
-    doubt = 1 + 2 * np.sqrt(2 / (axes * (pours - 1)))
-    return np.minimum(1.0, doubt * ratios.mean(axis=1))
-
-
-def pooled_scales(
-    prediction: Prediction, pours: int, widening: float, share: Array | float = 1.0
-) -> Array:
-    """Returns the square root of V_k at each predicted point, shape (n, s).
-
-    Args:
-        prediction: what is expected there.
-        pours: k.
-        widening: c.
-        share: of the noise that averages away, shape (n,) or a number.
-    """
-    noise, unknown = prediction.scales**2, prediction.unknown**2
-    own = noise * np.reshape(share, (-1, 1))
-    return np.sqrt(widening**2 * (noise + unknown) - (1 - 1 / pours) * own)
-
-
-def joint_density(prior: Prior, conditions: list[tuple[Likelihood, Array]]) -> ImportanceDensity:
-    """Returns the posterior of one material poured under one or several conditions.
-
-    Args:
-        prior: the prior, the same for all conditions.
-        conditions: for each the likelihood and its pours, standardised, shape (k, s).
-    """
-
-    def log_likelihood(u: Array, quick: bool) -> Array:
-        return np.sum([part.log_prob(z, u, quick=quick) for part, z in conditions], axis=0)
-
-    log_weights = np.sum([likelihood.start(z) for likelihood, z in conditions], axis=0)
-    return density_over_prior(prior, log_likelihood, conditions[0][0].pool, log_weights)
-
-
-def density_over_prior(
-    prior: Prior,
-    log_likelihood: Callable[[Array, bool], Array],
-    pool: Array,
-    log_weights: Array,
-    *,
-    mixtures: tuple[Mixture, ...] = (),
-) -> ImportanceDensity:
-    """Returns prior times likelihood, normalised; a proposal is adapted if few draws carry weight.
-
-    Args:
-        prior: the prior.
-        log_likelihood: up to a constant, of points inside the bounds, shape (n, p); the second
-            argument says whether the exactness of a weight will do.
-        pool: draws of the prior, shape (m, p).
-        log_weights: the log likelihood at them, shape (m,).
-        mixtures: kept with the result; where there are some, adaptation starts from them too.
-    """
-
-    def log_target(u: Array) -> Array:
-        return log_likelihood(u, False) + prior.coordinate_log_prob(u)
-
-    def weigh(u: Array) -> Array:
-        return log_likelihood(u, True) + prior.coordinate_log_prob(u)
-
-    found = ImportanceDensity.of_prior_draws(
-        prior, log_target, pool, log_weights, weigh=weigh, mixtures=mixtures
-    )
-    if found.effective_sample_size >= FEWEST_EFFECTIVE:
-        return found
-    # A few draws alone have no covariance.
-    weights = found.pool_weights + 1e-6
-    wide = prior_normal(prior)
-    first = kernel_estimate(pool, weights / weights.sum(), np.random.default_rng(0))
-    if mixtures:
-        first = mix(first, Mixture.pooled(list(mixtures)), 0.5)
-    start = mix(first, wide, DEFENSIVE_SHARE)
-    return ImportanceDensity.of(
-        prior, log_target, start, wide, effort=_EFFORT, weigh=weigh, mixtures=mixtures
-    )
-
-
-def linear_scores(u: Array, z: Array, train: NDArray[np.intp], held: NDArray[np.intp]) -> Array:
-    """Returns log densities of held parameters by linear regression on the statistics, (h,)."""
-    rows = np.column_stack([z, np.ones(len(z))])
-    gram = rows[train].T @ rows[train] + np.eye(rows.shape[1])
-    errors = u - rows @ np.linalg.solve(gram, rows[train].T @ u[train])
-    covariance = errors[train].T @ errors[train] / len(train) + 1e-9 * np.eye(u.shape[1])
-    white = np.linalg.solve(np.linalg.cholesky(covariance), errors[held].T)
-    return -0.5 * (np.sum(white**2, axis=0) + np.linalg.slogdet(2 * np.pi * covariance)[1])
 
 
 def _most_probable_of_the_honest(

@@ -14,10 +14,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.bayessim.emulator.likelihood import Likelihood, density_over_prior
+from granulcal.bayessim.emulator.likelihood import Likelihood
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.posterior.average import Average
 from granulcal.bayessim.posterior.importance import ImportanceDensity
+from granulcal.bayessim.posterior.joint import density_over_prior
 from granulcal.prior import Prior
 
 __all__ = ["geometric_density"]

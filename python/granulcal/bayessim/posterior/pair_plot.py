@@ -1,18 +1,19 @@
 """Figure of a posterior: marginals on the diagonal, pairs below it."""
 
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.arrays import as_matrix
+from granulcal.bayessim.posterior.marginal import Marginal
 from granulcal.files import save_figure
+from granulcal.prior import Prior
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from granulcal.bayessim.posterior.posterior import Posterior
 
 __all__ = ["pair_plot"]
 
@@ -27,12 +28,35 @@ _DRAWS = 20_000
 _PANEL_INCHES = 2.3
 
 
+class Drawn(Protocol):
+    """What the figure asks of a posterior."""
+
+    prior: Prior
+
+    @property
+    def names(self) -> list[str]:
+        """Paths of the free parameters."""
+        ...
+
+    def mode(self) -> Array:
+        """Returns the most probable parameters, own units, shape (p,)."""
+        ...
+
+    def sample(self, n: int, seed: int = 0) -> Array:
+        """Returns draws, own units, shape (n, p)."""
+        ...
+
+    def marginals(self) -> dict[str, Marginal]:
+        """Returns the marginal of each parameter by name."""
+        ...
+
+
 def pair_plot(
-    posterior: "Posterior",
+    posterior: Drawn,
     *,
     path: str | PathLike[str] | None = None,
     truth: ArrayLike | None = None,
-    extra: "Posterior | None" = None,
+    extra: Drawn | None = None,
 ) -> "Figure":
     """Returns the figure; axes span the prior's bounds, log parameters have log axes.
 
@@ -73,7 +97,7 @@ def pair_plot(
     return figure
 
 
-def _frame(axis: Any, posterior: "Posterior", row: int, column: int) -> None:
+def _frame(axis: Any, posterior: Drawn, row: int, column: int) -> None:
     """Sets limits, scales and labels of one panel, or hides it above the diagonal."""
     if column > row:
         axis.set_visible(False)
@@ -101,7 +125,7 @@ def _frame(axis: Any, posterior: "Posterior", row: int, column: int) -> None:
         axis.set_ylabel(_label(parameters[row].path), fontsize=9)
 
 
-def _draw(axes: Any, posterior: "Posterior", colour: str) -> None:
+def _draw(axes: Any, posterior: Drawn, colour: str) -> None:
     mode = posterior.mode()
     draws = posterior.prior.to_unconstrained(posterior.sample(_DRAWS, seed=0))
     for i, marginal in enumerate(posterior.marginals().values()):
@@ -120,7 +144,7 @@ def _draw(axes: Any, posterior: "Posterior", colour: str) -> None:
 
 
 def _contours(
-    axis: Any, posterior: "Posterior", draws: Array, column: int, row: int, colour: str
+    axis: Any, posterior: Drawn, draws: Array, column: int, row: int, colour: str
 ) -> None:
     """Fills the regions of highest smoothed histogram density that hold the levels."""
     parameters = posterior.prior.free
@@ -163,7 +187,7 @@ def _mark_truth(axes: Any, truth: Array) -> None:
             axis.plot(truth[column], truth[row], "x", color=_TRUTH_COLOUR, markersize=8)
 
 
-def _limits(posterior: "Posterior", i: int) -> tuple[float, float]:
+def _limits(posterior: Drawn, i: int) -> tuple[float, float]:
     """The prior's bounds, or its central 99.8 % where it has none."""
     low, high = posterior.prior.free[i].bounds
     near = posterior.prior.free[i].quantile(np.array([0.001, 0.999]))

@@ -1,6 +1,5 @@
 """Posterior of the free parameters given an observation: draws, density, regions, marginals."""
 
-from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -8,19 +7,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.arrays import as_matrix
-from granulcal.bayessim.emulator.likelihood import Likelihood, joint_density
+from granulcal.bayessim.emulator.likelihood import Likelihood
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.posterior.arithmetic import StackedDensity
 from granulcal.bayessim.posterior.average import Average
 from granulcal.bayessim.posterior.density import Density, TruncatedMixture
 from granulcal.bayessim.posterior.geometric import geometric_density
 from granulcal.bayessim.posterior.importance import FEWEST_EFFECTIVE, ImportanceDensity
+from granulcal.bayessim.posterior.joint import joint_density
 from granulcal.bayessim.posterior.product import LEAST_LOG_EVIDENCE_RATIO, product_density
 from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+from granulcal.bayessim.posterior.doubts import (
+    FewEffectiveDraws,
+    MassOutsidePrior,
+    OutOfRange,
+    PoursDisagree,
+)
+from granulcal.bayessim.posterior.marginal import CredibleRegion, Marginal, kernel_density
 
 __all__ = [
     "CredibleRegion",
@@ -39,139 +47,6 @@ _SUMMARY_DRAWS = 10_000
 _MODE_STARTS = 4
 _MODE_ROUNDS = 40
 _MODE_TRIES = 32
-
-
-@dataclass(frozen=True)
-class OutOfRange:
-    """Statistics of one pour lie beyond those of the training data: the model extrapolates.
-
-    Attributes:
-        pour: index of the pour.
-        names: the statistics.
-        values: what was observed, own units.
-        ranges: lowest and highest training value of each, own units.
-    """
-
-    pour: int
-    names: tuple[str, ...]
-    values: tuple[float, ...]
-    ranges: tuple[tuple[float, float], ...]
-
-    def __str__(self) -> str:
-        """One line that names each statistic with its value and its range."""
-        parts = [
-            f"{name} = {value:.4g} (trained on {low:.4g} .. {high:.4g})"
-            for name, value, (low, high) in zip(self.names, self.values, self.ranges, strict=True)
-        ]
-        return f"pour {self.pour} is outside the training range: {', '.join(parts)}"
-
-
-@dataclass(frozen=True)
-class MassOutsidePrior:
-    """Nearly all mass of a pour's mixture lies outside the prior's bounds.
-
-    Attributes:
-        pour: index of the pour.
-        mass_inside: share inside the bounds before truncation.
-    """
-
-    pour: int
-    mass_inside: float
-
-    def __str__(self) -> str:
-        """One line."""
-        return f"pour {self.pour}: only {self.mass_inside:.2g} of the mass is inside the prior"
-
-
-@dataclass(frozen=True)
-class FewEffectiveDraws:
-    """The pours' posteriors overlap so little that their product is poorly sampled.
-
-    Attributes:
-        effective_sample_size: independent draws that the weighted draws are worth.
-        needed: number below which this is reported.
-    """
-
-    effective_sample_size: float
-    needed: float
-
-    def __str__(self) -> str:
-        """One line."""
-        return (
-            f"the product of the pours is worth {self.effective_sample_size:.0f} draws only "
-            f"(at least {self.needed:.0f} wanted): do these pours share one material?"
-        )
-
-
-@dataclass(frozen=True)
-class PoursDisagree:
-    """One material explains the pours much worse than a material for each pour would.
-
-    Attributes:
-        log_evidence_ratio: log probability of the pours under one shared material less that under
-            independent materials [nat].
-        needed: ratio below which this is reported.
-    """
-
-    log_evidence_ratio: float
-    needed: float
-
-    def __str__(self) -> str:
-        """One line."""
-        return (
-            f"the pours contradict each other: log evidence of one material against several is "
-            f"{self.log_evidence_ratio:.1f} (reported below {self.needed:.1f})"
-        )
-
-
-@dataclass(frozen=True)
-class CredibleRegion:
-    """Intervals of each parameter and the joint region of highest density.
-
-    The joint region is {density of the coordinates >= threshold}; in coordinates a uniform or
-    log-uniform prior is flat, so the region does not depend on the unit of a log parameter.
-
-    Attributes:
-        level: probability of the region, and of each interval by itself.
-        names: paths of the parameters.
-        intervals: central intervals, own units, shape (p, 2).
-        log_density_threshold: least log density of the coordinates inside the joint region.
-        posterior: where the region comes from.
-    """
-
-    level: float
-    names: tuple[str, ...]
-    intervals: Array
-    log_density_threshold: float
-    posterior: "Posterior"
-
-    def contains(self, theta: ArrayLike) -> NDArray[np.bool_]:
-        """Returns whether each row of `theta` (n, p) lies in the joint region, shape (n,)."""
-        return self.posterior.coordinate_log_prob(theta) >= self.log_density_threshold
-
-    def __getitem__(self, name: str) -> tuple[float, float]:
-        """Returns the interval of one parameter."""
-        low, high = self.intervals[self.names.index(name)]
-        return float(low), float(high)
-
-
-@dataclass(frozen=True)
-class Marginal:
-    """Distribution of one parameter alone.
-
-    Attributes:
-        name: path of the parameter.
-        grid: values, own unit, evenly spaced in the parameter's coordinate, shape (g,).
-        density: density of the coordinate at the grid (per unit of prior range), shape (g,).
-        median: own unit.
-        interval90: central 90 % interval, own unit.
-    """
-
-    name: str
-    grid: Array
-    density: Array
-    median: float
-    interval90: tuple[float, float]
 
 
 class Posterior:
@@ -425,7 +300,7 @@ class Posterior:
         draws = self._draws()[0]
         result = {}
         for i, parameter in enumerate(self.prior.free):
-            points, density = _kernel_density(draws[:, i], parameter.coordinate_bounds, grid)
+            points, density = kernel_density(draws[:, i], parameter.coordinate_bounds, grid)
             values = parameter.from_coordinate(np.quantile(draws[:, i], [0.05, 0.5, 0.95]))
             result[parameter.path] = Marginal(
                 parameter.path,
@@ -467,21 +342,3 @@ def _outside(factors: list[TruncatedMixture]) -> list[MassOutsidePrior]:
         for i, factor in enumerate(factors)
         if factor.is_mostly_outside
     ]
-
-
-def _kernel_density(draws: Array, bounds: tuple[float, float], grid: int) -> tuple[Array, Array]:
-    """Gaussian kernel density of `draws` (n,), reflected at finite bounds."""
-    low = max(bounds[0], float(draws.min()) - 0.5 * float(np.ptp(draws)))
-    high = min(bounds[1], float(draws.max()) + 0.5 * float(np.ptp(draws)))
-    quartiles = np.quantile(draws, [0.25, 0.75])
-    spread = min(float(draws.std()), float(np.diff(quartiles)[0]) / 1.34) or 1e-12
-    width = 0.9 * spread * len(draws) ** -0.2
-    # Binning first makes the cost independent of the number of draws.
-    counts, edges = np.histogram(draws, bins=1000, range=(low, high))
-    centres = 0.5 * (edges[1:] + edges[:-1])
-    width = max(width, 2 * (edges[1] - edges[0]))
-    points = np.linspace(low, high, grid)
-    density = np.zeros(grid)
-    for mirrored in (centres, 2 * low - centres, 2 * high - centres):
-        density += np.exp(-0.5 * ((points[:, None] - mirrored) / width) ** 2) @ counts
-    return points, density / (len(draws) * width * np.sqrt(2 * np.pi))

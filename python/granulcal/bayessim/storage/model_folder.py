@@ -7,7 +7,7 @@ import tempfile
 import warnings
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import Any
 
 import numpy as np
 from safetensors import SafetensorError
@@ -17,13 +17,10 @@ from safetensors.numpy import save as tensor_bytes
 from granulcal import _native
 from granulcal.bayessim.check.calibration import Calibration
 from granulcal.bayessim.check.identifiability import Identifiability
-from granulcal.bayessim.check.misfit import MisfitReference
-from granulcal.bayessim.emulator.likelihood import Likelihood
-from granulcal.bayessim.network.amortised import Amortised
-from granulcal.bayessim.network.standardise import Standardiser
 from granulcal.bayessim.posterior.average import FORMS, Average
 from granulcal.bayessim.storage.damage import hashes, in_order, verify
 from granulcal.bayessim.storage.model_schema import check_model
+from granulcal.bayessim.storage.parts import Parts, Trained
 from granulcal.bayessim.storage.tensors import Tensors, model_tensors
 from granulcal.bayessim.training.config import Config
 from granulcal.bayessim.training.summary import TrainingSummary
@@ -31,9 +28,6 @@ from granulcal.documents import LARGEST_DOCUMENT, parse_json, read_bytes
 from granulcal.errors import ModelFormatError, UnverifiedModelWarning
 from granulcal.files import write_beside
 from granulcal.prior import Prior
-
-if TYPE_CHECKING:
-    from granulcal.bayessim.model import BayesSim
 
 __all__ = ["Parts", "load_parts", "save_model"]
 
@@ -43,24 +37,7 @@ _OLDER_VERSIONS = (3,)
 _JSON_NAME, _TENSORS_NAME = "model.json", "weights.safetensors"
 
 
-class Parts(TypedDict):
-    """What a saved model is joined from: the arguments of `BayesSim`."""
-
-    prior: Prior
-    config: Config
-    standardiser: Standardiser
-    likelihood: Likelihood
-    amortised: Amortised | None
-    average: Average
-    x_names: tuple[str, ...]
-    misfit_reference: MisfitReference
-    summary: TrainingSummary
-    calibration: Calibration | None
-    identifiability: Identifiability | None
-    scene_toml: str | None
-
-
-def save_model(model: "BayesSim", path: str | PathLike[str], *, compact: bool = False) -> None:
+def save_model(model: Trained, path: str | PathLike[str], *, compact: bool = False) -> None:
     """Writes `model` to the folder `path`; a model already there is replaced, other files stay.
 
     Raises:
@@ -154,7 +131,7 @@ def _keep_others(old: Path, target: Path) -> None:
             os.rename(entry, target / entry.name)
 
 
-def _document(model: "BayesSim") -> dict[str, Any]:
+def _document(model: Trained) -> dict[str, Any]:
     likelihood = model.likelihood
     return {
         "format": FORMAT,

@@ -1,7 +1,7 @@
 """The arrays of a model as named tensors, and back with every shape checked."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -16,12 +16,10 @@ from granulcal.bayessim.emulator.signal import SignalAxes
 from granulcal.bayessim.network.amortised import Amortised
 from granulcal.bayessim.network.network import HeadLayout, Network
 from granulcal.bayessim.network.standardise import Standardiser
+from granulcal.bayessim.storage.parts import Trained
 from granulcal.bayessim.training.config import Config
 from granulcal.errors import ModelFormatError
 from granulcal.prior import Prior
-
-if TYPE_CHECKING:
-    from granulcal.bayessim.model import BayesSim
 
 __all__ = ["Tensors", "model_tensors"]
 
@@ -30,7 +28,7 @@ Array = NDArray[np.float64]
 _X_NAMES = ("shift", "scale", "low", "high")
 
 
-def model_tensors(model: "BayesSim", *, compact: bool = False) -> dict[str, NDArray[Any]]:
+def model_tensors(model: Trained, *, compact: bool = False) -> dict[str, NDArray[Any]]:
     """Returns every array of a model by name.
 
     Args:

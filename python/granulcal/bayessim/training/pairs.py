@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 from granulcal.bayessim.arrays import as_matrix
 from granulcal.errors import TrainingDataError
+from granulcal.pours.status import NO_GRAINS, UNUSABLE, USABLE
 from granulcal.prior import Prior
 
 __all__ = ["TrainingPairs"]
 
 Array = NDArray[np.float64]
 
-KEPT_STATUSES = ("at_rest", "out_of_view", "ran_out", "horizon")
 # A jammed pour is healthy, but no formation: what is learned is p(theta | x, the funnel emptied).
-EXCLUDED_STATUSES = ("unhealthy", "jammed", "no_grains_in_view")
+EXCLUDED_STATUSES = (*UNUSABLE, NO_GRAINS)
 # Fewer pairs than this cannot be split into training, validation and test.
 FEWEST_PAIRS = 50
 
@@ -160,7 +160,7 @@ def _statuses(status: Sequence[str] | None, count: int) -> NDArray[np.str_]:
     statuses = np.asarray([str(each) for each in status])
     if len(statuses) != count:
         raise TrainingDataError(f"status must have {count} entries, got {len(statuses)}")
-    known = KEPT_STATUSES + EXCLUDED_STATUSES
+    known = USABLE + EXCLUDED_STATUSES
     unknown = sorted(set(statuses.tolist()) - set(known))
     if unknown:
         raise TrainingDataError(f"unknown status {', '.join(unknown)}; known: {', '.join(known)}")

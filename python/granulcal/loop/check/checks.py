@@ -5,11 +5,11 @@ from numpy.typing import NDArray
 
 from granulcal.loop.check.confirm import confirm
 from granulcal.loop.check.correction import Correction, corrections
-from granulcal.loop.check.coverage import Calibrated, calibrate
+from granulcal.loop.check.coverage import Coverage, calibrate
 from granulcal.loop.check.prior_pours import Look
 from granulcal.loop.check.standing import Moved
 from granulcal.loop.check.trivial import Group, TrivialRow, trivial_rows
-from granulcal.loop.pours.archive import Plan
+from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
 from granulcal.loop.pours.replicates import FEWEST, seeds_of_replicates
@@ -17,7 +17,7 @@ from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.observation import Observation
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Condition, Task
-from granulcal.loop.test.misfit import Improvement, compare
+from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Trace, trace
 
@@ -31,7 +31,7 @@ _PAIR_SEED, _PAIR_STEP = 9_000_011, 1000
 
 def confirmed(
     surrogate: Surrogate,
-    plan: Plan,
+    plan: ArchivePlan,
     fitted: tuple[Condition, ...],
     found: Trace,
     simulated: dict[str, tuple[Array, Array]],
@@ -45,13 +45,13 @@ def confirmed(
 def calibrated(
     forward: Forward,
     task: Task,
-    plan: Plan,
+    plan: ArchivePlan,
     surrogate: Surrogate,
     found: Trace,
     rules: Thresholds,
     pairs: int,
     seed: int,
-) -> Calibrated | None:
+) -> Coverage | None:
     """Returns the interval of the named effect by simulated pairs; None if none were asked for."""
     best = found.best
     if pairs == 0 or len(best.effects) != 1:
@@ -76,7 +76,7 @@ def calibrated(
 
 def corrected(
     task: Task,
-    plan: Plan,
+    plan: ArchivePlan,
     surrogate: Surrogate,
     found: Trace,
     measured: dict[str, Array],
@@ -95,7 +95,7 @@ def corrected(
 
 
 def moved(
-    task: Task, plan: Plan, surrogate: Surrogate, rules: Thresholds, seed: int
+    task: Task, plan: ArchivePlan, surrogate: Surrogate, rules: Thresholds, seed: int
 ) -> tuple[Moved, ...]:
     """Returns the verdicts of the pours to fit, looked at in every other way that was declared."""
     found = []
@@ -148,7 +148,7 @@ def nearer(
 
 def trivial(
     task: Task,
-    plan: Plan,
+    plan: ArchivePlan,
     measured: dict[str, Array],
     simulated: dict[str, tuple[Array, Array]],
     surrogate: Surrogate,

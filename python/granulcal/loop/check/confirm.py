@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.surrogate.baseline import Fit
-from granulcal.loop.surrogate.linearised import Local
-from granulcal.loop.surrogate.observation import Observation, Stack
+from granulcal.loop.surrogate.linearised import LinearisedSurrogate
+from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 
 __all__ = ["confirm"]
@@ -27,8 +28,8 @@ _DRAWS = 4000
 
 def confirm(surrogate: Surrogate, fit: Fit, fresh: Sequence[Observation]) -> float:
     """Returns p of fresh pours of a model at its fit, from `_DRAWS` draws of chi squared."""
-    stack = Stack.of(surrogate, fresh)
-    local = Local.at(surrogate, stack.conditions, stack.counts, fit.v)
+    stack = StackedMeans.of(surrogate, fresh)
+    local = LinearisedSurrogate.at(surrogate, stack.conditions, stack.counts, fit.v)
     covariance = local.pour_covariance(fit.v, fit.psi) + local.error_covariance(fit.v, fit.psi)
     root = np.linalg.cholesky(covariance)
     white = np.linalg.solve(root, stack.means.ravel() - local.mean(fit.v, fit.psi))

@@ -4,7 +4,7 @@ On the scale z of the surrogate's statistics, y measured and x simulated pours o
 
 $$ D^2_\mathrm{before} = D^2(y, x), \qquad D^2_\mathrm{after} = D^2(y, x + \hat\delta(c)) $$
 
-with $D^2$ of `misfit.py` and $\hat\delta$ of `discrepancy.py`, which was fitted to the conditions
+with $D^2$ of `distance.py` and $\hat\delta$ of `discrepancy.py`, which was fitted to the conditions
 to fit alone.
 """
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from granulcal.errors import ObservationError
 from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.surrogate.surrogate import Surrogate
-from granulcal.loop.test.misfit import noise_free_square
+from granulcal.loop.test.distance import noise_free_square
 from granulcal.loop.test.trace import Trace
 
 __all__ = ["Correction", "corrections"]

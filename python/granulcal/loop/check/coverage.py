@@ -27,12 +27,13 @@ from numpy.typing import NDArray
 
 from granulcal.loop.effects.design import LARGEST_Z, cube_from_normal
 from granulcal.loop.surrogate.baseline import Fit, fit_base
-from granulcal.loop.surrogate.observation import Observation, Stack
+from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.test.refit import Model, fit_single, interval
 from granulcal.loop.test.thresholds import Thresholds
 
-__all__ = ["FEWEST_PAIRS", "Calibrated", "calibrate", "needed_stretch"]
+__all__ = ["FEWEST_PAIRS", "Coverage", "calibrate", "needed_stretch"]
 
 Array = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ _WIDER = 2.0
 
 
 @dataclass(frozen=True)
-class Calibrated:
+class Coverage:
     """An interval that simulated pairs have widened.
 
     Attributes:
@@ -94,7 +95,7 @@ def calibrate(
     *,
     count: int,
     seed: int = 0,
-) -> Calibrated | None:
+) -> Coverage | None:
     """Returns the interval of a single effect's strength, widened until pairs cover.
 
     Args:
@@ -120,7 +121,7 @@ def calibrate(
         observed = pour(b, theta, psi)
         if observed is None:
             continue
-        stack = Stack.of(surrogate, observed)
+        stack = StackedMeans.of(surrogate, observed)
         local, base = fit_base(surrogate, stack, seed + b)
         found = fit_single(local, stack.means.ravel(), base, k, thresholds)
         stretches.append(needed_stretch(found.curve, psi, level))
@@ -135,7 +136,7 @@ def calibrate(
         else np.array(interval(model.curve, level, stretch))
     )
     held = sum(s == 1.0 for s in stretches)
-    return Calibrated(k, widened, stretch, held, len(stretches), float(np.mean(errors)))
+    return Coverage(k, widened, stretch, held, len(stretches), float(np.mean(errors)))
 
 
 def _widened(ends: Array) -> Array:

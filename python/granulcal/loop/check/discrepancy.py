@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.errors import ObservationError
 from granulcal.loop.surrogate.baseline import Fit
-from granulcal.loop.surrogate.linearised import Local
+from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.test.score import DISCREPANCY_LENGTH
 
 __all__ = ["Discrepancy"]
@@ -59,7 +59,7 @@ class Discrepancy:
     precision: Array
 
     @classmethod
-    def of(cls, local: Local, fit: Fit) -> "Discrepancy":
+    def of(cls, local: LinearisedSurrogate, fit: Fit) -> "Discrepancy":
         """Returns the discrepancy that a base fit leaves."""
         count, size = len(local.conditions), local.surrogate.size
         root, slopes = local.in_statistics(fit.root), local.in_statistics(fit.slopes)

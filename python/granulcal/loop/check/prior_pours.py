@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.effects.design import Design, normal_from_cube
-from granulcal.loop.pours.archive import Plan
+from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.refine import Rows
 from granulcal.loop.pours.scenes import faults_of, scene_of
@@ -79,7 +79,7 @@ def hypercube(count: int, dimensions: int, seed: int) -> Array:
 def look(
     forward: Forward,
     task: Task,
-    plan: Plan,
+    plan: ArchivePlan,
     found: Trace,
     measured: dict[str, Array],
     spread: Array,

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from granulcal.loop.check.trivial import TrivialRow
-from granulcal.loop.test.misfit import Improvement
+from granulcal.loop.test.distance import Improvement
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.verdict import NAMING, Verdict
 

@@ -7,7 +7,7 @@ $$ \hat y_\mathrm{nearest} = \bar y_{h^*}, \qquad \hat y_\mathrm{line} = \sum_h 
 
 $w$ are the weights of the straight line between the neighbours of c, which is carried on beyond the
 outermost two; with more inputs than one those of the least-squares plane; where the conditions span
-neither, the nearest condition has weight 1. $D^2$ of a row is that of `misfit.py`: the squared
+neither, the nearest condition has weight 1. $D^2$ of a row is that of `distance.py`: the squared
 distance without the noise of $\bar y_c$ and of the row itself.
 
 The last row asks more than it seems: it knows the base model and what was measured, and so all that
@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.test.misfit import noise_free_square
+from granulcal.loop.test.distance import noise_free_square
 
 __all__ = ["LINE", "NEAREST", "RESIDUAL", "Group", "TrivialRow", "line_weights", "trivial_rows"]
 

@@ -23,22 +23,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.documents import ListOf, Number, OneOf, Table, Text, read_json
-from granulcal.engines.in_use import version_of_pours
 from granulcal.errors import TrainingDataError
 from granulcal.files import write_beside
-from granulcal.loop.effects.design import Design
 from granulcal.loop.effects.image_faults import require_image
-from granulcal.loop.effects.library import LibraryEffect, fingerprint
 from granulcal.loop.effects.series_faults import require_series, reread
-from granulcal.loop.effects.tolerance import Tolerances
 from granulcal.loop.pours.cube import cube
 from granulcal.loop.pours.image_rows import ImageRows
 from granulcal.loop.pours.measures import Measures
+from granulcal.loop.pours.plan import ArchivePlan, Pours
 from granulcal.pours.dataset import Dataset, generate
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 
-__all__ = ["Archive", "Plan", "Pours"]
+__all__ = ["Archive", "ArchivePlan", "Pours"]
 
 Array = NDArray[np.float64]
 
@@ -58,108 +55,6 @@ _WHOLE_STRENGTHS = (0.25, 0.5, 0.75, 1.0)
 _SEED_STEP, _PLACE_STEP = 1009, 101
 # Base pours that are read anew for an effect that needs none of its own.
 _FREE_COPIES = 400
-# Most base pours whose images are kept at hand for that, and their largest share of the base.
-_IMAGES, _IMAGES_SHARE = 400, 0.25
-
-
-@dataclass(frozen=True, kw_only=True)
-class Plan:
-    """What an archive is of.
-
-    Attributes:
-        scene: the base scene.
-        prior: of the material.
-        conditions: path and range of each condition input, q of them.
-        library: the effects.
-        base: pours of the plain model, those of `images` among them.
-        each: pours of each effect.
-        seed: of all of them.
-        tolerances: of the statistics; they need no pours.
-        places: numbers of each condition, where pours are at these alone; else empty.
-    """
-
-    scene: Scene
-    prior: Prior
-    conditions: tuple[tuple[str, float, float], ...]
-    library: tuple[LibraryEffect, ...]
-    base: int
-    each: int
-    seed: int = 0
-    tolerances: Tolerances | None = None
-    places: tuple[dict[str, float], ...] = ()
-
-    def record(self) -> dict[str, object]:
-        """Returns what another run must agree with to use the same archive.
-
-        Sizes may grow, and the library at its end.
-        """
-        return {
-            "version": version_of_pours(),
-            "scene": self.scene.to_toml(),
-            "prior": self.prior.to_toml(),
-            "conditions": [list(condition) for condition in self.conditions],
-            "library": fingerprint(self.library),
-            "effects": [effect.name for effect in self.library],
-            "each_effect": [fingerprint((effect,)) for effect in self.library],
-            "seed": self.seed,
-            "places": list(self.places),
-        }
-
-    @property
-    def design(self) -> Design:
-        """The coordinates of the loop."""
-        return Design(
-            parameters=tuple(self.prior.names),
-            conditions=tuple(path for path, _, _ in self.conditions),
-            effects=(
-                *(effect.design() for effect in self.library),
-                *(self.tolerances.effects() if self.tolerances else ()),
-            ),
-        )
-
-    @property
-    def pours(self) -> int:
-        """Pours of the whole archive."""
-        own = [e for e in self.library if not e.is_free]
-        return self.base + self.each * len(own)
-
-    @property
-    def images(self) -> int:
-        """Base pours whose images are read again; none where no effect is one of the image."""
-        if not any(effect.image for effect in self.library):
-            return 0
-        return min(_IMAGES, int(_IMAGES_SHARE * self.base))
-
-    def unit(self, at: dict[str, float]) -> Array:
-        """Returns the inputs of a condition that states the numbers `at` in [0, 1], shape (q,)."""
-        return self.unit_condition(np.array([at[path] for path, _, _ in self.conditions]))
-
-    def unit_condition(self, values: Array) -> Array:
-        """Returns condition inputs (n, q) as unit coordinates."""
-        low = np.array([low for _, low, _ in self.conditions])
-        high = np.array([high for _, _, high in self.conditions])
-        return (values - low) / (high - low)
-
-
-@dataclass(frozen=True)
-class Pours:
-    """Rows of an archive in unit coordinates.
-
-    Attributes:
-        theta: shape (n, p).
-        condition: shape (n, q).
-        psi: shape (n, K).
-        x: statistics in their units, shape (n, s).
-        names: of the statistics.
-        left_out: pours that were not usable.
-    """
-
-    theta: Array
-    condition: Array
-    psi: Array
-    x: Array
-    names: tuple[str, ...]
-    left_out: int
 
 
 class Archive:
@@ -174,7 +69,7 @@ class Archive:
         TrainingDataError: the folder holds the archive of something else, or of another version.
     """
 
-    def __init__(self, folder: Path, plan: Plan) -> None:
+    def __init__(self, folder: Path, plan: ArchivePlan) -> None:
         """Opens or begins it."""
         require_image(plan.scene, (effect.name for effect in plan.library if effect.image))
         require_series(plan.scene, ((e.name, e.series) for e in plan.library if e.series))

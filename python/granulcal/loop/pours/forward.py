@@ -3,30 +3,26 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.engines.in_use import version_of_pours
-from granulcal.files import beside
 from granulcal.loop.pours.measures import Measures
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
+from granulcal.pours.status import UNUSABLE
+from granulcal.pours.store import PourStore
 
-__all__ = ["UNUSABLE", "Coarse", "Forward"]
+__all__ = ["Coarse", "Forward"]
 
 Array = NDArray[np.float64]
 
 # From one of the pours that are averaged to the next.
 _REPEAT_STEP = 1_000_000_007
-
-UNUSABLE = ("unhealthy", "jammed")
-"""Statuses of pours that nothing is learnt from."""
 
 
 class Forward:
@@ -39,7 +35,7 @@ class Forward:
 
     def __init__(self, folder: Path, threads: int) -> None:
         """Begins or goes on with a folder."""
-        self.folder, self.threads = folder, threads
+        self.store = PourStore(folder, threads)
         self.ran = 0
         folder.mkdir(parents=True, exist_ok=True)
 
@@ -53,17 +49,19 @@ class Forward:
         names = Measures.of(scene).names
         of = [version_of_pours(), names, scene.to_toml(), list(seeds)]
         text = json.dumps([*of, dict(faults)] if faults else of)
-        path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
-        kept = _kept(path)
-        if kept is not None:
-            return kept
-        with ThreadPoolExecutor(self.threads) as pool:
-            made = pool.map(lambda seed: _row(scene, seed, faults), seeds)
-            rows = [row for row in made if row is not None]
+        key = hashlib.sha256(text.encode()).hexdigest()[:16]
+        kept = self.store.read(key)
+        if kept is not None and "found" in kept:
+            return kept["found"]
+        older = self.store.folder / f"{key}.npy"
+        if older.exists():
+            # Of before there was a checksum.
+            return np.load(older)
+        made = self.store.make(lambda seed: _row(scene, seed, faults), seeds)
+        rows = [row for row in made if row is not None]
         self.ran += len(seeds)
         found = np.array(rows).reshape(len(rows), len(names))
-        with beside(path) as temporary:
-            np.savez(temporary, found=found)
+        self.store.keep(key, {"found": found})
         return found
 
     def limit(
@@ -107,19 +105,6 @@ class Coarse:
     def repeats(self) -> int:
         """Pours at each size whose mean, taken to the limit, scatters no more than one pour."""
         return ceil((1 - self.held) ** 2 + self.held**2)
-
-
-def _kept(path: Path) -> Array | None:
-    """The rows of a file; None where there is none, or a damaged one: it can be made again."""
-    # Of before there was a checksum.
-    older = path.with_suffix(".npy")
-    try:
-        if not path.exists():
-            return np.load(older) if older.exists() else None
-        with np.load(path) as file:
-            return file["found"]
-    except (ValueError, KeyError, EOFError, OSError, BadZipFile):
-        return None
 
 
 def _row(scene: Scene, seed: int, faults: Mapping[str, float] | None) -> Array | None:

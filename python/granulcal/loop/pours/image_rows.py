@@ -6,24 +6,20 @@ each effect. A chunk is whole or absent, and is made again where an effect has b
 """
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-from zipfile import BadZipFile
 from zlib import crc32
-from zlib import error as zlib_error
 
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.files import beside
 from granulcal.loop.effects.library import LibraryEffect
 from granulcal.loop.pours.cube import from_cube
-from granulcal.loop.pours.forward import UNUSABLE
 from granulcal.loop.pours.measures import Measures
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
+from granulcal.pours.status import UNUSABLE
+from granulcal.pours.store import PourStore
 from granulcal.prior import Prior
 
 __all__ = ["ImageRows"]
@@ -67,11 +63,11 @@ class ImageRows:
         missing = [i for i in range(self._chunks) if self._read(i) is None]
         if missing:
             say(f"images: {len(missing) * _CHUNK} pours, read under {len(self.effects)} effects")
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with ThreadPoolExecutor(threads) as pool:
-            for chunk in missing:
-                rows = range(chunk * _CHUNK, min((chunk + 1) * _CHUNK, self.count))
-                self._write(chunk, list(pool.map(self._row, rows)))
+        store = PourStore(self.folder, threads)
+        for chunk in missing:
+            of = range(chunk * _CHUNK, min((chunk + 1) * _CHUNK, self.count))
+            rows = store.make(self._row, of)
+            store.keep(_name(chunk), {k: np.array([row[k] for row in rows]) for k in rows[0]})
 
     def rows(self) -> dict[str, tuple[Array, Array, Array, Array]] | None:
         """Returns theta, condition, strength (n,) and statistics of the usable pours.
@@ -99,18 +95,9 @@ class ImageRows:
     def _chunks(self) -> int:
         return -(-self.count // _CHUNK)
 
-    def _path(self, chunk: int) -> Path:
-        return self.folder / f"rows-{chunk:05d}.npz"
-
     def _read(self, chunk: int) -> dict[str, Array] | None:
-        path = self._path(chunk)
-        if not path.exists():
-            return None
-        try:
-            with np.load(path) as file:
-                found = {name: file[name] for name in file.files}
-        except (ValueError, KeyError, EOFError, OSError, BadZipFile, zlib_error):
-            # Damaged: its pours can be made again.
+        found = PourStore(self.folder).read(_name(chunk))
+        if found is None or "theta" not in found:
             return None
         wanted = min((chunk + 1) * _CHUNK, self.count) - chunk * _CHUNK
         is_whole = all(f"x/{effect.name}" in found for effect in self.effects)
@@ -119,12 +106,6 @@ class ImageRows:
             if is_whole and len(found["theta"]) >= wanted
             else None
         )
-
-    def _write(self, chunk: int, rows: list[dict[str, Array]]) -> None:
-        path = self._path(chunk)
-        columns: dict[str, Any] = {k: np.array([row[k] for row in rows]) for k in rows[0]}
-        with beside(path) as temporary:
-            np.savez_compressed(temporary, **columns)
 
     def _row(self, row: int) -> dict[str, Array]:
         """One pour: NaN for what it does not show, and under effects that leave it out."""
@@ -162,3 +143,7 @@ class ImageRows:
             found[f"psi/{effect.name}"] = np.array(psi)
             found[f"x/{effect.name}"] = look(effect.faults(psi)) if is_read else nothing
         return found
+
+
+def _name(chunk: int) -> str:
+    return f"rows-{chunk:05d}"

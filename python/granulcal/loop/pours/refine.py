@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.pours.archive import Plan
+from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.baseline import Fit
@@ -58,7 +58,7 @@ class Rows:
 
 
 def further(
-    forward: Forward, task: Task, plan: Plan, found: Trace, number: int, seed: int
+    forward: Forward, task: Task, plan: ArchivePlan, found: Trace, number: int, seed: int
 ) -> list[Rows]:
     """Runs the pours of round `number`; those of effects on the camera's lengths need none."""
     free = {effect.name for effect in task.library if effect.camera}
@@ -75,7 +75,7 @@ def further(
 
 
 def _of_model(
-    forward: Forward, task: Task, plan: Plan, fit: Fit, names: list[str], seed: int
+    forward: Forward, task: Task, plan: ArchivePlan, fit: Fit, names: list[str], seed: int
 ) -> Rows | None:
     conditions = task.of(FIT)
     kept: list[tuple[Array, Array, Array, Array]] = []

@@ -9,7 +9,7 @@ from granulcal.loop.pours.measures import Measures
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import Condition, Task
-from granulcal.loop.test.misfit import Improvement, compare
+from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.trace import Explanation, Trace
 from granulcal.pours.scene import Scene
 

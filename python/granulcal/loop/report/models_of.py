@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.check.discrepancy import Discrepancy
-from granulcal.loop.pours.archive import Plan
+from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.report.models import Maker, Models
 from granulcal.loop.surrogate.fit_draws import draw
@@ -22,7 +22,7 @@ _DRAWS, _SEED = 40, 8_500_003
 
 def models_of(
     task: Task,
-    plan: Plan,
+    plan: ArchivePlan,
     surrogate: Surrogate,
     found: Trace,
     verdict: dict[str, object],
@@ -68,7 +68,7 @@ def models_of(
     )
 
 
-def _makers(task: Task, plan: Plan, found: Trace, one: Explanation) -> tuple[Maker, ...]:
+def _makers(task: Task, plan: ArchivePlan, found: Trace, one: Explanation) -> tuple[Maker, ...]:
     """The numbers of a model at its fit, then those of draws of it."""
     drawn = draw(found.fit_of(one), plan.design, _DRAWS, seed=_SEED)
     thetas = np.concatenate([one.theta[None], drawn[0]])

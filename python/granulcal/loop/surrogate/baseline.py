@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.effects.design import LARGEST_Z
-from granulcal.loop.surrogate.linearised import Local
-from granulcal.loop.surrogate.observation import Stack
+from granulcal.loop.surrogate.linearised import LinearisedSurrogate
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 
 __all__ = ["Fit", "Start", "fit_base", "improve"]
@@ -71,12 +71,12 @@ class Start:
 
 
 def fit_base(
-    surrogate: Surrogate, stack: Stack, seed: int, starts: Sequence[Start] = ()
-) -> tuple[Local, Fit]:
+    surrogate: Surrogate, stack: StackedMeans, seed: int, starts: Sequence[Start] = ()
+) -> tuple[LinearisedSurrogate, Fit]:
     """Returns the best fit without effects, and the surrogate around it."""
     places = [*_starts(surrogate, stack, seed), *(start.v for start in starts)]
-    best: tuple[Local, Fit] | None = None
-    local = Local.at(surrogate, stack.conditions, stack.counts, places[0])
+    best: tuple[LinearisedSurrogate, Fit] | None = None
+    local = LinearisedSurrogate.at(surrogate, stack.conditions, stack.counts, places[0])
     for start in places:
         fit = improve(local, stack.means.ravel(), start, local.none(), ())
         if best is None or fit.log_density > best[1].log_density:
@@ -84,12 +84,12 @@ def fit_base(
     assert best is not None
     fit = best[1]
     # What is local is taken at the fit, and the fit once more with it.
-    local = Local.at(surrogate, stack.conditions, stack.counts, fit.v)
+    local = LinearisedSurrogate.at(surrogate, stack.conditions, stack.counts, fit.v)
     return local, improve(local, stack.means.ravel(), fit.v, local.none(), ())
 
 
 def improve(
-    local: Local,
+    local: LinearisedSurrogate,
     target: Array,
     v: Array,
     psi: Array,
@@ -155,7 +155,7 @@ def improve(
 
 
 def summarise(
-    local: Local,
+    local: LinearisedSurrogate,
     target: Array,
     v: Array,
     psi: Array,
@@ -174,7 +174,7 @@ def summarise(
     return Fit(v, psi, active, target - mean, slopes, root, square, log_density)
 
 
-def _starts(surrogate: Surrogate, stack: Stack, seed: int) -> list[Array]:
+def _starts(surrogate: Surrogate, stack: StackedMeans, seed: int) -> list[Array]:
     """Draws of the prior that fit best where only their noise counts."""
     p, effects = len(surrogate.design.parameters), len(surrogate.design.effects)
     v = np.random.default_rng(seed).standard_normal((_STARTS, p))

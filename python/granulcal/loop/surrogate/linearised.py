@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from granulcal.loop.effects.design import cube_from_normal
 from granulcal.loop.surrogate.surrogate import Surrogate
 
-__all__ = ["Local"]
+__all__ = ["LinearisedSurrogate"]
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ _STEP = 1e-3
 
 
 @dataclass(frozen=True)
-class Local:
+class LinearisedSurrogate:
     """What does not change while theta moves a little.
 
     Attributes:
@@ -53,7 +53,9 @@ class Local:
     nuisance: Array
 
     @classmethod
-    def at(cls, surrogate: Surrogate, conditions: Array, counts: Array, v: Array) -> "Local":
+    def at(
+        cls, surrogate: Surrogate, conditions: Array, counts: Array, v: Array
+    ) -> "LinearisedSurrogate":
         """Returns what holds around `v` (p,)."""
         theta = cube_from_normal(v)
         count, size = len(conditions), surrogate.size

@@ -1,15 +1,13 @@
-"""Measured pours, one group for each condition, on the scale of the surrogate."""
+"""Measured pours of one material, one group for each condition."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.errors import ObservationError
-from granulcal.loop.surrogate.surrogate import Surrogate
 
-__all__ = ["Observation", "Stack"]
+__all__ = ["Observation"]
 
 Array = NDArray[np.float64]
 
@@ -39,51 +37,3 @@ class Observation:
         if rows.ndim != 2 or len(rows) == 0:
             raise ObservationError(f"{label}: pours must have shape (n > 0, s), got {rows.shape}")
         return cls(label, np.atleast_1d(np.asarray(condition, dtype=np.float64)), rows)
-
-
-@dataclass(frozen=True)
-class Stack:
-    """Means of pours under H conditions.
-
-    Attributes:
-        labels: of the conditions.
-        conditions: shape (H, q).
-        means: standardised, transformed, shape (H, m).
-        counts: pours of each, shape (H,).
-    """
-
-    labels: tuple[str, ...]
-    conditions: Array
-    means: Array
-    counts: Array
-
-    @classmethod
-    def of(cls, surrogate: Surrogate, observations: Sequence[Observation]) -> "Stack":
-        """Returns the means of `observations`.
-
-        Raises:
-            ObservationError: none, another number of condition inputs, one outside the archive's
-                range, or another number of statistics.
-        """
-        if not observations:
-            raise ObservationError("at least one condition with pours is needed, got none")
-        inputs = len(surrogate.design.conditions)
-        for one in observations:
-            if one.condition.shape != (inputs,):
-                raise ObservationError(
-                    f"{one.label}: the archive has {inputs} condition inputs, "
-                    f"got {one.condition.size}"
-                )
-            if inputs and not (one.condition.min() >= -1e-6 and one.condition.max() <= 1 + 1e-6):
-                raise ObservationError(
-                    f"{one.label}: condition inputs must be within the archive's range [0, 1], "
-                    f"got {one.condition.tolist()}"
-                )
-        return cls(
-            labels=tuple(one.label for one in observations),
-            conditions=np.array([one.condition for one in observations]).reshape(
-                len(observations), inputs
-            ),
-            means=np.array([surrogate.standardise(o.pours).mean(axis=0) for o in observations]),
-            counts=np.array([len(one.pours) for one in observations], dtype=np.float64),
-        )

@@ -29,7 +29,6 @@ Reference:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,11 +38,19 @@ from granulcal.bayessim.emulator.noise import fit_log_scale
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.effects.design import Design
 from granulcal.loop.surrogate.blocks import fit_blocks
+from granulcal.loop.surrogate.columns import (
+    _effect_columns,
+    held_residuals,
+    lack_of_fit,
+    mean_columns,
+    noise_correlation,
+    scale_columns,
+    uncorrelated_axes,
+    usable_statistics,
+)
+from granulcal.loop.surrogate.observation import Observation
 from granulcal.loop.surrogate.shift import Shift
 from granulcal.loop.surrogate.transform import Transform
-
-if TYPE_CHECKING:
-    from granulcal.loop.surrogate.observation import Observation
 
 __all__ = ["Surrogate"]
 
@@ -52,19 +59,9 @@ Array = NDArray[np.float64]
 _FEATURES = 96
 _SCALE_FEATURES = 10
 _SCALE_STRETCH = 2.0
-# Prior standard deviations of constant, slopes and curvatures of an effect, before its own width.
-_CONSTANT, _SLOPE, _CURVATURE = 1.0, 0.5, 0.25
-# Share of the correlation that is replaced by none.
-_SHRINKAGE = 0.03
-# Whitened residuals are held within this many standard deviations where they make covariances.
-_LARGEST_RESIDUAL = 6.0
-# A statistic whose most common value has this share of the pours says nothing smooth.
-_LARGEST_SHARE = 0.9
 # Rows of the archive whose residuals are kept from R, to make replicates of.
 _DONOR_SHARE = 0.35
 _LEAST_ROWS = 60
-# Pairs of near rows that show what the features cannot follow.
-_LACK_ROWS, _NEIGHBOURS = 2000, 4
 
 
 @dataclass(frozen=True)
@@ -156,7 +153,7 @@ class Surrogate:
         labels = tuple(names) if names is not None else tuple(f"x{i}" for i in range(x_.shape[1]))
         if len(labels) != x_.shape[1]:
             raise TrainingDataError(f"{x_.shape[1]} statistics need as many names, got {labels}")
-        columns, dropped = _usable(x_, labels)
+        columns, dropped = usable_statistics(x_, labels)
         kept = np.isfinite(x_[:, columns]).all(axis=1)
         theta_, condition_, psi_, x_ = theta_[kept], condition_[kept], psi_[kept], x_[kept]
         finite = np.where(np.isfinite(x_), x_, np.nan)
@@ -170,7 +167,7 @@ class Surrogate:
         quadratic = polynomial(2 * u[base] - 1, 2)
         transforms = tuple(Transform.choose(x_[base, j], quadratic) for j in columns)
         z = np.column_stack([t(x_[:, j]) for t, j in zip(transforms, columns, strict=True)])
-        axes = _axes(z[base], quadratic)
+        axes = uncorrelated_axes(z[base], quadratic)
         z = z @ axes
         spread = z[base].std(axis=0)
         lengths = learn_length_scales(
@@ -188,8 +185,8 @@ class Surrogate:
             moved[on] += psi_[on, k, None] * shift.move(u[on], k)
         z = z - moved
         bent = np.array([effect.held is None for effect in design.effects], dtype=bool)
-        design_matrix, blocks = _features(basis, u, psi_, bent)
-        scale_matrix = _scale_features(scale_basis, u, psi_, bent)
+        design_matrix, blocks = mean_columns(basis, u, psi_, bent)
+        scale_matrix = scale_columns(scale_basis, u, psi_, bent)
         coefficients = np.empty((size, design_matrix.shape[1]))
         roots = np.empty((size, design_matrix.shape[1], design_matrix.shape[1]))
         scale_coefficients = np.empty((size, scale_matrix.shape[1]))
@@ -226,8 +223,8 @@ class Surrogate:
             roots=roots,
             scale_basis=scale_basis,
             scale_coefficients=scale_coefficients,
-            correlation=_correlation(noise, np.ones(count)),
-            lack=_lack(basis, u[base], design_matrix[base], roots, white[base], scales[base]),
+            correlation=noise_correlation(noise, np.ones(count)),
+            lack=lack_of_fit(basis, u[base], design_matrix[base], roots, white[base], scales[base]),
             white=white,
             noise=noise,
             rows=u,
@@ -263,7 +260,7 @@ class Surrogate:
         """C^1/2: y times it is z, shape (m, m)."""
         return np.asarray(np.linalg.inv(self.axes), dtype=np.float64)
 
-    def beyond(self, observations: Sequence["Observation"]) -> tuple[str, ...]:
+    def beyond(self, observations: Sequence[Observation]) -> tuple[str, ...]:
         """Returns which observed statistics lie outside the range of all archive pours.
 
         A range is that of the pours, widened by half of itself; statistics that never vary in the
@@ -283,7 +280,7 @@ class Surrogate:
 
     def features(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns the features at rows of (theta, condition, psi), shape (n, d)."""
-        return _features(self.basis, np.column_stack([theta, condition]), psi, self._bent)[0]
+        return mean_columns(self.basis, np.column_stack([theta, condition]), psi, self._bent)[0]
 
     @property
     def _bent(self) -> NDArray[np.bool_]:
@@ -328,7 +325,7 @@ class Surrogate:
     def scale(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns s at rows of (theta, condition, psi), shape (n, m)."""
         u = np.column_stack([theta, condition])
-        features = _scale_features(self.scale_basis, u, psi, self._bent)
+        features = scale_columns(self.scale_basis, u, psi, self._bent)
         return np.exp(features @ self.scale_coefficients.T)
 
     def weights_near(self, theta: Array, condition: Array, width: float) -> Array:
@@ -345,7 +342,7 @@ class Surrogate:
         near = self.weights_near(theta, condition, width) * ~self.is_donor
         effective = near.sum() ** 2 / max(float(near @ near), 1e-300)
         share = effective / (effective + 4 * self.size)
-        local = _correlation(self.noise, near + 1e-12)
+        local = noise_correlation(self.noise, near + 1e-12)
         return share * local + (1 - share) * self.correlation
 
 
@@ -364,99 +361,6 @@ def _shift(
     gram, ones = plain.T @ plain, np.ones(len(plain))
     fits = [fit_blocks(plain, z[base, j], ones, blocks, gram) for j in range(z.shape[1])]
     coefficients = np.array([fit.coefficients for fit in fits])
-    sizes = np.array([np.sqrt(np.mean(_held(fit.noise) ** 2)) for fit in fits])
+    sizes = np.array([np.sqrt(np.mean(held_residuals(fit.noise) ** 2)) for fit in fits])
     p = len(design.parameters)
     return Shift.fit(basis, coefficients, sizes, u[~base], psi[~base], z[~base], p)
-
-
-def _held(noise: Array) -> Array:
-    """Residuals cut where they are no noise any more."""
-    largest = _LARGEST_RESIDUAL * float(np.median(np.abs(noise)) / 0.6745)
-    return np.clip(noise, -largest, largest)
-
-
-def _lack(
-    basis: Basis, u: Array, features: Array, roots: Array, white: Array, scales: Array
-) -> Array:
-    """Lambda of each axis; pairs are each of up to `_LACK_ROWS` rows with its nearest."""
-    metric = np.sqrt(np.mean(basis.frequencies**2, axis=0)) / basis.scale
-    v = u * metric
-    chosen = np.random.default_rng(0).permutation(len(u))[:_LACK_ROWS]
-    gaps = np.sum(v[chosen] ** 2, axis=1)[:, None] + np.sum(v**2, axis=1) - 2 * v[chosen] @ v.T
-    gaps[np.arange(len(chosen)), chosen] = np.inf
-    near = np.argpartition(gaps, _NEIGHBOURS, axis=1)[:, :_NEIGHBOURS]
-    held = np.clip(white, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
-    products = np.mean(held[chosen][:, None] * held[near], axis=(0, 1))
-    shared = np.empty(len(products))
-    for j, root in enumerate(roots):
-        along = (features @ root) / scales[:, j : j + 1]
-        shared[j] = np.mean(np.einsum("ij,ikj->ik", along[chosen], along[near], optimize=True))
-    return np.maximum(products + shared, 0.0)
-
-
-def _axes(z: Array, quadratic: Array) -> Array:
-    """C^-1/2 of what a quadratic leaves, C shrunk a little to its diagonal."""
-    hat = np.linalg.qr(quadratic)[0]
-    left = z - hat @ (hat.T @ z)
-    held = np.clip(left / left.std(axis=0), -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
-    moment = (held * left.std(axis=0)).T @ (held * left.std(axis=0)) / len(z)
-    moment = (1 - _SHRINKAGE) * moment + _SHRINKAGE * np.diag(np.diag(moment))
-    values, vectors = np.linalg.eigh(moment)
-    return (vectors / np.sqrt(values)) @ vectors.T
-
-
-def _usable(x: Array, labels: tuple[str, ...]) -> tuple[NDArray[np.intp], dict[str, str]]:
-    """Columns that can be emulated, and why the others cannot."""
-    dropped: dict[str, str] = {}
-    for j, label in enumerate(labels):
-        finite = x[np.isfinite(x[:, j]), j]
-        if len(finite) < 0.95 * len(x):
-            dropped[label] = f"not finite in {len(x) - len(finite)} of {len(x)} pours"
-        elif finite.std() <= 1e-9 * max(float(np.abs(finite).max()), 1e-300):
-            dropped[label] = "constant"
-        elif np.unique(finite, return_counts=True)[1].max() > _LARGEST_SHARE * len(finite):
-            dropped[label] = "one value in more than nine of ten pours"
-    kept = [j for j, label in enumerate(labels) if label not in dropped]
-    if not kept:
-        raise TrainingDataError("no statistic varies over the archive")
-    return np.array(kept, dtype=np.intp), dropped
-
-
-def _features(
-    basis: Basis, u: Array, psi: Array, bent: NDArray[np.bool_]
-) -> tuple[Array, list[slice]]:
-    first, second = _effect_columns(u)
-    main = basis(u)
-    waves = 2 * len(basis.frequencies)
-    widths = [main.shape[1] - waves, waves]
-    parts = [main]
-    for k in range(psi.shape[1]):
-        strength = psi[:, k : k + 1]
-        parts += [strength * first, bent[k] * strength**2 * second]
-        widths += [first.shape[1], second.shape[1]]
-    stops = np.cumsum(widths)
-    blocks = [slice(int(b - w), int(b)) for b, w in zip(stops, widths, strict=True)]
-    return np.concatenate(parts, axis=1), blocks
-
-
-def _effect_columns(u: Array) -> tuple[Array, Array]:
-    """Prior-scaled monomials of g_k and of h_k."""
-    centred = 2 * u - 1
-    dimension = u.shape[1]
-    scales = np.full((dimension + 1) * (dimension + 2) // 2, _CURVATURE)
-    scales[0], scales[1 : dimension + 1] = _CONSTANT, _SLOPE
-    first = polynomial(centred, 2) * scales
-    return first, first[:, : dimension + 1] * _SLOPE
-
-
-def _scale_features(basis: Basis, u: Array, psi: Array, bent: NDArray[np.bool_]) -> Array:
-    # A held strength may lie beyond what was poured: the noise there is that of the nearer size.
-    strength = np.where(bent, np.abs(psi), np.clip(psi, 0.0, 1.0))
-    return np.concatenate([basis(u), strength], axis=1)
-
-
-def _correlation(noise: Array, weights: Array) -> Array:
-    """Second moment of whitened residuals, shrunk to its diagonal."""
-    held = np.clip(noise, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
-    moment = (held * weights[:, None]).T @ held / weights.sum()
-    return (1 - _SHRINKAGE) * moment + _SHRINKAGE * np.diag(np.diag(moment))

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.surrogate.baseline import Fit, Start, improve
-from granulcal.loop.surrogate.linearised import Local
+from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.test.thresholds import Thresholds
 
 __all__ = ["Model", "fit_none", "fit_pair", "fit_single", "interval"]
@@ -81,7 +81,7 @@ def fit_none(fit: Fit, thresholds: Thresholds) -> Model:
 
 
 def fit_single(
-    local: Local,
+    local: LinearisedSurrogate,
     target: Array,
     base: Fit,
     k: int,
@@ -154,7 +154,7 @@ def interval(curve: Array, level: float, stretch: float = 1.0) -> tuple[float, f
 
 
 def fit_pair(
-    local: Local,
+    local: LinearisedSurrogate,
     target: Array,
     base: Fit,
     start: Fit,
@@ -195,7 +195,7 @@ def fit_pair(
     )
 
 
-def _joint(local: Local, target: Array, start: Fit, active: tuple[int, ...]) -> Fit:
+def _joint(local: LinearisedSurrogate, target: Array, start: Fit, active: tuple[int, ...]) -> Fit:
     """Best fit of theta and strengths together, V moving with them."""
     psi = start.psi.copy()
     for k in active:
@@ -204,7 +204,7 @@ def _joint(local: Local, target: Array, start: Fit, active: tuple[int, ...]) -> 
     return improve(local, target, start.v, psi, active, steps=16)
 
 
-def _root(local: Local, base: Fit, best: Fit) -> Array:
+def _root(local: LinearisedSurrogate, base: Fit, best: Fit) -> Array:
     """Root of V: pours of the base fit, the surrogate's error at the best strengths."""
     none = local.none()
     total = local.pour_covariance(base.v, none) + local.nuisance

@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.surrogate.baseline import Fit, improve
-from granulcal.loop.surrogate.linearised import NEAR, Local
+from granulcal.loop.surrogate.linearised import NEAR, LinearisedSurrogate
 from granulcal.loop.test.score import Scores
 
-__all__ = ["Gate", "draw_errors", "open_gate"]
+__all__ = ["ResidualTest", "draw_errors", "residual_test"]
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ _JITTER = 1e-9
 
 
 @dataclass(frozen=True)
-class Gate:
+class ResidualTest:
     """The test of one fit.
 
     Attributes:
@@ -62,9 +62,9 @@ class Gate:
     adjusted: Array
 
 
-def open_gate(
-    local: Local, fit: Fit, scores: Scores, *, replicates: int, refits: int, seed: int
-) -> Gate:
+def residual_test(
+    local: LinearisedSurrogate, fit: Fit, scores: Scores, *, replicates: int, refits: int, seed: int
+) -> ResidualTest:
     """Returns the test of what a fit leaves.
 
     Args:
@@ -87,7 +87,7 @@ def open_gate(
     single = np.array([_p(null[i], observed[i, 0]) for i in range(3)])
     ranks = np.stack([_ranks(row) for row in null])
     p = _p(-ranks.min(axis=0), -float(single.min()))
-    return Gate(
+    return ResidualTest(
         p=p,
         p_library=float(single[0]),
         p_any=float(single[1]),
@@ -103,7 +103,9 @@ def open_gate(
     )
 
 
-def draw_errors(local: Local, fit: Fit, count: int, generator: np.random.Generator) -> Array:
+def draw_errors(
+    local: LinearisedSurrogate, fit: Fit, count: int, generator: np.random.Generator
+) -> Array:
     """Returns stacked deviations of mean pours from the surrogate's mean, shape (count, H m)."""
     surrogate, size = local.surrogate, local.surrogate.size
     scales = local._scales(fit.v, fit.psi)
@@ -137,7 +139,9 @@ def _statistics(scores: Scores, residuals: Array) -> tuple[Array, Array]:
     return squares, np.stack([largest, any_, scores.unknown(residuals)])
 
 
-def _factors(local: Local, fit: Fit, scores: Scores, errors: Array, linear: Array) -> Array:
+def _factors(
+    local: LinearisedSurrogate, fit: Fit, scores: Scores, errors: Array, linear: Array
+) -> Array:
     if len(errors) == 0:
         return np.ones(3)
     mean = local.mean(fit.v, fit.psi)

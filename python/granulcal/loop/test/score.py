@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.surrogate.baseline import Fit
-from granulcal.loop.surrogate.linearised import Local
+from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 
 __all__ = ["Scores", "families"]
 
@@ -68,7 +68,7 @@ class Scores:
     smooth: Array
 
     @classmethod
-    def of(cls, local: Local, fit: Fit, effects: tuple[int, ...]) -> "Scores":
+    def of(cls, local: LinearisedSurrogate, fit: Fit, effects: tuple[int, ...]) -> "Scores":
         """Returns the scores of `effects` beyond a fit."""
         design = local.surrogate.design
         whiten = np.asarray(np.linalg.inv(fit.root), dtype=np.float64)

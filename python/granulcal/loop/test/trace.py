@@ -9,11 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.loop.effects.design import cube_from_normal, normal_from_cube
 from granulcal.loop.surrogate.baseline import Fit, Start, fit_base
-from granulcal.loop.surrogate.linearised import Local
-from granulcal.loop.surrogate.observation import Observation, Stack
+from granulcal.loop.surrogate.linearised import LinearisedSurrogate
+from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.test.refit import Model, fit_none, fit_pair, fit_single
-from granulcal.loop.test.residual_test import Gate, open_gate
+from granulcal.loop.test.residual_test import ResidualTest, residual_test
 from granulcal.loop.test.score import Scores, families
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.verdict import NAMING, Verdict, decide
@@ -132,7 +133,7 @@ class Trace:
     verdict: Verdict
     base: Explanation
     explanations: tuple[Explanation, ...]
-    gate: Gate
+    gate: ResidualTest
     power: Power
     labels: tuple[str, ...]
     statistics: tuple[str, ...]
@@ -144,7 +145,7 @@ class Trace:
     theta_sd: Array
     models: tuple[Model, ...]
     base_fit: Fit
-    local: Local
+    local: LinearisedSurrogate
 
     @property
     def best(self) -> Explanation:
@@ -225,11 +226,11 @@ def trace(
     """
     rules = thresholds or Thresholds()
     design = surrogate.design
-    stack = Stack.of(surrogate, observations)
+    stack = StackedMeans.of(surrogate, observations)
     target = stack.means.ravel()
     local, fit = fit_base(surrogate, stack, seed, starts)
     scores = Scores.of(local, fit, design.candidates)
-    gate = open_gate(
+    gate = residual_test(
         local, fit, scores, replicates=rules.replicates, refits=rules.refits, seed=seed
     )
     none = fit_none(fit, rules)
@@ -270,7 +271,7 @@ def _nearest(surrogate: Surrogate, scores: Scores, fit: Fit) -> tuple[tuple[str,
     return tuple((names[i], float(cosines[i])) for i in order)
 
 
-def _residuals(local: Local, fit: Fit) -> Array:
+def _residuals(local: LinearisedSurrogate, fit: Fit) -> Array:
     spread = np.sqrt(np.sum(local.in_statistics(fit.root) ** 2, axis=1))
     return (local.in_statistics(fit.residual) / spread).reshape(len(local.counts), -1)
 
@@ -284,11 +285,11 @@ def power(
     # Repeats of one condition have no inputs: (H, 0) is what no -1 can stand for.
     where = np.asarray(conditions, dtype=np.float64)
     where = where.reshape(len(each), len(surrogate.design.conditions))
-    local = Local.at(surrogate, where, each, v)
+    local = LinearisedSurrogate.at(surrogate, where, each, v)
     return Power.of(surrogate, Scores.of(local, fit_at(local, v), surrogate.design.candidates))
 
 
-def fit_at(local: Local, v: Array) -> Fit:
+def fit_at(local: LinearisedSurrogate, v: Array) -> Fit:
     """Returns the fit of data that are the surrogate's mean at `v` (p,)."""
     from granulcal.loop.surrogate.baseline import summarise
 
@@ -296,7 +297,7 @@ def fit_at(local: Local, v: Array) -> Fit:
 
 
 def _models(
-    local: Local,
+    local: LinearisedSurrogate,
     target: Array,
     base: Fit,
     rules: Thresholds,
@@ -328,10 +329,10 @@ def _models(
     return tested + [(m, _after(local, m, rules, seed)) for m in pairs.values()]
 
 
-def _after(local: Local, model: Model, rules: Thresholds, seed: int) -> float:
+def _after(local: LinearisedSurrogate, model: Model, rules: Thresholds, seed: int) -> float:
     rest = tuple(k for k in local.surrogate.design.candidates if k not in model.effects)
     scores = Scores.of(local, model.fit, rest)
-    gate = open_gate(
+    gate = residual_test(
         local,
         model.fit,
         scores,

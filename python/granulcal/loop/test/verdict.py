@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from granulcal.loop.effects.design import Design
 from granulcal.loop.test.refit import Model
-from granulcal.loop.test.residual_test import Gate
+from granulcal.loop.test.residual_test import ResidualTest
 from granulcal.loop.test.thresholds import Thresholds
 
 __all__ = ["KINDS", "NAMING", "Verdict", "decide"]
@@ -47,7 +47,7 @@ class Verdict:
 
 def decide(
     design: Design,
-    gate: Gate,
+    gate: ResidualTest,
     none: Model | None,
     models: list[tuple[Model, float]],
     thresholds: Thresholds,

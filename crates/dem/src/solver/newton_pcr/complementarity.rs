@@ -3,7 +3,7 @@
 //! `0 <= x _|_ y >= 0` becomes `psi(x, y) = 0`; docs/theory/solvers.md, box 2a. What is 0/0 in the formulas
 //! has a limit, and a row whose S grows without bound is an impulse that vanishes: both are said here.
 
-use crate::preset::Complementarity;
+use granulcal_scene::Complementarity;
 
 /// S over the contact's own stiffness from which a row is an impulse that vanishes.
 const NEVER_ACTS: f64 = 1e9;
@@ -11,9 +11,18 @@ const NEVER_ACTS: f64 = 1e9;
 /// A row `(A + shift) d_lambda = right` of the Newton system; `None` where the impulse must vanish.
 pub(super) type NormalRow = Option<(f64, f64)>;
 
-impl Complementarity {
+/// Rows of the Newton system.
+pub(super) trait Rows {
     /// The row of `0 <= a _|_ lambda_n >= 0`, with `c = stiffness lambda_n` as the second argument of psi.
-    pub fn normal(self, a: f64, lambda_n: f64, stiffness: f64) -> NormalRow {
+    fn normal(self, a: f64, lambda_n: f64, stiffness: f64) -> NormalRow;
+
+    /// W of the row `(A + W) d_lambda = -(u + W lambda)`, by which `u` comes to oppose an impulse of the
+    /// norm `lambda` or to vanish inside the ball of radius `limit`; `None` where the impulse must vanish.
+    fn friction(self, speed: f64, lambda: f64, limit: f64, stiffness: f64) -> Option<f64>;
+}
+
+impl Rows for Complementarity {
+    fn normal(self, a: f64, lambda_n: f64, stiffness: f64) -> NormalRow {
         let c = stiffness * lambda_n;
         let (psi, psi_a, psi_c) = match self {
             Self::MinMap if a < c => (a, 1.0, 0.0),
@@ -25,9 +34,7 @@ impl Complementarity {
         (shift < NEVER_ACTS * stiffness).then(|| (shift, -psi / psi_a))
     }
 
-    /// W of the row `(A + W) d_lambda = -(u + W lambda)`, by which `u` comes to oppose an impulse of the
-    /// norm `lambda` or to vanish inside the ball of radius `limit`; `None` where the impulse must vanish.
-    pub fn friction(self, speed: f64, lambda: f64, limit: f64, stiffness: f64) -> Option<f64> {
+    fn friction(self, speed: f64, lambda: f64, limit: f64, stiffness: f64) -> Option<f64> {
         let room = stiffness * (limit - lambda);
         let psi = match self {
             Self::MinMap => {

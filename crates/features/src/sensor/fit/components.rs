@@ -258,7 +258,7 @@ impl Problem<'_> {
     fn columns(&self, lengths: &[f64; LENGTHS]) -> [(Vec<f64>, Vec<f64>); COMPONENTS] {
         let unit = field(*lengths, Variances::repeat(1.0));
         let mut index = 0;
-        unit.components().map(|component| {
+        super::super::field::components(&unit).map(|component| {
             index += 1;
             if self.allowed[index - 1] {
                 self.estimator.expected(axes(&component))

@@ -145,7 +145,8 @@ mod tests {
             NoiseField { columns: 1.0, column_correlation: 3.0, ..NoiseField::default() },
             NoiseField { row_alternation: 1.0, ..NoiseField::default() },
         ] {
-            let component = field.components().into_iter().find(|c| c.sd > 0.0).unwrap();
+            let component =
+                crate::sensor::field::components(&field).into_iter().find(|c| c.sd > 0.0).unwrap();
             let [x, y] = axes(&component);
             let x = AxisResponse::new(x, width, degree, max_lag);
             let y = AxisResponse::new(y, height, degree, max_lag);
@@ -153,7 +154,7 @@ mod tests {
             let draws = 400;
             let mut mean = vec![0.0; 2 * (max_lag + 1)];
             for seed in 0..draws {
-                let values = field.sample(&grid, seed);
+                let values = crate::sensor::field::sample(&field, &grid, seed);
                 let patch = detrend(&values, width, degree, |v, t| v - t).unwrap();
                 let found = split(&[vec![patch]], &[(0, 0)], max_lag).noise;
                 for (sum, value) in mean.iter_mut().zip(found.x.iter().chain(&found.y)) {

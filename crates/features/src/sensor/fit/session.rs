@@ -1,6 +1,7 @@
 //! Measured frames and simulated ones under one estimator.
 
 use granulcal_numbers::scatter;
+use granulcal_scene::round_to;
 
 use super::comparison::Comparison;
 use super::components::Estimator;
@@ -11,8 +12,8 @@ use super::settings::FitSettings;
 use crate::error::FeatureError;
 use crate::region::Region;
 use crate::sensor::DepthSensor;
-use crate::sensor::depth_sensor::round_to;
 use crate::sensor::field::SensorGrid;
+use crate::sensor::field::sample;
 
 /// Least share of the pixels with data that lie on the surface, and largest standard deviation from it over the
 /// distance (of height maps: over the longer side). A depth camera errs by some 2 % of the distance; a room is no wall.
@@ -79,9 +80,9 @@ impl<'a> Session<'a> {
                 let error = |v, t| frames.optics.error(v, t);
                 let patch = detrend(&values, region.width, degree, error)?;
                 require_flat(&frames.optics, &values, &patch)?;
-                Ok(patch)
+                Ok::<_, FeatureError>(patch)
             };
-            patches.push(regions.iter().map(of).collect::<Result<Vec<_>, _>>()?);
+            patches.push(regions.iter().map(of).collect::<Result<Vec<_>, FeatureError>>()?);
         }
         let shifts = covariance::shifts(&patches, settings.max_shift);
         let max_lag = settings.max_lag;
@@ -173,10 +174,10 @@ impl<'a> Session<'a> {
             let (width, height) = (region.width, region.height);
             let wide = SensorGrid::under(width + 2 * margin, height + 2 * margin, 1.0)?;
             let seed_of = |what: u64| scatter(seed ^ scatter((r as u64) << 32 | what));
-            let pattern = sensor.fixed_pattern().sample(&wide, seed_of(0));
+            let pattern = sample(sensor.fixed_pattern(), &wide, seed_of(0));
             let grid = SensorGrid::under(width, height, 1.0)?;
             for (k, simulated) in simulated.iter_mut().enumerate() {
-                let noise = sensor.noise().sample(&grid, seed_of(k as u64 + 1));
+                let noise = sample(sensor.noise(), &grid, seed_of(k as u64 + 1));
                 let measured = &self.patches[k][r];
                 let (x, y) = self.shifts[k];
                 let at = |u: usize, v: usize| {

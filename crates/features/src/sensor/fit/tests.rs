@@ -5,6 +5,7 @@ use crate::camera::{Camera, Intrinsics};
 use crate::depth::DepthImage;
 use crate::height_map::HeightMap;
 use crate::region::Region;
+use crate::sensor::{Moments, Observe};
 
 const FOCAL: f64 = 390.0;
 const BASELINE: f64 = 0.05;

@@ -12,7 +12,7 @@ fn estimator() -> Estimator {
 fn expected(field: &NoiseField) -> Covariances {
     let estimator = estimator();
     let mut sum = Covariances::zeros(MAX_LAG);
-    for component in field.components() {
+    for component in crate::sensor::field::components(field) {
         let (x, y) = estimator.expected(axes(&component));
         let variance = component.sd * component.sd;
         sum.combine(&Covariances { x, y }, |sum, value| sum + variance * value);

@@ -1,0 +1,255 @@
+//! Numbers of a scene by their path, for example `material.sliding_friction` or `scene.funnel.height`.
+//!
+//! A scene as TOML is a tree of tables and lists; a path walks it, entries of lists by their number from 0. `scene.` in
+//! front may be left out.
+
+use toml::{Table, Value};
+
+use crate::error::SceneError;
+use crate::scene::Scene;
+
+impl Scene {
+    /// A copy with the number at `path` set to `value`, checked like any scene.
+    ///
+    /// # Errors
+    /// [`SceneError::Path`] if the path names no number of a scene, or what the changed scene's check says.
+    pub fn with(&self, path: &str, value: f64) -> Result<Self, SceneError> {
+        let mut scene = self.clone();
+        scene.set(&[(path, value)])?;
+        Ok(scene)
+    }
+
+    /// Sets several numbers by path; the scene stays as it was if any of them is refused.
+    ///
+    /// # Errors
+    /// As [`Scene::with`].
+    pub fn set(&mut self, values: &[(&str, f64)]) -> Result<(), SceneError> {
+        let mut tree = self.tree()?;
+        for &(path, value) in values {
+            insert(&mut tree, path, value)?;
+        }
+        let paths = || values.iter().map(|(path, _)| *path).collect::<Vec<_>>().join(", ");
+        let mut changed: Self = Value::Table(tree)
+            .try_into()
+            .map_err(|e: toml::de::Error| path_error(&paths(), e.message()))?;
+        changed.take_meshes(self);
+        changed.check()?;
+        *self = changed;
+        Ok(())
+    }
+
+    /// The number at `path`.
+    ///
+    /// # Errors
+    /// [`SceneError::Path`] if nothing or no number stands there.
+    pub fn get(&self, path: &str) -> Result<f64, SceneError> {
+        let mut found = &Value::Table(self.tree()?);
+        for key in keys(path) {
+            found = match found {
+                Value::Table(table) => table.get(key).ok_or_else(|| {
+                    let here: Vec<_> = table.keys().map(String::as_str).collect();
+                    path_error(path, &format!("no {key:?} here, only {}", here.join(", ")))
+                })?,
+                Value::Array(entries) => &entries[entry(path, key, entries.len())?],
+                other => {
+                    return Err(path_error(path, &format!("a {} stands there", other.type_str())));
+                }
+            };
+        }
+        match found {
+            Value::Float(number) => Ok(*number),
+            Value::Integer(number) => Ok(*number as f64),
+            other => Err(path_error(path, &format!("a {} stands there", other.type_str()))),
+        }
+    }
+
+    /// The path of the first thing in which another scene differs, with what stands there in this one and in the
+    /// other; `None` if the two are the same scene.
+    ///
+    /// # Errors
+    /// [`SceneError::TomlWrite`] if a number cannot be written.
+    pub fn first_difference(
+        &self,
+        other: &Self,
+    ) -> Result<Option<(String, String, String)>, SceneError> {
+        let (here, there) = (Value::Table(self.tree()?), Value::Table(other.tree()?));
+        Ok(first_difference("", Some(&here), Some(&there)))
+    }
+
+    fn tree(&self) -> Result<Table, SceneError> {
+        Table::try_from(self).map_err(|e| SceneError::TomlWrite(Box::new(e)))
+    }
+}
+
+/// The first thing in which two trees differ, which stand at `path`: its own path and both values.
+pub fn first_difference(
+    path: &str,
+    left: Option<&Value>,
+    right: Option<&Value>,
+) -> Option<(String, String, String)> {
+    let at = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+    match (left, right) {
+        _ if left == right => None,
+        (Some(Value::Table(a)), Some(Value::Table(b))) => {
+            let mut keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+            keys.find_map(|key| first_difference(&at(key), a.get(key), b.get(key)))
+        }
+        (Some(Value::Array(a)), Some(Value::Array(b))) => {
+            let mut entries = 0..a.len().max(b.len());
+            entries.find_map(|n| first_difference(&at(&n.to_string()), a.get(n), b.get(n)))
+        }
+        _ => {
+            let show = |value: Option<&Value>| value.map_or("absent".to_owned(), Value::to_string);
+            Some((path.to_owned(), show(left), show(right)))
+        }
+    }
+}
+
+/// Tables that a scene leaves out where they say nothing.
+const MATERIAL: &str = "material";
+const GROUND: &str = "ground";
+const EFFECTS: &str = "effects";
+
+fn keys(path: &str) -> impl Iterator<Item = &str> {
+    path.strip_prefix("scene.").unwrap_or(path).split('.')
+}
+
+fn path_error(path: &str, reason: &str) -> SceneError {
+    SceneError::Path { path: path.to_owned(), reason: reason.to_owned() }
+}
+
+/// Puts `value` at `path`. A missing number or table of coefficients is created, and whether it may exist
+/// is the scene's to say; other missing tables are not: a height must not conjure up a funnel.
+fn insert(tree: &mut Table, path: &str, value: f64) -> Result<(), SceneError> {
+    let keys: Vec<&str> = keys(path).collect();
+    let Some((last, first)) = keys.split_last() else { return Err(path_error(path, "is empty")) };
+    // An entry of a list stands where a number of a table does.
+    let mut table = tree;
+    let mut first = first.iter().copied().peekable();
+    let mut is_effect = false;
+    while let Some(key) = first.next() {
+        let may_be_new = [MATERIAL, GROUND, EFFECTS].contains(&key) || is_effect;
+        if !table.contains_key(key) && !may_be_new {
+            return Err(path_error(path, &format!("this scene has no {key:?}")));
+        }
+        is_effect = key == EFFECTS;
+        let mut here = table.entry(key.to_owned()).or_insert_with(|| Value::Table(Table::new()));
+        while let Value::Array(entries) = here {
+            let count = entries.len();
+            let Some(number) = first.next() else {
+                let number = &mut entries[entry(path, last, count)?];
+                return set_number(path, number, value);
+            };
+            here = &mut entries[entry(path, number, count)?];
+        }
+        let kind = here.type_str();
+        table = here
+            .as_table_mut()
+            .ok_or_else(|| path_error(path, &format!("{key:?} is a {kind}, not a table")))?;
+    }
+    let number = table.entry((*last).to_owned()).or_insert(Value::Float(value));
+    set_number(path, number, value)
+}
+
+/// Replaces a number by another; a whole number stays one.
+fn set_number(path: &str, place: &mut Value, value: f64) -> Result<(), SceneError> {
+    *place = match place {
+        Value::Integer(_) if value.fract() == 0.0 => Value::Integer(value as i64),
+        Value::Integer(_) => {
+            return Err(path_error(path, &format!("must be a whole number, got {value}")));
+        }
+        Value::Float(_) => Value::Float(value),
+        other => {
+            let reason = format!("a {} stands there, not a number", other.type_str());
+            return Err(path_error(path, &reason));
+        }
+    };
+    Ok(())
+}
+
+/// A key as the number of one of `count` entries of a list.
+fn entry(path: &str, key: &str, count: usize) -> Result<usize, SceneError> {
+    let number = key.parse().ok().filter(|&number| number < count);
+    number.ok_or_else(|| {
+        path_error(path, &format!("{key:?} must be one of {count} entries, counted from 0"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Motion, Shape, Wall, WallMaterial};
+
+    #[test]
+    fn sets_and_gets_by_path() {
+        let scene = Scene::funnel(0.12);
+        let changed = scene.with("material.sliding_friction", 0.25).unwrap();
+        assert_eq!(changed.material.sliding_friction, 0.25);
+        let changed = changed.with("scene.funnel.height", 0.05).unwrap();
+        assert_eq!(changed.get("funnel.height").unwrap(), 0.05);
+        assert_eq!(changed.with("grains.count", 100.0).unwrap().grains.count, 100);
+        let ground = scene.with("scene.ground.material.restitution", 0.1).unwrap();
+        assert_eq!(ground.ground.material.restitution, Some(0.1));
+    }
+
+    #[test]
+    fn entries_of_lists_have_numbers() {
+        let mut scene = Scene::funnel(0.12);
+        let shape = Shape::Plane { point: [0.0; 3], normal: [0.0, 0.0, 1.0] };
+        let motion = Motion::Lift { velocity: [0.0, 0.0, 0.1], begin: 0.5, end: 1.0 };
+        scene.walls.push(Wall { motion, ..Wall::fixed(shape, WallMaterial::default()) });
+        let changed = scene.with("walls.0.motion.velocity.2", 0.3).unwrap();
+        assert_eq!(changed.get("scene.walls.0.motion.velocity.2").unwrap(), 0.3);
+        assert_eq!(
+            changed.with("walls.0.motion.end", 2.0).unwrap().get("walls.0.motion.end").unwrap(),
+            2.0
+        );
+        let tilted = scene.with("gravity.0", 1.0).unwrap();
+        assert_eq!(tilted.gravity, [1.0, 0.0, -9.81]);
+        let stone = scene.with("walls.0.material.restitution", 0.2).unwrap();
+        assert_eq!(stone.walls[0].material.restitution, Some(0.2));
+        for path in ["walls.1.motion.end", "gravity.3", "gravity.x", "gravity", "walls.0"] {
+            assert!(matches!(scene.with(path, 1.0), Err(SceneError::Path { .. })), "{path}");
+            assert!(scene.get(path).is_err(), "{path}");
+        }
+    }
+
+    #[test]
+    fn the_first_difference_has_a_path() {
+        let scene = Scene::funnel(0.12);
+        let difference = |other: &Scene| scene.first_difference(other).unwrap();
+        assert_eq!(difference(&scene), None);
+        let changed = scene.with("funnel.height", 0.05).unwrap();
+        let expected = ("funnel.height".to_owned(), "0.12".to_owned(), "0.05".to_owned());
+        assert_eq!(difference(&changed), Some(expected));
+        let mut sideways = scene.clone();
+        sideways.gravity[1] = 1.0;
+        let expected = ("gravity.1".to_owned(), "0.0".to_owned(), "1.0".to_owned());
+        assert_eq!(difference(&sideways), Some(expected));
+        let mut rough = scene.clone();
+        rough.ground.material.restitution = Some(0.1);
+        let (path, here, _) = difference(&rough).unwrap();
+        assert_eq!((path.as_str(), here.as_str()), ("ground", "absent"));
+    }
+
+    #[test]
+    fn refuses_what_is_no_number_of_a_scene() {
+        let scene = Scene::drop(0.1);
+        for path in [
+            "material.friction",
+            "scene.start.kind",
+            "name",
+            "nothing.at.all",
+            "",
+            "preset.x",
+            "funnel.height",
+        ] {
+            let error = scene.with(path, 0.1).unwrap_err();
+            assert!(matches!(error, SceneError::Path { .. }), "{path}: {error}");
+        }
+        assert!(scene.with("grains.count", 1.5).is_err());
+        assert!(scene.with("material.restitution", 1.5).is_err());
+        assert!(scene.get("material.friction").is_err());
+        assert!(scene.get("material").is_err());
+    }
+}

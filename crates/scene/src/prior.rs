@@ -1,0 +1,240 @@
+//! A prior: which numbers of a scene are unknown, and how they are distributed.
+//!
+//! ```
+//! use granulcal_scene::Prior;
+//! let prior = Prior::from_toml(r#"
+//!     [[parameter]]
+//!     path = "material.sliding_friction"
+//!     distribution = "uniform"
+//!     low = 0.1
+//!     high = 1.0
+//! "#)?;
+//! assert_eq!(prior.names(), ["material.sliding_friction"]);
+//! // A draw depends on the seed and the row only.
+//! assert_eq!(prior.sample(1, 17), prior.sample(1, 17));
+//! # Ok::<(), granulcal_scene::SceneError>(())
+//! ```
+
+mod entry;
+mod parameter;
+
+use crate::distribution::Distribution;
+use crate::error::SceneError;
+use crate::scene::Scene;
+use crate::uniforms::Uniforms;
+use entry::{Entry, File};
+use parameter::refuse;
+pub use parameter::{Keys, Parameter};
+
+/// Independent parameters, each named by its path in the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prior {
+    parameters: Vec<Parameter>,
+}
+
+impl Default for Prior {
+    /// The paper's three coefficients: sliding friction and restitution uniform, rolling friction uniform in
+    /// its logarithm, from where a pile no longer notices it to where rolling is locked.
+    fn default() -> Self {
+        let of = |path: &str, distribution| Parameter { path: path.to_owned(), distribution };
+        let uniform = |low, high| Distribution::Uniform { low, high };
+        Self {
+            parameters: vec![
+                of("material.sliding_friction", uniform(0.0, 1.0)),
+                of("material.rolling_friction", Distribution::LogUniform { low: 1e-3, high: 1.0 }),
+                of("material.restitution", uniform(0.0, 1.0)),
+            ],
+        }
+    }
+}
+
+impl Parameter {
+    /// A parameter of the words and numbers that a file has of it.
+    ///
+    /// # Errors
+    /// [`SceneError::Prior`] names the parameter and what cannot be.
+    pub fn of_keys(path: &str, distribution: &str, keys: Keys) -> Result<Self, SceneError> {
+        let parameter = Entry::with(path, distribution, keys).into_parameter()?;
+        parameter.check()?;
+        Ok(parameter)
+    }
+}
+
+impl Prior {
+    /// A prior of these parameters, in this order.
+    ///
+    /// # Errors
+    /// [`SceneError::Prior`] names the parameter and the number that cannot be.
+    pub fn new(parameters: Vec<Parameter>) -> Result<Self, SceneError> {
+        if parameters.is_empty() {
+            return Err(refuse("", "parameter", "none".to_owned(), "given at least once"));
+        }
+        for (index, parameter) in parameters.iter().enumerate() {
+            parameter.check()?;
+            if parameters[..index].iter().any(|p| plain(&p.path) == plain(&parameter.path)) {
+                let got = "the same path twice".to_owned();
+                return Err(refuse(&parameter.path, "path", got, "given once"));
+            }
+        }
+        Ok(Self { parameters })
+    }
+
+    /// Reads a prior.
+    ///
+    /// # Errors
+    /// [`SceneError::PriorToml`] for what is not TOML of a prior (unknown keys included), else as [`Prior::new`].
+    pub fn from_toml(text: &str) -> Result<Self, SceneError> {
+        let file: File = toml::from_str(text).map_err(|e| SceneError::PriorToml(Box::new(e)))?;
+        let parameters = file.parameter.into_iter().map(Entry::into_parameter);
+        Self::new(parameters.collect::<Result<_, _>>()?)
+    }
+
+    /// The prior as TOML; [`Prior::from_toml`] reads it back unchanged.
+    ///
+    /// # Errors
+    /// [`SceneError::PriorTomlWrite`] if it cannot be written.
+    pub fn to_toml(&self) -> Result<String, SceneError> {
+        let file = File { parameter: self.parameters.iter().map(Entry::of).collect() };
+        toml::to_string(&file).map_err(|e| SceneError::PriorTomlWrite(Box::new(e)))
+    }
+
+    /// Checks that every parameter has a place in the scene over its whole range.
+    ///
+    /// # Errors
+    /// [`SceneError::PriorDoesNotFit`] names the parameter and the value that does not fit.
+    pub fn check(&self, scene: &Scene) -> Result<(), SceneError> {
+        for parameter in &self.parameters {
+            for value in parameter.distribution.extremes() {
+                scene.with(&parameter.path, value).map_err(|source| {
+                    let parameter = parameter.path.clone();
+                    SceneError::PriorDoesNotFit { parameter, value, source: Box::new(source) }
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// All parameters, fixed ones included.
+    pub fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    /// The paths of all parameters, fixed ones included.
+    pub fn names(&self) -> Vec<&str> {
+        self.parameters.iter().map(|p| p.path.as_str()).collect()
+    }
+
+    /// Indices of the parameters that vary.
+    pub fn free(&self) -> Vec<usize> {
+        let varies = |p: &Parameter| !matches!(p.distribution, Distribution::Fixed { .. });
+        (0..self.parameters.len()).filter(|&i| varies(&self.parameters[i])).collect()
+    }
+
+    /// The values of a row, one each parameter. They depend on the seed and the row only; fixing
+    /// one parameter leaves the draws of the others as they were.
+    pub fn sample(&self, seed: u64, row: u64) -> Vec<f64> {
+        let mut uniforms = Uniforms::of_row(seed, row);
+        self.parameters.iter().map(|p| p.distribution.quantile(uniforms.next())).collect()
+    }
+
+    /// The scene with these values of the parameters.
+    ///
+    /// # Errors
+    /// [`SceneError`] if the scene refuses them.
+    pub fn apply(&self, scene: &Scene, values: &[f64]) -> Result<Scene, SceneError> {
+        let changes: Vec<_> = self.names().into_iter().zip(values.iter().copied()).collect();
+        let mut scene = scene.clone();
+        scene.set(&changes)?;
+        Ok(scene)
+    }
+}
+
+/// The path without the optional `scene.` in front.
+fn plain(path: &str) -> &str {
+    path.strip_prefix("scene.").unwrap_or(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = r#"
+        [[parameter]]
+        path = "material.sliding_friction"
+        distribution = "uniform"
+        low = 0.1
+        high = 1.0
+        [[parameter]]
+        path = "scene.funnel.height"
+        distribution = "normal"
+        mean = 0.1
+        sd = 0.02
+        low = 0.05
+        [[parameter]]
+        path = "material.rolling_friction"
+        distribution = "log_uniform"
+        low = 0.001
+        high = 0.5
+        [[parameter]]
+        path = "material.restitution"
+        distribution = "fixed"
+        value = 0.4
+    "#;
+
+    #[test]
+    fn survives_toml_and_fits_the_scene() {
+        let prior = Prior::from_toml(TEXT).unwrap();
+        assert_eq!(Prior::from_toml(&prior.to_toml().unwrap()).unwrap(), prior);
+        prior.check(&Scene::funnel(0.12)).unwrap();
+        assert_eq!(prior.free(), [0, 1, 2]);
+        let values = prior.sample(5, 9);
+        let scene = prior.apply(&Scene::funnel(0.12), &values).unwrap();
+        assert_eq!(scene.material.sliding_friction, values[0]);
+        assert_eq!(scene.funnel.unwrap().height, values[1]);
+        assert_eq!(scene.material.restitution, 0.4);
+    }
+
+    #[test]
+    fn fixing_one_parameter_leaves_the_others() {
+        let prior = Prior::from_toml(TEXT).unwrap();
+        let fixed = TEXT.replace(
+            "distribution = \"uniform\"\n        low = 0.1\n        high = 1.0",
+            "distribution = \"fixed\"\n        value = 0.3",
+        );
+        let fixed = Prior::from_toml(&fixed).unwrap();
+        assert_eq!(prior.sample(1, 2)[1..], fixed.sample(1, 2)[1..]);
+    }
+
+    #[test]
+    fn slips_are_named() {
+        let cases = [
+            ("low = 0.001", "low = -0.001", "positive for log_uniform"),
+            ("high = 1.0", "high = 0.1", "above low"),
+            ("high = 1.0", "", "high must be given"),
+            ("value = 0.4", "value = 0.4\nlow = 0.1", "low must be absent"),
+            ("sd = 0.02", "sd = 0.0", "sd must be positive"),
+            ("\"fixed\"", "\"constant\"", "one of uniform"),
+            ("\"material.restitution\"", "\"material.sliding_friction\"", "given once"),
+            ("value = 0.4", "value = nan", "finite"),
+            ("low = 0.05", "low = 0.25", "of the normal's mass"),
+            ("\"material.restitution\"", "\"material restitution\"", "words joined by dots"),
+        ];
+        for (from, to, expected) in cases {
+            assert!(TEXT.contains(from), "{from}");
+            let error = Prior::from_toml(&TEXT.replacen(from, to, 1)).unwrap_err().to_string();
+            assert!(error.contains(expected), "{from} -> {to}: {error}");
+        }
+        let unknown = Prior::from_toml(&TEXT.replace("sd =", "sigma =")).unwrap_err();
+        let source = std::error::Error::source(&unknown).unwrap().to_string();
+        assert!(source.contains("sigma"), "{source}");
+    }
+
+    #[test]
+    fn values_that_the_scene_refuses_are_named() {
+        let prior = Prior::from_toml(&TEXT.replace("high = 1.0", "high = 11.0")).unwrap();
+        let error = prior.check(&Scene::funnel(0.12)).unwrap_err();
+        assert!(error.to_string().contains("11"), "{error}");
+        // A ball that is dropped has no funnel.
+        assert!(Prior::from_toml(TEXT).unwrap().check(&Scene::drop(0.1)).is_err());
+    }
+}

@@ -1,0 +1,112 @@
+//! One parameter of a prior, and what it may be.
+
+use granulcal_numbers::normal_cdf;
+
+use crate::distribution::Distribution;
+use crate::error::SceneError;
+
+/// A normal that is cut to less mass than this is a mistake, and its inverse would lose all its digits.
+const SMALLEST_NORMAL_MASS: f64 = 1e-6;
+
+/// One parameter of a prior.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Path of the number in the scene, for example `material.sliding_friction`.
+    pub path: String,
+    /// Its distribution.
+    pub distribution: Distribution,
+}
+
+/// The numbers of a distribution as a file has them: those that it needs, and no others.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Keys {
+    /// Lower bound.
+    pub low: Option<f64>,
+    /// Upper bound.
+    pub high: Option<f64>,
+    /// Mean of a normal before it is cut.
+    pub mean: Option<f64>,
+    /// Standard deviation of a normal before it is cut.
+    pub sd: Option<f64>,
+    /// The value of what is fixed.
+    pub value: Option<f64>,
+}
+
+impl Parameter {
+    /// Checks the path's form and the numbers of the distribution.
+    ///
+    /// # Errors
+    /// [`SceneError::Prior`] names the parameter and what cannot be.
+    pub fn check(&self) -> Result<(), SceneError> {
+        let is_word = |word: &str| {
+            !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c))
+        };
+        let begins = |c: char| c.is_ascii_alphabetic() || c == '_';
+        if !(self.path.starts_with(begins) && self.path.split('.').all(is_word)) {
+            let got = format!("{:?}", self.path);
+            return Err(refuse(&self.path, "path", got, "words joined by dots"));
+        }
+        check_distribution(&self.path, &self.distribution)
+    }
+}
+
+/// The share of a normal that lies between bounds.
+fn normal_mass(mean: f64, sd: f64, low: Option<f64>, high: Option<f64>) -> f64 {
+    let [a, b] = [low, high].map(|bound| bound.map(|bound| (bound - mean) / sd));
+    let (a, b) = (a.unwrap_or(f64::NEG_INFINITY), b.unwrap_or(f64::INFINITY));
+    // In the upper tail the probabilities of the lower one keep their digits.
+    if a > 0.0 { normal_cdf(-a) - normal_cdf(-b) } else { normal_cdf(b) - normal_cdf(a) }
+}
+
+/// What is wrong with a parameter, for messages.
+pub(super) fn refuse(
+    parameter: &str,
+    what: &'static str,
+    got: String,
+    allowed: &'static str,
+) -> SceneError {
+    SceneError::Prior { parameter: parameter.to_owned(), what, got, allowed }
+}
+
+fn check_distribution(path: &str, distribution: &Distribution) -> Result<(), SceneError> {
+    let finite = |what, value: f64| {
+        let refusal = || refuse(path, what, value.to_string(), "finite");
+        if value.is_finite() { Ok(()) } else { Err(refusal()) }
+    };
+    let ordered = |low: f64, high: f64| {
+        let refusal = || refuse(path, "high", format!("low {low} and high {high}"), "above low");
+        if low < high { Ok(()) } else { Err(refusal()) }
+    };
+    match *distribution {
+        Distribution::Uniform { low, high } => {
+            finite("low", low).and(finite("high", high)).and(ordered(low, high))
+        }
+        Distribution::LogUniform { low, high } => {
+            if low <= 0.0 {
+                return Err(refuse(path, "low", low.to_string(), "positive for log_uniform"));
+            }
+            finite("low", low).and(finite("high", high)).and(ordered(low, high))
+        }
+        Distribution::Normal { mean, sd, low, high } => {
+            finite("mean", mean).and(finite("sd", sd))?;
+            if sd <= 0.0 {
+                return Err(refuse(path, "sd", sd.to_string(), "positive"));
+            }
+            low.map_or(Ok(()), |low| finite("low", low))?;
+            high.map_or(Ok(()), |high| finite("high", high))?;
+            low.zip(high).map_or(Ok(()), |(low, high)| ordered(low, high))?;
+            let mass = normal_mass(mean, sd, low, high);
+            if mass < SMALLEST_NORMAL_MASS {
+                let got = format!("bounds that hold {mass:.3e}");
+                return Err(refuse(
+                    path,
+                    "low and high",
+                    got,
+                    "bounds of at least 1e-6 of the normal's mass",
+                ));
+            }
+            Ok(())
+        }
+        Distribution::Fixed { value } => finite("value", value),
+    }
+}

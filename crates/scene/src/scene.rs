@@ -1,0 +1,318 @@
+//! A scene: grains, how they start, walls, ground, gravity, camera, solver preset and end rule.
+//!
+//! The same words stand in Rust, in TOML and in Python. Lengths are metres, angles radians, the
+//! ground is the plane z = 0 and gravity points down unless the scene says otherwise.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::camera::{CameraSpec, Projection};
+use crate::check::{finite, positive};
+use crate::effects::{Effect, Effects};
+use crate::error::SceneError;
+use crate::grain_shape::Solid;
+use crate::grains::Grains;
+use crate::gravity::standard_gravity;
+use crate::material::Material;
+use crate::mesh::MeshFile;
+use crate::motion::Motion;
+use crate::observe::Observe;
+use crate::outflow::Outflow;
+use crate::periodic::Periodic;
+use crate::preset::Preset;
+use crate::start::Start;
+use crate::view::{ViewSpec, check_views};
+use crate::walls::{Funnel, Ground, Shape, Wall};
+
+/// A whole experiment but for its seed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// What the scene is called in data sets and reports.
+    pub name: String,
+    /// Solver settings by name.
+    #[serde(default)]
+    pub preset: Preset,
+    /// Gravity `[m/s^2]`.
+    #[serde(default = "standard_gravity")]
+    pub gravity: [f64; 3],
+    /// The grains' material, and every wall's that states none.
+    #[serde(default)]
+    pub material: Material,
+    /// What is poured.
+    pub grains: Grains,
+    /// Where the grains are when the pour begins.
+    pub start: Start,
+    /// The plane z = 0.
+    #[serde(default, skip_serializing_if = "Ground::is_plain")]
+    pub ground: Ground,
+    /// A conical funnel about the z axis, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub funnel: Option<Funnel>,
+    /// Further walls.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub walls: Vec<Wall>,
+    /// Space that repeats along an axis, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub periodic: Option<Periodic>,
+    /// Where grains leave the scene, if they do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outflow: Option<Outflow>,
+    /// What the plain model lacks, each off unless stated.
+    #[serde(default, skip_serializing_if = "Effects::is_plain")]
+    pub effects: Effects,
+    /// When the pour ends.
+    #[serde(default)]
+    pub end: EndRule,
+    /// The depth camera above the ground.
+    #[serde(default)]
+    pub camera: CameraSpec,
+    /// Further cameras, whose images are looked at and not inferred from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub views: Vec<ViewSpec>,
+    /// What is observed while the pour goes on, and at its end beside the image.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observe: Option<Observe>,
+}
+
+/// When a pour ends: at rest, with every moving grain out of view, or at the horizon. [`Outflow::until`] may end it before.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EndRule {
+    /// Longest simulated time `[s]`.
+    pub horizon: f64,
+    /// Mean kinetic energy of a grain per mass below which the pour is at rest `[m^2/s^2]`.
+    pub kinetic_energy: f64,
+}
+
+impl Default for EndRule {
+    fn default() -> Self {
+        Self { horizon: 4.0, kinetic_energy: 1e-8 }
+    }
+}
+
+impl Scene {
+    /// The paper's pour: 2000 grains of 4 mm through a funnel whose tip is `height` `[m]` above the ground.
+    pub fn funnel(height: f64) -> Self {
+        Self {
+            name: "funnel".to_owned(),
+            preset: Preset::Default,
+            gravity: standard_gravity(),
+            material: Material::default(),
+            grains: Grains { count: 2000, diameter: 4e-3, density: 1300.0, shape: None },
+            start: Start::Grid { counts: [10, 10, 20], spacing: 8e-3, jitter: 1e-4, base: -4e-3 },
+            ground: Ground::default(),
+            funnel: Some(Funnel { height, ..Funnel::default() }),
+            walls: Vec::new(),
+            periodic: None,
+            outflow: None,
+            effects: Effects::default(),
+            end: EndRule::default(),
+            camera: CameraSpec::default(),
+            views: Vec::new(),
+            observe: None,
+        }
+    }
+
+    /// A ball of 2000 grains of 4 mm let go with its lowest point `height` `[m]` above the ground.
+    pub fn drop(height: f64) -> Self {
+        Self {
+            name: "drop".to_owned(),
+            start: Start::Ball { height, solid_fraction: 0.6, jitter: 5e-5 },
+            funnel: None,
+            ..Self::funnel(0.0)
+        }
+    }
+
+    /// Reads and checks a scene.
+    ///
+    /// # Errors
+    /// [`SceneError::Toml`] for what is not TOML of a scene (unknown keys included),
+    /// [`SceneError::OutOfRange`] for numbers that no scene can have.
+    pub fn from_toml(text: &str) -> Result<Self, SceneError> {
+        let scene = Self::parse(text)?;
+        scene.check()?;
+        Ok(scene)
+    }
+
+    /// Reads a scene whose files are still to be read, and checks nothing else.
+    ///
+    /// # Errors
+    /// [`SceneError::Toml`] for what is not TOML of a scene.
+    pub fn parse(text: &str) -> Result<Self, SceneError> {
+        toml::from_str(text).map_err(|e| SceneError::Toml(Box::new(e)))
+    }
+
+    /// The scene as TOML; [`Scene::from_toml`] reads it back unchanged.
+    ///
+    /// # Errors
+    /// [`SceneError::TomlWrite`] if a number cannot be written.
+    pub fn to_toml(&self) -> Result<String, SceneError> {
+        toml::to_string(self).map_err(|e| SceneError::TomlWrite(Box::new(e)))
+    }
+
+    /// The mesh files that walls name.
+    pub fn mesh_files(&mut self) -> impl Iterator<Item = &mut MeshFile> {
+        self.walls.iter_mut().filter_map(|wall| match &mut wall.shape {
+            Shape::Mesh(file) => Some(file),
+            _ => None,
+        })
+    }
+
+    /// How the funnel and the walls move.
+    pub fn motions(&mut self) -> impl Iterator<Item = &mut Motion> {
+        let walls = self.walls.iter_mut().map(|wall| &mut wall.motion);
+        walls.chain(self.funnel.iter_mut().map(|funnel| &mut funnel.motion))
+    }
+
+    /// Takes over the meshes that another scene has read from the same files.
+    pub fn take_meshes(&mut self, other: &Self) {
+        for (mine, theirs) in self.walls.iter_mut().zip(&other.walls) {
+            if let (Shape::Mesh(mine), Shape::Mesh(theirs)) = (&mut mine.shape, &theirs.shape)
+                && mine.file == theirs.file
+            {
+                mine.mesh.clone_from(&theirs.mesh);
+            }
+        }
+    }
+
+    /// When the last wall has come to rest and the last effect that ends has, or the horizon if one never does `[s]`.
+    pub fn moves_until(&self) -> f64 {
+        let walls = self.walls.iter().map(|wall| &wall.motion);
+        let motions = walls.chain(self.funnel.iter().map(|funnel| &funnel.motion));
+        let last = motions.map(Motion::end).fold(self.effects.acts_until(), f64::max);
+        last.min(self.end.horizon)
+    }
+
+    /// The balls that hold the grains, whichever way they are turned: the grains themselves if they are round.
+    pub fn held_grains(&self) -> Grains {
+        let diameter = match self.grains.solid() {
+            Some(solid) => 2.0 * solid.reach,
+            None => self.effects.clump.envelope(&self.grains),
+        };
+        Grains { diameter, shape: None, ..self.grains }
+    }
+
+    /// Centres of the grains at time zero `[m]`, one each.
+    pub fn starting_positions(&self, seed: u64) -> Vec<Vector3<f64>> {
+        let pose = self.funnel.as_ref().and_then(|funnel| self.effects.funnel.of(funnel));
+        self.start.positions(&self.held_grains(), self.funnel.as_ref(), pose.as_ref(), seed)
+    }
+
+    /// What grains that are not round cannot be with.
+    fn check_clump(&self) -> Result<(), SceneError> {
+        let others = [
+            (self.effects.polydispersity.path(), self.effects.polydispersity.is_on()),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+        ];
+        match others.into_iter().find(|(_, is_there)| *is_there && self.effects.clump.is_on()) {
+            Some((other, _)) => Err(SceneError::Exclude { one: "effects.clump", other }),
+            None => Ok(()),
+        }
+    }
+
+    /// What convex bodies cannot be with: they have walls, gravity and the plain law.
+    fn check_shape(&self) -> Result<(), SceneError> {
+        let Some(shape) = &self.grains.shape else { return Ok(()) };
+        shape.check()?;
+        Solid::new(shape, self.grains.diameter)?;
+        let Effects { ground, tilt, funnel, outlet, .. } = self.effects.clone();
+        let alone = Effects { ground, tilt, funnel, outlet, ..Effects::default() };
+        let looks = |observe: &Observe| {
+            observe.images.is_some() || observe.surface.is_some() || observe.front.is_some()
+        };
+        let others = [
+            ("effects but ground, tilt, funnel and outlet", self.effects != alone),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+            ("observe.images, surface or front", self.observe.as_ref().is_some_and(looks)),
+            ("an orthographic camera", self.camera.projection == Projection::Orthographic),
+            ("preset paper", self.preset == Preset::Paper),
+        ];
+        match others.into_iter().find(|(_, is_there)| *is_there) {
+            Some((other, _)) => Err(SceneError::Exclude { one: "grains.shape", other }),
+            None => Ok(()),
+        }
+    }
+
+    /// Checks every number of the scene.
+    ///
+    /// # Errors
+    /// [`SceneError::OutOfRange`] or [`SceneError::StartTooSmall`].
+    pub fn check(&self) -> Result<(), SceneError> {
+        self.material.check("material")?;
+        positive("grains.diameter", self.grains.diameter)?;
+        positive("grains.density", self.grains.density)?;
+        positive("end.horizon", self.end.horizon)?;
+        positive("end.kinetic_energy", self.end.kinetic_energy)?;
+        for (axis, value) in ["x", "y", "z"].iter().zip(self.gravity) {
+            finite(&format!("gravity.{axis}"), value)?;
+        }
+        self.ground.check(&self.material)?;
+        self.effects.check()?;
+        self.check_clump()?;
+        self.check_shape()?;
+        self.start.check(&self.held_grains())?;
+        self.effects.check_method(self.preset.settings().method)?;
+        if let Some(funnel) = &self.funnel {
+            funnel.check(&self.material, self.grains.radius())?;
+        }
+        for (index, wall) in self.walls.iter().enumerate() {
+            wall.check(&format!("walls.{index}"), &self.material, &self.grains)?;
+        }
+        let (dt, diameter) = (self.preset.settings().dt, self.grains.diameter);
+        let walls = self.walls.iter().enumerate();
+        let named = walls.map(|(index, wall)| (format!("walls.{index}"), &wall.motion));
+        let funnel = self.funnel.iter().map(|funnel| ("funnel".to_owned(), &funnel.motion));
+        for (name, motion) in named.chain(funnel) {
+            motion.check_jumps(&name, dt, diameter)?;
+        }
+        if let Some(periodic) = &self.periodic {
+            periodic.check(self.grains.diameter)?;
+        }
+        if let Some(outflow) = &self.outflow {
+            outflow.check()?;
+        }
+        if let Some(observe) = &self.observe {
+            observe.check(self.end.horizon, self.grains.diameter)?;
+        }
+        check_views(&self.views)?;
+        self.camera.check()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn built_in_scenes_are_valid_and_survive_toml() {
+        for scene in [Scene::funnel(0.12), Scene::drop(0.2)] {
+            scene.check().unwrap();
+            assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+        }
+    }
+
+    #[test]
+    fn unknown_keys_are_named() {
+        let text = Scene::drop(0.1).to_toml().unwrap().replace("diameter", "diametre");
+        let error = Scene::from_toml(&text).unwrap_err();
+        let source = std::error::Error::source(&error).unwrap().to_string();
+        assert!(source.contains("diametre") && source.contains("diameter"), "{source}");
+    }
+
+    #[test]
+    fn bad_numbers_are_named() {
+        for (change, name) in [
+            ((|s: &mut Scene| s.grains.diameter = -1.0) as fn(&mut Scene), "grains.diameter"),
+            (|s| s.gravity[2] = f64::NAN, "gravity.z"),
+            (|s| s.end.horizon = 0.0, "end.horizon"),
+            (|s| s.material.restitution = 2.0, "material.restitution"),
+        ] {
+            let mut scene = Scene::funnel(0.12);
+            change(&mut scene);
+            assert!(scene.check().unwrap_err().to_string().contains(name), "{name}");
+        }
+    }
+}

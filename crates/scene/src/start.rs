@@ -1,0 +1,365 @@
+//! Where the grains are when a pour begins.
+
+use granulcal_numbers::half_open;
+use nalgebra::{Isometry3, Point3, Vector3};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::{Deserialize, Serialize};
+
+use crate::check::{finite, non_negative, positive};
+use crate::error::SceneError;
+use crate::grains::Grains;
+use crate::walls::Funnel;
+
+/// Most places of a lattice of which the lowest are taken.
+const MOST_PLACES: f64 = 1e8;
+/// Solid fraction of the closest packing of equal spheres, pi / sqrt(18).
+const CLOSEST_PACKING: f64 = 0.740_480_489_693_061;
+
+/// The arrangement of the grains at time zero, at rest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+pub enum Start {
+    /// A block about the z axis, filled layer by layer from below.
+    Grid {
+        /// Grains along x, y and z.
+        counts: [usize; 3],
+        /// Distance of neighbours `[m]`.
+        spacing: f64,
+        /// Half width of a uniform seeded displacement along each axis `[m]`.
+        jitter: f64,
+        /// Height of the lowest layer above the funnel's rim, or above the ground without a funnel `[m]`.
+        base: f64,
+    },
+    /// A ball cut out of a face-centred cubic lattice, its lowest point at `height` above the ground.
+    Ball {
+        /// Height of the lowest grain's lowest point `[m]`.
+        height: f64,
+        /// Share of the lattice's volume that is grain `[-]`, or ball that holds a grain that is not round.
+        solid_fraction: f64,
+        /// Half width of a uniform seeded displacement along each axis `[m]`.
+        jitter: f64,
+    },
+    /// The inside of a cylinder, filled from its lowest point up on a cubic lattice along its axis: to settle in a tube, a
+    /// drum or a hopper.
+    Cylinder {
+        /// Centre of one end `[m]`.
+        from: [f64; 3],
+        /// Centre of the other end `[m]`.
+        to: [f64; 3],
+        /// Radius `[m]`; no grain reaches beyond it.
+        radius: f64,
+        /// Distance of neighbours `[m]`.
+        spacing: f64,
+        /// Half width of a uniform seeded displacement along each axis `[m]`.
+        jitter: f64,
+    },
+    /// Listed centres, for example those of another pour that has come to rest. The seed changes nothing.
+    Positions {
+        /// Centre of each grain `[m]`, shape `[grains.count, 3]`. Overlaps are pushed apart like any other.
+        positions: Vec<[f64; 3]>,
+    },
+}
+
+impl Start {
+    pub(crate) fn check(&self, grains: &Grains) -> Result<(), SceneError> {
+        match self {
+            &Self::Grid { counts, spacing, jitter, base } => {
+                finite("start.base", base)?;
+                jitter_fits(jitter, spacing - grains.diameter)?;
+                positive("start.spacing", spacing)?;
+                let capacity =
+                    counts.iter().fold(1, |all: usize, &count| all.saturating_mul(count));
+                if grains.count > capacity {
+                    let count = grains.count;
+                    return Err(SceneError::StartTooSmall { kind: "grid", capacity, count });
+                }
+            }
+            &Self::Ball { height, solid_fraction, jitter } => {
+                non_negative("start.height", height)?;
+                if !(solid_fraction > 0.0 && solid_fraction <= CLOSEST_PACKING) {
+                    let allowed = "in (0, 0.7404]";
+                    return Err(SceneError::range("start.solid_fraction", solid_fraction, allowed));
+                }
+                jitter_fits(
+                    jitter,
+                    lattice_spacing(grains.diameter, solid_fraction) - grains.diameter,
+                )?;
+            }
+            &Self::Cylinder { from, to, radius, spacing, jitter } => {
+                for (name, end) in [("from", from), ("to", to)] {
+                    end.iter().try_for_each(|&c| finite(&format!("start.{name}"), c))?;
+                }
+                let length = (Vector3::from(to) - Vector3::from(from)).norm();
+                positive("start (distance of from and to)", length)?;
+                positive("start.radius", radius)?;
+                positive("start.spacing", spacing)?;
+                jitter_fits(jitter, spacing - grains.diameter)?;
+                let places = std::f64::consts::PI * radius * radius * length / spacing.powi(3);
+                if places > MOST_PLACES {
+                    let name = "start (places of the lattice in the cylinder)";
+                    let allowed =
+                        "at most 1e8: a smaller cylinder, or a wider spacing, holds as many grains";
+                    return Err(SceneError::range(name, places, allowed));
+                }
+                let capacity = cylinder(grains, from, to, radius, spacing, jitter).len();
+                if grains.count > capacity {
+                    let count = grains.count;
+                    return Err(SceneError::StartTooSmall { kind: "cylinder", capacity, count });
+                }
+            }
+            Self::Positions { positions } => {
+                let (got, expected) = (positions.len(), grains.count);
+                if got != expected {
+                    return Err(SceneError::Length { name: "start.positions", got, expected });
+                }
+                for (grain, position) in positions.iter().enumerate() {
+                    for (axis, &value) in ["x", "y", "z"].iter().zip(position) {
+                        finite(&format!("start.positions.{grain}.{axis}"), value)?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Centres of the grains `[m]`, one each. `grains` are the balls that hold them, `pose` is where the funnel hangs beside
+    /// its place.
+    pub(crate) fn positions(
+        &self,
+        grains: &Grains,
+        funnel: Option<&Funnel>,
+        pose: Option<&Isometry3<f64>>,
+        seed: u64,
+    ) -> Vec<Vector3<f64>> {
+        let (mut positions, jitter) = match self {
+            &Self::Grid { counts, spacing, jitter, base } => {
+                let floor = funnel.map_or(0.0, Funnel::rim_height);
+                let mut points = grid(grains.count, counts, spacing, floor + base);
+                if let Some(pose) = pose {
+                    for point in &mut points {
+                        *point = (pose * Point3::from(*point)).coords;
+                    }
+                }
+                (points, jitter)
+            }
+            &Self::Ball { height, solid_fraction, jitter } => {
+                let spacing = lattice_spacing(grains.diameter, solid_fraction);
+                (ball(grains, spacing, height + jitter), jitter)
+            }
+            &Self::Cylinder { from, to, radius, spacing, jitter } => {
+                let mut points = cylinder(grains, from, to, radius, spacing, jitter);
+                points.sort_by(|a, b| a.z.total_cmp(&b.z));
+                points.truncate(grains.count);
+                (points, jitter)
+            }
+            Self::Positions { positions } => {
+                return positions.iter().map(|&position| Vector3::from(position)).collect();
+            }
+        };
+        let mut random = Pcg64::seed_from_u64(seed);
+        for position in &mut positions {
+            for axis in 0..3 {
+                position[axis] += jitter * (2.0 * half_open(random.next_u64()) - 1.0);
+            }
+        }
+        positions
+    }
+}
+
+/// Two neighbours may move towards each other by `jitter` along every axis, so twice its length must fit the gap.
+fn jitter_fits(jitter: f64, gap: f64) -> Result<(), SceneError> {
+    non_negative("start.jitter", jitter)?;
+    if 2.0 * jitter * 3f64.sqrt() <= gap + 1e-12 {
+        return Ok(());
+    }
+    Err(SceneError::range("start.jitter", jitter, "small enough that no two grains overlap"))
+}
+
+fn lattice_spacing(diameter: f64, solid_fraction: f64) -> f64 {
+    diameter * (CLOSEST_PACKING / solid_fraction).cbrt()
+}
+
+fn grid(count: usize, counts: [usize; 3], spacing: f64, bottom: f64) -> Vec<Vector3<f64>> {
+    let centred = |index: usize, n: usize| spacing * (index as f64 - 0.5 * (n as f64 - 1.0));
+    (0..count)
+        .map(|index| {
+            let (x, rest) = (index % counts[0], index / counts[0]);
+            let (y, z) = (rest % counts[1], rest / counts[1]);
+            Vector3::new(centred(x, counts[0]), centred(y, counts[1]), bottom + spacing * z as f64)
+        })
+        .collect()
+}
+
+/// The points of a cubic lattice along the axis of a cylinder at which a grain that may move by `jitter` fits into it.
+fn cylinder(
+    grains: &Grains,
+    from: [f64; 3],
+    to: [f64; 3],
+    radius: f64,
+    spacing: f64,
+    jitter: f64,
+) -> Vec<Vector3<f64>> {
+    let (from, to) = (Vector3::from(from), Vector3::from(to));
+    let length = (to - from).norm();
+    let axis = (to - from) / length;
+    let u = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
+    let v = axis.cross(&u);
+    let margin = grains.radius() + 3f64.sqrt() * jitter;
+    let (room, free) = (radius - margin, length - 2.0 * margin);
+    if room < 0.0 || free < 0.0 {
+        return Vec::new();
+    }
+    let layers = (free / spacing).floor() as i64 + 1;
+    let side = (room / spacing).floor() as i64;
+    let first = 0.5 * (length - spacing * (layers - 1) as f64);
+    let mut points = Vec::new();
+    for layer in 0..layers {
+        let middle = from + (first + spacing * layer as f64) * axis;
+        for a in -side..=side {
+            for b in -side..=side {
+                let (a, b) = (spacing * a as f64, spacing * b as f64);
+                if a.hypot(b) <= room {
+                    points.push(middle + a * u + b * v);
+                }
+            }
+        }
+    }
+    points
+}
+
+/// The `count` lattice points nearest to the centre of a face-centred cubic lattice, lowest point at `height`.
+fn ball(grains: &Grains, spacing: f64, height: f64) -> Vec<Vector3<f64>> {
+    let edge = spacing * std::f64::consts::SQRT_2;
+    // Four points a cubic cell: this many cells each way hold twice the ball.
+    let reach = (3.0 * grains.count as f64 / (8.0 * std::f64::consts::PI)).cbrt().ceil() as i64 + 1;
+    let corners = [[0.0, 0.0, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0]];
+    let mut points = Vec::new();
+    for z in -reach..=reach {
+        for y in -reach..=reach {
+            for x in -reach..=reach {
+                for corner in corners {
+                    let cell = Vector3::new(x as f64, y as f64, z as f64);
+                    points.push(edge * (cell + Vector3::from(corner)));
+                }
+            }
+        }
+    }
+    // A stable sort: points at one distance keep the lattice's order on every machine.
+    points.sort_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
+    points.truncate(grains.count);
+    let lowest = points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    if lowest.is_finite() {
+        let lift = height + grains.radius() - lowest;
+        for point in &mut points {
+            point.z += lift;
+        }
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    fn nearest_pair(points: &[Vector3<f64>]) -> f64 {
+        let mut nearest = f64::INFINITY;
+        for (i, a) in points.iter().enumerate() {
+            for b in &points[..i] {
+                nearest = nearest.min((a - b).norm());
+            }
+        }
+        nearest
+    }
+
+    #[test]
+    fn no_grains_overlap_at_the_start() {
+        for mut scene in [Scene::funnel(0.12), Scene::drop(0.1)] {
+            scene.grains.count = 700;
+            let points = scene.starting_positions(3);
+            assert_eq!(points.len(), 700);
+            assert!(nearest_pair(&points) >= scene.grains.diameter);
+        }
+    }
+
+    #[test]
+    fn ball_hangs_at_its_height_and_is_round() {
+        let scene = Scene::drop(0.1);
+        let points = scene.starting_positions(1);
+        let lowest = points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+        assert!((lowest - 0.002 - 0.1).abs() < 2.1e-4, "{lowest}");
+        // Radius of a ball of 2000 grains at 60 % solid: (2000 / 0.6)^(1/3) * R.
+        let extent = points.iter().map(|p| p.x.abs()).fold(0.0, f64::max);
+        let expected = (2000.0f64 / 0.6).cbrt() * 0.002;
+        assert!((extent + 0.002 - expected).abs() < 0.1 * expected, "{extent} {expected}");
+    }
+
+    #[test]
+    fn a_cylinder_is_filled_from_below_and_holds_its_grains() {
+        for (from, to) in [([0.1, 0.0, 0.05], [0.1, 0.02, 0.05]), ([0.0; 3], [0.01, 0.02, 0.05])] {
+            let mut scene = Scene::drop(0.1);
+            scene.grains.diameter = 2.4e-3;
+            scene.grains.count = 300;
+            let (radius, spacing, jitter) = (0.03, 2.8e-3, 1e-4);
+            scene.start = Start::Cylinder { from, to, radius, spacing, jitter };
+            scene.check().unwrap();
+            let points = scene.starting_positions(2);
+            assert!(nearest_pair(&points) >= scene.grains.diameter);
+            let (from, to) = (Vector3::from(from), Vector3::from(to));
+            let axis = (to - from).normalize();
+            for point in &points {
+                let along = (point - from).dot(&axis);
+                let out = (point - from - along * axis).norm();
+                assert!(out <= 0.03 - 1.2e-3 && along >= 1.2e-3);
+                assert!(along <= (to - from).norm() - 1.2e-3);
+            }
+            let highest = points.iter().map(|p| p.z).fold(f64::MIN, f64::max);
+            assert!(highest < 0.6 * (0.05 + 0.03), "{highest}");
+            scene.grains.count = 10_000;
+            let error = scene.check().unwrap_err();
+            assert!(matches!(error, SceneError::StartTooSmall { kind: "cylinder", .. }), "{error}");
+        }
+    }
+
+    #[test]
+    fn seeds_differ_and_repeat() {
+        let scene = Scene::funnel(0.12);
+        let at = |seed| scene.starting_positions(seed);
+        assert_eq!(at(1), at(1));
+        assert_ne!(at(1), at(2));
+    }
+
+    #[test]
+    fn listed_positions_are_the_start_whatever_the_seed() {
+        let positions = vec![[0.0, 0.0, 0.002], [0.01, -0.02, 0.003]];
+        let mut scene = Scene::drop(0.1);
+        scene.grains.count = 2;
+        scene.start = Start::Positions { positions: positions.clone() };
+        scene.check().unwrap();
+        assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+        let started = scene.starting_positions(5);
+        assert_eq!(started, positions.iter().map(|p| Vector3::from(*p)).collect::<Vec<_>>());
+        assert_eq!(started, scene.starting_positions(6));
+    }
+
+    #[test]
+    fn listed_positions_must_be_finite_and_one_for_each_grain() {
+        let mut scene = Scene::drop(0.1);
+        scene.grains.count = 2;
+        scene.start = Start::Positions { positions: vec![[0.0; 3]] };
+        let error = scene.check().unwrap_err();
+        assert!(matches!(error, SceneError::Length { got: 1, expected: 2, .. }), "{error}");
+        scene.start = Start::Positions { positions: vec![[0.0; 3], [0.0, f64::NAN, 0.0]] };
+        assert!(scene.check().unwrap_err().to_string().contains("start.positions.1.y"));
+    }
+
+    #[test]
+    fn too_many_grains_or_too_much_jitter_is_refused() {
+        let mut scene = Scene::funnel(0.12);
+        scene.grains.count = 2001;
+        assert!(matches!(scene.check(), Err(SceneError::StartTooSmall { capacity: 2000, .. })));
+        let scene = Scene::drop(0.1).with("start.jitter", 1e-3);
+        assert!(scene.unwrap_err().to_string().contains("start.jitter"));
+    }
+}

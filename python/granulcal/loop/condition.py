@@ -1,0 +1,112 @@
+"""One condition of a task: numbers of the scene, recordings, and how they are read."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.errors import ObservationError
+from granulcal.loop.effects.definitions import Definition
+from granulcal.loop.pours.measures import Measures
+from granulcal.pours.scene import Scene
+
+__all__ = ["Condition", "condition_of", "require_different"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Pours of one material under one condition.
+
+    Attributes:
+        name: what tables call it.
+        at: numbers of the scene by path.
+        use: `fit` or `sealed`.
+        recordings: a pour each.
+        camera: of PNGs.
+        known: numbers that an effect has here, should it be the one, for example
+            `{"effects.fluid.density": 1260.0}`.
+        reading: arguments with which the recordings are read.
+        averaged: each recording is a mean over time of what a pour shows, at least as steady as the
+            simulated mean of one pour; it is taken to be as noisy as that.
+    """
+
+    name: str
+    at: dict[str, float]
+    use: str
+    recordings: tuple[Path, ...]
+    camera: Path | None = None
+    known: dict[str, float] = field(default_factory=dict)
+    reading: dict[str, Any] = field(default_factory=dict)
+    averaged: bool = False
+
+    def under(self, definition: Definition) -> "Condition":
+        """Returns the condition looked at in the way of a definition."""
+        return replace(
+            self,
+            at={**self.at, **definition.at},
+            reading={**self.reading, **definition.reading},
+        )
+
+    def statistics(self, scene: Scene) -> Array:
+        """Returns the statistics of each pour, shape (n, s).
+
+        Raises:
+            ObservationError: a recording that cannot be one of the scene, or that does not show all
+                that the scene observes.
+        """
+        there = scene.with_(self.at)
+        measures = Measures.of(there)
+        rows = np.array([self._read(measures, path, there) for path in self.recordings])
+        for path, row in zip(self.recordings, rows, strict=True):
+            unseen = [n for n, v in zip(measures.names, row, strict=True) if not np.isfinite(v)]
+            if unseen:
+                raise ObservationError(
+                    f"{path} does not show {', '.join(unseen)}, which the scene observes: let the "
+                    "scene observe what every recording shows, or leave this one out"
+                )
+        return rows
+
+    def _read(self, measures: Measures, path: Path, there: Scene) -> Array:
+        try:
+            return measures.of_recording(path, there, self.camera, self.reading)
+        except (TypeError, OverflowError) as error:
+            raise ObservationError(f"{path} cannot be read with {self.reading}: {error}") from None
+
+
+def condition_of(file: Path, table: dict[str, Any]) -> Condition:
+    """Returns the condition of a table of a task's `file`; its recordings must be there."""
+    recordings = tuple(file.parent / name for name in table["recordings"])
+    for recording in recordings:
+        if not recording.exists():
+            raise FileNotFoundError(f"{recording} of {file} is not there")
+    camera = file.parent / table["camera"] if "camera" in table else None
+    at = {path: float(value) for path, value in table["at"].items()}
+    known = {path: float(value) for path, value in table.get("known", {}).items()}
+    return Condition(
+        str(table["name"]),
+        at,
+        table["use"],
+        recordings,
+        camera,
+        known,
+        reading=dict(table.get("reading", {})),
+        averaged=table.get("averaged", False),
+    )
+
+
+def require_different(conditions: tuple[Condition, ...]) -> None:
+    """Refuses a recording that is given twice: it would count as two pours."""
+    seen: dict[Path, str] = {}
+    for condition in conditions:
+        for path in condition.recordings:
+            there = path.resolve()
+            if there in seen:
+                raise ObservationError(
+                    f"{path} is a recording of {seen[there]!r} and again of {condition.name!r}: "
+                    "each pour counts once"
+                )
+            seen[there] = condition.name

@@ -1,0 +1,125 @@
+"""Features of the surrogate, and the axes of uncorrelated noise that it stands on."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.bayessim.emulator.basis import Basis, polynomial
+from granulcal.errors import TrainingDataError
+
+__all__ = [
+    "held_residuals",
+    "lack_of_fit",
+    "mean_columns",
+    "noise_correlation",
+    "scale_columns",
+    "uncorrelated_axes",
+    "usable_statistics",
+]
+
+Array = NDArray[np.float64]
+
+# Share of the correlation that is replaced by none.
+_SHRINKAGE = 0.03
+# Whitened residuals are held within this many standard deviations where they make covariances.
+_LARGEST_RESIDUAL = 6.0
+# A statistic whose most common value has this share of the pours says nothing smooth.
+_LARGEST_SHARE = 0.9
+# Pairs of near rows that show what the features cannot follow.
+_LACK_ROWS, _NEIGHBOURS = 2000, 4
+# Prior standard deviations of constant, slopes and curvatures of an effect, before its own width.
+_CONSTANT, _SLOPE, _CURVATURE = 1.0, 0.5, 0.25
+
+
+def held_residuals(noise: Array) -> Array:
+    """Residuals cut where they are no noise any more."""
+    largest = _LARGEST_RESIDUAL * float(np.median(np.abs(noise)) / 0.6745)
+    return np.clip(noise, -largest, largest)
+
+
+def lack_of_fit(
+    basis: Basis, u: Array, features: Array, roots: Array, white: Array, scales: Array
+) -> Array:
+    """Lambda of each axis; pairs are each of up to `_LACK_ROWS` rows with its nearest."""
+    metric = np.sqrt(np.mean(basis.frequencies**2, axis=0)) / basis.scale
+    v = u * metric
+    chosen = np.random.default_rng(0).permutation(len(u))[:_LACK_ROWS]
+    gaps = np.sum(v[chosen] ** 2, axis=1)[:, None] + np.sum(v**2, axis=1) - 2 * v[chosen] @ v.T
+    gaps[np.arange(len(chosen)), chosen] = np.inf
+    near = np.argpartition(gaps, _NEIGHBOURS, axis=1)[:, :_NEIGHBOURS]
+    held = np.clip(white, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
+    products = np.mean(held[chosen][:, None] * held[near], axis=(0, 1))
+    shared = np.empty(len(products))
+    for j, root in enumerate(roots):
+        along = (features @ root) / scales[:, j : j + 1]
+        shared[j] = np.mean(np.einsum("ij,ikj->ik", along[chosen], along[near], optimize=True))
+    return np.maximum(products + shared, 0.0)
+
+
+def uncorrelated_axes(z: Array, quadratic: Array) -> Array:
+    """C^-1/2 of what a quadratic leaves, C shrunk a little to its diagonal."""
+    hat = np.linalg.qr(quadratic)[0]
+    left = z - hat @ (hat.T @ z)
+    held = np.clip(left / left.std(axis=0), -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
+    moment = (held * left.std(axis=0)).T @ (held * left.std(axis=0)) / len(z)
+    moment = (1 - _SHRINKAGE) * moment + _SHRINKAGE * np.diag(np.diag(moment))
+    values, vectors = np.linalg.eigh(moment)
+    return (vectors / np.sqrt(values)) @ vectors.T
+
+
+def usable_statistics(x: Array, labels: tuple[str, ...]) -> tuple[NDArray[np.intp], dict[str, str]]:
+    """Columns that can be emulated, and why the others cannot."""
+    dropped: dict[str, str] = {}
+    for j, label in enumerate(labels):
+        finite = x[np.isfinite(x[:, j]), j]
+        if len(finite) < 0.95 * len(x):
+            dropped[label] = f"not finite in {len(x) - len(finite)} of {len(x)} pours"
+        elif finite.std() <= 1e-9 * max(float(np.abs(finite).max()), 1e-300):
+            dropped[label] = "constant"
+        elif np.unique(finite, return_counts=True)[1].max() > _LARGEST_SHARE * len(finite):
+            dropped[label] = "one value in more than nine of ten pours"
+    kept = [j for j, label in enumerate(labels) if label not in dropped]
+    if not kept:
+        raise TrainingDataError("no statistic varies over the archive")
+    return np.array(kept, dtype=np.intp), dropped
+
+
+def mean_columns(
+    basis: Basis, u: Array, psi: Array, bent: NDArray[np.bool_]
+) -> tuple[Array, list[slice]]:
+    """Returns the features of the mean, shape (n, f), and where each block of them stands."""
+    first, second = _effect_columns(u)
+    main = basis(u)
+    waves = 2 * len(basis.frequencies)
+    widths = [main.shape[1] - waves, waves]
+    parts = [main]
+    for k in range(psi.shape[1]):
+        strength = psi[:, k : k + 1]
+        parts += [strength * first, bent[k] * strength**2 * second]
+        widths += [first.shape[1], second.shape[1]]
+    stops = np.cumsum(widths)
+    blocks = [slice(int(b - w), int(b)) for b, w in zip(stops, widths, strict=True)]
+    return np.concatenate(parts, axis=1), blocks
+
+
+def _effect_columns(u: Array) -> tuple[Array, Array]:
+    """Prior-scaled monomials of g_k and of h_k."""
+    centred = 2 * u - 1
+    dimension = u.shape[1]
+    scales = np.full((dimension + 1) * (dimension + 2) // 2, _CURVATURE)
+    scales[0], scales[1 : dimension + 1] = _CONSTANT, _SLOPE
+    first = polynomial(centred, 2) * scales
+    return first, first[:, : dimension + 1] * _SLOPE
+
+
+def scale_columns(basis: Basis, u: Array, psi: Array, bent: NDArray[np.bool_]) -> Array:
+    """Returns the features of the logarithm of the scales, shape (n, f)."""
+    # A held strength may lie beyond what was poured: the noise there is that of the nearer size.
+    strength = np.where(bent, np.abs(psi), np.clip(psi, 0.0, 1.0))
+    return np.concatenate([basis(u), strength], axis=1)
+
+
+def noise_correlation(noise: Array, weights: Array) -> Array:
+    """Second moment of whitened residuals, shrunk to its diagonal."""
+    held = np.clip(noise, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
+    moment = (held * weights[:, None]).T @ held / weights.sum()
+    return (1 - _SHRINKAGE) * moment + _SHRINKAGE * np.diag(np.diag(moment))

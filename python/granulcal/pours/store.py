@@ -1,0 +1,59 @@
+"""Pours that are kept in a folder and never made twice: arrays by name, a group of pours a file.
+
+A file is whole or absent. One that is damaged is as good as absent: its pours can be made again.
+"""
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TypeVar
+from zipfile import BadZipFile
+from zlib import error as zlib_error
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.files import beside
+
+__all__ = ["PourStore"]
+
+Array = NDArray[np.float64]
+Of, Row = TypeVar("Of"), TypeVar("Row")
+
+
+class PourStore:
+    """A folder of kept pours.
+
+    Args:
+        folder: made with the first group that is kept.
+        threads: pours at once.
+    """
+
+    def __init__(self, folder: Path, threads: int = 1) -> None:
+        """Touches nothing."""
+        self.folder, self.threads = folder, threads
+
+    def read(self, name: str) -> dict[str, Array] | None:
+        """Returns the arrays of a group; None where there is none, or a damaged one."""
+        path = self._path(name)
+        if not path.exists():
+            return None
+        try:
+            with np.load(path) as file:
+                return {key: file[key] for key in file.files}
+        except (ValueError, KeyError, EOFError, OSError, BadZipFile, zlib_error):
+            return None
+
+    def keep(self, name: str, arrays: dict[str, Array]) -> None:
+        """Writes a group, in place of one that is damaged or of fewer arrays."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with beside(self._path(name)) as temporary:
+            np.savez_compressed(temporary, **arrays)  # pyright: ignore[reportArgumentType]
+
+    def make(self, pour: Callable[[Of], Row], of: Iterable[Of]) -> list[Row]:
+        """Returns `pour` of each, several at once, in their order."""
+        with ThreadPoolExecutor(self.threads) as pool:
+            return list(pool.map(pour, of))
+
+    def _path(self, name: str) -> Path:
+        return self.folder / f"{name}.npz"
