@@ -32,7 +32,7 @@ pub(crate) fn generate(
     progress: Option<Py<PyAny>>,
     engine: Option<(String, Py<PyAny>)>,
 ) -> PyResult<(u64, u64, u64, u64)> {
-    let prior = Prior::from_toml(prior_toml).map_err(error::dataset)?;
+    let prior = Prior::from_toml(prior_toml).map_err(error::dem)?;
     let default = GenerateOptions::default();
     let threads = threads.unwrap_or(default.threads);
     let options = GenerateOptions { rows, seed, threads, resume, shard: Shard::WHOLE, ..default };
