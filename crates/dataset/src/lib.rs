@@ -54,6 +54,7 @@ mod plausible;
 pub mod png;
 mod prior;
 mod random;
+mod readable;
 mod recording;
 mod room;
 mod row;
@@ -85,6 +86,7 @@ pub use observer::{Observed, ObservedStatistic, Observer, Series, observed_stati
 pub use pictures::{Pictures, write_mask, write_pictures};
 pub use plausible::Limits;
 pub use prior::{Parameter, Prior};
+pub use readable::{plain, readable};
 pub use recording::{FRAMES, Folder, Frame, ReadOptions, Recording, Source, measured_data};
 pub use room::Room;
 pub use row::{Row, RowStatus};

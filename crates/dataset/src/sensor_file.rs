@@ -6,6 +6,7 @@ use granulcal_dem::{NoiseSpec, SensorSpec, StereoSpec, TimeOfFlightSpec};
 use granulcal_features::{DepthSensor, NoiseField, StereoSensor, TimeOfFlightSensor};
 use serde::{Deserialize, Serialize};
 
+use crate::readable::toml_error;
 use crate::{DatasetError, Form, files};
 
 /// The file that `fit-sensor` writes: the tables that belong under a scene's camera.
@@ -39,11 +40,8 @@ pub fn save_sensor(path: &Path, sensor: &DepthSensor) -> Result<(), DatasetError
 /// sensor has.
 pub fn load_sensor(path: &Path) -> Result<SensorSpec, DatasetError> {
     let text = files::read_text(path)?;
-    let file: SensorToml = toml::from_str(&text).map_err(|source| DatasetError::Toml {
-        path: path.to_owned(),
-        what: "sensor",
-        source: Box::new(source),
-    })?;
+    let file: SensorToml = toml::from_str(&text)
+        .map_err(|source| toml_error(path, "sensor", &text, Box::new(source)))?;
     let sensor = file.camera.sensor;
     sensor_of(&sensor)
         .require_valid()

@@ -1,11 +1,13 @@
 //! What can be wrong with a scene, a material or a path.
 
+use granulcal_numbers::General;
+
 /// Everything that this crate refuses. Each variant names the thing, what was found and what is allowed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DemError {
     /// A number lies outside its range.
-    #[error("{name} must be {allowed}, got {got}")]
+    #[error("{name} must be {allowed}, got {}", General(*got))]
     OutOfRange {
         /// Path of the number in the scene, for example `material.restitution`.
         name: String,
@@ -40,7 +42,9 @@ pub enum DemError {
     },
     /// Grains start inside a wall.
     #[error(
-        "{grains} grain(s) start in {wall}, the deepest by {depth:.2} of its radius; at most {allowed} is allowed"
+        "{grains} grain(s) start in {wall}, the deepest by {} of its radius; at most {} is allowed",
+        General((depth * 1e3).round() / 1e3),
+        General(*allowed)
     )]
     StartInWall {
         /// The wall's path in the scene, `funnel` or the ground.
@@ -54,7 +58,8 @@ pub enum DemError {
     },
     /// Grains would leave the scene before they have moved.
     #[error(
-        "{grains} grain(s) start below outflow.below = {below} m, where they would leave at once; at most 0 is allowed"
+        "{grains} grain(s) start below outflow.below = {} m, where they would leave at once; at most 0 is allowed",
+        General(*below)
     )]
     StartBelowOutflow {
         /// How many.
@@ -122,6 +127,16 @@ pub enum DemError {
         got: String,
         /// This version.
         allowed: &'static str,
+    },
+    /// A checkpoint of another law of the solver, which would go on as another pour.
+    #[error(
+        "the checkpoint must be of law {allowed} of the solver, got law {got}: begin the pour anew"
+    )]
+    CheckpointLaw {
+        /// The law that it was made by.
+        got: u32,
+        /// The law of this version.
+        allowed: u32,
     },
     /// A checkpoint of another scene, seed or settings.
     #[error("the checkpoint is of another pour: {what} is {found} there, but {given} is given")]

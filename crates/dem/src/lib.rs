@@ -74,6 +74,7 @@ pub use frozen_search::FrozenSearch;
 pub use grain_shape::GrainShape;
 pub use health::{Health, MAX_ENERGY_CREATED};
 pub use impact::ImpactWork;
+pub use law::LAW;
 pub use material::{
     Material, WallMaterial, rolling_friction_from_length, rolling_friction_to_length,
 };

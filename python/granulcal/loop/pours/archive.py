@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.documents import ListOf, Number, OneOf, Table, Text, read_json
-from granulcal.engines.in_use import version_of_pours
+from granulcal.engines.in_use import law_of_pours, version_of_pours
 from granulcal.errors import TrainingDataError
 from granulcal.files import write_beside
 from granulcal.loop.effects.design import Design
@@ -35,6 +35,7 @@ from granulcal.loop.pours.cube import cube
 from granulcal.loop.pours.image_rows import ImageRows
 from granulcal.loop.pours.measures import Measures
 from granulcal.pours.dataset import Dataset, generate
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 
@@ -95,6 +96,7 @@ class Plan:
         """
         return {
             "version": version_of_pours(),
+            "law": law_of_pours(),
             "scene": self.scene.to_toml(),
             "prior": self.prior.to_toml(),
             "conditions": [list(condition) for condition in self.conditions],
@@ -151,7 +153,7 @@ class Pours:
         psi: shape (n, K).
         x: statistics in their units, shape (n, s).
         names: of the statistics.
-        left_out: pours that were not usable.
+        left_out: pours that were not usable, by why.
     """
 
     theta: Array
@@ -159,7 +161,7 @@ class Pours:
     psi: Array
     x: Array
     names: tuple[str, ...]
-    left_out: int
+    left_out: LeftOut
 
 
 class Archive:
@@ -238,7 +240,7 @@ class Archive:
         """
         plan, measures = self.plan, Measures.of(self.plan.scene)
         rows: list[tuple[Array, Array, Array, Array]] = []
-        left_out = 0
+        left_out = LeftOut()
         for part in self._parts():
             scene, count, folder = part.scene, part.count, self.folder / part.name
             if not folder.exists():
@@ -246,7 +248,7 @@ class Archive:
             data = Dataset.load(folder)
             values, usable = measures.of_dataset(data)
             usable[count:] = False
-            left_out += int((~usable[:count]).sum())
+            left_out += LeftOut.of(data.status[:count].tolist(), usable[:count].tolist())
             columns = {path: data.theta[usable, i] for i, path in enumerate(data.theta_names)}
             n = int(usable.sum())
             theta = np.column_stack([columns[path] for path in plan.prior.names])

@@ -5,6 +5,7 @@ import json
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from io import BytesIO
 from math import ceil
 from pathlib import Path
 from zipfile import BadZipFile
@@ -12,7 +13,8 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.engines.in_use import version_of_pours
+from granulcal.documents import read_bytes
+from granulcal.engines.in_use import law_of_pours, version_of_pours
 from granulcal.files import beside
 from granulcal.loop.pours.measures import Measures
 from granulcal.pours.scene import Scene
@@ -51,7 +53,7 @@ class Forward:
         `faults` are those of the image, by kind.
         """
         names = Measures.of(scene).names
-        of = [version_of_pours(), names, scene.to_toml(), list(seeds)]
+        of = [version_of_pours(), law_of_pours(), names, scene.to_toml(), list(seeds)]
         text = json.dumps([*of, dict(faults)] if faults else of)
         path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
         kept = _kept(path)
@@ -116,7 +118,8 @@ def _kept(path: Path) -> Array | None:
     try:
         if not path.exists():
             return np.load(older) if older.exists() else None
-        with np.load(path) as file:
+        # In memory: a reader that stumbles leaves a file open.
+        with np.load(BytesIO(read_bytes(path))) as file:
             return file["found"]
     except (ValueError, KeyError, EOFError, OSError, BadZipFile):
         return None

@@ -8,6 +8,7 @@ each effect. A chunk is whole or absent, and is made again where an effect has b
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -17,6 +18,7 @@ from zlib import error as zlib_error
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.documents import read_bytes
 from granulcal.files import beside
 from granulcal.loop.effects.library import LibraryEffect
 from granulcal.loop.pours.cube import from_cube
@@ -107,7 +109,8 @@ class ImageRows:
         if not path.exists():
             return None
         try:
-            with np.load(path) as file:
+            # In memory: a reader that stumbles leaves a file open.
+            with np.load(BytesIO(read_bytes(path))) as file:
                 found = {name: file[name] for name in file.files}
         except (ValueError, KeyError, EOFError, OSError, BadZipFile, zlib_error):
             # Damaged: its pours can be made again.
