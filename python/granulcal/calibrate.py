@@ -19,6 +19,7 @@ from granulcal.report import write_report
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
+    from granulcal.bayessim.check.misfit import Misfit
     from granulcal.bayessim.posterior.posterior import Posterior
 
 __all__ = ["Calibrated", "calibrate", "require_own_statistics", "require_same_scene"]
@@ -37,6 +38,7 @@ class Calibrated:
         pours: pours at the posterior's mode.
         prior_pours: pours at the prior's mean.
         report: the HTML page.
+        misfit: whether any parameters explain the recordings.
     """
 
     posterior: "Posterior"
@@ -44,6 +46,7 @@ class Calibrated:
     pours: list[Pour]
     prior_pours: list[Pour]
     report: Path
+    misfit: "Misfit"
 
 
 def require_same_scene(model: "BayesSim", scene: Scene) -> None:
@@ -120,6 +123,7 @@ def calibrate(
     formations = [recording.formation(**options) for recording in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
     posterior = model.posterior(observed)
+    misfit = model.misfit(observed)
     numbers = range(_FIRST_SEED, _FIRST_SEED + seeds)
     fitted = scene_at(data.scene, model.prior, posterior.mode())
     unfitted = scene_at(data.scene, model.prior, model.prior.mean())
@@ -136,7 +140,7 @@ def calibrate(
         drawn=drawn,
         data=data,
         calibration=model.calibration,
-        misfit=model.misfit(observed),
+        misfit=misfit,
         truth=truth,
         title=title,
         summary=summary,
@@ -149,6 +153,7 @@ def calibrate(
         pours=pours,
         prior_pours=prior_pours,
         report=page,
+        misfit=misfit,
     )
 
 

@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -101,7 +102,8 @@ def _run_told(options: argparse.Namespace) -> int:
 def _guarded(command: Callable[[], int]) -> int:
     """Runs a command; tells what was wrong in one line instead of a traceback."""
     try:
-        with _interruptible(), one_thread():
+        with _interruptible(), one_thread(), warnings.catch_warnings():
+            warnings.showwarning = _show
             return command()
     except KeyboardInterrupt:
         print("granulcal: stopped", file=sys.stderr)
@@ -109,13 +111,13 @@ def _guarded(command: Callable[[], int]) -> int:
     except BrokenPipeError:
         return DONE
     except ModuleNotFoundError as error:
-        print(f"granulcal: {error}; pip install 'granulcal[all]'", file=sys.stderr)
+        _tell(f"{error}; pip install 'granulcal[all]'")
         return FAILED
     except (ValueError, TypeError, FileNotFoundError, NotADirectoryError) as error:
-        print(f"granulcal: {error}", file=sys.stderr)
+        _tell(error)
         return BAD_INPUT
     except OSError as error:
-        print(f"granulcal: {error}", file=sys.stderr)
+        _tell(error)
         return FAILED
     except MemoryError:
         print("granulcal: the memory is full", file=sys.stderr)
@@ -124,11 +126,18 @@ def _guarded(command: Callable[[], int]) -> int:
         if os.environ.get(_TRACEBACK) == "1":
             raise
         text = f"{type(error).__name__}: {error}"
-        print(
-            f"granulcal: an error of its own, {text}; with {_TRACEBACK}=1 it says where",
-            file=sys.stderr,
-        )
+        _tell(f"an error of its own, {text}; with {_TRACEBACK}=1 it says where")
         return FAILED
+
+
+def _tell(what: object) -> None:
+    """Says what was wrong; names in a stranger's file steer no terminal and fill none."""
+    print(f"granulcal: {_native.readable(str(what))}", file=sys.stderr)
+
+
+def _show(message: Warning | str, *_: object) -> None:
+    """Shows a warning in the manner of a command line, without the line of code that gave it."""
+    print(f"warning: {_native.readable(str(message))}", file=sys.stderr)
 
 
 def console() -> int:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from granulcal.calibrate import Calibrated, calibrate
+from granulcal.files import write_toml
 from granulcal.measured.recording import Recording
 from granulcal.pours.camera import Camera
 from granulcal.pours.dataset import generate
@@ -59,7 +60,7 @@ def record(folder: Path, scene: Scene) -> Recording:
     )
     # A file of its own: the camera's is written anew by every run, unless somebody changed it.
     segmented = folder / "segmentation.toml"
-    segmented.write_text(toml.read_text(encoding="utf-8") + settings, encoding="utf-8")
+    write_toml(segmented, toml.read_text(encoding="utf-8") + settings)
     return Recording.open(image, camera=segmented)
 
 

@@ -4,6 +4,7 @@ __all__ = [
     "ExtrapolationError",
     "ModelFormatError",
     "ObservationError",
+    "OtherLawWarning",
     "PriorError",
     "TrainingDataError",
     "UnreachableRingError",
@@ -34,6 +35,10 @@ class UnverifiedModelWarning(UserWarning):
 
 class UnverifiedDataWarning(UserWarning):
     """A data set without hashes of its rows, as earlier versions wrote them."""
+
+
+class OtherLawWarning(UserWarning):
+    """Pours, or a model of them, by another contact law of the solver than today's."""
 
 
 class ExtrapolationError(ValueError):

@@ -13,7 +13,7 @@ from granulcal import _native
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["beside", "replace_text", "save_figure", "write_beside"]
+__all__ = ["beside", "replace_text", "save_figure", "write_beside", "write_toml"]
 
 _TRIES = 100
 
@@ -28,6 +28,20 @@ def write_beside(path: Path, text: str | bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     data = text.encode("utf-8") if isinstance(text, str) else text
     _native.write_file(path, path.suffix.removeprefix("."), data)
+
+
+def write_toml(path: Path, text: str) -> None:
+    """Writes a document that somebody may have changed since: another text is left as it is.
+
+    Raises:
+        ValueError: another text stands there.
+    """
+    if path.exists() and path.read_bytes() != text.encode("utf-8"):
+        raise ValueError(
+            f"{path} is left as it is: it is not what would be written there; choose another "
+            "folder, or move it away"
+        )
+    replace_text(path, text)
 
 
 def replace_text(path: Path, text: str) -> None:

@@ -8,6 +8,7 @@ __all__ = ["ProgressLine"]
 
 _WIDTH = 30
 _LOG_EVERY_S = 30.0
+_LEFT_OUT = ("unhealthy", "jammed", "without grains in view")
 
 
 class ProgressLine:
@@ -24,22 +25,23 @@ class ProgressLine:
         self._logged = self._started
         self._shown = ""
 
-    def __call__(self, total: int, resumed: int, made: int, unhealthy: int) -> None:
+    def __call__(self, total: int, resumed: int, made: int, *left_out: int) -> None:
         """Shows the counts.
 
         Args:
             total: pours wanted.
             resumed: pours found on disk.
             made: pours simulated since.
-            unhealthy: pours among them whose numbers cannot be used.
+            *left_out: pours that are unhealthy, jammed and out of view, as far as they are known.
         """
         now = time.monotonic()
         done = resumed + made
         text = f"{done}/{total} pours"
         if resumed:
             text += f" ({resumed} from disk)"
-        if unhealthy:
-            text += f", {unhealthy} unhealthy"
+        for count, word in zip(left_out, _LEFT_OUT, strict=False):
+            if count:
+                text += f", {count} {word}"
         if made and done < total:
             left = (total - done) * (now - self._started) / made
             text += f", {_duration(left)} left"

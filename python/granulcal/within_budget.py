@@ -7,6 +7,7 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,10 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
-from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, Text, read_json
+from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, Text, Whole, read_json
+from granulcal.engines.in_use import law_of_pours
 from granulcal.files import write_beside
 from granulcal.measured.recording import Recording
 from granulcal.pours.forward import scene_at
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour, simulate
 from granulcal.pours.statistics import NAMES, statistics
@@ -37,7 +40,10 @@ _POUR = Table(
     {"theta": ListOf(Number(), least=1), "status": Text(), "x": Maybe(ListOf(Number()))},
     {"cpu_s": Number()},
 )
-_SCHEMA = Table({"key": Text(), "pours": Mapping(_POUR)}, {"names": ListOf(Text()), "hash": Text()})
+_SCHEMA = Table(
+    {"key": Text(), "pours": Mapping(_POUR)},
+    {"names": ListOf(Text()), "hash": Text(), "law": Whole()},
+)
 # Seeds of pours of one run; data sets' are hashes, and reports' begin at 9000.
 _FIRST_SEED = 40_000_000
 # Longest time for which finished pours are in memory alone [s].
@@ -60,7 +66,7 @@ class KeptPours:
         engine: another simulator in place of ours.
 
     Raises:
-        ValueError: the file is that of another scene, prior or seed, or is damaged.
+        ValueError: the file is that of another scene, prior, seed or law, or is damaged.
     """
 
     def __init__(
@@ -86,6 +92,8 @@ class KeptPours:
         if look is not None:
             text += f"\n{', '.join(self.x_names)}"
         text += "" if engine is None else f"\n{engine.name}"
+        # Another simulator has another law, whatever it is.
+        self.law = law_of_pours() if engine is None else 0
         self.key = hashlib.sha256(text.encode()).hexdigest()
         self.rows: dict[str, dict] = self._read() if path.exists() else {}
 
@@ -111,6 +119,12 @@ class KeptPours:
                     self._write()
         kept = [self.rows[str(first + i)]["x"] for i in range(len(theta))]
         return np.array([[np.nan] * len(self.x_names) if x is None else x for x in kept], float)
+
+    def left_out(self, count: int) -> LeftOut:
+        """Returns how many of the first `count` pours that are kept cannot be used, by why."""
+        kept = [row for index, row in list(self.rows.items()) if int(index) < count]
+        usable = [row["x"] is not None and np.isfinite(row["x"]).all() for row in kept]
+        return LeftOut.of([row["status"] for row in kept], usable)
 
     def _is_kept(self, index: int, theta: Array) -> bool:
         row = self.rows.get(str(index))
@@ -142,13 +156,22 @@ class KeptPours:
         key, rows = document["key"], document["pours"]
         if document.get("hash") not in (None, _hash(rows)):
             raise ValueError(f"{self.path} is damaged: its pours are not those that were written")
+        if document.get("law") != self.law:
+            law = document.get("law")
+            found = "a law of before laws had numbers" if law is None else f"law {law}"
+            raise ValueError(
+                f"{self.path} has pours by {found} of the solver, today's is {self.law}: their "
+                "statistics must not be mixed; give another folder, or remove the file"
+            )
         if key != self.key:
             raise ValueError(f"{self.path} has the pours of another scene, prior or seed")
         return rows
 
     def _write(self) -> None:
-        document = {"key": self.key, "names": self.prior.names, "hash": _hash(self.rows)}
-        write_beside(self.path, json.dumps({**document, "pours": self.rows}))
+        document = {"key": self.key, "law": self.law, "names": self.prior.names}
+        write_beside(
+            self.path, json.dumps({**document, "hash": _hash(self.rows), "pours": self.rows})
+        )
 
 
 def _hash(rows: dict[str, dict]) -> str:
@@ -203,6 +226,7 @@ def calibrate_within(
         progress=poured,
         engine=engine,
     )
-    return infer_within_budget(
+    found = infer_within_budget(
         pours, prior, observed, budget=budget, seed=seed, x_names=NAMES, progress=progress
     )
+    return replace(found, left_out=pours.left_out(len(found.x)))

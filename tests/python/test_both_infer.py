@@ -151,3 +151,78 @@ def _statistics(model: BayesSim, recording: list[str]) -> np.ndarray:
 
 def _is_inside(model: BayesSim, recording: list[str]) -> bool:
     return model.misfit(_statistics(model, recording)).is_inside
+
+
+def test_report_and_calibrate_say_what_is_outside_too(model, small_scene, tmp_path, capfd):
+    folder, _ = model
+    data = tmp_path / "pours.parquet"
+    scene, prior = tmp_path / "scene.toml", tmp_path / "prior.toml"
+    made = BayesSim.load(folder)
+    scene.write_text(small_scene.to_toml())
+    prior.write_text(made.prior.to_toml())
+    gc.generate(small_scene, made.prior, 3, seed=5, out=tmp_path / "few", progress=False).save(data)
+    # A room, as above, and a pile of three times as many grains, which could be of the scene.
+    room = _recorded(tmp_path / "room", height=2.0, field_width=2.0, pixels=160, seed=0)
+    report = ["report", str(folder), *room, "--data", str(data), "-o", str(tmp_path / "r.html")]
+    code = cli.main(report)
+    out = capfd.readouterr().out
+    assert code == 3 and "OUTSIDE THE MODEL" in out and "height" in out
+    assert not (tmp_path / "r.html").exists()
+    found = said(capfd, 3, [*report, "--json"])
+    assert found["inside_model"]["is_inside"] is False and found["parameters"] is None
+    run = ["calibrate", str(scene), str(prior), *room, "-o", str(tmp_path / "run"), "--json"]
+    found = said(capfd, 3, run)
+    assert found["inside_model"]["is_inside"] is False and found["parameters"] is None
+    assert any("height" in reason for reason in found["inside_model"]["impossible"])
+    # Nothing was poured for it.
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_pile_that_no_material_explains_is_outside_for_report_and_calibrate(
+    model, small_scene, small_data, tmp_path, capfd
+):
+    folder, made = model
+    many = small_scene.with_({"grains.count": 170})
+    pour = gc.simulate(
+        many, gc.Material(sliding_friction=0.9, rolling_friction=0.4, restitution=0.1), seed=3
+    )
+    camera = gc.Camera.overhead(
+        height=small_scene.get("camera.height"),
+        field_width=small_scene.get("camera.field_width"),
+        pixels=int(small_scene.get("camera.pixels")),
+    )
+    image, toml = camera.record(pour.positions, pour.radii, tmp_path / "pile")
+    recording = [str(image), "--camera", str(toml)]
+    assert not _is_inside(made, recording)
+    data = tmp_path / "pours.parquet"
+    small_data.save(data)
+    page = tmp_path / "r.html"
+    words = [
+        "report",
+        str(folder),
+        *recording,
+        "--data",
+        str(data),
+        "--seeds",
+        "1",
+        "-o",
+        str(page),
+    ]
+    assert cli.main(words) == 3
+    assert "OUTSIDE THE MODEL" in capfd.readouterr().out and page.exists()
+    scene, prior = tmp_path / "scene.toml", tmp_path / "prior.toml"
+    scene.write_text(small_scene.to_toml())
+    prior.write_text(made.prior.to_toml())
+    run = ["calibrate", str(scene), str(prior), *recording, "--budget", "60", "--json"]
+    found = said(capfd, 3, [*run, "-o", str(tmp_path / "run")])
+    assert found["inside_model"]["is_inside"] is False and found["parameters"] is not None
+    assert set(found["left_out"]) == {"unhealthy", "jammed", "out_of_view", "unseen"}
+
+
+def _recorded(folder, *, height: float, field_width: float, pixels: int, seed: int) -> list[str]:
+    """Boxes of half a metre on a floor, as a recording."""
+    camera = gc.Camera.overhead(height=height, field_width=field_width, pixels=pixels)
+    generator = np.random.default_rng(seed)
+    boxes = np.c_[generator.uniform(-0.6, 0.6, (12, 2)), np.full(12, 0.25)]
+    image, toml = camera.record(boxes, np.full(12, 0.25), folder)
+    return [str(image), "--camera", str(toml)]

@@ -270,7 +270,7 @@ def test_an_archive_of_something_else_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "archive"
     Archive(folder, plan).fill(threads=1, say=lambda _: None, progress=False)
     pours = Archive(folder, plan).pours()
-    assert len(pours.x) == 8 and pours.left_out == 0
+    assert len(pours.x) == 8 and pours.left_out.total == 0
     assert np.all(pours.psi[:4] == 0) and np.all(np.abs(pours.psi[4:]) <= 1)
     other = ArchivePlan(**{**plan.__dict__, "scene": scene.with_({"grains.count": 80})})
     # Conditions within its range are its own; beyond it they are another archive's.

@@ -52,7 +52,7 @@ def test_a_batch_can_be_extended_and_cut(small_scene, tmp_path):
         small_scene, prior, 9, out=tmp_path / "d", progress=lambda *c: counts.append(c)
     )
     assert np.array_equal(more.x[:5], first.x)
-    assert counts[-1] == (9, 5, 4, 0)
+    assert counts[-1] == (9, 5, 4, 0, 0, 0)
     assert len(batch(5)) == 5
     assert np.array_equal(batch(9, threads=1).x, more.x)
     with pytest.raises(ValueError, match="unless resumed"):

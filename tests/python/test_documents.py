@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import granulcal as gc
+from granulcal.cli import main
 from granulcal.documents import (
     Flag,
     ListOf,
@@ -21,6 +22,7 @@ from granulcal.documents import (
 )
 from granulcal.errors import ObservationError
 from granulcal.loop.task import Task
+from granulcal.starter.models import find_model
 
 SCHEMA = Table(
     {"name": Text(("a", "b")), "at": Mapping(Number(0, 1))},
@@ -127,3 +129,43 @@ def test_every_document_is_read_through_one_place():
         text = path.read_text(encoding="utf-8")
         if path.name not in allowed and "experiments" not in path.parts:
             assert "json.loads(" not in text and "tomllib.loads(" not in text, path
+
+
+def test_marks_and_lenses_that_are_damaged_are_no_traceback(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("GRANULCAL_CACHE", str(tmp_path))
+    folder = tmp_path / "models" / "funnel"
+    folder.mkdir(parents=True)
+    for text in ("[]", "{", "0", '"fingerprint"', '{"fingerprint": 3}', "\x00"):
+        (folder / "made.json").write_text(text)
+        assert find_model("funnel") is None
+    place = tmp_path / "start"
+    assert main(["init", str(place), "--scene", "drop", "--set", "grains.count=12"]) == 0
+    camera = place / "camera.toml"
+    whole = camera.read_text()
+    for text in ("", "fx = 1\n", whole.replace("fx =", 'fx = "a" #'), "[["):
+        camera.write_text(text)
+        assert main(["sample", str(place)]) == 2
+        assert "camera.toml" in capsys.readouterr().err
+
+
+def test_a_task_tells_nothing_of_a_file_that_is_none_of_its_own(tmp_path, capsys):
+    secret = tmp_path / "passwd"
+    secret.write_text("root:x:0:0:secret:/root:/bin/sh\n")
+    (tmp_path / "scene.toml").write_text(gc.Scene.drop(0.01, count=12).to_toml())
+    (tmp_path / "prior.toml").write_text(gc.Prior.default().to_toml())
+    for i in range(3):
+        (tmp_path / f"{i}.png").write_bytes(b"\x89PNG")
+    task = tmp_path / "loop.toml"
+    for old in ('"scene.toml"', '"prior.toml"'):
+        task.write_text(TASK.replace(old, '"passwd"'))
+        assert main(["close-loop", str(task), "-o", str(tmp_path / "loop")]) == 2
+        error = capsys.readouterr().err
+        assert "passwd" in error and "secret" not in error, error
+
+
+def test_messages_steer_no_terminal_and_fill_none(tmp_path, capsys):
+    name = tmp_path / "\x1b[2Jscene.toml"
+    name.write_text("x = " + "[" * 9000)
+    assert main(["calibrate", str(name), "default", str(name), "-o", str(tmp_path / "o")]) == 2
+    error = capsys.readouterr().err
+    assert "\x1b" not in error and len(error) < 5000, error[:300]

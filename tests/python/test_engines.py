@@ -7,7 +7,7 @@ import pytest
 import granulcal as gc
 from granulcal.cli import main
 from granulcal.engines import CallableEngine, CommandEngine, ExportedEngine, engine_named, installed
-from granulcal.engines.files import read_grains
+from granulcal.engines.files import read_array, read_grains
 
 # A simulator of one's own in a dozen lines: a pile that is the steeper, the rougher the grains are.
 SIMULATOR = """\
@@ -216,3 +216,44 @@ def test_a_loop_does_not_look_for_what_the_engine_cannot_be_told(
     with pouring_with(ExportedEngine("mujoco", python=sys.executable)):
         assert [effect.name for effect in _told(task).library] == ["diameter", "camera.scale"]
     assert "cohesion.capillary is not looked for" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "name", ["archive.npz", "objects.npy", "cut.npy", "text.npy", "folder.npy"]
+)
+def test_what_is_no_array_of_numbers_is_refused_by_name(
+    tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / name
+    if name == "archive.npz":
+        np.savez(path, grains=np.zeros((3, 3)))
+    elif name == "objects.npy":
+        np.save(path, np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    elif name == "cut.npy":
+        np.save(path, np.zeros((30, 3)))
+        path.write_bytes(path.read_bytes()[:200])
+    elif name == "text.npy":
+        path.write_text("0.1, 0.2")
+    else:
+        path.mkdir()
+    with pytest.raises(ValueError, match=name):
+        read_array(path)
+    words = ["export", "bed", "drop", "--to", "csv", "--positions", str(path)]
+    assert main([*words, "-o", str(tmp_path / "bed.csv")]) == 2
+    assert name in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("grains.csv", "x,y,z\n1,2,three\n"),
+        ("grains.csv", "x,y\n1,2\n"),
+        ("grains.dump", "no dump"),
+        ("grains.dump", "ITEM: ATOMS id x y z radius\n1 2 3\n"),
+        ("grains.npy", "no array"),
+    ],
+)
+def test_files_of_an_engine_are_refused_by_name(tmp_path: Path, name: str, text: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ValueError, match=name):
+        read_grains(tmp_path, 0.002)

@@ -168,7 +168,7 @@ def test_one_pour_serves_all_effects_of_the_image(tmp_path: Path) -> None:
     one.fill(threads=1, say=lambda _: None, progress=False)
     first = one.pours()
     plain = ~first.psi.any(axis=1)
-    assert plain.sum() + first.left_out == 24
+    assert plain.sum() + first.left_out.total == 24
     strengths = first.psi[~plain, 0]
     assert 0 < len(strengths) <= 6 and np.abs(strengths).max() <= 1
     # A row with the offset is a plain row, its heights moved.

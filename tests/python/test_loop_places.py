@@ -106,7 +106,7 @@ def test_an_archive_at_the_conditions_alone(tmp_path: Path) -> None:
         there = gc.Dataset.load(tmp_path / "archive" / f"base-at-{number}").scene
         assert all(there.get(path) == value for path, value in at.items())
     pours = archive.pours()
-    assert len(pours.x) + pours.left_out == 6 + 8 + 8
+    assert len(pours.x) + pours.left_out.total == 6 + 8 + 8
     # Base pours first, those of both places.
     assert np.all(pours.psi[:6] == 0)
     assert sorted(pours.condition[:6, 0].tolist()) == [0, 0, 0, 1, 1, 1]
@@ -240,7 +240,7 @@ def test_an_archive_takes_further_effects_and_keeps_its_pours(tmp_path: Path) ->
     both.fill(threads=1, say=lambda _: None, progress=False)
     after = both.pours()
     # A pour for each of four strengths at each of two places.
-    assert len(after.x) + after.left_out == len(before.x) + before.left_out + 8
+    assert len(after.x) + after.left_out.total == len(before.x) + before.left_out.total + 8
     assert np.array_equal(after.x[: len(before.x)], before.x)
     # The first still has its own; another order has other seeds, and is refused.
     assert np.array_equal(archive(tilt).pours().x, before.x)

@@ -2,16 +2,19 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from granulcal.cli import main
 from granulcal.errors import ObservationError
 from granulcal.loop import Design, Effect
 from granulcal.loop.check.prior_pours import Look, hypercube
 from granulcal.loop.check.standing import Moved, overturned, stand
 from granulcal.loop.check.trivial import LINE, NEAREST, RESIDUAL, Group, line_weights, trivial_rows
 from granulcal.loop.effects.definitions import Definition, check_definitions, definition_inputs
+from granulcal.loop.report.models import Maker, Models
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.test.distance import compare
 from granulcal.loop.test.thresholds import Thresholds
@@ -181,3 +184,42 @@ def test_random_draws_fill_the_prior_and_the_best_come_first() -> None:
     starts = seen.starts(Design(("a",), (), (Effect("drag"), Effect("tilt"))))
     assert [start.psi.tolist() for start in starts] == [[0.0, 0.3], [0.0, 0.9]]
     assert starts[0].v == pytest.approx([0.0]) and starts[1].v == pytest.approx([-0.8416], abs=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["NONE", "RESIDUAL", "EFFECT", "SET", "EFFECTS", "UNEXPLAINED"])
+def test_a_wrong_surrogate_stands_beside_every_word_and_in_the_exit_code(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    named = ("drag",) if kind in ("EFFECT", "SET", "EFFECTS") else ()
+    found = stand(Verdict(kind, named, named, 0.001, "why"), RULES, confirmed=0.001)
+    assert found.verdict.kind == "UNCONFIRMED" and not found.stands
+    assert f"the fits say {kind}" in found.verdict.reason
+    # The exit codes of close-loop, of the studies that close a loop and of predict.
+    closed = SimpleNamespace(standing=found)
+    monkeypatch.setattr("granulcal.loop.close.close_loop", lambda *_, **__: closed)
+    monkeypatch.setattr("granulcal.loop.report.folder.write_report", lambda *_, **__: None)
+    monkeypatch.setattr("granulcal.loop.task.Task.load", lambda _: None)
+    task = tmp_path / "loop.toml"
+    task.write_text("")
+    assert main(["close-loop", str(task), "-o", str(tmp_path / "loop")]) == 3
+    monkeypatch.setattr("granulcal.experiments.loop_column.reproduce", lambda *_: found.stands)
+    assert main(["reproduce", "loop_column", "--out", str(tmp_path), "--data", str(tmp_path)]) == 3
+    models = Models(
+        scene=Scene.drop(0.02, count=12),
+        verdict={"kind": found.verdict.kind, "named": []},
+        paths=("start.height",),
+        inputs=(("start.height", 0.01, 0.02),),
+        names=("max_z",),
+        makers={name: (Maker({}, {}, {}),) * 2 for name in ("base", "named")},
+        columns=(),
+        transforms=(),
+        correction=None,
+        known=np.array([[0.0], [1.0]]),
+        means=np.array([[0.01], [0.02]]),
+        scatter=np.array([[0.001], [0.001]]),
+        pours=np.array([2.0, 2.0]),
+    )
+    models.write(tmp_path)
+    words = ["predict", str(tmp_path), "--at", "start.height=0.015", "--model", "line"]
+    assert main(words) == 3
+    assert "UNCONFIRMED" in capsys.readouterr().err

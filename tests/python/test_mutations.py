@@ -12,8 +12,12 @@ from mutations import mutations
 import granulcal as gc
 from granulcal import cli
 from granulcal.design.posterior_file import PosteriorDraws
+from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.effects.tolerance import Tolerances
+from granulcal.loop.report.models import Maker, Models
+from granulcal.loop.surrogate.transform import Transform
 from granulcal.loop.task import Task
+from granulcal.pours.statistics import NAMES
 from granulcal.within_budget import KeptPours
 
 REPOSITORY = Path(__file__).parents[2]
@@ -75,6 +79,8 @@ class Shelf:
         )
         (folder / "meshed.toml").write_text(SCENE.to_toml() + walls)
         assert self.run("simulate", "scene.toml", "--checkpoint", "state.ckpt") in (0, 3)
+        (folder / "closed").mkdir()
+        closed_loop().write(folder / "closed")
 
     def at(self, name: str) -> Path:
         return self.folder / name
@@ -85,6 +91,32 @@ class Shelf:
             str(self.at(w)) if self.at(w.split("/")[0]).exists() or "." in w else w for w in words
         ]
         return cli.main(named)
+
+
+def closed_loop() -> Models:
+    """What `predict` reads: two conditions, a base model, one that is named, a correction."""
+    maker = Maker({"material.restitution": 0.4}, {"start.height": 1e-3}, {})
+    means = np.linspace(0.01, 0.02, 2 * len(NAMES)).reshape(2, -1)
+    return Models(
+        scene=SCENE,
+        verdict={"kind": "EFFECT", "named": ["drag"]},
+        paths=("start.height",),
+        inputs=(("start.height", 0.01, 0.02),),
+        names=tuple(NAMES),
+        makers={"base": (maker, maker), "named": (maker, maker)},
+        columns=(0, 3),
+        transforms=(
+            Transform("identity", 0.0, 1.0, 0.0, 1.0),
+            Transform("log", 0.1, 1.0, 0.0, 1.0),
+        ),
+        correction=Discrepancy(
+            np.array([[0.0], [1.0]]), np.array([0.1, 0.2]), 0.1 * np.arange(4.0), np.eye(4)
+        ),
+        known=np.array([[0.0], [1.0]]),
+        means=means,
+        scatter=0.1 * means,
+        pours=np.array([2.0, 3.0]),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -146,6 +178,13 @@ KINDS: dict[str, tuple[str, bool, Callable[[Path], object] | None, list[list[str
         "loop.toml", True, Task.load,
         [["close-loop", "X", "-o", "loop.out", "--budget", "1"]],
     ),
+    "models": (
+        "closed/models.json", True, lambda path: Models.load(path.parent),
+        [
+            ["predict", "closed", "--at", "start.height=0.015", "--model", "line"],
+            ["predict", "closed", "--at", "start.height=0.015", "--corrected", "--pours", "2"],
+        ],
+    ),
     "mesh": ("tray.stl", True, None, [["inspect", "meshed.toml"]]),
     "trajectory": ("way.csv", True, None, [["inspect", "meshed.toml"]]),
 }  # fmt: skip
@@ -154,7 +193,7 @@ KINDS: dict[str, tuple[str, bool, Callable[[Path], object] | None, list[list[str
 def try_kind(shelf: Shelf, kind: str, count: int, capfd) -> None:
     name, is_text, load, lines = KINDS[kind]
     whole = shelf.at(name).read_bytes()
-    in_place = kind in ("mesh", "trajectory", "task")
+    in_place = kind in ("mesh", "trajectory", "task", "models")
     target = shelf.at(name) if in_place else shelf.at(f"X{Path(name).suffix}")
     try:
         for i, data in enumerate(mutations(whole, count, seed=7, is_text=is_text)):

@@ -23,6 +23,9 @@ pub struct Document {
     pub x_names: Vec<String>,
     pub config: Config,
     pub scene_toml: Option<String>,
+    /// Absent in models of before laws had numbers.
+    #[serde(default)]
+    pub law: Option<u32>,
     pub has_network: bool,
     average: Form,
     emulator_weight: f64,

@@ -33,6 +33,9 @@ pub struct Model {
     pub x_names: Vec<String>,
     /// Scene of the training, TOML.
     pub scene_toml: Option<String>,
+    /// Law of the solver that the pours of the training follow, 0 for those of another simulator; `None` in models of
+    /// before laws had numbers, and in those of no pours.
+    pub law: Option<u32>,
     /// Whether the model passed its own check; `None` if there was none.
     pub is_calibrated: Option<bool>,
     /// Whether its files say what they hash to, and do; those of before there were hashes do not.
@@ -87,6 +90,7 @@ impl Model {
             prior,
             x_names: document.x_names,
             scene_toml: document.scene_toml,
+            law: document.law,
             is_calibrated: document.is_calibrated,
             is_verified,
         })

@@ -1,8 +1,8 @@
 //! What every command gets: how loud to be, and whether the user wants to stop.
 
-use std::borrow::Cow;
 use std::io::{self, IsTerminal, Write};
 
+use granulcal_dataset::{plain, readable};
 use serde::Serialize;
 use tracing_subscriber::filter::LevelFilter;
 
@@ -41,19 +41,9 @@ impl Context {
     }
 }
 
-/// A text in which nothing steers a terminal: names in a stranger's file may hold escapes.
-fn plain(text: &str) -> Cow<'_, str> {
-    let steers = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
-    if !text.contains(steers) {
-        return Cow::Borrowed(text);
-    }
-    let told = |c: char| if steers(c) { c.escape_default().to_string() } else { c.to_string() };
-    Cow::Owned(text.chars().map(told).collect())
-}
-
-/// Prints a line to stderr. If even that is closed there is no one left to tell.
+/// Prints a line to stderr, shortened where it quotes what is endless. If even that is closed there is no one left to tell.
 pub fn note(line: &str) {
-    let _ = writeln!(io::stderr(), "{}", plain(line));
+    let _ = writeln!(io::stderr(), "{}", readable(line));
 }
 
 /// Prints a line of results.
@@ -72,15 +62,4 @@ pub fn print_line(line: &str) -> anyhow::Result<()> {
 /// As [`print_line`].
 pub fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
     print_line(&serde_json::to_string_pretty(value)?)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_text_steers_the_terminal() {
-        assert_eq!(plain("a\tb\n"), "a\tb\n");
-        assert_eq!(plain("\u{1b}[2Jtopic\u{7}"), "\\u{1b}[2Jtopic\\u{7}");
-    }
 }

@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::form::marked;
+use crate::readable::toml_error;
 use crate::{DatasetError, Form, files};
 
 /// A depth camera as a file states it.
@@ -92,11 +93,8 @@ impl CameraFile {
     /// [`DatasetError::Toml`], or [`DatasetError::Recording`] and [`DatasetError::Content`] for
     /// numbers that no camera has and for a lens of which a part is missing.
     pub fn parse(path: &Path, text: &str) -> Result<Self, DatasetError> {
-        let file: CameraToml = toml::from_str(text).map_err(|source| DatasetError::Toml {
-            path: path.to_owned(),
-            what: "camera",
-            source: Box::new(source),
-        })?;
+        let file: CameraToml = toml::from_str(text)
+            .map_err(|source| toml_error(path, "camera", text, Box::new(source)))?;
         if let Some(unit) = file.depth_unit
             && !(unit > 0.0 && unit.is_finite())
         {

@@ -22,7 +22,7 @@ use granulcal_dem::{Pour, Simulation, Status};
 use granulcal_features::stats::DIAGNOSTIC_COUNT;
 
 use crate::engine::{Described, Engine, Outcome, describe, foreign_pour};
-use crate::header::Header;
+use crate::header::{FOREIGN_LAW, Header};
 use crate::manifest;
 use crate::observe::observe;
 use crate::observer::Observer;
@@ -86,6 +86,7 @@ pub fn generate_with(
     let mut header = Header::new(scene, prior, options.seed)?;
     if let Some(engine) = &engine {
         header.version = engine.version();
+        header.law = Some(FOREIGN_LAW);
     }
     let threads = options.threads.min(most_threads());
     Room::of_batch(scene, options.rows, threads, options.chunk).require(Some(out))?;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use granulcal_dem::LAW;
 use granulcal_scene::{Prior, Scene, SceneError};
 
 use crate::{DatasetError, ObservedStatistic, observed_statistics, scene_file};
@@ -9,7 +10,10 @@ use crate::{DatasetError, ObservedStatistic, observed_statistics, scene_file};
 /// The version of granulcal that writes.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Scene, prior, version and seed: together they determine every row.
+/// The law of rows that another simulator made.
+pub(crate) const FOREIGN_LAW: u32 = 0;
+
+/// Scene, prior, law, version and seed: together they determine every row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
     /// The scene before the prior's parameters are set.
@@ -18,6 +22,9 @@ pub struct Header {
     pub prior: Prior,
     /// The version of granulcal that wrote the rows.
     pub version: String,
+    /// The number of the solver's law that the rows follow, 0 for pours of another simulator; `None` for rows of before
+    /// the law had a number.
+    pub law: Option<u32>,
     /// The seed of the data set.
     pub seed: u64,
     pub(crate) scene_toml: String,
@@ -36,6 +43,7 @@ impl Header {
             scene: scene.clone(),
             prior: prior.clone(),
             version: VERSION.to_owned(),
+            law: Some(LAW),
             seed,
             scene_toml: scene.to_toml().map_err(|e| DatasetError::Simulation(e.into()))?,
             prior_toml: prior.to_toml().map_err(DatasetError::Prior)?,
@@ -47,12 +55,24 @@ impl Header {
         observed_statistics(&self.scene)
     }
 
+    /// What a user of the rows must know of the law that they follow, unless it is today's or another simulator's.
+    pub fn other_law(&self) -> Option<String> {
+        match self.law {
+            Some(LAW | FOREIGN_LAW) => None,
+            law => Some(format!(
+                "made by {}, which is not today's {LAW}: its pours are those of another simulator",
+                law_text(law)
+            )),
+        }
+    }
+
     /// The header that stands in the file at `path`.
     pub(crate) fn parse(
         path: &Path,
         scene_toml: &str,
         prior_toml: &str,
         version: String,
+        law: Option<u32>,
         seed: u64,
     ) -> Result<Self, DatasetError> {
         let wrong = |source| DatasetError::Scene { path: path.to_owned(), source };
@@ -72,6 +92,7 @@ impl Header {
                 }
             })?,
             version,
+            law,
             seed,
             scene_toml: scene_toml.to_owned(),
             prior_toml: prior_toml.to_owned(),
@@ -99,11 +120,23 @@ impl Header {
         if self.seed != given.seed {
             return differs("the seed".to_owned(), self.seed.to_string(), given.seed.to_string());
         }
+        if self.law != given.law {
+            let what = "the law of the solver".to_owned();
+            return differs(what, law_text(self.law), law_text(given.law));
+        }
         if self.version != given.version {
             let what = "the version of granulcal".to_owned();
             return differs(what, self.version.clone(), given.version.clone());
         }
         Ok(())
+    }
+}
+
+fn law_text(law: Option<u32>) -> String {
+    match law {
+        None => "one of before laws had numbers".to_owned(),
+        Some(FOREIGN_LAW) => "another simulator's".to_owned(),
+        Some(law) => format!("law {law}"),
     }
 }
 
@@ -130,7 +163,20 @@ mod tests {
         assert!(text.contains("scene.material.restitution is 0.5, but 0.3 is given"), "{text}");
         let text = message(Header::new(&scene, &prior, 2).unwrap());
         assert!(text.contains("the seed is 1, but 2 is given"), "{text}");
+        let text = message(Header { law: None, ..header.clone() });
+        assert!(text.contains("the law of the solver is law"), "{text}");
+        assert!(text.contains("one of before laws had numbers is given"), "{text}");
         let text = message(Header { version: "9.9.9".to_owned(), ..header.clone() });
         assert!(text.contains("9.9.9"), "{text}");
+    }
+
+    #[test]
+    fn rows_of_another_law_are_told() {
+        let header = Header::new(&Scene::drop(0.1), &Prior::default(), 1).unwrap();
+        let told = |law| Header { law, ..header.clone() }.other_law();
+        assert_eq!(told(Some(LAW)), None);
+        assert_eq!(told(Some(FOREIGN_LAW)), None);
+        assert!(told(Some(LAW - 1)).is_some_and(|text| text.contains("made by law 1")));
+        assert!(told(None).is_some_and(|text| text.contains("before laws had numbers")));
     }
 }

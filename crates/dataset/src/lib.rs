@@ -51,6 +51,7 @@ mod pictures;
 mod plausible;
 pub mod png;
 mod random;
+mod readable;
 mod recording;
 mod room;
 mod row;
@@ -82,6 +83,7 @@ pub use observe::{Observation, TooFewGrains, View, look, look_from, observe, ove
 pub use observer::{Observed, ObservedStatistic, Observer, Series, observed_statistics};
 pub use pictures::{Pictures, write_mask, write_pictures};
 pub use plausible::Limits;
+pub use readable::{plain, readable};
 pub use recording::{FRAMES, Folder, Frame, ReadOptions, Recording, Source, measured_data};
 pub use room::Room;
 pub use row::{Row, RowStatus};

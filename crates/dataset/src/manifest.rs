@@ -19,6 +19,8 @@ const FORMAT: u64 = 1;
 struct Contents {
     format: u64,
     version: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    law: Option<u32>,
     seed: u64,
     chunk: u64,
     scene: String,
@@ -51,8 +53,8 @@ impl Manifest {
         if contents.chunk == 0 {
             return refuse("chunk", 0, "at least 1");
         }
-        let Contents { version, seed, chunk, scene, prior, .. } = contents;
-        let header = Header::parse(&path, &scene, &prior, version, seed)?;
+        let Contents { version, law, seed, chunk, scene, prior, .. } = contents;
+        let header = Header::parse(&path, &scene, &prior, version, law, seed)?;
         Ok(Some(Self { header, chunk }))
     }
 
@@ -61,6 +63,7 @@ impl Manifest {
         let contents = Contents {
             format: FORMAT,
             version: self.header.version.clone(),
+            law: self.header.law,
             seed: self.header.seed,
             chunk: self.chunk,
             scene: self.header.scene_toml.clone(),

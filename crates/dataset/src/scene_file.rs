@@ -5,16 +5,21 @@ use std::sync::Arc;
 
 use granulcal_scene::{Motion, Prior, Scene, SceneError};
 
+use crate::readable::toml_error;
 use crate::{DatasetError, files, mesh_file, trajectory_file};
 
 /// Reads a scene with the meshes and trajectories that it names; their paths are from its folder.
 ///
 /// # Errors
-/// [`DatasetError::Io`] for a file that cannot be read, [`DatasetError::Scene`] for one that is no scene,
+/// [`DatasetError::Io`] for a file that cannot be read, [`DatasetError::Toml`] or [`DatasetError::Scene`] for one that is no scene,
 /// [`DatasetError::Content`] for a mesh or a trajectory that is none, or a mesh that is not the one it was.
 pub fn load_scene(path: &Path) -> Result<Scene, DatasetError> {
     let wrong = |source| DatasetError::Scene { path: path.to_owned(), source };
-    let mut scene = Scene::parse(&files::read_text(path)?).map_err(wrong)?;
+    let text = files::read_text(path)?;
+    let mut scene = Scene::parse(&text).map_err(|error| match error {
+        SceneError::Toml(source) => toml_error(path, "scene", &text, source),
+        other => wrong(other),
+    })?;
     fill(&mut scene, path.parent().unwrap_or(Path::new("")))?;
     scene.check().map_err(wrong)?;
     Ok(scene)
@@ -64,10 +69,9 @@ pub(crate) fn fill(scene: &mut Scene, folder: &Path) -> Result<(), DatasetError>
 /// [`DatasetError::Io`] for a file that cannot be read, [`DatasetError::Toml`] for one that is no
 /// TOML of a prior, [`DatasetError::Prior`] for a parameter that cannot be.
 pub fn load_prior(path: &Path) -> Result<Prior, DatasetError> {
-    Prior::from_toml(&files::read_text(path)?).map_err(|error| match error {
-        SceneError::PriorToml(source) => {
-            DatasetError::Toml { path: path.to_owned(), what: "prior", source }
-        }
+    let text = files::read_text(path)?;
+    Prior::from_toml(&text).map_err(|error| match error {
+        SceneError::PriorToml(source) => toml_error(path, "prior", &text, source),
         other => DatasetError::Prior(other),
     })
 }

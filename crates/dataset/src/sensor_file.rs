@@ -5,6 +5,7 @@ use std::path::Path;
 use granulcal_scene::DepthSensor;
 use serde::{Deserialize, Serialize};
 
+use crate::readable::toml_error;
 use crate::{DatasetError, Form, files};
 
 /// The file that `fit-sensor` writes: the tables that belong under a scene's camera.
@@ -38,11 +39,8 @@ pub fn save_sensor(path: &Path, sensor: &DepthSensor) -> Result<(), DatasetError
 /// sensor has.
 pub fn load_sensor(path: &Path) -> Result<DepthSensor, DatasetError> {
     let text = files::read_text(path)?;
-    let file: SensorToml = toml::from_str(&text).map_err(|source| DatasetError::Toml {
-        path: path.to_owned(),
-        what: "sensor",
-        source: Box::new(source),
-    })?;
+    let file: SensorToml = toml::from_str(&text)
+        .map_err(|source| toml_error(path, "sensor", &text, Box::new(source)))?;
     let sensor = file.camera.sensor;
     sensor
         .check("camera.sensor")

@@ -28,6 +28,7 @@ use columns::{Access, Column, columns};
 const SCENE_KEY: &str = "granulcal.scene";
 const PRIOR_KEY: &str = "granulcal.prior";
 const VERSION_KEY: &str = "granulcal.version";
+const LAW_KEY: &str = "granulcal.law";
 const SEED_KEY: &str = "granulcal.seed";
 const HASH_KEY: &str = "granulcal.hash";
 /// Bytes that one byte of a packed column may become: a column of one value packs well.
@@ -64,6 +65,10 @@ fn hash(header: &Header, rows: &[Row], columns: &[Column]) -> String {
         take(text.as_bytes());
     }
     take(&header.seed.to_le_bytes());
+    // Files of before laws had numbers keep their hash.
+    if let Some(law) = header.law {
+        take(&law.to_le_bytes());
+    }
     take(&(rows.len() as u64).to_le_bytes());
     for column in columns {
         take(column.name.as_bytes());
@@ -86,6 +91,7 @@ fn hash(header: &Header, rows: &[Row], columns: &[Column]) -> String {
 fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, ParquetError> {
     let fields = columns.iter().map(|c| c.schema().map(Arc::new)).collect::<Result<Vec<_>, _>>()?;
     let schema = Arc::new(Type::group_type_builder("granulcal").with_fields(fields).build()?);
+    let law = header.law.map(|law| (LAW_KEY, law.to_string()));
     let metadata = [
         (SCENE_KEY, header.scene_toml.clone()),
         (PRIOR_KEY, header.prior_toml.clone()),
@@ -93,7 +99,8 @@ fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, 
         (SEED_KEY, header.seed.to_string()),
         (HASH_KEY, hash(header, rows, columns)),
     ];
-    let metadata = metadata.into_iter().map(|(key, value)| KeyValue::new(key.to_owned(), value));
+    let metadata =
+        metadata.into_iter().chain(law).map(|(key, value)| KeyValue::new(key.to_owned(), value));
     let properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_created_by(format!("granulcal {}", header.version))
@@ -265,12 +272,19 @@ fn read_header(
             DatasetError::content(path, what, "none", "given, as granulcal-cli generate writes it")
         })
     };
+    let wrong = |key: &str, found: &str| {
+        DatasetError::content(
+            path,
+            format!("metadata {key}"),
+            format!("{found:?}"),
+            "a whole number",
+        )
+    };
     let seed = value(SEED_KEY)?;
-    let seed = seed.parse().map_err(|_| {
-        let what = format!("metadata {SEED_KEY}");
-        DatasetError::content(path, what, format!("{seed:?}"), "a whole number")
-    })?;
-    Header::parse(path, &value(SCENE_KEY)?, &value(PRIOR_KEY)?, value(VERSION_KEY)?, seed)
+    let seed = seed.parse().map_err(|_| wrong(SEED_KEY, &seed))?;
+    let law = metadata(file, LAW_KEY);
+    let law = law.map(|law| law.parse().map_err(|_| wrong(LAW_KEY, &law))).transpose()?;
+    Header::parse(path, &value(SCENE_KEY)?, &value(PRIOR_KEY)?, value(VERSION_KEY)?, law, seed)
 }
 
 /// Refuses columns that lie outside of the file: the reader takes their places for granted, and panics.

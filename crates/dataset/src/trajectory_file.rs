@@ -4,9 +4,8 @@ use std::path::Path;
 
 use crate::{DatasetError, files};
 
-/// Characters of a line that cannot be read that a message shows: the file may be a stranger's, or none that was meant.
-const SHOWN: usize = 60;
-
+/// Numbers of a knot.
+const KNOT: usize = 8;
 /// The columns, in this order; a first line of names may be there or not.
 const COLUMNS: &str = "time, x, y, z, qx, qy, qz, qw";
 
@@ -14,7 +13,7 @@ const COLUMNS: &str = "time, x, y, z, qx, qy, qz, qw";
 ///
 /// # Errors
 /// [`DatasetError::Io`]; [`DatasetError::Content`] for a line that is not eight numbers.
-pub(crate) fn read(path: &Path) -> Result<Vec<[f64; 8]>, DatasetError> {
+pub(crate) fn read(path: &Path) -> Result<Vec<[f64; KNOT]>, DatasetError> {
     let text = files::read_text(path)?;
     let mut knots = Vec::new();
     for (number, line) in text.lines().enumerate() {
@@ -24,14 +23,23 @@ pub(crate) fn read(path: &Path) -> Result<Vec<[f64; 8]>, DatasetError> {
             continue;
         }
         let numbers: Result<Vec<f64>, _> = line.split(',').map(|n| n.trim().parse()).collect();
-        let knot = numbers.ok().and_then(|numbers| <[f64; 8]>::try_from(numbers).ok());
+        let knot = numbers.ok().and_then(|numbers| <[f64; KNOT]>::try_from(numbers).ok());
         knots.push(knot.ok_or_else(|| {
+            // Nothing of the line itself: a stranger's scene may name a file that is none of theirs.
             let what = format!("line {}", number + 1);
-            let shown: String = line.chars().take(SHOWN).collect();
-            DatasetError::content(path, what, format!("{shown:?}"), format!("{COLUMNS} as numbers"))
+            DatasetError::content(path, what, wrong(line), format!("{COLUMNS} as numbers"))
         })?);
     }
     Ok(knots)
+}
+
+/// Why a line is no knot.
+fn wrong(line: &str) -> String {
+    let columns: Vec<_> = line.split(',').map(str::trim).collect();
+    match columns.iter().position(|column| column.parse::<f64>().is_err()) {
+        Some(at) if columns.len() == KNOT => format!("no number in column {}", at + 1),
+        _ => format!("{} of {KNOT} columns", columns.len()),
+    }
 }
 
 #[cfg(test)]
@@ -53,5 +61,23 @@ mod tests {
         std::fs::write(&path, "0,0,0,0,0,0,0,1\n1,2,3\n").unwrap();
         let message = read(&path).unwrap_err().to_string();
         assert!(message.contains("line 2") && message.contains("qx"), "{message}");
+        assert!(message.contains("3 of 8 columns"), "{message}");
+    }
+
+    #[test]
+    fn a_message_has_nothing_of_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("passwords");
+        let said = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            read(&path).unwrap_err().to_string()
+        };
+        let message = said("root:x:0:0:root:/root:/bin/sh\nsecret:x:1:1:secret:/:/bin/sh\n");
+        assert!(message.contains("line 2") && !message.contains("secret"), "{message}");
+        let message = said("0,0,0,secret,0,0,0,1\n");
+        assert!(
+            message.contains("no number in column 4") && !message.contains("secret"),
+            "{message}"
+        );
     }
 }

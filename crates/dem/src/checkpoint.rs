@@ -8,11 +8,12 @@ use toml::Value;
 use xxhash_rust::xxh3::xxh3_128;
 
 use crate::error::DemError;
+use crate::law::LAW;
 
 /// What a checkpoint begins with.
 const MAGIC: &[u8] = b"granulcal checkpoint\n";
 /// The format of header and state. Between two versions that are released a change of either is a new format.
-pub(crate) const FORMAT: u32 = 5;
+pub(crate) const FORMAT: u32 = 6;
 /// The version of granulcal that writes and reads.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -44,6 +45,7 @@ pub struct CheckpointHeader {
 struct Written {
     // First in every format, so that every version can name the one that wrote.
     version: String,
+    law: u32,
     scene: String,
     seed: u64,
     settings: SolverSettings,
@@ -60,7 +62,7 @@ impl CheckpointHeader {
     ///
     /// # Errors
     /// [`DemError::NotACheckpoint`], [`DemError::CheckpointLength`], [`DemError::CheckpointDamaged`],
-    /// [`DemError::CheckpointFormat`] or [`DemError::CheckpointVersion`].
+    /// [`DemError::CheckpointFormat`], [`DemError::CheckpointVersion`] or [`DemError::CheckpointLaw`].
     pub fn read(bytes: &[u8]) -> Result<Self, DemError> {
         Ok(open(bytes)?.0)
     }
@@ -104,6 +106,7 @@ pub(crate) fn hash(bytes: &[u8]) -> u128 {
 pub(crate) fn seal(header: &CheckpointHeader, state: &[u8]) -> Vec<u8> {
     let written = Written {
         version: header.version.clone(),
+        law: LAW,
         // Numbers of a scene that a simulation was made of can be written.
         scene: header.scene.to_toml().expect("a checked scene as TOML"),
         seed: header.seed,
@@ -133,9 +136,12 @@ pub(crate) fn open(bytes: &[u8]) -> Result<(CheckpointHeader, &[u8]), DemError> 
     }
     let strange = |_| DemError::CheckpointState { what: "a header that cannot be read" };
     let (written, state): (Written, _) = postcard::take_from_bytes(body).map_err(strange)?;
-    let Written { version, scene, seed, settings, substep } = written;
+    let Written { version, law, scene, seed, settings, substep } = written;
     if version != VERSION {
         return Err(DemError::CheckpointVersion { got: version, allowed: VERSION });
+    }
+    if law != LAW {
+        return Err(DemError::CheckpointLaw { got: law, allowed: LAW });
     }
     let scene = Scene::parse(&scene)?;
     Ok((CheckpointHeader { version, scene, seed, settings, substep }, state))
@@ -208,6 +214,19 @@ mod tests {
         let error = simulation().resume(&sealed(bytes)).unwrap_err();
         assert!(matches!(&error, DemError::CheckpointVersion { got, .. } if got.starts_with('7')));
         assert!(error.to_string().contains(VERSION), "{error}");
+    }
+
+    #[test]
+    fn another_law_is_refused_and_named() {
+        let mut bytes = simulation().checkpoint();
+        // Behind the text of the version and its length; numbers below 128 take one byte.
+        let law = LEAST - HASH + 1 + VERSION.len();
+        assert_eq!(u32::from(bytes[law]), LAW);
+        bytes[law] = 1;
+        let error = simulation().resume(&sealed(bytes)).unwrap_err();
+        assert!(matches!(error, DemError::CheckpointLaw { got: 1, allowed: LAW }), "{error}");
+        let said = error.to_string();
+        assert!(said.contains("law 1") && said.contains(&format!("law {LAW}")), "{said}");
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use granulcal_scene::SceneError;
 
+use granulcal_numbers::General;
+
 /// Everything that this crate refuses. Each variant names the thing, what was found and what is allowed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -11,7 +13,9 @@ pub enum DemError {
     Scene(#[from] SceneError),
     /// Grains start inside a wall.
     #[error(
-        "{grains} grain(s) start in {wall}, the deepest by {depth:.2} of its radius; at most {allowed} is allowed"
+        "{grains} grain(s) start in {wall}, the deepest by {} of its radius; at most {} is allowed",
+        General((depth * 1e3).round() / 1e3),
+        General(*allowed)
     )]
     StartInWall {
         /// The wall's path in the scene, `funnel` or the ground.
@@ -25,7 +29,8 @@ pub enum DemError {
     },
     /// Grains would leave the scene before they have moved.
     #[error(
-        "{grains} grain(s) start below outflow.below = {below} m, where they would leave at once; at most 0 is allowed"
+        "{grains} grain(s) start below outflow.below = {} m, where they would leave at once; at most 0 is allowed",
+        General(*below)
     )]
     StartBelowOutflow {
         /// How many.
@@ -75,6 +80,16 @@ pub enum DemError {
         got: String,
         /// This version.
         allowed: &'static str,
+    },
+    /// A checkpoint of another law of the solver, which would go on as another pour.
+    #[error(
+        "the checkpoint must be of law {allowed} of the solver, got law {got}: begin the pour anew"
+    )]
+    CheckpointLaw {
+        /// The law that it was made by.
+        got: u32,
+        /// The law of this version.
+        allowed: u32,
     },
     /// A checkpoint of another scene, seed or settings.
     #[error("the checkpoint is of another pour: {what} is {found} there, but {given} is given")]

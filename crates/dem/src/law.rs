@@ -4,6 +4,13 @@
 
 use crate::lanes::{Reg, Reg3, Width};
 
+/// Number of the law that pours follow: of contacts, impacts, starts and of how all of it is solved.
+///
+/// It counts up whenever a pour changes, be it by a bit, whatever the version of the package: data sets, checkpoints,
+/// models and kept pours state it, so that pours of two laws are never mixed. 1 had impacts one by one; 2 has them as
+/// springs in the limit of infinite stiffness.
+pub const LAW: u32 = 2;
+
 /// Share of a penetration that is corrected in one substep (Baumgarte).
 pub(crate) const CORRECTION: f64 = 0.2;
 /// Penetration that is left alone, so that resting contacts stay closed `[m]`.

@@ -1,5 +1,6 @@
 //! The one error type of the crate.
 
+use granulcal_numbers::General;
 use thiserror::Error;
 
 /// Why an image could not be rendered, segmented or described.
@@ -19,7 +20,7 @@ pub enum FeatureError {
         min: usize,
     },
     /// A NaN or an infinity where a finite number is needed.
-    #[error("{what}[{index}] must be finite, got {got}")]
+    #[error("{what}[{index}] must be finite, got {}", General(*got))]
     NonFinite {
         /// The array.
         what: &'static str,
@@ -29,7 +30,7 @@ pub enum FeatureError {
         got: f64,
     },
     /// A number outside its range.
-    #[error("{what} must be in [{min}, {max}], got {got}")]
+    #[error("{what} must be in [{}, {}], got {}", General(*min), General(*max), General(*got))]
     OutOfRange {
         /// The quantity.
         what: &'static str,
@@ -45,8 +46,10 @@ pub enum FeatureError {
     Sensor(#[from] granulcal_scene::SceneError),
     /// Frames of a flat surface that show something else.
     #[error(
-        "the frames must show something flat: {on_surface:.0} % of the pixels lie on one smooth surface (at least 50), \
-         {deviation:.1} % of the {scale} off it on average (at most 5); say with a region where the flat part is"
+        "the frames must show something flat: {} % of the pixels lie on one smooth surface (at least 50), \
+         {} % of the {scale} off it on average (at most 5); say with a region where the flat part is",
+        General(on_surface.round()),
+        General((deviation * 10.0).round() / 10.0)
     )]
     NotFlat {
         /// Pixels with data that lie on the surface [%].
@@ -96,7 +99,9 @@ pub enum FeatureError {
     },
     /// No pixel was taken for a grain.
     #[error(
-        "none of {valid} valid pixels belongs to a grain (highest is {highest} m, threshold {threshold} m)"
+        "none of {valid} valid pixels belongs to a grain (highest is {} m, threshold {} m)",
+        General(*highest),
+        General(*threshold)
     )]
     EmptyMask {
         /// Valid pixels.
@@ -121,7 +126,9 @@ pub enum FeatureError {
     NeedsPinhole,
     /// The points do not span a plane.
     #[error(
-        "points do not span a plane: their second largest spread is {got} m, it must exceed {min} m"
+        "points do not span a plane: their second largest spread is {} m, it must exceed {} m",
+        General(*got),
+        General(*min)
     )]
     DegeneratePlane {
         /// Root mean square extent along the second principal axis `[m]`.

@@ -1,9 +1,13 @@
-//! Random words as numbers and the normal distribution, once for all crates.
+//! Random words as numbers, the normal distribution and numbers in messages, once for all crates.
 //!
 //! A seed stands for a pour, a data set and an image. A distribution crate may change its algorithm between versions, and
 //! with it what every seed stands for; what is written here does not change by a bit.
 
+mod general;
+
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+
+pub use general::General;
 
 /// Increment of SplitMix64.
 const GOLDEN_GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;

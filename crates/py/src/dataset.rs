@@ -134,6 +134,18 @@ impl Dataset {
         self.inner.header.seed
     }
 
+    /// Number of the solver's law that the rows follow, 0 for another simulator's, None where nobody knows.
+    #[getter]
+    fn law(&self) -> Option<u32> {
+        self.inner.header.law
+    }
+
+    /// What must be known of rows of another law than today's, or None.
+    #[getter]
+    fn other_law(&self) -> Option<String> {
+        self.inner.header.other_law()
+    }
+
     #[getter]
     fn version(&self) -> &str {
         &self.inner.header.version

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::io;
 
-use granulcal_dataset::DatasetError;
+use granulcal_dataset::{DatasetError, readable};
 use granulcal_dem::DemError;
 use granulcal_features::FeatureError;
 use pyo3::PyErr;
@@ -45,7 +45,7 @@ fn os_error(action: &str, path: &str, source: &io::Error) -> PyErr {
     }
 }
 
-/// The message with its causes, joined as one line each.
+/// The message with its causes, joined as one line each, nothing endless in it.
 fn chain(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
@@ -54,5 +54,5 @@ fn chain(error: &dyn Error) -> String {
         text.push_str(cause.to_string().trim_end());
         source = cause.source();
     }
-    text
+    readable(&text).into_owned()
 }

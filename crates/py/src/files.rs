@@ -45,6 +45,12 @@ pub(crate) fn write_file(
     py.detach(|| granulcal_dataset::write_file(&path, form, bytes)).map_err(error::dataset)
 }
 
+/// A message of at most 60 lines of 1000 letters in which nothing steers a terminal.
+#[pyfunction]
+pub(crate) fn readable(text: &str) -> String {
+    granulcal_dataset::readable(text).into_owned()
+}
+
 /// XXH3 of 128 bits, as 32 hexadecimal digits.
 #[pyfunction]
 pub(crate) fn hash_bytes(py: Python<'_>, bytes: &[u8]) -> String {

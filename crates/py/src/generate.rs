@@ -14,7 +14,7 @@ use crate::signals::Watch;
 
 /// Makes the rows that a folder lacks, by our simulator or by `engine`, a pair of its name and a function of
 /// (scene, seed) that returns (positions, radii), or points alone; `progress` is called with (total, resumed, made,
-/// unhealthy).
+/// unhealthy, jammed, out of view).
 ///
 /// On Ctrl-C the finished rows are written before KeyboardInterrupt is raised.
 #[pyfunction]
@@ -31,7 +31,7 @@ pub(crate) fn generate(
     resume: bool,
     progress: Option<Py<PyAny>>,
     engine: Option<(String, Py<PyAny>)>,
-) -> PyResult<(u64, u64, u64, u64)> {
+) -> PyResult<Counts> {
     let prior = Prior::from_toml(prior_toml).map_err(error::dem)?;
     let default = GenerateOptions::default();
     let threads = threads.unwrap_or(default.threads);
@@ -82,6 +82,10 @@ fn foreign(py: Python<'_>, call: &Py<PyAny>, scene: &dem::Scene, seed: u64) -> P
     })
 }
 
-fn counts(progress: &Progress) -> (u64, u64, u64, u64) {
-    (progress.total, progress.resumed, progress.made, progress.unhealthy)
+/// Rows in all, found, made, unhealthy, jammed, without grains in view.
+type Counts = (u64, u64, u64, u64, u64, u64);
+
+fn counts(progress: &Progress) -> Counts {
+    let Progress { total, resumed, made, unhealthy, jammed, out_of_view, .. } = *progress;
+    (total, resumed, made, unhealthy, jammed, out_of_view)
 }

@@ -34,7 +34,7 @@ mod _native {
     #[pymodule_export]
     use crate::dataset::Dataset;
     #[pymodule_export]
-    use crate::files::{check_paths, hash_bytes, write_file};
+    use crate::files::{check_paths, hash_bytes, readable, write_file};
     #[pymodule_export]
     use crate::film::film;
     #[pymodule_export]
@@ -59,6 +59,10 @@ mod _native {
     use crate::simulate::simulate;
     #[pymodule_export]
     use crate::statistics::{diagnostics, paper16, statistics_table};
+
+    /// Number of the law that pours follow.
+    #[pymodule_export]
+    const LAW: u32 = granulcal_dem::LAW;
 
     /// Version of the Rust crates.
     #[pymodule_export]

@@ -14,7 +14,7 @@ use crate::{array, error, segmentation};
 /// A measured depth image or height map.
 #[pyclass(frozen, module = "granulcal._native")]
 pub(crate) struct Recording {
-    inner: granulcal_dataset::Recording,
+    pub(crate) inner: granulcal_dataset::Recording,
 }
 
 #[pymethods]

@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use granulcal_dataset::{Limits, Prior};
 use granulcal_dem as dem;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
 use crate::array::{Numbers, Vectors};
 use crate::pour::Pour;
+use crate::recording::Recording;
 use crate::{array, error};
 
 /// A scene, checked.
@@ -45,6 +47,25 @@ impl Scene {
     fn load(path: PathBuf) -> PyResult<Self> {
         let inner = granulcal_dataset::load_scene(&path).map_err(error::dataset)?;
         Ok(Self { inner })
+    }
+
+    /// Why what a recording shows cannot be of this scene whose parameters are of a prior, a sentence each; none if it
+    /// can, or if that cannot be told.
+    fn violations(
+        &self,
+        py: Python<'_>,
+        prior_toml: &str,
+        recording: &Recording,
+    ) -> PyResult<Vec<String>> {
+        let prior = Prior::from_toml(prior_toml).map_err(error::dem)?;
+        let found = py.detach(|| {
+            let mut settings = recording.inner.segmentation.clone();
+            settings.ground_resolution = Some(self.inner.camera.ground_resolution());
+            let Some(limits) = Limits::of(&self.inner, &prior) else { return Ok(Vec::new()) };
+            let formation = recording.inner.formation_with(&settings);
+            formation.map(|formation| limits.violations(&formation))
+        });
+        found.map_err(error::dataset)
     }
 
     fn to_toml(&self) -> PyResult<String> {

@@ -1,11 +1,13 @@
 //! What can be wrong with a scene, a material, a prior or a path.
 
+use granulcal_numbers::General;
+
 /// Everything that this crate refuses. Each variant names the thing, what was found and what is allowed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
     /// A number lies outside its range.
-    #[error("{name} must be {allowed}, got {got}")]
+    #[error("{name} must be {allowed}, got {}", General(*got))]
     OutOfRange {
         /// Path of the number in the scene, for example `material.restitution`.
         name: String,
@@ -117,7 +119,7 @@ pub enum SceneError {
         allowed: &'static str,
     },
     /// A value that the prior can draw has no place in the scene.
-    #[error("prior of {parameter:?} does not fit the scene at the value {value}")]
+    #[error("prior of {parameter:?} does not fit the scene at the value {}", General(*value))]
     PriorDoesNotFit {
         /// Path of the parameter in the scene.
         parameter: String,

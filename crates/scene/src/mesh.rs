@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use granulcal_numbers::General;
 use serde::{Deserialize, Serialize};
 
 use crate::check::positive;
@@ -34,7 +35,8 @@ impl Mesh {
     ) -> Result<Self, SceneError> {
         let bad = |reason: String| SceneError::Mesh { file: file.to_owned(), reason };
         if let Some(index) = vertices.iter().position(|v| v.iter().any(|c| !c.is_finite())) {
-            return Err(bad(format!("vertex {index} is {:?}, must be finite", vertices[index])));
+            let [x, y, z] = vertices[index].map(General);
+            return Err(bad(format!("vertex {index} is ({x}, {y}, {z}), must be finite")));
         }
         let mut number_of = HashMap::new();
         let mut kept = Vec::new();
@@ -142,8 +144,11 @@ impl MeshFile {
         if !(LEAST_DIAMETERS..=MOST_DIAMETERS).contains(&(extent / diameter)) {
             let [least, most] = [LEAST_DIAMETERS, MOST_DIAMETERS].map(|n| n * diameter);
             return Err(bad(format!(
-                "is {extent} m large in units of {unit} m, must be {least} to {most} m for these grains; is the \
-                 unit right?"
+                "is {} m large in units of {} m, must be {} to {} m for these grains; is the unit right?",
+                General(extent),
+                General(unit),
+                General(least),
+                General(most)
             )));
         }
         let open = if self.closed { mesh.open_edges() } else { 0 };

@@ -3,6 +3,7 @@
 //! A scene as TOML is a tree of tables and lists; a path walks it, entries of lists by their number from 0. `scene.` in
 //! front may be left out.
 
+use granulcal_numbers::General;
 use toml::{Table, Value};
 
 use crate::error::SceneError;
@@ -99,9 +100,25 @@ pub fn first_difference(
             entries.find_map(|n| first_difference(&at(&n.to_string()), a.get(n), b.get(n)))
         }
         _ => {
-            let show = |value: Option<&Value>| value.map_or("absent".to_owned(), Value::to_string);
+            let show = |value: Option<&Value>| value.map_or("absent".to_owned(), shown);
             Some((path.to_owned(), show(left), show(right)))
         }
+    }
+}
+
+/// A value in a message. Numbers are exact, for what differs may differ in the last digit; `{:?}` has an exponent where
+/// that is shorter.
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Float(number) => format!("{number:?}"),
+        Value::Array(entries) => {
+            format!("[{}]", entries.iter().map(shown).collect::<Vec<_>>().join(", "))
+        }
+        Value::Table(table) => {
+            let entry = |(key, value): (&String, &Value)| format!("{key} = {}", shown(value));
+            format!("{{ {} }}", table.iter().map(entry).collect::<Vec<_>>().join(", "))
+        }
+        other => other.to_string(),
     }
 }
 
@@ -156,7 +173,10 @@ fn set_number(path: &str, place: &mut Value, value: f64) -> Result<(), SceneErro
     *place = match place {
         Value::Integer(_) if value.fract() == 0.0 => Value::Integer(value as i64),
         Value::Integer(_) => {
-            return Err(path_error(path, &format!("must be a whole number, got {value}")));
+            return Err(path_error(
+                path,
+                &format!("must be a whole number, got {}", General(value)),
+            ));
         }
         Value::Float(_) => Value::Float(value),
         other => {

@@ -55,6 +55,8 @@ class BayesSim:
         calibration: check on pairs that were not trained on, or None if there were too few.
         identifiability: what an observation tells on average, or None likewise.
         scene_toml: the scene of the training data, or None.
+        law: number of the solver's law that the training's pours follow; 0 for another simulator,
+            None where nobody knows.
 
     Reference:
         Ramos, Possas and Fox, BayesSim: adaptive domain randomization via probabilistic inference
@@ -84,6 +86,7 @@ class BayesSim:
         calibration: Calibration | None = None,
         identifiability: Identifiability | None = None,
         scene_toml: str | None = None,
+        law: int | None = None,
     ) -> None:
         """Joins the parts of a trained model; use `fit` or `load`."""
         self.prior = prior
@@ -98,6 +101,7 @@ class BayesSim:
         self.calibration = calibration
         self.identifiability = identifiability
         self.scene_toml = scene_toml
+        self.law = law
 
     @classmethod
     @one_thread()
@@ -168,6 +172,7 @@ class BayesSim:
             if enough
             else None,
             scene_toml=pairs.scene_toml,
+            law=pairs.law,
         )
         if not quiet:
             print(model.summary)

@@ -5,7 +5,14 @@ import json
 import sys
 from typing import Any
 
-from granulcal.commands.reading import add_reading, exit_code_of, open_recordings
+from granulcal.commands.exit_code import UNHEALTHY
+from granulcal.commands.reading import (
+    add_reading,
+    exit_code_of,
+    open_recordings,
+    outside,
+    told_outside,
+)
 from granulcal.files import write_beside
 from granulcal.paths import READS, writes
 
@@ -35,6 +42,7 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named
+    from granulcal.measured.plausible import violations
     from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
     from granulcal.progress import ProgressLine
@@ -43,6 +51,10 @@ def _run(options: argparse.Namespace) -> int:
     scene = Scene.named(options.scene)
     prior = Prior.named(options.prior)
     recordings = open_recordings(options)
+    if impossible := violations(scene, prior, recordings, options.recording):
+        document = told_outside(options, impossible)
+        print(json.dumps(document, indent=1) if options.json else outside(impossible))
+        return UNHEALTHY
     line, first = ProgressLine(), []
 
     def poured(kept: int) -> None:
@@ -67,9 +79,14 @@ def _run(options: argparse.Namespace) -> int:
     document = {
         "recordings": [str(path) for path in options.recording],
         "parameters": _parameters(posterior),
-        "inside_model": {"is_inside": found.misfit.is_inside, "p_value": found.misfit.p_value},
+        "inside_model": {
+            "is_inside": found.misfit.is_inside,
+            "p_value": found.misfit.p_value,
+            "impossible": [],
+        },
         "pours": len(found.x),
         "usable": found.rounds[-1].usable,
+        "left_out": found.left_out.to_dict(),
         "warnings": [str(warning) for warning in posterior.warnings],
         "samples": posterior.sample(_SAMPLES).tolist(),
     }
@@ -77,13 +94,14 @@ def _run(options: argparse.Namespace) -> int:
     if options.json:
         del document["samples"]
         print(json.dumps(document, indent=1))
-        return exit_code_of(recordings)
+        return exit_code_of(recordings, found.misfit.is_inside)
     print(found.misfit)
     _print_parameters(document["parameters"])
     print(f"{found.rounds[-1]}; {found.choice}")
+    print(f"pours that cannot be used: {found.left_out}")
     for warning in document["warnings"]:
         print(f"note: {warning}", file=sys.stderr)
-    return exit_code_of(recordings)
+    return exit_code_of(recordings, found.misfit.is_inside)
 
 
 def _parameters(posterior: Any) -> dict[str, dict[str, Any]]:

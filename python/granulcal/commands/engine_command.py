@@ -115,7 +115,7 @@ def _generate(options: argparse.Namespace) -> int:
         print(json.dumps({"folder": str(options.out), "rows": len(data), "status": counts}))
     else:
         print(f"{options.out}: {data}")
-    unusable = len(data) - int(data.is_usable.sum())
-    if unusable:
-        print(f"note: {unusable} pours cannot be used", file=sys.stderr)
-    return 0 if not unusable else _UNHEALTHY
+    left_out = data.left_out
+    if left_out.total:
+        print(f"note: pours that cannot be used: {left_out}", file=sys.stderr)
+    return 0 if not left_out.total else _UNHEALTHY

@@ -161,14 +161,13 @@ def _scene(options: argparse.Namespace) -> int:
 
 
 def _bed(options: argparse.Namespace) -> int:
-    import numpy as np
-
+    from granulcal.engines.files import read_array
     from granulcal.export import export_bed
     from granulcal.pours.simulate import simulate
 
     scene = _loaded(options)
     if options.positions is not None:
-        positions, radii = np.load(options.positions), None
+        positions, radii = read_array(options.positions), None
     else:
         pour = simulate(scene, seed=options.seed)
         positions, radii = pour.positions, pour.radii

@@ -3,11 +3,15 @@
 import argparse
 import json
 import os
+import sys
 from typing import Any
 
 from granulcal.paths import READS
 
 __all__ = ["add"]
+
+# The exit code of what is done and does not stand.
+_FALLEN = 3
 
 _TEXT = "what the models of a closed loop say of a condition that was not measured"
 _DESCRIPTION = """\
@@ -21,7 +25,8 @@ differ:
     granulcal predict loop --at funnel.height=0.07 --model line  straight line through the means
 
 The correction knows no physics and holds between and near the measured conditions alone; farther
-away it is refused. Intervals are those of one pour.
+away it is refused. Intervals are those of one pour. Exit code 3: the loop's verdict
+does not stand.
 """
 
 
@@ -73,7 +78,7 @@ def _run(options: argparse.Namespace) -> int:
     )
     if options.json:
         print(json.dumps({"at": at, "verdict": models.verdict, **found.to_dict()}, indent=1))
-        return 0
+        return _outcome(models.verdict["kind"])
     word = " ".join([models.verdict["kind"], *models.verdict["named"]])
     print(f"{found.model} at {', '.join(options.at)}; the loop's verdict: {word}")
     print(f"{'statistic':<24}{'middle':>12}{f'{100 * found.level:g} % from':>14}{'to':>12}")
@@ -81,4 +86,14 @@ def _run(options: argparse.Namespace) -> int:
         found.names, found.middle, found.low, found.high, strict=True
     ):
         print(f"{name:<24}{middle:>12.5g}{low:>14.5g}{high:>12.5g}")
+    return _outcome(models.verdict["kind"])
+
+
+def _outcome(kind: str) -> int:
+    """Exit code 3 for a loop whose verdict does not stand: its surrogate or its fit is wrong."""
+    from granulcal.loop.check.standing import FALLEN
+
+    if kind in FALLEN:
+        print(f"warning: the loop is {kind}: its fit does not stand", file=sys.stderr)
+        return _FALLEN
     return 0

@@ -16,6 +16,8 @@ __all__ = [
     "exit_code_of",
     "open_model",
     "open_recordings",
+    "outside",
+    "told_outside",
 ]
 
 # The data set that a model was trained on, in the model's folder.
@@ -94,6 +96,21 @@ def open_recordings(options: argparse.Namespace) -> list[Any]:
             print(f"warning: {path}: {recording.lost}", file=sys.stderr)
         opened.append(recording)
     return opened
+
+
+def outside(reasons: Sequence[str]) -> str:
+    """Returns what is said of recordings that cannot be of the scene."""
+    first = "OUTSIDE THE MODEL: this cannot be a formation of the scene, whatever its material."
+    return "\n".join([first, *(f"  {reason}" for reason in reasons), "No posterior is given."])
+
+
+def told_outside(options: argparse.Namespace, reasons: Sequence[str]) -> dict[str, Any]:
+    """Returns the same for JSON, in the fields of `infer`."""
+    return {
+        "recordings": [str(path) for path in options.recording],
+        "parameters": None,
+        "inside_model": {"is_inside": False, "p_value": None, "impossible": list(reasons)},
+    }
 
 
 def exit_code_of(recordings: Sequence[Any], is_healthy: bool = True) -> int:

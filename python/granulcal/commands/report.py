@@ -2,14 +2,18 @@
 
 import argparse
 import shlex
+import sys
 from typing import Any
 
+from granulcal.commands.exit_code import UNHEALTHY
 from granulcal.commands.reading import (
     TRAINING,
     add_recordings,
     exit_code_of,
     open_model,
     open_recordings,
+    outside,
+    told_outside,
 )
 from granulcal.paths import READS, writes
 
@@ -38,9 +42,11 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from granulcal.calibrate import calibrate
+    from granulcal.calibrate import calibrate, require_same_scene
+    from granulcal.measured.plausible import violations
     from granulcal.measured.recording import FRAMES
     from granulcal.pours.dataset import Dataset
+    from granulcal.pours.left_out import LeftOut
     from granulcal.starter.models import model_named
 
     if options.seeds < 1:
@@ -53,6 +59,12 @@ def _run(options: argparse.Namespace) -> int:
     if options.data is None and not training.exists():
         raise FileNotFoundError(f"{folder} came without its training pours: give some with --data")
     data = Dataset.load(training)
+    require_same_scene(model, data.scene)
+    recordings = open_recordings(options)
+    if impossible := violations(data.scene, model.prior, recordings, options.recording):
+        options.told |= told_outside(options, impossible)
+        print(outside(impossible))
+        return UNHEALTHY
     names = " ".join(str(path) for path in options.recording)
     words = ["granulcal", "report", str(options.model), *map(str, options.recording)]
     for name in ("camera", "topic", "camera_topic", "colour_topic", "first_frame"):
@@ -62,7 +74,6 @@ def _run(options: argparse.Namespace) -> int:
         words += ["--frames", str(options.frames or "all")]
     words += ["-o", str(options.out), "--seeds", str(options.seeds)]
     words += ["--draws", str(options.draws)]
-    recordings = open_recordings(options)
     found = calibrate(
         model,
         data,
@@ -76,7 +87,15 @@ def _run(options: argparse.Namespace) -> int:
         f"with a model trained on {len(data)} pours.",
         command=shlex.join(words),
     )
+    if not found.misfit.is_inside:
+        print(found.misfit)
     print(found.report)
-    options.told["report"] = str(found.report)
-    is_healthy = all(p.status != "unhealthy" for p in [*found.pours, *found.prior_pours])
-    return exit_code_of(recordings, is_healthy)
+    left_out = LeftOut.of_pours([*found.pours, *found.prior_pours])
+    if left_out.total:
+        print(f"note: of the pours on the page cannot be used: {left_out}", file=sys.stderr)
+    options.told |= {
+        "report": str(found.report),
+        "inside_model": {"is_inside": found.misfit.is_inside, "p_value": found.misfit.p_value},
+        "left_out": left_out.to_dict(),
+    }
+    return exit_code_of(recordings, not left_out.unhealthy and found.misfit.is_inside)

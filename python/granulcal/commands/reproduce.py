@@ -6,7 +6,7 @@ import pkgutil
 from pathlib import Path
 from typing import Any
 
-from granulcal.commands.exit_code import DONE
+from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.paths import READS, writes
 
 __all__ = ["add"]
@@ -66,8 +66,9 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError(f"--maps and --json are of kinect_mounds, not of {options.study}")
     if data is None and options.maps is None:
         raise FileNotFoundError("no measured data: give --data or set $GRANULCAL_DATA")
-    module.reproduce(options.out, data, **given)
-    return DONE
+    # A study of the loop says whether its verdicts stand.
+    stands = module.reproduce(options.out, data, **given)
+    return UNHEALTHY if stands is False else DONE
 
 
 def _reproduce_paper(options: argparse.Namespace) -> int:

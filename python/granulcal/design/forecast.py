@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from granulcal import _native
 from granulcal.files import save_figure, write_beside
+from granulcal.pours.left_out import LeftOut
 
 __all__ = ["SpillForecast"]
 
@@ -38,7 +39,7 @@ class SpillForecast:
         total: grains of a pour.
         rho: correlation of two grains of one pour [-]; 0 is a binomial count.
         names: paths of the parameters that were drawn from a posterior.
-        unusable: pours that jammed or were unhealthy, besides.
+        unusable: pours besides that could not be used, by why.
     """
 
     heights: Array
@@ -52,7 +53,7 @@ class SpillForecast:
     total: int
     rho: float
     names: tuple[str, ...]
-    unusable: int
+    unusable: LeftOut
 
     def highest(self, k: int, at_most: float) -> float | None:
         """Returns the height up to which P(spilled >= k) stays within `at_most` [m], or None.
@@ -96,7 +97,7 @@ class SpillForecast:
             "unit": "m",
             "total": self.total,
             "pours": len(self.spilled),
-            "unusable": self.unusable,
+            "unusable": self.unusable.to_dict(),
             "correlation": self.rho,
             "drawn": list(self.names),
             "heights": self.heights.tolist(),
@@ -140,8 +141,8 @@ class SpillForecast:
             f"{', '.join(self.names)} drawn from a posterior" if self.names else "material known"
         )
         lines = [
-            f"{len(self.spilled)} pours of {self.total} grains ({self.unusable} more unusable), "
-            f"{known}; correlation of two grains {self.rho:.2g}",
+            f"{len(self.spilled)} pours of {self.total} grains (besides, not usable: "
+            f"{self.unusable}), {known}; correlation of two grains {self.rho:.2g}",
             f"{'height [cm]':>12}{'expected':>10}"
             + "".join(f"{f'P(>= {k})':>24}" for k in self.grains),
         ]

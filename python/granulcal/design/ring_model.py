@@ -13,6 +13,7 @@ from granulcal.design.reach import Reach
 from granulcal.design.ring import PERCENTILES, STATISTICS
 from granulcal.errors import TrainingDataError
 from granulcal.pours.dataset import Dataset, generate
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 
@@ -38,14 +39,14 @@ class HeldOut:
         means: posterior means [m], shape (n,).
         intervals: central 90 % intervals [m], shape (n, 2).
         floors: least standard deviation that the pours' own noise allows there [m], shape (n,).
-        unusable: pours among those asked for that jammed or were unhealthy.
+        unusable: pours besides that could not be used, by why.
     """
 
     heights: Array
     means: Array
     intervals: Array
     floors: Array
-    unusable: int
+    unusable: LeftOut
 
     @property
     def errors(self) -> Array:
@@ -63,8 +64,8 @@ class HeldOut:
         e = 100 * self.errors
         floor = 100 * float(np.sqrt(np.mean(self.floors**2)))
         return (
-            f"height of {len(e)} pours that were not trained on ({self.unusable} more unusable): "
-            f"error {e.mean():+.4f} ± {e.std(ddof=1):.4f} cm, mean absolute "
+            f"height of {len(e)} pours that were not trained on (besides, not usable: "
+            f"{self.unusable}): error {e.mean():+.4f} ± {e.std(ddof=1):.4f} cm, mean absolute "
             f"{np.abs(e).mean():.4f} cm, largest {np.abs(e).max():.3f} cm;\n"
             f"pours of one height differ by as much as {floor:.4f} cm of height (rms); "
             f"90 % intervals hold {self.coverage:.0%}"
@@ -205,7 +206,7 @@ class RingModel:
             means=np.array([p.mean()[0] for p in posteriors]),
             intervals=np.array([p.credible_region(0.9)[HEIGHT] for p in posteriors]),
             floors=np.array([self.reach.at(height).floor for height in heights]),
-            unusable=int((~usable).sum()),
+            unusable=data.left_out,
         )
 
 

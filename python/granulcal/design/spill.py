@@ -12,6 +12,7 @@ from granulcal.design.forecast import SpillForecast
 from granulcal.design.posterior_file import PosteriorDraws
 from granulcal.design.ring_model import HEIGHT, height_prior
 from granulcal.errors import TrainingDataError
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 from granulcal.progress import ProgressLine
@@ -80,7 +81,9 @@ def design_spill(
     line = ProgressLine() if progress else None
     resumed = len(kept.rows)
     if line is not None:
-        kept.progress = lambda done: line(pours, resumed, done - resumed, 0)
+        kept.progress = lambda done: line(
+            pours, resumed, done - resumed, *kept.left_out(pours).counts
+        )
     Path(out).mkdir(parents=True, exist_ok=True)
     try:
         observed = kept(np.column_stack([where, chosen]), 0)
@@ -90,7 +93,16 @@ def design_spill(
     counts = observed[:, kept.x_names.index(SPILLED)]
     total = int(scene.get("grains.count"))
     names = () if draws is None else draws.names
-    return forecast_of(where, chosen, counts, total, grains=grains, names=names, seed=seed)
+    return forecast_of(
+        where,
+        chosen,
+        counts,
+        total,
+        grains=grains,
+        names=names,
+        seed=seed,
+        unusable=kept.left_out(pours),
+    )
 
 
 def forecast_of(
@@ -102,6 +114,7 @@ def forecast_of(
     grains: Sequence[int],
     names: Sequence[str] = (),
     seed: int = 0,
+    unusable: LeftOut | None = None,
 ) -> SpillForecast:
     """Returns the forecast of counted pours.
 
@@ -113,6 +126,7 @@ def forecast_of(
         grains: numbers k.
         names: paths of the material's parameters.
         seed: seed of the draws.
+        unusable: why some pours cannot be used, where that is known.
     """
     usable = np.isfinite(counts)
     if usable.sum() < _FEWEST_POURS:
@@ -140,7 +154,7 @@ def forecast_of(
         total=total,
         rho=model.rho,
         names=tuple(names),
-        unusable=int((~usable).sum()),
+        unusable=LeftOut(unseen=int((~usable).sum())) if unusable is None else unusable,
     )
 
 

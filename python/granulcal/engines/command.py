@@ -6,9 +6,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-import numpy as np
-
-from granulcal.engines.files import read_grains
+from granulcal.engines.files import read_array, read_grains
 from granulcal.engines.protocol import Left, left
 from granulcal.pours.scene import Scene
 
@@ -65,7 +63,7 @@ class CommandEngine:
                 )
             points = folder / "points.npy"
             if points.exists():
-                return left(self.name, np.load(points))
+                return left(self.name, read_array(points))
             grains = read_grains(folder, 0.5 * scene.get("grains.diameter"))
             if grains is None:
                 raise ValueError(

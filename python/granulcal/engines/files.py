@@ -1,11 +1,14 @@
 """Grains as engines write them: LAMMPS dumps, CSV, npy."""
 
+import io
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["read_grains"]
+from granulcal.documents import read_bytes
+
+__all__ = ["read_array", "read_grains"]
 
 Array = NDArray[np.float64]
 NAMES = ("grains.npy", "grains.csv", "grains.dump")
@@ -38,15 +41,33 @@ def read_grains(folder: Path, radius: float | None = None) -> tuple[Array, Array
 
 def _table(path: Path) -> Array:
     if path.suffix == ".npy":
-        return np.asarray(np.load(path), float)
+        return read_array(path)
     if path.suffix == ".csv":
-        return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+        text = read_bytes(path).decode("utf-8", "replace")
+        try:
+            return np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1, ndmin=2)
+        except ValueError as error:
+            raise ValueError(f"{path}: not a table of numbers: {error}") from None
     return _dump(path)
+
+
+def read_array(path: Path) -> Array:
+    """Returns the array of numbers in a .npy file.
+
+    Raises:
+        ValueError: it is a device, too large, damaged, or holds something else; names the file.
+        OSError: it cannot be read.
+    """
+    try:
+        found = np.lib.format.read_array(io.BytesIO(read_bytes(path)), allow_pickle=False)
+        return np.asarray(found, float)
+    except (ValueError, TypeError, EOFError, MemoryError) as error:
+        raise ValueError(f"{path}: no array of numbers: {error}") from None
 
 
 def _dump(path: Path) -> Array:
     """Returns the last frame of a LAMMPS dump, in the order of the ids."""
-    text = path.read_text(encoding="utf-8")
+    text = read_bytes(path).decode("utf-8", "replace")
     head = text.rfind("ITEM: ATOMS")
     if head < 0:
         raise ValueError(f"{path} is no LAMMPS dump: it has no line ITEM: ATOMS")
@@ -55,6 +76,9 @@ def _dump(path: Path) -> Array:
     missing = {"id", "x", "y", "z", "radius"} - set(names)
     if missing:
         raise ValueError(f"{path} must have the columns id, x, y, z, radius; it has {names}")
-    table = np.array([row.split() for row in rows], float).reshape(len(rows), len(names))
+    try:
+        table = np.array([row.split() for row in rows], float).reshape(len(rows), len(names))
+    except ValueError as error:
+        raise ValueError(f"{path}: a row has not {len(names)} numbers: {error}") from None
     table = table[np.argsort(table[:, names.index("id")])]
     return table[:, [names.index(name) for name in ("x", "y", "z", "radius")]]

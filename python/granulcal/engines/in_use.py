@@ -9,7 +9,7 @@ from granulcal import _native
 if TYPE_CHECKING:
     from granulcal.engines.protocol import Engine
 
-__all__ = ["engine_in_use", "pouring_with", "version_of_pours"]
+__all__ = ["engine_in_use", "law_of_pours", "pouring_with", "version_of_pours"]
 
 # Not a context variable: the pours of a job run in threads of their own.
 _in_use: "Engine | None" = None
@@ -38,6 +38,11 @@ def pouring_with(engine: "Engine | None") -> Iterator[None]:
 def engine_in_use() -> "Engine | None":
     """Returns the engine of the job that runs, None for ours."""
     return _in_use
+
+
+def law_of_pours() -> int:
+    """Returns the number of the law that kept pours follow, 0 where another engine pours."""
+    return _native.LAW if _in_use is None else 0
 
 
 def version_of_pours() -> str:

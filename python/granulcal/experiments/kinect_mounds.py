@@ -175,7 +175,7 @@ def reproduce(
         results.append(_judge(path.stem, recording, calibrated, model, data))
         clouds.append((recording.formation(**_SEGMENTATION).points, calibrated.pours[0].points()))
         print(_row(results[-1]), flush=True)
-    (out_dir / "results.md").write_text(_table(results, model.prior.names), encoding="utf-8")
+    write_beside(out_dir / "results.md", _table(results, model.prior.names))
     _picture(out_dir / "formations.png", [path.stem for path in maps], clouds)
     print(f"table and picture in {out_dir}")
     if json_path is not None:

@@ -144,8 +144,11 @@ def _files(data: Path, tests: list[str]) -> tuple[Path, ...]:
     return tuple(data / _RUNOUT / f"{test}.txt" for test in tests)
 
 
-def reproduce(out: Path, data: Path) -> None:
-    """Runs the loop; report.html and verdict.json in `out`/loop_column."""
+def reproduce(out: Path, data: Path) -> bool:
+    """Runs the loop; report.html and verdict.json in `out`/loop_column.
+
+    Returns whether the verdict stands.
+    """
     folder = out / "loop_column"
     closed = close_loop(task(data), folder, budget=_BUDGET, rounds=2)
     write_report(
@@ -156,6 +159,7 @@ def reproduce(out: Path, data: Path) -> None:
     )
     _picture(folder / "fronts.png", closed, Forward(folder / "pours", 1))
     print(folder / "fronts.png")
+    return closed.standing.stands
 
 
 def _picture(path: Path, closed: Closed, forward: Forward) -> None:

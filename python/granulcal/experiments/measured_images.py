@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from granulcal.experiments.sensor import write_d435_camera
+from granulcal.files import write_beside, write_toml
 from granulcal.measured.recording import Formation, Levelled, Recording
 
 __all__ = ["Rig", "Seen", "images", "reproduce", "see"]
@@ -117,7 +118,7 @@ def reproduce(out_dir: Path, data_dir: Path) -> list[Seen]:
     for rig, name, label, recording in images(out_dir, data_dir):
         seen.append(see(rig, name, label, recording, volumes.get(name, float("nan"))))
         print(_row(seen[-1]), flush=True)
-    (out_dir / "results.md").write_text(_table(seen), encoding="utf-8")
+    write_beside(out_dir / "results.md", _table(seen))
     _write_statistics(out_dir / "statistics.csv", seen)
     formations = [each for each in seen if each.label in ("pile", "ring")]
     others = [each for each in seen if each not in formations]
@@ -146,7 +147,7 @@ def _sandbox(out_dir: Path, folder: Path) -> Iterator[tuple[str, str, Path, Path
 
     for camera, lens in [("kinect_v2", _KINECT_V2), ("kinect_v2_crop", _CROP)]:
         text = "".join(f"{key} = {value}\n" for key, value in lens.items())
-        (out_dir / f"{camera}.toml").write_text(text + "depth_unit = 0.0001\n", encoding="utf-8")
+        write_toml(out_dir / f"{camera}.toml", text + "depth_unit = 0.0001\n")
     for rig, name, camera in [
         ("sandbox", "depth_raw_a", "kinect_v2"),
         ("sandbox", "depth_raw_b", "kinect_v2"),

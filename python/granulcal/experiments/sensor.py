@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.cli import main as granulcal
+from granulcal.files import write_beside, write_toml
 
 __all__ = ["SURFACES", "Judged", "Surface", "fit_surface", "reproduce", "write_d435_camera"]
 
@@ -105,11 +106,11 @@ def write_d435_camera(out_dir: Path, data_dir: Path) -> tuple[Path, float]:
     facts = json.loads((data_dir / _D435 / "camera.json").read_text(encoding="utf-8"))
     lens = facts["depth"]
     path = out_dir / "d435.toml"
-    path.write_text(
+    write_toml(
+        path,
         f"width = {facts['width']}\nheight = {facts['height']}\n"
         f"fx = {lens['fx']}\nfy = {lens['fy']}\ncx = {lens['cx']}\ncy = {lens['cy']}\n"
         f"depth_unit = {lens['units_m']}\n",
-        encoding="utf-8",
     )
     return path, lens["stereo_baseline_mm"] / 1000
 
@@ -168,7 +169,7 @@ def reproduce(out_dir: Path, data_dir: Path) -> dict[str, Judged]:
         print(f"{name}: {surface.title}", flush=True)
         judged[name] = fit_surface(name, out_dir, data_dir)
         print(flush=True)
-    (out_dir / "results.md").write_text(_table(judged), encoding="utf-8")
+    write_beside(out_dir / "results.md", _table(judged))
     _plot(out_dir / "sensor.png", judged)
     print(f"sensors, table and picture in {out_dir}")
     return judged

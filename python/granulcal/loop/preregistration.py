@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from granulcal.documents import LARGEST_DOCUMENT, Table, check, parse_json, read_bytes
-from granulcal.engines.in_use import version_of_pours
+from granulcal.engines.in_use import law_of_pours, version_of_pours
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.effects.library import described, fingerprint
@@ -38,6 +38,7 @@ def register(
     document: dict[str, Any] = (
         {
             "version": version_of_pours(),
+            "law": law_of_pours(),
             "scene": plan.scene.to_toml(),
             "prior": plan.prior.to_toml(),
             "conditions": [

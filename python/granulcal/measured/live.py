@@ -14,6 +14,8 @@ __all__ = ["RealSense", "Ros2", "Source", "record"]
 
 _WARM_UP = 30
 _PATIENCE_S = 5.0
+# All of them are in memory until the file is written: 2.5 GB of a RealSense.
+_MOST_FRAMES = 1000
 
 
 class Source(Protocol):
@@ -157,8 +159,8 @@ def record(source: Source, path: str | PathLike[str], *, frames: int = 10) -> in
         ValueError: another name, or no frames asked for.
         OSError: the source delivers nothing.
     """
-    if frames < 1:
-        raise ValueError(f"frames must be at least 1, got {frames}")
+    if not 1 <= frames <= _MOST_FRAMES:
+        raise ValueError(f"frames must be from 1 to {_MOST_FRAMES}, got {frames}")
     kind = Path(path).suffix.lower()
     if kind not in (".bag", ".mcap"):
         raise ValueError(f"{path} must end in .bag or .mcap")

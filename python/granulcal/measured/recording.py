@@ -87,6 +87,11 @@ class Recording:
         self.path = path
         """The file or folder."""
 
+    @property
+    def native(self) -> _native.Recording:
+        """The Rust side of it."""
+        return self._native
+
     @classmethod
     def open(
         cls,

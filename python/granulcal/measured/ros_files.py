@@ -5,9 +5,9 @@ The layout of the .bag is that of the RealSense viewer (librealsense, `ros_file_
 the sensor. The .mcap has the topics of the realsense2_camera node. rosbags writes both.
 """
 
-import shutil
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from granulcal import _native
 
 __all__ = ["DepthFrame", "write_bag", "write_mcap"]
 
@@ -105,7 +107,7 @@ def write_bag(
     """Writes frames as the RealSense viewer saves them, lz4-compressed; returns their number.
 
     Args:
-        path: the .bag file; replaced if it exists.
+        path: the .bag file; another recording there is replaced, a file of another kind is not.
         frames: depth images of one size.
         lens: width, height, fx, fy, cx, cy [px], the first pixel's centre at 0.
         depth_unit: metres per count.
@@ -116,27 +118,27 @@ def write_bag(
     from rosbags.rosbag1 import Writer
 
     ros, count = _Messages(ros1=True, lens=lens), 0
-    beside = _beside(path)
-    writer = Writer(beside)
-    writer.set_compression(Writer.CompressionFormat.LZ4)
-    with writer:
-        connections: dict[str, Any] = {}
+    with _draft(path) as folder:
+        writer = Writer(folder / "draft.bag")
+        writer.set_compression(Writer.CompressionFormat.LZ4)
+        with writer:
+            connections: dict[str, Any] = {}
 
-        def write(topic: str, name: str, time_ns: int, message: Any) -> None:
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, name, typestore=ros.store)
-            writer.write(connections[topic], time_ns, ros.store.serialize_ros1(message, name))
+            def write(topic: str, name: str, time_ns: int, message: Any) -> None:
+                if topic not in connections:
+                    connections[topic] = writer.add_connection(topic, name, typestore=ros.store)
+                writer.write(connections[topic], time_ns, ros.store.serialize_ros1(message, name))
 
-        stream = f"{_SENSOR}/Depth_0"
-        unit = ros.make("std_msgs/msg/Float32", data=depth_unit)
-        write(f"{_SENSOR}/option/Depth Units/value", "std_msgs/msg/Float32", 1, unit)
-        camera = ros.camera("", 0)
-        write(f"{stream}/info/camera_info", "sensor_msgs/msg/CameraInfo", 1, camera)
-        for frame in frames:
-            picture = ros.image("0", frame.time_ns, "mono16", _counts(frame.depth, depth_unit))
-            write(f"{stream}/image/data", "sensor_msgs/msg/Image", frame.time_ns + 2, picture)
-            count += 1
-    beside.replace(path)
+            stream = f"{_SENSOR}/Depth_0"
+            unit = ros.make("std_msgs/msg/Float32", data=depth_unit)
+            write(f"{_SENSOR}/option/Depth Units/value", "std_msgs/msg/Float32", 1, unit)
+            camera = ros.camera("", 0)
+            write(f"{stream}/info/camera_info", "sensor_msgs/msg/CameraInfo", 1, camera)
+            for frame in frames:
+                picture = ros.image("0", frame.time_ns, "mono16", _counts(frame.depth, depth_unit))
+                write(f"{stream}/image/data", "sensor_msgs/msg/Image", frame.time_ns + 2, picture)
+                count += 1
+        _native.write_file(Path(path), "bag", (folder / "draft.bag").read_bytes())
     return count
 
 
@@ -148,7 +150,7 @@ def write_mcap(
     Depths are 32FC1 in metres, 0 is no data; the lens is sent with each.
 
     Args:
-        path: the .mcap file; replaced if it exists.
+        path: the .mcap file; another recording there is replaced, a file of another kind is not.
         frames: depth images of one size.
         lens: width, height, fx, fy, cx, cy [px], the first pixel's centre at 0.
 
@@ -158,8 +160,8 @@ def write_mcap(
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     ros, count = _Messages(ros1=False, lens=lens), 0
-    with tempfile.TemporaryDirectory(dir=Path(path).parent) as draft:
-        folder = Path(draft) / "bag"
+    with _draft(path) as place:
+        folder = place / "bag"
         with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
             writer_types = {
                 f"{_CAMERA}/camera_info": "sensor_msgs/msg/CameraInfo",
@@ -179,7 +181,7 @@ def write_mcap(
                     data = ros.store.serialize_cdr(message, name)
                     writer.write(connections[topic], frame.time_ns, data)
                 count += 1
-        shutil.move(next(folder.glob("*.mcap")), path)
+        _native.write_file(Path(path), "mcap", next(folder.glob("*.mcap")).read_bytes())
     return count
 
 
@@ -193,8 +195,8 @@ def _counts(depth: NDArray[np.floating], unit: float) -> Image:
     return counts.astype("<u2")
 
 
-def _beside(path: str | PathLike[str]) -> Path:
-    """Returns a name in the same folder for a file that is not whole yet, and clears it."""
-    beside = Path(path).with_name(Path(path).name + ".part")
-    beside.unlink(missing_ok=True)
-    return beside
+@contextmanager
+def _draft(path: str | PathLike[str]) -> Iterator[Path]:
+    """A folder of its own in that of `path` for what is not whole yet; it is gone at the end."""
+    with tempfile.TemporaryDirectory(prefix=".granulcal-", dir=Path(path).parent) as folder:
+        yield Path(folder)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from granulcal import _native
 from granulcal.engines.in_use import engine_in_use
-from granulcal.errors import UnverifiedDataWarning
+from granulcal.errors import OtherLawWarning, UnverifiedDataWarning
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import check_whole, require_scene
 from granulcal.pours.statistics import DIAGNOSTIC_NAMES, NAMES
@@ -78,6 +79,8 @@ class Dataset:
         """Seed of the whole data set."""
         self.version = native.version
         """Version of granulcal that made it."""
+        self.law = native.law
+        """Number of the law that the pours follow; 0 for another simulator, None if unknown."""
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> "Dataset":
@@ -95,6 +98,8 @@ class Dataset:
                 UnverifiedDataWarning,
                 stacklevel=2,
             )
+        if native.other_law is not None:
+            warnings.warn(f"{path} was {native.other_law}", OtherLawWarning, stacklevel=2)
         return cls(native, Path(path))
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -115,6 +120,11 @@ class Dataset:
     def is_usable(self) -> NDArray[np.bool_]:
         """Which pours are healthy, left the funnel and show every statistic of `x`, shape (n,)."""
         return ~np.isin(self.status, (*UNUSABLE, NO_GRAINS)) & np.isfinite(self.x).all(axis=1)
+
+    @property
+    def left_out(self) -> LeftOut:
+        """How many pours are not usable, by why."""
+        return LeftOut.of(self.status.tolist(), self.is_usable.tolist())
 
     def status_counts(self) -> dict[str, int]:
         """Returns how many pours ended in each status."""
@@ -191,7 +201,8 @@ def generate(
         out: folder of the Parquet files; the default is a new temporary folder, which stays.
         threads: pours at once; the default is one for each core.
         resume: keep the rows that are in `out` already; else a folder with rows is refused.
-        progress: show a line on stderr; or a function of (total, resumed, made, unhealthy).
+        progress: show a line on stderr; or a function of (total, resumed, made, unhealthy,
+            jammed, out of view), the last three of all rows that are there.
         engine: another simulator in place of ours; docs/engines.md says what it must do.
 
     Raises:

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,7 @@ _GRAIN = (214, 168, 96)
 _RING = 40
 _EASE = 1.08
 _HOLD_MS = 1500
+_MOST_FRAMES = 2000
 
 
 class _Eye:
@@ -72,9 +74,9 @@ def film(
         scene: what is poured.
         path: the GIF.
         seed: of the pour.
-        fps: frames a second of the film.
-        slow: seconds of the film for a second of the pour.
-        width: of the picture [px].
+        fps: frames a second of the film, 0.01 to 100: a GIF has no more.
+        slow: seconds of the film for a second of the pour, 0.01 to 1000.
+        width: of the picture [px], 64 to 4096.
         rise_deg: how far above the horizon one looks from [deg].
         most_frames: the film ends there, a long pour with its last frame.
         progress: called with the simulated time of each frame [s].
@@ -85,8 +87,12 @@ def film(
     """
     if Path(path).suffix.lower() != ".gif":
         raise ValueError(f"{path} must end in .gif")
-    if not (fps > 0 and slow > 0 and width >= 64 and most_frames >= 1):
-        raise ValueError("fps and slow must be positive, width at least 64, most_frames at least 1")
+    limits = {"fps": (fps, 0.01, 100), "slow": (slow, 0.01, 1000), "width": (width, 64, 4096)}
+    for name, (value, low, high) in limits.items():
+        if not low <= value <= high:
+            raise ValueError(f"{name} must be from {low:g} to {high:g}, got {value:g}")
+    if not 1 <= most_frames <= _MOST_FRAMES:
+        raise ValueError(f"most_frames must be from 1 to {_MOST_FRAMES}, got {most_frames}")
     lines = _outlines(scene)
     start, radii = scene.start(seed)
     everything = np.concatenate([start, *lines, [[-0.1, -0.1, 0.0], [0.1, 0.1, 0.0]]])
@@ -106,10 +112,10 @@ def film(
     _native.film(scene.native, seed, fps * slow, see)
     frames += last
     times = [round(1000 / fps)] * (len(frames) - 1) + [_HOLD_MS]
-    beside = Path(path).with_name(Path(path).name + ".part")
     options: dict[str, Any] = {"append_images": frames[1:], "duration": times, "loop": 0}
-    frames[0].save(beside, "GIF", save_all=True, optimize=True, **options)
-    beside.replace(path)
+    buffer = BytesIO()
+    frames[0].save(buffer, "GIF", save_all=True, optimize=True, **options)
+    _native.write_file(Path(path), "gif", buffer.getvalue())
     return len(frames)
 
 

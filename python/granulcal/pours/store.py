@@ -5,6 +5,7 @@ A file is whole or absent. One that is damaged is as good as absent: its pours c
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from io import BytesIO
 from pathlib import Path
 from typing import TypeVar
 from zipfile import BadZipFile
@@ -13,12 +14,14 @@ from zlib import error as zlib_error
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.documents import read_bytes
 from granulcal.files import beside
 
 __all__ = ["PourStore"]
 
 Array = NDArray[np.float64]
-Of, Row = TypeVar("Of"), TypeVar("Row")
+Of = TypeVar("Of")
+Row = TypeVar("Row")
 
 
 class PourStore:
@@ -39,7 +42,8 @@ class PourStore:
         if not path.exists():
             return None
         try:
-            with np.load(path) as file:
+            # In memory: a reader that stumbles leaves a file open.
+            with np.load(BytesIO(read_bytes(path))) as file:
                 return {key: file[key] for key in file.files}
         except (ValueError, KeyError, EOFError, OSError, BadZipFile, zlib_error):
             return None

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from granulcal import _native
+from granulcal.documents import Table, read_json
 from granulcal.files import write_beside
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
@@ -61,13 +62,17 @@ def find_model(name: str) -> Path | None:
     """Returns the folder of a built-in scene's model that fits this simulator, None if there is none."""
     wanted = fingerprint(Scene.built_in(name), Prior.default())
     for folder in (cache_folder() / "models" / name, _SHIPPED / name):
-        try:
-            made = json.loads((folder / _MADE).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            continue
-        if made.get("fingerprint") == wanted:
+        if _made(folder / _MADE).get("fingerprint") == wanted:
             return folder
     return None
+
+
+def _made(path: Path) -> dict[str, object]:
+    """Returns what a model's mark says, nothing where there is none or a damaged one."""
+    try:
+        return read_json(path, Table({}, open=True))
+    except (OSError, ValueError):
+        return {}
 
 
 def model_named(name: str | Path) -> Path:
@@ -128,7 +133,7 @@ def make_model(
     stamp = fingerprint(scene, prior)
     made = {"fingerprint": stamp, "pours": pours, "seed": seed, "compact": compact}
     path = folder / _MADE
-    if path.exists() and json.loads(path.read_text(encoding="utf-8")) == made:
+    if _made(path) == made:
         say(f"{folder} is there already")
         return folder
     path.unlink(missing_ok=True)

@@ -1,13 +1,22 @@
 """Recordings of a pour whose material is known, as cameras' software would have written them."""
 
 import json
-import tomllib
+import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from granulcal.documents import (
+    LARGEST_DOCUMENT,
+    Number,
+    Table,
+    Whole,
+    check,
+    parse_toml,
+    read_bytes,
+)
 from granulcal.files import write_beside
 from granulcal.measured.ros_files import DepthFrame, write_bag, write_mcap
 from granulcal.pours.camera import Camera
@@ -24,6 +33,18 @@ _FRAME_NS = 33_333_333
 _START_NS = 1_700_000_000_000_000_000
 _TILT_DEG = (1.5, -1.0)
 _DEPTH_UNIT = 1e-4
+_PIXELS, _LENGTH = Whole(1, 10_000), Number(0, 1e6)
+_LENS = Table(
+    {
+        "width": _PIXELS,
+        "height": _PIXELS,
+        "fx": _LENGTH,
+        "fy": _LENGTH,
+        "cx": _LENGTH,
+        "cy": _LENGTH,
+    },
+    open=True,
+)
 
 SENSOR = """\
 # The camera of the sample recordings: a stereo camera with a baseline of 5 cm, its errors in px of disparity.
@@ -108,16 +129,16 @@ def write_samples(
         FileNotFoundError: the folder has no scene.toml or camera.toml.
     """
     scene = Scene.load(folder / "scene.toml").with_material(material)
-    lens = tomllib.loads((folder / "camera.toml").read_text(encoding="utf-8"))
-    sensor = folder / ".sensor.toml"
-    sensor.write_text(SENSOR.format(focal=lens["fx"], unit=_DEPTH_UNIT), encoding="utf-8")
+    path = folder / "camera.toml"
+    lens = parse_toml(read_bytes(path, most=LARGEST_DOCUMENT), path)
+    check(lens, _LENS, path)
     height = scene.get("camera.height")
     camera = Camera.load(folder / "camera.toml", height=height)
-    studio = _Studio(camera.tilted(x_deg=_TILT_DEG[0], y_deg=_TILT_DEG[1]), lens, sensor)
-    try:
+    with tempfile.TemporaryDirectory(prefix="granulcal-sample-") as place:
+        sensor = Path(place) / "sensor.toml"
+        sensor.write_text(SENSOR.format(focal=lens["fx"], unit=_DEPTH_UNIT), encoding="utf-8")
+        studio = _Studio(camera.tilted(x_deg=_TILT_DEG[0], y_deg=_TILT_DEG[1]), lens, sensor)
         return _write(folder, scene, studio, seed, conditions or {}, pours)
-    finally:
-        sensor.unlink()
 
 
 def _write(

@@ -136,6 +136,7 @@ fn as_json(found: &SensorFit, checked: Option<&Comparison>) -> Value {
     json!({
         "sensor": found.sensor,
         "edge_holes": found.edge_holes,
+        "flatness": found.flatness,
         "fit": comparison_json(&found.comparison),
         "check": checked.map(comparison_json),
     })
@@ -184,6 +185,11 @@ fn print(found: &SensorFit, checked: Option<&Comparison>) -> anyhow::Result<()> 
             ))?;
         }
     }
+    print_line(&format!(
+        "flatness       {:.1} % of the pixels on one surface (at least 50), {:.2} % off it (at most 5)",
+        100.0 * found.flatness.on_surface,
+        100.0 * found.flatness.deviation
+    ))?;
     print_field("noise", found.sensor.noise(), unit)?;
     print_field("fixed pattern", found.sensor.fixed_pattern(), unit)?;
     print_comparison("fitted to", &found.comparison)?;

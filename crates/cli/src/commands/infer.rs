@@ -7,6 +7,7 @@ use std::path::Path;
 use anyhow::Context as _;
 use granulcal_bayessim::Model;
 use granulcal_dataset::{Form, Limits, Recording, scene_from_text, write_file};
+use granulcal_dem::LAW;
 use granulcal_features::{Formation, PAPER16};
 use granulcal_scene::Scene;
 use serde_json::json;
@@ -27,6 +28,15 @@ pub fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
         note(
             "note: the model is of an earlier version without hashes: damage in it cannot be found",
         );
+    }
+    // A model of pairs that were handed in is of no scene, and of no law.
+    if model.scene_toml.is_some() && !matches!(model.law, Some(0 | LAW)) {
+        let law =
+            model.law.map_or("one of before laws had numbers".to_owned(), |law| law.to_string());
+        note(&format!(
+            "warning: the model was trained on pours of another law of the solver, {law}; today's is {LAW}: pours at its \
+             posterior are not those that it knows; train again"
+        ));
     }
     if !model.x_names.iter().map(String::as_str).eq(PAPER16.iter().map(|s| s.name)) {
         let (names, found) = (PAPER16.map(|s| s.name).join(", "), model.x_names.join(", "));

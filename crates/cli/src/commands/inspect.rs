@@ -80,6 +80,7 @@ fn dataset_facts(dataset: &Dataset) -> Value {
         "files without a hash": dataset.unverified.len(),
         "seed": dataset.header.seed,
         "version": dataset.header.version,
+        "law": dataset.header.law,
         "cpu_s": dataset.rows.iter().map(|row| row.cpu_s).sum::<f64>(),
         "scene": scene_facts(&dataset.header.scene),
         "prior": prior_facts(&dataset.header.prior),
@@ -170,6 +171,7 @@ fn checkpoint_facts(path: &Path) -> anyhow::Result<Value> {
     Ok(json!({
         "kind": "checkpoint",
         "version": header.version,
+        "law": granulcal_dem::LAW,
         "seed": header.seed,
         "substeps": header.substep,
         "simulated_s": header.time(),

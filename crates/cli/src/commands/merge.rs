@@ -19,6 +19,9 @@ pub fn run(args: &MergeArgs) -> anyhow::Result<Outcome> {
             dataset.unverified[0].display()
         );
     }
+    if let Some(other) = dataset.header.other_law() {
+        tracing::warn!("the rows were {other}");
+    }
     dataset.write(&args.out)?;
     let gaps = dataset.gaps(NAMED_GAPS);
     if !gaps.is_empty() {

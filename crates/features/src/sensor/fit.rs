@@ -26,6 +26,7 @@ mod components;
 mod covariance;
 mod expected;
 mod flat;
+mod flatness;
 mod frames;
 mod margins;
 mod session;
@@ -37,6 +38,7 @@ use crate::error::FeatureError;
 pub use comparison::Comparison;
 use components::Estimator;
 pub use covariance::{Covariances, Split};
+pub use flatness::Flatness;
 pub use frames::FlatFrames;
 use session::Session;
 pub use settings::FitSettings;
@@ -53,6 +55,8 @@ pub struct SensorFit {
     pub sensor: DepthSensor,
     /// Measured and simulated covariances of the frames of the fit.
     pub comparison: Comparison,
+    /// How flat the least flat of the frames is.
+    pub flatness: Flatness,
     /// Holes at depth edges that decided the margin; 0 where the frames show too few.
     pub edge_holes: usize,
 }
@@ -60,7 +64,7 @@ pub struct SensorFit {
 /// Fits noise, fixed pattern, rounding and holes to frames of a flat surface.
 ///
 /// # Errors
-/// `TooFewPoints` when a region has hardly any data, `OutOfRange` for a setting or a region outside of
+/// `NotFlat` for frames of something else, `TooFewPoints` when a region has hardly any data, `OutOfRange` for a setting or a region outside of
 /// the frames.
 pub fn fit(frames: &FlatFrames, settings: &FitSettings) -> Result<SensorFit, FeatureError> {
     let session = Session::new(frames, settings)?;
@@ -71,7 +75,7 @@ pub fn fit(frames: &FlatFrames, settings: &FitSettings) -> Result<SensorFit, Fea
     measured.noise.reduce_variance(rounding);
     let sensor = with_fields(&template, &measured, &session.estimator());
     let comparison = session.compare(&sensor, settings)?;
-    Ok(SensorFit { sensor, comparison, edge_holes })
+    Ok(SensorFit { sensor, comparison, flatness: session.flatness(), edge_holes })
 }
 
 /// How a sensor's simulated frames compare with measured ones, for instance with frames that the fit

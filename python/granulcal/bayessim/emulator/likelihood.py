@@ -36,7 +36,11 @@ from granulcal.bayessim.check.diagnostics import uniform_p_value
 from granulcal.bayessim.emulator.basis import learn_length_scales
 from granulcal.bayessim.emulator.emulator import Emulator, Prediction
 from granulcal.bayessim.emulator.noise import Noise
-from granulcal.bayessim.emulator.pooling import averaging_share, linear_scores, pooled_scales
+from granulcal.bayessim.emulator.pooling import (
+    averaging_share,
+    linear_scores,
+    pooled_scales,
+)
 from granulcal.bayessim.emulator.signal import SignalAxes
 from granulcal.bayessim.posterior.density import quasi_prior
 from granulcal.prior import Prior

@@ -25,7 +25,7 @@ from granulcal.bayessim.storage.tensors import Tensors, model_tensors
 from granulcal.bayessim.training.config import Config
 from granulcal.bayessim.training.summary import TrainingSummary
 from granulcal.documents import LARGEST_DOCUMENT, parse_json, read_bytes
-from granulcal.errors import ModelFormatError, UnverifiedModelWarning
+from granulcal.errors import ModelFormatError, OtherLawWarning, UnverifiedModelWarning
 from granulcal.files import write_beside
 from granulcal.prior import Prior
 
@@ -94,6 +94,16 @@ def load_parts(path: str | PathLike[str]) -> Parts:
             UnverifiedModelWarning,
             stacklevel=3,
         )
+    law = document.get("law")
+    # A model of pairs that were handed in is of no scene, and of no law.
+    if document["scene_toml"] is not None and law not in (0, _native.LAW):
+        named = "one of before laws had numbers" if law is None else f"law {law}"
+        warnings.warn(
+            f"{folder} was trained on pours of another law of the solver, {named}, which is not "
+            f"today's {_native.LAW}: train again",
+            OtherLawWarning,
+            stacklevel=3,
+        )
     try:
         prior = Prior.from_toml(document["prior_toml"])
         config = Config(**document["config"])
@@ -113,6 +123,7 @@ def load_parts(path: str | PathLike[str]) -> Parts:
             summary=TrainingSummary.from_dict(document["summary"]),
             calibration=None if calibration is None else Calibration.from_dict(calibration),
             scene_toml=document["scene_toml"],
+            law=document.get("law"),
         )
     except KeyError as error:
         raise ModelFormatError(f"{where} has no entry {error}") from None
@@ -143,6 +154,7 @@ def _document(model: Trained) -> dict[str, Any]:
         "config": model.config.as_dict(),
         "scene_toml": model.scene_toml,
         "scene_hash": model.scene_hash,
+        "law": model.law,
         "has_network": model.amortised is not None,
         "average": model.average.form,
         "emulator_weight": model.average.emulator,

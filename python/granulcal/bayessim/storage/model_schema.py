@@ -131,7 +131,7 @@ def _schema(version: int) -> Schema:
             "calibration": Maybe(_CALIBRATION),
             **of_version,
         },
-        {"is_calibrated": Maybe(Flag())},
+        {"is_calibrated": Maybe(Flag()), "law": Maybe(Whole(0, 2**32 - 1))},
         open=True,
     )
 

@@ -31,6 +31,7 @@ class Parts(TypedDict):
     calibration: Calibration | None
     identifiability: Identifiability | None
     scene_toml: str | None
+    law: int | None
 
 
 class Trained(Protocol):
@@ -48,6 +49,7 @@ class Trained(Protocol):
     calibration: Calibration | None
     identifiability: Identifiability | None
     scene_toml: str | None
+    law: int | None
 
     @property
     def scene_hash(self) -> str | None:

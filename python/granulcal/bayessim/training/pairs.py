@@ -35,6 +35,7 @@ class TrainingPairs:
         excluded: pairs left out by reason.
         horizon_count: kept pairs whose simulation ended at its time limit.
         scene_toml: the scene that the pairs come from, or None.
+        law: number of the solver's law that the pours follow, 0 for another simulator, or None.
     """
 
     prior: Prior
@@ -45,6 +46,7 @@ class TrainingPairs:
     excluded: dict[str, int]
     horizon_count: int
     scene_toml: str | None
+    law: int | None = None
 
     @classmethod
     def gather(
@@ -65,7 +67,7 @@ class TrainingPairs:
                 parameters, parameters outside the prior, no prior, or too few usable pairs.
             TypeError: an array that does not hold real numbers.
         """
-        theta_names = None
+        theta_names, law = None, None
         if x is None:
             data = data_or_theta
             for attribute in ("theta", "x"):
@@ -80,6 +82,7 @@ class TrainingPairs:
             status = status if status is not None else getattr(data, "status", None)
             x_names = x_names if x_names is not None else getattr(data, "x_names", None)
             scene = scene if scene is not None else getattr(data, "scene_toml", None)
+            law = getattr(data, "law", None)
         else:
             theta_values = data_or_theta
         if prior is None:
@@ -116,6 +119,7 @@ class TrainingPairs:
             excluded=excluded,
             horizon_count=int(np.sum(statuses[keep] == "horizon")),
             scene_toml=_scene_toml(scene),
+            law=law,
         )
 
 

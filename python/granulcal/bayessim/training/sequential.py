@@ -21,7 +21,7 @@ Reference:
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +33,7 @@ from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.bayessim.training.round_fit import RoundFit, first_design
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.one_thread import one_thread
+from granulcal.pours.left_out import LeftOut
 from granulcal.prior import Prior
 
 __all__ = ["Round", "SequentialFit", "infer_within_budget", "round_sizes", "rounds_of"]
@@ -86,6 +87,7 @@ class SequentialFit:
         theta: parameters of all pours, own units, shape (n, p).
         x: their statistics, NaN where there are none, shape (n, s).
         rounds: what was known after each.
+        left_out: pours that could not be used, by why.
     """
 
     posterior: Posterior
@@ -94,6 +96,7 @@ class SequentialFit:
     theta: Array
     x: Array
     rounds: tuple[Round, ...]
+    left_out: LeftOut = field(default_factory=LeftOut)
 
 
 def round_sizes(budget: int) -> list[int]:

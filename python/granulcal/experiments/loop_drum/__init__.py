@@ -21,10 +21,13 @@ _BUDGET = 1900
 _ASKED = {"both": (15, 45), "fit-15": (15,), "fit-45": (45,)}
 
 
-def reproduce(out: Path, data: Path) -> None:
-    """Runs the loop on both speeds and on each alone; results.md and pages in `out`/loop_drum."""
+def reproduce(out: Path, data: Path) -> bool:
+    """Runs the loop on both speeds and on each alone; results.md and pages in `out`/loop_drum.
+
+    Returns whether every verdict stands.
+    """
     folder = out / "loop_drum"
-    surrogate = None
+    surrogate, stands = None, True
     for name, fitted in _ASKED.items():
         asked = task(data, fitted)
         closed = close_loop(
@@ -34,6 +37,7 @@ def reproduce(out: Path, data: Path) -> None:
             budget=_BUDGET,
             surrogate=surrogate,
         )
+        stands &= closed.standing.stands
         if surrogate is None:
             # The pours are the same whatever is fitted, and so is what they say.
             surrogate = closed.trace.local.surrogate
@@ -47,3 +51,4 @@ def reproduce(out: Path, data: Path) -> None:
             text = "\n".join(table(closed, compare_speeds(closed, folder))) + "\n"
             write_beside(folder / "results.md", text)
             print(folder / "results.md")
+    return stands

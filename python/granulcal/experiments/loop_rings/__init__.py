@@ -16,8 +16,11 @@ __all__ = ["GROUPS", "reproduce", "task"]
 _BUDGET = 1000
 
 
-def reproduce(out: Path, data: Path) -> None:
-    """Runs the loop on every group of rings; results.md and pages in `out`/loop_rings."""
+def reproduce(out: Path, data: Path) -> bool:
+    """Runs the loop on every group of rings; results.md and pages in `out`/loop_rings.
+
+    Returns whether every verdict stands.
+    """
     folder = out / "loop_rings"
     closed: dict[str, Closed] = {}
     surrogate = None
@@ -41,6 +44,7 @@ def reproduce(out: Path, data: Path) -> None:
     lines = [line for group, one in closed.items() for line in _table(group, one)]
     write_beside(folder / "results.md", "\n".join(lines) + "\n")
     print(folder / "results.md")
+    return all(one.standing.stands for one in closed.values())
 
 
 def _table(group: str, closed: Closed) -> list[str]:

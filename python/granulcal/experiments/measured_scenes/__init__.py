@@ -7,6 +7,7 @@ comes out is written down as it is.
 from pathlib import Path
 
 from granulcal.experiments.measured_scenes import column, drum, hopper
+from granulcal.files import write_beside
 
 __all__ = ["reproduce"]
 
@@ -18,5 +19,5 @@ def reproduce(out_dir: Path, data_dir: Path) -> None:
     for study in (column, hopper, drum):
         parts.append(study.reproduce(out_dir, data_dir))
         print(parts[-1], flush=True)
-    (out_dir / "results.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    write_beside(out_dir / "results.md", "\n\n".join(parts) + "\n")
     print(f"table and pictures in {out_dir}")

@@ -136,7 +136,8 @@ def run(workshop: Workshop) -> Outcome:
             "and not the mask.",
             "The sensor is a RealSense D435 as `granulcal reproduce sensor` fits it to boards at "
             "0.4 to 0.7 m.",
-            f"{training.unusable} training and {tests.unusable} test pours were not usable.",
+            f"Not usable were, of the training pours: {training.unusable}; of the tests: "
+            f"{tests.unusable}.",
         ],
     )
 

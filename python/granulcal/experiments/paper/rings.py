@@ -58,7 +58,7 @@ def run(workshop: Workshop) -> Outcome:
     wide = RingModel.train(
         scene, heights=_WIDE, pours=size.training, out=wide_folder, seed=_WIDE_SEED, **common
     )
-    workshop.pours += 2 * size.training + size.tests + held_out.unusable
+    workshop.pours += 2 * size.training + size.tests + held_out.unusable.total
     workshop.seeds |= {"rings": _SEED, "rings-wide": _WIDE_SEED, "spill": _SPILL_SEED}
     try:
         pattern_rows, plan_file = _pattern(workshop, wide, scene)
@@ -110,7 +110,7 @@ def run(workshop: Workshop) -> Outcome:
             "holds the funnel closed.",
             "The paper's spill counts stand in a figure and its bowl is not described: nothing "
             "can be compared. The bowl here has a rim of 14 cm at a height of 4.5 cm.",
-            f"{held_out.unusable} held-out pours jammed or were unhealthy and are not counted.",
+            f"Held-out pours that could not be used and are not counted: {held_out.unusable}.",
         ],
     )
 

@@ -122,7 +122,7 @@ def _filmed(scene: Scene) -> Scene:
 def _both(data: Dataset) -> dict[str, Pairs]:
     """The usable pours, by their last image and by all images."""
     kept = data.is_usable & np.isfinite(data.paper16).all(axis=1)
-    unusable, theta = int((~kept).sum()), data.theta[kept]
+    unusable, theta = data.left_out, data.theta[kept]
     last = data.paper16[kept]
     everything = np.column_stack([last, data.observed[kept]])
     names = (*NAMES, *data.observed_names)

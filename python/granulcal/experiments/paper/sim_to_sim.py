@@ -23,6 +23,7 @@ from granulcal.experiments.paper.common.measure import (
 from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.forward import scene_at
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.simulate import simulate
 
 __all__ = ["EXPERIMENT"]
@@ -65,7 +66,7 @@ class _Found:
     held: dict[float, int]
     tests: Pairs
     estimates: Array
-    unusable: int
+    unusable: LeftOut
 
 
 def run(workshop: Workshop) -> Outcome:
@@ -186,7 +187,7 @@ def _sharpness(found: dict[str, _Found]) -> Table:
 def _notes(found: dict[str, _Found]) -> list[str]:
     first = found[three.VARIANTS[0].name]
     third = found[three.VARIANTS[-1].name]
-    left = ", ".join(f"{each.unusable} of {name}" for name, each in found.items())
+    left = ", ".join(f"{name}: {each.unusable}" for name, each in found.items())
     return [
         "The paper's rolling friction is read as a length over the effective radius of 1 mm; its "
         "range then spans six decades, of which most are told apart from their neighbours by "

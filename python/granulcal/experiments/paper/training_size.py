@@ -64,7 +64,8 @@ def run(workshop: Workshop) -> Outcome:
         notes=[
             "Rolling friction and restitution are known and fixed at the scene's 0.1 and 0.5; the "
             "paper does not say at which values its own are.",
-            f"{training.unusable} training and {tests.unusable} test pours were not usable.",
+            f"Not usable were, of the training pours: {training.unusable}; of the tests: "
+            f"{tests.unusable}.",
         ],
     )
 

@@ -32,6 +32,7 @@ from granulcal.loop.pours.image_rows import ImageRows
 from granulcal.loop.pours.measures import Measures
 from granulcal.loop.pours.plan import ArchivePlan, Pours
 from granulcal.pours.dataset import Dataset, generate
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 
@@ -133,7 +134,7 @@ class Archive:
         """
         plan, measures = self.plan, Measures.of(self.plan.scene)
         rows: list[tuple[Array, Array, Array, Array]] = []
-        left_out = 0
+        left_out = LeftOut()
         for part in self._parts():
             scene, count, folder = part.scene, part.count, self.folder / part.name
             if not folder.exists():
@@ -141,7 +142,7 @@ class Archive:
             data = Dataset.load(folder)
             values, usable = measures.of_dataset(data)
             usable[count:] = False
-            left_out += int((~usable[:count]).sum())
+            left_out += LeftOut.of(data.status[:count].tolist(), usable[:count].tolist())
             columns = {path: data.theta[usable, i] for i, path in enumerate(data.theta_names)}
             n = int(usable.sum())
             theta = np.column_stack([columns[path] for path in plan.prior.names])

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.engines.in_use import version_of_pours
+from granulcal.engines.in_use import law_of_pours, version_of_pours
 from granulcal.loop.pours.measures import Measures
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
@@ -47,7 +47,7 @@ class Forward:
         `faults` are those of the image, by kind.
         """
         names = Measures.of(scene).names
-        of = [version_of_pours(), names, scene.to_toml(), list(seeds)]
+        of = [version_of_pours(), law_of_pours(), names, scene.to_toml(), list(seeds)]
         text = json.dumps([*of, dict(faults)] if faults else of)
         key = hashlib.sha256(text.encode()).hexdigest()[:16]
         kept = self.store.read(key)

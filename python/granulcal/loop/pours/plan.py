@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.engines.in_use import version_of_pours
+from granulcal.engines.in_use import law_of_pours, version_of_pours
 from granulcal.loop.effects.design import Design
 from granulcal.loop.effects.library import LibraryEffect, fingerprint
 from granulcal.loop.effects.tolerance import Tolerances
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
@@ -54,6 +55,7 @@ class ArchivePlan:
         """
         return {
             "version": version_of_pours(),
+            "law": law_of_pours(),
             "scene": self.scene.to_toml(),
             "prior": self.prior.to_toml(),
             "conditions": [list(condition) for condition in self.conditions],
@@ -110,7 +112,7 @@ class Pours:
         psi: shape (n, K).
         x: statistics in their units, shape (n, s).
         names: of the statistics.
-        left_out: pours that were not usable.
+        left_out: pours that were not usable, by why.
     """
 
     theta: Array
@@ -118,4 +120,4 @@ class Pours:
     psi: Array
     x: Array
     names: tuple[str, ...]
-    left_out: int
+    left_out: LeftOut

@@ -17,6 +17,7 @@ three conditions or more were fitted, the error with which the row tells each fr
 
 import json
 import tomllib
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -26,12 +27,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.errors import ObservationError
+from granulcal import _native
+from granulcal.documents import LARGEST_DOCUMENT, parse_json, read_bytes
+from granulcal.engines.in_use import law_of_pours
+from granulcal.errors import ObservationError, OtherLawWarning
 from granulcal.files import write_beside
 from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.check.trivial import line_weights, nearest_weights
 from granulcal.loop.effects.definitions import is_definition
 from granulcal.loop.pours.forward import Coarse, Forward
+from granulcal.loop.report.models_schema import check_models
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.pours.scene import Scene
 
@@ -135,6 +140,7 @@ class Models:
     def write(self, folder: Path) -> Path:
         """Writes `models.json` into a folder and returns its path."""
         document = {
+            "law": law_of_pours(),
             "scene": self.scene.to_toml(),
             "verdict": self.verdict,
             "paths": self.paths,
@@ -160,11 +166,21 @@ class Models:
 
         Raises:
             FileNotFoundError: there is no `models.json`.
+            ObservationError: it is damaged; the message says where.
         """
         path = folder / _NAME
         if not path.exists():
             raise FileNotFoundError(f"{path} is not there: is {folder} the -o of close-loop?")
-        d = json.loads(path.read_text(encoding="utf-8"))
+        data = read_bytes(path, most=LARGEST_DOCUMENT)
+        d = parse_json(data, path, error=ObservationError)
+        check_models(d, path)
+        if d.get("law") not in (0, _native.LAW):
+            warnings.warn(
+                f"{path} is of another law of the solver than today's {_native.LAW}: what it "
+                "fitted is not what is poured now; close the loop again",
+                OtherLawWarning,
+                stacklevel=2,
+            )
         inputs = tuple((str(p), float(a), float(b)) for p, a, b in d["inputs"])
         known = np.array(d["known"], dtype=float).reshape(len(d["means"]), len(inputs))
         return cls(

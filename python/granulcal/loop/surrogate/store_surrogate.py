@@ -27,5 +27,5 @@ def fit_surrogate(
     condition = np.concatenate([part.condition for part in whole])
     psi = np.concatenate([part.psi for part in whole])
     x = np.concatenate([part.x for part in whole])
-    say(f"surrogate of {len(x)} pours ({rows.left_out} left out: jammed, unhealthy, unseen)")
+    say(f"surrogate of {len(x)} pours (left out: {rows.left_out})")
     return Surrogate.fit(design, theta, condition, psi, x, names=rows.names, seed=seed)

@@ -7,6 +7,7 @@ use super::comparison::Comparison;
 use super::components::Estimator;
 use super::covariance::{self, Split};
 use super::flat::{Patch, SD_PER_MAD, detrend, median};
+use super::flatness::Flatness;
 use super::frames::{FlatFrames, Optics};
 use super::settings::FitSettings;
 use crate::error::FeatureError;
@@ -15,13 +16,8 @@ use crate::sensor::DepthSensor;
 use crate::sensor::field::SensorGrid;
 use crate::sensor::field::sample;
 
-/// Least share of the pixels with data that lie on the surface, and largest standard deviation from it over the
-/// distance (of height maps: over the longer side). A depth camera errs by some 2 % of the distance; a room is no wall.
-const LEAST_ON_SURFACE: f64 = 0.5;
-const LARGEST_DEVIATION: f64 = 0.05;
-
-/// Refuses frames of what is not flat: their shape would be taken for the sensor's pattern.
-fn require_flat(optics: &Optics, values: &[f64], patch: &Patch) -> Result<(), FeatureError> {
+/// How flat a region is; refuses one that is not.
+fn require_flat(optics: &Optics, values: &[f64], patch: &Patch) -> Result<Flatness, FeatureError> {
     let valid = values.iter().filter(|value| value.is_finite()).count().max(1);
     let on_surface = patch.count() as f64 / valid as f64;
     let (scale, relative): (_, Box<dyn Fn(f64, f64) -> f64>) = match *optics {
@@ -41,11 +37,7 @@ fn require_flat(optics: &Optics, values: &[f64], patch: &Patch) -> Result<(), Fe
         .map(|((residual, trend), _)| relative(*residual, *trend).abs())
         .collect();
     let deviation = SD_PER_MAD * median(&mut off);
-    if on_surface >= LEAST_ON_SURFACE && deviation <= LARGEST_DEVIATION {
-        return Ok(());
-    }
-    let (on_surface, deviation) = (100.0 * on_surface, 100.0 * deviation);
-    Err(FeatureError::NotFlat { on_surface, deviation, scale })
+    Flatness { on_surface, deviation }.require(scale)
 }
 
 /// Frames of one sensor, their trends and residuals.
@@ -55,6 +47,7 @@ pub(super) struct Session<'a> {
     /// Region r of frame k.
     patches: Vec<Vec<Patch>>,
     shifts: Vec<(isize, isize)>,
+    flatness: Flatness,
     trend_degree: usize,
     max_lag: usize,
 }
@@ -74,19 +67,25 @@ impl<'a> Session<'a> {
         let regions = frames.regions(&settings.regions)?;
         let degree = settings.trend_degree;
         let mut patches = Vec::with_capacity(frames.values.len());
+        let mut flatness = Flatness::BEST;
         for frame in 0..frames.values.len() {
-            let of = |region: &Region| {
+            let mut of = |region: &Region| {
                 let values = frames.cut(frame, region);
                 let error = |v, t| frames.optics.error(v, t);
                 let patch = detrend(&values, region.width, degree, error)?;
-                require_flat(&frames.optics, &values, &patch)?;
+                flatness = flatness.worst(require_flat(&frames.optics, &values, &patch)?);
                 Ok::<_, FeatureError>(patch)
             };
-            patches.push(regions.iter().map(of).collect::<Result<Vec<_>, FeatureError>>()?);
+            patches.push(regions.iter().map(&mut of).collect::<Result<Vec<_>, FeatureError>>()?);
         }
         let shifts = covariance::shifts(&patches, settings.max_shift);
         let max_lag = settings.max_lag;
-        Ok(Self { frames, regions, patches, shifts, trend_degree: degree, max_lag })
+        Ok(Self { frames, regions, patches, shifts, flatness, trend_degree: degree, max_lag })
+    }
+
+    /// How flat the least flat region of all frames is.
+    pub(super) fn flatness(&self) -> Flatness {
+        self.flatness
     }
 
     /// Covariances of the measured frames.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from granulcal.experiments.paper.common.eye import Disturbance, Eye
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.statistics import NAMES
 from granulcal.prior import Parameter, Prior
 
@@ -83,4 +84,4 @@ def _seen(workshop: Workshop, name: str, theta: Array, seed: int, views: Mapping
     look = Eye.of(scene).look(views)
     x = workshop.poured(name, scene, PRIOR, theta, seed=seed, look=look)
     kept = np.isfinite(x).all(axis=1)
-    return Pairs(theta[kept], x[kept], PRIOR, look[0], int((~kept).sum()))
+    return Pairs(theta[kept], x[kept], PRIOR, look[0], LeftOut(unseen=int((~kept).sum())))

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.files import write_beside
 from granulcal.pours.dataset import Dataset, generate
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour
 from granulcal.prior import Prior
@@ -38,14 +39,14 @@ class Pairs:
         x: statistics, shape (n, s).
         prior: that names the parameters.
         names: of the statistics.
-        unusable: pours besides that jammed, were unhealthy or showed too few grains.
+        unusable: pours besides that could not be used, by why.
     """
 
     theta: Array
     x: Array
     prior: Prior
     names: tuple[str, ...]
-    unusable: int
+    unusable: LeftOut
 
     def first(self, count: int) -> "Pairs":
         """Returns the first so many."""
@@ -169,7 +170,9 @@ class Workshop:
         self.say(f"{name}: {total} pours")
         line = None if self.quiet else ProgressLine()
         if line is not None:
-            kept.progress = lambda done: line(total, resumed, max(done - resumed, 0), 0)
+            kept.progress = lambda done: line(
+                total, resumed, max(done - resumed, 0), *kept.left_out(total).counts
+            )
         try:
             x = kept(theta, 0)
         finally:
@@ -208,7 +211,7 @@ class Workshop:
 
 def _usable(data: Dataset) -> Pairs:
     kept = data.is_usable
-    return Pairs(data.theta[kept], data.x[kept], data.prior, data.x_names, int((~kept).sum()))
+    return Pairs(data.theta[kept], data.x[kept], data.prior, data.x_names, data.left_out)
 
 
 def _key(pairs: Pairs, seed: int, settings: dict[str, Any]) -> str:

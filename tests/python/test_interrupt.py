@@ -1,0 +1,178 @@
+"""Ctrl-C ends every command of the Python half, with code 130 and no traceback; twice forces it.
+
+Each command runs in a process of its own that says when its work has begun and then never comes to
+an end by itself: `train` fits again and again, `calibrate` has a budget that nobody waits for. So
+there is no race with the clock. How long the end took is printed; `pytest -s` shows it.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.bayessim import BayesSim
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+
+# Marks the begin of the work in `what`, which is then repeated for ever.
+DRIVER = """
+import importlib, sys
+from granulcal import cli
+owner, name, repeats = {owner!r}, {name!r}, {repeats!r}
+module, _, inner = owner.partition(":")
+place = importlib.import_module(module)
+place = getattr(place, inner) if inner else place
+real = getattr(place, name)
+def work(*args, **kwargs):
+    print("begun", flush=True)
+    while True:
+        found = real(*args, **kwargs)
+        if not repeats:
+            return found
+if isinstance(place, type):
+    is_of_class = isinstance(place.__dict__[name], classmethod)
+    setattr(place, name, staticmethod(work) if is_of_class else work)
+else:
+    setattr(place, name, work)
+sys.argv = ["granulcal", *{words!r}]
+sys.exit(cli.console())
+"""
+QUICK: dict[str, Any] = {
+    "features": 8,
+    "ensemble": 2,
+    "components": 2,
+    "emulator_features": 8,
+    "max_epochs": 10,
+}
+TASK = """
+scene = "scene.toml"
+prior = "prior.toml"
+effects = ["drag"]
+camera = "camera.toml"
+[[conditions]]
+name = "low"
+at = { "start.height" = 0.02 }
+use = "fit"
+recordings = ["depth.png", "second.png"]
+[[conditions]]
+name = "high"
+at = { "start.height" = 0.04 }
+use = "fit"
+recordings = ["third.png", "fourth.png"]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(small_data, small_scene, small_prior, tmp_path_factory) -> Path:
+    """A scene, a prior, pours, a model and a recording."""
+    place = tmp_path_factory.mktemp("interrupted")
+    (place / "scene.toml").write_text(small_scene.to_toml())
+    (place / "prior.toml").write_text(small_prior.to_toml())
+    small_data.save(place / "pours.parquet")
+    model = BayesSim.fit(small_data, quiet=True, **QUICK)
+    model.save(place / "model")
+    camera = gc.Camera.overhead(
+        height=small_scene.get("camera.height"),
+        field_width=small_scene.get("camera.field_width"),
+        pixels=int(small_scene.get("camera.pixels")),
+    )
+    pour = gc.simulate(small_scene, seed=11)
+    camera.record(pour.positions, pour.radii, place)
+    for name in ("second", "third", "fourth"):
+        (place / f"{name}.png").write_bytes((place / "depth.png").read_bytes())
+    (place / "loop.toml").write_text(TASK)
+    return place
+
+
+CALIBRATE = "calibrate scene.toml prior.toml depth.png"
+# Command line, and what of it marks the begin: owner, name, whether it is repeated for ever.
+COMMANDS = {
+    "train": (
+        ["train", "pours.parquet", "-o", "new"],
+        ("granulcal.bayessim:BayesSim", "fit", True),
+    ),
+    "check": (
+        ["check", "model", "--data", "pours.parquet"],
+        ("granulcal.bayessim:BayesSim", "check", True),
+    ),
+    "infer": (
+        ["infer", "model", "depth.png", "--camera", "camera.toml"],
+        ("granulcal._native", "run_cli", True),
+    ),
+    "calibrate": (
+        [*CALIBRATE.split(), "--camera", "camera.toml", "--budget", "20000", "-o", "run"],
+        ("granulcal._native", "simulate", False),
+    ),
+    "close-loop": (
+        ["close-loop", "loop.toml", "-o", "loop", "--budget", "20000"],
+        ("granulcal._native", "generate", False),
+    ),
+    "reproduce": (
+        ["reproduce", "paper", "--quick", "--out", "out"],
+        ("granulcal._native", "generate", True),
+    ),
+}
+
+
+@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_ctrl_c_ends_the_command(folder: Path, tmp_path: Path, command: str, times: int) -> None:
+    words, (owner, name, repeats) = COMMANDS[command]
+    # What is read is there, what is written is of this test alone.
+    named = [str(folder / w) if (folder / w).exists() else w for w in words]
+    code = DRIVER.format(owner=owner, name=name, repeats=repeats, words=named)
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"GRANULCAL_NO_LIMITS": "1"},
+    )
+    try:
+        assert process.stdout is not None
+        said = []
+        for line in process.stdout:
+            said.append(line)
+            if line == "begun\n":
+                break
+        assert said and said[-1] == "begun\n", (said, process.communicate()[1])
+        started = time.monotonic()
+        for _ in range(times):
+            process.send_signal(signal.SIGINT)
+            time.sleep(0.02)
+        _, error = process.communicate(timeout=120)
+        print(f"{command}, Ctrl-C {times}x: ended after {time.monotonic() - started:.2f} s")
+    finally:
+        process.kill()
+    assert process.returncode == 130, error
+    assert "Traceback" not in error, error
+    assert "stopped" in error, error
+    left = [path for path in tmp_path.rglob("*") if path.name.endswith(".tmp")]
+    assert left == []
+
+
+def test_finished_pours_of_an_interrupted_calibration_are_kept(
+    small_scene, small_prior, tmp_path: Path
+) -> None:
+    from granulcal.within_budget import KeptPours
+
+    kept = KeptPours(small_scene, small_prior, tmp_path / "pours.json", threads=1)
+
+    def stop(count: int) -> None:
+        if count == 3:
+            raise KeyboardInterrupt
+
+    kept.progress = stop
+    theta = np.repeat(small_prior.mean()[None], 6, axis=0)
+    with pytest.raises(KeyboardInterrupt):
+        kept(theta, 0)
+    again = KeptPours(small_scene, small_prior, tmp_path / "pours.json", threads=1)
+    assert len(again.rows) >= 3
