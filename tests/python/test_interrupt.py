@@ -154,7 +154,8 @@ def test_ctrl_c_ends_the_command(folder: Path, tmp_path: Path, command: str, tim
         process.kill()
     assert process.returncode == 130, error
     assert "Traceback" not in error, error
-    assert "stopped" in error, error
+    # The second time ends it at once, whatever there was to say.
+    assert times == 2 or "stopped" in error, error
     left = [path for path in tmp_path.rglob("*") if path.name.endswith(".tmp")]
     assert left == []
 
