@@ -158,10 +158,10 @@ def test_the_drums_walls_turn_together_and_its_effects_fit_the_scene(tmp_path: P
     assert len(named) == 6 and not {"fill", "frame.x", "resolution"} & set(named)
     (fill,) = (effect for effect in asked.library if effect.name == "fill")
     assert fill.nuisance_sd == pytest.approx(0.5)
-    assert asked.coarse is not None and asked.coarse.held == pytest.approx(-5 / 7)
-    # Equal solid volume: as many grains of 2.4 mm as stood there before.
-    assert asked.coarse.numbers["grains.count"] == 3648
-    assert asked.coarse.numbers["start.spacing"] == pytest.approx(2.6e-3, rel=1e-3)
+    assert asked.coarse is not None and asked.coarse.held == pytest.approx(-1.2)
+    # Equal solid volume.
+    assert asked.coarse.numbers["grains.count"] == 1283
+    assert asked.coarse.numbers["start.spacing"] == pytest.approx(2.6e-3 * 3.4 / 2.4)
     scene.with_(asked.coarse.numbers)
     for entry in asked.library:
         effect = entry.at(scene)
