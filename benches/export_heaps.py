@@ -2,6 +2,7 @@
 
     python benches/export_heaps.py
     python benches/export_heaps.py --engines lammps yade --rows heap --seeds 2
+    python benches/export_heaps.py --engines --seeds 4        # ours alone
 
 Pours what export_heaps.csv lacks and prints the table. Engines that are not installed are left
 out; those of PyPI are looked for in build/engines-venv too. A pour is kept once it is made; ours
@@ -106,7 +107,7 @@ def main() -> None:
     """Pours what is missing and prints the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=list(ROWS))
-    parser.add_argument("--engines", nargs="+", choices=ENGINES, default=list(ENGINES))
+    parser.add_argument("--engines", nargs="*", choices=ENGINES, default=list(ENGINES))
     parser.add_argument("--seeds", type=int, default=2)
     options = parser.parse_args()
     rows, ours = read(), simulator()

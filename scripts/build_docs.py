@@ -121,8 +121,11 @@ def rust() -> str:
     lines = ["# Rust", "", "The simulator, its images and its files, without Python.", ""]
     lines += ["| crate | what |", "|---|---|"]
     for manifest in sorted((ROOT / "crates").glob("*/Cargo.toml")):
-        package = tomllib.loads(manifest.read_text(encoding="utf-8"))["package"]
-        name = package["name"]
+        table = tomllib.loads(manifest.read_text(encoding="utf-8"))
+        package, name = table["package"], table["package"]["name"]
+        if table.get("lib", {}).get("crate-type") == ["cdylib"]:
+            # Python's module: its page is that of Python.
+            continue
         # HTML: the pages are not there yet when the links of Markdown are looked at.
         place = f"rust/{name.replace('-', '_')}/index.html"
         lines.append(f'| <a href="{place}">{name}</a> | {package["description"]} |')

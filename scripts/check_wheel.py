@@ -29,7 +29,9 @@ def main() -> int:
         assert granulcal(["sample", str(folder)]) == 0
         scene = gc.Scene.load(folder / "scene.toml")
         pour = gc.simulate(scene, seed=1)
-        assert pour.status == "at_rest" and pour.positions.shape == (60, 3), pour
+        # Single grains may roll out of view: then it is not waited for them.
+        assert pour.status in ("at_rest", "out_of_view"), pour
+        assert pour.positions.shape == (60, 3), pour
         data = gc.generate(scene, gc.Prior.default(), 4, out=folder / "pours", progress=False)
         assert data.x.shape == (4, 16)
         image = gc.Recording.open(folder / "couscous.png", camera=folder / "camera.toml")

@@ -4,7 +4,7 @@ import sys
 import time
 from typing import TextIO
 
-__all__ = ["ProgressLine"]
+__all__ = ["ProgressLine", "duration"]
 
 _WIDTH = 30
 _LOG_EVERY_S = 30.0
@@ -44,7 +44,7 @@ class ProgressLine:
                 text += f", {count} {word}"
         if made and done < total:
             left = (total - done) * (now - self._started) / made
-            text += f", {_duration(left)} left"
+            text += f", {duration(left)} left"
         if self._is_terminal:
             filled = _WIDTH * done // max(total, 1)
             bar = "#" * filled + "-" * (_WIDTH - filled)
@@ -67,6 +67,9 @@ class ProgressLine:
             self._shown = text
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Returns a time in words: seconds, minutes or hours."""
+    if seconds >= 5400:
+        return f"{seconds / 3600:.1f} h"
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes} min {rest:02} s" if minutes else f"{rest} s"

@@ -1,11 +1,14 @@
 """The command line as one program: help, completions and suggestions know every command."""
 
+import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+import granulcal as gc
 from granulcal.cli import _parser, main
 
 ALL = """
@@ -75,3 +78,28 @@ def test_an_engine_needs_the_python_package(capfd: pytest.CaptureFixture[str]) -
     assert _native.run_cli(["granulcal-cli", "simulate", "drop", "--engine", "lammps"]) == 2
     assert "Python package" in capfd.readouterr().err
     assert main(["completions", "--help"]) == 0
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["calibrate", "{scene}", "default", "x.bag", "-o", "run", "--budget", "70"],
+        ["design", "rings", "{scene}", "--pile", "0.04", "-o", "plan", "--pours", "70"],
+    ],
+)
+def test_a_dry_run_says_how_long_and_makes_nothing(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x.bag").write_bytes(b"")
+    scene = gc.Scene.funnel(0.05, count=30, preset="fast")
+    (tmp_path / "scene.toml").write_text(scene.to_toml())
+    words = [word.format(scene="scene.toml") for word in words]
+    assert main([*words, "--dry-run", "--json", "--threads", "2"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    # As `generate --dry-run` says it.
+    assert told["missing"] == 70 and told["threads"] == 2
+    assert told["seconds"] == pytest.approx(70 * told["pour_cpu_s"] / 2) and told["seconds"] > 0
+    assert main([*words, "--dry-run"]) == 0
+    assert capsys.readouterr().out.startswith("about ")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml", "x.bag"]

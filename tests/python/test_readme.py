@@ -17,7 +17,7 @@ SMALL = {
     "-n 1000": "-n 64",
     "n=1000": "n=64",
     "--budget 100": "--budget 60",
-    "-o report.html": "-o report.html --seeds 1",
+    "-o report.html": "-o report.html --seeds 1 --draws 2",
     "close-loop loop.toml -o loop": "close-loop loop.toml -o loop --budget 200",
     "--pile 0.04 -o plan": "--pile 0.04 -o plan --pours 60 --extrapolate",
     "wall.bag --baseline 0.05": "wall.bag --baseline 0.05 --frames 3 --sessions 2",

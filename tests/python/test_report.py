@@ -194,6 +194,18 @@ def test_a_profile_of_a_cone_is_a_line_and_its_volume_the_cones():
     assert np.all(radial_profile(np.zeros((0, 3)), edges) == 0)
 
 
+def test_pixels_of_grains_that_lie_alone_are_no_wider():
+    heap = _cone(0.02) - [0.02, 0.0, 0.0]
+    # Twice as many lone pixels as those of the heap, 6 mm apart, 5 to 35 cm away.
+    y, x = np.mgrid[-0.35:0.35:118j, -0.35:0.35:118j]
+    alone = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 0.004)])
+    alone = alone[np.hypot(*alone[:, :2].T) > 0.056]
+    edges = np.linspace(0.0, 0.05, 11)
+    both = radial_profile(np.concatenate([heap, alone]), edges)
+    assert len(alone) > 1.5 * len(heap)
+    assert both == pytest.approx(radial_profile(heap, edges), rel=0.02)
+
+
 def test_a_band_holds_the_draws_and_tells_what_is_outside():
     draws = [_cone(height) for height in np.linspace(0.018, 0.022, 9)]
     band = profile_band(_cone(0.02), [_cone(0.02)], draws)

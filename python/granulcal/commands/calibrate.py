@@ -5,6 +5,7 @@ import json
 import sys
 from typing import Any
 
+from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
 from granulcal.commands.reading import (
     add_reading,
@@ -36,6 +37,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--seed", type=int, default=0, help="seed of the run (default: 0)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
+    add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.set_defaults(run=_run)
 
@@ -50,6 +52,9 @@ def _run(options: argparse.Namespace) -> int:
 
     scene = Scene.named(options.scene)
     prior = Prior.named(options.prior)
+    engine = None if options.engine is None else engine_named(options.engine)
+    if options.dry_run:
+        return say_how_long(options, scene, prior, options.budget, engine=engine)
     recordings = open_recordings(options)
     if impossible := violations(scene, prior, recordings, options.recording):
         document = told_outside(options, impossible)
@@ -72,7 +77,7 @@ def _run(options: argparse.Namespace) -> int:
         threads=options.threads,
         progress=lambda each: print(each, file=sys.stderr, flush=True),
         poured=poured,
-        engine=None if options.engine is None else engine_named(options.engine),
+        engine=engine,
     )
     line.close()
     posterior = found.posterior

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import KEPT, READS, writes
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
+    add_dry_run(parser)
     parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
     parser.add_argument("--json", action="store_true", help="print the verdict as JSON at the end")
     parser.set_defaults(run=_run)
@@ -83,6 +85,12 @@ def _run(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named, pouring_with
 
     engine = None if options.engine is None else engine_named(options.engine)
+    if options.dry_run:
+        from granulcal.loop.task import Task
+
+        task = Task.load(_file(options))
+        with pouring_with(engine):
+            return say_how_long(options, task.at_first(), task.prior, options.budget)
     aside = contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext()
     with aside, pouring_with(engine):
         code = _close(options)
@@ -92,13 +100,17 @@ def _run(options: argparse.Namespace) -> int:
     return code
 
 
+def _file(options: argparse.Namespace) -> Path:
+    return options.task / "loop.toml" if options.task.is_dir() else options.task
+
+
 def _close(options: argparse.Namespace) -> int:
     from granulcal.loop.close import close_loop
     from granulcal.loop.effects.tolerance import Tolerances
     from granulcal.loop.report.folder import write_report
     from granulcal.loop.task import Task
 
-    path = options.task / "loop.toml" if options.task.is_dir() else options.task
+    path = _file(options)
     task = Task.load(path)
     if options.tolerances is not None:
         task = replace(task, tolerances=Tolerances.load(options.tolerances))

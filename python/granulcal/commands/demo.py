@@ -1,9 +1,13 @@
 """The word `demo` of the command line."""
 
 import argparse
+import contextlib
+import json
+import sys
 from pathlib import Path
 from typing import Any
 
+from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import writes
 
 __all__ = ["add"]
@@ -25,10 +29,20 @@ def add(commands: Any) -> None:
         help="pours to train on; fewer are faster and less sharp (default: %(default)s)",
     )
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    add_dry_run(parser)
+    parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
-    from granulcal.demo import main
+    from granulcal.demo import demo_scene, main
+    from granulcal.prior import Prior
 
-    return main(options.out, pours=options.pours, threads=options.threads)
+    if options.dry_run:
+        return say_how_long(options, demo_scene(), Prior.default(), options.pours)
+    if not options.json:
+        return main(options.out, pours=options.pours, threads=options.threads)
+    with contextlib.redirect_stdout(sys.stderr):
+        code = main(options.out, pours=options.pours, threads=options.threads)
+    print(json.dumps({"report": str(options.out / "report.html")}))
+    return code

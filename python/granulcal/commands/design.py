@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import READS, writes
 
 __all__ = ["add"]
@@ -81,6 +82,7 @@ def _add_common(
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    add_dry_run(parser)
     parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
@@ -165,6 +167,11 @@ def _with_engine(
         from granulcal.engines import engine_named, pouring_with
 
         with pouring_with(None if options.engine is None else engine_named(options.engine)):
+            if options.dry_run:
+                from granulcal.design.ring_model import height_prior
+
+                prior = height_prior(tuple(options.heights))
+                return say_how_long(options, _scene(options), prior, options.pours)
             return command(options)
 
     return run

@@ -1,4 +1,4 @@
-"""The word `film`: a pour as an animated GIF."""
+"""The word `film`: a pour as an animated GIF or an MP4."""
 
 import argparse
 import json
@@ -10,14 +10,14 @@ from granulcal.paths import READS, writes
 
 __all__ = ["add"]
 
-_TEXT = "pour a scene and write an animated GIF of it"
+_TEXT = "pour a scene and write an animated GIF or an MP4 of it"
 _DESCRIPTION = """\
-Pour a scene and write an animated GIF: grains as balls, walls at rest as lines, half as fast as it was.
+Pour a scene and write an animated GIF or an MP4: grains as balls, walls at rest as lines, half as fast as it was.
 
   granulcal film funnel -o pour.gif
-  granulcal film scene.toml --set funnel.height=0.06 --slow 4 -o pour.gif
+  granulcal film scene.toml --set funnel.height=0.06 --slow 4 -o pour.mp4      pip install 'granulcal[film]'
 
-`simulate --mcap` writes a film for Foxglove, with depth images and walls.
+`simulate --mcap` writes a film for Foxglove, with depth images and walls; examples/foxglove.json is a layout for it.
 """
 
 
@@ -30,7 +30,9 @@ def add(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("scene", type=READS, help="TOML, or the word funnel or drop")
-    parser.add_argument("-o", "--out", type=writes("figure"), required=True, help="the GIF")
+    parser.add_argument(
+        "-o", "--out", type=writes("figure"), required=True, help="the film, .gif or .mp4"
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of the pour (default: 0)")
     parser.add_argument("--fps", type=float, default=15.0, help="frames a second (default: 15)")
     parser.add_argument(

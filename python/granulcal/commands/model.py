@@ -6,6 +6,7 @@ import json
 import sys
 from typing import Any
 
+from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import READS, writes
 
 __all__ = ["add"]
@@ -50,6 +51,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_run)
 
@@ -57,6 +59,12 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     from granulcal.starter.models import make_model
 
+    if options.dry_run:
+        from granulcal.pours.scene import Scene
+        from granulcal.prior import Prior
+
+        pours = 0 if options.data is not None else options.pours
+        return say_how_long(options, Scene.built_in(options.scene), Prior.default(), pours)
     # What is told on the way goes to stderr: stdout has the folder alone.
     with contextlib.redirect_stdout(sys.stderr):
         folder = make_model(

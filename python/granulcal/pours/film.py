@@ -1,7 +1,8 @@
-"""A pour as an animated GIF: shaded balls and the lines of walls, from a little above."""
+"""A pour as an animated GIF or an MP4: shaded balls and the lines of walls, from a little above."""
 
 import itertools
 from collections.abc import Callable
+from fractions import Fraction
 from io import BytesIO
 from os import PathLike
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.files import beside
 from granulcal.pours.scene import Scene
 
 if TYPE_CHECKING:
@@ -68,11 +70,11 @@ def film(
     most_frames: int = 120,
     progress: Callable[[float], object] | None = None,
 ) -> int:
-    """Pours a scene, writes an animated GIF and returns the number of its frames.
+    """Pours a scene, writes an animated GIF or an MP4 and returns the number of its frames.
 
     Args:
         scene: what is poured.
-        path: the GIF.
+        path: the film, .gif or .mp4 (H.264).
         seed: of the pour.
         fps: frames a second of the film, 0.01 to 100: a GIF has no more.
         slow: seconds of the film for a second of the pour, 0.01 to 1000.
@@ -82,17 +84,22 @@ def film(
         progress: called with the simulated time of each frame [s].
 
     Raises:
-        ModuleNotFoundError: Pillow, which comes with the extra `plot`, is not installed.
-        ValueError: a name that is not .gif, or numbers out of their range.
+        ModuleNotFoundError: Pillow, which comes with the extra `plot`, is not installed, or for an
+            MP4 PyAV, which comes with `film`.
+        ValueError: a name that is neither .gif nor .mp4, or numbers out of their range.
     """
-    if Path(path).suffix.lower() != ".gif":
-        raise ValueError(f"{path} must end in .gif")
+    ending = Path(path).suffix.lower()
+    if ending not in _WRITERS:
+        raise ValueError(f"{path} must end in {' or '.join(_WRITERS)}")
     limits = {"fps": (fps, 0.01, 100), "slow": (slow, 0.01, 1000), "width": (width, 64, 4096)}
     for name, (value, low, high) in limits.items():
         if not low <= value <= high:
             raise ValueError(f"{name} must be from {low:g} to {high:g}, got {value:g}")
     if not 1 <= most_frames <= _MOST_FRAMES:
         raise ValueError(f"most_frames must be from 1 to {_MOST_FRAMES}, got {most_frames}")
+    if ending == ".mp4":
+        # Before a pour that may take minutes.
+        import av  # noqa: F401
     lines = _outlines(scene)
     start, radii = scene.start(seed)
     everything = np.concatenate([start, *lines, [[-0.1, -0.1, 0.0], [0.1, 0.1, 0.0]]])
@@ -111,12 +118,34 @@ def film(
 
     _native.film(scene.native, seed, fps * slow, see)
     frames += last
+    _WRITERS[ending](Path(path), frames, fps)
+    return len(frames)
+
+
+def _write_gif(path: Path, frames: "list[Image.Image]", fps: float) -> None:
     times = [round(1000 / fps)] * (len(frames) - 1) + [_HOLD_MS]
     options: dict[str, Any] = {"append_images": frames[1:], "duration": times, "loop": 0}
     buffer = BytesIO()
     frames[0].save(buffer, "GIF", save_all=True, optimize=True, **options)
-    _native.write_file(Path(path), "gif", buffer.getvalue())
-    return len(frames)
+    _native.write_file(path, "gif", buffer.getvalue())
+
+
+def _write_mp4(path: Path, frames: "list[Image.Image]", fps: float) -> None:
+    import av
+
+    held = [frames[-1]] * round(fps * _HOLD_MS / 1000)
+    with beside(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
+        stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
+        # H.264 has half as many pixels of colour: sides are even.
+        stream.width, stream.height = (side - side % 2 for side in frames[0].size)
+        stream.pix_fmt = "yuv420p"
+        for image in (*frames, *held):
+            picture = image.convert("RGB").crop((0, 0, stream.width, stream.height))
+            container.mux(stream.encode(av.VideoFrame.from_image(picture)))
+        container.mux(stream.encode())
+
+
+_WRITERS = {".gif": _write_gif, ".mp4": _write_mp4}
 
 
 def _picture(eye: _Eye, centres: Array, radii: Array, lines: list[Array]) -> "Image.Image":

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["common_field", "formation_figure", "height_grid", "spacing"]
+__all__ = ["common_field", "formation_figure", "height_grid", "neighbour_distances"]
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def height_grid(points: Array, *, field: float, pixels: int = _PIXELS) -> Array:
     grid = np.full((pixels, pixels), -np.inf)
     if len(points):
         cell = field / pixels
-        width = int(np.ceil(spacing(points) / cell)) + 1
+        width = int(np.ceil(_spacing(points) / cell)) + 1
         corner = np.floor((points[:, :2] + field / 2) / cell - (width - 1) / 2).astype(int)
         for right in range(width):
             for up in range(width):
@@ -90,12 +90,21 @@ def formation_figure(clouds: dict[str, Array]) -> bytes:
     return buffer.getvalue()
 
 
-def spacing(points: Array) -> float:
+def _spacing(points: Array) -> float:
     """Median distance between neighbouring points in the horizontal plane [m]."""
+    return float(np.median(neighbour_distances(points)))
+
+
+def neighbour_distances(points: Array) -> Array:
+    """Returns the horizontal distance to the nearest point [m] of some hundred points.
+
+    Args:
+        points: points [m], shape (n, 3), at least one.
+    """
     some = points[:: max(1, len(points) // _SPACING_SAMPLE), :2]
     nearest = np.empty(len(some))
     for i, point in enumerate(some):
         squares = np.sum((points[:, :2] - point) ** 2, axis=1)
         # The smallest is the point itself.
         nearest[i] = np.partition(squares, 1)[1] if len(squares) > 1 else 0.0
-    return float(np.sqrt(np.median(nearest)))
+    return np.sqrt(nearest)

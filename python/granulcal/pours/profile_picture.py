@@ -7,7 +7,7 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.pours.formation_image import common_field, spacing
+from granulcal.pours.formation_image import common_field, neighbour_distances
 
 __all__ = ["ProfileBand", "profile_band", "profile_figure", "radial_profile"]
 
@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 _RINGS = 20
 _PARTS = 4
+_SIDE_BY_SIDE = 0.05
 _LEVELS = (0.05, 0.95)
 _MM = 1e3
 
@@ -22,8 +23,8 @@ _MM = 1e3
 def radial_profile(points: Array, edges: Array) -> Array:
     """Returns the mean height of rings of ground about the origin [m], shape (k,).
 
-    Each point stands for a square as wide as its distance to its neighbours; ground without grains
-    counts as zero, so that the profile times the rings' areas is the volume in view.
+    Each point is a pixel of the image; ground without grains counts as zero, so that the profile
+    times the rings' areas is the volume in view.
 
     Args:
         points: of the formation [m], shape (n, 3).
@@ -31,7 +32,7 @@ def radial_profile(points: Array, edges: Array) -> Array:
     """
     if len(points) < 2:
         return np.zeros(len(edges) - 1)
-    side = spacing(points)
+    side = _pixel(points)
     # Parts of a square may lie in different rings: the innermost are few squares wide.
     part = side * (np.arange(_PARTS) - (_PARTS - 1) / 2) / _PARTS
     x, y = (points[:, i, None] + part for i in (0, 1))
@@ -39,6 +40,14 @@ def radial_profile(points: Array, edges: Array) -> Array:
     heights = np.repeat(points[:, 2], r.shape[1])
     volume, _ = np.histogram(r.ravel(), edges, weights=heights * side**2 / r.shape[1])
     return volume / (np.pi * np.diff(edges**2))
+
+
+def _pixel(points: Array) -> float:
+    """Width of a pixel on the ground [m]: how near neighbours are where grains lie side by side.
+
+    Pixels of grains that lie alone have no neighbours: most of a thin formation.
+    """
+    return float(np.quantile(neighbour_distances(points), _SIDE_BY_SIDE))
 
 
 @dataclass(frozen=True)
