@@ -4,8 +4,8 @@
 //!     cargo run --release --example solver_accuracy -- out.csv paper      # of these schemes only
 //!     cargo run --release --example solver_accuracy -- out.csv --only-tables
 //!
-//! Schemes are the presets and `reference`: the step of `default`, each substep solved to a residual of 1e-3, in 200 sweeps at most.
-//! One line of the file is one pour; a run that was stopped goes on where it was.
+//! Schemes are the presets and `reference`: the step of `default`, each substep solved to a residual of 1e-3, in 200
+//! sweeps at most. One line of the file is one pour; a run that was stopped goes on where it was.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;

@@ -1,8 +1,8 @@
 //! granulcal calibrates a granular simulator from depth images.
 //!
-//! This crate is the front door; the rooms are [`scene`] (what is asked: scenes, sensors,
-//! priors), [`dem`] (grains, contact law, solver), [`features`] (camera, depth raster, segmentation, the 16 statistics) and
-//! [`dataset`] (recordings, resumable batches, Parquet, MCAP).
+//! This crate is the front door; the rooms are [`scene`] (what is asked: scenes, sensors, priors), [`dem`] (grains,
+//! contact law, solver), [`features`] (camera, depth raster, segmentation, the 16 statistics) and [`dataset`]
+//! (recordings, resumable batches, Parquet, MCAP).
 //!
 //! ```
 //! use granulcal::dem::{Scene, Simulation};

@@ -1,5 +1,5 @@
-//! Grains that are convex bodies, through the same door as all others: scene, pour, checkpoint. What one body does has closed
-//! forms, in `crates/dem/src/bodies/exams.rs`.
+//! Grains that are convex bodies, through the same door as all others: scene, pour, checkpoint. What one body does has
+//! closed forms, in `crates/dem/src/bodies/exams.rs`.
 
 use granulcal::dem::{DemError, GrainShape, Pour, Scene, Simulation, Status};
 use nalgebra::Vector3;

@@ -1,9 +1,9 @@
 //! Golden counters: a solver that silently needs more sweeps fails here although its piles are right.
 //!
-//! The arithmetic of a substep is + - * /, fused multiply-add and square root in f64, without libm, all of which IEEE 754
-//! defines to the bit; so the counters are compared exactly, on every machine. They change whenever the order of contacts, the
-//! law or the settings change: run `cargo test --test physics counters -- --nocapture`, read whether the change is meant, and
-//! copy the printed numbers.
+//! The arithmetic of a substep is + - * /, fused multiply-add and square root in f64, without libm, all of which IEEE
+//! 754 defines to the bit; so the counters are compared exactly, on every machine. They change whenever the order of
+//! contacts, the law or the settings change: run `cargo test --test physics counters -- --nocapture`, read whether the
+//! change is meant, and copy the printed numbers.
 
 use granulcal::dem::{
     Method, Periodic, PeriodicAxis, Preset, Scene, Shape, Simulation, SolverSettings, Status, Wall,

@@ -268,7 +268,8 @@ fn grains_of_all_sizes_come_to_rest_and_hold_together_when_wet() {
 
 #[test]
 fn fluid_inside_a_cluster_goes_with_it() {
-    // A grain and its twelve neighbours of a face-centred cubic lattice, too far apart to touch, in something very thick.
+    // A grain and its twelve neighbours of a face-centred cubic lattice, too far apart to touch, in something very
+    // thick.
     let spacing = 2.1 * RADIUS / 2f64.sqrt();
     let mut positions = vec![[0.0, 0.0, 1.0]];
     for [a, b] in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
@@ -282,8 +283,9 @@ fn fluid_inside_a_cluster_goes_with_it() {
     scene.effects.fluid = Fluid { density: 1260.0, viscosity, entrained: 1.0, ..Fluid::default() };
     let speeds = after(&scene, 0.01).velocities();
     let lone = (2500.0 - 1260.0) * GRAVITY * 2.0 / 9.0 * RADIUS * RADIUS / viscosity;
-    // The middle one goes lone faster than its neighbours; one of those, with five neighbours of the eight that a packing
-    // has, lone faster than (4 v + v_middle) / 8: v = 3 lone, v_middle = 4 lone. The mean over all outer grains:
+    // The middle one goes lone faster than its neighbours; one of those, with five neighbours of the eight that a
+    // packing has, lone faster than (4 v + v_middle) / 8: v = 3 lone, v_middle = 4 lone. The mean over all outer
+    // grains:
     let outer = -speeds[1..].iter().map(|v| v.z).sum::<f64>() / 12.0;
     assert!((-speeds[0].z / (4.0 * lone) - 1.0).abs() < 0.01, "{} {lone}", speeds[0].z);
     assert!((outer / (3.0 * lone) - 1.0).abs() < 0.01, "{outer} {lone}");

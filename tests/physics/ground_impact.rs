@@ -1,11 +1,12 @@
 //! One impact on the ground with sliding and rolling friction, against the exact path of both.
 //!
-//! In the plane, with the normal impulse p as the time, sliding u = v + W and rolling W (W = r omega, positive: backwards) obey
+//! In the plane, with the normal impulse p as the time, sliding u = v + W and rolling W (W = r omega, positive:
+//! backwards) obey
 //!
 //!     v' = -a,    W' = -5/2 a - 5/2 b,    u' = -7/2 a - 5/2 b,    |a| <= mu_s,    |b| <= mu_r:
 //!
-//! a is mu_s sign(u) while u slides and what keeps u = 0 else, b is
-//! mu_r sign(W) while it rolls and what keeps W = 0 else (docs/theory/contact.md, Friction of an impact). Both are constant between changes.
+//! a is mu_s sign(u) while u slides and what keeps u = 0 else, b is mu_r sign(W) while it rolls and what keeps W = 0
+//! else (docs/theory/contact.md, Friction of an impact). Both are constant between changes.
 
 use granulcal::dem::{Material, Preset, SolverSettings};
 use nalgebra::Vector3;
@@ -99,8 +100,8 @@ fn sliding_and_rolling_share_the_spin_as_the_law_says() {
 
 #[test]
 fn the_boundary_between_sticking_and_sliding_is_where_the_law_has_it() {
-    // Rolling resistance holds the spin where mu_r >= mu_s: a grain without spin sticks below mu_s (1 + e). Where it does not,
-    // u falls by (7/2 mu_s - 5/2 mu_r) (1 + e), the spin at the end turning forward.
+    // Rolling resistance holds the spin where mu_r >= mu_s: a grain without spin sticks below mu_s (1 + e). Where it
+    // does not, u falls by (7/2 mu_s - 5/2 mu_r) (1 + e), the spin at the end turning forward.
     for (mu_s, mu_r) in [(0.5, 0.3), (0.5, 0.6), (0.3, 0.0), (0.8, 0.1)] {
         for e in [0.0, 0.3, 0.8] {
             let limit = (3.5 * mu_s - 2.5 * f64::min(mu_r, mu_s)) * (1.0 + e);

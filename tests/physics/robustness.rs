@@ -153,8 +153,8 @@ fn only_grains_in_view_must_come_to_rest() {
 
 #[test]
 fn a_flat_box_that_sweeps_through_elastic_grains_ends_in_a_status() {
-    // The sides of a box that is thinner than the grains are triangles, of which a grain at an edge touches one and then
-    // another: an impact was foreseen with one that was not there to be met.
+    // The sides of a box that is thinner than the grains are triangles, of which a grain at an edge touches one and
+    // then another: an impact was foreseen with one that was not there to be met.
     let mut scene = drop_of(20, 0.0, material(0.0, 0.0, 1.0));
     scene.gravity = [0.0; 3];
     let (from, to) = (

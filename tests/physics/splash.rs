@@ -75,8 +75,8 @@ fn splash(places: usize) -> Splash {
     mean
 }
 
-/// LAMMPS at E 3e6 Pa on a heap that has settled there moves 7.0 ± 0.4 mm in sum (40 places). Impacts one after the other move
-/// 3.9 mm. Twelve places scatter by 1.5 mm.
+/// LAMMPS at E 3e6 Pa on a heap that has settled there moves 7.0 ± 0.4 mm in sum (40 places). Impacts one after the
+/// other move 3.9 mm. Twelve places scatter by 1.5 mm.
 #[test]
 fn a_blow_on_a_heap_is_handed_on() {
     let got = splash(12);
@@ -84,8 +84,8 @@ fn a_blow_on_a_heap_is_handed_on() {
     assert!((5.0..11.5).contains(&got.sum), "{got:?}");
 }
 
-/// Forty places scatter by 0.6 mm. Measured are 8.6 mm, and 12.0 mm for the grain that falls; asked for were 7.0 ± 0.6 and 10.4 ± 1.5,
-/// which docs/results/peers.md says is missed.
+/// Forty places scatter by 0.6 mm. Measured are 8.6 mm, and 12.0 mm for the grain that falls; asked for were 7.0 ± 0.6
+/// and 10.4 ± 1.5, which docs/results/peers.md says is missed.
 #[test]
 #[ignore = "takes a minute"]
 fn a_blow_on_a_heap_is_handed_on_as_in_lammps() {
@@ -95,8 +95,8 @@ fn a_blow_on_a_heap_is_handed_on_as_in_lammps() {
     assert!((got.striker - 12.0).abs() < 2.5, "{got:?}");
 }
 
-/// A block of 8 x 8 x 8 grains that falls 80 mm on the ground: energy of translation at 0.2 s over that of a fall of 0.1 m,
-/// and the mean distance from the axis at 0.4 s `[mm]`.
+/// A block of 8 x 8 x 8 grains that falls 80 mm on the ground: energy of translation at 0.2 s over that of a fall of
+/// 0.1 m, and the mean distance from the axis at 0.4 s `[mm]`.
 fn fallen_block(preset: Preset) -> [f64; 2] {
     let mut scene = block([8, 8, 8], 8e-3, 0.08, material(0.5, 0.3, 0.3));
     scene.preset = preset;
@@ -112,7 +112,8 @@ fn fallen_block(preset: Preset) -> [f64; 2] {
     [0.5 * energy / count / (9.81 * 0.1), 1e3 * radius / count]
 }
 
-/// Impacts one after the other leave 0.0030 and 27.0 mm, LAMMPS 0.0065 and 28.2 mm at E 3e8 Pa, 0.0076 and 29.0 mm at 3e6.
+/// Impacts one after the other leave 0.0030 and 27.0 mm, LAMMPS 0.0065 and 28.2 mm at E 3e8 Pa, 0.0076 and 29.0 mm at
+/// 3e6.
 #[test]
 fn a_block_that_falls_keeps_what_soft_contacts_leave() {
     let [energy, radius] = fallen_block(Preset::Default);

@@ -5,8 +5,9 @@ use nalgebra::Vector3;
 
 use crate::scenes::{RADIUS, material, one_grain, start};
 
-/// A row of point masses that touch, the first touching a wall, struck at the far end with speed 1: linear springs of one stiffness
-/// and dashpots that never pull, semi-implicit steps of 1e-3 / omega. Returns the velocities at the end, the striker's last.
+/// A row of point masses that touch, the first touching a wall, struck at the far end with speed 1: linear springs of
+/// one stiffness and dashpots that never pull, semi-implicit steps of 1e-3 / omega. Returns the velocities at the end,
+/// the striker's last.
 fn springs(count: usize, restitution: f64) -> Vec<f64> {
     let beta = damping(restitution);
     // Contact 0 is at the wall: reduced mass 1, else 1/2, so that all contacts last equally long.

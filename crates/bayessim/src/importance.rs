@@ -1,6 +1,6 @@
 //! A density known up to a factor, by weighted draws of a proposal: Cappe, Guillin, Marin and Robert (2004). A draw of
-//! it is one of those that then walks some steps of Metropolis along differences of others (Gilks and Berzuini 2001; ter
-//! Braak 2006): without them a thousand draws are some hundred points, each several times.
+//! it is one of those that then walks some steps of Metropolis along differences of others (Gilks and Berzuini 2001;
+//! ter Braak 2006): without them a thousand draws are some hundred points, each several times.
 
 use std::sync::Arc;
 

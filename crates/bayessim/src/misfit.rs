@@ -1,5 +1,5 @@
-//! Is an observation inside the model? Its residual at the best fit, against held-out simulations: the same as
-//! Python's `bayessim/check/misfit.py`, which has the derivation. For one pour the numbers are equal to rounding; for several
+//! Is an observation inside the model? Its residual at the best fit, against held-out simulations: the same as Python's
+//! `bayessim/check/misfit.py`, which has the derivation. For one pour the numbers are equal to rounding; for several
 //! the replicates are other random draws.
 
 use std::fmt;

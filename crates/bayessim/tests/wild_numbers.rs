@@ -71,7 +71,8 @@ fn numbers_that_are_none_are_refused_by_name_or_come_to_an_end() {
     }
     // Python alone reads these.
     assert_eq!(taken.into_iter().collect::<Vec<_>>(), ["axes_relevance", "emulator_relevance"]);
-    assert!(tried > 40 && refused >= tried / 2, "{refused} of {tried}");
+    // Half of the numbers that were tried are none, four of them of those two tensors.
+    assert!(tried > 40 && refused + 4 >= tried / 2, "{refused} of {tried}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The arguments: clap types and nothing else.
 //!
-//! Longer than other files because the help of every command stands in it; groups that several commands share are in `args/`.
+//! Longer than other files because the help of every command stands in it; groups that several commands share are in
+//! `args/`.
 
 mod completions;
 mod global;

@@ -129,7 +129,8 @@ pub fn start(
     }
 }
 
-/// Simulates `scene` from where `simulation` is to its end, before the eyes of `observer`; `None` when the user stopped it.
+/// Simulates `scene` from where `simulation` is to its end, before the eyes of `observer`; `None` when the user stopped
+/// it.
 ///
 /// # Errors
 /// What is wrong with the file that is kept, before anything is simulated or when the user stops; later on it is kept

@@ -87,8 +87,8 @@ impl Observer {
         self.begin + self.next as f64 / self.rate
     }
 
-    /// Simulates `seconds`, or less if the pour ends before, and takes the samples that fall due. Samples before the time
-    /// at which the first call begins are missed, as after a restart from a checkpoint.
+    /// Simulates `seconds`, or less if the pour ends before, and takes the samples that fall due. Samples before the
+    /// time at which the first call begins are missed, as after a restart from a checkpoint.
     pub fn advance(&mut self, simulation: &mut Simulation, seconds: f64) {
         if self.is_idle() {
             simulation.advance(seconds);

@@ -2,11 +2,11 @@
 //!
 //! Reads places and velocities (gravity included), writes the batches.
 
-use crate::bed::Bed;
 use crate::contact::{Batch, Candidate};
 use crate::contact_set::ContactSet;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, vectors, widest};
 use crate::law;
+use crate::particles::Particles;
 use crate::period::Period;
 use crate::wall::{Nearest, Walls};
 use nalgebra::Vector3;
@@ -34,7 +34,7 @@ widest! {
     /// Refreshes the contacts between grains at the beginning of a substep and lists the possible impacts.
     pub(crate) fn assemble_pairs<W>(
         batches: &mut [Batch],
-        bed: &Bed,
+        bed: &Particles,
         dt: f64,
         candidates: &mut Vec<Candidate>,
     ) -> Seen {
@@ -67,7 +67,7 @@ widest! {
     pub(crate) fn assemble_walls<W>(
         set: &mut ContactSet,
         walls: &Walls,
-        bed: &Bed,
+        bed: &Particles,
         dt: f64,
         lost: &mut [bool],
         candidates: &mut Vec<Candidate>,
@@ -98,7 +98,7 @@ widest! {
 widest! {
     /// Refreshes the batches of pairs in which a grain has had an impact, as they are when the later one of
     /// their last impacts happened.
-    pub(crate) fn refresh_pairs<W>(batches: &mut [Batch], bed: &Bed, dt: f64) {
+    pub(crate) fn refresh_pairs<W>(batches: &mut [Batch], bed: &Particles, dt: f64) {
         for batch in batches {
             let mut clocks = Lanes::ZERO;
             for lane in batch.lanes() {
@@ -127,7 +127,7 @@ widest! {
 
 widest! {
     /// The same for the contacts at walls.
-    pub(crate) fn refresh_walls<W>(set: &mut ContactSet, walls: &Walls, bed: &Bed, dt: f64) {
+    pub(crate) fn refresh_walls<W>(set: &mut ContactSet, walls: &Walls, bed: &Particles, dt: f64) {
         for number in 0..set.batches.len() {
             let mut clocks = Lanes::ZERO;
             for lane in set.batches[number].lanes() {
@@ -221,7 +221,7 @@ fn wall_geometry(
     set: &mut ContactSet,
     number: usize,
     walls: &Walls,
-    bed: &Bed,
+    bed: &Particles,
     dt: f64,
     seen: &mut Seen,
 ) -> WallGeometry {

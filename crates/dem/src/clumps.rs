@@ -16,10 +16,10 @@ use granulcal_scene::{ClumpShape, Effect, Scene};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::bed::Bed;
 use crate::body::Body;
 use crate::lanes::Row;
 use crate::law::INVERSE_INERTIA;
+use crate::particles::Particles;
 use crate::turns::turns;
 
 /// Keeps the orientations of a seed apart from its places.
@@ -128,7 +128,7 @@ impl Clumps {
     }
 
     /// Moves and turns the clumps, once they are joined, and puts their spheres where they belong.
-    pub fn move_on(&mut self, bed: &mut Bed, dt: f64) {
+    pub fn move_on(&mut self, bed: &mut Particles, dt: f64) {
         let members = self.members();
         for number in 0..self.bodies.len() {
             let rigid = self.bodies[number];
@@ -170,7 +170,7 @@ impl Clumps {
     /// Sets a clump in motion; returns the kinetic energy that this adds, per typical mass `[m^2/s^2]`.
     pub fn set_motion(
         &mut self,
-        bed: &mut Bed,
+        bed: &mut Particles,
         clump: usize,
         velocity: &Vector3<f64>,
         angular: &Vector3<f64>,

@@ -49,7 +49,7 @@ pub(crate) struct LawLanes {
     pub rolling_friction: Lanes,
     pub torsional_friction: Lanes,
     /// What a soft contact gives way per impulse; 0 is rigid.
-    pub give: Lanes,
+    pub compliance: Lanes,
     /// Rolling velocity up to which the rolling impulse grows with it `[m/s]`; 0 is Coulomb's law.
     pub rolling_speed: f64,
     /// Whether the sliding impulse of any lane changes its rolling velocity: not between equal spheres.
@@ -91,8 +91,8 @@ pub(crate) struct ContactLaw {
     pub sliding_friction: f64,
     pub rolling_friction: f64,
     pub torsional_friction: f64,
-    /// See [`LawLanes::give`].
-    pub give: f64,
+    /// See [`LawLanes::compliance`].
+    pub compliance: f64,
     /// See [`LawLanes::rolling_speed`].
     pub rolling_speed: f64,
 }
@@ -131,7 +131,7 @@ impl LawLanes {
             sliding_friction: Lanes::ZERO,
             rolling_friction: Lanes::ZERO,
             torsional_friction: Lanes::ZERO,
-            give: Lanes::ZERO,
+            compliance: Lanes::ZERO,
             rolling_speed: law.rolling_speed,
             couples: false,
         };
@@ -148,8 +148,8 @@ impl LawLanes {
         self.lever_i.0[lane] = lever_i;
         self.lever_j.0[lane] = lever_j;
         self.couples |= lever_i * mass_i != lever_j * mass_j;
-        self.compliance_n.0[lane] = 1.0 / (mass_i + mass_j + law.give);
-        self.give.0[lane] = law.give;
+        self.compliance_n.0[lane] = 1.0 / (mass_i + mass_j + law.compliance);
+        self.compliance.0[lane] = law.compliance;
         let roll = lever_i * lever_i * mass_i + lever_j * lever_j * mass_j;
         self.compliance_r.0[lane] = 1.0 / (INVERSE_INERTIA * roll);
         self.sliding_friction.0[lane] = law.sliding_friction;

@@ -9,16 +9,16 @@ mod check;
 use std::ops::Range;
 
 use crate::assemble::{self, Seen};
-use crate::bed::Bed;
 use crate::blocks::Blocks;
 use crate::body::Body;
 use crate::contact::{Batch, Candidate, ContactKey};
+use crate::contact_context::ContactContext;
 use crate::contact_set::{BodyKind, ContactSet};
 use crate::lanes::Row;
 use crate::neighbor::{Neighbours, PairSearch};
+use crate::particles::Particles;
 use crate::partners::Partners;
 use crate::path::{Ball, Path, Reach};
-use crate::surroundings::Surroundings;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -65,7 +65,7 @@ impl Contacts {
 
     /// Puts the grains that have left the period in at its other end; returns by how much that changes their energy in
     /// `gravity`, per typical mass `[m^2/s^2]`.
-    pub fn wrap(&mut self, bed: &mut Bed, gravity: &Vector3<f64>) -> f64 {
+    pub fn wrap(&mut self, bed: &mut Particles, gravity: &Vector3<f64>) -> f64 {
         let Some(period) = bed.period else { return 0.0 };
         let mut gained = 0.0;
         for grain in 0..bed.count() {
@@ -81,7 +81,7 @@ impl Contacts {
     }
 
     /// Lists what may touch in the coming substep.
-    pub fn follow(&mut self, bed: &Bed, around: &Surroundings) {
+    pub fn follow(&mut self, bed: &Particles, around: &ContactContext) {
         if self.paths.is_empty() || self.age >= around.settings.list_period {
             self.list(bed, around);
             return;
@@ -111,8 +111,8 @@ impl Contacts {
         &mut self,
         grain: usize,
         time: f64,
-        bed: &Bed,
-        around: &Surroundings,
+        bed: &Particles,
+        around: &ContactContext,
     ) {
         let dt = around.settings.dt;
         // `assemble` has counted the present substep already.
@@ -131,8 +131,8 @@ impl Contacts {
     /// Gaps, normals and biases of every listed contact; `found` gets what may be an impact.
     pub fn assemble(
         &mut self,
-        bed: &Bed,
-        around: &Surroundings,
+        bed: &Particles,
+        around: &ContactContext,
         lost: &mut [bool],
         found: &mut Vec<Candidate>,
     ) -> Seen {
@@ -149,7 +149,7 @@ impl Contacts {
     }
 
     /// The same for the contacts of grains that have had an impact.
-    pub fn assemble_again(&mut self, bed: &Bed, around: &Surroundings) {
+    pub fn assemble_again(&mut self, bed: &Particles, around: &ContactContext) {
         let refresh = |batches: &mut [Batch]| {
             assemble::refresh_pairs(batches, bed, around.settings.dt);
         };
@@ -160,7 +160,7 @@ impl Contacts {
     /// Puts the walls' motion into the bodies that stand for them, one for each contact at a wall.
     ///
     /// A contact sees its second body's surface at `v_j - n x w_j`, so `v_j = v_wall + n x w_j` with `w_j = r omega_wall`.
-    pub fn move_walls(&self, bed: &mut Bed, around: &Surroundings) {
+    pub fn move_walls(&self, bed: &mut Particles, around: &ContactContext) {
         if !around.has_moving_walls {
             return;
         }
@@ -179,9 +179,9 @@ impl Contacts {
         }
     }
 
-    /// Work that the walls have done on the grains in the lasting contacts of the substep, per typical mass
+    /// SolveInfo that the walls have done on the grains in the lasting contacts of the substep, per typical mass
     /// `[m^2/s^2]`: impulse times the velocity of the wall, moment times its turning.
-    pub fn work_of_walls(&self, bed: &Bed) -> f64 {
+    pub fn work_of_walls(&self, bed: &Particles) -> f64 {
         let work = |(number, lane): (usize, usize)| {
             let batch = &self.at_walls.batches[number];
             let [normal, lambda_t, lambda_r] = [&batch.normal, &batch.lambda_t, &batch.lambda_r]
@@ -201,7 +201,7 @@ impl Contacts {
     }
 
     /// A new list for all grains.
-    fn list(&mut self, bed: &Bed, around: &Surroundings) {
+    fn list(&mut self, bed: &Particles, around: &ContactContext) {
         self.age = 0;
         self.renewed = 0;
         self.paths = Path::all_of(bed);
@@ -241,7 +241,7 @@ impl Contacts {
     }
 
     /// Lists the walls within reach of each grain, and whether they may be touched.
-    fn list_walls(&mut self, bed: &Bed, around: &Surroundings, reach: Reach) {
+    fn list_walls(&mut self, bed: &Particles, around: &ContactContext, reach: Reach) {
         self.near_walls.clear();
         let (paths, walls) = (&self.paths, &around.walls);
         let list = |grains: Range<usize>, found: &mut Vec<(ContactKey, bool)>| {
@@ -269,7 +269,7 @@ impl Contacts {
     }
 
     /// Gives a grain a new path from `now` `[s]` after the list on and lists what lies on it.
-    fn renew(&mut self, grain: usize, now: f64, bed: &Bed, around: &Surroundings) {
+    fn renew(&mut self, grain: usize, now: f64, bed: &Particles, around: &ContactContext) {
         let settings = &around.settings;
         let left = settings.dt * settings.list_period as f64 - now;
         let (at, velocity) = (bed.position(grain), bed.velocity(grain));
@@ -318,6 +318,6 @@ impl Contacts {
 }
 
 /// Whether a grain this far from its path has left it.
-fn is_off(deviation: &Vector3<f64>, around: &Surroundings) -> bool {
+fn is_off(deviation: &Vector3<f64>, around: &ContactContext) -> bool {
     deviation.norm_squared() > 0.25 * around.margin * around.margin
 }

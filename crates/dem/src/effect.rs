@@ -1,20 +1,20 @@
 //! What the effects of a scene do in a substep, as plug-ins, without influence on a single bit when off
 //! (docs/theory/effects.md). Their numbers are in `scene/effects/`.
 
+mod attraction;
 mod drag;
+mod elastic_layer;
 mod film;
 mod near;
-mod pad;
 mod pore_surface;
-mod pull;
 
 use nalgebra::Vector3;
 
+pub(crate) use attraction::{Attraction, Bridges};
 use drag::Drag;
+pub(crate) use elastic_layer::ElasticLayer;
 use film::Film;
 use granulcal_scene::{Effect, RestitutionSpeed, Scene, Vibration};
-pub(crate) use pad::Pad;
-pub(crate) use pull::{Bridges, Pull};
 
 /// What the effects of a scene do in a substep; what is off is absent.
 #[derive(Clone, Debug)]
@@ -23,10 +23,10 @@ pub(crate) struct Acting {
     pub gravity: Vector3<f64>,
     pub vibration: Option<Vibration>,
     pub drag: Option<Drag>,
-    pub pull: Option<Pull>,
+    pub pull: Option<Attraction>,
     pub film: Option<Film>,
     pub restitution: Option<RestitutionSpeed>,
-    pub pad: Option<Pad>,
+    pub pad: Option<ElasticLayer>,
     /// See [`RollingForm::speed`].
     pub rolling_speed: f64,
 }
@@ -49,11 +49,11 @@ impl Acting {
         Self {
             gravity,
             vibration: effects.vibration.is_on().then_some(effects.vibration),
-            pull: Pull::of(scene, inverse_inertia),
+            pull: Attraction::of(scene, inverse_inertia),
             film: Film::of(scene, inverse_inertia),
             drag,
             restitution: effects.restitution_speed.is_on().then_some(effects.restitution_speed),
-            pad: effects.layer.is_on().then(|| Pad::of(scene)),
+            pad: effects.layer.is_on().then(|| ElasticLayer::of(scene)),
             rolling_speed: effects.rolling_form.speed,
         }
     }
@@ -69,7 +69,7 @@ impl Acting {
     /// How far the longest force across a gap reaches `[m]`; 0 without one.
     pub fn reach(&self) -> f64 {
         let film = self.film.as_ref().map_or(0.0, Film::reach);
-        self.pull.as_ref().map_or(0.0, Pull::reach).max(film)
+        self.pull.as_ref().map_or(0.0, Attraction::reach).max(film)
     }
 
     /// The restitution of an impact at `speed` `[m/s]` that would be `restitution` at the speed of reference.

@@ -1,15 +1,15 @@
 //! One search for pairs, frozen: what studies of its cost repeat.
 
-use crate::bed::Bed;
+use crate::contact_context::ContactContext;
 use crate::neighbor::{Neighbours, PairSearch};
 use crate::parallel::Threads;
+use crate::particles::Particles;
 use crate::path::{Path, Reach};
-use crate::surroundings::Surroundings;
 
 /// The grains of a moment, whose neighbours can be searched again and again.
 #[derive(Clone, Debug)]
 pub struct FrozenSearch {
-    bed: Bed,
+    bed: Particles,
     paths: Vec<Path>,
     reach: Reach,
     threads: Threads,
@@ -18,7 +18,7 @@ pub struct FrozenSearch {
 }
 
 impl FrozenSearch {
-    pub(crate) fn new(bed: Bed, around: &Surroundings) -> Self {
+    pub(crate) fn new(bed: Particles, around: &ContactContext) -> Self {
         Self {
             paths: Path::all_of(&bed),
             reach: around.reach(),

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::solver::work::Work;
+use crate::solver::solve_info::SolveInfo;
 
 /// Numbers that tell whether a pour can be trusted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -91,7 +91,7 @@ impl HealthWatch {
         self.worst_residual = self.worst_residual.max(residual);
     }
 
-    pub fn see_solve(&mut self, work: &Work) {
+    pub fn see_solve(&mut self, work: &SolveInfo) {
         self.sweeps += work.sweeps;
         self.unconverged += usize::from(work.unconverged);
         self.guarded += work.guarded;

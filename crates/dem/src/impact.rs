@@ -14,11 +14,11 @@ mod spring;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use crate::bed::Bed;
 use crate::contact::Candidate;
+use crate::contact_context::ContactContext;
 use crate::contacts::Contacts;
 use crate::law::IMPACT_SPEED;
-use crate::surroundings::Surroundings;
+use crate::particles::Particles;
 
 use cluster::{Cluster, Outcome};
 
@@ -75,8 +75,8 @@ impl Event {
         pair: Candidate,
         now: f64,
         counts: [u32; 2],
-        bed: &Bed,
-        around: &Surroundings,
+        bed: &Particles,
+        around: &ContactContext,
     ) -> Option<Self> {
         let time = match other_grain(pair, bed) {
             Some(j) => time_of_pair(pair.i as usize, j, now, bed),
@@ -110,7 +110,7 @@ pub(crate) struct Impacts {
     pub candidates: Vec<Candidate>,
     queue: BinaryHeap<Event>,
     foreseen: Vec<Event>,
-    /// Work that walls have done in impacts since it was last asked for, per typical mass `[m^2/s^2]`.
+    /// SolveInfo that walls have done in impacts since it was last asked for, per typical mass `[m^2/s^2]`.
     pub work_of_walls: f64,
     /// Impacts of each grain in this substep.
     counts: Vec<u32>,
@@ -124,12 +124,12 @@ pub(crate) struct Impacts {
 
 impl Impacts {
     /// Resolves the impacts that the candidates lead to, in the order of their times; returns their number.
-    /// Leaves each grain that was hit where it was at its last impact (`Bed::clocks`).
+    /// Leaves each grain that was hit where it was at its last impact (`Particles::clocks`).
     pub fn resolve(
         &mut self,
-        bed: &mut Bed,
+        bed: &mut Particles,
         contacts: &mut Contacts,
-        around: &Surroundings,
+        around: &ContactContext,
     ) -> usize {
         self.counts.resize(bed.count(), 0);
         let foreseen = |candidates: &mut [Candidate], found: &mut Vec<Event>| {
@@ -176,7 +176,13 @@ impl Impacts {
     }
 
     /// Whether a wall that bends is not reached yet at the time that its first normal gave; the impact is then foreseen anew.
-    fn is_early(&mut self, pair: Candidate, time: f64, bed: &Bed, around: &Surroundings) -> bool {
+    fn is_early(
+        &mut self,
+        pair: Candidate,
+        time: f64,
+        bed: &Particles,
+        around: &ContactContext,
+    ) -> bool {
         let Some(surface) = (pair.partner as usize).checked_sub(bed.count()) else { return false };
         let place = bed.place_at(pair.i as usize, time);
         let near = around.walls.nearest(surface, &place.vector(), time);
@@ -197,9 +203,9 @@ impl Impacts {
         &mut self,
         grain: usize,
         now: f64,
-        bed: &Bed,
+        bed: &Particles,
         contacts: &Contacts,
-        around: &Surroundings,
+        around: &ContactContext,
     ) {
         if self.counts[grain] >= MAX_IMPACTS {
             return;
@@ -218,18 +224,18 @@ impl Impacts {
     }
 
     /// Queues the impact of a pair, if there is one after `now`.
-    fn foresee(&mut self, pair: Candidate, now: f64, bed: &Bed, around: &Surroundings) {
+    fn foresee(&mut self, pair: Candidate, now: f64, bed: &Particles, around: &ContactContext) {
         self.queue.extend(Event::next(pair, now, self.counts_of(pair), bed, around));
     }
 }
 
-fn other_grain(pair: Candidate, bed: &Bed) -> Option<usize> {
+fn other_grain(pair: Candidate, bed: &Particles) -> Option<usize> {
     let j = pair.partner as usize;
     (j < bed.count()).then_some(j)
 }
 
 /// When two grains on their straight ways touch fast enough: the root of `|d + w tau| = r_i + r_j`.
-fn time_of_pair(i: usize, j: usize, now: f64, bed: &Bed) -> Option<f64> {
+fn time_of_pair(i: usize, j: usize, now: f64, bed: &Particles) -> Option<f64> {
     let (a, b) = (bed.place_at(i, now), bed.place_at(j, now));
     let apart = bed.nearest(a.vector() - b.vector());
     let relative = bed.velocity(i) - bed.velocity(j);
@@ -251,7 +257,12 @@ fn time_of_pair(i: usize, j: usize, now: f64, bed: &Bed) -> Option<f64> {
 }
 
 /// When a grain touches a wall, on the parabola of which the substep is the chord.
-fn time_at_wall(pair: Candidate, now: f64, bed: &Bed, around: &Surroundings) -> Option<f64> {
+fn time_at_wall(
+    pair: Candidate,
+    now: f64,
+    bed: &Particles,
+    around: &ContactContext,
+) -> Option<f64> {
     let (grain, dt) = (pair.i as usize, around.settings.dt);
     let surface = pair.partner as usize - bed.count();
     let place = bed.place_at(grain, now);

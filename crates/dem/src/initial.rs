@@ -2,13 +2,13 @@
 
 use granulcal_scene::Scene;
 
-use crate::bed::Bed;
 use crate::clumps::Clumps;
 use crate::lanes::Row;
+use crate::particles::Particles;
 use crate::period::Period;
 
 /// The grains where they start, as large and as heavy as the scene says: the spheres of `clumps` if they are not round.
-pub(crate) fn bed(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Bed {
+pub(crate) fn bed(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Particles {
     let radius = scene.grains.radius();
     let (mut places, inverse): (Vec<Row>, f64) = if let Some(clumps) = clumps {
         (clumps.places(), clumps.members() as f64)
@@ -23,5 +23,5 @@ pub(crate) fn bed(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Bed {
             *inverse = (radius / own).powi(3);
         }
     }
-    Bed::new(places, inverse_mass, scene.periodic.as_ref().map(Period::of))
+    Particles::new(places, inverse_mass, scene.periodic.as_ref().map(Period::of))
 }

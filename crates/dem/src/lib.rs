@@ -30,13 +30,13 @@
 #![allow(clippy::inline_always)]
 
 mod assemble;
-mod bed;
 mod blocks;
 mod bodies;
 mod body;
 mod checkpoint;
 mod clumps;
 mod contact;
+mod contact_context;
 mod contact_set;
 mod contacts;
 mod effect;
@@ -49,6 +49,7 @@ mod lanes;
 mod law;
 mod neighbor;
 mod parallel;
+mod particles;
 mod partners;
 mod path;
 mod period;
@@ -58,7 +59,6 @@ mod problem;
 mod rebound;
 mod simulation;
 mod solver;
-mod surroundings;
 mod turns;
 mod wall;
 mod wall_load;

@@ -12,9 +12,9 @@ use std::ops::Range;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::bed::Bed;
 use crate::lanes::widest;
 use crate::parallel::Threads;
+use crate::particles::Particles;
 use crate::path::{Ball, Path, Reach};
 use crate::period::Period;
 
@@ -63,7 +63,7 @@ impl PairSearch {
     /// the order depends on the state alone.
     pub fn pairs(
         &mut self,
-        bed: &Bed,
+        bed: &Particles,
         paths: &[Path],
         reach: Reach,
         threads: &Threads,
@@ -94,7 +94,7 @@ impl PairSearch {
     /// Adds the pairs that come within reach across the end of the period: those whose nearest images are not direct.
     fn across(
         &self,
-        bed: &Bed,
+        bed: &Particles,
         paths: &[Path],
         reach: Reach,
         period: &Period,
@@ -176,7 +176,7 @@ impl PairSearch {
         }
     }
 
-    fn sweep_balls(&mut self, bed: &Bed, paths: &[Path], reach: Reach) {
+    fn sweep_balls(&mut self, bed: &Particles, paths: &[Path], reach: Reach) {
         self.middles.clear();
         self.reaches.clear();
         for (grain, path) in paths.iter().enumerate() {
@@ -187,7 +187,7 @@ impl PairSearch {
     }
 
     /// Counting sort by cell. A cell is as wide as the two widest balls reach, so that partners are neighbours.
-    fn sort_into_cells(&mut self, bed: &Bed) {
+    fn sort_into_cells(&mut self, bed: &Particles) {
         let (mut low, mut high) = (self.middles[0], self.middles[0]);
         for middle in &self.middles {
             low = low.inf(middle);
@@ -357,7 +357,7 @@ pub(crate) struct Neighbours {
 impl Neighbours {
     /// Whether neither is nearer to the other's image.
     #[inline]
-    fn is_direct(&self, bed: &Bed, paths: &[Path]) -> bool {
+    fn is_direct(&self, bed: &Particles, paths: &[Path]) -> bool {
         bed.period.is_none_or(|period| {
             period.is_direct(&(paths[self.i as usize].from - paths[self.j as usize].from))
         })
@@ -365,7 +365,7 @@ impl Neighbours {
 
     /// Whether they are within reach on their paths; notes whether they come near.
     #[inline]
-    fn follow(&mut self, bed: &Bed, paths: &[Path], reach: Reach) -> bool {
+    fn follow(&mut self, bed: &Particles, paths: &[Path], reach: Reach) -> bool {
         let (i, j) = (self.i as usize, self.j as usize);
         let nearest = paths[i].nearest_squared(&paths[j], bed, reach.interval);
         let touching = bed.radius(i) + bed.radius(j);

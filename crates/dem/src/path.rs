@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::bed::Bed;
+use crate::particles::Particles;
 
 /// What rounding to single precision may hide in a grid of metres `[m]`.
 const ROUNDING: f64 = 1e-6;
@@ -30,7 +30,7 @@ impl From<Path> for [[f64; 3]; 2] {
 
 impl Path {
     /// The ways of all grains from now on.
-    pub fn all_of(bed: &Bed) -> Vec<Self> {
+    pub fn all_of(bed: &Particles) -> Vec<Self> {
         let path = |i| Self { from: bed.position(i), velocity: bed.velocity(i) };
         (0..bed.count()).map(path).collect()
     }
@@ -42,7 +42,7 @@ impl Path {
 
     /// Square of the least distance of two grains' ways in the next `interval` `[s]`, `[m^2]`.
     #[inline]
-    pub fn nearest_squared(&self, other: &Self, bed: &Bed, interval: f64) -> f64 {
+    pub fn nearest_squared(&self, other: &Self, bed: &Particles, interval: f64) -> f64 {
         let apart = bed.nearest(self.from - other.from);
         let relative = self.velocity - other.velocity;
         let closing = -apart.dot(&relative);
@@ -55,7 +55,7 @@ impl Path {
 
     /// Whether the way comes within `limit` `[m]` of another in the next `interval` `[s]`.
     #[inline]
-    pub fn comes_within(&self, other: &Self, bed: &Bed, limit: f64, interval: f64) -> bool {
+    pub fn comes_within(&self, other: &Self, bed: &Particles, limit: f64, interval: f64) -> bool {
         self.nearest_squared(other, bed, interval) < limit * limit
     }
 }

@@ -17,7 +17,7 @@ pub(crate) struct Placement {
 }
 
 /// Poses that are looked at for the bound of an interval.
-const LOOKS: usize = 8;
+const SAMPLES: usize = 8;
 /// What the looks may miss: a swing's crest lies between two of them.
 const BETWEEN_LOOKS: f64 = 1.2;
 
@@ -44,8 +44,8 @@ impl Placement {
     pub fn look_ahead(&mut self, time: f64, interval: f64) {
         let back = self.pose.inverse();
         self.reach = (0.0, 0.0);
-        for look in 1..=LOOKS {
-            let share = look as f64 / LOOKS as f64;
+        for look in 1..=SAMPLES {
+            let share = look as f64 / SAMPLES as f64;
             let moved = self.motion.pose(time + share * interval) * back;
             self.reach.0 = self.reach.0.max(BETWEEN_LOOKS * moved.translation.vector.norm());
             self.reach.1 = self.reach.1.max(BETWEEN_LOOKS * moved.rotation.angle());

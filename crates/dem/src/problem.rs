@@ -5,12 +5,12 @@
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use crate::bed::Bed;
 use crate::body::Body;
 use crate::contact::Batch;
 use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
 use crate::law::INVERSE_INERTIA;
+use crate::particles::Particles;
 
 /// Residual at which a solution counts as converged, over the fastest velocity or impulse `[-]`: some
 /// fifty roundings.
@@ -212,7 +212,7 @@ fn motion(body: &Body) -> Vector6<f64> {
 
 impl ContactProblem {
     /// Reads assembled contacts; `bed` holds the free velocities, without the warm start.
-    pub(crate) fn new(bed: &Bed, contacts: &Contacts, time: f64, dt: f64) -> Self {
+    pub(crate) fn new(bed: &Particles, contacts: &Contacts, time: f64, dt: f64) -> Self {
         let free_velocities = bed.bodies[..bed.count()].iter().map(motion).collect();
         let contacts = lanes(contacts)
             .map(|(set, number, lane)| FrozenContact::read(set, number, lane, &bed.bodies))

@@ -2,14 +2,14 @@
 
 use nalgebra::Vector3;
 
-use crate::bed::Bed;
+use crate::contact_context::ContactContext;
 use crate::contact_set::ContactSet;
 use crate::law::IMPACT_SPEED;
-use crate::surroundings::Surroundings;
+use crate::particles::Particles;
 
 /// Gives the contacts of a set their restitution: what closes faster than an impact must and touches
 /// within the substep may not leave slower than `-e w_n`. Source: Moreau 1988 as in Acary and Brogliato 2008, 10.1.
-pub(crate) fn rebound(set: &mut ContactSet, bed: &Bed, around: &Surroundings) {
+pub(crate) fn rebound(set: &mut ContactSet, bed: &Particles, around: &ContactContext) {
     let at_walls = set.is_at_walls();
     for number in 0..set.batches.len() {
         for lane in set.batches[number].lanes() {

@@ -12,9 +12,9 @@ use std::sync::Arc;
 use granulcal_scene::{Scene, SolverSettings};
 use nalgebra::Vector3;
 
-use crate::bed::Bed;
 use crate::bodies::Bodies;
 use crate::clumps::Clumps;
+use crate::contact_context::ContactContext;
 use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
 use crate::effect::Bridges;
@@ -23,8 +23,8 @@ use crate::health::{Health, HealthWatch};
 use crate::impact::{ImpactWork, Impacts};
 use crate::initial;
 use crate::parallel::Threads;
+use crate::particles::Particles;
 use crate::pour::{ConvexGrains, Pour, Status};
-use crate::surroundings::Surroundings;
 use crate::wall_load::{self, WallLoad};
 
 /// A scene in motion.
@@ -34,9 +34,9 @@ use crate::wall_load::{self, WallLoad};
 /// its time; solve the lasting contacts; move.
 #[derive(Clone, Debug)]
 pub struct Simulation {
-    bed: Bed,
+    bed: Particles,
     contacts: Contacts,
-    around: Surroundings,
+    around: ContactContext,
     impacts: Impacts,
     /// Liquid bridges between grains.
     bridges: Bridges,
@@ -72,7 +72,7 @@ impl Simulation {
         scene.check()?;
         let clumps = Clumps::of(scene, seed);
         let bed = initial::bed(scene, clumps.as_ref(), seed);
-        let around = Surroundings::new(scene);
+        let around = ContactContext::new(scene);
         let gravity = around.gravity;
         let lift = gravity.norm() * scene.grains.radius();
         let least_scale = (lift + scene.end.kinetic_energy) * bed.count() as f64;
@@ -273,9 +273,9 @@ impl Simulation {
 
 /// Energy of the grains and of what they press in, per typical mass `[m^2/s^2]`.
 fn energy(
-    bed: &Bed,
+    bed: &Particles,
     (clumps, bodies): (Option<&Clumps>, Option<&Bodies>),
-    around: &Surroundings,
+    around: &ContactContext,
 ) -> f64 {
     let gravity = &around.effects.gravity;
     let energy = match (clumps, bodies) {

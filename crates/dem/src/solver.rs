@@ -10,7 +10,7 @@ use crate::body::Body;
 use crate::clumps::Clumps;
 use crate::contact_set::ContactSet;
 use crate::parallel::Threads;
-use crate::solver::work::Work;
+use crate::solver::solve_info::SolveInfo;
 
 mod components;
 pub(crate) mod frozen;
@@ -19,8 +19,8 @@ pub(crate) mod nsgs;
 mod pcr;
 pub(crate) mod reference;
 pub(crate) mod residual;
+pub(crate) mod solve_info;
 mod velocities;
-pub(crate) mod work;
 
 /// Solves the contacts of `sets` together, from the impulses that they carry and velocities without them;
 /// `quiet_tolerance` is the change of an impulse that counts as none in a quiet state, if this is one `[m/s]`, `radius` that of a
@@ -33,7 +33,7 @@ pub(crate) fn solve(
     radius: f64,
     clumps: Option<&mut Clumps>,
     threads: &Threads,
-) -> Work {
+) -> SolveInfo {
     for set in sets.iter_mut() {
         nsgs::warm_start(set, bodies, threads);
     }

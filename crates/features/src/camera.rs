@@ -180,8 +180,8 @@ impl Camera {
     /// straight down or up. `field_width_m` is the width in view at the distance of the target.
     ///
     /// # Errors
-    /// `OutOfRange` when the field width or the way from eye to target is not positive and below 1 km, `pixels` (columns,
-    /// rows) are 0 or too many, or a coordinate is not finite.
+    /// `OutOfRange` when the field width or the way from eye to target is not positive and below 1 km, `pixels`
+    /// (columns, rows) are 0 or too many, or a coordinate is not finite.
     pub fn looking_at(
         eye: Vector3<f64>,
         target: Vector3<f64>,

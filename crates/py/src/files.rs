@@ -31,8 +31,8 @@ pub(crate) fn check_paths(
     py.detach(|| claims.check()).map_err(error::dataset)
 }
 
-/// Writes a whole file or none; it may replace a file of its own kind, which `ending` names; one of another ending, anything but
-/// TOML.
+/// Writes a whole file or none; it may replace a file of its own kind, which `ending` names; one of another ending,
+/// anything but TOML.
 #[pyfunction]
 pub(crate) fn write_file(
     py: Python<'_>,

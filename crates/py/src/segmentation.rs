@@ -12,7 +12,8 @@ const KEYWORDS: &str = "height_threshold, threshold_floor, border_px, downsample
 /// A recording's own segmentation with what the keywords change; what is None stays.
 ///
 /// # Errors
-/// `TypeError` names a keyword that there is not, and one whose value is of another type; `OverflowError` one that is no count.
+/// `TypeError` names a keyword that there is not, and one whose value is of another type; `OverflowError` one that is
+/// no count.
 pub(crate) fn changed(
     own: &Segmentation,
     keywords: Option<&Bound<'_, PyDict>>,

@@ -1,5 +1,5 @@
-//! The depth camera as a scene states it. Rendering belongs to `granulcal-features`; a simulation only needs to know which
-//! piece of the ground is in view.
+//! The depth camera as a scene states it. Rendering belongs to `granulcal-features`; a simulation only needs to know
+//! which piece of the ground is in view.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,5 @@
-//! The shape of every grain as a scene states it, `[grains.shape]`, in diameters of the scene's grains; as a body it is in
-//! `grain_shape/solid.rs`.
+//! The shape of every grain as a scene states it, `[grains.shape]`, in diameters of the scene's grains; as a body it is
+//! in `grain_shape/solid.rs`.
 
 mod solid;
 

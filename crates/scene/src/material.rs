@@ -36,20 +36,21 @@ pub struct Material {
     /// Torsional friction mu_t `[-]`: resists spinning about the normal, as `rolling_friction` resists rolling.
     #[serde(default = "default_torsional_friction")]
     pub torsional_friction: f64,
-    /// Gap below which two grains count as touching when one of them is struck, over the mean of their radii `[-]`: about
-    /// the overlap of a typical impact. 0.01 stands for a Young's modulus of some 3e8 Pa at 1 m/s, 0.05 for 3e6 to 3e7.
+    /// Gap below which two grains count as touching when one of them is struck, over the mean of their radii `[-]`:
+    /// about the overlap of a typical impact. 0.01 stands for a Young's modulus of some 3e8 Pa at 1 m/s, 0.05 for 3e6
+    /// to 3e7.
     #[serde(default = "default_softness")]
     pub softness: f64,
-    /// q `[-]`: contacts that touched before a blow have the restitution e^q, the pair that strikes has e. 1 is a viscous
-    /// dashpot, 0 an elastic contact; numbers in between are nuisances of other engines' contacts.
+    /// q `[-]`: contacts that touched before a blow have the restitution e^q, the pair that strikes has e. 1 is a
+    /// viscous dashpot, 0 an elastic contact; numbers in between are nuisances of other engines' contacts.
     #[serde(default = "one")]
     pub touching_exponent: f64,
     /// Friction cones in impacts over those in lasting contacts `[-]`; above 1 for dashpots that pull, whose tension
     /// other engines count into |F_n|.
     #[serde(default = "one")]
     pub impact_friction: f64,
-    /// Dashpot on rolling during an impact, beside the moment limit and not bounded by it, as a share of the critical one
-    /// `[-]`: LIGGGHTS' `epsd` (`coefficientRollingViscousDamping`).
+    /// Dashpot on rolling during an impact, beside the moment limit and not bounded by it, as a share of the critical
+    /// one `[-]`: LIGGGHTS' `epsd` (`coefficientRollingViscousDamping`).
     #[serde(default)]
     pub rolling_damping: f64,
 }

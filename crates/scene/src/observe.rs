@@ -116,7 +116,8 @@ pub struct ObserveSpill {
 pub struct ObserveImages {
     /// When the images are taken, after `begin`, rising `[s]`: each is of the first sample at or after its time.
     pub times: Vec<f64>,
-    /// Grains with their centre above are in no image, as those that a funnel still hides `[m]`; none are left out if absent.
+    /// Grains with their centre above are in no image, as those that a funnel still hides `[m]`; none are left out if
+    /// absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub below: Option<f64>,
 }

@@ -187,7 +187,8 @@ impl Preset {
                 newton: NewtonSettings::default(),
                 reference: ReferenceSettings::default(),
             },
-            // 1/60 s in 10 substeps, 4 Newton steps of 20 iterations, relaxation 0.75. Overlaps of 0.29 radii were seen.
+            // 1/60 s in 10 substeps, 4 Newton steps of 20 iterations, relaxation 0.75. Overlaps of 0.29 radii were
+            // seen.
             Self::Paper => SolverSettings {
                 method: Method::NewtonPcr,
                 dt: 1.0 / 600.0,

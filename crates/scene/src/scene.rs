@@ -75,7 +75,8 @@ pub struct Scene {
     pub observe: Option<Observe>,
 }
 
-/// When a pour ends: at rest, with every moving grain out of view, or at the horizon. [`Outflow::until`] may end it before.
+/// When a pour ends: at rest, with every moving grain out of view, or at the horizon. [`Outflow::until`] may end it
+/// before.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EndRule {

@@ -1,5 +1,5 @@
-//! The depth sensor as a scene states it and `fit-sensor` fits it. What it delivers of an image is in `granulcal-features`;
-//! equations (1) to (5) of `docs/theory/sensor.md`.
+//! The depth sensor as a scene states it and `fit-sensor` fits it. What it delivers of an image is in
+//! `granulcal-features`; equations (1) to (5) of `docs/theory/sensor.md`.
 
 use serde::{Deserialize, Serialize};
 

@@ -40,8 +40,8 @@ pub enum Start {
         /// Half width of a uniform seeded displacement along each axis `[m]`.
         jitter: f64,
     },
-    /// The inside of a cylinder, filled from its lowest point up on a cubic lattice along its axis: to settle in a tube, a
-    /// drum or a hopper.
+    /// The inside of a cylinder, filled from its lowest point up on a cubic lattice along its axis: to settle in a
+    /// tube, a drum or a hopper.
     Cylinder {
         /// Centre of one end `[m]`.
         from: [f64; 3],
@@ -123,8 +123,8 @@ impl Start {
         Ok(())
     }
 
-    /// Centres of the grains `[m]`, one each. `grains` are the balls that hold them, `pose` is where the funnel hangs beside
-    /// its place.
+    /// Centres of the grains `[m]`, one each. `grains` are the balls that hold them, `pose` is where the funnel hangs
+    /// beside its place.
     pub(crate) fn positions(
         &self,
         grains: &Grains,

@@ -8,7 +8,8 @@ use crate::camera::{IN_LENGTHS, LENGTHS};
 use crate::check::{finite, within};
 use crate::error::SceneError;
 
-/// A depth camera at rest anywhere, that looks at a point. Its image is without noise, and no statistics are taken of it.
+/// A depth camera at rest anywhere, that looks at a point. Its image is without noise, and no statistics are taken of
+/// it.
 ///
 /// The world's z axis is up in the image; for a camera that looks straight down or up, the y axis is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,7 +1,7 @@
 //! Janssen's silo: the wall carries all but a share of the grains that grows no more with the filling.
 //!
-//! Be M the weight above a level and S what the level carries, both in grains, K the ratio of the stress on the wall
-//! to that on the level and mu the friction that the wall mobilises. A slice's balance is dS/dM = 1 - S / M_sat, so that
+//! Be M the weight above a level and S what the level carries, both in grains, K the ratio of the stress on the wall to
+//! that on the level and mu the friction that the wall mobilises. A slice's balance is dS/dM = 1 - S / M_sat, so that
 //!
 //!     S = M_sat (1 - exp(-M / M_sat)),    M_sat = D (dM/dz) / (4 mu K)
 //!

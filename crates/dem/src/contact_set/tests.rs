@@ -9,7 +9,7 @@ fn law(number: f64) -> ContactLaw {
         sliding_friction: number,
         rolling_friction: 0.1,
         torsional_friction: 0.05,
-        give: 0.0,
+        compliance: 0.0,
         rolling_speed: 0.0,
     }
 }

@@ -32,8 +32,8 @@ use granulcal_scene::{Fluid, Grains};
 use nalgebra::Vector3;
 
 use super::pore_surface::{PACKED, PoreSurface};
-use crate::bed::Bed;
 use crate::contact_set::ContactSet;
+use crate::particles::Particles;
 
 /// Reynolds number from which on the drag coefficient is constant.
 const NEWTON: f64 = 1000.0;
@@ -91,7 +91,7 @@ impl Drag {
     /// `[m^2/s^2]`.
     pub fn act(
         &self,
-        bed: &mut Bed,
+        bed: &mut Particles,
         pairs: &ContactSet,
         gravity: &Vector3<f64>,
         radius: f64,
@@ -177,7 +177,7 @@ impl Neighbours {
 }
 
 /// The neighbours of every grain, with their velocities before they fell by `fall` `[m/s]` in this substep.
-fn neighbours(bed: &Bed, pairs: &ContactSet, fall: &Vector3<f64>) -> Vec<Neighbours> {
+fn neighbours(bed: &Particles, pairs: &ContactSet, fall: &Vector3<f64>) -> Vec<Neighbours> {
     let mut around = vec![Neighbours::default(); bed.count()];
     for (grain, near) in around.iter_mut().enumerate() {
         // The ground is a neighbour that rests.

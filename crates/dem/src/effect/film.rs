@@ -14,8 +14,8 @@ use std::f64::consts::PI;
 use granulcal_scene::{Effect, Scene};
 
 use super::near::{Near, at_walls, pairs};
-use crate::bed::Bed;
 use crate::contact_set::ContactSet;
+use crate::particles::Particles;
 use crate::wall::Walls;
 
 /// The film of a scene.
@@ -48,7 +48,7 @@ impl Film {
     /// Resists for `dt` `[s]` what comes together and what parts: pairs of grains and grains at walls.
     pub fn act(
         &self,
-        bed: &mut Bed,
+        bed: &mut Particles,
         [pair_set, wall_set]: [&ContactSet; 2],
         walls: &Walls,
         dt: f64,
@@ -64,7 +64,7 @@ impl Film {
         }
     }
 
-    fn resist(&self, bed: &mut Bed, walls: &Walls, near: &Near, count: u32, dt: f64) {
+    fn resist(&self, bed: &mut Particles, walls: &Walls, near: &Near, count: u32, dt: f64) {
         let (i, j) = (near.pair.0 as usize, near.pair.1 as usize);
         let (other, inverse_mass) = if near.is_wall {
             let wall = walls.wall(j - count as usize);

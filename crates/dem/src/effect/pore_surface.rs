@@ -8,7 +8,7 @@
 //! Journal for Numerical Methods in Fluids 47 (2005) 139, doi:10.1002/fld.801). W is a binomial filter, with a standard deviation of 1.4 grains, on a grid of cells as
 //! wide as a typical grain. Slopes are central differences between cells, interpolated linearly.
 
-use crate::bed::Bed;
+use crate::particles::Particles;
 
 /// Solid fraction of a random packing `[-]`.
 pub(super) const PACKED: f64 = 0.6;
@@ -29,7 +29,7 @@ pub(super) struct PoreSurface {
 
 impl PoreSurface {
     /// The surface of the grains in the scene; `radius` is that of a typical grain `[m]`.
-    pub fn of(bed: &Bed, radius: f64) -> Self {
+    pub fn of(bed: &Particles, radius: f64) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for place in bed.present().map(|grain| bed.position(grain)) {
             for axis in 0..2 {
@@ -128,7 +128,7 @@ mod tests {
             }
         }
         let inverse_mass = vec![1.0; places.len()];
-        let surface = PoreSurface::of(&Bed::new(places, inverse_mass, None), radius);
+        let surface = PoreSurface::of(&Particles::new(places, inverse_mass, None), radius);
         // A grain a cell is a thickness of pi / 6 / 0.6 cells.
         let expected = -std::f64::consts::PI / 3.6;
         for [x, y] in [[0.03, 0.0], [0.027, -0.0071]] {

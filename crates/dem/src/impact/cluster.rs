@@ -11,11 +11,11 @@ use super::friction::Friction;
 use super::links::{Link, Links};
 use super::members::Members;
 use super::spring::Spring;
-use crate::bed::Bed;
 use crate::contact::Candidate;
+use crate::contact_context::ContactContext;
 use crate::contacts::Contacts;
 use crate::law::{IMPACT_SPEED, INVERSE_INERTIA};
-use crate::surroundings::Surroundings;
+use crate::particles::Particles;
 
 /// How long an impact lasts at most, in 1/omega: walls that close on a grain never let go. What still closes then is for
 /// the contact solve `[-]`.
@@ -34,7 +34,7 @@ pub(super) struct Outcome {
     pub micro_steps: usize,
     /// Whether contacts still pressed when the impact had lasted its longest.
     pub is_cut: bool,
-    /// Work of moving walls per typical mass `[m^2/s^2]`.
+    /// SolveInfo of moving walls per typical mass `[m^2/s^2]`.
     pub work_of_walls: f64,
     /// Energy of the grains that were hit, after over before and the walls' work `[-]`.
     pub energy_ratio: f64,
@@ -43,9 +43,9 @@ pub(super) struct Outcome {
 /// What stays the same while an impact is resolved.
 struct Scenery<'a> {
     time: f64,
-    bed: &'a Bed,
+    bed: &'a Particles,
     contacts: &'a Contacts,
-    around: &'a Surroundings,
+    around: &'a ContactContext,
     /// What gravity has done between the middle of the substep, whose velocities we have, and now.
     fallen: Vector3<f64>,
 }
@@ -67,9 +67,9 @@ impl Cluster {
         &mut self,
         pair: Candidate,
         time: f64,
-        bed: &mut Bed,
+        bed: &mut Particles,
         contacts: &Contacts,
-        around: &Surroundings,
+        around: &ContactContext,
     ) -> Option<Outcome> {
         let fallen = around.gravity * (time - 0.5 * around.settings.dt);
         let scenery = Scenery { time, bed, contacts, around, fallen };
@@ -181,7 +181,7 @@ impl Cluster {
     }
 
     /// Gives a link that closes at a speed for the first time its spring.
-    fn find_spring(&mut self, number: usize, closing: f64, around: &Surroundings) {
+    fn find_spring(&mut self, number: usize, closing: f64, around: &ContactContext) {
         let link = &self.links[number];
         let mut restitution = around.effects.restitution_at(link.restitution, closing);
         if link.exponent != 1.0 {
@@ -253,7 +253,7 @@ impl Cluster {
 
     /// The normal motion of a link by itself through a micro-step; returns its impulse.
     #[inline]
-    fn press_on(&mut self, number: usize, h: f64, around: &Surroundings) -> f64 {
+    fn press_on(&mut self, number: usize, h: f64, around: &ContactContext) -> f64 {
         let link = &mut self.links[number];
         let closing = -self.members.closing_rate(&link.ends, &link.normal);
         let Some(spring) = link.spring else {
@@ -306,7 +306,7 @@ impl Cluster {
     fn rub_with(&mut self, number: usize, friction: &Friction) {
         let link = &mut self.links[number];
         if link.tangential_restitution > 0.0 {
-            // Work of an impulse: itself times the mean of the velocities before and after.
+            // SolveInfo of an impulse: itself times the mean of the velocities before and after.
             let slip = self.members.slip(link).u;
             let after = slip + link.block.a_t * friction.t + link.block.kappa * friction.m;
             link.total.sliding_taken -= 0.5 * friction.t.dot(&(slip + after));
@@ -343,7 +343,7 @@ impl Cluster {
         }
     }
 
-    /// Work of walls that move, per typical mass `[m^2/s^2]`.
+    /// SolveInfo of walls that move, per typical mass `[m^2/s^2]`.
     fn work_of_walls(&self, fallen: &Vector3<f64>) -> f64 {
         let of = |link: &Link| {
             let Some((velocity, spin)) = self.members.wall_motion(link.ends[1]) else { return 0.0 };
@@ -358,7 +358,7 @@ impl Cluster {
     fn write_back(
         &mut self,
         time: f64,
-        bed: &mut Bed,
+        bed: &mut Particles,
         fallen: &Vector3<f64>,
         work_of_walls: f64,
     ) -> f64 {

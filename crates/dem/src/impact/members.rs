@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::friction::{Friction, Slip};
 use super::links::Link;
-use crate::bed::Bed;
 use crate::law::INVERSE_INERTIA;
+use crate::particles::Particles;
 
 /// No grain, or no member.
 const NONE: u32 = u32::MAX;
@@ -40,7 +40,7 @@ impl Members {
     }
 
     /// The member that a grain is.
-    pub fn grain(&mut self, grain: usize, bed: &Bed) -> usize {
+    pub fn grain(&mut self, grain: usize, bed: &Particles) -> usize {
         if self.of_grain.len() < bed.count() {
             self.of_grain.resize(bed.count(), NONE);
         }

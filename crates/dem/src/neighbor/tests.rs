@@ -5,16 +5,16 @@ use proptest::prelude::*;
 use super::*;
 use crate::lanes::Row;
 
-fn bed(points: &[([f64; 3], [f64; 3], f64)]) -> Bed {
+fn bed(points: &[([f64; 3], [f64; 3], f64)]) -> Particles {
     let places = points.iter().map(|&(position, _, radius)| Row::new(&position.into(), radius));
-    let mut bed = Bed::new(places.collect(), vec![1.0; points.len()], None);
+    let mut bed = Particles::new(places.collect(), vec![1.0; points.len()], None);
     for (i, (_, velocity, _)) in points.iter().enumerate() {
         bed.bodies[i].velocity = Row::new(&(*velocity).into(), 0.0);
     }
     bed
 }
 
-fn brute_force(bed: &Bed, reach: Reach) -> Vec<Neighbours> {
+fn brute_force(bed: &Particles, reach: Reach) -> Vec<Neighbours> {
     let pairs = (0..bed.count()).flat_map(|i| (i + 1..bed.count()).map(move |j| (i, j)));
     let path = |grain| Path { from: bed.position(grain), velocity: bed.velocity(grain) };
     let within = |i, j, gap| {

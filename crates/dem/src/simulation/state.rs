@@ -10,7 +10,6 @@ use std::borrow::Cow;
 use serde::{Deserialize, Serialize};
 
 use super::Simulation;
-use crate::bed::Bed;
 use crate::bodies::{Bodies, BodiesState};
 use crate::checkpoint::{self, CheckpointHeader};
 use crate::clumps::{ClumpState, Clumps};
@@ -20,6 +19,7 @@ use crate::effect::Bridges;
 use crate::error::DemError;
 use crate::health::HealthWatch;
 use crate::impact::Impacts;
+use crate::particles::Particles;
 use crate::pour::Status;
 
 /// What changes as a simulation goes on.
@@ -29,7 +29,7 @@ struct State<'a> {
     is_quiet: bool,
     seemed_ended: Option<(Status, usize)>,
     ended: Option<Status>,
-    bed: Cow<'a, Bed>,
+    bed: Cow<'a, Particles>,
     contacts: Cow<'a, Contacts>,
     bridges: Cow<'a, Bridges>,
     on_layer: Cow<'a, ContactSet>,

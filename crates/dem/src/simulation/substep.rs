@@ -9,7 +9,7 @@ use crate::pour::Status;
 use crate::rebound::rebound;
 use crate::solver;
 use crate::solver::residual::ResidualSums;
-use crate::solver::work::Work;
+use crate::solver::solve_info::SolveInfo;
 
 /// Mean energy of a grain's translation over that of a fall by its radius below which grains hardly move `[-]`.
 const QUIET: f64 = 0.0025;
@@ -83,7 +83,7 @@ impl Simulation {
         watch.see_contacts(step.points);
         watch.see_work(step.work_of_walls);
         let (sweeps, unconverged) = (step.sweeps, step.unconverged);
-        watch.see_solve(&Work { sweeps, unconverged, ..Work::default() });
+        watch.see_solve(&SolveInfo { sweeps, unconverged, ..SolveInfo::default() });
         for (grain, [centre, velocity, omega]) in bodies.motions().enumerate() {
             self.bed.places[grain] = Row::new(&centre, self.bed.radius(grain));
             self.bed.set_motion(grain, &velocity, &omega);

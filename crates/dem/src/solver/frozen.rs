@@ -3,20 +3,20 @@
 use granulcal_scene::SolverSettings;
 use nalgebra::Vector3;
 
-use crate::bed::Bed;
 use crate::contact_set::ContactSet;
 use crate::error::DemError;
 use crate::parallel::Threads;
+use crate::particles::Particles;
 use crate::solver;
 use crate::solver::residual::ResidualSums;
-use crate::solver::work::Work;
+use crate::solver::solve_info::SolveInfo;
 
 /// Contacts with normals, biases and warm impulses, and the velocities before they are solved, as
 /// [`Simulation::frozen_solve`](crate::Simulation::frozen_solve) has frozen them.
 #[derive(Clone, Debug)]
 pub struct FrozenSolve {
     sets: [ContactSet; 2],
-    bed: Bed,
+    bed: Particles,
     radius: f64,
 }
 
@@ -42,7 +42,7 @@ pub struct FrozenSolution {
 }
 
 impl FrozenSolve {
-    pub(crate) fn new(sets: [ContactSet; 2], bed: Bed, radius: f64) -> Self {
+    pub(crate) fn new(sets: [ContactSet; 2], bed: Particles, radius: f64) -> Self {
         Self { sets, bed, radius }
     }
 
@@ -91,7 +91,7 @@ impl FrozenSolve {
     }
 
     /// Solves it where it is.
-    fn run(&mut self, settings: &SolverSettings) -> Work {
+    fn run(&mut self, settings: &SolverSettings) -> SolveInfo {
         let Self { sets, bed, radius } = self;
         let threads = Threads::default();
         let sets = &mut sets.each_mut();

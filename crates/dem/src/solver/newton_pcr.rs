@@ -23,7 +23,7 @@ use crate::solver::components::{
 };
 use crate::solver::newton_pcr::guard::Guard;
 use crate::solver::pcr::{Diagonal, System};
-use crate::solver::work::Work;
+use crate::solver::solve_info::SolveInfo;
 
 mod complementarity;
 mod guard;
@@ -36,8 +36,8 @@ pub(super) fn solve(
     settings: &NewtonSettings,
     too_fast: f64,
     threads: &Threads,
-) -> Work {
-    let mut work = Work::default();
+) -> SolveInfo {
+    let mut work = SolveInfo::default();
     let mut guard = Guard::new(sets, bodies, threads);
     let mut velocities = vec![Components::ZERO; batches(sets).count()];
     for _ in 0..settings.outer {

@@ -22,8 +22,8 @@ use crate::contact_set::ContactSet;
 use crate::lanes::{Lanes, Reg, Reg3, Width, widest};
 use crate::law::{TANGENTIAL_INERTIA, project_ball};
 use crate::parallel::Threads;
+use crate::solver::solve_info::SolveInfo;
 use crate::solver::velocities::Velocities;
-use crate::solver::work::Work;
 
 /// How far a sweep still was from the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,10 +51,10 @@ pub(super) fn solve(
     radius: f64,
     mut clumps: Option<&mut Clumps>,
     threads: &Threads,
-) -> Work {
+) -> SolveInfo {
     let too_fast = settings.closing * radius / settings.dt;
     let settled = settings.settled * radius / settings.dt;
-    let mut work = Work::default();
+    let mut work = SolveInfo::default();
     let (mut has_settled, mut has_stopped) = (false, false);
     let mut join = |bodies: &mut [Body]| {
         if let Some(clumps) = &mut clumps {
@@ -71,14 +71,14 @@ pub(super) fn solve(
         let Progress { closing, change } =
             sweep(sets, bodies, SweepOptions::relaxed(relaxation), threads);
         join(bodies);
-        work = Work { sweeps, closing, ..work };
+        work = SolveInfo { sweeps, closing, ..work };
         if is_enough && closing <= too_fast {
             return work;
         }
         has_settled = change <= settled;
         has_stopped = quiet_tolerance.is_some_and(|tolerance| change <= tolerance);
     }
-    Work { unconverged: work.closing > too_fast, ..work }
+    SolveInfo { unconverged: work.closing > too_fast, ..work }
 }
 
 /// Sweeps `count` times, from velocities that contain the impulses.
@@ -320,8 +320,11 @@ pub(super) fn closing<W: Width, const SOFT: bool>(
 ) -> Reg<W> {
     let w_n = Reg3::load(&batch.normal).dot(velocities.v_i - velocities.v_j);
     let opening = w_n + Reg::load(&batch.bias);
-    let opening =
-        if SOFT { opening + Reg::load(&law.give) * Reg::load(&batch.lambda_n) } else { opening };
+    let opening = if SOFT {
+        opening + Reg::load(&law.compliance) * Reg::load(&batch.lambda_n)
+    } else {
+        opening
+    };
     Reg::splat(0.0) - opening
 }
 

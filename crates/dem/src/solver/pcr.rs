@@ -129,7 +129,7 @@ mod tests {
             sliding_friction: 0.5,
             rolling_friction: 0.1,
             torsional_friction: 0.05,
-            give: 0.0,
+            compliance: 0.0,
             rolling_speed: 0.0,
         });
         for (batch, axis) in set.batches.iter_mut().zip(AXES) {

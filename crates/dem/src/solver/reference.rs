@@ -21,7 +21,7 @@ use crate::solver::components::{
 };
 use crate::solver::nsgs::{self, SweepOptions};
 use crate::solver::residual::ResidualSums;
-use crate::solver::work::Work;
+use crate::solver::solve_info::SolveInfo;
 
 /// Sweeps between two looks at the residual, which costs a sweep.
 const LOOK: usize = 8;
@@ -32,12 +32,12 @@ pub(super) fn solve(
     bodies: &mut [Body],
     settings: &ReferenceSettings,
     threads: &Threads,
-) -> Work {
+) -> SolveInfo {
     let count = sets.iter().map(|set| set.batches.len()).sum();
     let mut direction = vec![Components::ZERO; count]; // p
     let mut direction_velocities = vec![Body::default(); bodies.len()]; // M^-1 J^T p
     let mut taken_before = f64::INFINITY; // |g before|^2
-    let mut work = Work { unconverged: true, ..Work::default() };
+    let mut work = SolveInfo { unconverged: true, ..SolveInfo::default() };
     let mut before = impulses(sets);
     loop {
         work.closing = nsgs::sweep(sets, bodies, SweepOptions::EXACT, threads).closing;

@@ -29,7 +29,7 @@ fn law(sliding_friction: f64, rolling_friction: f64) -> ContactLaw {
         sliding_friction,
         rolling_friction,
         torsional_friction: 0.0,
-        give: 0.0,
+        compliance: 0.0,
         rolling_speed: 0.0,
     }
 }
@@ -67,7 +67,7 @@ fn solved(
     set: &ContactSet,
     bodies: &[Body],
     settings: &SolverSettings,
-) -> (ContactSet, Vec<Body>, Work) {
+) -> (ContactSet, Vec<Body>, SolveInfo) {
     let (mut set, mut bodies) = (set.clone(), bodies.to_vec());
     let work = solve(&mut [&mut set], &mut bodies, settings, None, 2e-3, None, &Threads::default());
     (set, bodies, work)

@@ -1,10 +1,10 @@
 //! Grains of one convex shape over the ground plane to a depth image, exact to the ray.
 //!
-//! A body is an intersection of half spaces `n . x <= d` and, if it is round, of the inside of a cylinder about its y axis.
-//! The ray `o + t r` in the body's axes is inside the half space for `t <= (d - n . o) / (n . r)` where it leaves it
-//! (`n . r > 0`), and from there on where it enters; inside the cylinder between the roots of
-//! `(r_x^2 + r_z^2) t^2 + 2 (o_x r_x + o_z r_z) t + o_x^2 + o_z^2 - R^2`. The body begins at the last entry, if that comes before
-//! the first exit.
+//! A body is an intersection of half spaces `n . x <= d` and, if it is round, of the inside of a cylinder about its y
+//! axis. The ray `o + t r` in the body's axes is inside the half space for `t <= (d - n . o) / (n . r)` where it leaves
+//! it (`n . r > 0`), and from there on where it enters; inside the cylinder between the roots of
+//! `(r_x^2 + r_z^2) t^2 + 2 (o_x r_x + o_z r_z) t + o_x^2 + o_z^2 - R^2`. The body begins at the last entry, if that
+//! comes before the first exit.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -27,12 +27,13 @@ pub struct ConvexShape {
 
 /// The depth image of equal convex bodies on the ground z = 0, every `step`-th pixel of it.
 ///
-/// As [`super::render_grid`] draws spheres: 0.0 where the ray meets nothing; a body whose ball contains the camera's centre or lies
-/// behind it is not seen.
+/// As [`super::render_grid`] draws spheres: 0.0 where the ray meets nothing; a body whose ball contains the camera's
+/// centre or lies behind it is not seen.
 ///
 /// # Errors
-/// `LengthMismatch` when there is not one orientation per position, `OutOfRange` for a shape without a size, a coordinate beyond
-/// 1000 km or not finite, or a camera with nonsense in its fields; `DownsampleFactor` when no pixel would be left.
+/// `LengthMismatch` when there is not one orientation per position, `OutOfRange` for a shape without a size, a
+/// coordinate beyond 1000 km or not finite, or a camera with nonsense in its fields; `DownsampleFactor` when no pixel
+/// would be left.
 pub fn render_convex(
     camera: &Camera,
     shape: &ConvexShape,

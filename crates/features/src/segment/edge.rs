@@ -16,7 +16,8 @@ pub struct EdgePixels {
 }
 
 impl Formation {
-    /// The pixels that hang on the edge of the image, apart from the formation, after down-sampling; `None` without any.
+    /// The pixels that hang on the edge of the image, apart from the formation, after down-sampling; `None` without
+    /// any.
     pub fn edge(&self) -> Option<EdgePixels> {
         edge_pixels(&self.mask, self.width)
     }

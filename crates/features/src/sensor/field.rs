@@ -121,8 +121,8 @@ pub(crate) fn components(field: &NoiseField) -> [Component; 6] {
     ]
 }
 
-/// The field of `seed` on the grid, row by row; what a pixel of the sensor gets does not depend on which others the grid
-/// has.
+/// The field of `seed` on the grid, row by row; what a pixel of the sensor gets does not depend on which others the
+/// grid has.
 pub(crate) fn sample(field: &NoiseField, grid: &SensorGrid, seed: u64) -> Vec<f64> {
     let mut values = vec![0.0; grid.columns.len() * grid.rows.len()];
     for (index, component) in components(field).iter().enumerate() {

@@ -6,6 +6,7 @@
 //!
 //! ```
 //! use granulcal_features::sensor::fit::{FitSettings, FlatFrames, fit};
+//! use granulcal_features::sensor::{Moments, Observe};
 //! use granulcal_features::{DepthSensor, HeightMap, NoiseField, TimeOfFlightSensor};
 //!
 //! let noise = NoiseField { white: 2e-4, ..NoiseField::default() };

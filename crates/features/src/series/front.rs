@@ -6,10 +6,10 @@
 //! c(ρ) = |∪ᵢ Aᵢ(ρ)| / 2π,   Aᵢ(ρ) = { φ : |ρ e(φ) - xᵢ| ≤ aᵢ },
 //! ```
 //!
-//! an arc about the azimuth of grain i of half width arccos((ρ² + dᵢ² - aᵢ²) / (2 ρ dᵢ)), all of the circle where
-//! ρ + dᵢ ≤ aᵢ. Of a solid body whose outline is R(φ), c(ρ) is the share of azimuths with R(φ) > ρ, so that the
-//! radius where c = 1/2 is the median of the front over the azimuth; single grains that have run ahead hardly change it.
-//! c is taken as its mean over a ring one mean diameter wide, in which the gaps between single grains even out.
+//! an arc about the azimuth of grain i of half width arccos((ρ² + dᵢ² - aᵢ²) / (2 ρ dᵢ)), all of the circle where ρ +
+//! dᵢ ≤ aᵢ. Of a solid body whose outline is R(φ), c(ρ) is the share of azimuths with R(φ) > ρ, so that the radius
+//! where c = 1/2 is the median of the front over the azimuth; single grains that have run ahead hardly change it. c is
+//! taken as its mean over a ring one mean diameter wide, in which the gaps between single grains even out.
 
 use std::f64::consts::{PI, TAU};
 

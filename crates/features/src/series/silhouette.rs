@@ -27,7 +27,8 @@ pub struct Silhouette {
 }
 
 impl Silhouette {
-    /// Columns at `x` (rising) `[m]` between the heights `bottom` and `top` `[m]`, with cells of a sixteenth of `radius`.
+    /// Columns at `x` (rising) `[m]` between the heights `bottom` and `top` `[m]`, with cells of a sixteenth of
+    /// `radius`.
     ///
     /// # Errors
     /// `OutOfRange` for heights that hold no cell or more than a million.
@@ -75,8 +76,8 @@ impl Silhouette {
         }
     }
 
-    /// Height of the surface in each column `[m]`: where from above the share of frames that hide first reaches `level`,
-    /// linear between cells; NaN where it does nowhere, or without a frame.
+    /// Height of the surface in each column `[m]`: where from above the share of frames that hide first reaches
+    /// `level`, linear between cells; NaN where it does nowhere, or without a frame.
     pub fn surface(&self, level: f64) -> Vec<f64> {
         self.hidden.chunks(self.cells).map(|column| self.height(column, level)).collect()
     }

@@ -1,10 +1,11 @@
 //! Dry adhesion: surfaces that touch pull each other with a constant force, the pull-off force.
 //!
-//! For rigid grains only the pull-off force of JKR, `F = 3 pi gamma R_eff`, is left, with `R_eff = r_i r_j / (r_i + r_j)` (r at
-//! a flat wall) and gamma half the work of adhesion; DMT's is 4/3 of it, and a simplified JKR (SJKR) differs in how the
-//! force sets in over an overlap that rigid grains do not have. Source: Johnson, Kendall and Roberts, Proc. R. Soc. A
-//! 324 (1971) 301, doi:10.1098/rspa.1971.0141; Derjaguin, Muller and Toporov, J. Colloid Interface Sci. 53 (1975) 314.
-//! Dimensional screen: roughness cuts an ideal surface's pull 10 to 100 times; no effect below a Bond number of 0.03.
+//! For rigid grains only the pull-off force of JKR, `F = 3 pi gamma R_eff`, is left, with
+//! `R_eff = r_i r_j / (r_i + r_j)` (r at a flat wall) and gamma half the work of adhesion; DMT's is 4/3 of it, and a
+//! simplified JKR (SJKR) differs in how the force sets in over an overlap that rigid grains do not have. Source:
+//! Johnson, Kendall and Roberts, Proc. R. Soc. A 324 (1971) 301, doi:10.1098/rspa.1971.0141; Derjaguin, Muller and
+//! Toporov, J. Colloid Interface Sci. 53 (1975) 314. Dimensional screen: roughness cuts an ideal surface's pull 10 to
+//! 100 times; no effect below a Bond number of 0.03.
 
 use std::f64::consts::PI;
 

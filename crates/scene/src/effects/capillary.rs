@@ -8,8 +8,8 @@
 //! ruptures at S_c = (1 + theta / 2) V^(1/3)
 //! ```
 //!
-//! Source: Willett, Adams, Johnson and Seville, Langmuir 16 (2000) 9396, doi:10.1021/la000657y; rupture: Lian, Thornton and
-//! Adams, J. Colloid Interface Sci. 161 (1993) 138, doi:10.1006/jcis.1993.1452. Dimensional screen: no effect below
+//! Source: Willett, Adams, Johnson and Seville, Langmuir 16 (2000) 9396, doi:10.1021/la000657y; rupture: Lian, Thornton
+//! and Adams, J. Colloid Interface Sci. 161 (1993) 138, doi:10.1006/jcis.1993.1452. Dimensional screen: no effect below
 //! a Bond number of about 0.03. Water on 4 mm couscous, wetted all around: about 2.
 
 use std::f64::consts::TAU;
@@ -79,7 +79,8 @@ impl Capillary {
         (1.0 + 0.5 * self.contact_angle) * self.volume.cbrt()
     }
 
-    /// Pull of a bridge over that of touching typical grains `[-]`: `gap` and `derjaguin` (R) in radii of a typical grain.
+    /// Pull of a bridge over that of touching typical grains `[-]`: `gap` and `derjaguin` (R) in radii of a typical
+    /// grain.
     pub fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
         let s = gap.max(0.0) * (derjaguin / self.volume).sqrt();
         derjaguin / (1.0 + 1.05 * s + 2.5 * s * s)

@@ -6,9 +6,9 @@
 //! V = pi int r^2 dx,   I_along / m = (pi / 2 V) int r^4 dx,   I_across / m = (pi / V) int (r^4 / 4 + r^2 x^2) dx
 //! ```
 //!
-//! The union of the spheres is a body of revolution, whose volume and inertia these integrals are, whatever the overlap; rho
-//! is such that V is the volume of the ball that the scene states. An aspect of 1 is that ball. Prior of the
-//! aspect: uniform over 1 to 1.8; couscous has about 1.2, rice 2 to 3.
+//! The union of the spheres is a body of revolution, whose volume and inertia these integrals are, whatever the
+//! overlap; rho is such that V is the volume of the ball that the scene states. An aspect of 1 is that ball. Prior of
+//! the aspect: uniform over 1 to 1.8; couscous has about 1.2, rice 2 to 3.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -95,8 +95,9 @@ impl Clump {
     }
 }
 
-/// Volume, and moments of inertia along and across over the mass, of spheres of radius 1 in a row about 0. Between the planes half
-/// way to the neighbours the body is one sphere, and the integrands are polynomials of degree 4: three points of Gauss are exact.
+/// Volume, and moments of inertia along and across over the mass, of spheres of radius 1 in a row about 0. Between the
+/// planes half way to the neighbours the body is one sphere, and the integrands are polynomials of degree 4: three
+/// points of Gauss are exact.
 fn integrals(centres: &[f64]) -> [f64; 3] {
     const POINTS: [(f64, f64); 3] = [
         (-0.774_596_669_241_483_4, 5.0 / 9.0),

@@ -20,7 +20,8 @@ pub struct Fluid {
     pub crowding: f64,
     /// Share of its neighbours' velocity that the fluid around a grain has `[-]`: 0 for a fluid at rest.
     pub entrained: f64,
-    /// Share of the pressure of a fluid that fills the grains up to their own surface `[-]`: 0 for one that is everywhere.
+    /// Share of the pressure of a fluid that fills the grains up to their own surface `[-]`: 0 for one that is
+    /// everywhere.
     pub saturated: f64,
 }
 

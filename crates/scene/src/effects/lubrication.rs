@@ -6,13 +6,13 @@
 //! F = 6 pi mu R_eff^2 v_n / max(h, h_0)
 //! ```
 //!
-//! which is (3/2) pi mu a^2 v_n / h for equal spheres of radius a, and 6 pi mu a^2 v_n / h at a wall. h_0 is what roughness
-//! leaves between surfaces that touch. It acts on the motion of surfaces towards each other, where a drag acts on that
-//! against the fluid; tangential motion, whose force grows with the logarithm of h alone, is left out.
+//! which is (3/2) pi mu a^2 v_n / h for equal spheres of radius a, and 6 pi mu a^2 v_n / h at a wall. h_0 is what
+//! roughness leaves between surfaces that touch. It acts on the motion of surfaces towards each other, where a drag
+//! acts on that against the fluid; tangential motion, whose force grows with the logarithm of h alone, is left out.
 //!
-//! Source: Reynolds' equation in the limit of a thin film, Kim and Karrila, Microhydrodynamics (1991), chapter 9; with a cut at the
-//! roughness: Smart and Leighton, Phys. Fluids A 1 (1989) 52, doi:10.1063/1.857523. Dimensional screen: no effect above a
-//! Stokes number rho_s d v / 9 mu of some hundred.
+//! Source: Reynolds' equation in the limit of a thin film, Kim and Karrila, Microhydrodynamics (1991), chapter 9; with
+//! a cut at the roughness: Smart and Leighton, Phys. Fluids A 1 (1989) 52, doi:10.1063/1.857523. Dimensional screen: no
+//! effect above a Stokes number rho_s d v / 9 mu of some hundred.
 
 use serde::{Deserialize, Serialize};
 

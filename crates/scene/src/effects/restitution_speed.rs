@@ -1,8 +1,9 @@
 //! Restitution that depends on the speed of the impact: `e(v) = e (v / v_0)^(-q)`, at most 1.
 //!
-//! Source: q = 1/4 for plastic contacts (Thornton, J. Appl. Mech. 64 (1997) 383, doi:10.1115/1.2787319), q about 0.06 for
-//! viscoelastic ones near e = 0.8 (Ramirez et al., Phys. Rev. E 60 (1999) 4465, doi:10.1103/PhysRevE.60.4465, as a power law over
-//! a decade of speeds). Dimensional screen: over pours of 4 to 12 cm speeds differ by a factor 1.7, so e by 0.6 q.
+//! Source: q = 1/4 for plastic contacts (Thornton, J. Appl. Mech. 64 (1997) 383, doi:10.1115/1.2787319), q about 0.06
+//! for viscoelastic ones near e = 0.8 (Ramirez et al., Phys. Rev. E 60 (1999) 4465, doi:10.1103/PhysRevE.60.4465, as a
+//! power law over a decade of speeds). Dimensional screen: over pours of 4 to 12 cm speeds differ by a factor 1.7, so e
+//! by 0.6 q.
 
 use serde::{Deserialize, Serialize};
 

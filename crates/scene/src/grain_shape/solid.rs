@@ -143,8 +143,8 @@ impl Solid {
         })
     }
 
-    /// The points of the body that may touch a surface whose normal, towards the body, is `-direction`: of a polyhedron its
-    /// corners, of a cylinder the ends of the generator that is farthest, and three more points of that end's rim.
+    /// The points of the body that may touch a surface whose normal, towards the body, is `-direction`: of a polyhedron
+    /// its corners, of a cylinder the ends of the generator that is farthest, and three more points of that end's rim.
     pub fn extremes(&self, direction: &Vector3<f64>, mut found: impl FnMut(Vector3<f64>)) {
         let Some((radius, half)) = self.round else {
             self.corners.iter().for_each(|corner| found(*corner));
@@ -163,7 +163,8 @@ impl Solid {
         }
     }
 
-    /// Density-free energy of turning, `omega . I omega / 2 m`, from the angular momentum over the mass in the body's axes.
+    /// Density-free energy of turning, `omega . I omega / 2 m`, from the angular momentum over the mass in the body's
+    /// axes.
     pub fn turning_energy(&self, momentum: &Vector3<f64>) -> f64 {
         0.5 * momentum.component_mul(momentum).component_div(&self.inertia).sum()
     }

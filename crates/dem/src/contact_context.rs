@@ -3,10 +3,10 @@
 use granulcal_scene::{Material, Scene, SolverSettings};
 use nalgebra::Vector3;
 
-use crate::bed::Bed;
 use crate::contact::ContactLaw;
 use crate::effect::Acting;
 use crate::parallel::Threads;
+use crate::particles::Particles;
 use crate::path::Reach;
 use crate::wall::Walls;
 
@@ -15,7 +15,7 @@ const NEAR: f64 = 0.02;
 
 /// What the contacts are made of: walls, material and settings of one simulation.
 #[derive(Clone, Debug)]
-pub(crate) struct Surroundings {
+pub(crate) struct ContactContext {
     pub walls: Walls,
     /// Whether any wall may move.
     pub has_moving_walls: bool,
@@ -33,7 +33,7 @@ pub(crate) struct Surroundings {
     pub margin: f64,
 }
 
-impl Surroundings {
+impl ContactContext {
     pub fn new(scene: &Scene) -> Self {
         let settings = scene.preset.settings();
         let walls = Walls::of(scene);
@@ -74,14 +74,14 @@ impl Surroundings {
     }
 
     /// The coefficients of a contact between two grains.
-    pub fn pair_law(&self, bed: &Bed, i: usize, j: usize) -> ContactLaw {
+    pub fn pair_law(&self, bed: &Particles, i: usize, j: usize) -> ContactLaw {
         let (r_i, r_j) = (bed.radius(i), bed.radius(j));
         let lever = [r_j / (r_i + r_j), r_i / (r_i + r_j)];
         self.law(&self.material, [bed.inverse_mass[i], bed.inverse_mass[j]], lever)
     }
 
     /// The coefficients of a contact between a grain and a wall.
-    pub fn wall_law(&self, bed: &Bed, i: usize, wall: usize) -> ContactLaw {
+    pub fn wall_law(&self, bed: &Particles, i: usize, wall: usize) -> ContactLaw {
         // The spin of a moving wall is in units of the grain's radius, so that its lever is the grain's.
         let lever = if self.has_moving_walls { [1.0, 1.0] } else { [1.0, 0.0] };
         self.law(&self.walls.wall(wall).material, [bed.inverse_mass[i], 0.0], lever)
@@ -94,7 +94,7 @@ impl Surroundings {
             sliding_friction: material.sliding_friction,
             rolling_friction: material.rolling_friction,
             torsional_friction: material.torsional_friction,
-            give: 0.0,
+            compliance: 0.0,
             rolling_speed: self.effects.rolling_speed,
         }
     }

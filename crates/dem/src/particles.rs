@@ -15,7 +15,7 @@ const SHARE: usize = if cfg!(test) { 16 } else { 4096 };
 /// Grains as arrays. `places` and `bodies` have one entry more than there are grains: the resting body that
 /// walls and empty lanes refer to. Where walls move, further bodies stand for them, one for each contact.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Bed {
+pub(crate) struct Particles {
     /// Centre and radius of each grain `[m]`.
     pub places: Vec<Row>,
     pub bodies: Vec<Body>,
@@ -30,7 +30,7 @@ pub(crate) struct Bed {
     pub period: Option<Period>,
 }
 
-impl Bed {
+impl Particles {
     /// Grains at rest, each with its centre and radius `[m]` and its inverse mass.
     pub fn new(mut places: Vec<Row>, inverse_mass: Vec<f64>, period: Option<Period>) -> Self {
         let count = inverse_mass.len();
@@ -171,7 +171,7 @@ impl Bed {
             .sum()
     }
 
-    /// Work of an acceleration on all grains within `dt` `[s]`, per typical mass `[m^2/s^2]`.
+    /// SolveInfo of an acceleration on all grains within `dt` `[s]`, per typical mass `[m^2/s^2]`.
     pub fn work_of(&self, acceleration: &Vector3<f64>, dt: f64) -> f64 {
         let step = dt * acceleration;
         let work = |i| (self.velocity(i) + 0.5 * step).dot(&step) / self.inverse_mass[i];
@@ -241,9 +241,9 @@ mod tests {
     use super::*;
 
     /// Three grains of different size and mass, in motion.
-    fn bed() -> Bed {
+    fn bed() -> Particles {
         let places = [1e-3, 2e-3, 4e-3].map(|radius| Row([5.0 * radius, 0.0, 0.1, radius]));
-        let mut bed = Bed::new(places.to_vec(), vec![8.0, 1.0, 0.125], None);
+        let mut bed = Particles::new(places.to_vec(), vec![8.0, 1.0, 0.125], None);
         for (i, body) in bed.bodies[..3].iter_mut().enumerate() {
             let i = i as f64;
             body.velocity = Row([1.0 + i, -2.0, 0.5 * i, 0.0]);

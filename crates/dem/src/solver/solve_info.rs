@@ -2,7 +2,7 @@
 
 /// What a solve took and what it left.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Work {
+pub(crate) struct SolveInfo {
     /// Passes over all contacts: Gauss-Seidel sweeps and iterations of the linear solver.
     pub sweeps: usize,
     /// Fastest closing `-(w_n + b)` of a contact at the last look `[m/s]`.

@@ -18,22 +18,22 @@
 
 use granulcal_scene::Scene;
 
-use crate::bed::Bed;
 use crate::blocks::Blocks;
 use crate::contact::{ContactKey, ContactLaw};
 use crate::contact_set::{BodyKind, ContactSet};
 use crate::lanes::Lanes;
+use crate::particles::Particles;
 
 /// A layer as the solver sees it, over a typical mass.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Pad {
+pub(crate) struct ElasticLayer {
     /// k `[1/s^2]`
     rigidity: f64,
     /// c `[1/s]`
     damping: f64,
 }
 
-impl Pad {
+impl ElasticLayer {
     /// The layer of a scene.
     pub fn of(scene: &Scene) -> Self {
         let layer = scene.effects.layer;
@@ -43,13 +43,13 @@ impl Pad {
     }
 
     /// a `[-]`: how far a contact gives way to an impulse in a substep.
-    fn give(&self, dt: f64) -> f64 {
+    fn compliance(&self, dt: f64) -> f64 {
         1.0 / (dt * (dt * self.rigidity + self.damping))
     }
 
     /// b of a contact of so much gap `[m]`, negative inside the layer `[m/s]`.
     fn bias(&self, gap: f64, dt: f64) -> f64 {
-        if gap < 0.0 { self.give(dt) * dt * self.rigidity * gap } else { gap / dt }
+        if gap < 0.0 { self.compliance(dt) * dt * self.rigidity * gap } else { gap / dt }
     }
 
     /// Lists the grains that are in the layer by the end of a substep of `dt` `[s]`, with what they had before; `ground` has the
@@ -57,7 +57,7 @@ impl Pad {
     pub fn assemble(
         &self,
         set: &mut ContactSet,
-        bed: &Bed,
+        bed: &Particles,
         dt: f64,
         ground: impl Fn(usize) -> ContactLaw,
     ) {
@@ -65,9 +65,9 @@ impl Pad {
         let comes = |&grain: &usize| gap(grain) + dt * bed.velocity(grain).z.min(0.0) < 0.0;
         let listed: Vec<ContactKey> =
             bed.present().filter(comes).map(|i| ContactKey { i: i as u32, partner: 0 }).collect();
-        let give = self.give(dt);
+        let compliance = self.compliance(dt);
         set.rebuild(&listed, &Blocks::default(), bed.count(), BodyKind::SoftLayer, |contact| {
-            ContactLaw { give, ..ground(contact.i as usize) }
+            ContactLaw { compliance, ..ground(contact.i as usize) }
         });
         for batch in &mut set.batches {
             batch.bias = Lanes::splat(f64::INFINITY);
@@ -78,7 +78,7 @@ impl Pad {
     }
 
     /// What the layer's springs hold, per typical mass `[m^2/s^2]`.
-    pub fn energy(&self, bed: &Bed) -> f64 {
+    pub fn energy(&self, bed: &Particles) -> f64 {
         let depth = |grain| (bed.radius(grain) - bed.position(grain).z).max(0.0);
         let spring = |grain| 0.5 * self.rigidity * depth(grain) * depth(grain);
         bed.present().map(spring).sum()
@@ -91,10 +91,10 @@ mod tests {
 
     #[test]
     fn a_contact_that_gives_way_is_a_spring_and_a_damper() {
-        let pad = Pad { rigidity: 4e4, damping: 300.0 };
+        let pad = ElasticLayer { rigidity: 4e4, damping: 300.0 };
         let (dt, gap, w_n) = (1e-4, -2e-4, 0.03);
         // The impulse of the complementarity condition at this velocity, and of the force at the substep's end.
-        let lambda = -(w_n + pad.bias(gap, dt)) / pad.give(dt);
+        let lambda = -(w_n + pad.bias(gap, dt)) / pad.compliance(dt);
         let force = -pad.rigidity * (gap + dt * w_n) - pad.damping * w_n;
         assert!((lambda - dt * force).abs() < 1e-12 * dt * force.abs(), "{lambda}");
     }

@@ -10,8 +10,8 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::near::{Near, at_walls, pairs};
-use crate::bed::Bed;
 use crate::contact_set::ContactSet;
+use crate::particles::Particles;
 use crate::wall::Walls;
 
 /// The pairs that a bridge joins, sorted: first grain, then second grain or the number of grains plus the wall's surface.
@@ -24,7 +24,7 @@ pub(crate) struct Bridges {
 
 /// What pulls in a scene.
 #[derive(Clone, Debug)]
-pub(crate) struct Pull {
+pub(crate) struct Attraction {
     /// With the acceleration of a typical grain that touches another `[m/s^2]`.
     capillary: Option<(Capillary, f64)>,
     adhesion: Option<(Adhesion, f64)>,
@@ -32,7 +32,7 @@ pub(crate) struct Pull {
     radius: f64,
 }
 
-impl Pull {
+impl Attraction {
     /// `inverse_inertia`: mass of a grain over its mass with what of the fluid moves with it.
     pub fn of(scene: &Scene, inverse_inertia: f64) -> Option<Self> {
         let (capillary, adhesion) = (scene.effects.capillary, scene.effects.adhesion);
@@ -59,7 +59,7 @@ impl Pull {
     /// Pulls all that is near for `dt` `[s]`: pairs of grains and grains at walls; bridges form at a touch and go at their rupture.
     pub fn act(
         &self,
-        bed: &mut Bed,
+        bed: &mut Particles,
         [pair_set, wall_set]: [&ContactSet; 2],
         walls: &Walls,
         bridges: &mut Bridges,
