@@ -13,10 +13,10 @@ import numpy as np
 from safetensors.numpy import load_file, save_file
 
 from granulcal.bayessim import BayesSim
-from granulcal.bayessim.average import Average
+from granulcal.bayessim.posterior.average import Average
 from granulcal.parameter import Parameter
+from granulcal.pours.statistics import NAMES
 from granulcal.prior import Prior
-from granulcal.statistics import NAMES
 
 HERE = Path(__file__).parent
 SMALL = {"features": 8, "ensemble": 2, "components": 2, "emulator_features": 8, "max_epochs": 15}
