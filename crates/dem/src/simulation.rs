@@ -97,7 +97,7 @@ impl Simulation {
     /// Settings other than the preset's, for convergence studies.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`] for a step, margin or bound that is not positive, or a count of 0.
+    /// [`DemError::Scene`] for a step, margin or bound that is not positive, or a count of 0.
     pub fn with_settings(mut self, settings: SolverSettings) -> Result<Self, DemError> {
         settings.check()?;
         self.origin.scene.effects.check_method(settings.method)?;
@@ -158,7 +158,7 @@ impl Simulation {
     /// time set v - dt g / 2.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`] for a grain that is not there, or no longer, or a number that is not finite.
+    /// [`DemError::Scene`] for a grain that is not there, or no longer, or a number that is not finite.
     pub fn set_motion(
         &mut self,
         grain: usize,
