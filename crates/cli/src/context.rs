@@ -41,7 +41,8 @@ impl Context {
     }
 }
 
-/// Prints a line to stderr, shortened where it quotes what is endless. If even that is closed there is no one left to tell.
+/// Prints a line to stderr, shortened where it quotes what is endless. If even that is closed there is no one left to
+/// tell.
 pub fn note(line: &str) {
     let _ = writeln!(io::stderr(), "{}", readable(line));
 }

@@ -1,9 +1,9 @@
 //! Batches: a scene and a prior to a folder of Parquet parts, stopped and resumed at will.
 //!
-//! Row i depends on the scene, the prior, the seed and i, and on nothing else: not on the number of
-//! threads, of shards, of interruptions. Rows are written in chunks, and every half minute what there is of chunks that
-//! are not complete; a part is whole on disk or absent, so a run that was killed loses the rows in flight and those that
-//! were finished in the last half minute.
+//! Row i depends on the scene, the prior, the seed and i, and on nothing else: not on the number of threads, of shards,
+//! of interruptions. Rows are written in chunks, and every half minute what there is of chunks that are not complete; a
+//! part is whole on disk or absent, so a run that was killed loses the rows in flight and those that were finished in
+//! the last half minute.
 
 mod chunk;
 mod folder;

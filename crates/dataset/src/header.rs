@@ -35,7 +35,7 @@ impl Header {
     /// The header of rows that are written now.
     ///
     /// # Errors
-    /// [`DatasetError::PriorDoesNotFit`] if the prior names what the scene has not.
+    /// [`DatasetError::Prior`] if the prior names what the scene has not.
     pub fn new(scene: &Scene, prior: &Prior, seed: u64) -> Result<Self, DatasetError> {
         scene.check().map_err(|e| DatasetError::Simulation(e.into()))?;
         prior.check(scene).map_err(DatasetError::Prior)?;

@@ -1,5 +1,5 @@
-//! Messages that people read: of what strangers wrote, nothing steers a terminal, nothing fills it, and nothing is quoted
-//! from a file that may be none of theirs.
+//! Messages that people read: of what strangers wrote, nothing steers a terminal, nothing fills it, and nothing is
+//! quoted from a file that may be none of theirs.
 
 use std::borrow::Cow;
 use std::path::Path;

@@ -11,8 +11,9 @@ use crate::{DatasetError, files, mesh_file, trajectory_file};
 /// Reads a scene with the meshes and trajectories that it names; their paths are from its folder.
 ///
 /// # Errors
-/// [`DatasetError::Io`] for a file that cannot be read, [`DatasetError::Toml`] or [`DatasetError::Scene`] for one that is no scene,
-/// [`DatasetError::Content`] for a mesh or a trajectory that is none, or a mesh that is not the one it was.
+/// [`DatasetError::Io`] for a file that cannot be read, [`DatasetError::Toml`] or [`DatasetError::Scene`] for one that
+/// is no scene, [`DatasetError::Content`] for a mesh or a trajectory that is none, or a mesh that is not the one it
+/// was.
 pub fn load_scene(path: &Path) -> Result<Scene, DatasetError> {
     let wrong = |source| DatasetError::Scene { path: path.to_owned(), source };
     let text = files::read_text(path)?;
@@ -28,7 +29,8 @@ pub fn load_scene(path: &Path) -> Result<Scene, DatasetError> {
 /// A scene of this text; relative paths of its meshes and trajectories are from `folder`.
 ///
 /// # Errors
-/// As [`load_scene`], but for [`DatasetError::Io`] of the scene itself; [`DatasetError::Simulation`] for what is no scene.
+/// As [`load_scene`], but for [`DatasetError::Io`] of the scene itself; [`DatasetError::Simulation`] for what is no
+/// scene.
 pub fn scene_from_text(text: &str, folder: &Path) -> Result<Scene, DatasetError> {
     let mut scene = Scene::parse(text).map_err(|e| DatasetError::Simulation(e.into()))?;
     fill(&mut scene, folder)?;

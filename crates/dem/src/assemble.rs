@@ -254,8 +254,8 @@ fn wall_geometry(
     geometry
 }
 
-/// How much farther from a wall that bends a grain is after a time on its straight way than its first normal says `[m]`; at the
-/// edge of a mesh whose next point to touch is another facet's, as from the edge.
+/// How much farther from a wall that bends a grain is after a time on its straight way than its first normal says
+/// `[m]`; at the edge of a mesh whose next point to touch is another facet's, as from the edge.
 fn passing_of_wall(near: &Nearest, end: &Nearest, relative: &Vector3<f64>, time: f64) -> f64 {
     let w_n = near.normal.dot(relative);
     if end.distance.is_finite() {

@@ -224,8 +224,8 @@ impl Bodies {
     }
 }
 
-/// Solves every point once, forwards or backwards; returns the largest change of an impulse `[m/s]` and the root mean square of
-/// all changes over that of the normal impulses `[-]`.
+/// Solves every point once, forwards or backwards; returns the largest change of an impulse `[m/s]` and the root mean
+/// square of all changes over that of the normal impulses `[-]`.
 fn sweep(points: &mut [Point], bodies: &mut [Moving], backwards: bool) -> (f64, f64) {
     let (mut largest, mut changes, mut normals) = (0.0_f64, 0.0, 0.0);
     let mut one = |point: &mut Point| {

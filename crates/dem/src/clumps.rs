@@ -1,16 +1,17 @@
 //! Rigid bodies of several spheres, by splitting their mass.
 //!
-//! Every sphere of a clump is a body of its own to the contact solver, with an equal share of the mass. After each sweep the
-//! impulses that the spheres have got are the clump's, and its spheres get the velocities of a rigid motion:
+//! Every sphere of a clump is a body of its own to the contact solver, with an equal share of the mass. After each
+//! sweep the impulses that the spheres have got are the clump's, and its spheres get the velocities of a rigid motion:
 //!
 //! ```text
 //! P <- P + sum m_i dv_i,   L <- L + sum (r_i x m_i dv_i + 2/5 m_i rho^2 d(omega_i)),   V = P / m,   omega = I^-1 L
 //! v_i = V + omega x r_i,   omega_i = omega
 //! ```
 //!
-//! A sphere by itself is easier to move than its clump, so that a sweep goes less far than it might, never too far, and what
-//! does not change any more is the solution for rigid bodies. Source: mass splitting, Tonge et al., ACM Trans. Graph. 31 (2012)
-//! 105, doi:10.1145/2185520.2185601. Angular momentum is what is kept in flight, in a frame that does not turn.
+//! A sphere by itself is easier to move than its clump, so that a sweep goes less far than it might, never too far, and
+//! what does not change any more is the solution for rigid bodies. Source: mass splitting, Tonge et al., ACM Trans.
+//! Graph. 31 (2012) 105, doi:10.1145/2185520.2185601. Angular momentum is what is kept in flight, in a frame that does
+//! not turn.
 
 use granulcal_scene::{ClumpShape, Effect, Scene};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};

@@ -159,7 +159,8 @@ impl Contacts {
 
     /// Puts the walls' motion into the bodies that stand for them, one for each contact at a wall.
     ///
-    /// A contact sees its second body's surface at `v_j - n x w_j`, so `v_j = v_wall + n x w_j` with `w_j = r omega_wall`.
+    /// A contact sees its second body's surface at `v_j - n x w_j`, so `v_j = v_wall + n x w_j` with
+    /// `w_j = r omega_wall`.
     pub fn move_walls(&self, bed: &mut Particles, around: &ContactContext) {
         if !around.has_moving_walls {
             return;

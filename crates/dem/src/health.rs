@@ -13,8 +13,8 @@ pub struct Health {
     pub mean_residual: f64,
     /// Worst natural-map residual over rms normal impulse of the sampled substeps `[-]`.
     pub worst_residual: f64,
-    /// Largest rise of mechanical energy above its lowest value so far `[-]`, over the energy at the start, or over what
-    /// lifts every grain by its radius and sets it in motion as the end rule sees it, if that is more.
+    /// Largest rise of mechanical energy above its lowest value so far `[-]`, over the energy at the start, or over
+    /// what lifts every grain by its radius and sets it in motion as the end rule sees it, if that is more.
     pub energy_created: f64,
     /// Grains whose centre passed through a wall; must be 0.
     pub grains_lost: usize,

@@ -175,7 +175,8 @@ impl Impacts {
         resolved
     }
 
-    /// Whether a wall that bends is not reached yet at the time that its first normal gave; the impact is then foreseen anew.
+    /// Whether a wall that bends is not reached yet at the time that its first normal gave; the impact is then foreseen
+    /// anew.
     fn is_early(
         &mut self,
         pair: Candidate,

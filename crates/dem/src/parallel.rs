@@ -88,7 +88,8 @@ impl Threads {
         pool.install(|| slices.into_par_iter().map(&work).reduce(V::default, &join))
     }
 
-    /// Calls `work` for shares of `items` and appends what it finds to `found`; returns what `join` makes of the values.
+    /// Calls `work` for shares of `items` and appends what it finds to `found`; returns what `join` makes of the
+    /// values.
     pub fn gather<T: Send, U: Send, V: Send + Default>(
         &self,
         items: &mut [T],

@@ -23,7 +23,8 @@ struct Link {
 }
 
 impl Partners {
-    /// Replaces all: `each` calls its argument with every grain and its partner, in the same order whenever it is asked.
+    /// Replaces all: `each` calls its argument with every grain and its partner, in the same order whenever it is
+    /// asked.
     pub fn rebuild(&mut self, grains: usize, each: impl Fn(&mut dyn FnMut(u32, u32))) {
         self.latest.clear();
         self.latest.resize(grains, NONE);

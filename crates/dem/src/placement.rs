@@ -11,8 +11,8 @@ pub(crate) struct Placement {
     /// From the pose at the begin of the substep to that at its end.
     step: Isometry3<f64>,
     dt: f64,
-    /// What bounds how far a point goes in the coming interval between two lists: a length `[m]`, and an angle by which its
-    /// distance from the scene's origin counts.
+    /// What bounds how far a point goes in the coming interval between two lists: a length `[m]`, and an angle by which
+    /// its distance from the scene's origin counts.
     reach: (f64, f64),
 }
 

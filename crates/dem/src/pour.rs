@@ -77,7 +77,8 @@ pub struct Pour {
     pub state_hash: u128,
 }
 
-/// Grains that are convex bodies of one shape: an intersection of half spaces, and of a cylinder about the y axis if it is round.
+/// Grains that are convex bodies of one shape: an intersection of half spaces, and of a cylinder about the y axis if it
+/// is round.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvexGrains {
     /// Outward unit normals and distances from the centre of mass of the flat faces, in the body's axes `[m]`.

@@ -1,5 +1,5 @@
-//! A pour in time: what it is of and what can be asked of it. The substep is in `simulation/substep.rs`, when it ends in
-//! `simulation/end.rs`, its state as bytes in `simulation/state.rs`.
+//! A pour in time: what it is of and what can be asked of it. The substep is in `simulation/substep.rs`, when it ends
+//! in `simulation/end.rs`, its state as bytes in `simulation/state.rs`.
 
 mod end;
 mod frozen;
@@ -97,7 +97,7 @@ impl Simulation {
     /// Settings other than the preset's, for convergence studies.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`] for a step, margin or bound that is not positive, or a count of 0.
+    /// [`DemError::Scene`] for a step, margin or bound that is not positive, or a count of 0.
     pub fn with_settings(mut self, settings: SolverSettings) -> Result<Self, DemError> {
         settings.check()?;
         self.origin.scene.effects.check_method(settings.method)?;
@@ -151,14 +151,15 @@ impl Simulation {
         grains.filter(|&i| self.bed.has_left(i)).map(|i| self.bed.radius(i)).collect()
     }
 
-    /// Sets a grain (one that is not round, as a whole), by its number at the start, in motion: velocity `[m/s]` and angular velocity `[rad/s]` at its centre. A pour that had
-    /// ended goes on, and the energy put in does not count as created.
+    /// Sets a grain (one that is not round, as a whole), by its number at the start, in motion: velocity `[m/s]` and
+    /// angular velocity `[rad/s]` at its centre. A pour that had ended goes on, and the energy put in does not count as
+    /// created.
     ///
     /// Velocities live at the middle of substeps (x += dt v after v += dt g): for a motion v at the present
     /// time set v - dt g / 2.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`] for a grain that is not there, or no longer, or a number that is not finite.
+    /// [`DemError::Scene`] for a grain that is not there, or no longer, or a number that is not finite.
     pub fn set_motion(
         &mut self,
         grain: usize,

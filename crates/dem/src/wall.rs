@@ -45,8 +45,8 @@ impl Wall {
         Nearest { normal: placement.turned(&near.normal), ..near }
     }
 
-    /// Where a centre is in the wall's stated place, and how near a surface that comes nearer than `range` until the next list
-    /// may be.
+    /// Where a centre is in the wall's stated place, and how near a surface that comes nearer than `range` until the
+    /// next list may be.
     fn seen(&self, centre: &Vector3<f64>, range: f64) -> (Vector3<f64>, f64) {
         match &self.placement {
             None => (*centre, range),

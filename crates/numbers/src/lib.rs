@@ -1,7 +1,7 @@
 //! Random words as numbers, the normal distribution and numbers in messages, once for all crates.
 //!
-//! A seed stands for a pour, a data set and an image. A distribution crate may change its algorithm between versions, and
-//! with it what every seed stands for; what is written here does not change by a bit.
+//! A seed stands for a pour, a data set and an image. A distribution crate may change its algorithm between versions,
+//! and with it what every seed stands for; what is written here does not change by a bit.
 
 mod general;
 
@@ -32,8 +32,8 @@ pub fn open(word: u64) -> f64 {
     ((word >> 12) as f64 + 0.5) * (1.0 / (1u64 << 52) as f64)
 }
 
-/// Two independent standard normal numbers of two uniform ones, `u` in (0, 1] and `v` in [0, 1]: the transform of Box and
-/// Muller (1958), doi:10.1214/aoms/1177706645.
+/// Two independent standard normal numbers of two uniform ones, `u` in (0, 1] and `v` in [0, 1]: the transform of Box
+/// and Muller (1958), doi:10.1214/aoms/1177706645.
 ///
 /// ```
 /// let [a, b] = granulcal_numbers::box_muller((-0.5f64).exp(), 0.125);

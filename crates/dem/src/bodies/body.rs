@@ -4,8 +4,8 @@
 //! dx/dt = v,   dq/dt = (0, omega) q / 2,   omega = R I^-1 R^T L,   dL/dt = torque
 //! ```
 //!
-//! What is kept in flight is the angular momentum L in the axes of the scene; that omega changes although L does not is the
-//! gyroscopic term. A step turns the body about the angular velocity of its middle (second order).
+//! What is kept in flight is the angular momentum L in the axes of the scene; that omega changes although L does not is
+//! the gyroscopic term. A step turns the body about the angular velocity of its middle (second order).
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};

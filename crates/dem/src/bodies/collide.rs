@@ -1,5 +1,5 @@
-//! Where bodies touch each other and the walls: parry's manifolds between bodies, the nearest points of the body's own corners
-//! at walls. The only file of this room that asks parry.
+//! Where bodies touch each other and the walls: parry's manifolds between bodies, the nearest points of the body's own
+//! corners at walls. The only file of this room that asks parry.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use parry3d_f64::math::{Pose, Rotation};

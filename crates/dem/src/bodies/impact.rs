@@ -1,7 +1,8 @@
 //! Impacts of bodies: one manifold after the other, each at its time.
 //!
 //! The plastic impact of a manifold, all its points that meet within the substep together, gives impulses lambda with
-//! lambda . u_0 <= 0 and u_0 = u + W lambda. Restitution gives e lambda more, friction and all. With E the kinetic energy,
+//! lambda . u_0 <= 0 and u_0 = u + W lambda. Restitution gives e lambda more, friction and all. With E the kinetic
+//! energy,
 //!
 //! ```text
 //! E_plastic = E + lambda . u_0 - lambda . W lambda / 2
@@ -24,8 +25,8 @@ const STANDS: f64 = 1e-11;
 /// Impacts of a substep at most, over its manifolds: a cube between two others may be hit often.
 const ROUNDS: usize = 8;
 
-/// Resolves what meets within the substep faster than an impact must; returns the number of impacts, and what moving walls have put in
-/// over the mass `[m^2/s^2]`.
+/// Resolves what meets within the substep faster than an impact must; returns the number of impacts, and what moving
+/// walls have put in over the mass `[m^2/s^2]`.
 pub(super) fn resolve(points: &mut [Point], bodies: &mut [Moving], dt: f64) -> (usize, f64) {
     let manifolds = manifolds(points);
     let (mut count, mut work) = (0, 0.0);

@@ -44,8 +44,8 @@ impl ContactSet {
         if fits { Ok(()) } else { Err("a contact of grains that the scene has not") }
     }
 
-    /// The parts are all batches in turn, the phases all parts, and no grain is in two parts of a phase or in two lanes of a
-    /// batch.
+    /// The parts are all batches in turn, the phases all parts, and no grain is in two parts of a phase or in two lanes
+    /// of a batch.
     fn check_parts(&self) -> Result<(), &'static str> {
         let (mut part, mut batch) = (0, 0);
         let mut part_of = vec![usize::MAX; self.grains];

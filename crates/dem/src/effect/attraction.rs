@@ -14,7 +14,8 @@ use crate::contact_set::ContactSet;
 use crate::particles::Particles;
 use crate::wall::Walls;
 
-/// The pairs that a bridge joins, sorted: first grain, then second grain or the number of grains plus the wall's surface.
+/// The pairs that a bridge joins, sorted: first grain, then second grain or the number of grains plus the wall's
+/// surface.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Bridges {
     joined: Vec<(u32, u32)>,
@@ -56,7 +57,8 @@ impl Attraction {
             * self.adhesion.as_ref().map_or(0.0, |(surface, _)| surface.range).max(capillary)
     }
 
-    /// Pulls all that is near for `dt` `[s]`: pairs of grains and grains at walls; bridges form at a touch and go at their rupture.
+    /// Pulls all that is near for `dt` `[s]`: pairs of grains and grains at walls; bridges form at a touch and go at
+    /// their rupture.
     pub fn act(
         &self,
         bed: &mut Particles,

@@ -7,26 +7,27 @@
 //! 0.4 (m + C_a m_f) r^2 d(omega)/dt = -8 pi mu r^3 omega
 //! ```
 //!
-//! Source: Schiller and Naumann 1933 as in Clift, Grace and Weber, Bubbles, Drops and Particles (1978), table 5.1; the moment
-//! is Stokes'; chi and the superficial velocity w are Di Felice's (Int. J. Multiphase Flow 20 (1994) 153,
-//! doi:10.1016/0301-9322(94)90011-6), whose drag agrees with Ergun's in a packing. phi, between 0 and 1, is how crowded a grain is:
-//! its neighbours over those inside a packing; `<v>` is their mean velocity. `crowding` 0 is the drag of a lone grain, `entrained`
-//! 0 a fluid at rest, and with both at 0 eps is 1. With `entrained` 1 the fluid inside a packing goes with the grains, as it must
-//! where it cannot seep as fast as they fall, and only the outer grains are dragged. The fluid has no inertia but the added mass.
+//! Source: Schiller and Naumann 1933 as in Clift, Grace and Weber, Bubbles, Drops and Particles (1978), table 5.1; the
+//! moment is Stokes'; chi and the superficial velocity w are Di Felice's (Int. J. Multiphase Flow 20 (1994) 153,
+//! doi:10.1016/0301-9322(94)90011-6), whose drag agrees with Ergun's in a packing. phi, between 0 and 1, is how crowded
+//! a grain is: its neighbours over those inside a packing; `<v>` is their mean velocity. `crowding` 0 is the drag of a
+//! lone grain, `entrained` 0 a fluid at rest, and with both at 0 eps is 1. With `entrained` 1 the fluid inside a
+//! packing goes with the grains, as it must where it cannot seep as fast as they fall, and only the outer grains are
+//! dragged. The fluid has no inertia but the added mass.
 //!
-//! `saturated` 1 is a fluid that fills the grains up to their own surface h(x, y) (`pore_surface.rs`), as a column that stands in air holds it: with
-//! the pressure of a fluid at rest below that surface, `p = rho_f g (h - z)`, a grain and the fluid between it and the next get
-//! buoyancy and a push down the slope of the surface,
+//! `saturated` 1 is a fluid that fills the grains up to their own surface h(x, y) (`pore_surface.rs`), as a column that
+//! stands in air holds it: with the pressure of a fluid at rest below that surface, `p = rho_f g (h - z)`, a grain and
+//! the fluid between it and the next get buoyancy and a push down the slope of the surface,
 //!
 //! ```text
 //! -grad p V / 0.6 = rho_f g (V / 0.6) (z - phi grad h)
 //! ```
 //!
-//! and the fluid goes with the neighbours alone, the ground among them: outside there is none. Source: hydrostatic pore pressure as
-//! in Iverson, Rev. Geophys. 35 (1997) 245, doi:10.1029/97RG00426; the inertia of the fluid between grains is an added mass of
-//! 0.4 / 0.6. The added mass turns with the grain here (the solver's spheres are solid), so that spin is too
-//! inert by C_a rho_f / rho; a perfect fluid would not turn. Dimensional screen: drag matters where the terminal
-//! speed is not far above the speed of the fall; for couscous in air at 12 cm it takes 0.6 % of the speed.
+//! and the fluid goes with the neighbours alone, the ground among them: outside there is none. Source: hydrostatic pore
+//! pressure as in Iverson, Rev. Geophys. 35 (1997) 245, doi:10.1029/97RG00426; the inertia of the fluid between grains
+//! is an added mass of 0.4 / 0.6. The added mass turns with the grain here (the solver's spheres are solid), so that
+//! spin is too inert by C_a rho_f / rho; a perfect fluid would not turn. Dimensional screen: drag matters where the
+//! terminal speed is not far above the speed of the fall; for couscous in air at 12 cm it takes 0.6 % of the speed.
 
 use granulcal_scene::{Fluid, Grains};
 use nalgebra::Vector3;
@@ -50,8 +51,8 @@ pub(crate) struct Drag {
     pub weight: f64,
     /// Mass of a grain over that with its added mass `[-]`.
     pub inverse_inertia: f64,
-    /// Acceleration down a slope of 1 by the pressure of a fluid that fills the grains, `rho_f g / 0.6` over the inertia of
-    /// a volume of grain `[m/s^2]`.
+    /// Acceleration down a slope of 1 by the pressure of a fluid that fills the grains, `rho_f g / 0.6` over the
+    /// inertia of a volume of grain `[m/s^2]`.
     push: f64,
 }
 
@@ -86,9 +87,9 @@ impl Drag {
     }
 
     /// What the fluid does to every grain within `dt` `[s]` after `gravity` `[m/s^2]` has acted:
-    /// `v + g dt -> u + (v + g dt - u) / (1 + k(v - u) dt)`, implicit in the velocity, so that no step is too long and the
-    /// terminal speed is exact; and the push of its pressure. Returns the energy that a fluid in motion gives, per typical mass
-    /// `[m^2/s^2]`.
+    /// `v + g dt -> u + (v + g dt - u) / (1 + k(v - u) dt)`, implicit in the velocity, so that no step is too long and
+    /// the terminal speed is exact; and the push of its pressure. Returns the energy that a fluid in motion gives, per
+    /// typical mass `[m^2/s^2]`.
     pub fn act(
         &self,
         bed: &mut Particles,
@@ -151,7 +152,8 @@ impl Drag {
 
 /// Gap below which two grains are neighbours, in radii `[-]`: what every preset lists.
 const NEIGHBOUR: f64 = 0.25;
-/// Neighbours inside a random packing: `python examples/neighbours.py` counts 7.9 and, of smoother beads, 8.7 deep in a column.
+/// Neighbours inside a random packing: `python examples/neighbours.py` counts 7.9 and, of smoother beads, 8.7 deep in a
+/// column.
 const NEIGHBOURS: f64 = 8.0;
 
 /// The neighbours of a grain.

@@ -12,9 +12,9 @@
 //! 0 <= w_n + b + a lambda_n _|_ lambda_n >= 0,    a = 1 / (dt (dt k + c)),    b = -a dt k s
 //! ```
 //!
-//! with the ground's friction on its own `lambda_n`. Source: Winkler 1867 as in Johnson, Contact Mechanics (1985), 4.3; the
-//! contact that gives way as in Lacoursiere 2007 (doctoral thesis, Umea), 4.4. The hard ground lies below it and keeps
-//! its own coefficients: no thickness is no layer. Prior of the thickness: uniform over 0 to a radius.
+//! with the ground's friction on its own `lambda_n`. Source: Winkler 1867 as in Johnson, Contact Mechanics (1985), 4.3;
+//! the contact that gives way as in Lacoursiere 2007 (doctoral thesis, Umea), 4.4. The hard ground lies below it and
+//! keeps its own coefficients: no thickness is no layer. Prior of the thickness: uniform over 0 to a radius.
 
 use granulcal_scene::Scene;
 
@@ -52,8 +52,8 @@ impl ElasticLayer {
         if gap < 0.0 { self.compliance(dt) * dt * self.rigidity * gap } else { gap / dt }
     }
 
-    /// Lists the grains that are in the layer by the end of a substep of `dt` `[s]`, with what they had before; `ground` has the
-    /// coefficients of a grain on the hard ground.
+    /// Lists the grains that are in the layer by the end of a substep of `dt` `[s]`, with what they had before;
+    /// `ground` has the coefficients of a grain on the hard ground.
     pub fn assemble(
         &self,
         set: &mut ContactSet,

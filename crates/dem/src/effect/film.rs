@@ -1,13 +1,14 @@
 //! A fluid film between surfaces that come near: `scene/effects/lubrication.rs` has its law.
 //!
-//! Implicit in the speed at which a gap closes, one pair after the other: with k = F dt / (m v_n), m a typical mass, and the
-//! inverse masses w of both,
+//! Implicit in the speed at which a gap closes, one pair after the other: with k = F dt / (m v_n), m a typical mass,
+//! and the inverse masses w of both,
 //!
 //! ```text
 //! J = -k v_n / (1 + k (w_i + w_j)),   v_n -> v_n / (1 + k (w_i + w_j))
 //! ```
 //!
-//! the gap being that at the middle of the substep, so that no film is too thick for the substep, and none can turn a motion round.
+//! the gap being that at the middle of the substep, so that no film is too thick for the substep, and none can turn a
+//! motion round.
 
 use std::f64::consts::PI;
 

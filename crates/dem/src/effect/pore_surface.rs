@@ -4,9 +4,10 @@
 //! h(x, y) = sum over grains of V_i / 0.6 W(x - x_i, y - y_i)
 //! ```
 //!
-//! the thickness of what lies there if it is packed, as in shallow-water particle methods (Ata and Soulaimani, International
-//! Journal for Numerical Methods in Fluids 47 (2005) 139, doi:10.1002/fld.801). W is a binomial filter, with a standard deviation of 1.4 grains, on a grid of cells as
-//! wide as a typical grain. Slopes are central differences between cells, interpolated linearly.
+//! the thickness of what lies there if it is packed, as in shallow-water particle methods (Ata and Soulaimani,
+//! International Journal for Numerical Methods in Fluids 47 (2005) 139, doi:10.1002/fld.801). W is a binomial filter,
+//! with a standard deviation of 1.4 grains, on a grid of cells as wide as a typical grain. Slopes are central
+//! differences between cells, interpolated linearly.
 
 use crate::particles::Particles;
 

@@ -17,8 +17,8 @@ use crate::contacts::Contacts;
 use crate::law::{IMPACT_SPEED, INVERSE_INERTIA};
 use crate::particles::Particles;
 
-/// How long an impact lasts at most, in 1/omega: walls that close on a grain never let go. What still closes then is for
-/// the contact solve `[-]`.
+/// How long an impact lasts at most, in 1/omega: walls that close on a grain never let go. What still closes then is
+/// for the contact solve `[-]`.
 const LONGEST: f64 = 400.0;
 /// Time between two turns of friction, in 1/omega: it has the direction of sliding to follow, not the spring `[-]`.
 const FRICTION_PERIOD: f64 = 1.0;
@@ -61,8 +61,8 @@ pub(super) struct Cluster {
 }
 
 impl Cluster {
-    /// Lets a pair that meets at `time` `[s]` into the substep collide, with all that touches it, if it still closes fast
-    /// enough. Leaves the grains that were hit where they are then.
+    /// Lets a pair that meets at `time` `[s]` into the substep collide, with all that touches it, if it still closes
+    /// fast enough. Leaves the grains that were hit where they are then.
     pub fn resolve(
         &mut self,
         pair: Candidate,
@@ -210,8 +210,8 @@ impl Cluster {
         self.members.set_hit(j);
     }
 
-    /// Micro-steps, forward and backward through the links in turn, until nothing presses any more; returns their number, and
-    /// whether they were cut short.
+    /// Micro-steps, forward and backward through the links in turn, until nothing presses any more; returns their
+    /// number, and whether they were cut short.
     fn ring(&mut self, settings: ImpactSettings, scenery: &Scenery) -> (usize, bool) {
         // A force, so that it does not depend on how finely time is cut.
         let enough = settings.stopping_speed * settings.micro_step;

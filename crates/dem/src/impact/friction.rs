@@ -1,4 +1,5 @@
-//! Sliding, rolling and torsion of one contact under a given normal impulse (docs/theory/contact.md, Friction of an impact).
+//! Sliding, rolling and torsion of one contact under a given normal impulse (docs/theory/contact.md, Friction of an
+//! impact).
 //!
 //! With rolling turned into the tangent plane, `rho = n x r`, `lambda_r = n x m`, the two rows are
 //!
@@ -37,7 +38,8 @@ pub(super) struct FrictionBlock {
     pub rolling_speed: f64,
 }
 
-/// How the surfaces of a contact move: u across n, r (rolling turned into the tangent plane) and the spin about n `[m/s]`.
+/// How the surfaces of a contact move: u across n, r (rolling turned into the tangent plane) and the spin about n
+/// `[m/s]`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Slip {
     pub u: Vector3<f64>,
@@ -136,8 +138,8 @@ impl FrictionBlock {
         all
     }
 
-    /// The normal impulse after which sliding or rolling, as they go on now, would be at its least; at most `left`. What
-    /// stands still need not be looked at: its impulse does not change its sense before the other has stopped.
+    /// The normal impulse after which sliding or rolling, as they go on now, would be at its least; at most `left`.
+    /// What stands still need not be looked at: its impulse does not change its sense before the other has stopped.
     fn until_change(&self, slip: &Slip, left: f64) -> f64 {
         if self.kappa == 0.0 || self.rolling_speed > 0.0 {
             return left;

@@ -102,7 +102,8 @@ impl Links {
         self.0.push(*link);
     }
 
-    /// Whether a member has a link to a wall that faces the same way: the next facet of a curved mesh is no second wall.
+    /// Whether a member has a link to a wall that faces the same way: the next facet of a curved mesh is no second
+    /// wall.
     pub fn has_wall_like(&self, member: usize, normal: &Vector3<f64>) -> bool {
         let is_like = |link: &Link| {
             link.inverse_mass[1] == 0.0

@@ -23,8 +23,8 @@ pub(super) struct RollingSpring {
 }
 
 impl RollingSpring {
-    /// The impulse m of the dashpot of a contact with A_r = `a_r` and A_n = 1 / `compliance_n` on what rolls at `r`, over a
-    /// time in which the normal impulse was `push`.
+    /// The impulse m of the dashpot of a contact with A_r = `a_r` and A_n = 1 / `compliance_n` on what rolls at `r`,
+    /// over a time in which the normal impulse was `push`.
     pub fn act(
         &mut self,
         r: &Vector3<f64>,

@@ -7,8 +7,9 @@
 //! ```
 //!
 //! The dashpot never pulls: a contact that closes at s lets go, where f vanishes, with -e s and
-//! `e = exp(-2 beta acos(beta) / sqrt(1 - beta^2))`, `acosh` and `sqrt(beta^2 - 1)` beyond beta = 1.
-//! Functions of the crate libm, whose bits are the same on every machine. Source: Schwager and Poeschel, Granular Matter 9 (2007) 465, doi:10.1007/s10035-007-0065-z.
+//! `e = exp(-2 beta acos(beta) / sqrt(1 - beta^2))`, `acosh` and `sqrt(beta^2 - 1)` beyond beta = 1. Functions of the
+//! crate libm, whose bits are the same on every machine. Source: Schwager and Poeschel, Granular Matter 9 (2007) 465,
+//! doi:10.1007/s10035-007-0065-z.
 
 /// Restitution below which a contact swallows its closing at once: the dashpot is then stiffer than any micro-step.
 const PLASTIC: f64 = 1e-5;

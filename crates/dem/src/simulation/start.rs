@@ -7,12 +7,13 @@ use crate::error::DemError;
 const MAX_DEPTH: f64 = 0.25;
 
 impl Simulation {
-    /// Refuses grains that would leave the scene before they move, and those that are deep in a wall now, which a pour could
-    /// only answer by throwing them out of it. To ask before the first substep, of a start that somebody has written.
+    /// Refuses grains that would leave the scene before they move, and those that are deep in a wall now, which a pour
+    /// could only answer by throwing them out of it. To ask before the first substep, of a start that somebody has
+    /// written.
     ///
     /// # Errors
-    /// [`DemError::StartBelowOutflow`]; [`DemError::StartInWall`] names the wall that most grains are in, how many they are
-    /// and how deep the deepest is.
+    /// [`DemError::StartBelowOutflow`]; [`DemError::StartInWall`] names the wall that most grains are in, how many they
+    /// are and how deep the deepest is.
     pub fn check_start(&self) -> Result<(), DemError> {
         if let Some(outflow) = &self.origin.scene.outflow {
             let below = outflow.below;

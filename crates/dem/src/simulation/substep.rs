@@ -20,7 +20,8 @@ const RESIDUAL_PERIOD: usize = 4;
 /// Change of an impulse of convex bodies in a sweep over that by gravity in a substep at which it has settled `[-]`.
 const SETTLED: f64 = 1e-3;
 
-/// How much deeper than a sphere a convex body may be: a corner that no manifold had before enters by the way of a substep.
+/// How much deeper than a sphere a convex body may be: a corner that no manifold had before enters by the way of a
+/// substep.
 const CORNER_SLACK: f64 = 2.0;
 
 /// How much of a substep is done.

@@ -1,7 +1,8 @@
 //! Vectors over all contacts: eight numbers each, and the operators between contacts and bodies.
 //!
-//! With J the rows `w_n, u_t, rho` of every contact, rho split into its part across the normal and the one along it, and M the masses, `spread` is `M^-1 J^T`, from impulses
-//! to velocities of bodies, and `collect` is J, from there to velocities at the contacts. No matrix is formed.
+//! With J the rows `w_n, u_t, rho` of every contact, rho split into its part across the normal and the one along it,
+//! and M the masses, `spread` is `M^-1 J^T`, from impulses to velocities of bodies, and `collect` is J, from there to
+//! velocities at the contacts. No matrix is formed.
 
 use crate::body::{Body, SharedBodies};
 use crate::contact::Batch;

@@ -54,7 +54,7 @@ impl FrozenSolve {
     /// Solves a copy with the method and the iterations of `settings`.
     ///
     /// # Errors
-    /// [`DemError::OutOfRange`] for settings that no simulation would take.
+    /// [`DemError::Scene`] for settings that no simulation would take.
     pub fn solve(&self, settings: &SolverSettings) -> Result<FrozenSolution, DemError> {
         settings.check()?;
         let mut copy = self.clone();

@@ -40,8 +40,8 @@ impl Progress {
     }
 }
 
-/// Sweeps over all contacts: at least `settings.sweeps` times unless the impulses have settled, and until none
-/// closes too fast, but no more than `settings.max_sweeps` times. In a quiet state at least `settings.quiet_sweeps` times
+/// Sweeps over all contacts: at least `settings.sweeps` times unless the impulses have settled, and until none closes
+/// too fast, but no more than `settings.max_sweeps` times. In a quiet state at least `settings.quiet_sweeps` times
 /// unless the impulses change by less than `quiet_tolerance` `[m/s]`.
 pub(super) fn solve(
     sets: &mut [&mut ContactSet],
@@ -193,7 +193,8 @@ widest! {
     }
 }
 
-/// Solves batch after batch. `AT_WALLS`: the second body is the resting one, and stays so. `SOFT`: the contacts give way.
+/// Solves batch after batch. `AT_WALLS`: the second body is the resting one, and stays so. `SOFT`: the contacts give
+/// way.
 #[inline(always)]
 fn sweep_batches<W: Width, const AT_WALLS: bool, const SOFT: bool>(
     batches: &mut [Batch],

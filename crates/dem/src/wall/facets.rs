@@ -1,9 +1,9 @@
 //! A mesh as the solver sees it: a contact for each place where its distance to a grain is least nearby.
 //!
-//! A grain in a corner touches two faces, one on a flat wall touches one triangle of it. So each triangle reports its nearest
-//! point if that is a local minimum of the distance over the whole mesh: inside the triangle it always is, on an edge
-//! only if the distance does not fall into the triangle across, at a corner only if it falls along no edge that leaves
-//! it. Of the triangles that share such an edge or corner the first reports it.
+//! A grain in a corner touches two faces, one on a flat wall touches one triangle of it. So each triangle reports its
+//! nearest point if that is a local minimum of the distance over the whole mesh: inside the triangle it always is, on
+//! an edge only if the distance does not fall into the triangle across, at a corner only if it falls along no edge that
+//! leaves it. Of the triangles that share such an edge or corner the first reports it.
 //!
 //! The library's vectors are converted here and nowhere else.
 

@@ -43,7 +43,8 @@ pub(crate) struct Nearest {
     pub normal: Vector3<f64>,
     /// Which side of a shell's generator the centre is on, 0 beyond its ends; a change is a passage through the wall.
     pub side: i8,
-    /// Whether the surface bends here, or ends: the distance then changes to second order with a motion across the normal.
+    /// Whether the surface bends here, or ends: the distance then changes to second order with a motion across the
+    /// normal.
     pub bends: bool,
 }
 
@@ -142,8 +143,8 @@ fn any_normal(axis: &Vector3<f64>) -> Vector3<f64> {
     axis.cross(&other).normalize()
 }
 
-/// Gives each rim that two shells share to the first of them: a grain that slides off one onto the rim would else be hit by the
-/// other's, which juts out by as much as the first contact overlaps.
+/// Gives each rim that two shells share to the first of them: a grain that slides off one onto the rim would else be
+/// hit by the other's, which juts out by as much as the first contact overlaps.
 pub(super) fn join_rims<'a>(surfaces: impl Iterator<Item = &'a mut Surface>) {
     let mut known: Vec<(Vector3<f64>, f64)> = Vec::new();
     for surface in surfaces {
