@@ -28,6 +28,9 @@ impl Grains {
     }
 
     /// The body that every grain is, if it has a shape; of a checked scene.
+    ///
+    /// # Panics
+    /// For a shape that a checked scene cannot have.
     pub fn solid(&self) -> Option<Arc<Solid>> {
         let solid = |shape| Solid::new(shape, self.diameter).expect("a checked shape");
         self.shape.as_ref().map(solid)

@@ -23,7 +23,7 @@ pub(super) struct Images {
 
 impl Images {
     pub(super) fn new(spec: &ObserveImages, camera: &CameraSpec) -> Self {
-        let camera = CameraSpec { blur: 0.0, depth_noise: 0.0, sensor: None, ..camera.clone() };
+        let camera = CameraSpec { blur: 0.0, depth_noise: 0.0, sensor: None, ..*camera };
         Self { spec: spec.clone(), camera, seen: Vec::new() }
     }
 
@@ -59,9 +59,10 @@ impl Observation for Images {
 
     fn values(&self, pour: &Pour) -> Vec<f64> {
         let rest = self.spec.times.len() - self.seen.len();
-        let last = match holds(pour) {
-            true if rest > 0 => self.look(&pour.positions, &pour.radii),
-            _ => [f64::NAN; COUNT],
+        let last = if rest > 0 && holds(pour) {
+            self.look(&pour.positions, &pour.radii)
+        } else {
+            [f64::NAN; COUNT]
         };
         let ended = std::iter::repeat_n(last, rest);
         self.seen.iter().copied().chain(ended).flatten().collect()
