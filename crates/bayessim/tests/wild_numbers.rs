@@ -62,10 +62,8 @@ fn numbers_that_are_none_are_refused_by_name_or_come_to_an_end() {
                 refused += 1;
                 // What is not a number is named with its tensor.
                 assert!(value.is_finite() || said.contains(&name), "{name}: {said}");
-            } else {
-                if !value.is_finite() {
-                    taken.insert(name.clone());
-                }
+            } else if !value.is_finite() {
+                taken.insert(name.clone());
             }
         }
     }

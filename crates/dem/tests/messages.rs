@@ -32,7 +32,8 @@ fn message(error: &DemError) -> String {
     let mut text = error.to_string();
     let mut cause: &dyn Error = error;
     while let Some(next) = cause.source() {
-        text += &format!(": {next}");
+        text.push_str(": ");
+        text.push_str(&next.to_string());
         cause = next;
     }
     text
