@@ -95,7 +95,10 @@ fn nothing_half_written_is_left_on_a_full_disk() {
     let output = place.run(&batch);
     assert!(is_refused(&output), "{}", text(&output.stderr));
     let left = names_below(&disk.0);
-    assert!(left.iter().all(|name| !name.contains(".tmp")), "{left:?}");
+    assert!(
+        left.iter().all(|name| std::path::Path::new(name).extension().is_none_or(|e| e != "tmp")),
+        "{left:?}"
+    );
 }
 
 #[test]
@@ -113,7 +116,11 @@ fn what_was_there_stays_on_a_full_disk_and_a_batch_goes_on_when_there_is_room() 
     disk.fill("full");
     assert!(is_refused(&place.run(&batch("6"))));
     assert_eq!(fs::read(&part).unwrap(), before);
-    assert!(names_below(&disk.0).iter().all(|name| !name.contains(".tmp")));
+    assert!(
+        names_below(&disk.0)
+            .iter()
+            .all(|name| std::path::Path::new(name).extension().is_none_or(|e| e != "tmp"))
+    );
     fs::remove_file(disk.0.join("full")).unwrap();
     let output = place.run(&batch("6"));
     assert!(finished(output.status.code()), "{}", text(&output.stderr));
