@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 import granulcal as gc
+from granulcal import _native
 from granulcal.design.count_model import CountModel, beta_binomial_tail, log_gamma
 from granulcal.design.pattern import Pattern, simulate_plan
 from granulcal.design.posterior_file import PosteriorDraws
@@ -17,6 +18,7 @@ from granulcal.design.ring import STATISTICS
 from granulcal.design.ring_model import HEIGHT, RingModel, height_prior, observing_radii
 from granulcal.design.spill import forecast_of
 from granulcal.errors import ExtrapolationError, TrainingDataError, UnreachableRingError
+from granulcal.pours.left_out import LeftOut
 
 pytest.importorskip("torch")
 
@@ -38,6 +40,8 @@ class _Line:
         self.x = self.radii(self.theta) + noise
         self.status = np.full(count, "at_rest")
         self.is_usable = np.ones(count, bool)
+        self.left_out = LeftOut()
+        self.law = _native.LAW
 
     @staticmethod
     def radii(heights):

@@ -70,7 +70,7 @@ def test_rows_of_an_engine_are_a_data_set_and_are_not_mixed_with_ours(
     assert np.allclose(data.paper16[:, 0], expected)
     more = gc.generate(small_scene, small_prior, 8, out=tmp_path, progress=False, engine=engine)
     assert np.array_equal(more.x[:6], data.x)
-    with pytest.raises(ValueError, match="version of granulcal"):
+    with pytest.raises(ValueError, match="law of the solver is another simulator's"):
         gc.generate(small_scene, small_prior, 8, out=tmp_path, progress=False)
 
 

@@ -125,5 +125,5 @@ def test_messages_of_ros_become_metres() -> None:
 def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="must end in .bag or .mcap"):
         record(OwnSource(), tmp_path / "x.png")
-    with pytest.raises(ValueError, match="frames must be at least 1"):
+    with pytest.raises(ValueError, match="frames must be from 1 to 1000, got 0"):
         record(OwnSource(), tmp_path / "x.bag", frames=0)

@@ -124,7 +124,7 @@ def test_paper_prior_scales_with_the_grain():
             '[[parameter]]\npath="a"\ndistribution="uniform"\nlow=nan\nhigh=1',
             "must be finite, got NaN",
         ),
-        (table(path="a", distribution="beta", low=0, high=1), "'beta'"),
+        (table(path="a", distribution="beta", low=0, high=1), 'fixed, got "beta"'),
         (table(path="a", distribution="normal", mean=0, sd=0), "sd must be positive, got 0"),
         (table(path="a", distribution="normal", mean=0, sd=1, low=9), "mass"),
         (table(path="a", distribution="fixed", value=1), "at least one parameter"),

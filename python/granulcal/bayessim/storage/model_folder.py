@@ -95,8 +95,9 @@ def load_parts(path: str | PathLike[str]) -> Parts:
             stacklevel=3,
         )
     law = document.get("law")
-    # A model of pairs that were handed in is of no scene, and of no law.
-    if document["scene_toml"] is not None and law not in (0, _native.LAW):
+    # A model of pairs that were handed in states that it is of no law; 0 is another simulator's.
+    is_older = "law" not in document and document["scene_toml"] is not None
+    if is_older or law not in (None, 0, _native.LAW):
         named = "one of before laws had numbers" if law is None else f"law {law}"
         warnings.warn(
             f"{folder} was trained on pours of another law of the solver, {named}, which is not "
