@@ -96,7 +96,7 @@ fn nothing_half_written_is_left_on_a_full_disk() {
     assert!(is_refused(&output), "{}", text(&output.stderr));
     let left = names_below(&disk.0);
     assert!(
-        left.iter().all(|name| std::path::Path::new(name).extension().is_none_or(|e| e != "tmp")),
+        left.iter().all(|name| Path::new(name).extension().is_none_or(|e| e != "tmp")),
         "{left:?}"
     );
 }
@@ -119,7 +119,7 @@ fn what_was_there_stays_on_a_full_disk_and_a_batch_goes_on_when_there_is_room() 
     assert!(
         names_below(&disk.0)
             .iter()
-            .all(|name| std::path::Path::new(name).extension().is_none_or(|e| e != "tmp"))
+            .all(|name| Path::new(name).extension().is_none_or(|e| e != "tmp"))
     );
     fs::remove_file(disk.0.join("full")).unwrap();
     let output = place.run(&batch("6"));
