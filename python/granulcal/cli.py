@@ -70,7 +70,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if word in ("simulate", "generate") and engine_command.is_asked(words):
         return _guarded(lambda: engine_command.run(words))
     if word not in _commands(parser):
-        return _native.run_cli(["granulcal", *words], describe(parser, after_help=_EPILOG))
+        with _interruptible(raises=False):
+            return _native.run_cli(["granulcal", *words], describe(parser, after_help=_EPILOG))
     try:
         options = parser.parse_args(words)
     except SystemExit as end:
@@ -157,19 +158,32 @@ def _subparsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentP
 
 
 @contextlib.contextmanager
-def _interruptible() -> Iterator[None]:
-    """Lets Ctrl-C end the process within a second whatever runs, and at once if asked twice."""
+def _interruptible(*, raises: bool = True) -> Iterator[None]:
+    """Lets Ctrl-C or SIGTERM end the process within a second whatever runs, and at once if asked twice.
+
+    Each raises a KeyboardInterrupt, too, unless what runs ends by itself when it is asked to.
+    """
     if threading.current_thread() is not threading.main_thread() or not Path("/dev/fd").exists():
         yield
         return
     read, write = os.pipe()
     os.set_blocking(write, False)
     before = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
-    _native.listen_for_signals(f"/dev/fd/{read}")
+    listener = _native.listen_for_signals(f"/dev/fd/{read}")
+    handlers = {}
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # Of a process in the background of a shell that is `nohup` some are ignored, and stay so.
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            handlers[number] = signal.signal(
+                number, signal.default_int_handler if raises else lambda *_: None
+            )
     try:
         yield
     finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
         signal.set_wakeup_fd(before)
+        listener.close()
         os.close(write)
         os.close(read)
 

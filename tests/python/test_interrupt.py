@@ -1,4 +1,4 @@
-"""Ctrl-C ends every command of the Python half, with code 130 and no traceback; twice forces it.
+"""Ctrl-C and SIGTERM end every command, with code 130 and no traceback; twice forces it.
 
 Each command runs in a process of its own that says when its work has begun and then never comes to
 an end by itself: `train` fits again and again, `calibrate` has a budget that nobody waits for. So
@@ -106,6 +106,10 @@ COMMANDS = {
         ["infer", "model", "depth.png", "--camera", "camera.toml"],
         ("granulcal._native", "run_cli", True),
     ),
+    "generate": (
+        ["generate", "scene.toml", "prior.toml", "-n", "100000", "-o", "batch"],
+        ("granulcal._native", "run_cli", False),
+    ),
     "calibrate": (
         [*CALIBRATE.split(), "--camera", "camera.toml", "--budget", "20000", "-o", "run"],
         ("granulcal._native", "simulate", False),
@@ -116,14 +120,17 @@ COMMANDS = {
     ),
     "reproduce": (
         ["reproduce", "paper", "--quick", "--out", "out"],
-        ("granulcal._native", "generate", True),
+        ("granulcal._native", "simulate", False),
     ),
 }
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("times", [1, 2])
 @pytest.mark.parametrize("command", COMMANDS)
-def test_ctrl_c_ends_the_command(folder: Path, tmp_path: Path, command: str, times: int) -> None:
+def test_a_signal_ends_the_command(
+    folder: Path, tmp_path: Path, command: str, times: int, number: signal.Signals
+) -> None:
     words, (owner, name, repeats) = COMMANDS[command]
     # What is read is there, what is written is of this test alone.
     named = [str(folder / w) if (folder / w).exists() else w for w in words]
@@ -146,12 +153,13 @@ def test_ctrl_c_ends_the_command(folder: Path, tmp_path: Path, command: str, tim
         assert said and said[-1] == "begun\n", (said, process.communicate()[1])
         started = time.monotonic()
         for _ in range(times):
-            process.send_signal(signal.SIGINT)
+            process.send_signal(number)
             time.sleep(0.02)
         _, error = process.communicate(timeout=120)
-        print(f"{command}, Ctrl-C {times}x: ended after {time.monotonic() - started:.2f} s")
+        print(f"{command}, {number.name} {times}x: {time.monotonic() - started:.2f} s")
     finally:
-        process.kill()
+        with process:
+            process.kill()
     assert process.returncode == 130, error
     assert "Traceback" not in error, error
     # The second time ends it at once, whatever there was to say.
@@ -177,3 +185,19 @@ def test_finished_pours_of_an_interrupted_calibration_are_kept(
         kept(theta, 0)
     again = KeptPours(small_scene, small_prior, tmp_path / "pours.json", threads=1)
     assert len(again.rows) >= 3
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_after_a_command_signals_do_what_they_did_before(number: signal.Signals) -> None:
+    code = (
+        "import os, signal, time\nfrom granulcal import cli\n"
+        "before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)\n"
+        "assert cli.main(['features', '--list']) == 0\n"
+        "assert cli.main(['infer', 'none', 'none.png']) == 2\n"
+        "assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before\n"
+        f"os.kill(os.getpid(), {int(number)})\ntime.sleep(60)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=50)
+    # SIGINT raises a KeyboardInterrupt, of which Python dies by the signal; SIGTERM ends at once.
+    assert done.returncode == -number, done.stderr
+    assert number == signal.SIGTERM or done.stderr.endswith("KeyboardInterrupt\n"), done.stderr

@@ -1,4 +1,4 @@
-//! What every command gets: how loud to be, and whether the user wants to stop.
+//! What every command gets: how loud to be.
 
 use std::io::{self, IsTerminal, Write};
 
@@ -7,7 +7,6 @@ use serde::Serialize;
 use tracing_subscriber::filter::LevelFilter;
 
 use crate::args::Global;
-use crate::interrupt;
 
 /// Options and state that all commands share.
 #[derive(Debug)]
@@ -19,7 +18,7 @@ pub struct Context {
 }
 
 impl Context {
-    /// Sets up logging to stderr and the handler of Ctrl-C.
+    /// Sets up logging to stderr.
     pub fn new(global: &Global) -> Self {
         let level = match (global.quiet, global.verbose) {
             (true, _) => LevelFilter::ERROR,
@@ -36,7 +35,6 @@ impl Context {
             .without_time()
             .with_target(false)
             .try_init();
-        let _ = ctrlc::set_handler(interrupt::asked);
         Self { quiet: global.quiet, terminal }
     }
 }

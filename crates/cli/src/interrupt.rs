@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{Read, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 /// How long a command has to end by itself.
@@ -20,25 +21,43 @@ static ASKED: AtomicUsize = AtomicUsize::new(0);
 /// Number of the command that runs; 0 while there is none.
 static RUNNING: AtomicU64 = AtomicU64::new(0);
 static STARTED: AtomicU64 = AtomicU64::new(0);
+/// Commands that run inside of each other.
+static DEPTH: Mutex<usize> = Mutex::new(0);
 
-/// A command that runs; when it is dropped nothing ends the process any more.
-pub struct Armed {
-    /// The command that it runs inside of.
-    outer: u64,
-}
+/// A command that runs; when the outermost is dropped nothing ends the process any more.
+pub struct Armed(());
 
-/// Begins a command.
+/// Begins a command. One that runs inside of another is stopped with it: what was asked of the outer stands.
 pub fn arm() -> Armed {
-    STOP.store(false, Ordering::SeqCst);
-    ASKED.store(0, Ordering::SeqCst);
-    let outer = RUNNING.swap(STARTED.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
-    Armed { outer }
+    let mut depth = DEPTH.lock().unwrap_or_else(PoisonError::into_inner);
+    if *depth == 0 {
+        STOP.store(false, Ordering::SeqCst);
+        ASKED.store(0, Ordering::SeqCst);
+        RUNNING.store(STARTED.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+    }
+    *depth += 1;
+    Armed(())
 }
 
 impl Drop for Armed {
     fn drop(&mut self) {
-        RUNNING.store(self.outer, Ordering::SeqCst);
+        let mut depth = DEPTH.lock().unwrap_or_else(PoisonError::into_inner);
+        *depth -= 1;
+        if *depth == 0 {
+            RUNNING.store(0, Ordering::SeqCst);
+        }
     }
+}
+
+/// Takes the signals of the process. A program that has handlers of its own calls [`listen`] instead.
+pub fn handle_signals() {
+    // It fails only where a handler is set already, which does the same.
+    let _ = ctrlc::set_handler(|| {
+        if RUNNING.load(Ordering::SeqCst) == 0 {
+            end();
+        }
+        asked();
+    });
 }
 
 /// Whether the user has not asked to stop.
@@ -47,14 +66,14 @@ pub fn keeps_going() -> bool {
 }
 
 /// What a signal does.
-pub fn asked() {
-    STOP.store(true, Ordering::SeqCst);
+fn asked() {
     let running = RUNNING.load(Ordering::SeqCst);
-    if ASKED.fetch_add(1, Ordering::SeqCst) > 0 {
-        end();
-    }
     if running == 0 {
         return;
+    }
+    STOP.store(true, Ordering::SeqCst);
+    if ASKED.fetch_add(1, Ordering::SeqCst) > 0 {
+        end();
     }
     std::thread::spawn(move || {
         std::thread::sleep(GRACE);
@@ -69,16 +88,17 @@ pub fn asked() {
     });
 }
 
-/// Does the same for every byte SIGINT that is read from a pipe, until it is closed: Python writes the numbers of
+/// Does the same for every byte of SIGINT or SIGTERM that is read from a pipe, until it is closed: Python writes the numbers of
 /// signals into one as soon as they come, whatever the interpreter is busy with.
+///
+/// What comes after the returned command is dropped is not heard.
 ///
 /// # Errors
 /// If there is no such pipe.
-pub fn listen(pipe: &Path) -> std::io::Result<()> {
+pub fn listen(pipe: &Path) -> std::io::Result<Armed> {
     let mut pipe = File::open(pipe)?;
     let armed = arm();
     std::thread::spawn(move || {
-        let _armed = armed;
         let mut signal = [0];
         while pipe.read_exact(&mut signal).is_ok() {
             // SIGINT and SIGTERM, which have these numbers everywhere.
@@ -87,7 +107,7 @@ pub fn listen(pipe: &Path) -> std::io::Result<()> {
             }
         }
     });
-    Ok(())
+    Ok(armed)
 }
 
 fn end() -> ! {

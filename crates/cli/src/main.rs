@@ -3,5 +3,6 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    granulcal_cli::interrupt::handle_signals();
     ExitCode::from(granulcal_cli::run(std::env::args_os()))
 }
