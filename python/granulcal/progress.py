@@ -1,10 +1,20 @@
-"""How far a batch is, on stderr: a line that renews itself in a terminal, a few lines in a log."""
+"""How far long work is, on stderr: a line that renews itself in a terminal, a few lines in a log.
+
+A batch of pours has a `ProgressLine`. Work of many kinds of steps, such as a training, names each
+kind where it loops, `for part in steps("emulator", parts)`; a command that wants to show them runs
+it `with shown():`, and nobody else sees them.
+"""
 
 import sys
 import time
-from typing import TextIO
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TextIO, TypeVar
 
-__all__ = ["ProgressLine", "duration"]
+__all__ = ["ProgressLine", "duration", "shown", "steps"]
+
+_T = TypeVar("_T")
 
 _WIDTH = 30
 _LOG_EVERY_S = 30.0
@@ -45,8 +55,36 @@ class ProgressLine:
         if made and done < total:
             left = (total - done) * (now - self._started) / made
             text += f", {duration(left)} left"
+        self._show(text, done / max(total, 1), now)
+
+    def step(self, what: str, done: int, total: int, since: float) -> None:
+        """Shows one kind of steps.
+
+        Args:
+            what: the kind.
+            done: steps done.
+            total: steps of this kind at most.
+            since: when the first began, of `time.monotonic` [s].
+        """
+        now = time.monotonic()
+        if done >= total:
+            self._erase()
+            return
+        text = f"{what} {done}/{total}"
+        if done:
+            text += f", at most {duration((total - done) * (now - since) / done)} left"
+        self._show(text, done / total, now)
+
+    def _erase(self) -> None:
+        """Leaves an empty line for what is printed next."""
+        if self._is_terminal and self._shown:
+            self._stream.write("\r" + " " * len(self._shown) + "\r")
+            self._stream.flush()
+            self._shown = ""
+
+    def _show(self, text: str, share: float, now: float) -> None:
         if self._is_terminal:
-            filled = _WIDTH * done // max(total, 1)
+            filled = int(_WIDTH * share)
             bar = "#" * filled + "-" * (_WIDTH - filled)
             self._write("\r", f"[{bar}] {text}")
         elif now - self._logged >= _LOG_EVERY_S:
@@ -65,6 +103,42 @@ class ProgressLine:
             self._stream.write(start + text.ljust(len(self._shown)))
             self._stream.flush()
             self._shown = text
+
+
+_LINE: ContextVar[ProgressLine | None] = ContextVar("_LINE", default=None)
+
+
+def steps(what: str, items: Sequence[_T]) -> Iterator[_T]:
+    """Yields the items; the line that is shown says how many of them are done.
+
+    Args:
+        what: kind of the steps, for example "emulator".
+        items: one for each step.
+    """
+    line = _LINE.get()
+    if line is None:
+        yield from items
+        return
+    since = time.monotonic()
+    try:
+        for done, item in enumerate(items):
+            line.step(what, done, len(items), since)
+            yield item
+    finally:
+        # Also where the loop is left early.
+        line.step(what, len(items), len(items), since)
+
+
+@contextmanager
+def shown(stream: TextIO | None = None) -> Generator[ProgressLine, None, None]:
+    """Shows the steps of what runs inside; `stream` is stderr by default."""
+    line = ProgressLine(stream)
+    token = _LINE.set(line)
+    try:
+        yield line
+    finally:
+        _LINE.reset(token)
+        line.close()
 
 
 def duration(seconds: float) -> str:

@@ -9,7 +9,12 @@ import pytest
 
 import granulcal as gc
 from granulcal.cli import main
-from granulcal.experiments.paper.common.command import experiments, find, reproduce_paper
+from granulcal.experiments.paper.common.command import (
+    experiments,
+    find,
+    missing_sets,
+    reproduce_paper,
+)
 from granulcal.experiments.paper.common.eye import BARE, Disturbance, Eye
 from granulcal.experiments.paper.common.measure import (
     Published,
@@ -66,12 +71,24 @@ def _check(folder: Path, name: str) -> None:
     for figure in outcome.figures:
         data = (folder / name / figure.file).read_bytes()
         assert data.startswith(b"\x89PNG"), figure.file
-    assert made["size"] == "tiny" and name in made["command"] and made["pours"] > 0
+    assert made["size"] == "tiny" and name in made["command"]
+    sets = find(name).sets(TINY)
+    assert {each.name for each in sets} == set(made["seeds"]), name
+    assert made["pours"] >= sum(each.count for each in sets) > 0
 
 
 def test_experiments_run_and_say_what_they_did(ran):
     for name in _QUICKEST:
         _check(ran[0], name)
+
+
+def test_sets_that_are_there_are_not_missing(ran):
+    out = ran[0].parent
+    assert missing_sets(out, "noise", size=TINY) == []
+    everything = {each.name for each in missing_sets(out, size=TINY)}
+    shared = {"default-training", "default-tests"}
+    assert shared < everything and "noise" not in everything
+    assert shared <= {each.name for each in missing_sets(out, "ablation", size=TINY)}
 
 
 @pytest.mark.slow

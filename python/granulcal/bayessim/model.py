@@ -27,6 +27,7 @@ from granulcal.bayessim.training.summary import TrainingSummary
 from granulcal.errors import ObservationError
 from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
+from granulcal.progress import steps
 
 __all__ = ["BayesSim"]
 
@@ -243,7 +244,7 @@ class BayesSim:
             draw_count: draws of each posterior.
         """
         truth, observed = as_real("theta", theta), self._checked(x)
-        posteriors = [self.posterior(row) for row in observed]
+        posteriors = [self.posterior(row) for row in steps("posteriors", list(observed))]
         return Calibration.of(self.prior, posteriors, truth, draw_count=draw_count)
 
     def save(self, path: str | PathLike[str], *, compact: bool = False) -> None:

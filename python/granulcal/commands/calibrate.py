@@ -47,7 +47,7 @@ def _run(options: argparse.Namespace) -> int:
     from granulcal.measured.plausible import violations
     from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
-    from granulcal.progress import ProgressLine
+    from granulcal.progress import shown
     from granulcal.within_budget import calibrate_within
 
     scene = Scene.named(options.scene)
@@ -60,26 +60,26 @@ def _run(options: argparse.Namespace) -> int:
         document = told_outside(options, impossible)
         print(json.dumps(document, indent=1) if options.json else outside(impossible))
         return UNHEALTHY
-    line, first = ProgressLine(), []
+    first: list[int] = []
 
     def poured(kept: int) -> None:
         # What was kept before the first pour of this run is not counted in the time that is left.
         first.append(kept - 1)
         line(options.budget, first[0], kept - first[0], 0)
 
-    found = calibrate_within(
-        scene,
-        prior,
-        recordings,
-        budget=options.budget,
-        out=options.out,
-        seed=options.seed,
-        threads=options.threads,
-        progress=lambda each: print(each, file=sys.stderr, flush=True),
-        poured=poured,
-        engine=engine,
-    )
-    line.close()
+    with shown() as line:
+        found = calibrate_within(
+            scene,
+            prior,
+            recordings,
+            budget=options.budget,
+            out=options.out,
+            seed=options.seed,
+            threads=options.threads,
+            progress=lambda each: print(each, file=sys.stderr, flush=True),
+            poured=poured,
+            engine=engine,
+        )
     posterior = found.posterior
     document = {
         "recordings": [str(path) for path in options.recording],

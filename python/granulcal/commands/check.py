@@ -30,6 +30,7 @@ def _run(options: argparse.Namespace) -> int:
     from granulcal.bayessim import BayesSim
     from granulcal.bayessim.training.pairs import TrainingPairs
     from granulcal.pours.dataset import Dataset
+    from granulcal.progress import shown
     from granulcal.starter.models import model_named
 
     model = BayesSim.load(model_named(options.model))
@@ -42,7 +43,8 @@ def _run(options: argparse.Namespace) -> int:
                 f"{options.data} has the statistics {pairs.x_names}, the model {model.x_names}"
             )
         print(f"on the {len(pairs.theta)} usable pours of {options.data}:")
-        calibration = model.check(pairs.theta, pairs.x)
+        with shown():
+            calibration = model.check(pairs.theta, pairs.x)
     options.told["model"] = str(options.model)
     options.told["calibrated"] = None if calibration is None else calibration.is_calibrated
     if calibration is None:

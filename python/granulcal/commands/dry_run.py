@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
 
-__all__ = ["add_dry_run", "say_how_long"]
+__all__ = ["add_dry_run", "cost", "say_how_long"]
 
 _TRIED = 3
 # Draws of their own: a run that follows is not begun by them.
@@ -28,6 +28,23 @@ def add_dry_run(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="say how long it would take, from three pours, and make nothing",
     )
+
+
+def cost(scene: "Scene", prior: "Prior", *, engine: "Engine | None" = None) -> float:
+    """Returns what a pour costs, the mean of three draws of a prior [s of a core]."""
+    from granulcal.engines import engine_in_use
+    from granulcal.pours.forward import scene_at
+    from granulcal.pours.simulate import simulate
+
+    foreign = engine or engine_in_use()
+    took = []
+    for i, theta in enumerate(prior.sample(_TRIED, seed=_SEED)):
+        begun = time.monotonic()
+        pour = simulate(scene_at(scene, prior, theta), seed=_SEED + i, engine=foreign)
+        # Nobody knows the processor's time of another engine.
+        known = foreign is None and math.isfinite(pour.cpu_seconds)
+        took.append(pour.cpu_seconds if known else time.monotonic() - begun)
+    return sum(took) / _TRIED
 
 
 def say_how_long(
@@ -47,19 +64,7 @@ def say_how_long(
         pours: those that are missing, at most.
         engine: another simulator in place of ours, or of the one in use.
     """
-    from granulcal.engines import engine_in_use
-    from granulcal.pours.forward import scene_at
-    from granulcal.pours.simulate import simulate
-
-    foreign = engine or engine_in_use()
-    took = []
-    for i, theta in enumerate(prior.sample(_TRIED, seed=_SEED)):
-        begun = time.monotonic()
-        pour = simulate(scene_at(scene, prior, theta), seed=_SEED + i, engine=foreign)
-        # Nobody knows the processor's time of another engine.
-        known = foreign is None and math.isfinite(pour.cpu_seconds)
-        took.append(pour.cpu_seconds if known else time.monotonic() - begun)
-    each, threads = sum(took) / _TRIED, options.threads or os.cpu_count() or 1
+    each, threads = cost(scene, prior, engine=engine), options.threads or os.cpu_count() or 1
     seconds = pours * each / threads
     if getattr(options, "json", False):
         told = {"missing": pours, "threads": threads, "pour_cpu_s": each, "seconds": seconds}

@@ -42,13 +42,15 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     from granulcal.bayessim import BayesSim
     from granulcal.pours.dataset import Dataset
+    from granulcal.progress import shown
 
     data = Dataset.load(options.data)
     told = options.told
     settings: dict[str, Any] = {}
     if options.components:
         settings["components"] = tuple(options.components)
-    model = BayesSim.fit(data, seed=options.seed, method=options.method, **settings)
+    with shown():
+        model = BayesSim.fit(data, seed=options.seed, method=options.method, **settings)
     model.save(options.out)
     data.save(options.out / TRAINING)
     print(f"model written to {options.out}")

@@ -16,6 +16,7 @@ from granulcal.files import write_beside
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
 from granulcal.prior import Prior
+from granulcal.progress import shown
 
 if TYPE_CHECKING:
     from granulcal.pours.dataset import Dataset
@@ -142,7 +143,9 @@ def make_model(
         say(f"1/2 {pours} pours of the scene {name}, kept in {kept}")
         there = generate(scene, prior, pours, seed=seed, out=kept, threads=threads)
     say(f"2/2 training on {pours} pours")
-    BayesSim.fit(there, seed=seed).save(folder, compact=compact)
+    with shown():
+        model = BayesSim.fit(there, seed=seed)
+    model.save(folder, compact=compact)
     if not compact:
         there.save(folder / "training.parquet")
     # Last: a folder without it is no model yet.

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.bayessim.arrays import as_matrix
 from granulcal.files import save_figure
+from granulcal.progress import steps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -301,6 +302,8 @@ def _new_figure(columns: int = 1) -> tuple["Figure", Any]:
 def _matched(posteriors: Iterable[Samplable], truth: Array) -> Iterable[Samplable]:
     """Yields the posteriors; refuses more or fewer than rows of `truth`."""
     found = 0
+    if isinstance(posteriors, Sequence):
+        posteriors = steps("check", posteriors)
     for posterior in posteriors:
         found += 1
         if found > len(truth):

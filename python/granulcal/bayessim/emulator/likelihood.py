@@ -44,6 +44,7 @@ from granulcal.bayessim.emulator.pooling import (
 from granulcal.bayessim.emulator.signal import SignalAxes
 from granulcal.bayessim.posterior.density import quasi_prior
 from granulcal.prior import Prior
+from granulcal.progress import steps
 
 __all__ = ["EmulatorChoice", "Fold", "Likelihood"]
 
@@ -149,7 +150,7 @@ class Likelihood:
         levels: dict[_Form, Array] = {}
         fits: dict[_Form, list[Likelihood]] = {}
         for varying in (False, True):
-            for part in parts:
+            for part in steps("emulator", parts):
                 train = np.setdiff1d(everything, part)
                 held = part[: _HELD_OUT // _FOLDS]
                 grown = _Growing.fit(u[train], z[train], prior, lengths, features, varying, seed)

@@ -13,6 +13,7 @@ from granulcal.bayessim.network.features import draw_frequencies
 from granulcal.bayessim.network.network import HeadLayout, Network
 from granulcal.bayessim.training.config import Config
 from granulcal.one_thread import one_thread
+from granulcal.progress import steps
 
 __all__ = ["Progress", "TrainingResult", "train"]
 
@@ -144,7 +145,7 @@ class _Training:
         train_loss = torch.zeros(members)
         epoch, status = 0, "epoch_limit"
         curve = []
-        for epoch in range(1, self.passes + 1):
+        for epoch in steps("network", range(1, self.passes + 1)):
             turn = math.pi * (epoch - 1) / self.passes
             train_loss = self._one_pass(adam, 0.5 * config.learning_rate * (1 + math.cos(turn)))
             with torch.no_grad():

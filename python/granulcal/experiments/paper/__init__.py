@@ -4,6 +4,11 @@ One file is one experiment and holds `EXPERIMENT`; `granulcal reproduce paper` r
 share is in `common`. Equations and what the paper leaves open: docs/results/paper.md.
 """
 
-from granulcal.experiments.paper.common.command import experiments, find, reproduce_paper
+from granulcal.experiments.paper.common.command import (
+    experiments,
+    find,
+    missing_sets,
+    reproduce_paper,
+)
 
-__all__ = ["experiments", "find", "reproduce_paper"]
+__all__ = ["experiments", "find", "missing_sets", "reproduce_paper"]

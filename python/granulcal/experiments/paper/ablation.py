@@ -14,7 +14,15 @@ from numpy.typing import NDArray
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import SECOND, bars, new_figure, save
 from granulcal.experiments.paper.common.measure import bootstrap, share_interval
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.outcome import (
+    Experiment,
+    Figure,
+    Outcome,
+    PouredSet,
+    Row,
+    Table,
+)
+from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.statistics import NAMES
 
@@ -56,6 +64,11 @@ class _Scores:
             regions = [bool(p.credible_region(0.9).contains(t)[0]) for p, t in pairs]
             self.held[ordered] = sum(regions)
         return float(self.log_density[ordered].mean())
+
+
+def sets(size: Size) -> list[PouredSet]:
+    """Returns the pours of this experiment."""
+    return three.sets(size, three.VARIANTS[0])
 
 
 def run(workshop: Workshop) -> Outcome:
@@ -202,4 +215,5 @@ EXPERIMENT = Experiment(
     section="Summary Statistic Extraction",
     asks="Which of the 16 statistics are needed for the three parameters?",
     run=run,
+    sets=sets,
 )

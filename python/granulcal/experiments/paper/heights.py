@@ -21,7 +21,14 @@ from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import formations
 from granulcal.experiments.paper.common.eye import Disturbance, Eye
 from granulcal.experiments.paper.common.measure import Published, level_row
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.outcome import (
+    Experiment,
+    Figure,
+    Outcome,
+    PouredSet,
+    Row,
+    Table,
+)
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.pours.forward import scene_at
@@ -132,10 +139,28 @@ class _Grain:
     outside: str
 
 
+def _set_name(name: str, number: int, height: float) -> str:
+    return f"heights-{name}-{number}-{1e3 * height:.0f}mm"
+
+
+def sets(size: Size) -> list[PouredSet]:
+    """Returns the pours of this experiment."""
+    variant = three.VARIANTS[0]
+    scene, found = variant.scene(size), three.sets(size, variant)
+    for name in _PAPER:
+        found.append(PouredSet(f"heights-{name}-each", size.recordings[0], scene))
+        found += [
+            PouredSet(_set_name(name, number, height), _FORWARD, scene)
+            for number in range(len(_RECIPES))
+            for height in (_CALIBRATED_AT, *_HEIGHTS)
+        ]
+    return found
+
+
 def run(workshop: Workshop) -> Outcome:
     """Calibrates both grains and predicts the other heights."""
     size, variant = workshop.size, three.VARIANTS[0]
-    scene = variant.scene(workshop)
+    scene = variant.scene(workshop.size)
     training, _ = three.training_and_tests(workshop, variant)
     model = workshop.model(variant.name, training)
     sd = training.x.std(axis=0, ddof=1)
@@ -202,9 +227,8 @@ def _calibrate(
         at = {}
         for height in (_CALIBRATED_AT, *_HEIGHTS):
             measured = x if height == _CALIBRATED_AT else seen(height, size.recordings[1])
-            label = f"heights-{name}-{number}-{1e3 * height:.0f}mm"
             poured = workshop.poured(
-                label,
+                _set_name(name, number, height),
                 scene.with_({"funnel.height": height}),
                 prior,
                 np.repeat(theta[None], _FORWARD, axis=0),
@@ -265,4 +289,5 @@ EXPERIMENT = Experiment(
     asks="Do parameters calibrated on pours of another engine from 12 cm predict its pours from 2 "
     "to 10 cm?",
     run=run,
+    sets=sets,
 )

@@ -9,7 +9,15 @@ metres, as the paper's axes are, beside the coefficient of variation, which has 
 import numpy as np
 
 from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, save
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.outcome import (
+    Experiment,
+    Figure,
+    Outcome,
+    PouredSet,
+    Row,
+    Table,
+)
+from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.pours.statistics import NAMES, UNITS
 from granulcal.prior import Parameter, Prior
@@ -20,6 +28,11 @@ _SEED = 101
 _FRICTIONS = (0.01, 1.0)
 # "At least two orders of magnitude smaller".
 _BAR = 1e-2
+
+
+def sets(size: Size) -> list[PouredSet]:
+    """Returns the pours of this experiment."""
+    return [PouredSet("noise", len(_FRICTIONS) * size.repeats, size.scene())]
 
 
 def run(workshop: Workshop) -> Outcome:
@@ -124,4 +137,5 @@ EXPERIMENT = Experiment(
     section="Preliminary Tests for System Noise",
     asks="How much do the 16 statistics differ between pours of one material?",
     run=run,
+    sets=sets,
 )

@@ -20,7 +20,15 @@ from granulcal.experiments.paper.common.draw import (
     save,
 )
 from granulcal.experiments.paper.common.measure import bootstrap
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.outcome import (
+    Experiment,
+    Figure,
+    Outcome,
+    PouredSet,
+    Row,
+    Table,
+)
+from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 
 __all__ = ["EXPERIMENT"]
@@ -59,6 +67,11 @@ class _Level:
     @property
     def rms(self) -> float:
         return float(np.sqrt(np.mean(self.errors**2)))
+
+
+def sets(size: Size) -> list[PouredSet]:
+    """Returns the pours of this experiment."""
+    return friction.sets(size, "even")
 
 
 def run(workshop: Workshop) -> Outcome:
@@ -244,4 +257,5 @@ EXPERIMENT = Experiment(
     asks="Which blur and which depth noise break the inference, and does training on such images "
     "move that?",
     run=run,
+    sets=sets,
 )

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, save
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row
+from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, PouredSet, Row
+from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.pours.statistics import NAMES
 from granulcal.prior import Parameter, Prior
@@ -38,6 +39,16 @@ _SHORT = {
 }
 
 
+def _set_name(path: str) -> str:
+    return f"propagation-{path.rpartition('.')[2]}"
+
+
+def sets(size: Size) -> list[PouredSet]:
+    """Returns the pours of this experiment."""
+    count = size.sweep[0] * size.sweep[1]
+    return [PouredSet(_set_name(path), count, size.scene()) for path in _SWEEPS]
+
+
 def run(workshop: Workshop) -> Outcome:
     """Sweeps the three parameters."""
     size = workshop.size
@@ -51,8 +62,7 @@ def run(workshop: Workshop) -> Outcome:
         prior = Prior([Parameter(path=path, distribution=kind, low=bounds[0], high=bounds[1])])
         theta = np.repeat(_unwarp(path, values), size.sweep[1])[:, None]
         theta = np.clip(theta, *bounds)
-        name = f"propagation-{path.rpartition('.')[2]}"
-        x = workshop.poured(name, scene, prior, theta, seed=_SEED + number)
+        x = workshop.poured(_set_name(path), scene, prior, theta, seed=_SEED + number)
         x = x.reshape(len(values), size.sweep[1], -1)
         curves[path] = values, x
         at, short = float(_warp(path, middle)), _SHORT[path]
@@ -161,4 +171,5 @@ EXPERIMENT = Experiment(
     section="Propagation of Error",
     asks="How wrong may a parameter be before height, mean radius or diameter show it?",
     run=run,
+    sets=sets,
 )

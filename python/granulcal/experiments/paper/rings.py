@@ -18,7 +18,15 @@ from granulcal.design.spill import design_spill
 from granulcal.errors import ExtrapolationError, UnreachableRingError
 from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, save
 from granulcal.experiments.paper.common.measure import Published, error_row
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.outcome import (
+    Experiment,
+    Figure,
+    Outcome,
+    PouredSet,
+    Row,
+    Table,
+)
+from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
@@ -41,6 +49,16 @@ _WIDE = (0.025, 0.3)
 _BOWL = Path(__file__).parent / "bowl.toml"
 _SPILL_HEIGHTS = (0.06, 0.30)
 _CM = 1e2
+
+
+def sets(size: Size) -> list[PouredSet]:
+    """Returns the pours of this experiment."""
+    scene, bowl = size.scene(), Scene.load(_BOWL).with_({"grains.count": size.grains})
+    return [
+        PouredSet("rings", size.training + size.tests, scene),
+        PouredSet("rings-wide", size.training, scene),
+        PouredSet("spill", 2 * size.spills, bowl),
+    ]
 
 
 def run(workshop: Workshop) -> Outcome:
@@ -192,4 +210,5 @@ EXPERIMENT = Experiment(
     section="Robotic Demonstrations",
     asks="From which height does a ring have to be poured, and how many grains does a bowl spill?",
     run=run,
+    sets=sets,
 )

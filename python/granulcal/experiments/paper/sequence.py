@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, save
 from granulcal.experiments.paper.common.measure import bootstrap, error_row, share_interval
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.outcome import (
+    Experiment,
+    Figure,
+    Outcome,
+    PouredSet,
+    Row,
+    Table,
+)
+from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.dataset import Dataset
 from granulcal.pours.scene import Scene
@@ -27,6 +35,14 @@ _RATE = 20.0
 _SEED = 1001
 _NAMES = ("sliding friction", "ln rolling friction", "restitution")
 _LAST, _SEQUENCE = "last image", "sequence"
+
+
+def sets(size: Size) -> list[PouredSet]:
+    """Returns the pours of this experiment."""
+    return [
+        PouredSet("sequence-training", size.sequence, size.scene()),
+        PouredSet("sequence-tests", size.tests, size.scene()),
+    ]
 
 
 def run(workshop: Workshop) -> Outcome:
@@ -154,4 +170,5 @@ EXPERIMENT = Experiment(
     section="Conclusions",
     asks="How much sharper is the posterior from images on the way than from the last image alone?",
     run=run,
+    sets=sets,
 )

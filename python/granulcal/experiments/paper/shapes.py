@@ -15,7 +15,8 @@ from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import formations
 from granulcal.experiments.paper.common.measure import Published, level_row
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Table
+from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, PouredSet, Table
+from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.forward import scene_at
 from granulcal.pours.scene import Scene
@@ -59,10 +60,27 @@ def shaped(scene: Scene, shape: str) -> Scene:
     return Scene.from_toml(scene.to_toml().replace("[grains]\n", f"[grains]\nshape = {shape}\n", 1))
 
 
+def sets(size: Size) -> list[PouredSet]:
+    """Returns the pours of this experiment."""
+    variant = three.VARIANTS[0]
+    found = three.sets(size, variant)
+    for name, (shape, _) in _SHAPES.items():
+        spheres = variant.scene(size)
+        scene = shaped(spheres, shape)
+        found += [
+            PouredSet(f"{name}-tests", size.tests, scene),
+            PouredSet(f"{name}-training", size.shapes, scene),
+            PouredSet(f"{name}-by-spheres", size.tests, spheres),
+            PouredSet(f"{name}-by-{name}", size.tests, scene),
+            PouredSet(f"{name}-floor", size.tests, scene),
+        ]
+    return found
+
+
 def run(workshop: Workshop) -> Outcome:
     """Infers both shapes with spheres and with themselves."""
     size, variant = workshop.size, three.VARIANTS[0]
-    spheres = variant.scene(workshop)
+    spheres = variant.scene(workshop.size)
     training, _ = three.training_and_tests(workshop, variant)
     sd = training.x.std(axis=0, ddof=1)
     round_model = workshop.model(variant.name, training)
@@ -172,4 +190,5 @@ EXPERIMENT = Experiment(
     section="Sim-to-sim Parameter Estimation",
     asks="How well do spheres stand for cylinders and cubes, and what does the right shape mend?",
     run=run,
+    sets=sets,
 )

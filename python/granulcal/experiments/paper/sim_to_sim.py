@@ -20,7 +20,15 @@ from granulcal.experiments.paper.common.measure import (
     level_row,
     share_interval,
 )
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.outcome import (
+    Experiment,
+    Figure,
+    Outcome,
+    PouredSet,
+    Row,
+    Table,
+)
+from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.forward import scene_at
 from granulcal.pours.left_out import LeftOut
@@ -67,6 +75,16 @@ class _Found:
     tests: Pairs
     estimates: Array
     unusable: LeftOut
+
+
+def sets(size: Size) -> list[PouredSet]:
+    """Returns the pours of this experiment."""
+    found = []
+    for variant in three.VARIANTS:
+        found += three.sets(size, variant)
+        again = (f"{variant.name}-again", f"{variant.name}-floor")
+        found += [PouredSet(name, size.tests, variant.scene(size)) for name in again]
+    return found
 
 
 def run(workshop: Workshop) -> Outcome:
@@ -117,7 +135,7 @@ def _infer(workshop: Workshop, variant: three.Variant) -> _Found:
     model = workshop.model(f"{variant.name}", training)
     posteriors = [model.posterior(x) for x in tests.x]
     estimates = np.array([three.estimate(p) for p in posteriors])
-    scene, prior = variant.scene(workshop), variant.prior
+    scene, prior = variant.scene(workshop.size), variant.prior
     name = variant.name
     again = workshop.poured(f"{name}-again", scene, prior, estimates, seed=_AGAIN_SEED)
     floor = workshop.poured(f"{name}-floor", scene, prior, tests.theta, seed=_FLOOR_SEED)
@@ -210,7 +228,7 @@ def _notes(found: dict[str, _Found]) -> list[str]:
 def _pictures(workshop: Workshop, found: _Found) -> str:
     """Pours the first tests and their estimates again, for their pictures."""
     variant = three.VARIANTS[0]
-    scene, eye = variant.scene(workshop), Eye.of(variant.scene(workshop))
+    scene, eye = variant.scene(workshop.size), Eye.of(variant.scene(workshop.size))
     top, bottom, titles = [], [], []
     for truth, theta in list(zip(found.tests.theta, found.estimates, strict=True))[:_EXAMPLES]:
         for row, values in ((top, truth), (bottom, theta)):
@@ -249,4 +267,5 @@ EXPERIMENT = Experiment(
     asks="How well are sliding friction, rolling friction and restitution inferred from one image, "
     "and what do pours at the estimates look like?",
     run=run,
+    sets=sets,
 )

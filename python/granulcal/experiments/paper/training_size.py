@@ -5,7 +5,8 @@ import numpy as np
 from granulcal.experiments.paper.common import friction
 from granulcal.experiments.paper.common.draw import ACCENT, new_figure, save
 from granulcal.experiments.paper.common.measure import Published, error_row
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, Table
+from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, PouredSet, Table
+from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
 
 __all__ = ["EXPERIMENT"]
@@ -17,6 +18,11 @@ _PAPER = {
 }
 _SHARES = (0.125, 0.25, 0.5, 1.0)
 _FEWEST = 50
+
+
+def sets(size: Size) -> list[PouredSet]:
+    """Returns the pours of this experiment."""
+    return friction.sets(size, "tests")
 
 
 def run(workshop: Workshop) -> Outcome:
@@ -98,4 +104,5 @@ EXPERIMENT = Experiment(
     section="Preliminary Tests for System Noise",
     asks="How sharply is the sliding friction inferred from 500 and from 1000 pours?",
     run=run,
+    sets=sets,
 )

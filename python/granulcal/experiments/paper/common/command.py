@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from granulcal import _native
-from granulcal.experiments.paper.common.outcome import Experiment, Outcome
+from granulcal.experiments.paper.common.outcome import Experiment, Outcome, PouredSet
 from granulcal.experiments.paper.common.page import write_page
 from granulcal.experiments.paper.common.sizes import FULL, Size
 from granulcal.experiments.paper.common.workshop import Workshop
 
-__all__ = ["experiments", "find", "reproduce_paper", "run_one"]
+__all__ = ["experiments", "find", "missing_sets", "reproduce_paper", "run_one"]
 
 _QUICK_NOTE = (
     "This is the small version: few grains and few pours. It shows that everything runs; its "
@@ -48,6 +48,26 @@ def find(word: str) -> Experiment:
     raise ValueError(f"the paper has no experiment {word!r} here; there are {listed}")
 
 
+def missing_sets(out: Path, experiment: str | None = None, *, size: Size = FULL) -> list[PouredSet]:
+    """Returns the pours that `reproduce_paper` would need, each set once.
+
+    What an experiment that has run rests on is not among them; of a set that was begun all are.
+    """
+    folder = _folder(out, size)
+    wanted = experiments() if experiment is None else [find(experiment)]
+    done, missing = {}, {}
+    for each in experiments():
+        if Outcome.load(folder / each.name) is not None:
+            done |= {one.name: one for one in each.sets(size)}
+    for each in wanted:
+        missing |= {one.name: one for one in each.sets(size) if one.name not in done}
+    return list(missing.values())
+
+
+def _folder(out: Path, size: Size) -> Path:
+    return out / ("paper" if size.is_full else f"paper-{size.name}")
+
+
 def reproduce_paper(
     out: Path,
     experiment: str | None = None,
@@ -73,7 +93,7 @@ def reproduce_paper(
     Returns:
         The page, if one was asked for.
     """
-    folder = out / ("paper" if size.is_full else f"paper-{size.name}")
+    folder = _folder(out, size)
     wanted = experiments() if experiment is None else [find(experiment)]
     if not size.is_full and not quiet:
         print(_QUICK_NOTE)

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.experiments.paper.common.eye import Disturbance, Eye
+from granulcal.experiments.paper.common.outcome import PouredSet
+from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.left_out import LeftOut
 from granulcal.pours.statistics import NAMES
 from granulcal.prior import Parameter, Prior
 
-__all__ = ["BLURS", "NOISES", "PRIOR", "even_tests", "tests", "training", "view"]
+__all__ = ["BLURS", "NOISES", "PRIOR", "even_tests", "sets", "tests", "training", "view"]
 
 Array = NDArray[np.float64]
 
@@ -51,6 +53,15 @@ _TRAINING_VIEWS = {
     "d435": Disturbance(is_d435=True),
     "mixed": _mixed,
 }
+
+
+def sets(size: Size, kind: str) -> list[PouredSet]:
+    """Returns what `training` pours and the tests: `tests`, or `even` for `even_tests`."""
+    scene = size.scene()
+    return [
+        PouredSet("friction-training", size.training, scene),
+        PouredSet(f"friction-{kind}", size.tests, scene),
+    ]
 
 
 def training(workshop: Workshop) -> Pairs:

@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from granulcal.files import write_beside
+from granulcal.pours.scene import Scene
 
 if TYPE_CHECKING:
+    from granulcal.experiments.paper.common.sizes import Size
     from granulcal.experiments.paper.common.workshop import Workshop
 
-__all__ = ["Experiment", "Figure", "Outcome", "Row", "Table"]
+__all__ = ["Experiment", "Figure", "Outcome", "PouredSet", "Row", "Table"]
 
 _RESULT = "result.json"
 
@@ -113,6 +115,21 @@ class Outcome:
         write_beside(folder / _RESULT, text + "\n")
 
 
+@dataclass(frozen=True)
+class PouredSet:
+    """Pours that an experiment makes, or finds made by another.
+
+    Attributes:
+        name: of the set, below `pours`.
+        count: pours at least; further ones take the place of those that cannot be used.
+        scene: what a pour costs as much as.
+    """
+
+    name: str
+    count: int
+    scene: Scene
+
+
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
     """One experiment of the paper.
@@ -124,6 +141,7 @@ class Experiment:
         section: the section of the paper.
         asks: what it asks, in a sentence.
         run: makes it.
+        sets: the sets of pours that it rests on, of which it may share some with others.
     """
 
     number: int
@@ -132,3 +150,4 @@ class Experiment:
     section: str
     asks: str
     run: "Callable[[Workshop], Outcome]"
+    sets: "Callable[[Size], list[PouredSet]]"

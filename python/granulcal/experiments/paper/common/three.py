@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.bayessim.posterior.posterior import Posterior
+from granulcal.experiments.paper.common.outcome import PouredSet
+from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
-__all__ = ["VARIANTS", "Variant", "estimate", "in_ln", "training_and_tests"]
+__all__ = ["VARIANTS", "Variant", "estimate", "in_ln", "sets", "training_and_tests"]
 
 Array = NDArray[np.float64]
 
@@ -36,9 +38,9 @@ class Variant:
     preset: str
     seed: int
 
-    def scene(self, workshop: Workshop) -> Scene:
+    def scene(self, size: Size) -> Scene:
         """Returns the pour."""
-        return workshop.size.scene().with_(preset=self.preset)
+        return size.scene().with_(preset=self.preset)
 
 
 VARIANTS = (
@@ -49,9 +51,17 @@ VARIANTS = (
 """The first is this project's; the others are nearer and nearer to the paper's set-up."""
 
 
+def sets(size: Size, variant: Variant) -> list[PouredSet]:
+    """Returns what `training_and_tests` pours."""
+    counts = {"training": size.training, "tests": size.tests}
+    scene = variant.scene(size)
+    return [PouredSet(f"{variant.name}-{part}", count, scene) for part, count in counts.items()]
+
+
 def training_and_tests(workshop: Workshop, variant: Variant) -> tuple[Pairs, Pairs]:
     """Returns the training pours of a variant, and tests drawn from the same prior."""
-    size, scene, name = workshop.size, variant.scene(workshop), variant.name
+    size, name = workshop.size, variant.name
+    scene = variant.scene(size)
     training = workshop.pairs(f"{name}-training", scene, variant.prior, size.training, variant.seed)
     tests = workshop.tests(f"{name}-tests", scene, variant.prior, size.tests, variant.seed + 1)
     return training, tests
