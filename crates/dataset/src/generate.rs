@@ -7,6 +7,7 @@
 
 mod chunk;
 mod folder;
+mod gathered;
 mod options;
 mod queue;
 
@@ -32,6 +33,7 @@ use crate::{DatasetError, Room, table};
 use chunk::OpenChunk;
 pub use chunk::Progress;
 use folder::{Folder, Plan};
+pub use gathered::GatheredBatch;
 use granulcal_scene::Prior;
 pub use options::{GenerateOptions, Shard};
 use queue::Queue;

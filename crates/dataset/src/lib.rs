@@ -13,6 +13,7 @@
 //! | [`observe()`] | pour to image to statistics |
 //! | [`Observer`] | what a scene observes over time and at its end |
 //! | [`generate()`] | resumable batches |
+//! | [`GatheredBatch`] | batches whose parts are made elsewhere |
 //! | [`Dataset`], [`merge`] | Parquet back into memory |
 //! | [`Recording`] | measured height maps and depth images |
 //! | [`Survey`] | what is in a .bag or .mcap |
@@ -71,7 +72,9 @@ pub use engine::{Engine, Outcome, foreign_pour};
 pub use error::DatasetError;
 pub use files::{is_writing, read_file, remove_temporaries, write_file};
 pub use form::Form;
-pub use generate::{GenerateOptions, Progress, Shard, Summary, generate, generate_with};
+pub use generate::{
+    GatheredBatch, GenerateOptions, Progress, Shard, Summary, generate, generate_with,
+};
 /// Priors, from the crate of what is asked.
 pub use granulcal_scene::{Distribution, Parameter, Prior};
 pub use header::{Header, VERSION};

@@ -139,7 +139,11 @@ fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, 
 /// [`DatasetError::Parquet`] for a truncated or damaged file, [`DatasetError::Damaged`] for one whose numbers are not
 /// those that were written, [`DatasetError::Content`] for a Parquet file that is no data set of granulcal.
 pub(crate) fn read(path: &Path) -> Result<Table, DatasetError> {
-    let bytes = files::read(path)?;
+    parse(path, files::read(path)?)
+}
+
+/// As [`read`], of the bytes of a file; `path` names it in errors.
+pub(crate) fn parse(path: &Path, bytes: Vec<u8>) -> Result<Table, DatasetError> {
     let length = bytes.len();
     let parquet = |source| DatasetError::Parquet { path: path.to_owned(), source };
     let file = SerializedFileReader::new(bytes::Bytes::from(bytes)).map_err(parquet)?;

@@ -14,11 +14,12 @@ use crate::signals::Watch;
 
 /// Makes the rows that a folder lacks, by our simulator or by `engine`, a pair of its name and a function of
 /// (scene, seed) that returns (positions, radii), or points alone; `progress` is called with (total, resumed, made,
-/// unhealthy, jammed, out of view).
+/// unhealthy, jammed, out of view). Of `shard`, a pair (index, count), those of this shard;
+/// `chunk` rows are a part.
 ///
 /// On Ctrl-C the finished rows are written before KeyboardInterrupt is raised.
 #[pyfunction]
-#[pyo3(signature = (scene, prior_toml, out, *, rows, seed, threads, resume, progress, engine = None))]
+#[pyo3(signature = (scene, prior_toml, out, *, rows, seed, threads, resume, progress, engine = None, shard = None, chunk = None))]
 #[allow(clippy::too_many_arguments)] // Python's keywords.
 pub(crate) fn generate(
     py: Python<'_>,
@@ -31,11 +32,15 @@ pub(crate) fn generate(
     resume: bool,
     progress: Option<Py<PyAny>>,
     engine: Option<(String, Py<PyAny>)>,
+    shard: Option<(u64, u64)>,
+    chunk: Option<u64>,
 ) -> PyResult<Counts> {
     let prior = Prior::from_toml(prior_toml).map_err(error::dem)?;
     let default = GenerateOptions::default();
     let threads = threads.unwrap_or(default.threads);
-    let options = GenerateOptions { rows, seed, threads, resume, shard: Shard::WHOLE, ..default };
+    let shard = shard.map_or(Shard::WHOLE, |(index, count)| Shard { index, count });
+    let chunk = chunk.unwrap_or(default.chunk);
+    let options = GenerateOptions { rows, seed, threads, resume, shard, chunk, ..default };
     let scene = &scene.inner;
     let (name, pours) = engine.unzip();
     let name = name.unwrap_or_default();

@@ -12,6 +12,7 @@ mod error;
 mod files;
 mod film;
 mod formation;
+mod gathered;
 mod generate;
 mod levelled;
 mod observation;
@@ -39,6 +40,8 @@ mod _native {
     use crate::film::film;
     #[pymodule_export]
     use crate::formation::Formation;
+    #[pymodule_export]
+    use crate::gathered::GatheredBatch;
     #[pymodule_export]
     use crate::generate::generate;
     #[pymodule_export]

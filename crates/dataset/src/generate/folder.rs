@@ -114,8 +114,23 @@ impl Folder {
     /// The rows of a part, each checked against what it must have been made from, and whether the part has a hash.
     fn read_part(&self, chunk: u64) -> Result<(Vec<Row>, bool), DatasetError> {
         let path = manifest::part_path(&self.path, chunk);
-        let Table { header, rows, is_verified } = table::read(&path)?;
-        header.require_same(&path, &self.header)?;
+        self.check_part(&path, chunk, table::read(&path)?)
+    }
+
+    /// The rows of a part that is not of this folder yet, checked as if it were.
+    pub(super) fn parse_part(&self, chunk: u64, bytes: Vec<u8>) -> Result<Vec<Row>, DatasetError> {
+        let path = manifest::part_path(&self.path, chunk);
+        Ok(self.check_part(&path, chunk, table::parse(&path, bytes)?)?.0)
+    }
+
+    fn check_part(
+        &self,
+        path: &Path,
+        chunk: u64,
+        table: Table,
+    ) -> Result<(Vec<Row>, bool), DatasetError> {
+        let Table { header, rows, is_verified } = table;
+        header.require_same(path, &self.header)?;
         let range = chunk * self.chunk..(chunk + 1) * self.chunk;
         let allowed = format!("rising within {}..{}", range.start, range.end);
         let mut last = None;
@@ -123,14 +138,14 @@ impl Folder {
             let index = row.row;
             if !range.contains(&index) || last.is_some_and(|last| last >= index) {
                 let found = format!("row {index} after {last:?}");
-                return Err(DatasetError::content(&path, "column row", found, allowed));
+                return Err(DatasetError::content(path, "column row", found, allowed));
             }
             last = Some(index);
             let expected = self.header.prior.sample(self.header.seed, index);
             if row.parameters != expected || row.seed != pour_seed(self.header.seed, index) {
                 let found = format!("{:?}", row.parameters);
                 let what = format!("the parameters of row {index}");
-                return Err(DatasetError::content(&path, what, found, format!("{expected:?}")));
+                return Err(DatasetError::content(path, what, found, format!("{expected:?}")));
             }
         }
         Ok((rows, is_verified))

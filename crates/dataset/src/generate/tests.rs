@@ -79,6 +79,50 @@ fn threads_chunks_shards_and_growth_do_not_change_rows() {
 }
 
 #[test]
+fn parts_that_were_made_elsewhere_are_gathered() {
+    let place = Place::new();
+    place.make("whole", &options(10));
+    let chunk = 4;
+    let one = |index| GenerateOptions { chunk, shard: Shard { index, count: 3 }, ..options(10) };
+    let part = |index| {
+        place.make(&format!("worker-{index}"), &one(index));
+        let name = format!("worker-{index}/part-{index:06}.parquet");
+        std::fs::read(place.at(&name)).unwrap()
+    };
+    let open = |rows| {
+        let options = GenerateOptions { chunk, ..options(rows) };
+        GatheredBatch::open(&small(), &Prior::default(), &options, &place.at("all"))
+    };
+    let mut batch = open(10).unwrap();
+    assert_eq!((batch.chunks(), batch.missing().collect::<Vec<_>>()), (3, vec![0, 1, 2]));
+    assert!(matches!(open(10).unwrap_err(), DatasetError::Locked { .. }));
+    // Of another chunk, and damaged: refused, and nothing is written.
+    let last = part(2);
+    let refused = batch.put(1, &last).unwrap_err();
+    assert!(matches!(refused, DatasetError::Content { .. }), "{refused}");
+    let mut damaged = last.clone();
+    damaged[20] ^= 1;
+    assert!(batch.put(2, &damaged).is_err());
+    assert_eq!(batch.missing().count(), 3);
+    assert!(batch.put(2, &last).unwrap() && !batch.put(2, &last).unwrap());
+    drop(batch);
+    // Gone on with, and a part that has not all of its rows any more.
+    let mut batch = open(10).unwrap();
+    assert_eq!((batch.missing().collect::<Vec<_>>(), batch.progress().resumed), (vec![0, 1], 2));
+    assert!(batch.put(0, &part(0)).unwrap() && batch.put(1, &part(1)).unwrap());
+    assert_eq!((batch.missing().count(), batch.progress().made), (0, 8));
+    drop(batch);
+    assert_same(
+        &Dataset::open(&place.at("whole")).unwrap(),
+        &Dataset::open(&place.at("all")).unwrap(),
+    );
+    let mut grown = open(11).unwrap();
+    assert_eq!(grown.missing().collect::<Vec<_>>(), [2]);
+    let short = grown.put(2, &last).unwrap_err();
+    assert!(matches!(short, DatasetError::Content { .. }), "{short}");
+}
+
+#[test]
 fn a_row_can_be_made_again_by_itself() {
     let place = Place::new();
     place.make("whole", &options(3));

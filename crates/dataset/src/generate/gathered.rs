@@ -1,0 +1,90 @@
+//! A batch whose parts are made elsewhere and brought here: which chunks lack rows, and what is brought.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::chunk::Progress;
+use super::folder::Folder;
+use super::options::GenerateOptions;
+use super::{Plan, check};
+use crate::header::Header;
+use crate::{DatasetError, Form, Room, files, manifest};
+use granulcal_scene::Prior;
+
+/// An open folder that takes parts; nobody else writes into it while this lives.
+///
+/// Chunk c is what shard c of as many shards as there are chunks makes: `Shard { index: c, count: chunks }`.
+#[derive(Debug)]
+pub struct GatheredBatch {
+    folder: Folder,
+    rows: u64,
+    missing: BTreeSet<u64>,
+    progress: Progress,
+}
+
+impl GatheredBatch {
+    /// Opens or creates the folder `out` of a batch of our simulator.
+    ///
+    /// # Errors
+    /// As [`crate::generate()`], which makes the same rows in it.
+    pub fn open(
+        scene: &granulcal_dem::Scene,
+        prior: &Prior,
+        options: &GenerateOptions,
+        out: &Path,
+    ) -> Result<Self, DatasetError> {
+        check(options)?;
+        let header = Header::new(scene, prior, options.seed)?;
+        Room::of_batch(scene, options.rows, 1, options.chunk).require(Some(out))?;
+        let folder = Folder::open(out, header, options)?;
+        let Plan { missing: lacking, progress, .. } = folder.plan(options)?;
+        let is_complete = |chunk: &u64| lacking.get(chunk).is_some_and(Vec::is_empty);
+        let chunks = options.rows.div_ceil(folder.chunk);
+        let missing = (0..chunks).filter(|chunk| !is_complete(chunk)).collect();
+        Ok(Self { folder, rows: options.rows, missing, progress })
+    }
+
+    /// Chunks of the batch.
+    pub fn chunks(&self) -> u64 {
+        self.rows.div_ceil(self.folder.chunk)
+    }
+
+    /// Rows of a chunk.
+    pub fn chunk_size(&self) -> u64 {
+        self.folder.chunk
+    }
+
+    /// The chunks that lack rows, in order.
+    pub fn missing(&self) -> impl Iterator<Item = u64> + '_ {
+        self.missing.iter().copied()
+    }
+
+    /// How far the batch is; the rows that were brought are those made.
+    pub fn progress(&self) -> Progress {
+        self.progress
+    }
+
+    /// Takes the bytes of a chunk's part; returns whether it lacked it.
+    ///
+    /// # Errors
+    /// [`DatasetError`] of a part that is damaged, not whole, of another batch or chunk; the folder is as before.
+    pub fn put(&mut self, chunk: u64, bytes: &[u8]) -> Result<bool, DatasetError> {
+        if !self.missing.contains(&chunk) {
+            return Ok(false);
+        }
+        let path = manifest::part_path(&self.folder.path, chunk);
+        let rows = self.folder.parse_part(chunk, bytes.to_vec())?;
+        let wanted = self.folder.chunk.min(self.rows - chunk * self.folder.chunk);
+        if (rows.len() as u64) < wanted {
+            let allowed = format!("{wanted}");
+            return Err(DatasetError::content(&path, "the rows", rows.len().to_string(), allowed));
+        }
+        files::write_file(&path, Form::Parquet, bytes)?;
+        self.missing.remove(&chunk);
+        for row in &rows {
+            self.progress.made += 1;
+            self.progress.count(row.status);
+        }
+        Ok(true)
+    }
+}
