@@ -19,6 +19,7 @@ from granulcal.design.rings import design_rings
 from granulcal.design.spill import design_spill
 from granulcal.measured.recording import Formation, Levelled, Plane, Recording
 from granulcal.pours.camera import Camera
+from granulcal.pours.cluster import Cluster
 from granulcal.pours.dataset import Dataset, generate
 from granulcal.pours.scene import Material, Scene
 from granulcal.pours.simulate import Pour, simulate
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BayesSim",
     "Camera",
+    "Cluster",
     "Dataset",
     "DiagnosticStatistics",
     "Formation",

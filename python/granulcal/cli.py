@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from granulcal import _native, paths
-from granulcal.commands import engine_command
+from granulcal.commands import elsewhere
 from granulcal.commands.exit_code import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from granulcal.commands.program import Parser, describe
 from granulcal.one_thread import one_thread
@@ -67,8 +67,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     parser = _parser()
     word = words[0] if words else ""
-    if word in ("simulate", "generate") and engine_command.is_asked(words):
-        return _guarded(lambda: engine_command.run(words))
+    if word in ("simulate", "generate") and elsewhere.is_asked(words):
+        return _guarded(lambda: elsewhere.run(words))
     if word not in _commands(parser):
         with _interruptible(raises=False):
             return _native.run_cli(["granulcal", *words], describe(parser, after_help=_EPILOG))

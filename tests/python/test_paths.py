@@ -9,7 +9,7 @@ import pytest
 
 import granulcal as gc
 from granulcal import cli, paths
-from granulcal.commands import engine_command
+from granulcal.commands import elsewhere
 from granulcal.files import write_beside, write_toml
 from granulcal.paths import Reads, Writes
 
@@ -30,7 +30,7 @@ FIRST = {
 def every_command() -> Iterator[tuple[tuple[str, ...], argparse.ArgumentParser]]:
     """Commands of the program, and those that take the simulator's words for another engine."""
     yield from commands(cli._parser())
-    for words, parser in commands(engine_command._parser()):
+    for words, parser in commands(elsewhere.parser()):
         yield (*words, "--engine=lammps"), parser
 
 
@@ -87,6 +87,8 @@ def test_every_path_says_whether_it_is_read_or_written():
     }
     known = {"method", "topic", "camera_topic", "colour_topic", "study", "engine", "to", "scene"}
     assert texts <= known | {
+        "ray",
+        "ray_store",
         "material",
         "kind",
         "sample",

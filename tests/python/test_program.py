@@ -62,6 +62,21 @@ def test_completions_know_the_commands_of_both_halves(shell: str) -> None:
     assert "granulcal-cli" not in script
 
 
+def test_help_and_completions_know_the_options_of_the_python_package() -> None:
+    for words in (("generate", "--help"), ("completions", "bash")):
+        told = _told(*words).stdout
+        assert "--ray " in told and "--ray-store" in told and "--engine" in told, words
+
+
+def test_a_store_is_of_a_cluster(capfd: pytest.CaptureFixture[str]) -> None:
+    from granulcal import _native
+
+    words = ["generate", "drop", "default", "-o", "pours", "--ray-store", "store"]
+    assert main(words) == 2 and "belongs to --ray" in capfd.readouterr().err
+    assert _native.run_cli(["granulcal-cli", *words]) == 2
+    assert "--ray-store" in capfd.readouterr().err
+
+
 def test_every_command_that_ends_with_results_takes_json() -> None:
     without = {"demo", "reproduce"}
     for name, parser in _parser()._actions[-1].choices.items():  # pyright: ignore

@@ -198,6 +198,12 @@ pub struct GenerateArgs {
     /// command; `granulcal` of the Python package only
     #[arg(long, value_name = "ENGINE")]
     pub engine: Option<String>,
+    /// Pour on a Ray cluster: auto, local, HOST:PORT or ray://HOST:PORT; `granulcal` of the Python package only
+    #[arg(long, value_name = "ADDRESS")]
+    pub ray: Option<String>,
+    /// Folder that the workers of --ray write their parts to, for example s3://bucket/run
+    #[arg(long, value_name = "URL")]
+    pub ray_store: Option<String>,
     /// Rows of the whole data set
     #[arg(long = "rows", short = 'n', default_value_t = 1000)]
     pub rows: u64,
@@ -429,7 +435,8 @@ mod tests {
                 }
                 // Texts that are no paths are known by name: a new one is to be looked at.
                 let is_text = kind == TypeId::of::<String>();
-                let texts = ["topic", "camera_topic", "colour_topic", "view", "engine"];
+                let texts =
+                    ["topic", "camera_topic", "colour_topic", "view", "engine", "ray", "ray_store"];
                 if is_text && !texts.contains(&argument.get_id().as_str()) {
                     found.push(format!("{} {}", command.get_name(), argument.get_id()));
                 }

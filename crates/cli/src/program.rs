@@ -64,7 +64,10 @@ impl FurtherOption {
     fn argument(self) -> Arg {
         let action = if self.takes_value { ArgAction::Append } else { ArgAction::SetTrue };
         let mut argument =
-            Arg::new(self.long.clone()).long(self.long).help(self.help).action(action);
+            Arg::new(self.long.clone()).long(self.long.clone()).help(self.help).action(action);
+        if self.takes_value {
+            argument = argument.value_name(self.long.to_uppercase());
+        }
         if let Some(short) = self.short {
             argument = argument.short(short);
         }

@@ -33,14 +33,14 @@ pub fn load(args: &SceneArgs) -> anyhow::Result<Scene> {
     changed(&args.scene, &args.with)
 }
 
-/// Refuses another engine: they are run by the Python package, which does not come here then.
+/// Refuses what the Python package alone does, which does not come here then: pours that are made elsewhere.
 ///
 /// # Errors
-/// [`BadArgument`] if one is named.
-pub fn refuse_engine(engine: Option<&str>) -> Result<(), BadArgument> {
-    match engine {
-        Some(name) => Err(BadArgument(format!(
-            "--engine {name:?}: other simulators are run by `granulcal` of the Python package alone"
+/// [`BadArgument`] if a value is given.
+pub fn refuse_elsewhere(option: &str, value: Option<&str>) -> Result<(), BadArgument> {
+    match value {
+        Some(value) => Err(BadArgument(format!(
+            "{option} {value:?}: that is done by `granulcal` of the Python package alone"
         ))),
         None => Ok(()),
     }

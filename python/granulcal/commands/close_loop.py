@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import KEPT, READS, writes
 
@@ -77,12 +78,14 @@ def add(commands: Any) -> None:
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
     add_dry_run(parser)
     parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
+    add_cluster(parser)
     parser.add_argument("--json", action="store_true", help="print the verdict as JSON at the end")
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named, pouring_with
+    from granulcal.pours.cluster import spread_over
 
     engine = None if options.engine is None else engine_named(options.engine)
     if options.dry_run:
@@ -92,7 +95,7 @@ def _run(options: argparse.Namespace) -> int:
         with pouring_with(engine):
             return say_how_long(options, task.at_first(), task.prior, options.budget)
     aside = contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext()
-    with aside, pouring_with(engine):
+    with aside, pouring_with(engine), spread_over(cluster_of(options)):
         code = _close(options)
     if not options.json:
         return code

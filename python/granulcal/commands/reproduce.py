@@ -7,9 +7,11 @@ import pkgutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.dry_run import add_dry_run, cost
 from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.paths import READS, writes
+from granulcal.pours.cluster import spread_over
 from granulcal.progress import duration, shown
 
 if TYPE_CHECKING:
@@ -37,6 +39,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--json", type=writes("json"), help="kinect_mounds: file for what each map gave"
     )
+    add_cluster(parser)
     paper = parser.add_argument_group("only with the study `paper`")
     paper.add_argument(
         "--quick", action="store_true", help="few grains and few pours; says so, proves nothing"
@@ -77,7 +80,7 @@ def _run(options: argparse.Namespace) -> int:
     if data is None and options.maps is None:
         raise FileNotFoundError("no measured data: give --data or set $GRANULCAL_DATA")
     # A study of the loop says whether its verdicts stand.
-    with shown():
+    with shown(), spread_over(cluster_of(options)):
         stands = module.reproduce(options.out, data, **given)
     return UNHEALTHY if stands is False else DONE
 
@@ -88,7 +91,7 @@ def _reproduce_paper(options: argparse.Namespace) -> int:
 
     if options.dry_run:
         return _say_how_long(options, QUICK if options.quick else FULL)
-    with shown():
+    with shown(), spread_over(cluster_of(options)):
         reproduce_paper(
             options.out,
             options.experiment,

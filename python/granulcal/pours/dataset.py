@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from granulcal import _native
 from granulcal.engines.in_use import engine_in_use
 from granulcal.errors import OtherLawWarning, UnverifiedDataWarning
+from granulcal.pours.cluster import Cluster, cluster_in_use, gather
 from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import check_whole, require_scene
@@ -185,8 +186,9 @@ def generate(
     threads: int | None = None,
     resume: bool = True,
     *,
-    progress: bool | Callable[[int, int, int, int], object] = True,
+    progress: bool | Callable[..., object] = True,
     engine: "Engine | None" = None,
+    ray: "str | Cluster | None" = None,
 ) -> Dataset:
     """Returns `n` pours with parameters drawn from `prior`, simulating what `out` lacks.
 
@@ -204,6 +206,8 @@ def generate(
         progress: show a line on stderr; or a function of (total, resumed, made, unhealthy,
             jammed, out of view), the last three of all rows that are there.
         engine: another simulator in place of ours; docs/engines.md says what it must do.
+        ray: address of a Ray cluster that makes the pours, as `ray.init` takes it, or `local`;
+            docs/cluster.md.
 
     Raises:
         ValueError: a parameter that does not fit the scene, or a folder made from something else.
@@ -226,18 +230,33 @@ def generate(
     folder = Path(tempfile.mkdtemp(prefix="granulcal-") if out is None else out)
     line = ProgressLine() if progress is True else None
     report = line if line is not None else (progress if callable(progress) else None)
+    cluster = Cluster(ray) if isinstance(ray, str) else ray or cluster_in_use()
+    if cluster is not None and engine is not None:
+        raise ValueError(f"a cluster pours with granulcal alone, not with the engine {engine.name}")
     try:
-        counts = _native.generate(
-            scene.native,
-            prior.to_toml(),
-            folder,
-            rows=n,
-            seed=seed,
-            threads=threads,
-            resume=resume,
-            progress=report,
-            engine=None if engine is None else (engine.name, _asked(engine)),
-        )
+        if cluster is not None:
+            counts = gather(
+                scene.native,
+                prior.to_toml(),
+                folder,
+                rows=n,
+                seed=seed,
+                resume=resume,
+                cluster=cluster,
+                report=report,
+            )
+        else:
+            counts = _native.generate(
+                scene.native,
+                prior.to_toml(),
+                folder,
+                rows=n,
+                seed=seed,
+                threads=threads,
+                resume=resume,
+                progress=report,
+                engine=None if engine is None else (engine.name, _asked(engine)),
+            )
         if report is not None:
             report(*counts)
     finally:

@@ -17,7 +17,9 @@ use crate::sides::SideFiles;
 const TRIED: u64 = 3;
 
 pub fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
-    scene::refuse_engine(args.engine.as_deref())?;
+    scene::refuse_elsewhere("--engine", args.engine.as_deref())?;
+    scene::refuse_elsewhere("--ray", args.ray.as_deref())?;
+    scene::refuse_elsewhere("--ray-store", args.ray_store.as_deref())?;
     let scene = scene::load(&args.scene)?;
     let prior = scene::prior(&args.prior)?;
     let defaults = GenerateOptions::default();

@@ -50,7 +50,7 @@ struct Report {
 }
 
 pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
-    scene::refuse_engine(args.engine.as_deref())?;
+    scene::refuse_elsewhere("--engine", args.engine.as_deref())?;
     let scene = scene::load(&args.scene)?;
     if let Some(path) = &args.depth {
         check_name(path, &scene)?;

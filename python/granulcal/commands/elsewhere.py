@@ -1,4 +1,4 @@
-"""`simulate --engine` and `generate --engine`: pours of another simulator."""
+"""Pours that are made elsewhere: `--engine` of `simulate` and `generate`, `generate --ray`."""
 
 import argparse
 import json
@@ -8,54 +8,58 @@ from collections.abc import Sequence
 import numpy as np
 
 from granulcal import paths
+from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.init import assignment
 from granulcal.commands.program import Parser
 from granulcal.files import beside
 from granulcal.paths import READS, writes
 
-__all__ = ["is_asked", "run"]
+__all__ = ["is_asked", "parser", "run"]
 
-_FLAG = "--engine"
+_ENGINE, _RAY, _STORE = "--engine", "--ray", "--ray-store"
 _UNHEALTHY = 3
 
 
 def is_asked(words: Sequence[str]) -> bool:
-    """Returns whether the words name another engine."""
-    return any(word == _FLAG or word.startswith(f"{_FLAG}=") for word in words)
+    """Returns whether the words name another engine or a cluster."""
+    return any(word.split("=")[0] in (_ENGINE, _RAY, _STORE) for word in words)
 
 
 def run(words: Sequence[str]) -> int:
-    """Runs `simulate` or `generate` with another engine; returns the exit code."""
+    """Runs `simulate` or `generate`; returns the exit code."""
     try:
-        parser = _parser()
-        options = parser.parse_args(words)
+        known = parser()
+        options = known.parse_args(words)
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 2
-    paths.check(parser, options)
+    paths.check(known, options)
     return options.run(options)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = Parser(prog="granulcal")
-    commands = parser.add_subparsers(required=True, dest="command")
+def parser() -> argparse.ArgumentParser:
+    """Returns the parser of both commands."""
+    whole = Parser(prog="granulcal")
+    commands = whole.add_subparsers(required=True, dest="command")
     simulate = commands.add_parser("simulate")
     _add_common(simulate)
+    simulate.add_argument(_ENGINE, required=True)
     simulate.add_argument("--positions", type=writes("array"))
     simulate.set_defaults(run=_simulate)
     generate = commands.add_parser("generate")
     _add_common(generate)
+    generate.add_argument(_ENGINE)
+    add_cluster(generate)
     generate.add_argument("prior", type=READS)
     generate.add_argument("-n", "--rows", type=int, default=1000)
     generate.add_argument("-o", "--out", type=writes("data_set"), required=True)
     generate.add_argument("--threads", type=int)
     generate.add_argument("--no-resume", action="store_true")
     generate.set_defaults(run=_generate)
-    return parser
+    return whole
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=READS)
-    parser.add_argument(_FLAG, required=True)
     parser.add_argument("--set", action="append", default=[], type=assignment)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true")
@@ -108,7 +112,8 @@ def _generate(options: argparse.Namespace) -> int:
         threads=options.threads,
         resume=not options.no_resume,
         progress=not options.quiet,
-        engine=engine_named(options.engine),
+        engine=None if options.engine is None else engine_named(options.engine),
+        ray=cluster_of(options),
     )
     counts = data.status_counts()
     if options.json:

@@ -1,0 +1,34 @@
+"""The options `--ray` and `--ray-store` of commands that pour batches."""
+
+import argparse
+
+from granulcal.pours.cluster import Cluster
+
+__all__ = ["add_cluster", "cluster_of"]
+
+
+def add_cluster(parser: argparse.ArgumentParser) -> None:
+    """Adds the options."""
+    parser.add_argument(
+        "--ray",
+        metavar="ADDRESS",
+        help="pour on a Ray cluster: auto, local, HOST:PORT or ray://HOST:PORT; docs/cluster.md",
+    )
+    parser.add_argument(
+        "--ray-store",
+        metavar="URL",
+        help="folder that the cluster's workers write their parts to, for example s3://bucket/run",
+    )
+
+
+def cluster_of(options: argparse.Namespace) -> Cluster | None:
+    """Returns the cluster that was asked for, None for this machine's threads.
+
+    Raises:
+        ValueError: a store without a cluster.
+    """
+    if options.ray is None:
+        if options.ray_store is not None:
+            raise ValueError("--ray-store belongs to --ray: where is the cluster?")
+        return None
+    return Cluster(options.ray, store=options.ray_store)

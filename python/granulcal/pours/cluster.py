@@ -1,0 +1,236 @@
+"""A batch on a Ray cluster: a task makes a part of 16 rows, the driver gathers the parts.
+
+A row depends on scene, prior, seed and its number alone, so that it does not matter where it is
+made, nor whether it is made twice: the first part of a chunk is kept. Ray starts a task again whose
+worker or node is gone; what the driver has gathered is on its disk, and a driver that is started
+again asks for what is missing.
+"""
+
+import contextlib
+import statistics
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from granulcal import _native
+from granulcal.pours.part_store import PartStore
+
+__all__ = ["Cluster", "cluster_in_use", "gather", "spread_over"]
+
+# Tasks for each core, so that none waits for the driver.
+_AHEAD = 2
+# Tasks that take this many medians are made a second time on a core that has nothing to do.
+_STRAGGLES = 3.0
+_LEAST_STRAGGLE_S = 20.0
+_PATIENCE_S = 0.5
+# Workers that are killed under the same part so often are not killed by chance.
+_RETRIES = 20
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Where the pours are made.
+
+    Attributes:
+        address: of the cluster as `ray.init` takes it; `local` starts one on this machine.
+        store: URL of a folder of parts that workers write and the driver reads, for example
+            s3://bucket/run; None: parts come back through Ray.
+    """
+
+    address: str = "auto"
+    store: str | None = None
+
+
+_in_use: Cluster | None = None
+
+
+@contextlib.contextmanager
+def spread_over(cluster: Cluster | None) -> Iterator[None]:
+    """Lets `generate` use a cluster where it is given none; None for this machine's threads."""
+    global _in_use
+    before, _in_use = _in_use, cluster
+    try:
+        yield
+    finally:
+        _in_use = before
+
+
+def cluster_in_use() -> Cluster | None:
+    """Returns the cluster of the job that runs, None for this machine's threads."""
+    return _in_use
+
+
+def gather(
+    scene: _native.Scene,
+    prior_toml: str,
+    folder: Path,
+    *,
+    rows: int,
+    seed: int,
+    resume: bool,
+    cluster: Cluster,
+    report: Callable[..., object] | None = None,
+) -> tuple[int, int, int, int, int, int]:
+    """Brings every part that `folder` lacks from a cluster; returns the counts of the batch.
+
+    Args:
+        scene: what is poured.
+        prior_toml: what is drawn.
+        folder: of the batch; made where it is absent.
+        rows: rows in all.
+        seed: of the batch.
+        resume: keep what is in the folder; else a folder with rows is refused.
+        cluster: where the pours are made.
+        report: called with (total, resumed, made, unhealthy, jammed, out of view).
+
+    Raises:
+        ModuleNotFoundError: ray is not installed.
+        ConnectionError: there is no cluster at the address.
+        ValueError: a folder made from something else, or a worker with another granulcal.
+    """
+    import ray
+
+    batch = _native.GatheredBatch(scene, prior_toml, folder, rows=rows, seed=seed, resume=resume)
+    try:
+        store = None if cluster.store is None else PartStore(cluster.store)
+        if store is not None:
+            for chunk in sorted(store.chunks() & set(batch.missing())):
+                batch.put(chunk, store.read(chunk))
+        if batch.missing():
+            with _connected(ray, cluster.address):
+                order = (scene.to_toml(), prior_toml, rows, seed, batch.chunk_size, batch.chunks)
+                _Gathering(ray, batch, order, store, report).run()
+        return batch.counts()
+    finally:
+        batch.close()
+
+
+@contextlib.contextmanager
+def _connected(ray: Any, address: str) -> Iterator[None]:
+    """Connects to a cluster unless the process is connected already."""
+    if ray.is_initialized():
+        yield
+        return
+    quiet = {"log_to_driver": False, "logging_level": "ERROR", "include_dashboard": False}
+    if address != "local":
+        del quiet["include_dashboard"]
+    ray.init(address=address, **quiet)
+    try:
+        yield
+    finally:
+        ray.shutdown()
+
+
+def _make_part(
+    scene_toml: str,
+    prior_toml: str,
+    rows: int,
+    seed: int,
+    chunk_size: int,
+    chunks: int,
+    chunk: int,
+    store: str | None,
+) -> bytes | None:
+    """Makes one part on a worker; returns its bytes, or None once they are in the store."""
+    scene = _native.Scene.from_toml(scene_toml)
+    with tempfile.TemporaryDirectory(prefix="granulcal-") as place:
+        _native.generate(
+            scene,
+            prior_toml,
+            place,
+            rows=rows,
+            seed=seed,
+            threads=1,
+            resume=True,
+            progress=None,
+            shard=(chunk, chunks),
+            chunk=chunk_size,
+        )
+        part = (Path(place) / f"part-{chunk:06}.parquet").read_bytes()
+    if store is None:
+        return part
+    PartStore(store).write(chunk, part)
+    return None
+
+
+@dataclass
+class _Task:
+    chunk: int
+    since: float
+    is_second: bool
+
+
+class _Gathering:
+    """The driver's loop."""
+
+    def __init__(
+        self,
+        ray: Any,
+        batch: _native.GatheredBatch,
+        order: tuple[str, str, int, int, int, int],
+        store: PartStore | None,
+        report: Callable[..., object] | None,
+    ) -> None:
+        self.ray, self.batch, self.order, self.store, self.report = ray, batch, order, store, report
+        self.remote = ray.remote(num_cpus=1, max_retries=_RETRIES)(_make_part)
+        self.waiting = deque(batch.missing())
+        self.tasks: dict[Any, _Task] = {}
+        self.took: list[float] = []
+
+    def run(self) -> None:
+        """Submits, waits and gathers until no chunk is missing."""
+        try:
+            while self.batch.missing():
+                self._submit()
+                done, _ = self.ray.wait(list(self.tasks), timeout=_PATIENCE_S)
+                for reference in done:
+                    self._take(reference)
+                if self.report is not None:
+                    self.report(*self.batch.counts())
+        finally:
+            for reference in self.tasks:
+                self.ray.cancel(reference, force=True)
+
+    def _submit(self) -> None:
+        cores = max(1, int(self.ray.cluster_resources().get("CPU", 1)))
+        while self.waiting and len(self.tasks) < _AHEAD * cores:
+            self._start(self.waiting.popleft(), is_second=False)
+        if self.waiting or not self.took or len(self.tasks) >= cores:
+            return
+        late = max(_LEAST_STRAGGLE_S, _STRAGGLES * statistics.median(self.took))
+        twice = {task.chunk for task in self.tasks.values() if task.is_second}
+        for task in list(self.tasks.values()):
+            is_late = time.monotonic() - task.since > late
+            if is_late and task.chunk not in twice and len(self.tasks) < cores:
+                self._start(task.chunk, is_second=True)
+                twice.add(task.chunk)
+
+    def _start(self, chunk: int, *, is_second: bool) -> None:
+        store = None if self.store is None else self.store.url
+        reference = self.remote.remote(*self.order, chunk, store)
+        self.tasks[reference] = _Task(chunk, time.monotonic(), is_second)
+
+    def _take(self, reference: Any) -> None:
+        task = self.tasks.pop(reference)
+        try:
+            part = self.ray.get(reference)
+        except self.ray.exceptions.RayTaskError as error:
+            # What granulcal said on the worker, not the worker's trace of it.
+            raise error.cause if isinstance(error.cause, Exception) else error from None
+        except (self.ray.exceptions.RayError, OSError):
+            # Killed more often than Ray starts it again, or its result went with its node.
+            if task.chunk in self.batch.missing():
+                self.waiting.append(task.chunk)
+            return
+        if self.store is not None:
+            part = self.store.read(task.chunk)
+        if self.batch.put(task.chunk, part):
+            self.took.append(time.monotonic() - task.since)
+        for other, same in list(self.tasks.items()):
+            if same.chunk == task.chunk:
+                del self.tasks[other]
+                self.ray.cancel(other, force=True)

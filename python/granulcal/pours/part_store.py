@@ -1,0 +1,51 @@
+"""A folder of parts at a URL: a shared path or an object store, by fsspec."""
+
+import uuid
+from typing import Any
+
+__all__ = ["PartStore"]
+
+_NAME = "part-{:06}.parquet"
+
+
+class PartStore:
+    """Parts that workers write and the driver reads, each whole or absent.
+
+    Args:
+        url: folder as fsspec takes it, for example s3://bucket/run or file:///shared/run.
+
+    Raises:
+        ModuleNotFoundError: fsspec, or what it needs for this kind of URL, is not installed.
+        ValueError: no such kind of URL.
+    """
+
+    def __init__(self, url: str) -> None:
+        import fsspec  # pyright: ignore[reportMissingImports]
+
+        self.url = url
+        found: tuple[Any, str] = fsspec.core.url_to_fs(url)
+        self._files, self._root = found[0], found[1].rstrip("/")
+
+    def chunks(self) -> set[int]:
+        """Returns the numbers of the parts that are there."""
+        if not self._files.exists(self._root):
+            return set()
+        names = [path.rpartition("/")[2] for path in self._files.ls(self._root, detail=False)]
+        begin, end = _NAME.split("{:06}")
+        named = [name for name in names if name.startswith(begin) and name.endswith(end)]
+        numbers = [name[len(begin) : -len(end)] for name in named]
+        return {int(number) for number in numbers if number.isdigit()}
+
+    def read(self, chunk: int) -> bytes:
+        """Returns the bytes of a part."""
+        return self._files.cat_file(self._path(chunk))
+
+    def write(self, chunk: int, part: bytes) -> None:
+        """Writes a part beside its place and moves it there; a second one is the same."""
+        self._files.makedirs(self._root, exist_ok=True)
+        beside = f"{self._path(chunk)}.{uuid.uuid4().hex}.tmp"
+        self._files.pipe_file(beside, part)
+        self._files.mv(beside, self._path(chunk))
+
+    def _path(self, chunk: int) -> str:
+        return f"{self._root}/{_NAME.format(chunk)}"
