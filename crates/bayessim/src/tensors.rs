@@ -47,13 +47,13 @@ impl<'a> Tensors<'a> {
     }
 
     /// The numbers of a tensor of this shape.
-    pub fn take(&self, name: &str, shape: &[usize]) -> Result<Vec<f64>, ModelError> {
+    pub(crate) fn take(&self, name: &str, shape: &[usize]) -> Result<Vec<f64>, ModelError> {
         let shape: Vec<_> = shape.iter().map(|&n| Some(n)).collect();
         Ok(self.any(name, &shape)?.0)
     }
 
     /// A matrix of this shape, or `None` where there is no such tensor.
-    pub fn matrix_if_there(
+    pub(crate) fn matrix_if_there(
         &self,
         name: &str,
         rows: usize,
@@ -70,12 +70,17 @@ impl<'a> Tensors<'a> {
     }
 
     /// A matrix of this shape.
-    pub fn matrix(&self, name: &str, rows: usize, columns: usize) -> Result<Matrix, ModelError> {
+    pub(crate) fn matrix(
+        &self,
+        name: &str,
+        rows: usize,
+        columns: usize,
+    ) -> Result<Matrix, ModelError> {
         Ok(Matrix { data: self.take(name, &[rows, columns])?, columns })
     }
 
     /// A matrix with so many columns (and rows, where given).
-    pub fn rows(
+    pub(crate) fn rows(
         &self,
         name: &str,
         rows: Option<usize>,
@@ -86,7 +91,7 @@ impl<'a> Tensors<'a> {
     }
 
     /// A tensor that is there and cannot be used.
-    pub fn unfit(&self, name: &str, allowed: &str, found: &str) -> ModelError {
+    pub(crate) fn unfit(&self, name: &str, allowed: &str, found: &str) -> ModelError {
         ModelError::Content {
             path: self.path.clone(),
             what: name.to_owned(),
