@@ -72,7 +72,9 @@ pub fn run_as(program: &Program, args: impl IntoIterator<Item = OsString>) -> u8
     let context = Context::new(&cli.global);
     let _armed = interrupt::arm();
     let checked = args::paths::check(&command, &matches).map_err(anyhow::Error::from);
-    let setting = Setting { context: &context, whole: &command, binary: program.binary() };
+    // Not the one that has parsed: its command `help` is closed.
+    let whole = program.command();
+    let setting = Setting { context: &context, whole: &whole, binary: program.binary() };
     match checked.and_then(|()| cli.command.run(&setting)) {
         Ok(outcome) => outcome.exit_code(),
         Err(error) => {
