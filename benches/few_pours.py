@@ -18,12 +18,12 @@ Reference:
 import argparse
 
 import numpy as np
+from scipy import stats
 
 from granulcal.bayessim.check.toys import PileStandIn
 from granulcal.bayessim.emulator.likelihood import Likelihood
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.network.standardise import Standardiser
-from granulcal.bayessim.posterior.joint import joint_density
 from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.bayessim.training.sequential import infer_within_budget
 from granulcal.one_thread import one_thread
@@ -39,7 +39,7 @@ def of_the_prior(toy: PileStandIn, count: int, x_obs: np.ndarray, theta: np.ndar
     fitted = Likelihood.fit(u, standardiser.apply(x), toy.prior, features=100, seed=0)[0]
     z = standardiser.apply(x_obs)
     return [
-        judged(toy, Posterior(toy.prior, joint_density(toy.prior, [(fitted, row[None])])), at)
+        judged(toy, Posterior.from_conditions(toy.prior, [(fitted, row[None])]), at)
         for row, at in zip(z, theta, strict=True)
     ]
 
@@ -57,13 +57,13 @@ def filtered(toy: PileStandIn, x_obs: np.ndarray, seed: int) -> Posterior:
     """Returns the posterior of the iterative filter."""
     generator = np.random.default_rng(seed)
     u = generator.random((SIZE, 3))
-    mixture, spread = None, np.ones(16)
+    normal, spread = None, np.ones(16)
     for number in range(ROUNDS):
         theta = toy.prior.from_unconstrained(u)
         x = toy.simulate_at(theta, seed=seed * 100 + number)
-        spread = x.std(axis=0) if mixture is None else spread
+        spread = x.std(axis=0) if normal is None else spread
         squares = np.sum(((x - x_obs) / spread) ** 2, axis=1)
-        log_proposal = 0.0 if mixture is None else mixture.log_prob(u)
+        log_proposal = 0.0 if normal is None else normal.logpdf(u)
         for share in np.geomspace(1e-3, 1e4, 200):
             log_weights = -0.5 * squares / share - log_proposal
             weights = np.exp(log_weights - log_weights.max())
@@ -72,9 +72,9 @@ def filtered(toy: PileStandIn, x_obs: np.ndarray, seed: int) -> Posterior:
                 break
         mean = weights @ u
         covariance = (u - mean).T @ (weights[:, None] * (u - mean)) + 1e-6 * np.eye(3)
-        mixture = Mixture.from_covariances(np.ones(1), mean[None], covariance[None])
-        u = np.clip(mixture.sample(SIZE, generator), 0, 1)
-    assert mixture is not None
+        normal = stats.multivariate_normal(mean, covariance)
+        u = np.clip(normal.rvs(SIZE, random_state=generator), 0, 1)
+    mixture = Mixture.from_covariances(np.ones(1), mean[None], covariance[None])
     return Posterior.from_mixture(toy.prior, mixture)
 
 

@@ -10,7 +10,61 @@ from numpy.typing import NDArray
 from granulcal.measured.segmentation import SegmentationSettings
 
 LAW: int
+SIGNIFICANCE: float
 __version__: str
+
+def quasi_uniform(count: int, dimension: int) -> NDArray[np.float64]: ...
+def directions(
+    covariance: NDArray[np.float64],
+) -> tuple[float, list[float], float]: ...
+
+@final
+class Coordinates:
+    def __new__(cls, prior_toml: str) -> Coordinates: ...
+    def quasi_prior(self, count: int) -> NDArray[np.float64]: ...
+
+@final
+class Emulated:
+    def __new__(
+        cls,
+        coordinates: Coordinates,
+        arrays: dict[str, NDArray[np.float64]],
+        *,
+        statistics: int,
+        widening: float,
+        degrees: float,
+        leading_degrees: float,
+        axis_count: int,
+    ) -> Emulated: ...
+    def log_prob(self, z: NDArray[np.float64], u: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def at_pool(self, z: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def expected_at_pool(self) -> list[NDArray[np.float64]]: ...
+    def best_fits(
+        self, z: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def misfit(
+        self, reference: dict[str, NDArray[np.float64]], z: NDArray[np.float64], names: list[str]
+    ) -> tuple[float, float, list[tuple[str, float, float]], str]: ...
+
+@final
+class Posterior:
+    def __new__(
+        cls,
+        coordinates: Coordinates,
+        conditions: list[tuple[Emulated, NDArray[np.float64]]],
+        mixtures: list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]],
+        average: tuple[str, float, float],
+    ) -> Posterior: ...
+    def log_prob(self, u: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def sample(self, n: int, seed: int) -> NDArray[np.float64]: ...
+    def mode(self) -> NDArray[np.float64]: ...
+    def identifiability(
+        self,
+    ) -> tuple[list[float], list[list[float]], float, list[float], float]: ...
+    @property
+    def effective_sample_size(self) -> float | None: ...
+    @property
+    def warnings(self) -> list[tuple[str, list[float], str]]: ...
 
 @final
 class Scene:

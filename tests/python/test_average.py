@@ -1,7 +1,6 @@
 """Emulator and network as one: the geometric average, its weights, and what is saved of it."""
 
 import json
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,14 +12,15 @@ from signed import sign
 
 from granulcal.bayessim import BayesSim
 from granulcal.bayessim.check.toys import LinearGaussian
-from granulcal.bayessim.emulator.likelihood import Fold
+from granulcal.bayessim.emulator.basis import Basis
+from granulcal.bayessim.emulator.emulator import Emulator
+from granulcal.bayessim.emulator.likelihood import Fold, Likelihood
+from granulcal.bayessim.emulator.noise import Noise
+from granulcal.bayessim.emulator.signal import SignalAxes
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.posterior.average import EMULATOR_ALONE, NETWORK_ALONE, Average, HeldOut
-from granulcal.bayessim.posterior.density import TruncatedMixture, quasi_prior
-from granulcal.bayessim.posterior.geometric import geometric_density
 from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.errors import ModelFormatError
-from granulcal.prior import Prior
 
 SMALL: dict[str, Any] = {
     "features": 20,
@@ -32,22 +32,25 @@ SMALL: dict[str, Any] = {
 TOY = LinearGaussian.random(seed=1, noise=2.0)
 
 
-@dataclass(frozen=True)
-class _NormalLikelihood:
-    """A likelihood that is a normal of the coordinates."""
-
-    prior: Prior
-    normal: Mixture
-
-    @property
-    def pool(self):
-        return quasi_prior(self.prior, 16_384)
-
-    def start(self, z):
-        return self.normal.log_prob(self.pool)
-
-    def log_prob(self, z, u, *, quick=False):
-        return self.normal.log_prob(u)
+def _normal_likelihood(prior, mean, covariance):
+    """An emulator whose statistics are the coordinates, and the pour at which they are `mean`."""
+    count, spreads = len(mean), np.sqrt(np.diag(covariance))
+    origin, ones, still = np.zeros(count), np.ones(count), np.zeros((1, count))
+    basis, scale_basis = (Basis(origin, ones, still, degree) for degree in (1, 2))
+    polynomial = 3.0  # `_POLYNOMIAL` of `basis.py`: the size of constant and slopes.
+    coefficients = np.zeros((count, 1 + count + 2))
+    coefficients[:, 1 : 1 + count] = np.eye(count) / polynomial
+    scales = np.zeros((count, scale_basis(still).shape[1]))
+    scales[:, 0] = np.log(spreads) / polynomial
+    unknown = np.zeros_like(scales)
+    unknown[:, 0] = -20.0 / polynomial
+    root = np.linalg.cholesky(covariance / np.outer(spreads, spreads))
+    # Of so many degrees of freedom it is a normal.
+    emulator = Emulator(
+        basis, coefficients, scale_basis, scales, unknown, Noise(root, 1e6), origin, ones
+    )
+    likelihood = Likelihood(prior, SignalAxes.identity(count), emulator, emulator, 1.0)
+    return likelihood, np.asarray(mean)[None]
 
 
 def _normal(mean, covariance):
@@ -61,17 +64,16 @@ def test_normals_pool_to_the_normal_of_weighted_precisions(average, width):
     first = np.array([[0.3, 0.1, 0.0], [0.1, 0.4, -0.1], [0.0, -0.1, 0.2]]) * width
     second = np.array([[0.2, -0.1, 0.1], [-0.1, 0.5, 0.0], [0.1, 0.0, 0.3]]) * width
     means = np.array([0.2, -0.4, 0.1]), np.array([0.1, -0.2, 0.3])
-    likelihood: Any = _NormalLikelihood(prior, _normal(means[0], first))
-    pooled = geometric_density(
-        prior, (likelihood, np.zeros((1, 1))), [_normal(means[1], second)], average
-    )
+    condition = _normal_likelihood(prior, means[0], first)
+    networks = [_normal(means[1], second)]
+    pooled = Posterior.from_average(prior, condition, networks, average).density
     precisions = [average.emulator * np.linalg.inv(first), average.network * np.linalg.inv(second)]
     covariance = np.linalg.inv(sum(precisions) + (1 - average.network) * np.eye(3))
     mean = covariance @ (precisions[0] @ means[0] + precisions[1] @ means[1])
-    exact = _normal(mean, covariance)
-    points = exact.sample(50, np.random.default_rng(0))
+    exact = Posterior.from_mixture(prior, _normal(mean, covariance)).density
+    points = exact.sample(50, 0)
     np.testing.assert_allclose(pooled.log_prob(points), exact.log_prob(points), atol=0.05)
-    draws = pooled.sample(4000, np.random.default_rng(1))
+    draws = pooled.sample(4000, 1)
     spreads = np.sqrt(np.diag(covariance))
     assert np.all(np.abs(draws.mean(axis=0) - mean) < 0.1 * spreads)
     np.testing.assert_allclose(draws.std(axis=0), spreads, rtol=0.1)
@@ -138,11 +140,7 @@ def averaged():
 
 def _density(model, mixture, row, average):
     condition = (model.likelihood, row[None])
-    if average == EMULATOR_ALONE:
-        return Posterior.from_conditions(TOY.prior, [condition]).density
-    if average == NETWORK_ALONE:
-        return TruncatedMixture.cut(TOY.prior, mixture)
-    return geometric_density(TOY.prior, condition, [mixture], average)
+    return Posterior.from_average(TOY.prior, condition, [mixture], average).density
 
 
 def test_held_out_scores_are_those_of_the_posteriors(averaged):
@@ -167,8 +165,10 @@ def test_networks_of_several_pours_pool_like_one_of_their_mean_precision():
         _normal(np.array(m), np.linalg.inv(p)) for m, p in zip(means, precisions, strict=True)
     ]
     centre = np.array([0.1, 0.1, 0.0])
-    likelihood: Any = _NormalLikelihood(prior, _normal(centre, 0.16 * np.eye(3)))
-    pooled = geometric_density(prior, (likelihood, np.zeros((3, 1))), networks, average)
+    likelihood, pour = _normal_likelihood(prior, centre, 0.16 * np.eye(3))
+    # Pours that do not differ have no noise of their own that would average away.
+    condition = (likelihood, np.repeat(pour, 3, axis=0))
+    pooled = Posterior.from_average(prior, condition, networks, average).density
     shared = sum(precisions) / 3
     pull = sum(p @ np.array(m) for p, m in zip(precisions, means, strict=True)) / 3
     covariance = np.linalg.inv(
@@ -177,8 +177,8 @@ def test_networks_of_several_pours_pool_like_one_of_their_mean_precision():
         + (1 - average.network) * np.eye(3)
     )
     mean = covariance @ (average.emulator * centre / 0.16 + average.network * pull)
-    exact = _normal(mean, covariance)
-    points = exact.sample(50, np.random.default_rng(0))
+    exact = Posterior.from_mixture(prior, _normal(mean, covariance)).density
+    points = exact.sample(50, 0)
     np.testing.assert_allclose(pooled.log_prob(points), exact.log_prob(points), atol=0.05)
 
 
@@ -187,8 +187,10 @@ def test_one_pour_shown_thrice_has_one_networks_posterior(averaged):
     z = averaged.standardiser.apply(x)
     mixtures = averaged.amortised.mixtures(z)
     condition = (averaged.likelihood, z)
-    one = geometric_density(TOY.prior, condition, mixtures, averaged.average)
-    thrice = geometric_density(TOY.prior, condition, 3 * mixtures, averaged.average)
+    one, thrice = (
+        Posterior.from_average(TOY.prior, condition, times * mixtures, averaged.average).density
+        for times in (1, 3)
+    )
     at = TOY.prior.to_unconstrained(theta)
     # The draws that the normalisers come from differ.
     np.testing.assert_allclose(thrice.log_prob(at), one.log_prob(at), atol=0.01)
@@ -202,6 +204,17 @@ def test_several_pours_of_an_arithmetic_average_are_the_emulators_alone(averaged
     several = Posterior.from_average(TOY.prior, condition, mixtures, average)
     alone = Posterior.from_conditions(TOY.prior, [condition])
     np.testing.assert_array_equal(several.log_prob(theta), alone.log_prob(theta))
+
+
+def test_an_arithmetic_average_is_sampled_by_its_weights():
+    """Two normals apart: the share of draws near each is its weight, in any part of the draws."""
+    prior = TOY.prior
+    condition = _normal_likelihood(prior, np.full(3, -1.0), 0.05 * np.eye(3))
+    network = _normal(np.full(3, 1.5), 0.05 * np.eye(3))
+    average = Average(0.3, 0.7, "arithmetic")
+    draws = Posterior.from_average(prior, condition, [network], average).density.sample(4000, 0)
+    assert np.mean(draws[:, 0] < 0.25) == pytest.approx(0.3, abs=0.03)
+    assert np.mean(draws[:2000, 0] < 0.25) == pytest.approx(0.3, abs=0.05)
 
 
 def test_an_average_comes_back_from_its_file(averaged, tmp_path):

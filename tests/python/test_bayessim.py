@@ -20,6 +20,7 @@ from granulcal.bayessim.network.standardise import Standardiser  # noqa: E402
 from granulcal.bayessim.network.trainer import Progress  # noqa: E402
 from granulcal.bayessim.posterior.posterior import OutOfRange, Posterior  # noqa: E402
 from granulcal.errors import ModelFormatError, ObservationError, TrainingDataError  # noqa: E402
+from granulcal.parameter import Parameter  # noqa: E402
 from granulcal.prior import Prior  # noqa: E402
 
 QUICK = {"quiet": True, "method": "mdrff", "max_epochs": 3, "ensemble": 2, "features": 20}
@@ -74,7 +75,13 @@ def test_training_density_is_the_mixture_density():
     outputs = torch.randn(5, layout.size, generator=torch.Generator().manual_seed(0)).double()
     u = torch.randn(5, 3, generator=torch.Generator().manual_seed(1)).double()
     mixtures = layout.mixtures(outputs)
-    expected = [m.log_prob(row[None].numpy())[0] for m, row in zip(mixtures, u, strict=True)]
+    prior = Prior(
+        Parameter(path=f"n.{i}", distribution="normal", mean=0.0, sd=1.0) for i in range(3)
+    )
+    expected = [
+        Posterior.from_mixture(prior, m).density.log_prob(row[None].numpy())[0]
+        for m, row in zip(mixtures, u, strict=True)
+    ]
     np.testing.assert_allclose(layout.log_density(outputs, u).numpy(), expected, rtol=1e-10)
 
 

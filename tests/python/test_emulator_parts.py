@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from granulcal.bayessim.emulator.basis import Basis, _Evidence, _frequencies, polynomial
+from granulcal.bayessim.emulator.basis import _Evidence, _frequencies, polynomial
 from granulcal.bayessim.emulator.noise import Noise
 from granulcal.bayessim.network.adam import Adam
 
@@ -51,14 +51,6 @@ def test_slopes_of_the_evidence_are_those_of_differences() -> None:
             low = [a - step * (n == which) for n, a in enumerate(at)]
             difference = (evidence(*high) - evidence(*low)) / 2e-5
             assert slopes[which][i] == pytest.approx(difference, rel=1e-4, abs=1e-4)
-
-
-def test_quick_features_are_the_features_in_single_precision() -> None:
-    u = np.random.default_rng(0).random((500, 3))
-    basis = Basis.draw(u, np.array([0.1, 1.0, 10.0]), features=40, seed=0)
-    exact = basis(u)
-    error = np.abs(basis(u, quick=True) - exact)
-    assert np.all(error < 2e-7 * np.maximum(1, np.abs(exact)))
 
 
 def test_noise_of_two_sizes_gets_heavy_tails() -> None:

@@ -10,9 +10,8 @@ from granulcal.bayessim.check.diagnostics import binomial_band, tarp
 from granulcal.bayessim.check.identifiability import Identifiability
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.bayessim.emulator.noise import Noise
-from granulcal.bayessim.emulator.pooling import pooled_scales
 from granulcal.bayessim.emulator.ridge import Ridge
-from granulcal.bayessim.posterior.joint import joint_density
+from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.errors import TrainingDataError
 from granulcal.parameter import Parameter
 from granulcal.prior import Prior
@@ -56,12 +55,32 @@ def test_noise_density_integrates_to_one():
         assert np.exp(density).sum() * 0.1**2 == pytest.approx(1, abs=5e-3)
 
 
-def test_noise_averages_away_and_errors_of_the_emulator_do_not(model):
-    prediction = model.likelihood.leading.predict(np.zeros((1, 3)))
-    single, many = (pooled_scales(prediction, k, 1.5)[0] ** 2 for k in (1, 10**9))
-    noise, unknown = prediction.scales[0] ** 2, prediction.unknown[0] ** 2
-    np.testing.assert_allclose(single, 1.5**2 * (noise + unknown))
-    np.testing.assert_allclose(many, single - noise, rtol=1e-6)
+def expected_likelihood(likelihood, z, u):
+    """The equations of `likelihood.py`, with the emulator and the noise that training fits."""
+    prediction, pours = likelihood.leading.predict(u), len(z)
+    y = likelihood.axes.apply(z)[:, : likelihood.axis_count]
+    noise, unknown = prediction.scales**2, prediction.unknown**2
+    share = np.ones((len(u), 1))
+    if pours > 1:
+        ratios = np.minimum(y.var(axis=0, ddof=1) / noise, 2.0)
+        doubt = 1 + 2 * np.sqrt(2 / (y.shape[1] * (pours - 1)))
+        share = np.minimum(1.0, doubt * ratios.mean(axis=1, keepdims=True))
+    variance = likelihood.widening**2 * (noise + unknown) - (1 - 1 / pours) * share * noise
+    deviations = y.mean(axis=0) - prediction.means
+    return likelihood.leading.noise.log_density(deviations, np.sqrt(variance))
+
+
+@pytest.mark.parametrize("pours", [1, 5])
+def test_the_extension_evaluates_what_training_has_fitted(toy, model, pours):
+    theta = np.repeat(toy.prior.sample(1, seed=3), pours, axis=0)
+    z = model.standardiser.apply(toy.simulate_at(theta, seed=4))
+    u = toy.prior.to_unconstrained(toy.prior.sample(200, seed=5))
+    expected = expected_likelihood(model.likelihood, z, u)
+    np.testing.assert_allclose(model.likelihood.log_prob(z, u), expected, atol=1e-8)
+    at_pool = expected_likelihood(model.likelihood, z, model.likelihood.pool[:500])
+    np.testing.assert_allclose(model.likelihood.at_pool(z)[:500], at_pool, atol=1e-8)
+    # The cells of training are the first points of the pool.
+    np.testing.assert_array_equal(model.likelihood.cells[:500], model.likelihood.pool[:500])
 
 
 @pytest.mark.parametrize("pours", [1, 5])
@@ -84,10 +103,10 @@ def test_conditions_are_joined_like_pours(toy, model):
     """The same condition twice, one pour each, has no less information than one pour."""
     theta = np.repeat(toy.prior.sample(1, seed=5), 2, axis=0)
     z = model.standardiser.apply(toy.simulate_at(theta, seed=2))
-    both = joint_density(toy.prior, [(model.likelihood, z[:1]), (model.likelihood, z[1:])])
-    one = joint_density(toy.prior, [(model.likelihood, z[:1])])
-    generator = np.random.default_rng(0)
-    narrow, wide = (d.sample(2000, generator).std(axis=0) for d in (both, one))
+    conditions = [(model.likelihood, z[:1]), (model.likelihood, z[1:])]
+    both = Posterior.from_conditions(toy.prior, conditions)
+    one = Posterior.from_conditions(toy.prior, conditions[:1])
+    narrow, wide = (each.density.sample(2000, 0).std(axis=0) for each in (both, one))
     assert np.all(narrow < 0.95 * wide)
 
 

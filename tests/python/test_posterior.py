@@ -30,31 +30,26 @@ def random_mixture(seed: int, *, components: int = 3, dimension: int = 2) -> Mix
     return Mixture.from_covariances(weights, means, covariances)
 
 
+def unbounded(dimension: int) -> Prior:
+    return Prior(
+        Parameter(path=f"n.{i}", distribution="normal", mean=0.0, sd=1.0) for i in range(dimension)
+    )
+
+
 def test_mixture_matches_scipy():
     mixture = random_mixture(1, dimension=3)
+    density = Posterior.from_mixture(unbounded(3), mixture).density
     u = np.random.default_rng(0).standard_normal((40, 3))
     expected = sum(
         w * stats.multivariate_normal(m, c).pdf(u)
         for w, m, c in zip(mixture.weights, mixture.means, mixture.covariances, strict=True)
     )
-    np.testing.assert_allclose(mixture.log_prob(u), np.log(expected), rtol=1e-9)
-    np.testing.assert_allclose(mixture.log_prob(u, quick=True), np.log(expected), atol=1e-5)
-
-
-def test_mixture_conditional_is_joint_over_marginal():
-    mixture = random_mixture(2, dimension=3)
-    conditional = mixture.conditional({1: 0.4})
-    u = np.random.default_rng(0).random((10, 3))
-    u[:, 1] = 0.4
-    ratio = mixture.log_prob(u) - conditional.log_prob(u[:, [0, 2]])
-    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
-    with pytest.raises(ValueError, match="some but not all"):
-        mixture.conditional({0: 0.0, 1: 0.0, 2: 0.0})
+    np.testing.assert_allclose(density.log_prob(u), np.log(expected), rtol=1e-9)
 
 
 def test_mixture_draws_have_the_mixture_moments():
     mixture = random_mixture(3)
-    draws = mixture.sample(40_000, np.random.default_rng(0))
+    draws = Posterior.from_mixture(unbounded(2), mixture).density.sample(40_000, 0)
     np.testing.assert_allclose(draws.mean(axis=0), mixture.weights @ mixture.means, atol=0.01)
 
 
@@ -129,8 +124,9 @@ def test_mode_and_mean_of_one_normal():
     toy = LinearGaussian.random(seed=3)
     x = toy.simulate(1, seed=5)[1]
     posterior = toy.posterior(x[0])
-    exact = toy.prior.from_unconstrained(posterior.density.mixtures[0].means)[0]
-    spread = 2 * np.sqrt(np.diag(posterior.density.mixtures[0].covariances[0]))
+    normal = toy.normal(x[0])
+    exact = toy.prior.from_unconstrained(normal.means)[0]
+    spread = 2 * np.sqrt(np.diag(normal.covariances[0]))
     assert np.all(np.abs(posterior.mode() - exact) < 0.02 * spread)
     assert np.all(np.abs(posterior.mean() - exact) < 0.05 * spread)
 
@@ -150,9 +146,7 @@ def test_product_of_exact_posteriors_is_the_exact_posterior(bounded: bool, pours
     theta = toy.prior.sample(1, seed=4)
     x = toy.simulate_at(np.repeat(theta, pours, axis=0), seed=6)
     exact = toy.posterior(x)
-    product = Posterior.from_mixtures(
-        toy.prior, [toy.posterior(row).density.mixtures[0] for row in x]
-    )
+    product = Posterior.from_mixtures(toy.prior, [toy.normal(row) for row in x])
     assert product.warnings == ()
     draws = exact.sample(2000, seed=1)
     # Mean of the log ratio is the divergence of the product from the exact posterior [nat].

@@ -22,7 +22,7 @@ pytest.importorskip("jinja2")
 def posterior() -> gc.Posterior:
     """A posterior of the default prior's parameters, without training."""
     toy = LinearGaussian.random(bounded=True)
-    mixture = toy.posterior(toy.simulate(1)[1][0]).density.mixtures[0]
+    mixture = toy.normal(toy.simulate(1)[1][0])
     return gc.Posterior.from_mixture(gc.Prior.default(), mixture)
 
 

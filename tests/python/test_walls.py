@@ -95,6 +95,18 @@ def test_a_sound_house_passes_once_it_is_drawn(tmp_path: Path) -> None:
             "one = 1\ndef f():\n    from granulcal.b import two\n",
             "python/granulcal: a circle of 2 files, for example a.py -> b.py -> a.py",
         ),
+        # By a module's name, whole or put together.
+        (
+            "python/granulcal/a.py",
+            'import importlib\none = 1\nhome = "granulcal.b"\nimportlib.import_module(home)\n',
+            "python/granulcal: a circle of 2 files, for example a.py -> b.py -> a.py",
+        ),
+        (
+            "python/granulcal/a.py",
+            "from importlib import import_module\none = 1\n"
+            'def f(word):\n    import_module(f"granulcal.{word}")\n',
+            "python/granulcal: a circle of 2 files, for example a.py -> b.py -> a.py",
+        ),
         (
             "crates/dem/Cargo.toml",
             ROOM.format(name="granulcal-dem", uses="") + '[dev-dependencies]\ngranulcal = "1"\n',

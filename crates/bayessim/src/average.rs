@@ -18,6 +18,7 @@ pub enum Form {
 /// The weights of both.
 #[derive(Clone, Copy, Debug)]
 pub struct Average {
+    /// What is averaged.
     pub form: Form,
     /// a; 0: the network alone.
     pub emulator: f64,

@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct Component {
     /// Log weight.
     pub log_weight: f64,
+    /// Its centre.
     pub mean: DVector<f64>,
     /// F, lower triangular with a positive diagonal.
     pub factor: DMatrix<f64>,

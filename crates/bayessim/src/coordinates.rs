@@ -26,20 +26,29 @@ struct Coordinate {
     log_mass: f64,
 }
 
-/// The free parameters of a prior.
+/// The free parameters of a prior, mapped to where the inference lives.
 #[derive(Clone, Debug)]
 pub struct Coordinates {
+    names: Vec<String>,
     each: Vec<Coordinate>,
     normal: OnceLock<DMatrix<f64>>,
 }
 
 impl Coordinates {
+    /// Of a prior.
     pub fn of(prior: &Prior) -> Self {
         let free = prior.free();
+        let names = free.iter().map(|&i| prior.names()[i].to_owned()).collect();
         let each = free.iter().map(|&i| coordinate(prior.parameters()[i].distribution)).collect();
-        Self { each, normal: OnceLock::new() }
+        Self { names, each, normal: OnceLock::new() }
     }
 
+    /// Paths of the parameters.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// How many.
     pub fn dimension(&self) -> usize {
         self.each.len()
     }
@@ -49,6 +58,7 @@ impl Coordinates {
         self.each.iter().all(|c| c.low == f64::NEG_INFINITY && c.high == f64::INFINITY)
     }
 
+    /// Whether a point lies within the bounds.
     pub fn is_inside(&self, u: &[f64]) -> bool {
         self.each.iter().zip(u).all(|(c, &u)| c.low <= u && u <= c.high)
     }
@@ -158,7 +168,7 @@ fn coordinate(distribution: Distribution) -> Coordinate {
         Distribution::Normal { mean, sd, low, high } => {
             let low = low.map_or(f64::NEG_INFINITY, |low| (low - mean) / sd);
             let high = high.map_or(f64::INFINITY, |high| (high - mean) / sd);
-            let log_mass = (normal_cdf(high) - normal_cdf(low)).ln();
+            let log_mass = distribution.mass().ln();
             Coordinate { distribution, origin: mean, scale: sd, is_log: false, low, high, log_mass }
         }
     }

@@ -42,11 +42,16 @@ pub struct Config {
     pub emulator_features: usize,
 }
 
-#[derive(Debug, Deserialize)]
+/// Numbers of an emulator that are no arrays.
+#[derive(Clone, Copy, Debug, Deserialize)]
 pub struct EmulatorScalars {
+    /// Factor on the noise, chosen by held-out pairs.
     pub widening: f64,
+    /// Degrees of freedom of the noise of all signal axes.
     pub degrees: f64,
+    /// The same of the leading ones.
     pub leading_degrees: f64,
+    /// How many lead.
     pub axis_count: usize,
 }
 

@@ -91,15 +91,15 @@ pub struct Emulator {
 impl Emulator {
     /// The first `axes` of `s` axes over `p` coordinates.
     pub fn read(
-        tensors: &Tensors,
+        tensors: &Tensors<'_>,
         p: usize,
         s: usize,
-        features: usize,
+        features: Option<usize>,
         axes: usize,
     ) -> Result<Self, ModelError> {
         let centre = tensors.take("emulator_centre", &[p])?;
         let scale = tensors.take("emulator_scale", &[p])?;
-        let basis = Basis::of(&tensors.matrix("emulator_frequencies", features, p)?, false);
+        let basis = Basis::of(&tensors.rows("emulator_frequencies", features, Some(p))?, false);
         let frequencies = tensors.rows("emulator_scale_frequencies", None, Some(p))?;
         let scale_basis = Basis::of(&frequencies, true);
         let first = |name: &str, columns: usize| -> Result<Matrix, ModelError> {

@@ -1,5 +1,5 @@
-//! What a posterior knows: information over the prior, directions that are known, the one along which least is. The
-//! same as Python's `identifiability.py`, which has the references.
+//! What a posterior knows: information over the prior, directions that are known, the one along which least is.
+//! `python/granulcal/bayessim/check/identifiability.py` averages it over posteriors and has the references.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 use serde::Serialize;
@@ -29,7 +29,7 @@ pub struct Identifiability {
 
 impl Identifiability {
     /// Of draws of coordinates.
-    pub(crate) fn of(names: &[String], coordinates: &Coordinates, draws: &[Vec<f64>]) -> Self {
+    pub(crate) fn of(coordinates: &Coordinates, draws: &[Vec<f64>]) -> Self {
         let (p, count) = (coordinates.dimension(), draws.len() as f64);
         let gains = (0..p)
             .map(|i| {
@@ -45,14 +45,46 @@ impl Identifiability {
                 (gain - bias).max(0.0)
             })
             .collect();
-        let (_, variance) = coordinates.moments();
-        let mean: Vec<_> =
-            (0..p).map(|i| draws.iter().map(|u| u[i]).sum::<f64>() / count).collect();
-        let covariance = DMatrix::from_fn(p, p, |i, j| {
-            let product = |u: &Vec<f64>| (u[i] - mean[i]) * (u[j] - mean[j]);
-            let sum: f64 = draws.iter().map(product).sum();
-            sum / (count - 1.0) / (variance[i] * variance[j]).sqrt()
-        });
+        let covariance = covariance(coordinates, draws);
+        let found = Directions::of(covariance);
+        Self {
+            names: coordinates.names().to_vec(),
+            gains,
+            effective_dimension: found.effective_dimension,
+            ridge: found.ridge,
+            ridge_spread: found.ridge_spread,
+            blind: Vec::new(),
+        }
+    }
+}
+
+/// Covariance of draws of coordinates, in spreads of the prior.
+pub(crate) fn covariance(coordinates: &Coordinates, draws: &[Vec<f64>]) -> DMatrix<f64> {
+    let (p, count) = (coordinates.dimension(), draws.len() as f64);
+    let (_, variance) = coordinates.moments();
+    let mean: Vec<_> = (0..p).map(|i| draws.iter().map(|u| u[i]).sum::<f64>() / count).collect();
+    DMatrix::from_fn(p, p, |i, j| {
+        let product = |u: &Vec<f64>| (u[i] - mean[i]) * (u[j] - mean[j]);
+        let sum: f64 = draws.iter().map(product).sum();
+        sum / (count - 1.0) / (variance[i] * variance[j]).sqrt()
+    })
+}
+
+/// How many directions are known, and along which least is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Directions {
+    /// Directions that are known, 0 to the number of parameters.
+    pub effective_dimension: f64,
+    /// Unit vector along which least is known, in spreads of the prior.
+    pub ridge: Vec<f64>,
+    /// Posterior spread along it over the prior's.
+    pub ridge_spread: f64,
+}
+
+impl Directions {
+    /// Of a covariance in spreads of the prior.
+    pub fn of(covariance: DMatrix<f64>) -> Self {
+        let p = covariance.nrows();
         // A search for eigenvalues of what is not finite has no end.
         let is_finite = covariance.iter().all(|value| value.is_finite());
         let covariance = if is_finite { covariance } else { DMatrix::identity(p, p) };
@@ -62,12 +94,9 @@ impl Identifiability {
         let longest =
             ridge.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
         Self {
-            names: names.to_vec(),
-            gains,
             effective_dimension: eigen.eigenvalues.iter().map(|v| (1.0 - v).clamp(0.0, 1.0)).sum(),
             ridge: ridge.iter().map(|part| part * longest.signum()).collect(),
             ridge_spread: eigen.eigenvalues[widest].max(0.0).sqrt(),
-            blind: Vec::new(),
         }
     }
 }

@@ -17,18 +17,31 @@ use crate::random::{Random, cumulative};
 const CENTRES: usize = 60;
 /// Share of every proposal that stays as wide as the prior.
 const DEFENSIVE_SHARE: f64 = 0.1;
-const ADAPTING_DRAWS: usize = 1000;
-const FINAL_DRAWS: usize = 2000;
-const ROUNDS: usize = 6;
-/// The target is tempered until so many draws carry weight.
-const EFFECTIVE: f64 = 150.0;
-/// Adaptation ends when this share of an untempered round's draws carries weight.
-const GOOD_SHARE: f64 = 0.25;
 /// Steps of each draw: to part equal draws, and to mend a pool that is worth few draws.
 const STEPS: usize = 3;
 const MENDING_STEPS: usize = 20;
 /// Factors on the length of a step that is best for a normal.
 const STEP_FACTORS: [f64; 3] = [0.3, 0.7, 1.0];
+
+/// How much work a density is worth.
+pub struct Effort {
+    /// Draws of one round of adaptation.
+    draws: usize,
+    /// Weighted draws in the end.
+    pool: usize,
+    rounds: usize,
+    /// The target is tempered until so many draws carry weight.
+    effective: f64,
+    /// Adaptation ends when this share of an untempered round's draws carries weight.
+    good_share: f64,
+}
+
+impl Effort {
+    pub const OF_A_LIKELIHOOD: Self =
+        Self { draws: 1000, pool: 2000, rounds: 6, effective: 150.0, good_share: 0.25 };
+    pub const OF_A_PRODUCT: Self =
+        Self { draws: 4000, pool: 20_000, rounds: 8, effective: 300.0, good_share: 0.3 };
+}
 
 /// The log of a density up to a constant, of coordinates inside the bounds.
 pub type LogTarget<'a> = dyn Fn(&[f64], &mut Scratch) -> f64 + Sync + 'a;
@@ -84,7 +97,7 @@ impl Importance {
         let best = 2.38 / (2.0 * coordinates.dimension() as f64).sqrt();
         // All that is random is drawn first, so that threads may share the walks.
         let walks: Vec<_> = (0..n)
-            .map(|_| Walk {
+            .map(|_| MetropolisChain {
                 from: random.index(&sums),
                 steps: (0..if is_poor { MENDING_STEPS } else { STEPS })
                     .map(|_| Step {
@@ -95,7 +108,7 @@ impl Importance {
                     .collect(),
             })
             .collect();
-        let walk = |scratch: &mut Scratch, walk: &Walk| {
+        let walk = |scratch: &mut Scratch, walk: &MetropolisChain| {
             let mut draw = self.draws.row(walk.from).to_vec();
             let mut height = self.heights[walk.from];
             for step in &walk.steps {
@@ -122,6 +135,7 @@ impl Importance {
         coordinates: &Coordinates,
         log_target: &LogTarget<'_>,
         known: Option<&Mixture>,
+        effort: &Effort,
     ) -> Self {
         let mut random = Random::new(0);
         let (mean, variance) = coordinates.moments();
@@ -139,26 +153,26 @@ impl Importance {
         if let Some(known) = known {
             proposal = Mixture::pooled(&[proposal, known.clone()]);
         }
-        let mut tried = Tried::none(coordinates.dimension());
-        for _ in 0..ROUNDS {
-            tried.add(ADAPTING_DRAWS, &proposal, coordinates, log_target, &mut random);
+        let mut tried = ProposalDraws::none(coordinates.dimension());
+        for _ in 0..effort.rounds {
+            tried.add(effort.draws, &proposal, coordinates, log_target, &mut random);
             let (weights, _) = normalised(&tried.log_ratios, 1.0);
-            if effective(&weights) > GOOD_SHARE * ADAPTING_DRAWS as f64 {
+            if effective(&weights) > effort.good_share * effort.draws as f64 {
                 // A round whose proposal is kept is the beginning of the draws.
                 break;
             }
-            let weights = tempered(&tried.log_ratios);
+            let weights = tempered(&tried.log_ratios, effort.effective);
             proposal = kernel_estimate(&tried.draws, &weights, &wide, &mut random);
-            tried = Tried::none(coordinates.dimension());
+            tried = ProposalDraws::none(coordinates.dimension());
         }
-        let missing = FINAL_DRAWS - tried.draws.rows();
+        let missing = effort.pool - tried.draws.rows();
         tried.add(missing, &proposal, coordinates, log_target, &mut random);
         Self::of(Arc::new(tried.draws), tried.heights, &tried.log_ratios)
     }
 }
 
 /// A draw and the steps that it tries.
-struct Walk {
+struct MetropolisChain {
     from: usize,
     steps: Vec<Step>,
 }
@@ -172,13 +186,13 @@ struct Step {
 }
 
 /// Draws of a proposal, log target and log of target over proposal at them.
-struct Tried {
+struct ProposalDraws {
     draws: Matrix,
     heights: Vec<f64>,
     log_ratios: Vec<f64>,
 }
 
-impl Tried {
+impl ProposalDraws {
     fn none(dimension: usize) -> Self {
         let draws = Matrix { data: Vec::new(), columns: dimension };
         Self { draws, heights: Vec::new(), log_ratios: Vec::new() }
@@ -252,11 +266,11 @@ fn kernel_estimate(
     Mixture::of(components)
 }
 
-fn tempered(log_ratios: &[f64]) -> Vec<f64> {
+fn tempered(log_ratios: &[f64], least: f64) -> Vec<f64> {
     let mut power = 1.0;
     loop {
         let (weights, _) = normalised(log_ratios, power);
-        if effective(&weights) >= EFFECTIVE || power < 1e-3 {
+        if effective(&weights) >= least || power < 1e-3 {
             return weights;
         }
         power *= 0.7;
@@ -300,7 +314,7 @@ mod tests {
         let draws = Matrix { data: draws.concat(), columns: 3 };
         let start = Importance::of_prior_draws(Arc::new(draws), &likelihood, &coordinates);
         assert!(start.effective_sample_size() < 100.0);
-        let found = start.adapted(&coordinates, &log_target, None);
+        let found = start.adapted(&coordinates, &log_target, None, &Effort::OF_A_LIKELIHOOD);
         assert!(found.effective_sample_size() > 500.0, "{}", found.effective_sample_size());
         // Half of the mass is cut off.
         let exact = 1.5 * (std::f64::consts::TAU * sd * sd).ln() - 2f64.ln();
@@ -319,5 +333,44 @@ mod tests {
         };
         assert!(different(&sample) > 3700, "{} of 4000", different(&sample));
         assert!(different(&found.resample(4000, &mut Random::new(1))) < 2000);
+    }
+
+    /// Six normals that hang together, from a proposal as wide as the prior and too few rounds.
+    #[test]
+    fn draws_worth_little_are_mended_by_the_steps() {
+        let parameter = |i: usize| {
+            format!(
+                "[[parameter]]\npath = \"p{i}\"\ndistribution = \"normal\"\nmean = 0.0\nsd = 1.0\n"
+            )
+        };
+        let text: String = (0..6).map(parameter).collect();
+        let coordinates = Coordinates::of(&Prior::from_toml(&text).unwrap());
+        // An autoregression: the first has spread 0.3, each other hangs on the one before.
+        let (mean, sd) = ([0.8, -0.5, 0.3, 0.6, -0.9, 0.1], 0.3);
+        let log_target = |u: &[f64], _: &mut Scratch| {
+            let off = |i: usize| u[i] - mean[i];
+            let step = |i: usize| off(i) - if i > 0 { 0.5 * off(i - 1) } else { 0.0 };
+            -0.5 * (0..6).map(|i| (step(i) / sd).powi(2)).sum::<f64>()
+        };
+        let points = coordinates.quasi_prior(4096);
+        let over_prior =
+            |u: &Vec<f64>| log_target(u, &mut Scratch::default()) - coordinates.log_density(u);
+        let log_ratios: Vec<_> = points.iter().map(over_prior).collect();
+        let draws = Arc::new(Matrix { data: points.concat(), columns: 6 });
+        let start = Importance::of_prior_draws(draws, &log_ratios, &coordinates);
+        let effort = Effort { draws: 300, pool: 300, rounds: 2, effective: 60.0, good_share: 0.9 };
+        let found = start.adapted(&coordinates, &log_target, None, &effort);
+        let effective = found.effective_sample_size();
+        assert!(effective < 200.0, "{effective}");
+        let sample = found.sample(4000, &mut Random::new(1), &coordinates, &log_target);
+        let mut variance = 0.0;
+        for i in 0..6 {
+            variance = 0.25 * variance + sd * sd;
+            let spread = f64::sqrt(variance);
+            let found = sample.iter().map(|u| u[i]).sum::<f64>() / 4000.0;
+            assert!((found - mean[i]).abs() < 0.25 * spread, "{i}: {found}");
+            let square = sample.iter().map(|u| (u[i] - found).powi(2)).sum::<f64>() / 4000.0;
+            assert!((square.sqrt() / spread - 1.0).abs() < 0.2, "{i}: {square}");
+        }
     }
 }

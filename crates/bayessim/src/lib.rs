@@ -1,10 +1,10 @@
-//! Posteriors without Python: reads what `granulcal train` wrote and evaluates it.
+//! Posteriors: reads what `granulcal train` wrote and evaluates it, for the command line and for Python.
 //!
 //! A [`Model`] is a folder of `model.json` and `weights.safetensors`. [`Model::posterior`] gives the
 //! [`Posterior`] of one pour, or of several of one material, by the equations of
 //! `docs/theory/bayessim.md`: an emulated likelihood, a mixture density network, or the average of
-//! both. Where Python integrates over evenly spread points these are the same points, so that
-//! densities agree to rounding; draws have another generator and agree in distribution.
+//! both. Python trains and draws plots; what it evaluates on the way, of folds and of models that are not saved yet, is
+//! evaluated here, too.
 //!
 //! | module | what it is |
 //! |---|---|
@@ -12,25 +12,30 @@
 //! | `standardiser` | statistics to spread 1 |
 //! | `emulator`, `noise`, `likelihood` | density of statistics given coordinates |
 //! | `network`, `mixture` | density of coordinates given statistics |
-//! | `average`, `tilt` | how much each of both counts, and what the prior is multiplied by |
+//! | `average`, `log_ratio` | how much each of both counts, and what the prior is multiplied by |
 //! | `importance` | normaliser and draws of a density known up to a factor |
-//! | [`Misfit`], [`Identifiability`] | whether any parameters explain an observation, and what it tells |
+//! | `best_fit`, [`Misfit`] | whether any parameters explain an observation |
+//! | [`Identifiability`] | what an observation tells |
 //! | `waves`, `lanes` | random features and mixtures in wide registers |
 //! | [`Model`], [`Posterior`] | the file, and what it says |
+//! | [`Tensors`], [`Emulated`], [`Evidence`] | the same of parts that are in memory, which is how training asks |
 
 #![allow(clippy::inline_always)] // what is compiled for wider registers must be inlined to reach them
 
 mod average;
+mod best_fit;
 mod component;
 mod coordinates;
 mod damage;
 mod document;
+mod emulated;
 mod emulator;
 mod error;
 mod identifiability;
 mod importance;
 mod lanes;
 mod likelihood;
+mod log_ratio;
 mod matrix;
 mod misfit;
 mod mixture;
@@ -43,11 +48,18 @@ mod quasi;
 mod random;
 mod standardiser;
 mod tensors;
-mod tilt;
 mod waves;
 
+pub use average::{Average, Form};
+pub use component::Component;
+pub use coordinates::Coordinates;
+pub use document::EmulatorScalars;
+pub use emulated::Emulated;
 pub use error::ModelError;
-pub use identifiability::Identifiability;
-pub use misfit::{Misfit, StatisticMisfit};
+pub use identifiability::{Directions, Identifiability};
+pub use misfit::{Misfit, MisfitReference, SIGNIFICANCE, StatisticMisfit};
+pub use mixture::Mixture;
 pub use model::Model;
-pub use posterior::{Marginal, Posterior, Warning};
+pub use posterior::{Evidence, Marginal, Posterior, Warning};
+pub use quasi::QuasiUniform;
+pub use tensors::{Array, Tensors};

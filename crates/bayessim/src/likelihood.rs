@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::ModelError;
 use crate::coordinates::Coordinates;
-use crate::document::Document;
+use crate::document::EmulatorScalars;
 use crate::emulator::{Emulator, Prediction, Workings};
 use crate::matrix::Matrix;
 use crate::noise::Noise;
@@ -22,6 +22,7 @@ pub const FEWEST_EFFECTIVE: f64 = 500.0;
 /// Density of standardised statistics given coordinates.
 #[derive(Debug)]
 pub struct Likelihood {
+    coordinates: Arc<Coordinates>,
     axes: Matrix,
     emulator: Emulator,
     noise: Noise,
@@ -39,14 +40,19 @@ pub struct Pool {
 }
 
 impl Pool {
-    /// What is expected at each point.
+    /// What is expected at each point: means, variances of one pour, variances of the means.
+    pub fn rows(&self) -> &Matrix {
+        &self.rows
+    }
+
+    /// The same, one after the other.
     pub fn predictions(&self) -> impl IndexedParallelIterator<Item = Prediction<'_>> {
         self.rows.data.par_chunks_exact(self.rows.columns).map(Prediction::of)
     }
 }
 
 /// What a model's file says that its emulator of so many axes expects at the pool, if it does.
-fn expected_at_pool(tensors: &Tensors, axes: usize) -> Result<Option<Matrix>, ModelError> {
+fn expected_at_pool(tensors: &Tensors<'_>, axes: usize) -> Result<Option<Matrix>, ModelError> {
     let read = |name| tensors.matrix_if_there(name, POOL, axes);
     let (Some(means), Some(scales), Some(unknown)) =
         (read("pool_means")?, read("pool_scales")?, read("pool_unknown")?)
@@ -77,24 +83,25 @@ pub struct Observed {
 }
 
 impl Likelihood {
+    /// Of an emulator of `s` statistics.
     pub fn read(
-        tensors: &Tensors,
-        document: &Document,
-        coordinates: &Coordinates,
-        p: usize,
+        tensors: &Tensors<'_>,
+        coordinates: &Arc<Coordinates>,
+        s: usize,
+        scalars: &EmulatorScalars,
+        features: Option<usize>,
     ) -> Result<Self, ModelError> {
-        let (s, scalars) = (document.x_names.len(), &document.emulator);
         let count = scalars.axis_count;
         let root = tensors.matrix("emulator_leading_root", count, count)?;
-        let features = document.config.emulator_features;
         let pool = OnceLock::new();
         if let Some(rows) = expected_at_pool(tensors, count)? {
-            let points = points(coordinates);
+            let points = pool_points(coordinates);
             pool.set(Pool { points, rows }).expect("a lock that is still empty");
         }
         Ok(Self {
+            coordinates: Arc::clone(coordinates),
             axes: tensors.matrix("emulator_axes", s, s)?,
-            emulator: Emulator::read(tensors, p, s, features, count)?,
+            emulator: Emulator::read(tensors, coordinates.dimension(), s, features, count)?,
             noise: Noise::new(&root, scalars.leading_degrees),
             widening: scalars.widening,
             pool,
@@ -102,9 +109,9 @@ impl Likelihood {
     }
 
     /// The points of the prior, made at the first call unless the model's file had the table.
-    pub fn pool(&self, coordinates: &Coordinates) -> &Pool {
+    pub fn pool(&self) -> &Pool {
         self.pool.get_or_init(|| {
-            let points = points(coordinates);
+            let points = pool_points(&self.coordinates);
             let columns = 3 * self.emulator.axis_count();
             let mut data = vec![0.0; columns * points.rows()];
             let rows = data.par_chunks_exact_mut(columns).enumerate();
@@ -121,6 +128,12 @@ impl Likelihood {
         row.resize(3 * self.emulator.axis_count(), 0.0);
         self.emulator.predict(u, workings, row);
         self.at(observed, Prediction::of(row), scaled)
+    }
+
+    /// Log likelihood at each point of the pool.
+    pub fn at_pool(&self, observed: &Observed) -> Vec<f64> {
+        let at = |scaled: &mut Vec<f64>, at| self.at(observed, at, scaled);
+        self.pool().predictions().map_init(Vec::new, at).collect()
     }
 
     /// What the likelihood needs of k standardised pours.
@@ -174,7 +187,38 @@ pub fn averaging_share(pours: f64, variance: &[f64], noise: &[f64]) -> f64 {
     (doubt * ratios.sum::<f64>() / size).min(1.0)
 }
 
-fn points(coordinates: &Coordinates) -> Arc<Matrix> {
+/// The points of the prior, the same for all likelihoods over it.
+pub fn pool_points(coordinates: &Coordinates) -> Arc<Matrix> {
     let data = coordinates.quasi_prior(POOL).concat();
     Arc::new(Matrix { data, columns: coordinates.dimension() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    fn variance(rows: &[Vec<f64>]) -> Vec<f64> {
+        let count = rows.len() as f64;
+        let one = |j: usize| {
+            let mean = rows.iter().map(|row| row[j]).sum::<f64>() / count;
+            rows.iter().map(|row| (row[j] - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0)
+        };
+        (0..rows[0].len()).map(one).collect()
+    }
+
+    #[test]
+    fn pours_share_what_they_do_not_differ_by() {
+        let mut random = Random::new(1);
+        let mut share = |size: f64| {
+            let mut row = || (0..16).map(|_| size * random.normal()).collect();
+            let rows: Vec<Vec<f64>> = (0..5).map(|_| row()).collect();
+            averaging_share(5.0, &variance(&rows), &[1.0; 16])
+        };
+        let noisy = (0..200).map(|_| share(1.0)).sum::<f64>() / 200.0;
+        assert!(noisy > 0.98, "{noisy}");
+        let quiet = share(0.3);
+        assert!(0.05 < quiet && quiet < 0.2, "{quiet}");
+        assert_eq!(averaging_share(1.0, &[0.0; 16], &[1.0; 16]), 1.0);
+    }
 }

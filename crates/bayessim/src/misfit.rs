@@ -1,27 +1,23 @@
-//! Is an observation inside the model? Its residual at the best fit, against held-out simulations: the same as Python's
-//! `bayessim/check/misfit.py`, which has the derivation. For one pour the numbers are equal to rounding; for several
-//! the replicates are other random draws.
+//! Is an observation inside the model? Its residual at the best fit, against held-out simulations.
+//!
+//! With Q the squared length of the residual in units of the noise and r the residuals of the single statistics, the
+//! smaller p-value of Q and max |r|, ranked among those of held-out pairs, is itself ranked among theirs. For several
+//! pours of one material the held-out residuals are bootstrapped: the share that pours have each for themselves is
+//! averaged over as many of them, the share that they have in common is taken from one, and what the emulator does not
+//! know of its means is drawn. `python/granulcal/bayessim/check/misfit.py` has the derivation.
 
 use std::fmt;
-use std::sync::OnceLock;
 
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::ModelError;
-use crate::coordinates::Coordinates;
-use crate::document::Document;
-use crate::emulator::{Emulator, Prediction, Workings};
+use crate::best_fit::{BestFit, Fit, Pooled};
+use crate::emulator::Prediction;
 use crate::likelihood::averaging_share;
 use crate::matrix::{Matrix, dot};
-use crate::noise::Noise;
 use crate::random::Random;
 use crate::tensors::Tensors;
 
-/// Points of the prior among which the best fit begins.
-const CELLS: usize = 4096;
-const STEPS: usize = 3;
-const DIFFERENCE: f64 = 1e-3;
 const REPLICATES: usize = 199;
 /// Smallest spread of a residual.
 const LEAST_SPREAD: f64 = 1e-12;
@@ -87,155 +83,65 @@ impl fmt::Display for Misfit {
     }
 }
 
-/// What the test needs of a model.
-#[derive(Debug)]
-pub struct MisfitTest {
-    axes: Matrix,
-    /// From signal axes to statistics.
-    back: Matrix,
-    emulator: Emulator,
-    noise: Noise,
-    root: Matrix,
-    widening: f64,
+/// Residuals of held-out pairs: what an observation of a right model can leave.
+#[derive(Clone, Debug)]
+pub struct MisfitReference {
     /// Squared length, residual and noise of held-out pairs.
     squares: Vec<f64>,
     residuals: Matrix,
     own_noise: Matrix,
-    cells: OnceLock<Cells>,
 }
 
-/// Points of the prior, what is expected there, and the box that they fill.
-#[derive(Debug)]
-struct Cells {
-    points: Vec<Vec<f64>>,
-    rows: Matrix,
-    low: Vec<f64>,
-    high: Vec<f64>,
-}
-
-/// How the mean of some pours is compared: their number, and the share of the noise that is each pour's own.
-#[derive(Clone, Copy)]
-struct Pooled {
-    pours: f64,
-    share: f64,
-}
-
-/// The best fit.
-struct Fit {
-    u: Vec<f64>,
-    square: f64,
-    left: Vec<f64>,
-}
-
-impl MisfitTest {
-    pub fn read(tensors: &Tensors, document: &Document, p: usize) -> Result<Self, ModelError> {
-        let s = document.x_names.len();
-        let axes = tensors.matrix("emulator_axes", s, s)?;
-        let inverse = DMatrix::from_row_slice(s, s, &axes.data).try_inverse();
-        let back =
-            inverse.ok_or_else(|| tensors.unfit("emulator_axes", "invertible", "singular"))?;
-        let root = tensors.matrix("emulator_root", s, s)?;
+impl MisfitReference {
+    /// Those of a model of `s` statistics.
+    ///
+    /// # Errors
+    /// [`ModelError::Content`] for arrays that are missing, of another shape, not finite, or of no pair.
+    pub fn read(tensors: &Tensors<'_>, s: usize) -> Result<Self, ModelError> {
         let residuals = tensors.rows("misfit_residuals", None, Some(s))?;
         let own_noise = tensors.rows("misfit_noise", None, Some(s))?;
         let squares = tensors.take("misfit_squares", &[residuals.rows()])?;
         if squares.is_empty() || own_noise.rows() == 0 {
             return Err(tensors.unfit("misfit_squares", "of at least one pair", "none"));
         }
-        Ok(Self {
-            emulator: Emulator::read(tensors, p, s, document.config.emulator_features, s)?,
-            noise: Noise::new(&root, document.emulator.degrees),
-            root,
-            axes,
-            // Row-major is the transposed of what nalgebra holds.
-            back: Matrix { data: back.transpose().as_slice().to_vec(), columns: s },
-            widening: document.emulator.widening,
-            squares,
-            residuals,
-            own_noise,
-            cells: OnceLock::new(),
-        })
+        Ok(Self { squares, residuals, own_noise })
     }
 
     /// The test of pours that are standardised without being moved into the training range.
-    pub fn test(&self, coordinates: &Coordinates, z: &[Vec<f64>], names: &[String]) -> Misfit {
-        let cells = self.cells(coordinates);
-        let y: Vec<_> = z.iter().map(|row| self.axes.after(row)).collect();
+    pub(crate) fn test(&self, fit: &BestFit, z: &[Vec<f64>], names: &[String]) -> Misfit {
+        let y: Vec<_> = z.iter().map(|row| fit.axes.after(row)).collect();
         let pours = y.len() as f64;
-        let size = self.axes.columns;
+        let size = fit.axes.columns;
         let mean: Vec<_> =
             (0..size).map(|j| y.iter().map(|row| row[j]).sum::<f64>() / pours).collect();
         // Which share of the noise is the pours' own is asked once, at the best cell.
-        let all_own = Pooled { pours, share: 1.0 };
-        let nearest = Prediction::of(cells.rows.row(self.nearest(cells, &mean, all_own)));
+        let nearest = fit.predict(fit.nearest(&mean, Pooled { pours, share: 1.0 }));
         let spread = |j: usize| y.iter().map(|row| (row[j] - mean[j]).powi(2)).sum::<f64>();
         let variance: Vec<_> = (0..size).map(|j| spread(j) / (pours - 1.0).max(1.0)).collect();
-        let pooled = Pooled { pours, share: averaging_share(pours, &variance, nearest.noise) };
-        let start = self.nearest(cells, &mean, pooled);
-        let best = self.improved(cells, cells.points[start].clone(), &mean, pooled);
-        let replicates = (z.len() > 1).then(|| self.replicates(cells, &best.u, z.len(), pooled));
+        let noise = Prediction::of(&nearest).noise;
+        let pooled = Pooled { pours, share: averaging_share(pours, &variance, noise) };
+        let best = fit.of(&mean, pooled);
+        let replicates = (z.len() > 1).then(|| self.replicates(fit, &best.u, z.len(), pooled));
         let (null_squares, null_residuals) = match &replicates {
             Some((squares, residuals)) => (squares, residuals),
             None => (&self.squares, &self.residuals),
         };
-        self.compared(names, z.len(), &best, null_squares, null_residuals)
-    }
-
-    /// P-values of a fit among those of the model itself.
-    fn compared(
-        &self,
-        names: &[String],
-        pours: usize,
-        best: &Fit,
-        null_squares: &[f64],
-        null_residuals: &Matrix,
-    ) -> Misfit {
-        let (size, count) = (names.len(), null_squares.len());
-        let column = |j: usize| (0..count).map(move |i| null_residuals.row(i)[j]);
-        let spread: Vec<_> = (0..size)
-            .map(|j| {
-                let mean = column(j).sum::<f64>() / count as f64;
-                let variance = column(j).map(|r| (r - mean).powi(2)).sum::<f64>() / count as f64;
-                variance.sqrt().max(LEAST_SPREAD)
-            })
-            .collect();
-        let sizes: Vec<_> =
-            self.back.after(&best.left).iter().zip(&spread).map(|(left, sd)| left / sd).collect();
-        let largest =
-            |row: &[f64]| row.iter().zip(&spread).map(|(r, sd)| (r / sd).abs()).fold(0.0, f64::max);
-        let null_largest: Vec<_> = (0..count).map(|i| largest(null_residuals.row(i))).collect();
-        let joint_p_value = p_value(null_squares, best.square);
-        let mut statistics: Vec<_> = names
-            .iter()
-            .zip(&sizes)
-            .map(|(name, &residual)| StatisticMisfit {
-                name: name.clone(),
-                residual,
-                p_value: p_value(&null_largest, residual.abs()),
-            })
-            .collect();
-        statistics.sort_by(|a, b| b.residual.abs().total_cmp(&a.residual.abs()));
-        // The smaller of two p-values, itself ranked among held-out pairs.
-        let smallest = statistics.iter().map(|s| s.p_value).fold(joint_p_value, f64::min);
-        let null = |i: usize| {
-            p_value(null_squares, null_squares[i]).min(p_value(&null_largest, null_largest[i]))
-        };
-        let below = (0..count).filter(|&i| null(i) <= smallest).count();
-        let p_value = (1 + below) as f64 / (1 + count) as f64;
-        Misfit { pours, p_value, joint_p_value, statistics }
+        let left = fit.back.after(&best.left);
+        compared(names, z.len(), best.square, &left, null_squares, null_residuals)
     }
 
     /// Squared lengths and residuals of sets of pours at `u`.
     fn replicates(
         &self,
-        cells: &Cells,
+        fit: &BestFit,
         u: &[f64],
         pours: usize,
         pooled: Pooled,
     ) -> (Vec<f64>, Matrix) {
-        let (mut random, size) = (Random::new(0), self.axes.columns);
-        let here = self.predict(u);
+        let (mut random, size) = (Random::new(0), fit.axes.columns);
+        let here = fit.predict(u);
         let here = Prediction::of(&here);
-        let shared = 1.0 - pooled.share / (self.widening * self.widening);
+        let shared = 1.0 - pooled.share / (fit.widening * fit.widening);
         // All that is random is drawn first, so that threads may share the fits.
         let errors: Vec<Vec<f64>> = (0..REPLICATES)
             .map(|_| {
@@ -246,7 +152,7 @@ impl MisfitTest {
                 }
                 let common = self.own_noise.row(random.below(self.own_noise.rows()));
                 let normal: Vec<_> = (0..size).map(|_| random.normal()).collect();
-                let unknown = |j: usize| here.unknown[j].sqrt() * dot(self.root.row(j), &normal);
+                let unknown = |j: usize| here.unknown[j].sqrt() * dot(fit.root.row(j), &normal);
                 (0..size)
                     .map(|j| {
                         (1.0 - shared).sqrt() * own[j] + shared.sqrt() * common[j] + unknown(j)
@@ -259,113 +165,56 @@ impl MisfitTest {
             .par_iter()
             .map(|error| {
                 let mean: Vec<_> = here.means.iter().zip(error).map(|(m, e)| m + e).collect();
-                let fit = self.improved(cells, u.to_vec(), &mean, pooled);
-                (fit.square, self.back.after(&fit.left))
+                let Fit { square, left, .. } = fit.improved(u.to_vec(), &mean, pooled);
+                (square, fit.back.after(&left))
             })
             .collect();
         let (squares, residuals): (Vec<_>, Vec<_>) = fits.into_iter().unzip();
         (squares, Matrix { data: residuals.concat(), columns: size })
     }
-
-    /// The cell that fits best.
-    fn nearest(&self, cells: &Cells, mean: &[f64], pooled: Pooled) -> usize {
-        let rows = cells.rows.data.par_chunks_exact(cells.rows.columns);
-        let squares: Vec<_> =
-            rows.map(|row| self.square(Prediction::of(row), mean, pooled)).collect();
-        let smallest = squares.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
-        smallest.map_or(0, |(cell, _)| cell)
-    }
-
-    /// A better fit by Gauss and Newton, from `u`.
-    fn improved(&self, cells: &Cells, mut u: Vec<f64>, mean: &[f64], pooled: Pooled) -> Fit {
-        let mut row = self.predict(&u);
-        let mut square = self.square(Prediction::of(&row), mean, pooled);
-        for _ in 0..STEPS {
-            let here = Prediction::of(&row);
-            let scales = self.scales(here, pooled);
-            let white = |of: &dyn Fn(usize) -> f64| {
-                let scaled: Vec<_> = (0..scales.len()).map(|j| of(j) / scales[j]).collect();
-                self.noise.whitened(&scaled)
-            };
-            let slopes: Vec<_> = (0..u.len())
-                .map(|i| {
-                    let mut beside = u.clone();
-                    beside[i] += DIFFERENCE;
-                    let there = self.predict(&beside);
-                    white(&|j| (there[j] - here.means[j]) / DIFFERENCE)
-                })
-                .collect();
-            let left = white(&|j| mean[j] - here.means[j]);
-            let slopes = DMatrix::from_columns(
-                &slopes.into_iter().map(DVector::from_vec).collect::<Vec<_>>(),
-            );
-            let Some(step) = least_squares(slopes, &DVector::from_vec(left)) else { break };
-            // The emulator knows nothing beyond the prior.
-            let tried: Vec<_> = (0..u.len())
-                .map(|i| (u[i] + step[i]).max(cells.low[i]).min(cells.high[i]))
-                .collect();
-            let there = self.predict(&tried);
-            let reached = self.square(Prediction::of(&there), mean, pooled);
-            // Not a number is no better, either.
-            if reached.is_nan() || reached >= square {
-                break;
-            }
-            (u, row, square) = (tried, there, reached);
-        }
-        let left = mean.iter().zip(Prediction::of(&row).means).map(|(a, b)| a - b).collect();
-        Fit { u, square, left }
-    }
-
-    fn predict(&self, u: &[f64]) -> Vec<f64> {
-        let mut row = vec![0.0; 3 * self.emulator.axis_count()];
-        self.emulator.predict(u, &mut Workings::default(), &mut row);
-        row
-    }
-
-    /// Squared length of what is left, in units of the noise.
-    fn square(&self, at: Prediction<'_>, mean: &[f64], pooled: Pooled) -> f64 {
-        let scales = self.scales(at, pooled);
-        let scaled: Vec<_> =
-            (0..scales.len()).map(|j| (mean[j] - at.means[j]) / scales[j]).collect();
-        self.noise.whitened(&scaled).iter().map(|white| white * white).sum()
-    }
-
-    /// `sqrt(V_k)`, as in the likelihood.
-    fn scales(&self, at: Prediction<'_>, pooled: Pooled) -> Vec<f64> {
-        let widened = self.widening * self.widening;
-        let averaged = (1.0 - 1.0 / pooled.pours) * pooled.share;
-        let both = at.noise.iter().zip(at.unknown);
-        both.map(|(s, h)| (widened * (s + h) - averaged * s).sqrt()).collect()
-    }
-
-    fn cells(&self, coordinates: &Coordinates) -> &Cells {
-        self.cells.get_or_init(|| {
-            let points = coordinates.quasi_prior(CELLS);
-            let columns = 3 * self.emulator.axis_count();
-            let mut data = vec![0.0; columns * CELLS];
-            let rows = data.par_chunks_exact_mut(columns).zip(&points);
-            rows.for_each_init(Workings::default, |workings, (row, u)| {
-                self.emulator.predict(u, workings, row);
-            });
-            let edge = |i: usize, pick: fn(f64, f64) -> f64, start: f64| {
-                points.iter().map(|u| u[i]).fold(start, pick)
-            };
-            let dimensions = 0..coordinates.dimension();
-            let low = dimensions.clone().map(|i| edge(i, f64::min, f64::INFINITY)).collect();
-            let high = dimensions.map(|i| edge(i, f64::max, f64::NEG_INFINITY)).collect();
-            Cells { points, rows: Matrix { data, columns }, low, high }
-        })
-    }
 }
 
-fn least_squares(matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    if matrix.iter().chain(right.iter()).any(|value| !value.is_finite()) {
-        return None;
-    }
-    let larger = matrix.nrows().max(matrix.ncols()) as f64;
-    let svd = matrix.svd(true, true);
-    let cut = larger * f64::EPSILON * svd.singular_values.max();
-    svd.solve(right, cut).ok()
+/// P-values of a fit among those of the model itself.
+fn compared(
+    names: &[String],
+    pours: usize,
+    square: f64,
+    left: &[f64],
+    null_squares: &[f64],
+    null_residuals: &Matrix,
+) -> Misfit {
+    let (size, count) = (names.len(), null_squares.len());
+    let column = |j: usize| (0..count).map(move |i| null_residuals.row(i)[j]);
+    let spread: Vec<_> = (0..size)
+        .map(|j| {
+            let mean = column(j).sum::<f64>() / count as f64;
+            let variance = column(j).map(|r| (r - mean).powi(2)).sum::<f64>() / count as f64;
+            variance.sqrt().max(LEAST_SPREAD)
+        })
+        .collect();
+    let sizes: Vec<_> = left.iter().zip(&spread).map(|(left, sd)| left / sd).collect();
+    let largest =
+        |row: &[f64]| row.iter().zip(&spread).map(|(r, sd)| (r / sd).abs()).fold(0.0, f64::max);
+    let null_largest: Vec<_> = (0..count).map(|i| largest(null_residuals.row(i))).collect();
+    let joint_p_value = p_value(null_squares, square);
+    let mut statistics: Vec<_> = names
+        .iter()
+        .zip(&sizes)
+        .map(|(name, &residual)| StatisticMisfit {
+            name: name.clone(),
+            residual,
+            p_value: p_value(&null_largest, residual.abs()),
+        })
+        .collect();
+    statistics.sort_by(|a, b| b.residual.abs().total_cmp(&a.residual.abs()));
+    // The smaller of two p-values, itself ranked among held-out pairs.
+    let smallest = statistics.iter().map(|s| s.p_value).fold(joint_p_value, f64::min);
+    let null = |i: usize| {
+        p_value(null_squares, null_squares[i]).min(p_value(&null_largest, null_largest[i]))
+    };
+    let below = (0..count).filter(|&i| null(i) <= smallest).count();
+    let p_value = (1 + below) as f64 / (1 + count) as f64;
+    Misfit { pours, p_value, joint_p_value, statistics }
 }
 
 /// Rank among values of the model itself.

@@ -21,12 +21,14 @@ pub struct Mixture {
 }
 
 impl Mixture {
+    /// Of components whose weights sum to one.
     pub fn of(components: Vec<Component>) -> Self {
         let constants: Vec<_> = components.iter().map(Component::constant).collect();
         let lanes = Lanes::of(&components, &constants);
         Self { components, constants, lanes }
     }
 
+    /// Log density.
     pub fn log_prob(&self, u: &[f64]) -> f64 {
         self.lanes.log_sum(u)
     }
@@ -56,6 +58,7 @@ impl Mixture {
         self.components.iter().map(inverse).collect()
     }
 
+    /// What draws from it.
     pub fn sampler(&self) -> Sampler<'_> {
         let weights = self.components.iter().map(|c| c.log_weight.exp());
         Sampler { mixture: self, spreads: self.placer(), cumulative: cumulative(weights) }

@@ -1,28 +1,25 @@
 //! A trained model, as a folder.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use granulcal_dataset::read_file;
 use granulcal_scene::Prior;
 
 use crate::ModelError;
-use crate::average::{Average, Form};
+use crate::average::Average;
 use crate::coordinates::Coordinates;
 use crate::damage;
 use crate::document::Document;
-use crate::likelihood::{FEWEST_EFFECTIVE, Likelihood};
-use crate::misfit::{Misfit, MisfitTest};
-use crate::mixture::TruncatedMixture;
+use crate::emulated::Emulated;
+use crate::misfit::{Misfit, MisfitReference};
 use crate::network::Network;
-use crate::posterior::{Belief, Posterior, Tilted, Warning};
+use crate::posterior::{Evidence, Posterior, Warning};
 use crate::standardiser::Standardiser;
 use crate::tensors::Tensors;
-use crate::tilt::Tilt;
 
 const DOCUMENT: &str = "model.json";
 const TENSORS: &str = "weights.safetensors";
-/// Odds against one shared material from which pours are said to contradict each other.
-const LEAST_ODDS: f64 = 20.0;
 
 /// What `granulcal train` made.
 #[derive(Debug)]
@@ -40,11 +37,10 @@ pub struct Model {
     pub is_calibrated: Option<bool>,
     /// Whether its files say what they hash to, and do; those of before there were hashes do not.
     pub is_verified: bool,
-    names: Vec<String>,
-    coordinates: Coordinates,
+    coordinates: Arc<Coordinates>,
     standardiser: Standardiser,
-    likelihood: Likelihood,
-    misfit: MisfitTest,
+    emulated: Emulated,
+    misfit: MisfitReference,
     network: Option<Network>,
     average: Average,
 }
@@ -68,7 +64,7 @@ impl Model {
         let document = Document::parse(text, &path)?;
         let prior = Prior::from_toml(&document.prior_toml)
             .map_err(|e| ModelError::Prior { path, source: Box::new(e) })?;
-        let coordinates = Coordinates::of(&prior);
+        let coordinates = Arc::new(Coordinates::of(&prior));
         let (p, s) = (coordinates.dimension(), document.x_names.len());
         let path = folder.join(TENSORS);
         let is_verified = damage::verify(bytes, &path, &folder.join(DOCUMENT), text)?;
@@ -78,12 +74,11 @@ impl Model {
         } else {
             None
         };
-        let names = prior.free().iter().map(|&i| prior.names()[i].to_owned()).collect();
+        let features = Some(document.config.emulator_features);
         Ok(Self {
-            names,
             standardiser: Standardiser::read(&tensors, s)?,
-            likelihood: Likelihood::read(&tensors, &document, &coordinates, p)?,
-            misfit: MisfitTest::read(&tensors, &document, p)?,
+            emulated: Emulated::read(&tensors, &coordinates, s, &document.emulator, features)?,
+            misfit: MisfitReference::read(&tensors, s)?,
             coordinates,
             network,
             average: document.average(),
@@ -104,82 +99,27 @@ impl Model {
     pub fn misfit(&self, x: &[Vec<f64>]) -> Result<Misfit, ModelError> {
         self.check(x)?;
         let z: Vec<_> = x.iter().map(|row| self.standardiser.apply_unclipped(row)).collect();
-        Ok(self.misfit.test(&self.coordinates, &z, &self.x_names))
+        Ok(self.emulated.misfit(&self.misfit, &z, &self.x_names))
     }
 
     /// The posterior given one pour, or several of one material, as statistics in own units.
     ///
     /// # Errors
     /// [`ModelError::Observation`] for no pour, another number of statistics, or one that is not finite.
-    pub fn posterior(&self, x: &[Vec<f64>]) -> Result<Posterior<'_>, ModelError> {
+    pub fn posterior(&self, x: &[Vec<f64>]) -> Result<Posterior, ModelError> {
         self.check(x)?;
-        let mut warnings = self.out_of_range(x);
         let z: Vec<_> = x.iter().map(|row| self.standardiser.apply(row)).collect();
-        let learnt = self.learnt(&z);
-        let outside = learnt.iter().filter(|cut| cut.is_mostly_outside());
-        warnings
-            .extend(outside.map(|cut| Warning::MassOutsidePrior { inside: cut.log_mass.exp() }));
-        let log_masses: f64 = learnt.iter().map(|cut| cut.log_mass).sum();
-        let is_product = self.average.emulator == 0.0 && learnt.len() > 1;
-        let belief = self.belief(&z, learnt);
-        if let (true, Belief::Tilted(tilted)) = (is_product, &belief) {
-            let log_evidence_ratio = tilted.density.log_normaliser - log_masses;
-            if log_evidence_ratio < -LEAST_ODDS.ln() {
-                warnings.push(Warning::PoursDisagree { log_evidence_ratio });
-            }
-        }
-        if let Belief::Tilted(tilted) | Belief::Sum(tilted, ..) = &belief {
-            let effective = tilted.density.effective_sample_size();
-            if effective < FEWEST_EFFECTIVE {
-                warnings.push(Warning::FewEffectiveDraws { effective });
-            }
-        }
-        Ok(Posterior { coordinates: &self.coordinates, names: &self.names, belief, warnings })
-    }
-
-    /// The network's mixture of each pour, where it counts: an arithmetic average is of one pour.
-    fn learnt(&self, z: &[Vec<f64>]) -> Vec<TruncatedMixture> {
-        let average = self.average;
-        match &self.network {
-            Some(network)
-                if average.network > 0.0
-                    && (average.form == Form::Geometric
-                        || average.emulator == 0.0
-                        || z.len() == 1) =>
-            {
-                let cut = |z| TruncatedMixture::cut(&self.coordinates, network.mixture(z));
-                z.iter().map(|z| cut(z)).collect()
+        let mixtures = match &self.network {
+            Some(network) if self.average.network > 0.0 => {
+                z.iter().map(|z| network.mixture(z)).collect()
             }
             _ => Vec::new(),
-        }
-    }
-
-    fn belief<'a>(&'a self, z: &[Vec<f64>], mut learnt: Vec<TruncatedMixture>) -> Belief<'a> {
-        let average = self.average;
-        let tilted = |tilt: Tilt<'a>| {
-            let density = tilt.posterior(&self.coordinates);
-            Tilted { tilt, density }
         };
-        let tilt = || Tilt::of(&self.likelihood, z);
-        if learnt.is_empty() {
-            return Belief::Tilted(tilted(tilt()));
-        }
-        if average.emulator == 0.0 && learnt.len() == 1 {
-            return Belief::Learnt(learnt.remove(0));
-        }
-        if average.emulator == 0.0 {
-            // The product of the pours' posteriors over prior^(k - 1).
-            let average = Average { network: learnt.len() as f64, ..average };
-            let mixtures = learnt.into_iter().map(|cut| cut.mixture).collect();
-            return Belief::Tilted(tilted(tilt().averaged(mixtures, average)));
-        }
-        match average.form {
-            Form::Geometric => {
-                let mixtures = learnt.into_iter().map(|cut| cut.mixture).collect();
-                Belief::Tilted(tilted(tilt().averaged(mixtures, average)))
-            }
-            Form::Arithmetic => Belief::Sum(tilted(tilt()), learnt.remove(0), average.emulator),
-        }
+        let conditions = vec![(self.emulated.clone(), z)];
+        let evidence = Evidence { conditions, mixtures, average: self.average };
+        let mut found = Posterior::of(&self.coordinates, evidence);
+        found.warnings.splice(..0, self.out_of_range(x));
+        Ok(found)
     }
 
     fn check(&self, x: &[Vec<f64>]) -> Result<(), ModelError> {

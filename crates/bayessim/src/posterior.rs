@@ -1,19 +1,26 @@
 //! Belief about the free parameters after one or several pours.
 
 use std::fmt;
+use std::sync::Arc;
 
+use rayon::prelude::*;
+
+use crate::average::{Average, Form};
 use crate::coordinates::Coordinates;
+use crate::emulated::Emulated;
 use crate::identifiability::{self, Identifiability};
 use crate::importance::Importance;
-use crate::likelihood::Scratch;
+use crate::likelihood::{FEWEST_EFFECTIVE, Scratch};
+use crate::log_ratio::LogRatio;
 use crate::matrix::log_sum_exp;
-use crate::mixture::TruncatedMixture;
+use crate::mixture::{Mixture, TruncatedMixture};
 use crate::mode;
 use crate::random::Random;
-use crate::tilt::Tilt;
 
 /// Draws among which the search for the mode begins.
 const MODE_DRAWS: usize = 1000;
+/// Odds against one shared material from which pours are said to contradict each other.
+const LEAST_ODDS: f64 = 20.0;
 
 /// What a reader must know before trusting the numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +41,8 @@ pub enum Warning {
     },
     /// Nearly all mass of the network's mixture lies outside the prior.
     MassOutsidePrior {
+        /// Index of the pour.
+        pour: usize,
         /// Share inside before truncation.
         inside: f64,
     },
@@ -41,11 +50,15 @@ pub enum Warning {
     FewEffectiveDraws {
         /// How many.
         effective: f64,
+        /// Fewer than this are told.
+        needed: f64,
     },
     /// One material explains the pours much worse than a material for each would.
     PoursDisagree {
         /// Log evidence of one material against several `[nat]`.
         log_evidence_ratio: f64,
+        /// Less than this is told.
+        needed: f64,
     },
 }
 
@@ -56,15 +69,18 @@ impl fmt::Display for Warning {
                 f,
                 "pour {pour} is outside the training range: {name} = {value:.4e} (trained on {low:.4e} .. {high:.4e})"
             ),
-            Self::MassOutsidePrior { inside } => {
-                write!(f, "only {inside:.2} of the network's mass is inside the prior")
+            Self::MassOutsidePrior { pour, inside } => {
+                write!(f, "pour {pour}: only {inside:.2} of the network's mass is inside the prior")
             }
-            Self::FewEffectiveDraws { effective } => {
-                write!(f, "the posterior is worth {effective:.0} draws only")
-            }
-            Self::PoursDisagree { log_evidence_ratio } => write!(
+            Self::FewEffectiveDraws { effective, needed } => write!(
                 f,
-                "the pours contradict each other: log evidence of one material against several is {log_evidence_ratio:.1}"
+                "the posterior is worth {effective:.0} draws only, at least {needed:.0} are wanted; of several pours: do \
+                 they share one material?"
+            ),
+            Self::PoursDisagree { log_evidence_ratio, needed } => write!(
+                f,
+                "the pours contradict each other: log evidence of one material against several is \
+                 {log_evidence_ratio:.1}, told below {needed:.1}"
             ),
         }
     }
@@ -92,58 +108,122 @@ enum Draws {
     Walked,
 }
 
-/// A posterior as weighted draws: prior times tilt, normalised.
-pub(crate) struct Tilted<'a> {
-    pub tilt: Tilt<'a>,
-    pub density: Importance,
+/// A posterior as weighted draws: prior times ratio, normalised.
+struct Weighted {
+    ratio: LogRatio,
+    density: Importance,
 }
 
-impl Tilted<'_> {
+impl Weighted {
+    fn of(ratio: LogRatio) -> Self {
+        Self { density: ratio.posterior(), ratio }
+    }
+
     fn log_prob(&self, coordinates: &Coordinates, u: &[f64]) -> f64 {
         if !coordinates.is_inside(u) {
             return f64::NEG_INFINITY;
         }
-        let tilt = self.tilt.log(coordinates, u, &mut Scratch::default());
-        tilt + coordinates.log_density(u) - self.density.log_normaliser
+        let ratio = self.ratio.log(u, &mut Scratch::default());
+        ratio + coordinates.log_density(u) - self.density.log_normaliser
     }
 
-    fn sample(
-        &self,
-        coordinates: &Coordinates,
-        n: usize,
-        random: &mut Random,
-        draws: Draws,
-    ) -> Vec<Vec<f64>> {
+    fn sample(&self, n: usize, random: &mut Random, draws: Draws) -> Vec<Vec<f64>> {
         match draws {
             Draws::Resampled => self.density.resample(n, random),
-            Draws::Walked => self.tilt.sample(&self.density, coordinates, n, random),
+            Draws::Walked => self.ratio.sample(&self.density, n, random),
         }
     }
 }
 
 /// Where a posterior comes from.
-pub(crate) enum Belief<'a> {
-    /// The emulator, alone or in a geometric average with the network.
-    Tilted(Tilted<'a>),
-    /// The network alone.
+enum Source {
+    /// The emulator, alone or in a geometric average with the network; or a product of networks' posteriors.
+    Weighted(Weighted),
+    /// The network alone, of one pour.
     Learnt(TruncatedMixture),
     /// The arithmetic average of both, and the weight of the first.
-    Sum(Tilted<'a>, TruncatedMixture, f64),
+    Sum(Weighted, TruncatedMixture, f64),
+}
+
+/// What is known of one material: its standardised pours under one or several conditions, and what a network says of
+/// each pour.
+pub struct Evidence {
+    /// Emulator of each condition and its pours, standardised.
+    pub conditions: Vec<(Emulated, Vec<Vec<f64>>)>,
+    /// The network's mixture of each pour over coordinates; none where there is no network.
+    pub mixtures: Vec<Mixture>,
+    /// How much both count.
+    pub average: Average,
 }
 
 /// A normalised density over the parameters, in own units, zero outside the prior's bounds.
-pub struct Posterior<'a> {
-    pub(crate) coordinates: &'a Coordinates,
-    pub(crate) names: &'a [String],
-    pub(crate) belief: Belief<'a>,
+pub struct Posterior {
+    coordinates: Arc<Coordinates>,
+    source: Source,
     /// What to know before trusting it.
     pub warnings: Vec<Warning>,
 }
 
-impl Posterior<'_> {
+impl Posterior {
+    /// The posterior of one material.
+    ///
+    /// Under the emulator several pours have one likelihood. A network's posteriors are multiplied and the prior is
+    /// divided out all but once. Where both are averaged, the networks' posteriors together count as much as one does
+    /// for one pour: their error is the same in all. An arithmetic average is of one pour: several are the emulator's
+    /// alone.
+    pub fn of(coordinates: &Arc<Coordinates>, evidence: Evidence) -> Self {
+        let Evidence { conditions, mut mixtures, average } = evidence;
+        let is_sum = average.form == Form::Arithmetic && average.emulator > 0.0;
+        if average.network == 0.0 || (is_sum && mixtures.len() > 1) {
+            mixtures.clear();
+        }
+        let mut warnings = Vec::new();
+        let cut = |mixture| TruncatedMixture::cut(coordinates, mixture);
+        let mut learnt: Vec<_> = mixtures.into_iter().map(cut).collect();
+        for (pour, cut) in learnt.iter().enumerate().filter(|(_, cut)| cut.is_mostly_outside()) {
+            warnings.push(Warning::MassOutsidePrior { pour, inside: cut.log_mass.exp() });
+        }
+        let log_masses: f64 = learnt.iter().map(|cut| cut.log_mass).sum();
+        let is_product = average.emulator == 0.0 && learnt.len() > 1;
+        let conditions: Vec<_> = if average.emulator > 0.0 || learnt.is_empty() {
+            conditions.into_iter().map(|(emulated, z)| (emulated.likelihood, z)).collect()
+        } else {
+            Vec::new()
+        };
+        let ratio = LogRatio::of(coordinates, &conditions);
+        let all =
+            |learnt: Vec<TruncatedMixture>| learnt.into_iter().map(|cut| cut.mixture).collect();
+        let source = if learnt.is_empty() {
+            Source::Weighted(Weighted::of(ratio))
+        } else if is_product {
+            // The product of the pours' posteriors over prior^(k - 1).
+            let average = Average { network: learnt.len() as f64, ..average };
+            Source::Weighted(Weighted::of(ratio.averaged(all(learnt), average)))
+        } else if average.emulator == 0.0 {
+            Source::Learnt(learnt.remove(0))
+        } else if is_sum {
+            Source::Sum(Weighted::of(ratio), learnt.remove(0), average.emulator)
+        } else {
+            Source::Weighted(Weighted::of(ratio.averaged(all(learnt), average)))
+        };
+        if let (true, Source::Weighted(weighted)) = (is_product, &source) {
+            let (found, needed) = (weighted.density.log_normaliser - log_masses, -LEAST_ODDS.ln());
+            if found < needed {
+                warnings.push(Warning::PoursDisagree { log_evidence_ratio: found, needed });
+            }
+        }
+        if let Source::Weighted(weighted) | Source::Sum(weighted, ..) = &source {
+            let (effective, needed) = (weighted.density.effective_sample_size(), FEWEST_EFFECTIVE);
+            if effective < needed {
+                warnings.push(Warning::FewEffectiveDraws { effective, needed });
+            }
+        }
+        Self { coordinates: Arc::clone(coordinates), source, warnings }
+    }
+
     /// Paths of the parameters.
     pub fn names(&self) -> &[String] {
-        self.names
+        self.coordinates.names()
     }
 
     /// Log density at parameters in own units.
@@ -154,17 +234,32 @@ impl Posterior<'_> {
 
     /// Log density of the prior's coordinates.
     pub fn coordinate_log_prob(&self, u: &[f64]) -> f64 {
-        let coordinates = self.coordinates;
-        match &self.belief {
-            Belief::Tilted(tilted) => tilted.log_prob(coordinates, u),
-            Belief::Learnt(learnt) => learnt.log_prob(coordinates, u),
-            Belief::Sum(tilted, learnt, weight) => log_sum_exp(
+        let coordinates = &self.coordinates;
+        match &self.source {
+            Source::Weighted(weighted) => weighted.log_prob(coordinates, u),
+            Source::Learnt(learnt) => learnt.log_prob(coordinates, u),
+            Source::Sum(weighted, learnt, weight) => log_sum_exp(
                 [
-                    weight.ln() + tilted.log_prob(coordinates, u),
+                    weight.ln() + weighted.log_prob(coordinates, u),
                     (1.0 - weight).ln() + learnt.log_prob(coordinates, u),
                 ]
                 .into_iter(),
             ),
+        }
+    }
+
+    /// The same at each of many.
+    pub fn coordinate_log_probs(&self, u: &[Vec<f64>]) -> Vec<f64> {
+        u.par_iter().map(|u| self.coordinate_log_prob(u)).collect()
+    }
+
+    /// Number of independent draws that the weighted ones are worth; `None` where no draw is weighted.
+    pub fn effective_sample_size(&self) -> Option<f64> {
+        match &self.source {
+            Source::Learnt(_) => None,
+            Source::Weighted(weighted) | Source::Sum(weighted, ..) => {
+                Some(weighted.density.effective_sample_size())
+            }
         }
     }
 
@@ -175,15 +270,32 @@ impl Posterior<'_> {
 
     /// The parameters of highest density in coordinates, in own units; always the same.
     pub fn mode(&self) -> Vec<f64> {
+        self.coordinates.values(&self.coordinate_mode())
+    }
+
+    /// The coordinates of highest density; always the same.
+    pub fn coordinate_mode(&self) -> Vec<f64> {
         let draws = self.draws(MODE_DRAWS, 0, Draws::Resampled);
-        let best = mode::climb(self.coordinates, |u| self.coordinate_log_prob(u), &draws);
-        self.coordinates.values(&best)
+        mode::climb(&self.coordinates, |u| self.coordinate_log_prob(u), &draws)
+    }
+
+    /// `n` draws of the coordinates.
+    pub fn coordinate_sample(&self, n: usize, seed: u64) -> Vec<Vec<f64>> {
+        self.draws(n, seed, Draws::Walked)
     }
 
     /// What it knows of the parameters.
     pub fn identifiability(&self) -> Identifiability {
         let draws = self.draws(identifiability::DRAWS, 0, Draws::Walked);
-        Identifiability::of(self.names, self.coordinates, &draws)
+        Identifiability::of(&self.coordinates, &draws)
+    }
+
+    /// The same, and the covariance in spreads of the prior, row by row.
+    pub fn knowledge(&self) -> (Identifiability, Vec<Vec<f64>>) {
+        let draws = self.draws(identifiability::DRAWS, 0, Draws::Walked);
+        let covariance = identifiability::covariance(&self.coordinates, &draws);
+        let rows = covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
+        (Identifiability::of(&self.coordinates, &draws), rows)
     }
 
     fn values(&self, n: usize, seed: u64, kind: Draws) -> Vec<Vec<f64>> {
@@ -191,15 +303,18 @@ impl Posterior<'_> {
     }
 
     fn draws(&self, n: usize, seed: u64, kind: Draws) -> Vec<Vec<f64>> {
-        let (coordinates, mut random) = (self.coordinates, Random::new(seed));
-        match &self.belief {
-            Belief::Tilted(tilted) => tilted.sample(coordinates, n, &mut random, kind),
-            Belief::Learnt(learnt) => learnt.sample(coordinates, n, &mut random),
-            Belief::Sum(tilted, learnt, weight) => {
-                let count = (0..n).filter(|_| random.uniform() < *weight).count();
-                let mut draws = tilted.sample(coordinates, count, &mut random, kind);
-                draws.extend(learnt.sample(coordinates, n - count, &mut random));
-                draws
+        let (coordinates, mut random) = (&self.coordinates, Random::new(seed));
+        match &self.source {
+            Source::Weighted(weighted) => weighted.sample(n, &mut random, kind),
+            Source::Learnt(learnt) => learnt.sample(coordinates, n, &mut random),
+            Source::Sum(weighted, learnt, weight) => {
+                let of_first: Vec<_> = (0..n).map(|_| random.uniform() < *weight).collect();
+                let count = of_first.iter().filter(|&&is_first| is_first).count();
+                let mut first = weighted.sample(count, &mut random, kind).into_iter();
+                let mut second = learnt.sample(coordinates, n - count, &mut random).into_iter();
+                // In random order: any of them are draws of both.
+                let draw = |is_first| if is_first { first.next() } else { second.next() };
+                of_first.into_iter().filter_map(draw).collect()
             }
         }
     }
@@ -218,6 +333,6 @@ impl Posterior<'_> {
                 interval90: (at(0.05), at(0.95)),
             }
         };
-        self.names.iter().enumerate().map(marginal).collect()
+        self.names().iter().enumerate().map(marginal).collect()
     }
 }

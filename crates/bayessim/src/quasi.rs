@@ -6,6 +6,7 @@ use granulcal_numbers::box_muller;
 pub struct QuasiUniform(Vec<f64>);
 
 impl QuasiUniform {
+    /// Points of so many dimensions.
     pub fn new(dimension: usize) -> Self {
         let mut ratio: f64 = 2.0;
         for _ in 0..60 {
@@ -14,6 +15,7 @@ impl QuasiUniform {
         Self((1..=dimension).map(|power| ratio.powf(-(power as f64))).collect())
     }
 
+    /// One of them.
     pub fn point(&self, index: usize) -> Vec<f64> {
         self.0.iter().map(|step| (0.5 + (index + 1) as f64 * step).rem_euclid(1.0)).collect()
     }

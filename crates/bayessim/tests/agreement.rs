@@ -1,4 +1,4 @@
-//! What Rust says of a model is what Python and torch say; numbers by data/make_models.py.
+//! What is said of a model is what NumPy and PyTorch said of it (data/reference.json, see data/make_models.py).
 
 use std::fs;
 use std::path::{Path, PathBuf};

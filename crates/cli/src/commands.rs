@@ -1,6 +1,6 @@
-//! One file per command; here only the dispatch.
+//! The commands: a file each, which holds arguments, help and what is done, and a line in the list below.
 
-pub mod completions;
+mod completions;
 mod features;
 mod fit_sensor;
 mod generate;
@@ -12,27 +12,101 @@ mod render;
 mod scene;
 mod simulate;
 
-use crate::args::Command;
-use crate::context::Context;
-use crate::outcome::Outcome;
-use crate::program::Program;
+use clap::{Parser, Subcommand};
 
-/// Runs a command.
-///
-/// # Errors
-/// Whatever went wrong, to be printed once.
-pub fn dispatch(context: &Context, program: &Program, command: Command) -> anyhow::Result<Outcome> {
-    match command {
-        Command::Scene(args) => scene::run(&args),
-        Command::Simulate(args) => simulate::run(context, &args),
-        Command::Generate(args) => generate::run(context, &args),
-        Command::Render(args) => render::run(context, &args),
-        Command::Features(args) => features::run(&args),
-        Command::Infer(args) => infer::run(&args),
-        Command::FitSensor(args) => fit_sensor::run(&args),
-        Command::PickColour(args) => pick_colour::run(&args),
-        Command::Inspect(args) => inspect::run(&args),
-        Command::Merge(args) => merge::run(&args),
-        Command::Completions(args) => completions::run(program, &args),
+use crate::args::Global;
+use crate::outcome::Outcome;
+use crate::run::{Run, Setting};
+
+/// Makes [`Command`] of the one list of all commands.
+macro_rules! commands {
+    ($($word:ident: $arguments:ty,)*) => {
+        /// What can be done.
+        #[derive(Debug, Subcommand)]
+        pub enum Command {
+            $($word($arguments),)*
+        }
+
+        impl Run for Command {
+            fn run(&self, setting: &Setting<'_>) -> anyhow::Result<Outcome> {
+                match self {
+                    $(Self::$word(arguments) => arguments.run(setting),)*
+                }
+            }
+        }
+    };
+}
+
+// In the order of the help.
+commands! {
+    Scene: scene::PrintSceneArgs,
+    Simulate: simulate::SimulateArgs,
+    Generate: generate::GenerateArgs,
+    Render: render::RenderArgs,
+    Features: features::FeaturesArgs,
+    Infer: infer::InferArgs,
+    FitSensor: fit_sensor::FitSensorArgs,
+    PickColour: pick_colour::PickColourArgs,
+    Inspect: inspect::InspectArgs,
+    Merge: merge::MergeArgs,
+    Completions: completions::CompletionsArgs,
+}
+
+/// Calibrates a granular simulator from depth images: pours grains, looks at them, describes them.
+#[derive(Debug, Parser)]
+#[command(name = "granulcal-cli", version, propagate_version = true, arg_required_else_help = true)]
+#[command(after_help = "\
+Start here:
+  granulcal-cli simulate funnel                       one pour, its health and its 16 statistics
+  granulcal-cli generate funnel default -n 100 -o d   100 pours with unknown material, as Parquet
+  granulcal-cli features pile.bag                     the same statistics of a measured pile
+  granulcal-cli infer model pile.bag                  its material, by a model of `granulcal train`
+
+Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy or without
+grains in view, some frames of a recording lost, or a recording outside the model, 130 stopped. Results go to stdout, progress and messages to stderr.")]
+pub struct Cli {
+    #[command(flatten)]
+    pub global: Global,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[cfg(test)]
+mod tests {
+    use std::any::TypeId;
+    use std::ffi::OsString;
+    use std::path::PathBuf;
+
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    /// A path that does not say whether it is read or written escapes the check of `args/paths.rs`.
+    #[test]
+    fn every_path_says_whether_it_is_read_or_written() {
+        fn walk(command: &clap::Command, found: &mut Vec<String>) {
+            for argument in command.get_arguments() {
+                let kind = argument.get_value_parser().type_id();
+                if kind == TypeId::of::<PathBuf>() || kind == TypeId::of::<OsString>() {
+                    found.push(format!("{} {}", command.get_name(), argument.get_id()));
+                }
+                // Texts that are no paths are known by name: a new one is to be looked at.
+                let is_text = kind == TypeId::of::<String>();
+                let texts =
+                    ["topic", "camera_topic", "colour_topic", "view", "engine", "ray", "ray_store"];
+                if is_text && !texts.contains(&argument.get_id().as_str()) {
+                    found.push(format!("{} {}", command.get_name(), argument.get_id()));
+                }
+            }
+            command.get_subcommands().for_each(|below| walk(below, found));
+        }
+        let mut found = Vec::new();
+        walk(&Cli::command(), &mut found);
+        assert!(found.is_empty(), "neither Reads nor Writes: {found:?}");
     }
 }

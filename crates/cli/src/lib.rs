@@ -17,6 +17,7 @@ pub mod interrupt;
 mod outcome;
 mod program;
 mod progress;
+mod run;
 mod scene;
 mod sides;
 
@@ -24,10 +25,11 @@ use std::ffi::OsString;
 
 use clap::FromArgMatches;
 
-use args::Cli;
+use commands::Cli;
 use context::Context;
 use outcome::Outcome;
 pub use program::{Further, FurtherOption, Program};
+use run::{Run, Setting};
 
 /// Runs one command line, the name of the program first, and returns its exit code.
 ///
@@ -70,7 +72,10 @@ pub fn run_as(program: &Program, args: impl IntoIterator<Item = OsString>) -> u8
     let context = Context::new(&cli.global);
     let _armed = interrupt::arm();
     let checked = args::paths::check(&command, &matches).map_err(anyhow::Error::from);
-    match checked.and_then(|()| commands::dispatch(&context, program, cli.command)) {
+    // Not the one that has parsed: its command `help` is closed.
+    let whole = program.command();
+    let setting = Setting { context: &context, whole: &whole, binary: program.binary() };
+    match checked.and_then(|()| cli.command.run(&setting)) {
         Ok(outcome) => outcome.exit_code(),
         Err(error) => {
             let code = outcome::exit_code_of(&error);

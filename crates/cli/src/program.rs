@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use clap::{Arg, ArgAction, Command, CommandFactory};
 use serde::Deserialize;
 
-use crate::args::Cli;
+use crate::commands::Cli;
 
 /// What the commands call themselves in their help unless told otherwise.
 const NAME: &str = "granulcal-cli";

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use granulcal_dataset::{
-    DatasetError, Observer, Prior, Room, load_prior, load_scene, load_sensor, record_pour,
-    resume_checkpoint, write_checkpoint,
+    DatasetError, Observer, POLL_INTERVAL, Prior, Room, load_prior, load_scene, load_sensor,
+    record_pour, resume_checkpoint, write_checkpoint,
 };
 use granulcal_dem::{Pour, Simulation};
 use granulcal_scene::Scene;
@@ -22,8 +22,6 @@ use crate::sides::SideFiles;
 const FUNNEL_HEIGHT: f64 = 0.12;
 /// Drop height of the built-in scene `[m]`.
 const DROP_HEIGHT: f64 = 0.1;
-/// Simulated time between two looks at the clock and at Ctrl-C `[s]`: some substeps, seconds for a million grains.
-const GLANCE: f64 = 0.002;
 
 /// The scene that the arguments describe.
 ///
@@ -191,7 +189,7 @@ pub fn pour(
     Ok(pour)
 }
 
-/// Goes on to the end, or until `watch` says no; `keep` is called at every glance, and with true at the last one.
+/// Goes on to the end, or until `watch` says no; `keep` is called each time, and with true at the last.
 fn run(
     mut simulation: Simulation,
     observer: &mut Observer,
@@ -205,6 +203,6 @@ fn run(
         if !goes_on {
             return Ok(has_ended.then(|| simulation.into_pour()));
         }
-        observer.advance(&mut simulation, GLANCE);
+        observer.advance(&mut simulation, POLL_INTERVAL);
     }
 }

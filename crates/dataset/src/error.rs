@@ -232,6 +232,11 @@ pub enum DatasetError {
 }
 
 impl DatasetError {
+    /// A scene that no simulation takes.
+    pub(crate) fn refused(source: SceneError) -> Self {
+        Self::Simulation(source.into())
+    }
+
     /// Whether the input is to blame, and not the machine: wrong arguments and wrong or missing files.
     pub fn is_bad_input(&self) -> bool {
         match self {

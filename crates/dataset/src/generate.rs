@@ -256,7 +256,7 @@ fn make_row(
     let start = ThreadTime::now();
     let parameters = header.prior.sample(header.seed, row);
     let scene = header.prior.apply(&header.scene, &parameters);
-    let scene = scene.map_err(|e| DatasetError::Simulation(e.into()))?;
+    let scene = scene.map_err(DatasetError::refused)?;
     let seed = pour_seed(header.seed, row);
     let mut observer = Observer::new(&scene);
     let pour = if let Some(engine) = engine {

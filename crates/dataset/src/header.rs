@@ -37,7 +37,7 @@ impl Header {
     /// # Errors
     /// [`DatasetError::Prior`] if the prior names what the scene has not.
     pub fn new(scene: &Scene, prior: &Prior, seed: u64) -> Result<Self, DatasetError> {
-        scene.check().map_err(|e| DatasetError::Simulation(e.into()))?;
+        scene.check().map_err(DatasetError::refused)?;
         prior.check(scene).map_err(DatasetError::Prior)?;
         Ok(Self {
             scene: scene.clone(),
@@ -45,7 +45,7 @@ impl Header {
             version: VERSION.to_owned(),
             law: Some(LAW),
             seed,
-            scene_toml: scene.to_toml().map_err(|e| DatasetError::Simulation(e.into()))?,
+            scene_toml: scene.to_toml().map_err(DatasetError::refused)?,
             prior_toml: prior.to_toml().map_err(DatasetError::Prior)?,
         })
     }
@@ -108,9 +108,7 @@ impl Header {
             Err(DatasetError::Differs { path: path.to_owned(), what, found, given })
         };
         let difference = self.scene.first_difference(&given.scene);
-        if let Some((key, found, given)) =
-            difference.map_err(|e| DatasetError::Simulation(e.into()))?
-        {
+        if let Some((key, found, given)) = difference.map_err(DatasetError::refused)? {
             return differs(format!("scene.{key}"), found, given);
         }
         if self.prior != given.prior {

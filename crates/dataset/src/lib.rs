@@ -83,7 +83,9 @@ pub use mcap_file::{Filmed, record_pour};
 pub use message_file::{Damage, MessageFormat};
 pub use npz::{Npz, write_height_map};
 pub use observe::{Observation, TooFewGrains, View, look, look_from, observe, overhead};
-pub use observer::{Observed, ObservedStatistic, Observer, Series, observed_statistics};
+pub use observer::{
+    Observed, ObservedStatistic, Observer, POLL_INTERVAL, Series, observed_statistics,
+};
 pub use pictures::{Pictures, write_mask, write_pictures};
 pub use plausible::Limits;
 pub use readable::{plain, readable};

@@ -70,7 +70,7 @@ pub fn record_pour(
         let (what, got) = ("the frames per second", rate.to_string());
         return Err(DatasetError::Argument { what, got, allowed: "positive and finite" });
     }
-    let scene_toml = scene.to_toml().map_err(|e| DatasetError::Simulation(e.into()))?;
+    let scene_toml = scene.to_toml().map_err(DatasetError::refused)?;
     let failed = |source| DatasetError::Mcap { path: path.to_owned(), source };
     let mut recorder = Recorder::create(path)?;
     recorder.attach_scene(&scene_toml).map_err(failed)?;

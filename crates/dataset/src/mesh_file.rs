@@ -32,8 +32,7 @@ pub(crate) fn read(path: &Path) -> Result<(Mesh, String), DatasetError> {
         return Err(DatasetError::content(path, "a mesh's file", found, "named .stl or .obj"));
     };
     let name = path.display().to_string();
-    let mesh =
-        Mesh::new(&vertices, &triangles, &name).map_err(|e| DatasetError::Simulation(e.into()))?;
+    let mesh = Mesh::new(&vertices, &triangles, &name).map_err(DatasetError::refused)?;
     Ok((mesh, format!("{:016x}", xxhash_rust::xxh3::xxh3_64(&bytes))))
 }
 

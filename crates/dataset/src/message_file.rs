@@ -17,12 +17,12 @@ pub use visit::Damage;
 pub(crate) use visit::{Channel, Message, Visit, Walk};
 
 /// Every format; a new one is a file in `message_file/` and a line here.
-const FORMATS: [&MessageFormat; 2] = [&bag::FORMAT, &mcap::FORMAT];
+const FORMATS: &[&MessageFormat] = &[&bag::FORMAT, &mcap::FORMAT];
 
 impl MessageFormat {
     /// The format that a file's first bytes belong to.
     pub(crate) fn of(first: &[u8]) -> Option<Self> {
-        FORMATS.into_iter().find(|format| first.starts_with(format.magic)).copied()
+        FORMATS.iter().find(|format| first.starts_with(format.magic)).map(|&&format| format)
     }
 }
 

@@ -19,8 +19,8 @@ use crate::row::RowStatus;
 use observation::{Frame, Observation};
 pub use observation::{ObservedStatistic, Series};
 
-/// Simulated time between two questions whether to go on `[s]`.
-const GLANCE: f64 = 0.002;
+/// Simulated time between two questions whether to go on `[s]`: some substeps, seconds for a million grains.
+pub const POLL_INTERVAL: f64 = 0.002;
 
 /// What a pour has shown.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -122,7 +122,7 @@ impl Observer {
             if !keep_going() {
                 return None;
             }
-            self.advance(&mut simulation, GLANCE);
+            self.advance(&mut simulation, POLL_INTERVAL);
         }
         Some(simulation.into_pour())
     }

@@ -32,9 +32,9 @@ pub fn load_scene(path: &Path) -> Result<Scene, DatasetError> {
 /// As [`load_scene`], but for [`DatasetError::Io`] of the scene itself; [`DatasetError::Simulation`] for what is no
 /// scene.
 pub fn scene_from_text(text: &str, folder: &Path) -> Result<Scene, DatasetError> {
-    let mut scene = Scene::parse(text).map_err(|e| DatasetError::Simulation(e.into()))?;
+    let mut scene = Scene::parse(text).map_err(DatasetError::refused)?;
     fill(&mut scene, folder)?;
-    scene.check().map_err(|e| DatasetError::Simulation(e.into()))?;
+    scene.check().map_err(DatasetError::refused)?;
     Ok(scene)
 }
 

@@ -30,7 +30,7 @@ use crate::plane::PlaneFit;
 use levelled::{Cloud, Footprint, flipped};
 
 /// Sides of the grid `[px]` on which the ground is looked for to choose the down-sampling.
-const GLANCE_PX: usize = 160;
+const COARSE_SIDE_PX: usize = 160;
 
 /// The formation in a depth image.
 ///
@@ -97,8 +97,8 @@ pub fn level_depth(
     let cloud = |n: usize| depth_cloud(camera, &image, segmentation, n);
     let grains = |n: usize| colour.map(|(colour, range)| colour.mask(range, n)).transpose();
     let n = if segmentation.downsample.is_none() && segmentation.ground_resolution.is_some() {
-        // A pixel's width on the ground needs the ground: a glance at some pixels is enough.
-        let coarse = (side / GLANCE_PX).max(1);
+        // A pixel's width on the ground needs the ground, for which some pixels are enough.
+        let coarse = (side / COARSE_SIDE_PX).max(1);
         let glance = cloud(coarse)?;
         let (plane, _) = glance.ground(segmentation, grains(coarse)?.as_deref(), up)?;
         segmentation.factor(glance.resolution(&plane).0 / coarse as f64, side)

@@ -3,7 +3,7 @@
 use bytemuck::cast_slice;
 use nalgebra::Vector3;
 use numpy::{
-    Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray1,
+    Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArray1,
     PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods, dtype,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -64,6 +64,37 @@ impl<'py> Image<'py> {
     pub(crate) fn parts(&self) -> PyResult<(usize, usize, &[f32])> {
         Ok((self.0.shape()[1], self.0.shape()[0], self.0.as_slice()?))
     }
+}
+
+/// Rows of numbers, copied from an array of shape (n, columns), float64.
+pub(crate) struct Rows(pub(crate) Vec<Vec<f64>>);
+
+impl Rows {
+    /// Copies the rows; `columns` are asked for if they are known.
+    pub(crate) fn read(
+        name: &str,
+        value: &Bound<'_, PyAny>,
+        columns: Option<usize>,
+    ) -> PyResult<Self> {
+        let array = untyped::<f64>(name, value)?;
+        let shape = array.shape();
+        if shape.len() != 2 || columns.is_some_and(|columns| shape[1] != columns) {
+            let allowed =
+                columns.map_or("(n, columns)".to_owned(), |columns| format!("(n, {columns})"));
+            return Err(bad_shape(name, &allowed, array));
+        }
+        let (rows, columns) = (shape[0], shape[1]);
+        let array = value.cast::<PyArray2<f64>>()?.try_readonly()?;
+        let numbers = array.as_slice()?;
+        Ok(Self((0..rows).map(|i| numbers[i * columns..(i + 1) * columns].to_vec()).collect()))
+    }
+}
+
+/// Shape and numbers of an array of any shape, float64.
+pub(crate) fn any_shape(name: &str, value: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)> {
+    let shape = untyped::<f64>(name, value)?.shape().to_vec();
+    let array = value.cast::<PyArrayDyn<f64>>()?.try_readonly()?;
+    Ok((shape, array.as_slice()?.to_vec()))
 }
 
 /// A contiguous array of the right dtype, of any shape.

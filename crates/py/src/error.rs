@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::io;
 
+use granulcal_bayessim::ModelError;
 use granulcal_dataset::{DatasetError, readable};
 use granulcal_dem::DemError;
 use granulcal_features::FeatureError;
@@ -12,6 +13,11 @@ use pyo3::exceptions::{PyBlockingIOError, PyOSError, PyRuntimeError, PyValueErro
 /// A refused scene or simulation: ValueError.
 pub(crate) fn dem(error: impl Into<DemError>) -> PyErr {
     PyValueError::new_err(chain(&error.into()))
+}
+
+/// A refused part of a model: ValueError.
+pub(crate) fn model(error: ModelError) -> PyErr {
+    PyValueError::new_err(chain(&error))
 }
 
 /// A refused image or cloud of points: ValueError.

@@ -7,7 +7,9 @@
 
 mod array;
 mod camera;
+mod coordinates;
 mod dataset;
+mod emulated;
 mod error;
 mod files;
 mod film;
@@ -16,6 +18,7 @@ mod gathered;
 mod generate;
 mod levelled;
 mod observation;
+mod posterior;
 mod pour;
 mod prior;
 mod recording;
@@ -33,7 +36,11 @@ mod _native {
     #[pymodule_export]
     use crate::camera::Camera;
     #[pymodule_export]
+    use crate::coordinates::{Coordinates, quasi_uniform};
+    #[pymodule_export]
     use crate::dataset::Dataset;
+    #[pymodule_export]
+    use crate::emulated::Emulated;
     #[pymodule_export]
     use crate::files::{check_paths, hash_bytes, readable, write_file};
     #[pymodule_export]
@@ -49,13 +56,15 @@ mod _native {
     #[pymodule_export]
     use crate::observation::Observation;
     #[pymodule_export]
+    use crate::posterior::{Posterior, directions};
+    #[pymodule_export]
     use crate::pour::Pour;
     #[pymodule_export]
     use crate::prior::check_parameter;
     #[pymodule_export]
     use crate::recording::Recording;
     #[pymodule_export]
-    use crate::run_cli::{listen_for_signals, run_cli};
+    use crate::run_cli::{Listener, listen_for_signals, run_cli};
     #[pymodule_export]
     use crate::scene::Scene;
     #[pymodule_export]
@@ -66,6 +75,10 @@ mod _native {
     /// Number of the law that pours follow.
     #[pymodule_export]
     const LAW: u32 = granulcal_dem::LAW;
+
+    /// How often a right model is called wrong by an observation's misfit.
+    #[pymodule_export]
+    const SIGNIFICANCE: f64 = granulcal_bayessim::SIGNIFICANCE;
 
     /// Version of the Rust crates.
     #[pymodule_export]

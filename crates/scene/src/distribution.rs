@@ -4,6 +4,8 @@
 //! whatever the distribution. Exponentials and logarithms come from `libm`, which gives the same bits
 //! on every machine.
 
+use granulcal_numbers::normal_cdf;
+
 use crate::normal::truncated_normal_quantile;
 
 /// How a parameter is distributed.
@@ -50,6 +52,15 @@ impl Distribution {
             Self::Normal { .. } => "normal",
             Self::Fixed { .. } => "fixed",
         }
+    }
+
+    /// The share of the normal that the bounds leave; 1 of what is no normal.
+    pub fn mass(&self) -> f64 {
+        let Self::Normal { mean, sd, low, high } = *self else { return 1.0 };
+        let [a, b] = [low, high].map(|bound| bound.map(|bound| (bound - mean) / sd));
+        let (a, b) = (a.unwrap_or(f64::NEG_INFINITY), b.unwrap_or(f64::INFINITY));
+        // In the upper tail the probabilities of the lower one keep their digits.
+        if a > 0.0 { normal_cdf(-a) - normal_cdf(-b) } else { normal_cdf(b) - normal_cdf(a) }
     }
 
     /// The value below which a draw falls with probability `u`, in (0, 1).

@@ -22,29 +22,18 @@ mod vibration;
 
 use serde::{Deserialize, Serialize};
 
-pub use adhesion::Adhesion;
-pub use capillary::Capillary;
-pub use clump::Clump;
 pub use clump::ClumpShape;
 pub use effect::Effect;
-pub use fluid::Fluid;
-pub use funnel_pose::FunnelPose;
-pub use ground::GroundUnlike;
-pub use layer::Layer;
-pub use lubrication::Lubrication;
-pub use outlet::{Outlet, OutletMesh};
-pub use polydispersity::Polydispersity;
-pub use restitution_speed::RestitutionSpeed;
-pub use rolling_form::RollingForm;
-pub use tilt::Tilt;
-pub use vibration::Vibration;
+pub use outlet::OutletMesh;
 
 use crate::error::SceneError;
 use crate::preset::Method;
 
 /// Makes [`Effects`] of the one list of all effects.
 macro_rules! effects {
-    ($($(#[$doc:meta])* $table:ident: $kind:ty,)*) => {
+    ($($(#[$doc:meta])* $table:ident: $module:ident::$kind:ident,)*) => {
+        $(pub use $module::$kind;)*
+
         /// The effects of a scene. Every default is off.
         #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields, default)]
@@ -77,33 +66,33 @@ macro_rules! effects {
 
 effects! {
     /// Liquid bridges.
-    capillary: Capillary,
+    capillary: capillary::Capillary,
     /// Dry adhesion of touching grains.
-    adhesion: Adhesion,
+    adhesion: adhesion::Adhesion,
     /// Grains that are not round.
-    clump: Clump,
+    clump: clump::Clump,
     /// Grains of different size.
-    polydispersity: Polydispersity,
+    polydispersity: polydispersity::Polydispersity,
     /// A ground whose coefficients are not the grains'.
-    ground: GroundUnlike,
+    ground: ground::GroundUnlike,
     /// A soft layer on the ground.
-    layer: Layer,
+    layer: layer::Layer,
     /// Restitution that depends on the speed of an impact.
-    restitution_speed: RestitutionSpeed,
+    restitution_speed: restitution_speed::RestitutionSpeed,
     /// Rolling resistance that grows with the speed of rolling.
-    rolling_form: RollingForm,
+    rolling_form: rolling_form::RollingForm,
     /// A fluid at rest around the grains.
-    fluid: Fluid,
+    fluid: fluid::Fluid,
     /// A fluid film between surfaces.
-    lubrication: Lubrication,
+    lubrication: lubrication::Lubrication,
     /// A table that is not level.
-    tilt: Tilt,
+    tilt: tilt::Tilt,
     /// A funnel that hangs beside its place, leans, or has a friction of its own.
-    funnel: FunnelPose,
+    funnel: funnel_pose::FunnelPose,
     /// A funnel whose outlet is not round.
-    outlet: Outlet,
+    outlet: outlet::Outlet,
     /// A table that shakes.
-    vibration: Vibration,
+    vibration: vibration::Vibration,
 }
 
 fn paths_of<T: Effect + Serialize>(effect: &T) -> Result<Vec<String>, SceneError> {

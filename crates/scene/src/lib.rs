@@ -39,11 +39,7 @@ mod walls;
 
 pub use camera::{CameraSpec, MAX_BLUR, MAX_DEPTH_NOISE, MAX_SENSOR_PIXELS, Mask, Projection};
 pub use distribution::Distribution;
-pub use effects::{
-    Adhesion, Capillary, Clump, ClumpShape, Effect, Effects, Fluid, FunnelPose, GroundUnlike,
-    Layer, Lubrication, Outlet, OutletMesh, Polydispersity, RestitutionSpeed, RollingForm, Tilt,
-    Vibration,
-};
+pub use effects::*;
 pub use error::SceneError;
 pub use grain_shape::{GrainShape, Solid, parry};
 pub use grains::Grains;

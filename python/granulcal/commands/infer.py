@@ -8,7 +8,7 @@ from typing import Any
 
 from granulcal import _native
 from granulcal.commands.exit_code import DONE, UNHEALTHY
-from granulcal.commands.reading import add_recordings, open_model, open_recordings
+from granulcal.commands.reading import add_recordings, open_model, open_recordings, reading_words
 from granulcal.paths import writes
 
 __all__ = ["add"]
@@ -36,20 +36,10 @@ def _run(options: argparse.Namespace) -> int:
         raise ModuleNotFoundError("--plot needs PyTorch")
     model = model_named(str(options.model))
     words = ["granulcal", "infer", str(model), *map(str, options.recording)]
-    for name in (
-        "camera",
-        "topic",
-        "camera_topic",
-        "colour_topic",
-        "first_frame",
-        "scene",
-        "border",
-        "out",
-    ):
-        value = getattr(options, name)
-        if value is not None:
-            words.append(f"--{name.replace('_', '-')}={value}")
-    words.append(f"--frames={options.frames or 'all'}")
+    words += reading_words(options)
+    for name in ("scene", "border", "out"):
+        if getattr(options, name) is not None:
+            words.append(f"--{name}={getattr(options, name)}")
     if options.json:
         words.append("--json")
     code = _native.run_cli(words)

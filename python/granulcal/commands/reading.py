@@ -17,6 +17,7 @@ __all__ = [
     "open_model",
     "open_recordings",
     "outside",
+    "reading_words",
     "told_outside",
 ]
 
@@ -53,6 +54,15 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         help="frames to average, or all (default: the last 10)",
     )
     parser.add_argument("--first-frame", type=int, help="index of the first of them, from 0")
+
+
+def reading_words(options: argparse.Namespace) -> list[str]:
+    """Returns what `add_reading` was told but the recordings, as words of a command line."""
+    words = []
+    for name in ("camera", "topic", "camera_topic", "colour_topic", "first_frame"):
+        if getattr(options, name) is not None:
+            words.append(f"--{name.replace('_', '-')}={getattr(options, name)}")
+    return [*words, f"--frames={options.frames or 'all'}"]
 
 
 def open_model(options: argparse.Namespace) -> Any:

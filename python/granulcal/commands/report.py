@@ -13,6 +13,7 @@ from granulcal.commands.reading import (
     open_model,
     open_recordings,
     outside,
+    reading_words,
     told_outside,
 )
 from granulcal.paths import READS, writes
@@ -44,7 +45,6 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     from granulcal.calibrate import calibrate, require_same_scene
     from granulcal.measured.plausible import violations
-    from granulcal.measured.recording import FRAMES
     from granulcal.pours.dataset import Dataset
     from granulcal.pours.left_out import LeftOut
     from granulcal.starter.models import model_named
@@ -67,11 +67,7 @@ def _run(options: argparse.Namespace) -> int:
         return UNHEALTHY
     names = " ".join(str(path) for path in options.recording)
     words = ["granulcal", "report", str(options.model), *map(str, options.recording)]
-    for name in ("camera", "topic", "camera_topic", "colour_topic", "first_frame"):
-        if getattr(options, name) is not None:
-            words += [f"--{name.replace('_', '-')}", str(getattr(options, name))]
-    if options.frames != FRAMES:
-        words += ["--frames", str(options.frames or "all")]
+    words += reading_words(options)
     words += ["-o", str(options.out), "--seeds", str(options.seeds)]
     words += ["--draws", str(options.draws)]
     found = calibrate(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.cli import main as granulcal
+from granulcal import _native
 from granulcal.files import write_beside, write_toml
 
 __all__ = ["SURFACES", "Judged", "Surface", "fit_surface", "reproduce", "write_d435_camera"]
@@ -138,7 +138,7 @@ def fit_surface(name: str, out_dir: Path, data_dir: Path, *, sessions: int = 24)
     report = out_dir / f"{name}.json"
     words += [*surface.options, "--sessions", str(sessions), "--report", str(report)]
     words += ["--out", str(out_dir / f"{name}.toml")]
-    if granulcal(words) != 0:
+    if _native.run_cli(["granulcal", *words]) != 0:
         raise RuntimeError(f"fit-sensor failed on {name}: granulcal {' '.join(words)}")
     return judge(json.loads(report.read_text(encoding="utf-8")))
 

@@ -45,9 +45,7 @@ def pours_at(scene: Scene, seeds: Sequence[int], *, threads: int | None = None) 
         seeds: one for each pour.
         threads: pours at once; the default is one for each core.
     """
-    workers = threads or os.cpu_count() or 1
-    with ThreadPoolExecutor(min(workers, max(len(seeds), 1))) as pool:
-        return list(pool.map(lambda seed: simulate(scene, seed=seed), seeds))
+    return _side_by_side([scene] * len(seeds), seeds, threads)
 
 
 def draws_of(
@@ -62,8 +60,11 @@ def draws_of(
         threads: pours at once; the default is one for each core.
     """
     scenes = [scene_at(scene, posterior.prior, theta) for theta in posterior.sample(count)]
+    made = _side_by_side(scenes, range(_FIRST_DRAW, _FIRST_DRAW + count), threads)
+    return [pour for pour in made if pour.status != "unhealthy"]
+
+
+def _side_by_side(scenes: Sequence[Scene], seeds: Sequence[int], threads: int | None) -> list[Pour]:
     workers = threads or os.cpu_count() or 1
-    with ThreadPoolExecutor(min(workers, max(count, 1))) as pool:
-        seeds = range(_FIRST_DRAW, _FIRST_DRAW + count)
-        made = pool.map(lambda each, seed: simulate(each, seed=seed), scenes, seeds)
-        return [pour for pour in made if pour.status != "unhealthy"]
+    with ThreadPoolExecutor(min(workers, max(len(seeds), 1))) as pool:
+        return list(pool.map(lambda scene, seed: simulate(scene, seed=seed), scenes, seeds))

@@ -2,24 +2,38 @@
 
 use std::any::TypeId;
 
-use clap::{Arg, Command, ValueHint};
+use clap::{Arg, Args, Command, ValueHint};
+use clap_complete::Shell;
 
-use crate::args::CompletionsArgs;
 use crate::args::paths::{Reads, Writes};
 use crate::context::print_line;
 use crate::outcome::Outcome;
-use crate::program::Program;
+use crate::run::{Run, Setting};
 
-pub fn run(program: &Program, args: &CompletionsArgs) -> anyhow::Result<Outcome> {
-    let mut script = Vec::new();
-    clap_complete::generate(
-        args.shell,
-        &mut with_path_hints(program.command()),
-        program.binary(),
-        &mut script,
-    );
-    print_line(String::from_utf8_lossy(&script).trim_end())?;
-    Ok(Outcome::Done)
+/// Print a completion script for a shell
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Prints a completion script.
+
+Example:
+  granulcal-cli completions bash > ~/.local/share/bash-completion/completions/granulcal-cli")]
+pub struct CompletionsArgs {
+    /// Shell to write for
+    pub shell: Shell,
+}
+
+impl Run for CompletionsArgs {
+    fn run(&self, setting: &Setting<'_>) -> anyhow::Result<Outcome> {
+        let mut script = Vec::new();
+        clap_complete::generate(
+            self.shell,
+            &mut with_path_hints(setting.whole.clone()),
+            setting.binary,
+            &mut script,
+        );
+        print_line(String::from_utf8_lossy(&script).trim_end())?;
+        Ok(Outcome::Done)
+    }
 }
 
 /// The parser whose paths are completed as paths.

@@ -1,5 +1,7 @@
 //! `features`: a recording to its statistics.
 
+mod args;
+
 use anyhow::Context as _;
 use granulcal_dataset::{Recording, npy, write_pictures};
 use granulcal_features::{
@@ -8,13 +10,20 @@ use granulcal_features::{
 };
 use serde_json::{Map, Value, json};
 
-use crate::args::FeaturesArgs;
 use crate::context::{note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
+use crate::run::{Run, Setting};
 use crate::scene;
 use crate::sides::SideFiles;
+pub use args::FeaturesArgs;
 
-pub fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
+impl Run for FeaturesArgs {
+    fn run(&self, _: &Setting<'_>) -> anyhow::Result<Outcome> {
+        run(self)
+    }
+}
+
+fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     if args.list {
         return if args.diagnostics {
             list(&DIAGNOSTICS, args.json)

@@ -1,5 +1,7 @@
 //! `fit-sensor`: frames of a flat surface to a sensor.
 
+mod args;
+
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -10,13 +12,20 @@ use granulcal_features::sensor::fit::{
 use granulcal_features::{Camera, DepthImage, DepthSensor, HeightMap, Moments, NoiseField};
 use serde_json::{Value, json};
 
-use crate::args::FitSensorArgs;
 use crate::args::paths::Reads;
 use crate::context::{note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
+use crate::run::{Run, Setting};
 use crate::sides::SideFiles;
+pub use args::FitSensorArgs;
 
-pub fn run(args: &FitSensorArgs) -> anyhow::Result<Outcome> {
+impl Run for FitSensorArgs {
+    fn run(&self, _: &Setting<'_>) -> anyhow::Result<Outcome> {
+        run(self)
+    }
+}
+
+fn run(args: &FitSensorArgs) -> anyhow::Result<Outcome> {
     let (frames, mut is_whole) = frames(&args.recordings, args)?;
     let mut settings = FitSettings {
         regions: args.regions.clone(),

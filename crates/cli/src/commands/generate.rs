@@ -1,22 +1,97 @@
 //! `generate`: many pours to a folder of Parquet parts.
 
+use std::time::Duration;
+
+use clap::Args;
 use cpu_time::ThreadTime;
-use granulcal_dataset::{Dataset, GenerateOptions, Observer, Prior, Summary, generate};
+use granulcal_dataset::{
+    Dataset, GenerateOptions, Observer, Prior, Product, Shard, Summary, generate,
+};
 use granulcal_scene::Scene;
 use serde_json::json;
 
-use crate::args::GenerateArgs;
+use crate::args::SceneArgs;
+use crate::args::numbers::period;
+use crate::args::paths::{Reads, Writes, writes};
 use crate::context::{Context, print_json, print_line};
 use crate::interrupt::keeps_going;
 use crate::outcome::Outcome;
 use crate::progress::RowProgress;
+use crate::run::{Run, Setting};
 use crate::scene::{self, Keep};
 use crate::sides::SideFiles;
 
 /// Pours that a dry run makes.
 const TRIED: u64 = 3;
 
-pub fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
+/// Simulate many pours with parameters drawn from a prior, to Parquet
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Draws parameters from a prior, simulates a pour for each draw and writes one row a pour:
+parameters, seed, status, health and the 16 statistics, as Parquet.
+
+Row i depends on the scene, the prior, the seed and i only. Stop it at any moment, also by
+pulling the plug, and start it again with the same arguments: the rows are the same as
+without the stop. A larger -n continues the same data set. Shards of several machines, each
+in a folder of its own, are joined by `merge`.
+
+Example:
+  granulcal-cli generate examples/funnel.toml examples/prior.toml -n 1000 --seed 1 -o data/
+  granulcal-cli generate funnel default -n 1000 --shard 0/4 -o shard-0/")]
+pub struct GenerateArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Prior as TOML, or the word `default` for the friction, rolling friction and restitution of a dry grain
+    pub prior: Reads,
+    /// Another simulator in place of ours: lammps, liggghts, yade, mujoco, newton, module:function or a
+    /// command; `granulcal` of the Python package only
+    #[arg(long, value_name = "ENGINE")]
+    pub engine: Option<String>,
+    /// Pour on a Ray cluster: auto, local, HOST:PORT or ray://HOST:PORT; `granulcal` of the Python package only
+    #[arg(long, value_name = "ADDRESS")]
+    pub ray: Option<String>,
+    /// Folder that the workers of --ray write their parts to, for example s3://bucket/run
+    #[arg(long, value_name = "URL")]
+    pub ray_store: Option<String>,
+    /// Rows of the whole data set
+    #[arg(long = "rows", short = 'n', default_value_t = 1000)]
+    pub rows: u64,
+    /// Folder to write into
+    #[arg(long = "out", short = 'o', value_name = "DIR", value_parser = writes(Product::DATA_SET))]
+    pub out: Writes,
+    /// Seed of the data set
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Make the i-th of k parts only, counted from 0
+    #[arg(long, value_name = "I/K", default_value = "0/1")]
+    pub shard: Shard,
+    /// Pours at once [default: all cores]
+    #[arg(long)]
+    pub threads: Option<usize>,
+    /// Rows in a part
+    #[arg(long, default_value_t = 16)]
+    pub chunk: u64,
+    /// Longest time that a finished row is in memory only, and a kill can lose it [s]
+    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = period)]
+    pub flush_every: Duration,
+    /// Refuse a folder that holds rows already
+    #[arg(long)]
+    pub no_resume: bool,
+    /// Say how long it would take, from three pours, and make nothing
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Run for GenerateArgs {
+    fn run(&self, setting: &Setting<'_>) -> anyhow::Result<Outcome> {
+        run(setting.context, self)
+    }
+}
+
+fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
     scene::refuse_elsewhere("--engine", args.engine.as_deref())?;
     scene::refuse_elsewhere("--ray", args.ray.as_deref())?;
     scene::refuse_elsewhere("--ray-store", args.ray_store.as_deref())?;

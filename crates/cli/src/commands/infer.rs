@@ -5,16 +5,19 @@ mod report;
 use std::path::Path;
 
 use anyhow::Context as _;
+use clap::Args;
 use granulcal_bayessim::Model;
-use granulcal_dataset::{Form, Limits, Recording, scene_from_text, write_file};
+use granulcal_dataset::{Form, Limits, Product, Recording, scene_from_text, write_file};
 use granulcal_dem::LAW;
 use granulcal_features::{Formation, PAPER16};
 use granulcal_scene::Scene;
 use serde_json::json;
 
-use crate::args::InferArgs;
+use crate::args::ReadArgs;
+use crate::args::paths::{Reads, Writes, recording, writes};
 use crate::context::{note, print_json};
 use crate::outcome::{BadArgument, Outcome};
+use crate::run::{Run, Setting};
 use crate::scene;
 use crate::sides::SideFiles;
 use report::Report;
@@ -22,7 +25,61 @@ use report::Report;
 /// Draws in the file of `--out`.
 const KEPT_DRAWS: usize = 1000;
 
-pub fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
+/// Infer the parameters from recordings with a trained model
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Evaluates a model that `granulcal train` made: recordings to statistics to the posterior of the
+parameters. Needs neither Python nor torch; a robot runs it after every pour.
+
+RECORDING is what `features` reads. Several recordings are pours of one material and give one
+posterior. The images are down-sampled so that a pixel is as wide on the ground as in the scene
+that the model was trained on, unless --camera says otherwise.
+
+A model answers under its own assumptions, right or wrong. So the recording's height, extent and
+ground are compared with what the model's scene allows, and its statistics with what any parameters
+can explain; if either fails, OUTSIDE THE MODEL is said, inside_model in the JSON is false, and the
+exit code is 3. A model whose own check failed is told on stderr.
+
+Example:
+  granulcal-cli infer model/ pile.bag
+  granulcal-cli infer model/ pile.png --camera camera.toml --json
+  granulcal-cli infer model/ 1.mcap 2.mcap 3.mcap --samples 1000 --json")]
+pub struct InferArgs {
+    /// Folder of the model
+    pub model: Reads,
+    /// Recordings of one material
+    #[arg(required = true, value_name = "RECORDING", value_parser = recording())]
+    pub recordings: Vec<Reads>,
+    #[command(flatten)]
+    pub read: ReadArgs,
+    /// Ignore a frame of so many pixels
+    #[arg(long, value_name = "PIXELS")]
+    pub border: Option<usize>,
+    /// Print so many draws of the posterior in the JSON
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "json")]
+    pub samples: usize,
+    /// Write the JSON with 1000 draws of the posterior to this file
+    #[arg(long = "out", short = 'o', value_name = "OUT.json",
+        value_parser = writes(Product::File(Form::Json)))]
+    pub out: Option<Writes>,
+    /// Refuse a model of another scene than this TOML
+    #[arg(long)]
+    pub scene: Option<Reads>,
+    /// Seed of the draws
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Run for InferArgs {
+    fn run(&self, _: &Setting<'_>) -> anyhow::Result<Outcome> {
+        run(self)
+    }
+}
+
+fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
     let model = Model::load(&args.model)?;
     if !model.is_verified {
         note(

@@ -1,5 +1,6 @@
 //! `inspect`: what is in a file, or in one substep of a scene.
 
+mod args;
 mod contact_problem;
 mod recording;
 
@@ -13,16 +14,23 @@ use granulcal_dataset::{
 use granulcal_scene::Scene;
 use serde_json::{Map, Value, json};
 
-use crate::args::InspectArgs;
 use crate::context::{print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
+use crate::run::{Run, Setting};
+pub use args::InspectArgs;
 
 /// Letters within which small things stand on one line.
 const ONE_LINE: usize = 110;
 /// How many missing rows are named.
 const NAMED_GAPS: usize = 5;
 
-pub fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
+impl Run for InspectArgs {
+    fn run(&self, _: &Setting<'_>) -> anyhow::Result<Outcome> {
+        run(self)
+    }
+}
+
+fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
     let mut is_whole = true;
     let facts = if let Some(out) = &args.contact_problem {
         contact_problem::write(&args.path, out, &args.substep)?

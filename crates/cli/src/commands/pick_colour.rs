@@ -1,19 +1,60 @@
 //! `pick-colour`: an image to the range of colours that marks its grains.
 
 use anyhow::Context as _;
-use granulcal_dataset::{png, write_mask};
-use granulcal_features::pick_range;
+use clap::Args;
+use granulcal_dataset::{Form, Product, png, write_mask};
+use granulcal_features::{Region, pick_range};
 use serde_json::json;
 
-use crate::args::PickColourArgs;
+use crate::args::paths::{Reads, Writes, writes};
 use crate::context::{note, print_json, print_line};
 use crate::outcome::Outcome;
+use crate::run::{Run, Setting};
 use crate::sides::SideFiles;
 
 /// Share of the ground's sample in the range from which the two cannot be told apart by colour.
 const MUCH_GROUND: f64 = 0.05;
 
-pub fn run(args: &PickColourArgs) -> anyhow::Result<Outcome> {
+/// Pick the range of colours that marks grains from an image
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Finds the range of hue, saturation and value that marks the grains of a colour image, for the
+table [segmentation.colour] of a camera's TOML.
+
+Point at some grains with --grains and, if you can, at some ground with --ground: rectangles of
+the image. The range is that of the grains, its bounds half way to the ground's where the two
+do not overlap. Without a rectangle the image is cut in two by brightness or saturation, and
+the smaller part is taken for grains.
+
+Look at the result: --mask writes the image with the grains outlined.
+
+Example:
+  granulcal-cli pick-colour pile.png --mask mask.png
+  granulcal-cli pick-colour pile.png --grains 300,220,40,40 --ground 20,20,80,80 --mask mask.png")]
+pub struct PickColourArgs {
+    /// 8-bit colour PNG
+    pub image: Reads,
+    /// Rectangle with grains only; repeat as needed
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT")]
+    pub grains: Vec<Region>,
+    /// Rectangle without grains; repeat as needed
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", requires = "grains")]
+    pub ground: Vec<Region>,
+    /// Write the image with the grains outlined
+    #[arg(long, value_name = "OUT.png", value_parser = writes(Product::File(Form::Png)))]
+    pub mask: Option<Writes>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Run for PickColourArgs {
+    fn run(&self, _: &Setting<'_>) -> anyhow::Result<Outcome> {
+        run(self)
+    }
+}
+
+fn run(args: &PickColourArgs) -> anyhow::Result<Outcome> {
     let image = png::read_colour(&args.image)?;
     let picked = pick_range(&image, &args.grains, &args.ground)?;
     let mut sides = SideFiles::default();

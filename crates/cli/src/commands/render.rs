@@ -2,18 +2,59 @@
 
 use std::path::Path;
 
+use clap::Args;
 use granulcal_dataset::{
-    CameraFile, Drawn, Observer, View, look, look_from, npy, png, write_height_map,
+    CameraFile, Drawn, Observer, Product, View, look, look_from, npy, png, write_height_map,
 };
 use granulcal_scene::{Projection, Scene, ViewSpec};
 
-use crate::args::RenderArgs;
+use crate::args::SceneArgs;
+use crate::args::numbers::positive;
+use crate::args::paths::{Reads, Writes, writes};
 use crate::context::{Context, print_line};
 use crate::outcome::{BadArgument, Outcome};
+use crate::run::{Run, Setting};
 use crate::scene::{self, Keep};
 use crate::sides::SideFiles;
 
-pub fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
+/// Simulate or take grains and write the depth image that the scene's camera sees
+#[derive(Debug, Args)]
+#[command(long_about = "\
+Writes the image that the scene's camera delivers, down-sampled and with the scene's noise:
+a 16-bit PNG of depth with the camera's TOML beside it, or an .npz height map for an
+orthographic camera. Both can be read back by `features`.
+
+Example:
+  granulcal-cli render funnel --seed 1 -o pile.png && granulcal-cli features pile.png --camera pile.toml
+  granulcal-cli render funnel --positions grains.npy -o pile.png")]
+pub struct RenderArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// Image to write: .png for a pinhole camera, .npz for an orthographic one
+    #[arg(long = "out", short = 'o', value_parser = writes(Product::View))]
+    pub out: Writes,
+    /// What this one of the scene's views sees, a depth image without noise, instead of the scene's camera
+    #[arg(long, value_name = "NAME")]
+    pub view: Option<String>,
+    /// Render these centres [m], an array (n, 3), with the scene's grain diameter, instead of a pour
+    #[arg(long, value_name = "IN.npy")]
+    pub positions: Option<Reads>,
+    /// Seed of the pour and of the camera's noise
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Metres per count of the PNG
+    #[arg(long, default_value_t = granulcal_dataset::png::DEPTH_UNIT, value_name = "METRES",
+        value_parser = positive)]
+    pub depth_unit: f64,
+}
+
+impl Run for RenderArgs {
+    fn run(&self, setting: &Setting<'_>) -> anyhow::Result<Outcome> {
+        run(setting.context, self)
+    }
+}
+
+fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
     let scene = scene::load(&args.scene)?;
     let further = args.view.as_deref().map(|name| find_view(&scene, name)).transpose()?;
     match further {

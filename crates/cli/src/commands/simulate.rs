@@ -1,5 +1,7 @@
 //! `simulate`: one pour.
 
+mod args;
+
 use std::time::Instant;
 
 use anyhow::Context as _;
@@ -14,11 +16,12 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::render::{check_name, write_view};
-use crate::args::SimulateArgs;
 use crate::context::{Context, print_json, print_line};
 use crate::outcome::Outcome;
+use crate::run::{Run, Setting};
 use crate::scene::{self, Keep};
 use crate::sides::SideFiles;
+pub use args::SimulateArgs;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -49,7 +52,13 @@ struct Report {
     series: Map<String, Value>,
 }
 
-pub fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
+impl Run for SimulateArgs {
+    fn run(&self, setting: &Setting<'_>) -> anyhow::Result<Outcome> {
+        run(setting.context, self)
+    }
+}
+
+fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
     scene::refuse_elsewhere("--engine", args.engine.as_deref())?;
     let scene = scene::load(&args.scene)?;
     if let Some(path) = &args.depth {

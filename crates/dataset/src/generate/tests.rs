@@ -87,7 +87,7 @@ fn parts_that_were_made_elsewhere_are_gathered() {
     let part = |index| {
         place.make(&format!("worker-{index}"), &one(index));
         let name = format!("worker-{index}/part-{index:06}.parquet");
-        std::fs::read(place.at(&name)).unwrap()
+        fs::read(place.at(&name)).unwrap()
     };
     let open = |rows| {
         let options = GenerateOptions { chunk, ..options(rows) };

@@ -1,7 +1,5 @@
 //! One parameter of a prior, and what it may be.
 
-use granulcal_numbers::normal_cdf;
-
 use crate::distribution::Distribution;
 use crate::error::SceneError;
 
@@ -50,14 +48,6 @@ impl Parameter {
     }
 }
 
-/// The share of a normal that lies between bounds.
-fn normal_mass(mean: f64, sd: f64, low: Option<f64>, high: Option<f64>) -> f64 {
-    let [a, b] = [low, high].map(|bound| bound.map(|bound| (bound - mean) / sd));
-    let (a, b) = (a.unwrap_or(f64::NEG_INFINITY), b.unwrap_or(f64::INFINITY));
-    // In the upper tail the probabilities of the lower one keep their digits.
-    if a > 0.0 { normal_cdf(-a) - normal_cdf(-b) } else { normal_cdf(b) - normal_cdf(a) }
-}
-
 /// What is wrong with a parameter, for messages.
 pub(super) fn refuse(
     parameter: &str,
@@ -95,7 +85,7 @@ fn check_distribution(path: &str, distribution: &Distribution) -> Result<(), Sce
             low.map_or(Ok(()), |low| finite("low", low))?;
             high.map_or(Ok(()), |high| finite("high", high))?;
             low.zip(high).map_or(Ok(()), |(low, high)| ordered(low, high))?;
-            let mass = normal_mass(mean, sd, low, high);
+            let mass = distribution.mass();
             if mass < SMALLEST_NORMAL_MASS {
                 let got = format!("bounds that hold {mass:.3e}");
                 return Err(refuse(

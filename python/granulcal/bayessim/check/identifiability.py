@@ -4,7 +4,8 @@ For each parameter the information gained over the prior is the divergence of it
 from its prior, $\int p(v | x) \log p(v | x) dv$ with v the parameter's quantile in the prior [nat].
 With $\Sigma$ the posterior's covariance in units of the prior's spread and $\lambda$ its values,
 $\sum_i \max(1 - \lambda_i, 0)$ counts the directions that are known: the effective dimension. The
-eigenvector of the largest eigenvalue is the ridge, along which parameters can be traded.
+eigenvector of the largest eigenvalue is the ridge, along which parameters can be traded. Evaluated
+by the extension (`crates/bayessim/src/identifiability.rs`); here it is averaged.
 
 Reference:
     Lindley, On a measure of the information provided by an experiment, Annals of Mathematical
@@ -15,12 +16,12 @@ Reference:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal import _native
 from granulcal.prior import Prior
 
 if TYPE_CHECKING:
@@ -30,7 +31,6 @@ __all__ = ["Identifiability"]
 
 Array = NDArray[np.float64]
 
-_DRAWS, _BINS, _PRIOR_DRAWS = 1000, 20, 20_000
 # A gain below this is hardly told from none: a posterior 10 % narrower than the prior.
 NO_TRACE = 0.1
 _PARTS = ("low", "middle", "high")
@@ -59,20 +59,23 @@ class Identifiability:
     @classmethod
     def of(cls, posterior: "Posterior") -> "Identifiability":
         """Returns what one posterior knows."""
-        gains, covariance = _knowledge(posterior)
-        return cls(tuple(posterior.names), gains, *_directions(covariance))
+        gains, _, dimension, ridge, spread = posterior.density.identifiability()
+        return cls(tuple(posterior.names), np.array(gains), dimension, np.array(ridge), spread)
 
     @classmethod
     def average(cls, posteriors: Sequence["Posterior"], truth: Array) -> "Identifiability":
         """Returns what posteriors of known parameters `truth` (n, p) know on average."""
         prior = posteriors[0].prior
-        known = [_knowledge(posterior) for posterior in posteriors]
-        gains = np.array([gain for gain, _ in known])
-        covariance = np.mean([each for _, each in known], axis=0)
+        known = [posterior.density.identifiability() for posterior in posteriors]
+        gains = np.array([each[0] for each in known])
+        covariance = np.mean([each[1] for each in known], axis=0)
+        dimension, ridge, spread = _native.directions(covariance)
         return cls(
             tuple(prior.names),
             gains.mean(axis=0),
-            *_directions(covariance),
+            dimension,
+            np.array(ridge),
+            spread,
             _blind(prior, gains, truth),
         )
 
@@ -105,36 +108,6 @@ class Identifiability:
             f"{ridge}, where {self.ridge_spread:.0%} of the prior's spread is left",
         ]
         return "\n".join(lines + [f"  no trace: {line}" for line in self.blind])
-
-
-def _knowledge(posterior: "Posterior") -> tuple[Array, Array]:
-    """Gain of each parameter (p,) and covariance in the prior's spreads (p, p)."""
-    prior = posterior.prior
-    reference = _sorted_prior(prior)
-    draws = prior.to_unconstrained(posterior.sample(_DRAWS, seed=0))
-    gains = np.empty(draws.shape[1])
-    for i in range(draws.shape[1]):
-        quantiles = np.searchsorted(reference[:, i], draws[:, i]) / _PRIOR_DRAWS
-        share = np.histogram(quantiles, bins=_BINS, range=(0, 1))[0] / _DRAWS
-        filled = share[share > 0]
-        # Empty evidence has a positive gain by chance: (bins - 1) / 2n.
-        bias = (len(filled) - 1) / (2 * _DRAWS)
-        gains[i] = max(float(np.sum(filled * np.log(filled * _BINS))) - bias, 0.0)
-    scaled = draws / reference.std(axis=0)
-    return gains, np.cov(scaled.T).reshape(draws.shape[1], -1)
-
-
-@lru_cache(maxsize=4)
-def _sorted_prior(prior: Prior) -> Array:
-    """Each coordinate of many draws of the prior, in order, shape (draws, p)."""
-    return np.sort(prior.to_unconstrained(prior.sample(_PRIOR_DRAWS, seed=0)), axis=0)
-
-
-def _directions(covariance: Array) -> tuple[float, Array, float]:
-    values, vectors = np.linalg.eigh(covariance)
-    ridge = vectors[:, -1] * (1 if vectors[np.abs(vectors[:, -1]).argmax(), -1] > 0 else -1)
-    known = float(np.sum(np.clip(1 - values, 0, 1)))
-    return known, ridge, float(np.sqrt(values[-1]))
 
 
 def _blind(prior: Prior, gains: Array, truth: Array) -> tuple[str, ...]:

@@ -80,6 +80,10 @@ class LinearGaussian:
 
     def posterior(self, x: ArrayLike) -> Posterior:
         """Returns the exact posterior given `x` (s,) or k observations of one theta (k, s)."""
+        return Posterior.from_mixture(self.prior, self.normal(x))
+
+    def normal(self, x: ArrayLike) -> Mixture:
+        """Returns the one normal of the coordinates that the posterior is, cut to the prior."""
         observed = as_matrix("x", x, columns=len(self.matrix))
         information = self.matrix.T @ np.linalg.inv(self.noise_covariance)
         precision = len(observed) * information @ self.matrix
@@ -87,8 +91,7 @@ class LinearGaussian:
             precision = precision + np.eye(len(precision))
         covariance = np.linalg.inv(precision)
         mean = covariance @ information @ observed.sum(axis=0)
-        mixture = Mixture.from_covariances(np.ones(1), mean[None], covariance[None])
-        return Posterior.from_mixture(self.prior, mixture)
+        return Mixture.from_covariances(np.ones(1), mean[None], covariance[None])
 
 
 class PileStandIn:

@@ -10,7 +10,6 @@ length scales maximise the summed evidence of all statistics.
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain, combinations_with_replacement
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,25 +52,13 @@ class Basis:
         base = _frequencies(features, u.shape[1], seed)
         return cls(u.mean(axis=0), np.where(spread > 0, spread, 1.0), base / length_scales, degree)
 
-    def __call__(self, u: Array, *, quick: bool = False) -> Array:
-        """Returns the features at `u` (n, p), shape (n, d).
-
-        Args:
-            u: coordinates.
-            quick: cosines and sines in single precision, a tenth of the time; their error of 1e-7
-                is too much for a log density to the last digit, but not for a weight.
-        """
+    def __call__(self, u: Array) -> Array:
+        """Returns the features at `u` (n, p), shape (n, d)."""
         v = (u - self.centre) / self.scale
-        phase: NDArray[np.floating] = self.frequencies @ v.T
-        if quick:
-            # The turns are taken away before digits are lost.
-            turns = phase / (2 * np.pi)
-            turns -= np.rint(turns)
-            phase = turns.astype(np.float32)
-            phase *= np.float32(2 * np.pi)
+        phase = self.frequencies @ v.T
         terms, count = _terms(u.shape[1], self.degree), len(self.frequencies)
         # One feature after the other lies in memory, so that each is filled in one go.
-        features: Any = np.empty((len(terms) + 2 * count, len(u)), dtype=phase.dtype)
+        features = np.empty((len(terms) + 2 * count, len(u)))
         _fill_polynomial(v, terms, features)
         features[: len(terms)] *= _POLYNOMIAL
         waves = features[len(terms) :]
@@ -98,9 +85,7 @@ def _terms(dimension: int, degree: int) -> tuple[tuple[int, ...], ...]:
     )
 
 
-def _fill_polynomial(
-    v: Array, terms: tuple[tuple[int, ...], ...], rows: NDArray[np.floating]
-) -> None:
+def _fill_polynomial(v: Array, terms: tuple[tuple[int, ...], ...], rows: Array) -> None:
     for term, row in zip(terms, rows, strict=False):
         row[:] = v[:, term[0]] if term else 1.0
         for i in term[1:]:

@@ -54,11 +54,6 @@ class Prediction:
         """Returns what is expected of the first `count` statistics."""
         return Prediction(self.means[:, :count], self.scales[:, :count], self.unknown[:, :count])
 
-    def row(self, i: int) -> "Prediction":
-        """Returns what is expected at one of the points."""
-        rows = slice(i, i + 1)
-        return Prediction(self.means[rows], self.scales[rows], self.unknown[rows])
-
 
 @dataclass(frozen=True)
 class Emulator:
@@ -173,17 +168,15 @@ class Emulator:
             spread=self.spread[rows],
         )
 
-    def predict(self, u: Array, *, quick: bool = False) -> Prediction:
-        """Returns what is expected at `u` (n, p); `quick` as in `Basis`."""
-        kind = np.float32 if quick else np.float64
-        coefficients = self.coefficients.T.astype(kind, copy=False)
+    def predict(self, u: Array) -> Prediction:
+        """Returns what is expected at `u` (n, p)."""
         means = np.empty((len(u), len(self.coefficients)))
         for start in range(0, len(u), _BLOCK):
             rows = slice(start, start + _BLOCK)
-            means[rows] = self.basis(u[rows], quick=quick) @ coefficients
-        design = self.scale_basis(u, quick=quick)
-        scales = np.exp(design @ self.scale_coefficients.T.astype(kind, copy=False))
-        unknown = np.exp(design @ self.unknown_coefficients.T.astype(kind, copy=False))
+            means[rows] = self.basis(u[rows]) @ self.coefficients.T
+        design = self.scale_basis(u)
+        scales = np.exp(design @ self.scale_coefficients.T)
+        unknown = np.exp(design @ self.unknown_coefficients.T)
         return Prediction(
             self.shift + self.spread * means, self.spread * scales, self.spread * unknown
         )

@@ -1,4 +1,4 @@
-r"""Likelihood of the parameters by an emulator of the leading signal axes.
+r"""Likelihood of the parameters by an emulator of the leading signal axes: its fit.
 
 The statistics are rotated to their signal axes (`signal.py`); the first r of them are emulated, and
 k pours with the mean $\bar y$ have
@@ -17,6 +17,10 @@ Which r and c, and whether the noise changes over the parameters, is chosen by h
 parameters of pairs that an emulator has not seen are to be most probable under its posterior, among
 those choices whose highest-density regions hold them as often as they claim.
 
+Fitted here, evaluated by the extension (`crates/bayessim/src/likelihood.rs`) of parts that are in
+memory. What stays beside it here is the choice among hundreds of forms at thousands of cells at
+once, in single precision, which needs matrices of all pairs; a test holds the two together.
+
 Reference:
     Wood, Statistical inference for noisy nonlinear ecological dynamic systems, Nature 466, 2010
     (synthetic likelihood).
@@ -27,22 +31,19 @@ Reference:
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import NamedTuple
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal import _native
 from granulcal.bayessim.check.diagnostics import uniform_p_value
 from granulcal.bayessim.emulator.basis import learn_length_scales
 from granulcal.bayessim.emulator.emulator import Emulator, Prediction
+from granulcal.bayessim.emulator.linear import linear_scores
 from granulcal.bayessim.emulator.noise import Noise
-from granulcal.bayessim.emulator.pooling import (
-    averaging_share,
-    linear_scores,
-    pooled_scales,
-)
 from granulcal.bayessim.emulator.signal import SignalAxes
-from granulcal.bayessim.posterior.density import quasi_prior
+from granulcal.bayessim.posterior.coordinates import coordinates_of, quasi_prior
 from granulcal.prior import Prior
 from granulcal.progress import steps
 
@@ -89,6 +90,15 @@ class EmulatorChoice:
             f"log density of held-out pairs {self.score:.2f} (linear regression "
             f"{self.linear_score:.2f})"
         )
+
+
+class Scalars(TypedDict):
+    """Numbers of a likelihood that are no arrays."""
+
+    widening: float
+    degrees: float
+    leading_degrees: float
+    axis_count: int
 
 
 class _Form(NamedTuple):
@@ -202,54 +212,61 @@ class Likelihood:
         """What the leading emulator expects there."""
         return self.leading.predict(self.cells)
 
-    @cached_property
-    def everything_at_cells(self) -> Prediction:
-        """What the emulator of all axes expects there."""
-        return self.emulator.predict(self.cells)
-
-    @cached_property
+    @property
     def pool(self) -> Array:
-        """More evenly spread draws of the prior, shape (m, p)."""
+        """More evenly spread draws of the prior, the cells first, shape (m, p)."""
         return quasi_prior(self.prior, _POOL)
 
     @cached_property
-    def at_pool(self) -> Prediction:
-        """What the leading emulator expects there."""
-        return self.leading.predict(self.pool)
+    def native(self) -> _native.Emulated:
+        """The same as the extension evaluates it."""
+        return _native.Emulated(
+            coordinates_of(self.prior),
+            {name: np.ascontiguousarray(array, float) for name, array in self.arrays().items()},
+            statistics=len(self.axes.matrix),
+            **self.scalars(),
+        )
 
-    def log_prob(self, z: Array, u: Array, *, quick: bool = False) -> Array:
+    def arrays(self) -> dict[str, Array]:
+        """Returns its arrays by their names in a model's file."""
+        emulator = self.emulator
+        return {
+            "emulator_axes": self.axes.matrix,
+            "emulator_relevance": self.axes.relevance,
+            "emulator_centre": emulator.scale_basis.centre,
+            "emulator_scale": emulator.scale_basis.scale,
+            "emulator_frequencies": emulator.basis.frequencies,
+            "emulator_coefficients": emulator.coefficients,
+            "emulator_scale_frequencies": emulator.scale_basis.frequencies,
+            "emulator_scale_coefficients": emulator.scale_coefficients,
+            "emulator_unknown_coefficients": emulator.unknown_coefficients,
+            "emulator_root": emulator.noise.root,
+            "emulator_leading_root": self.leading.noise.root,
+            "emulator_y_shift": emulator.shift,
+            "emulator_y_spread": emulator.spread,
+        }
+
+    def scalars(self) -> Scalars:
+        """Returns its numbers that are no arrays, by their names in a model's file."""
+        return Scalars(
+            widening=self.widening,
+            degrees=self.emulator.noise.degrees,
+            leading_degrees=self.leading.noise.degrees,
+            axis_count=self.axis_count,
+        )
+
+    def log_prob(self, z: Array, u: Array) -> Array:
         """Returns the log likelihood of k pours `z` (k, s) at `u` (n, p), shape (n,).
 
         Args:
             z: standardised statistics.
             u: coordinates.
-            quick: as in `Basis`.
         """
-        return self.of_prediction(z, self.leading.predict(u, quick=quick))
+        return self.native.log_prob(np.ascontiguousarray(z), np.ascontiguousarray(u))
 
-    @cached_property
-    def scales_at_pool(self) -> Array:
-        """Square root of V_1 there, shape (m, r)."""
-        return pooled_scales(self.at_pool, 1, self.widening)
-
-    def start(self, z: Array) -> Array:
+    def at_pool(self, z: Array) -> Array:
         """Returns the log likelihood of k pours `z` (k, s) at `pool`, shape (m,)."""
-        return self.of_prediction(z, self.at_pool, self.scales_at_pool if len(z) == 1 else None)
-
-    def of_prediction(self, z: Array, prediction: Prediction, scales: Array | None = None) -> Array:
-        """Returns the log likelihood where the leading emulator expects `prediction`, shape (n,).
-
-        Args:
-            z: standardised statistics of k pours, shape (k, s).
-            prediction: at n points.
-            scales: square root of V_k there, if known already.
-        """
-        y = self.axes.apply(z)[:, : self.axis_count]
-        if scales is not None:
-            return self.leading.noise.log_density(y[0] - prediction.means, scales)
-        share = averaging_share(y, prediction.scales)
-        scales = pooled_scales(prediction, len(z), self.widening, share)
-        return self.leading.noise.log_density(y.mean(axis=0) - prediction.means, scales)
+        return self.native.at_pool(np.ascontiguousarray(z))
 
     def held_out_scores(
         self, u: Array, z: Array, at_cells: Prediction | None = None

@@ -33,9 +33,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal import _native
 from granulcal.bayessim.emulator.likelihood import Fold
 from granulcal.bayessim.network.mixture import Mixture
-from granulcal.bayessim.posterior.density import TruncatedMixture
+from granulcal.bayessim.posterior.coordinates import coordinates_of
 
 __all__ = ["Average", "HeldOut"]
 
@@ -112,18 +113,19 @@ class HeldOut:
             z: standardised statistics, shape (n, s).
             seed: seed of the draws.
         """
-        likelihood, generator = fold.likelihood, np.random.default_rng(seed)
-        prior, cells, at_cells = likelihood.prior, likelihood.cells, likelihood.at_cells
+        likelihood = fold.likelihood
+        prior, cells = likelihood.prior, likelihood.cells
         log_prior = prior.coordinate_log_prob(u)
+        network = (NETWORK_ALONE.form, NETWORK_ALONE.emulator, NETWORK_ALONE.network)
         found: list[tuple[Array, Array, Array]] = []
         for mixture, truth, row in zip(mixtures, u, z[:, None], strict=True):
-            cut = TruncatedMixture.cut(prior, mixture)
+            cut = _native.Posterior(coordinates_of(prior), [], [mixture.arrays], network)
             # The truth is one of the points, so that it cannot be more probable than all.
-            others = np.concatenate([cut.sample(_DRAWS, generator), truth[None]])
+            others = np.concatenate([cut.sample(_DRAWS, seed), truth[None]])
             points = np.concatenate([cells, others])
-            emulated = np.concatenate(
-                [likelihood.of_prediction(row, at_cells), likelihood.log_prob(row, others)]
-            )
+            # The cells are the first points of the pool.
+            at_cells = likelihood.at_pool(row)[: len(cells)]
+            emulated = np.concatenate([at_cells, likelihood.log_prob(row, others)])
             learnt = cut.log_prob(points) - prior.coordinate_log_prob(points)
             share = _DRAWS / (_DRAWS + len(cells))
             log_weights = -np.logaddexp(math.log(1 - share), math.log(share) + learnt)

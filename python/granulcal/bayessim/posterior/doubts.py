@@ -1,17 +1,10 @@
 """What a posterior warns of: an observation or a prior for which it says less than it seems to."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
+from granulcal import _native
 
-if TYPE_CHECKING:
-    pass
-
-__all__ = ["FewEffectiveDraws", "MassOutsidePrior", "OutOfRange", "PoursDisagree"]
-
-Array = NDArray[np.float64]
+__all__ = ["FewEffectiveDraws", "MassOutsidePrior", "OutOfRange", "PoursDisagree", "doubts_of"]
 
 
 @dataclass(frozen=True)
@@ -40,7 +33,18 @@ class OutOfRange:
 
 
 @dataclass(frozen=True)
-class MassOutsidePrior:
+class _Told:
+    """What the extension found, in its words."""
+
+    text: str = field(kw_only=True, default="", repr=False, compare=False)
+
+    def __str__(self) -> str:
+        """One line."""
+        return self.text
+
+
+@dataclass(frozen=True)
+class MassOutsidePrior(_Told):
     """Nearly all mass of a pour's mixture lies outside the prior's bounds.
 
     Attributes:
@@ -51,14 +55,10 @@ class MassOutsidePrior:
     pour: int
     mass_inside: float
 
-    def __str__(self) -> str:
-        """One line."""
-        return f"pour {self.pour}: only {self.mass_inside:.2g} of the mass is inside the prior"
-
 
 @dataclass(frozen=True)
-class FewEffectiveDraws:
-    """The pours' posteriors overlap so little that their product is poorly sampled.
+class FewEffectiveDraws(_Told):
+    """The weighted draws of the posterior are worth few independent ones.
 
     Attributes:
         effective_sample_size: independent draws that the weighted draws are worth.
@@ -68,16 +68,9 @@ class FewEffectiveDraws:
     effective_sample_size: float
     needed: float
 
-    def __str__(self) -> str:
-        """One line."""
-        return (
-            f"the product of the pours is worth {self.effective_sample_size:.0f} draws only "
-            f"(at least {self.needed:.0f} wanted): do these pours share one material?"
-        )
-
 
 @dataclass(frozen=True)
-class PoursDisagree:
+class PoursDisagree(_Told):
     """One material explains the pours much worse than a material for each pour would.
 
     Attributes:
@@ -89,9 +82,19 @@ class PoursDisagree:
     log_evidence_ratio: float
     needed: float
 
-    def __str__(self) -> str:
-        """One line."""
-        return (
-            f"the pours contradict each other: log evidence of one material against several is "
-            f"{self.log_evidence_ratio:.1f} (reported below {self.needed:.1f})"
-        )
+
+Doubt = OutOfRange | MassOutsidePrior | FewEffectiveDraws | PoursDisagree
+
+
+def doubts_of(density: _native.Posterior) -> tuple[Doubt, ...]:
+    """Returns what the extension warns of."""
+    found: list[Doubt] = []
+    for kind, numbers, text in density.warnings:
+        first, second = numbers
+        if kind == "mass_outside_prior":
+            found.append(MassOutsidePrior(int(first), second, text=text))
+        elif kind == "few_effective_draws":
+            found.append(FewEffectiveDraws(first, second, text=text))
+        else:
+            found.append(PoursDisagree(first, second, text=text))
+    return tuple(found)

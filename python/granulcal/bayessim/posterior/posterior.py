@@ -6,29 +6,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from granulcal import _native
 from granulcal.bayessim.arrays import as_matrix
 from granulcal.bayessim.emulator.likelihood import Likelihood
 from granulcal.bayessim.network.mixture import Mixture
-from granulcal.bayessim.posterior.arithmetic import StackedDensity
-from granulcal.bayessim.posterior.average import Average
-from granulcal.bayessim.posterior.density import Density, TruncatedMixture
-from granulcal.bayessim.posterior.geometric import geometric_density
-from granulcal.bayessim.posterior.importance import FEWEST_EFFECTIVE, ImportanceDensity
-from granulcal.bayessim.posterior.joint import joint_density
-from granulcal.bayessim.posterior.product import LEAST_LOG_EVIDENCE_RATIO, product_density
+from granulcal.bayessim.posterior.average import EMULATOR_ALONE, NETWORK_ALONE, Average
+from granulcal.bayessim.posterior.coordinates import coordinates_of
+from granulcal.bayessim.posterior.doubts import (
+    Doubt,
+    FewEffectiveDraws,
+    MassOutsidePrior,
+    OutOfRange,
+    PoursDisagree,
+    doubts_of,
+)
+from granulcal.bayessim.posterior.marginal import CredibleRegion, Marginal, kernel_density
 from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-from granulcal.bayessim.posterior.doubts import (
-    FewEffectiveDraws,
-    MassOutsidePrior,
-    OutOfRange,
-    PoursDisagree,
-)
-from granulcal.bayessim.posterior.marginal import CredibleRegion, Marginal, kernel_density
 
 __all__ = [
     "CredibleRegion",
@@ -44,9 +41,6 @@ Array = NDArray[np.float64]
 
 # Draws behind means, regions and marginals; a quantile of them is good to about 1 %.
 _SUMMARY_DRAWS = 10_000
-_MODE_STARTS = 4
-_MODE_ROUNDS = 40
-_MODE_TRIES = 32
 
 
 class Posterior:
@@ -57,7 +51,7 @@ class Posterior:
 
     Attributes:
         prior: the prior.
-        density: the density over the prior's coordinates.
+        density: the density over the prior's coordinates, evaluated by the extension.
         warnings: what a reader must know before trusting the numbers; empty if nothing.
 
     Examples:
@@ -70,11 +64,13 @@ class Posterior:
         True
     """
 
-    def __init__(self, prior: Prior, density: Density, *, warnings: tuple[Any, ...] = ()) -> None:
+    def __init__(
+        self, prior: Prior, density: _native.Posterior, *, warnings: tuple[Doubt, ...] = ()
+    ) -> None:
         """Joins a prior and a density over its coordinates."""
         self.prior = prior
         self.density = density
-        self.warnings = warnings
+        self.warnings = (*warnings, *doubts_of(density))
         self._summary: tuple[Array, Array] | None = None
         self._last: tuple[tuple[int, int], Array] | None = None
 
@@ -85,23 +81,17 @@ class Posterior:
 
     @classmethod
     def from_mixtures(
-        cls, prior: Prior, mixtures: list[Mixture], *, warnings: tuple[Any, ...] = ()
+        cls, prior: Prior, mixtures: list[Mixture], *, warnings: tuple[Doubt, ...] = ()
     ) -> "Posterior":
-        """Returns the posterior of k pours of one material, given each pour's own mixture.
+        r"""Returns the posterior of k pours of one material, given each pour's own mixture.
 
-        For k > 1 this is the product of the pours' posteriors over prior^(k - 1), by importance
-        sampling; it is not their average.
+        Given the parameters the pours are independent, so for k > 1 this is
+
+        $$ p(u | x_1, ..., x_k) \propto p(u)^{1 - k} \prod_i p(u | x_i) $$
+
+        by importance sampling; it is not the average of the pours' posteriors.
         """
-        factors = [TruncatedMixture.cut(prior, mixture) for mixture in mixtures]
-        found = [*warnings, *_outside(factors)]
-        if len(factors) == 1:
-            return cls(prior, factors[0], warnings=tuple(found))
-        product = product_density(prior, factors)
-        if product.effective_sample_size < FEWEST_EFFECTIVE:
-            found.append(FewEffectiveDraws(product.effective_sample_size, FEWEST_EFFECTIVE))
-        if product.log_normaliser < LEAST_LOG_EVIDENCE_RATIO:
-            found.append(PoursDisagree(product.log_normaliser, LEAST_LOG_EVIDENCE_RATIO))
-        return cls(prior, product, warnings=tuple(found))
+        return cls._of(prior, [], mixtures, NETWORK_ALONE, warnings)
 
     @classmethod
     def from_conditions(
@@ -109,7 +99,7 @@ class Posterior:
         prior: Prior,
         conditions: list[tuple[Likelihood, Array]],
         *,
-        warnings: tuple[Any, ...] = (),
+        warnings: tuple[Doubt, ...] = (),
     ) -> "Posterior":
         """Returns the posterior of one material under one or several conditions.
 
@@ -118,7 +108,7 @@ class Posterior:
             conditions: for each the emulated likelihood and its k standardised pours, shape (k, s).
             warnings: what is known beforehand.
         """
-        return cls._sampled(prior, joint_density(prior, conditions), warnings)
+        return cls._of(prior, conditions, [], EMULATOR_ALONE, warnings)
 
     @classmethod
     def from_average(
@@ -128,11 +118,16 @@ class Posterior:
         mixtures: list[Mixture],
         average: Average,
         *,
-        warnings: tuple[Any, ...] = (),
+        warnings: tuple[Doubt, ...] = (),
     ) -> "Posterior":
-        """Returns the average of an emulator's and a network's posterior of k pours.
+        r"""Returns the average of an emulator's and a network's posterior of k pours.
 
-        The arithmetic average is for one pour: several are the emulator's alone.
+        $$ p(u \mid x_1, \ldots, x_k) \propto p(u) \, L_k(u)^a \,
+           \prod_i \Big(\frac{q(u \mid x_i)}{p(u)}\Big)^{b / k} $$
+
+        with the emulator's likelihood L of k pours of one material and the network's mixture q of
+        each; the network's errors are the same for all pours, so that all of them together count
+        as one. The arithmetic average is for one pour: several are the emulator's alone.
 
         Args:
             prior: the prior.
@@ -141,24 +136,23 @@ class Posterior:
             average: form and weights.
             warnings: what is known beforehand.
         """
-        if average.form == "arithmetic" and len(mixtures) > 1:
-            return cls.from_conditions(prior, [condition], warnings=warnings)
-        learnt = [TruncatedMixture.cut(prior, mixture) for mixture in mixtures]
-        warnings = (*warnings, *_outside(learnt))
-        if average.form == "arithmetic":
-            emulated = cls.from_conditions(prior, [condition], warnings=warnings)
-            density = StackedDensity(emulated.density, learnt[0], average.emulator)
-            return cls(prior, density, warnings=emulated.warnings)
-        density = geometric_density(prior, condition, mixtures, average)
-        return cls._sampled(prior, density, warnings)
+        return cls._of(prior, [condition], mixtures, average, warnings)
 
     @classmethod
-    def _sampled(
-        cls, prior: Prior, density: ImportanceDensity, warnings: tuple[Any, ...]
+    def _of(
+        cls,
+        prior: Prior,
+        conditions: list[tuple[Likelihood, Array]],
+        mixtures: list[Mixture],
+        average: Average,
+        warnings: tuple[Doubt, ...],
     ) -> "Posterior":
-        effective = density.effective_sample_size
-        if effective < FEWEST_EFFECTIVE:
-            warnings = (*warnings, FewEffectiveDraws(effective, FEWEST_EFFECTIVE))
+        density = _native.Posterior(
+            coordinates_of(prior),
+            [(likelihood.native, np.ascontiguousarray(z)) for likelihood, z in conditions],
+            [mixture.arrays for mixture in mixtures],
+            (average.form, average.emulator, average.network),
+        )
         return cls(prior, density, warnings=warnings)
 
     @property
@@ -173,7 +167,7 @@ class Posterior:
             raise ValueError(f"n must be a whole number of at least 0, got {n!r}")
         # Checks ask the same draws one after the other.
         if self._last is None or self._last[0] != (n, seed):
-            coordinates = self.density.sample(int(n), np.random.default_rng(seed))
+            coordinates = self.density.sample(int(n), seed)
             self._last = (n, seed), self.prior.from_unconstrained(coordinates)
         return self._last[1].copy()
 
@@ -214,25 +208,7 @@ class Posterior:
 
         Found by climbing from the best draws with random steps that shrink; always the same.
         """
-        draws, log_density = self._draws()
-        generator = np.random.default_rng(0)
-        low, high = self.prior.unconstrained_bounds.T
-        best = np.argsort(log_density)[::-1][:_MODE_STARTS]
-        points, heights = draws[best], log_density[best]
-        root = np.linalg.cholesky(np.cov(draws.T).reshape(len(low), -1) + 1e-18 * np.eye(len(low)))
-        step = 0.5
-        for _ in range(_MODE_ROUNDS):
-            shape = (len(points), _MODE_TRIES, len(low))
-            tries = points[:, None] + step * generator.standard_normal(shape) @ root.T
-            tries = np.clip(tries, low, high)
-            tried = self.density.log_prob(tries.reshape(-1, len(low))).reshape(shape[:2])
-            top = tried.argmax(axis=1)
-            rows = np.arange(len(points))
-            is_higher = tried[rows, top] > heights
-            points = np.where(is_higher[:, None], tries[rows, top], points)
-            heights = np.where(is_higher, tried[rows, top], heights)
-            step *= 0.85
-        return self.prior.from_unconstrained(points[heights.argmax()][None])[0]
+        return self.prior.from_unconstrained(self.density.mode()[None])[0]
 
     @one_thread()
     def credible_region(self, level: float = 0.9) -> CredibleRegion:
@@ -331,14 +307,6 @@ class Posterior:
     def _draws(self) -> tuple[Array, Array]:
         """Fixed draws of the coordinates and their log densities, made once."""
         if self._summary is None:
-            draws = self.density.sample(_SUMMARY_DRAWS, np.random.default_rng(0))
+            draws = self.density.sample(_SUMMARY_DRAWS, 0)
             self._summary = draws, self.density.log_prob(draws)
         return self._summary
-
-
-def _outside(factors: list[TruncatedMixture]) -> list[MassOutsidePrior]:
-    return [
-        MassOutsidePrior(i, float(np.exp(factor.log_mass)))
-        for i, factor in enumerate(factors)
-        if factor.is_mostly_outside
-    ]

@@ -144,7 +144,6 @@ def _keep_others(old: Path, target: Path) -> None:
 
 
 def _document(model: Trained) -> dict[str, Any]:
-    likelihood = model.likelihood
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -160,12 +159,7 @@ def _document(model: Trained) -> dict[str, Any]:
         "average": model.average.form,
         "emulator_weight": model.average.emulator,
         "network_weight": model.average.network,
-        "emulator": {
-            "widening": likelihood.widening,
-            "degrees": likelihood.emulator.noise.degrees,
-            "leading_degrees": likelihood.leading.noise.degrees,
-            "axis_count": likelihood.axis_count,
-        },
+        "emulator": model.likelihood.scalars(),
         "is_calibrated": None if model.calibration is None else model.calibration.is_calibrated,
         "summary": model.summary.as_dict(),
         "identifiability": None

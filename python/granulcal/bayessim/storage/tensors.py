@@ -36,35 +36,19 @@ def model_tensors(model: Trained, *, compact: bool = False) -> dict[str, NDArray
         compact: without what the emulator expects at the pool of draws, which can be worked out.
     """
     standardiser, likelihood = model.standardiser, model.likelihood
-    emulator = likelihood.emulator
     tensors: dict[str, NDArray[Any]] = {
         "x_is_log": standardiser.is_log.astype(np.uint8),
         **{f"x_{name}": getattr(standardiser, name) for name in _X_NAMES},
-        "emulator_axes": likelihood.axes.matrix,
-        "emulator_relevance": likelihood.axes.relevance,
-        "emulator_centre": emulator.scale_basis.centre,
-        "emulator_scale": emulator.scale_basis.scale,
-        "emulator_frequencies": emulator.basis.frequencies,
-        "emulator_coefficients": emulator.coefficients,
-        "emulator_scale_frequencies": emulator.scale_basis.frequencies,
-        "emulator_scale_coefficients": emulator.scale_coefficients,
-        "emulator_unknown_coefficients": emulator.unknown_coefficients,
-        "emulator_root": emulator.noise.root,
-        "emulator_leading_root": likelihood.leading.noise.root,
-        "emulator_y_shift": emulator.shift,
-        "emulator_y_spread": emulator.spread,
-        "misfit_squares": model.misfit_reference.squares,
-        "misfit_residuals": model.misfit_reference.residuals,
-        "misfit_noise": model.misfit_reference.noise,
+        **likelihood.arrays(),
+        **model.misfit_reference.arrays(),
     }
     if model.average.emulator > 0 and not compact:
-        # What the Rust side would have to work out before its first posterior; single precision
+        # What the command line would have to work out before its first posterior; single precision
         # is enough for the weights of draws.
-        at_pool = likelihood.at_pool
+        names = ("pool_means", "pool_scales", "pool_unknown")
+        expected = likelihood.native.expected_at_pool()
         tensors |= {
-            "pool_means": at_pool.means.astype(np.float32),
-            "pool_scales": at_pool.scales.astype(np.float32),
-            "pool_unknown": at_pool.unknown.astype(np.float32),
+            name: array.astype(np.float32) for name, array in zip(names, expected, strict=True)
         }
     if model.amortised is not None:
         network = model.amortised.network

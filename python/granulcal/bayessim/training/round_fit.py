@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal import _native
 from granulcal.bayessim.check.misfit import MisfitReference
 from granulcal.bayessim.emulator.likelihood import EmulatorChoice, Fold, Likelihood
 from granulcal.bayessim.network.standardise import Standardiser
-from granulcal.bayessim.posterior.density import quasi_uniform
 from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.prior import Prior
 
@@ -72,7 +72,7 @@ class RoundFit:
         """
         generator = np.random.default_rng(seed)
         pool = self.likelihood.pool
-        log_weights = power * self.likelihood.start(self.observed)
+        log_weights = power * self.likelihood.at_pool(self.observed)
         weights = np.exp(log_weights - log_weights.max()) + 1e-12
         blind = max(1, round(_PRIOR_SHARE * count))
         # Farthest of few: of many, and with the prior's among them, all would be of the tails.
@@ -97,6 +97,6 @@ class RoundFit:
 def first_design(prior: Prior, count: int, seed: int) -> Array:
     """Returns evenly spread draws of the prior, moved by the seed, coordinates (count, p)."""
     shift = np.random.default_rng(seed).random(len(prior.free))
-    uniform = (quasi_uniform(count, len(prior.free)) + shift) % 1
+    uniform = (_native.quasi_uniform(count, len(prior.free)) + shift) % 1
     columns = [p.quantile(uniform[:, i]) for i, p in enumerate(prior.free)]
     return prior.to_unconstrained(np.column_stack(columns))

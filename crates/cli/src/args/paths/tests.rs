@@ -6,7 +6,7 @@ use std::fs;
 use clap::{Arg, CommandFactory};
 
 use super::*;
-use crate::args::Cli;
+use crate::commands::Cli;
 
 const TEXT: &str = "name = \"mine\"\n[grains]\ncount = 3\n";
 

@@ -15,13 +15,13 @@ pub struct Report<'a> {
     observed: &'a [Vec<f64>],
     /// Why the recordings cannot be of the model's scene.
     impossible: Vec<String>,
-    found: Option<Found<'a>>,
+    found: Option<Found>,
 }
 
 /// What a model says of recordings that can be of its scene.
-struct Found<'a> {
+struct Found {
     misfit: Misfit,
-    posterior: Posterior<'a>,
+    posterior: Posterior,
     marginals: Vec<Marginal>,
     mode: Vec<f64>,
     known: Identifiability,
@@ -133,7 +133,7 @@ impl<'a> Report<'a> {
     }
 }
 
-impl Found<'_> {
+impl Found {
     fn parameters(&self) -> Map<String, Value> {
         let value = |(m, mode): (&Marginal, &f64)| {
             let interval = [m.interval90.0, m.interval90.1];

@@ -7,7 +7,7 @@ use granulcal_dataset::{Room, write_contact_problem};
 use granulcal_dem::Simulation;
 use serde_json::{Value, json};
 
-use crate::args::SubstepArgs;
+use super::args::SubstepArgs;
 use crate::outcome::BadArgument;
 use crate::scene;
 

@@ -1,11 +1,11 @@
-//! Arguments of the commands about the camera itself.
+//! Arguments of `fit-sensor`.
 
 use clap::Args;
 use granulcal_dataset::{Form, Product};
 use granulcal_features::Region;
 
-use super::paths::{Reads, Writes, recording, writes};
-use super::read::ReadArgs;
+use crate::args::ReadArgs;
+use crate::args::paths::{Reads, Writes, recording, writes};
 
 /// Fit a depth camera's noise, fixed pattern, rounding and holes to frames of a flat surface
 #[derive(Debug, Args)]
@@ -75,39 +75,6 @@ pub struct FitSensorArgs {
     #[arg(long, value_name = "REPORT.json", value_parser = writes(Product::File(Form::Json)))]
     pub report: Option<Writes>,
     /// Print that JSON instead of the table
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// Pick the range of colours that marks grains from an image
-#[derive(Debug, Args)]
-#[command(long_about = "\
-Finds the range of hue, saturation and value that marks the grains of a colour image, for the
-table [segmentation.colour] of a camera's TOML.
-
-Point at some grains with --grains and, if you can, at some ground with --ground: rectangles of
-the image. The range is that of the grains, its bounds half way to the ground's where the two
-do not overlap. Without a rectangle the image is cut in two by brightness or saturation, and
-the smaller part is taken for grains.
-
-Look at the result: --mask writes the image with the grains outlined.
-
-Example:
-  granulcal-cli pick-colour pile.png --mask mask.png
-  granulcal-cli pick-colour pile.png --grains 300,220,40,40 --ground 20,20,80,80 --mask mask.png")]
-pub struct PickColourArgs {
-    /// 8-bit colour PNG
-    pub image: Reads,
-    /// Rectangle with grains only; repeat as needed
-    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT")]
-    pub grains: Vec<Region>,
-    /// Rectangle without grains; repeat as needed
-    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", requires = "grains")]
-    pub ground: Vec<Region>,
-    /// Write the image with the grains outlined
-    #[arg(long, value_name = "OUT.png", value_parser = writes(Product::File(Form::Png)))]
-    pub mask: Option<Writes>,
-    /// Print one JSON object
     #[arg(long)]
     pub json: bool,
 }

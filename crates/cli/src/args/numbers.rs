@@ -1,0 +1,13 @@
+//! Numbers of more than one command.
+
+use std::time::Duration;
+
+pub fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|&number: &f64| number > 0.0 && number.is_finite());
+    number.ok_or_else(|| format!("must be a positive number, got {text:?}"))
+}
+
+pub fn period(text: &str) -> Result<Duration, String> {
+    let period = text.parse().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    period.ok_or_else(|| format!("must be a number of seconds, 0 or more, got {text:?}"))
+}
