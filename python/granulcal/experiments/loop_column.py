@@ -23,23 +23,26 @@ __all__ = ["reproduce", "task"]
 _SCENE = Path(__file__).with_suffix(".toml")
 _RUNOUT = Path("column-collapse-webb") / "runout"
 _STANDARD, _CENTRIFUGE = -9.81, -45.22
-_BUDGET = 2800 + 2 * ROUND
+# 980 pours of the archive; the others are where the fits are, and for the checks.
+_ROUNDS = 3
+_BUDGET = 1220 + _ROUNDS * ROUND
 # Free numbers of the contact law: two dimensions more are what the archive can bear.
 _WANTED = ("touching_exponent", "softness")
 # Pours of a model that was not the verdict's, for the picture.
 _DRAWN, _SEED = 5, 8_200_007
+# Fluids first: an archive that is cut short keeps these.
 _EFFECTS = (
-    "ground.restitution",
-    "ground.sliding",
-    "ground.rolling",
-    "polydispersity",
-    "restitution.speed",
-    "restitution.tangential",
-    "fluid.density",
-    "fluid.viscosity",
     "fluid.saturated",
     "fluid.entrained",
+    "fluid.density",
     "fluid.lubrication",
+    "ground.sliding",
+    "ground.rolling",
+    "ground.restitution",
+    "fluid.viscosity",
+    "restitution.tangential",
+    "polydispersity",
+    "restitution.speed",
     "ground.layer",
 )
 # Tension in N/m: as multiples of a bead's weight it would grow with gravity.
@@ -150,7 +153,7 @@ def reproduce(out: Path, data: Path) -> bool:
     Returns whether the verdict stands.
     """
     folder = out / "loop_column"
-    closed = close_loop(task(data), folder, budget=_BUDGET, rounds=2)
+    closed = close_loop(task(data), folder, budget=_BUDGET, rounds=_ROUNDS)
     write_report(
         closed,
         folder,

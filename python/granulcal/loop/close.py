@@ -38,6 +38,7 @@ from granulcal.loop.pours.replicates import (
     model_scene,
     placebo_of,
 )
+from granulcal.loop.pours.time_needed import time_needed
 from granulcal.loop.preregistration import register
 from granulcal.loop.report.models_of import models_of
 from granulcal.loop.surrogate.observation import Observation
@@ -224,6 +225,7 @@ def close_loop(
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
 
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
+    say(time_needed(task, store, budget - plan.pours, workers))
     store.fill(threads=threads, say=say)
     surrogate = surrogate or fit_surrogate(store, seed=seed, say=say)
     fitted = task.of(FIT)
