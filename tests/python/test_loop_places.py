@@ -9,7 +9,7 @@ import pytest
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.experiments import loop_column, loop_drum, loop_rings
-from granulcal.loop.close import planned
+from granulcal.loop.close import _candidates, planned
 from granulcal.loop.effects.design import Design, Effect, normal_from_cube
 from granulcal.loop.effects.library import LibraryEffect, by_name
 from granulcal.loop.pours.archive import Archive, ArchivePlan
@@ -199,6 +199,9 @@ def test_the_columns_are_read_by_their_outline_and_their_own_errors_have_no_name
     assert [path for path, _, _ in asked.inputs] == ["gravity.2", "observe.front.link"]
     assert asked.at_first().get("observe.front.link") == 1.5
     assert asked.places == ({"gravity.2": -9.81},)
+    # What might be poured next is where the archive is, looked at as the verdict is.
+    ((label, at),) = _candidates(planned(asked, 996, 0, rounds=1, draws=48))
+    assert label == "gravity.2 = -9.81" and at == pytest.approx([1.0, 0.375])
     (one, *_) = asked.under(asked.definitions[3], FIT)
     assert one.reading == {"camera": 1} and one.at["observe.front.link"] == 1.5
     named = {effect.name for effect in asked.library if not effect.nuisance_sd}

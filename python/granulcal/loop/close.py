@@ -375,8 +375,10 @@ def _candidates(plan: ArchivePlan) -> list[tuple[str, Array]]:
     """
     found = []
     for place in plan.places:
-        label = ", ".join(f"{path} = {place[path]:.4g}" for path, _, _ in plan.conditions)
-        found.append((label, plan.unit(place)))
+        label = ", ".join(f"{p} = {place[p]:.4g}" for p, _, _ in plan.conditions if p in place)
+        # Looked at as the verdict is.
+        looked = {p: plan.scene.get(p) for p, _, _ in plan.conditions if p not in place}
+        found.append((label, plan.unit({**looked, **place})))
     if found:
         return found
     for i, (path, low, high) in enumerate(plan.conditions):
