@@ -12,8 +12,8 @@ from unittest.mock import patch
 
 import numpy as np
 
-from granulcal.bayessim import likelihood
 from granulcal.bayessim.check.toys import PileStandIn
+from granulcal.bayessim.emulator import likelihood
 from granulcal.bayessim.emulator.basis import learn_length_scales
 from granulcal.bayessim.emulator.emulator import Prediction
 from granulcal.bayessim.emulator.likelihood import WIDENINGS, Likelihood

@@ -28,7 +28,7 @@ import granulcal as gc
 from granulcal.loop import Discrepancy, Observation, Surrogate, Thresholds, Trace, compare, trace
 from granulcal.loop.check.coverage import calibrate
 from granulcal.loop.effects.library import FUNNEL, LibraryEffect
-from granulcal.loop.pours.archive import Archive, Plan
+from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.surrogate.baseline import fit_base
@@ -106,9 +106,9 @@ def scene(is_small: bool) -> gc.Scene:
     return gc.Scene.from_toml(text).with_({"camera.pixels": 320})
 
 
-def plan(base: int, each: int, is_small: bool) -> Plan:
+def plan(base: int, each: int, is_small: bool) -> ArchivePlan:
     """Returns what the archive of the study is of."""
-    return Plan(
+    return ArchivePlan(
         scene=scene(is_small),
         prior=gc.Prior.load(BLIND / "prior.toml"),
         conditions=(("funnel.height", *HEIGHTS),),
@@ -122,7 +122,9 @@ def plan(base: int, each: int, is_small: bool) -> Plan:
 class Study:
     """Sets of one archive."""
 
-    def __init__(self, archive: Path, kept: Path, plan: Plan, threads: int, pairs: int = 0) -> None:
+    def __init__(
+        self, archive: Path, kept: Path, plan: ArchivePlan, threads: int, pairs: int = 0
+    ) -> None:
         """Fills the archive and fits its surrogate."""
         self.plan, self.pairs = plan, pairs
         store = Archive(archive, self.plan)

@@ -12,11 +12,12 @@ import argparse
 
 import numpy as np
 
-from granulcal.bayessim import likelihood, round_fit
 from granulcal.bayessim.check.toys import PileStandIn
+from granulcal.bayessim.emulator import likelihood
 from granulcal.bayessim.emulator.likelihood import Likelihood
 from granulcal.bayessim.network.standardise import Standardiser
 from granulcal.bayessim.posterior.posterior import Posterior
+from granulcal.bayessim.training import round_fit
 from granulcal.bayessim.training.round_fit import RoundFit, first_design
 from granulcal.one_thread import one_thread
 

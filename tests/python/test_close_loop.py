@@ -17,6 +17,7 @@ from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
 from granulcal.loop.pours.refine import further
+from granulcal.loop.pours.time_needed import time_needed
 from granulcal.loop.task import Task
 from granulcal.pours.camera import Camera
 
@@ -249,6 +250,15 @@ def test_what_a_task_file_lacks_is_named(tilted: Path, tmp_path: Path) -> None:
         load(text.replace("tilt.y", "magnetism"))
 
 
+def test_how_long_it_takes_is_told_before_it_pours(tilted: Path, tmp_path: Path) -> None:
+    task = gc.Task.load(tilted)
+    store = Archive(tmp_path / "archive", planned(task, 2000, 0))
+    text = time_needed(task, store, 120, 2)
+    assert text.startswith(f"{store.missing} pours of the archive are missing, 120 follow at most")
+    assert store.missing == store.plan.pours > 1000
+    assert not any((tmp_path / "archive").glob("base*"))
+
+
 def test_a_recording_in_other_units_is_refused(tilted: Path) -> None:
     task = Task.load(tilted)
     # Grains of 0.4 mm under a camera that saw grains of 4 mm: a volume 1000 times off.
@@ -268,7 +278,10 @@ def test_an_archive_of_something_else_is_refused(tmp_path: Path) -> None:
         each=4,
     )
     folder = tmp_path / "archive"
+    assert Archive(folder, plan).missing == 8
     Archive(folder, plan).fill(threads=1, say=lambda _: None, progress=False)
+    assert Archive(folder, plan).missing == 0
+    assert Archive(folder, ArchivePlan(**{**plan.__dict__, "each": 9})).missing == 5
     pours = Archive(folder, plan).pours()
     assert len(pours.x) == 8 and pours.left_out.total == 0
     assert np.all(pours.psi[:4] == 0) and np.all(np.abs(pours.psi[4:]) <= 1)

@@ -9,7 +9,7 @@ import pytest
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.experiments import loop_column, loop_drum, loop_rings
-from granulcal.loop.close import planned
+from granulcal.loop.close import _candidates, planned
 from granulcal.loop.effects.design import Design, Effect, normal_from_cube
 from granulcal.loop.effects.library import LibraryEffect, by_name
 from granulcal.loop.pours.archive import Archive, ArchivePlan
@@ -84,6 +84,26 @@ def test_pours_at_the_conditions_alone_have_all_their_numbers() -> None:
     plan = planned(places, 420, 0)
     assert plan.places == places.places and plan.conditions == places.inputs
     assert (plan.base, plan.each) == (300, 78)
+
+
+def test_an_archive_may_leave_sealed_conditions_out(tmp_path: Path) -> None:
+    scene, prior = gc.Scene.from_toml(SCENE), gc.Prior.from_toml(PRIOR)
+    for name in "abc":
+        (tmp_path / name).touch()
+    conditions = (
+        Condition("low", LOW, FIT, tuple(tmp_path / name for name in "ab"), averaged=True),
+        Condition("high", HIGH, SEALED, (tmp_path / "c",), averaged=True),
+    )
+
+    def asked(between: bool) -> Task:
+        return Task(scene, prior, conditions, (), between=between, sealed_in_archive=False)
+
+    (place,) = asked(False).places
+    assert place == {path: LOW[path] for path in ("start.height", "end.horizon")}
+    # A sealed condition still has its place in the coordinates.
+    assert planned(asked(False), 400, 0).unit(HIGH) == pytest.approx([1.0])
+    with pytest.raises(ObservationError, match="needs between = false"):
+        asked(True)
 
 
 def test_an_archive_at_the_conditions_alone(tmp_path: Path) -> None:
@@ -178,6 +198,10 @@ def test_the_columns_are_read_by_their_outline_and_their_own_errors_have_no_name
     asked = loop_column.task(tmp_path)
     assert [path for path, _, _ in asked.inputs] == ["gravity.2", "observe.front.link"]
     assert asked.at_first().get("observe.front.link") == 1.5
+    assert asked.places == ({"gravity.2": -9.81},)
+    # What might be poured next is where the archive is, looked at as the verdict is.
+    ((label, at),) = _candidates(planned(asked, 996, 0, rounds=1, draws=48))
+    assert label == "gravity.2 = -9.81" and at == pytest.approx([1.0, 0.375])
     (one, *_) = asked.under(asked.definitions[3], FIT)
     assert one.reading == {"camera": 1} and one.at["observe.front.link"] == 1.5
     named = {effect.name for effect in asked.library if not effect.nuisance_sd}

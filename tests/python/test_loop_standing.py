@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from granulcal.cli import main
 from granulcal.errors import ObservationError
 from granulcal.loop import Design, Effect
 from granulcal.loop.check.prior_pours import Look, hypercube
+from granulcal.loop.check.recentre import Recentred
 from granulcal.loop.check.standing import Moved, overturned, stand
 from granulcal.loop.check.trivial import LINE, NEAREST, RESIDUAL, Group, line_weights, trivial_rows
 from granulcal.loop.effects.definitions import Definition, check_definitions, definition_inputs
@@ -99,6 +101,27 @@ def test_a_wrong_surrogate_takes_every_word_away(before: Verdict) -> None:
     assert stand(before, RULES, confirmed=float("nan")).verdict.kind == "UNCONFIRMED"
     assert stand(before, RULES, confirmed=0.02).verdict is before
     assert found.to_dict()["verdict_before_checks"] == before.kind
+
+
+def test_what_its_own_pours_leave_takes_a_name_away() -> None:
+    def own(p: float) -> Any:
+        empty = np.empty(0)
+        gate = SimpleNamespace(p=p)
+        return Recentred(cast(Any, gate), empty, np.array([0.4]), np.array([[0.3, 0.5]]), 1.0)
+
+    found = stand(EFFECT, RULES, confirmed=0.5, own=own(0.015))
+    assert found.verdict.kind == "UNCONFIRMED" and not found.stands
+    assert "its own pours at its fit leave something of the data (p = 0.015)" in (
+        found.verdict.reason
+    )
+    said = found.to_dict()["own_pours"]
+    assert said == {"p": 0.015, "strengths": [0.4], "intervals": [[0.3, 0.5]], "step": 1.0}
+    assert stand(EFFECT, RULES, confirmed=0.5, own=own(0.03)).verdict is EFFECT
+    # NONE names nothing and has the gate's smaller level.
+    assert stand(NONE, RULES, confirmed=0.5, own=own(0.015)).verdict is NONE
+    assert stand(NONE, RULES, confirmed=0.5, own=own(0.005)).verdict.kind == "UNCONFIRMED"
+    unexplained = Verdict("UNEXPLAINED", (), (), 0.001, "")
+    assert stand(unexplained, RULES, confirmed=0.5, own=own(0.001)).verdict is unexplained
 
 
 def test_a_random_draw_that_is_nearer_than_the_fit_takes_the_word_away() -> None:

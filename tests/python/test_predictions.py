@@ -7,7 +7,7 @@ import pytest
 
 from granulcal.experiments.predictions import columns, write_csv
 from granulcal.experiments.predictions.between_speeds import between_speeds
-from granulcal.experiments.predictions.between_tests import BetweenTests
+from granulcal.experiments.predictions.between_tests import BetweenTests, Told
 from granulcal.experiments.predictions.column_tests import (
     Fronts,
     Test,
@@ -18,6 +18,7 @@ from granulcal.experiments.predictions.column_tests import (
 from granulcal.experiments.predictions.columns import column_rows, observing
 from granulcal.experiments.predictions.drum import SPEEDS, drum_rows
 from granulcal.experiments.predictions.drum_base import DrumBase
+from granulcal.experiments.predictions.model_error import ModelError
 from granulcal.loop.report.models import Maker, Models
 from granulcal.pours.scene import Scene
 
@@ -139,12 +140,30 @@ def test_fronts_are_poured_for_every_test(tmp_path: Path, monkeypatch: pytest.Mo
     )
     tests = {str(row[1]) for row in rows}
     assert tests == {"a_08g", "c_06g", "a_further_08g", "c_further_06g"}
-    assert all("corrected" in line for line in told) and len(told) == 4
+    assert sum("corrected" in line for line in told) == 4
+    # No front was measured: nothing is known of a model's error.
+    assert sum("with an rms of nan mm" in line for line in told) == 2 and len(told) == 6
     table = {(row[0], row[1], row[2]): [float(str(v)) for v in row[3:]] for row in rows}
     for model in ("base", "named"):
         end = table[model, "a_08g", "end"]
         assert 10 < end[1] <= end[0] <= end[2] < 300
         assert sum(key[:2] == (model, "a_08g") for key in table) == 17
+
+
+def test_a_model_is_as_wide_as_it_was_off_on_other_days() -> None:
+    (near, row), (far, _) = campaign(101, 1, 8e-3, 1e-3, 100), campaign(102, 1, 8e-3, 1e-3, 100)
+    measured, middle = np.array(row), np.array(row) - 6.0
+    measured[-1] = np.nan
+    told = {test.code: Told(middle, middle, middle) for test in (near, far)}
+    error = ModelError(Fronts((near,), measured[None]), told)
+    there = error.widened(far, told[far.code])
+    # 6 mm off at every time; the end was not seen and has the last known error.
+    assert (there.high - there.middle) == pytest.approx(1.645 * 6.0)
+    # Its own day says nothing of it.
+    same = error.widened(near, told[near.code])
+    assert (same.high - same.middle)[:-1] == pytest.approx(0.0)
+    rms, share = error.held(told)
+    assert rms == pytest.approx(6.0) and share == 0.0
 
 
 def campaign(

@@ -7,6 +7,7 @@ inferred with the material.
 """
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +22,12 @@ from granulcal.measured.recording import Recording
 from granulcal.pours.compare import Scale, nearest_row, standardised_distance
 from granulcal.pours.dataset import Dataset, generate
 from granulcal.pours.forward import pours_at, scene_at
+from granulcal.pours.pour_time import in_the_middle, pour_time
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour
 from granulcal.pours.statistics import diagnostic_statistics
 from granulcal.prior import Prior
+from granulcal.progress import duration
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
@@ -201,6 +204,12 @@ def demo(out_dir: Path, data_dir: Path) -> Calibrated:
 def _training_pours(out_dir: Path, count: int) -> Dataset:
     scene = Scene.load(_HERE / "kinect_mounds.toml")
     prior = Prior.load(_HERE / "kinect_mounds_prior.toml")
+    each, threads = pour_time([in_the_middle(scene, prior)]), os.cpu_count() or 1
+    print(
+        f"{count} pours less those that are there: at {each:.1f} s each, {threads} at once, about "
+        f"{duration(count * each / threads)} for all; then {3 * _FORWARD_SEEDS} for each map",
+        flush=True,
+    )
     return generate(scene, prior, count, seed=_SEED, out=out_dir / "pours")
 
 

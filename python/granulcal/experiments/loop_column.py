@@ -23,24 +23,22 @@ __all__ = ["reproduce", "task"]
 _SCENE = Path(__file__).with_suffix(".toml")
 _RUNOUT = Path("column-collapse-webb") / "runout"
 _STANDARD, _CENTRIFUGE = -9.81, -45.22
-_BUDGET = 2800 + 2 * ROUND
+# 660 pours of the archive; the others are where the fits are, and for the checks.
+_ROUNDS = 1
+_BUDGET = 900 + _ROUNDS * ROUND
 # Free numbers of the contact law: two dimensions more are what the archive can bear.
 _WANTED = ("touching_exponent", "softness")
 # Pours of a model that was not the verdict's, for the picture.
 _DRAWN, _SEED = 5, 8_200_007
+# In this order, so that an archive that is cut short has the fluids.
 _EFFECTS = (
-    "ground.restitution",
     "ground.sliding",
-    "ground.rolling",
-    "polydispersity",
-    "restitution.speed",
-    "restitution.tangential",
-    "fluid.density",
-    "fluid.viscosity",
     "fluid.saturated",
     "fluid.entrained",
+    "fluid.density",
     "fluid.lubrication",
-    "ground.layer",
+    "ground.rolling",
+    "restitution.tangential",
 )
 # Tension in N/m: as multiples of a bead's weight it would grow with gravity.
 _TENSIONS = (
@@ -130,8 +128,18 @@ def task(data: Path) -> Task:
         for name, g, test, density, viscosity in _SEALED
     ]
     conditions = (*fitted, *sealed)
-    library = (*_TENSIONS, *by_name(_EFFECTS), *declared_nuisances(_NUISANCES, scene))
-    return Task(scene, prior, conditions, library, definitions=_DEFINITIONS)
+    effects = (one for name in _EFFECTS for one in by_name([name]))
+    library = (*_TENSIONS, *effects, *declared_nuisances(_NUISANCES, scene))
+    return Task(
+        scene,
+        prior,
+        conditions,
+        library,
+        # Every fit is at 1 g.
+        between=False,
+        sealed_in_archive=False,
+        definitions=_DEFINITIONS,
+    )
 
 
 def _known_law(scene: Scene) -> list[str]:
@@ -150,7 +158,7 @@ def reproduce(out: Path, data: Path) -> bool:
     Returns whether the verdict stands.
     """
     folder = out / "loop_column"
-    closed = close_loop(task(data), folder, budget=_BUDGET, rounds=2)
+    closed = close_loop(task(data), folder, budget=_BUDGET, rounds=_ROUNDS)
     write_report(
         closed,
         folder,

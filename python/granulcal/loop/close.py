@@ -18,7 +18,15 @@ from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
-from granulcal.loop.check.checks import calibrated, confirmed, corrected, moved, nearer, trivial
+from granulcal.loop.check.checks import (
+    calibrated,
+    confirmed,
+    corrected,
+    moved,
+    nearer,
+    recentred,
+    trivial,
+)
 from granulcal.loop.check.correction import Correction
 from granulcal.loop.check.coverage import FEWEST_PAIRS, Coverage
 from granulcal.loop.check.prior_rounds import LOOKS, look_over
@@ -38,6 +46,7 @@ from granulcal.loop.pours.replicates import (
     model_scene,
     placebo_of,
 )
+from granulcal.loop.pours.time_needed import time_needed
 from granulcal.loop.preregistration import register
 from granulcal.loop.report.models_of import models_of
 from granulcal.loop.surrogate.observation import Observation
@@ -126,13 +135,16 @@ class Closed:
     def strengths(self) -> dict[str, tuple[float, float, float]]:
         """Low, middle and high of each named effect's number, in the scene's unit.
 
-        Of the effect that simulated pairs were poured for the interval is theirs.
+        Of the verdict's model they are those that its own pours at the fit give; of the effect that
+        simulated pairs were poured for the interval is theirs.
         """
         found: dict[str, tuple[float, float, float]] = {}
+        own = self.standing.own
         for one in self.trace.explanations:
-            for name, middle, (low, high) in zip(
-                one.effects, one.strengths, one.intervals, strict=True
-            ):
+            strengths, intervals = one.strengths, one.intervals
+            if one is self.trace.best and own is not None:
+                strengths, intervals = own.strengths, own.intervals
+            for name, middle, (low, high) in zip(one.effects, strengths, intervals, strict=True):
                 if one is self.trace.best and self.calibrated is not None:
                     low, high = self.calibrated.interval
                 if name in self.trace.verdict.named and name not in found:
@@ -224,6 +236,7 @@ def close_loop(
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
 
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
+    say(time_needed(task, store, budget - plan.pours, workers))
     store.fill(threads=threads, say=say)
     surrogate = surrogate or fit_surrogate(store, seed=seed, say=say)
     fitted = task.of(FIT)
@@ -253,6 +266,9 @@ def close_loop(
     simulated = {c.name: both(forward, task, c, found, seed) for c in task.conditions}
     right = confirmed(surrogate, store.plan, fitted, found, simulated)
     say(f"fresh pours of the verdict's model: the surrogate is right there with p = {right:.3g}")
+    own = recentred(surrogate, store.plan, fitted, found, measured, simulated, rules, seed)
+    if own is not None:
+        say(f"they leave of the measured pours what has p = {own.gate.p:.3g}")
     elsewhere = moved(task, store.plan, surrogate, rules, seed)
     for one in elsewhere:
         say(f"looked at as {one.definition}: {one.verdict.kind}, p = {one.verdict.p:.3g}")
@@ -269,6 +285,7 @@ def close_loop(
         found.verdict,
         rules,
         confirmed=right,
+        own=own,
         draws=seen.draws,
         nearer=nearer(forward, task, found, seen.best, measured, simulated, surrogate, seed),
         moved=elsewhere,
@@ -358,8 +375,10 @@ def _candidates(plan: ArchivePlan) -> list[tuple[str, Array]]:
     """
     found = []
     for place in plan.places:
-        label = ", ".join(f"{path} = {place[path]:.4g}" for path, _, _ in plan.conditions)
-        found.append((label, plan.unit(place)))
+        label = ", ".join(f"{p} = {place[p]:.4g}" for p, _, _ in plan.conditions if p in place)
+        # Looked at as the verdict is.
+        looked = {p: plan.scene.get(p) for p, _, _ in plan.conditions if p not in place}
+        found.append((label, plan.unit({**looked, **place})))
     if found:
         return found
     for i, (path, low, high) in enumerate(plan.conditions):

@@ -34,7 +34,9 @@ archive has a value of its own, and every fit has them free.
 themselves many times (a drum's picture), so that one is enough.
 
 `between = false`: the archive has pours at the conditions alone and not between them. Numbers of a
-condition may then depend on each other (two walls that turn together).
+condition may then depend on each other (two walls that turn together). With
+`sealed_in_archive = false` as well it has none at sealed conditions: no fit needs them there, and
+all pours are where the fits are.
 """
 
 from dataclasses import dataclass
@@ -92,6 +94,7 @@ _SCHEMA = Table(
         "tolerances": Text(),
         "reading": _READING,
         "between": Flag(),
+        "sealed_in_archive": Flag(),
         "definitions": ListOf(Table({"name": Text()}, {"at": _AT, "reading": _READING})),
         # As a prior's, which checks them.
         "nuisance": ListOf(Mapping(OneOf((Text(), Number())))),
@@ -116,6 +119,7 @@ class Task:
         tolerances: of the statistics.
         between: whether the archive's pours lie between the conditions, their numbers drawn
             independently; if not, they are at the conditions alone.
+        sealed_in_archive: whether they are at sealed conditions, too; with `between` they must be.
         definitions: ways to look at the pours, the first is the verdict's; none: the scene's own.
         stated: the conditions as they were before the first definition was put in.
     """
@@ -129,6 +133,7 @@ class Task:
     between: bool = True
     definitions: tuple[Definition, ...] = ()
     stated: tuple[Condition, ...] = ()
+    sealed_in_archive: bool = True
 
     def __post_init__(self) -> None:
         """Checks that the conditions can be asked about.
@@ -144,6 +149,11 @@ class Task:
             first = self.definitions[0]
             looked = tuple(condition.under(first) for condition in self.conditions)
             object.__setattr__(self, "conditions", looked)
+        if self.between and not self.sealed_in_archive:
+            raise ObservationError(
+                "sealed_in_archive = false needs between = false: pours that lie between the "
+                "conditions lie at the sealed ones, too"
+            )
         require_image(self.scene, (effect.name for effect in self.library if effect.image))
         require_series(self.scene, ((e.name, e.series) for e in self.library if e.series))
         self._refuse_fitted()
@@ -216,6 +226,7 @@ class Task:
             if "tolerances" in document
             else None,
             between=document.get("between", True),
+            sealed_in_archive=document.get("sealed_in_archive", True),
             definitions=tuple(Definition.of(table) for table in document.get("definitions", [])),
         )
 
@@ -266,7 +277,7 @@ class Task:
         if self.between:
             return ()
         found: list[dict[str, float]] = []
-        for condition in self.conditions:
+        for condition in self.conditions if self.sealed_in_archive else self.of(FIT):
             there = {path: condition.at[path] for path in self._differing}
             if there not in found:
                 found.append(there)

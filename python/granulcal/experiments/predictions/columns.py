@@ -1,8 +1,10 @@
 """Fronts of collapsing columns under every test with beads of 8 and 6 mm.
 
 A test states gravity, beads and fluid. The base model takes the beads and the gravity; a named
-effect of a fluid takes the fluid's own density and viscosity as well. The rows without physics are
-told from the other measured tests (`between_tests.py`) and need no closed loop.
+effect of a fluid takes the fluid's own density and viscosity as well. Their interval is that of
+pours at draws of the fit and of the model's own error, which is the root mean square of its
+residuals at the same time of the tests that were measured on other days. The rows without physics
+are told from the other measured tests (`between_tests.py`) and need no closed loop.
 """
 
 import re
@@ -16,8 +18,9 @@ from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
 from granulcal.experiments.predictions.between_tests import MODELS as WITHOUT_PHYSICS
-from granulcal.experiments.predictions.between_tests import BetweenTests
+from granulcal.experiments.predictions.between_tests import BetweenTests, Told
 from granulcal.experiments.predictions.column_tests import Test, all_tests, read_fronts, times_of
+from granulcal.experiments.predictions.model_error import ModelError
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.models import Models, Prediction
 from granulcal.pours.scene import Scene
@@ -26,7 +29,9 @@ __all__ = ["column_rows", "column_rows_without_physics", "observing"]
 
 Array = NDArray[np.float64]
 
-_POURS = 8
+# Of each model for each test, at as many draws of the fit.
+_POURS = 4
+_HALF = 1.645
 _FLUID = {
     "effects.fluid.density": "rho_f",
     "effects.fluid.viscosity": "mu_f",
@@ -53,8 +58,20 @@ def column_rows(
 ) -> list[tuple[object, ...]]:
     """Returns rows (model, test, time, radius, low, high) in s and mm; the end's time is `end`."""
     forward, rows = Forward(pours, 1), list[tuple[object, ...]]()
-    for test in all_tests(data):
-        rows += _simulated(models, test, forward, say)
+    tests, fronts = all_tests(data), read_fronts(data)
+    for model in _simulated_models(models, say):
+        found = {t.code: _simulated(models, model, t, forward, say) for t in tests}
+        told = {code: one for code, one in found.items() if one is not None}
+        error = ModelError(fronts, told)
+        rmse, share = error.held(told)
+        say(
+            f"columns, {model}: measured tests with an rms of {rmse:.1f} mm, {share:.0%} in the "
+            "90 % intervals"
+        )
+        for test in tests:
+            if test.code in told:
+                rows += _rows_of(model, test, error.widened(test, told[test.code]))
+    for test in tests:
         rows += _corrected(models, test, forward, say)
     return rows
 
@@ -72,31 +89,39 @@ def column_rows_without_physics(
                 f"{error:.1f} mm, at the end {end:.1f} mm; {share:.0%} in the 90 % intervals"
             )
     for test in all_tests(data):
-        times = [*times_of(test).tolist(), "end"]
         for model in WITHOUT_PHYSICS:
-            told = rows_of.tell(model, test)
-            columns = zip(times, told.middle, told.low, told.high, strict=True)
-            rows += [(model, test.code, t, float(m), float(a), float(b)) for t, m, a, b in columns]
+            rows += _rows_of(model, test, rows_of.tell(model, test))
     return rows
 
 
+def _simulated_models(models: Models, say: Callable[[str], None]) -> list[str]:
+    if models.makers["named"][0] == models.makers["base"][0]:
+        say("columns, named: no rows: the verdict names no model but the base one")
+        return ["base"]
+    return ["named", "base"]
+
+
 def _simulated(
-    models: Models, test: Test, forward: Forward, say: Callable[[str], None]
-) -> list[tuple[object, ...]]:
+    models: Models, model: str, test: Test, forward: Forward, say: Callable[[str], None]
+) -> Told | None:
+    """Fronts of the model at the test's times and at the end [mm], with the interval of pours."""
     scene = observing(models.scene, times_of(test))
     there = replace(models, scene=scene, names=tuple(scene.observed_names))
-    found = []
-    for model in ("named", "base"):
-        at = test.scene_numbers(models.scene)
-        own = models.makers[model][0].numbers
-        at |= {path: test.numbers[column] for path, column in _FLUID.items() if path in own}
-        try:
-            prediction = there.predict(model, at, forward, pours=_POURS)
-        except ValueError as error:
-            say(f"columns, {model} of {test.code}: no prediction: {error}")
-            continue
-        found += _rows(model, test, prediction, times_of(test), 1.0)
-    return found
+    at = test.scene_numbers(models.scene)
+    own = models.makers[model][0].numbers
+    at |= {path: test.numbers[column] for path, column in _FLUID.items() if path in own}
+    try:
+        found = there.predict(model, at, forward, pours=_POURS)
+    except ValueError as error:
+        say(f"columns, {model} of {test.code}: no prediction: {error}")
+        return None
+    return Told(1e3 * found.middle, 1e3 * found.low, 1e3 * found.high)
+
+
+def _rows_of(model: str, test: Test, told: Told) -> list[tuple[object, ...]]:
+    times = [*times_of(test).tolist(), "end"]
+    columns = zip(times, told.middle, told.low, told.high, strict=True)
+    return [(model, test.code, t, float(m), float(a), float(b)) for t, m, a, b in columns]
 
 
 def _corrected(

@@ -7,6 +7,7 @@ from granulcal.loop.check.confirm import confirm
 from granulcal.loop.check.correction import Correction, corrections
 from granulcal.loop.check.coverage import Coverage, calibrate
 from granulcal.loop.check.prior_pours import Look
+from granulcal.loop.check.recentre import Recentred, recentre
 from granulcal.loop.check.standing import Moved
 from granulcal.loop.check.trivial import Group, TrivialRow, trivial_rows
 from granulcal.loop.pours.archive import ArchivePlan
@@ -21,7 +22,7 @@ from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Trace, trace
 
-__all__ = ["calibrated", "confirmed", "corrected", "moved", "nearer", "trivial"]
+__all__ = ["calibrated", "confirmed", "corrected", "moved", "nearer", "recentred", "trivial"]
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,25 @@ def confirmed(
     rows = [(c, simulated[c.name][1]) for c in fitted]
     fresh = [Observation.of(c.name, plan.unit(c.at), x) for c, x in rows if len(x) >= FEWEST]
     return confirm(surrogate, found.fit_of(found.best), fresh) if fresh else float("nan")
+
+
+def recentred(
+    surrogate: Surrogate,
+    plan: ArchivePlan,
+    fitted: tuple[Condition, ...],
+    found: Trace,
+    measured: dict[str, Array],
+    simulated: dict[str, tuple[Array, Array]],
+    rules: Thresholds,
+    seed: int,
+) -> Recentred | None:
+    """Returns what pours of the verdict's model at its fit say; None where too few are usable."""
+    told = [c for c in fitted if len(simulated[c.name][1]) >= FEWEST]
+    if len(told) < len(fitted):
+        return None
+    seen = [Observation.of(c.name, plan.unit(c.at), measured[c.name]) for c in told]
+    fresh = [Observation.of(c.name, plan.unit(c.at), simulated[c.name][1]) for c in told]
+    return recentre(surrogate, found.fit_of(found.best), seen, fresh, rules, seed=seed)
 
 
 def calibrated(

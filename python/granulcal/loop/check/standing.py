@@ -3,19 +3,21 @@
 | check | what it asks | if it fails |
 |---|---|---|
 | surrogate | fresh pours of the model are where the surrogate says, p > `confirm` | UNCONFIRMED |
+| own pours | they leave nothing of the data: p > `adequate`, for NONE > `name` | UNCONFIRMED |
 | look | no random draw of the model is nearer to the data than its fit | UNCONFIRMED |
 | definitions | the same verdict with every threshold and definition moved | OVERTURNED |
 | sealed rows | the named effect beats what needs no physics (`trivial.py`) | said beside the name |
 
-The first two hold for every word, NONE as well: nothing may be said from a fit that rests where the
-surrogate is wrong. The last takes no word away, for a name may be right and yet predict no better
-than a straight line; but it is said wherever the name is.
+The first and the look hold for every word, NONE as well: nothing may be said from a fit that rests
+where the surrogate is wrong. The last takes no word away, for a name may be right and yet predict
+no better than a straight line; but it is said wherever the name is.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from granulcal.loop.check.recentre import Recentred
 from granulcal.loop.check.trivial import TrivialRow
 from granulcal.loop.test.distance import Improvement
 from granulcal.loop.test.thresholds import Thresholds
@@ -57,6 +59,7 @@ class Standing:
         verdict: the final one.
         before: the verdict before the checks.
         confirmed: p of fresh pours; NaN where none was usable.
+        own: what the model's own pours at its fit say of the data; None where too few are usable.
         draws: random draws of the model that were poured.
         nearer: D^2 of the best draw less that of the fit, with 95 %; None where neither was poured.
         moved: verdicts under the other definitions.
@@ -70,6 +73,7 @@ class Standing:
     nearer: Improvement | None
     moved: tuple[Moved, ...]
     trivial: tuple[TrivialRow, ...]
+    own: Recentred | None = None
 
     @property
     def stands(self) -> bool:
@@ -89,6 +93,7 @@ class Standing:
             "stands": self.stands,
             "verdict_before_checks": self.before.kind,
             "confirmed_p": None if self.confirmed != self.confirmed else self.confirmed,
+            "own_pours": None if self.own is None else self.own.to_dict(),
             "random_draws": self.draws,
             "fit_less_best_draw": None if self.nearer is None else -self.nearer.gain,
             "definitions": [one.to_dict() for one in self.moved],
@@ -117,6 +122,7 @@ def stand(
     rules: Thresholds,
     *,
     confirmed: float,
+    own: Recentred | None = None,
     draws: int = 0,
     nearer: Improvement | None = None,
     moved: Sequence[Moved] = (),
@@ -128,6 +134,7 @@ def stand(
         before: the verdict of the fits.
         rules: what was fixed beforehand.
         confirmed: p of fresh pours of the verdict's model; NaN counts as failed.
+        own: what these say of the data.
         draws: random draws that were poured.
         nearer: from the best of them (before) to the fit (after), conditions to fit.
         moved: verdicts under other definitions.
@@ -145,6 +152,10 @@ def stand(
             f"(D² {best:.3g}, {off:.3g})"
         )
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
+    least = {"NONE": rules.name, **dict.fromkeys(NAMING, rules.adequate)}.get(before.kind, 0.0)
+    if own is not None and own.gate.p <= least:
+        why = f"its own pours at its fit leave something of the data (p = {own.gate.p:.3g})"
+        verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
     if not confirmed > rules.confirm:
         why = (
             "no fresh pour of its model is usable"
@@ -152,7 +163,7 @@ def stand(
             else f"the surrogate is wrong at its fit (p = {confirmed:.3g} of fresh pours)"
         )
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
-    found = Standing(verdict, before, confirmed, draws, nearer, tuple(moved), tuple(trivial))
+    found = Standing(verdict, before, confirmed, draws, nearer, tuple(moved), tuple(trivial), own)
     if found.stands and found.unbeaten:
         rows = " nor ".join(found.unbeaten)
         said = Verdict(
@@ -162,7 +173,7 @@ def stand(
             verdict.p,
             f"{verdict.reason}; at the sealed conditions it does not beat {rows}",
         )
-        return Standing(said, before, confirmed, draws, nearer, tuple(moved), tuple(trivial))
+        return replace(found, verdict=said)
     return found
 
 

@@ -126,6 +126,16 @@ class Archive:
         if self.plan.images:
             self._image_rows().fill(threads=threads or os.cpu_count() or 1, say=say)
 
+    @property
+    def missing(self) -> int:
+        """Pours that are planned and not there yet; those with images count as missing."""
+        count = self.plan.images
+        for part in self._parts():
+            folder = self.folder / part.name
+            there = len(Dataset.load(folder)) if folder.exists() else 0
+            count += max(part.count - there, 0)
+        return count
+
     def pours(self) -> Pours:
         """Returns all usable rows.
 

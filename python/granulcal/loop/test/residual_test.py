@@ -114,10 +114,12 @@ def draw_errors(
     for h, condition in enumerate(local.conditions):
         near = surrogate.weights_near(theta, condition, NEAR) * surrogate.is_donor
         near = near / near.sum()
-        pours = int(local.counts[h])
+        # A difference of two means has no whole number of pours: rescaled to its scatter.
+        pours = max(int(local.counts[h]), 1)
         chosen = generator.choice(len(near), size=(count, pours), p=near)
         noise = surrogate.noise - near @ surrogate.noise
-        parts.append(scales[h] * noise[chosen].mean(axis=1))
+        scatter = np.sqrt(pours / local.counts[h])
+        parts.append(scatter * scales[h] * noise[chosen].mean(axis=1))
     errors = np.concatenate(parts, axis=1)
     shared = local.error_covariance(fit.v, fit.psi) + local.nuisance
     shared[np.diag_indices_from(shared)] += _JITTER
