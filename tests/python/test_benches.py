@@ -11,8 +11,9 @@ FOLDERS = ("benches", "examples", "scripts")
 def names_of_granulcal(file):
     """Module and name of every `from granulcal... import ...` in a file."""
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("granulcal"):
-            yield from ((node.module, alias.name) for alias in node.names)
+        module = node.module if isinstance(node, ast.ImportFrom) else None
+        if isinstance(node, ast.ImportFrom) and module and module.startswith("granulcal"):
+            yield from ((module, alias.name) for alias in node.names)
 
 
 def test_what_benches_import_is_there():
