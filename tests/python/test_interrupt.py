@@ -23,7 +23,8 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSI
 
 # Marks the begin of the work in `what`, which is then repeated for ever.
 DRIVER = """
-import importlib, sys
+import importlib, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from granulcal import cli
 owner, name, repeats = {owner!r}, {name!r}, {repeats!r}
 module, _, inner = owner.partition(":")
