@@ -54,7 +54,12 @@ class Parameter:
                 continue
             if isinstance(number, bool) or not isinstance(number, int | float | np.number):
                 raise PriorError(f"{self.path}: {key} must be a number, got {number!r}")
-            numbers[key] = float(number)
+            try:
+                numbers[key] = float(number)
+            except OverflowError:
+                # A whole number has any length in TOML and in Python.
+                allowed = "from -1.8e308 to 1.8e308"
+                raise PriorError(f"{self.path}: {key} must be {allowed}, got more") from None
             object.__setattr__(self, key, numbers[key])
         try:
             _native.check_parameter(self.path, self.distribution, **numbers)

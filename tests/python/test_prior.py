@@ -121,6 +121,10 @@ def test_paper_prior_scales_with_the_grain():
         ),
         (table(path="a", distribution="uniform", low="nan", high=1), "must be a number"),
         (
+            f'[[parameter]]\npath="a"\ndistribution="uniform"\nlow={"9" * 400}\nhigh=1',
+            "low must be from -1.8e308",
+        ),
+        (
             '[[parameter]]\npath="a"\ndistribution="uniform"\nlow=nan\nhigh=1',
             "must be finite, got NaN",
         ),
