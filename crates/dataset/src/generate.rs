@@ -23,7 +23,7 @@ use granulcal_dem::{Pour, Simulation, Status};
 use granulcal_features::stats::DIAGNOSTIC_COUNT;
 
 use crate::engine::{Described, Engine, Outcome, describe, foreign_pour};
-use crate::header::{FOREIGN_LAW, Header};
+use crate::header::{FIRST_ARITHMETIC, FOREIGN_LAW, Header};
 use crate::manifest;
 use crate::observe::observe;
 use crate::observer::Observer;
@@ -89,6 +89,8 @@ pub fn generate_with(
     if let Some(engine) = &engine {
         header.version = engine.version();
         header.law = Some(FOREIGN_LAW);
+        // It is not ours to count.
+        header.arithmetic = FIRST_ARITHMETIC;
     }
     let threads = options.threads.min(most_threads());
     Room::of_batch(scene, options.rows, threads, options.chunk).require(Some(out))?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use granulcal_dem::LAW;
+use granulcal_dem::{ARITHMETIC, LAW};
 use granulcal_scene::{Prior, Scene, SceneError};
 
 use crate::{DatasetError, ObservedStatistic, observed_statistics, scene_file};
@@ -13,7 +13,10 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// The law of rows that another simulator made.
 pub(crate) const FOREIGN_LAW: u32 = 0;
 
-/// Scene, prior, law, version and seed: together they determine every row.
+/// The arithmetic of rows of before it was written.
+pub(crate) const FIRST_ARITHMETIC: u32 = 1;
+
+/// Scene, prior, law, arithmetic, version and seed: together they determine every row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
     /// The scene before the prior's parameters are set.
@@ -25,6 +28,8 @@ pub struct Header {
     /// The number of the solver's law that the rows follow, 0 for pours of another simulator; `None` for rows of before
     /// the law had a number.
     pub law: Option<u32>,
+    /// The number of the arithmetic that the solver worked in; of another simulator's pours it says nothing.
+    pub arithmetic: u32,
     /// The seed of the data set.
     pub seed: u64,
     pub(crate) scene_toml: String,
@@ -44,6 +49,7 @@ impl Header {
             prior: prior.clone(),
             version: VERSION.to_owned(),
             law: Some(LAW),
+            arithmetic: ARITHMETIC,
             seed,
             scene_toml: scene.to_toml().map_err(DatasetError::refused)?,
             prior_toml: prior.to_toml().map_err(DatasetError::Prior)?,
@@ -72,7 +78,7 @@ impl Header {
         scene_toml: &str,
         prior_toml: &str,
         version: String,
-        law: Option<u32>,
+        (law, arithmetic): (Option<u32>, u32),
         seed: u64,
     ) -> Result<Self, DatasetError> {
         let wrong = |source| DatasetError::Scene { path: path.to_owned(), source };
@@ -93,6 +99,7 @@ impl Header {
             })?,
             version,
             law,
+            arithmetic,
             seed,
             scene_toml: scene_toml.to_owned(),
             prior_toml: prior_toml.to_owned(),
@@ -121,6 +128,10 @@ impl Header {
         if self.law != given.law {
             let what = "the law of the solver".to_owned();
             return differs(what, law_text(self.law), law_text(given.law));
+        }
+        if self.arithmetic != given.arithmetic {
+            let what = "the arithmetic of the solver".to_owned();
+            return differs(what, self.arithmetic.to_string(), given.arithmetic.to_string());
         }
         if self.version != given.version {
             let what = "the version of granulcal".to_owned();
@@ -164,6 +175,8 @@ mod tests {
         let text = message(Header { law: None, ..header.clone() });
         assert!(text.contains("the law of the solver is law"), "{text}");
         assert!(text.contains("one of before laws had numbers is given"), "{text}");
+        let text = message(Header { arithmetic: 99, ..header.clone() });
+        assert!(text.contains("the arithmetic of the solver is") && text.contains("99"), "{text}");
         let text = message(Header { version: "9.9.9".to_owned(), ..header.clone() });
         assert!(text.contains("9.9.9"), "{text}");
     }

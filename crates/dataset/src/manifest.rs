@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::header::Header;
+use crate::header::{FIRST_ARITHMETIC, Header};
 use crate::{DatasetError, Form, files};
 
 /// Name of the manifest in its folder.
@@ -21,10 +21,17 @@ struct Contents {
     version: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     law: Option<u32>,
+    #[serde(default = "first_arithmetic")]
+    arithmetic: u32,
     seed: u64,
     chunk: u64,
     scene: String,
     prior: String,
+}
+
+/// Manifests of before it was written.
+fn first_arithmetic() -> u32 {
+    FIRST_ARITHMETIC
 }
 
 /// The header of a folder and the rows in each of its parts.
@@ -53,8 +60,8 @@ impl Manifest {
         if contents.chunk == 0 {
             return refuse("chunk", 0, "at least 1");
         }
-        let Contents { version, law, seed, chunk, scene, prior, .. } = contents;
-        let header = Header::parse(&path, &scene, &prior, version, law, seed)?;
+        let Contents { version, law, arithmetic, seed, chunk, scene, prior, .. } = contents;
+        let header = Header::parse(&path, &scene, &prior, version, (law, arithmetic), seed)?;
         Ok(Some(Self { header, chunk }))
     }
 
@@ -64,6 +71,7 @@ impl Manifest {
             format: FORMAT,
             version: self.header.version.clone(),
             law: self.header.law,
+            arithmetic: self.header.arithmetic,
             seed: self.header.seed,
             chunk: self.chunk,
             scene: self.header.scene_toml.clone(),

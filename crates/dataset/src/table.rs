@@ -19,7 +19,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 use xxhash_rust::xxh3::Xxh3;
 
-use crate::header::Header;
+use crate::header::{FIRST_ARITHMETIC, Header};
 use crate::row::{Row, RowStatus};
 use crate::{DatasetError, Form, files};
 use columns::{Access, Column, columns};
@@ -29,6 +29,7 @@ const SCENE_KEY: &str = "granulcal.scene";
 const PRIOR_KEY: &str = "granulcal.prior";
 const VERSION_KEY: &str = "granulcal.version";
 const LAW_KEY: &str = "granulcal.law";
+const ARITHMETIC_KEY: &str = "granulcal.arithmetic";
 const SEED_KEY: &str = "granulcal.seed";
 const HASH_KEY: &str = "granulcal.hash";
 /// Bytes that one byte of a packed column may become: a column of one value packs well.
@@ -69,6 +70,10 @@ fn hash(header: &Header, rows: &[Row], columns: &[Column]) -> String {
     if let Some(law) = header.law {
         take(&law.to_le_bytes());
     }
+    // And so do files of before there was another arithmetic than the first.
+    if header.arithmetic != FIRST_ARITHMETIC {
+        take(&header.arithmetic.to_le_bytes());
+    }
     take(&(rows.len() as u64).to_le_bytes());
     for column in columns {
         take(column.name.as_bytes());
@@ -96,6 +101,7 @@ fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, 
         (SCENE_KEY, header.scene_toml.clone()),
         (PRIOR_KEY, header.prior_toml.clone()),
         (VERSION_KEY, header.version.clone()),
+        (ARITHMETIC_KEY, header.arithmetic.to_string()),
         (SEED_KEY, header.seed.to_string()),
         (HASH_KEY, hash(header, rows, columns)),
     ];
@@ -288,7 +294,11 @@ fn read_header(
     let seed = seed.parse().map_err(|_| wrong(SEED_KEY, &seed))?;
     let law = metadata(file, LAW_KEY);
     let law = law.map(|law| law.parse().map_err(|_| wrong(LAW_KEY, &law))).transpose()?;
-    Header::parse(path, &value(SCENE_KEY)?, &value(PRIOR_KEY)?, value(VERSION_KEY)?, law, seed)
+    let arithmetic = metadata(file, ARITHMETIC_KEY).map_or(Ok(FIRST_ARITHMETIC), |number| {
+        number.parse().map_err(|_| wrong(ARITHMETIC_KEY, &number))
+    })?;
+    let (scene, prior, version) = (value(SCENE_KEY)?, value(PRIOR_KEY)?, value(VERSION_KEY)?);
+    Header::parse(path, &scene, &prior, version, (law, arithmetic), seed)
 }
 
 /// Refuses columns that lie outside of the file: the reader takes their places for granted, and panics.

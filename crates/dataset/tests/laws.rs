@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use granulcal_dataset::{Dataset, DatasetError, GenerateOptions, generate, merge};
-use granulcal_dem::LAW;
+use granulcal_dem::{ARITHMETIC, LAW};
 
 /// Three rows that were made before laws had numbers.
 fn before() -> PathBuf {
@@ -65,4 +65,23 @@ fn rows_of_two_laws_are_not_merged() {
     fs::write(out.join("manifest.toml"), other).unwrap();
     let error = Dataset::open(&out).unwrap_err().to_string();
     assert!(error.contains("part-000000.parquet") && error.contains("law 1"), "{error}");
+}
+
+#[test]
+fn rows_of_two_arithmetics_are_neither_gone_on_with_nor_merged() {
+    let place = tempfile::tempdir().unwrap();
+    let (one, other) = (place.path().join("one"), place.path().join("other"));
+    for out in [&one, &other] {
+        make(out).unwrap();
+    }
+    let manifest = fs::read_to_string(other.join("manifest.toml")).unwrap();
+    let changed = manifest.replace(&format!("arithmetic = {ARITHMETIC}"), "arithmetic = 99");
+    assert_ne!(changed, manifest);
+    fs::write(other.join("manifest.toml"), changed).unwrap();
+    let said = make(&other).unwrap_err().to_string();
+    let expected = format!("the arithmetic of the solver is 99, but {ARITHMETIC} is given");
+    assert!(said.contains(&expected), "{said}");
+    // Its parts say what they are themselves, too.
+    assert!(Dataset::open(&other).unwrap_err().to_string().contains("the arithmetic"));
+    assert!(merge(&[one, other]).unwrap_err().to_string().contains("the arithmetic"));
 }

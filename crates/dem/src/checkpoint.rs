@@ -8,12 +8,12 @@ use toml::Value;
 use xxhash_rust::xxh3::xxh3_128;
 
 use crate::error::DemError;
-use crate::law::LAW;
+use crate::law::{ARITHMETIC, LAW};
 
 /// What a checkpoint begins with.
 const MAGIC: &[u8] = b"granulcal checkpoint\n";
 /// The format of header and state. Between two versions that are released a change of either is a new format.
-pub(crate) const FORMAT: u32 = 6;
+pub(crate) const FORMAT: u32 = 7;
 /// The version of granulcal that writes and reads.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -46,6 +46,7 @@ struct Written {
     // First in every format, so that every version can name the one that wrote.
     version: String,
     law: u32,
+    arithmetic: u32,
     scene: String,
     seed: u64,
     settings: SolverSettings,
@@ -62,7 +63,8 @@ impl CheckpointHeader {
     ///
     /// # Errors
     /// [`DemError::NotACheckpoint`], [`DemError::CheckpointLength`], [`DemError::CheckpointDamaged`],
-    /// [`DemError::CheckpointFormat`], [`DemError::CheckpointVersion`] or [`DemError::CheckpointLaw`].
+    /// [`DemError::CheckpointFormat`], [`DemError::CheckpointVersion`], [`DemError::CheckpointLaw`] or
+    /// [`DemError::CheckpointArithmetic`].
     pub fn read(bytes: &[u8]) -> Result<Self, DemError> {
         Ok(open(bytes)?.0)
     }
@@ -107,6 +109,7 @@ pub(crate) fn seal(header: &CheckpointHeader, state: &[u8]) -> Vec<u8> {
     let written = Written {
         version: header.version.clone(),
         law: LAW,
+        arithmetic: ARITHMETIC,
         // Numbers of a scene that a simulation was made of can be written.
         scene: header.scene.to_toml().expect("a checked scene as TOML"),
         seed: header.seed,
@@ -136,12 +139,15 @@ pub(crate) fn open(bytes: &[u8]) -> Result<(CheckpointHeader, &[u8]), DemError> 
     }
     let strange = |_| DemError::CheckpointState { what: "a header that cannot be read" };
     let (written, state): (Written, _) = postcard::take_from_bytes(body).map_err(strange)?;
-    let Written { version, law, scene, seed, settings, substep } = written;
+    let Written { version, law, arithmetic, scene, seed, settings, substep } = written;
     if version != VERSION {
         return Err(DemError::CheckpointVersion { got: version, allowed: VERSION });
     }
     if law != LAW {
         return Err(DemError::CheckpointLaw { got: law, allowed: LAW });
+    }
+    if arithmetic != ARITHMETIC {
+        return Err(DemError::CheckpointArithmetic { got: arithmetic, allowed: ARITHMETIC });
     }
     let scene = Scene::parse(&scene)?;
     Ok((CheckpointHeader { version, scene, seed, settings, substep }, state))
@@ -227,6 +233,17 @@ mod tests {
         assert!(matches!(error, DemError::CheckpointLaw { got: 1, allowed: LAW }), "{error}");
         let said = error.to_string();
         assert!(said.contains("law 1") && said.contains(&format!("law {LAW}")), "{said}");
+    }
+
+    #[test]
+    fn another_arithmetic_is_refused_and_named() {
+        let mut bytes = simulation().checkpoint();
+        let arithmetic = LEAST - HASH + 1 + VERSION.len() + 1;
+        assert_eq!(u32::from(bytes[arithmetic]), ARITHMETIC);
+        bytes[arithmetic] = 99;
+        let error = simulation().resume(&sealed(bytes)).unwrap_err();
+        assert!(matches!(error, DemError::CheckpointArithmetic { got: 99, .. }), "{error}");
+        assert!(error.to_string().contains("arithmetic 99"), "{error}");
     }
 
     #[test]

@@ -91,6 +91,16 @@ pub enum DemError {
         /// The law of this version.
         allowed: u32,
     },
+    /// A checkpoint of the same law, worked out in another arithmetic.
+    #[error(
+        "the checkpoint must be of arithmetic {allowed} of the solver, got arithmetic {got}: begin the pour anew"
+    )]
+    CheckpointArithmetic {
+        /// The arithmetic that it was made in.
+        got: u32,
+        /// The arithmetic of this version.
+        allowed: u32,
+    },
     /// A checkpoint of another scene, seed or settings.
     #[error("the checkpoint is of another pour: {what} is {found} there, but {given} is given")]
     CheckpointDiffers {

@@ -6,10 +6,17 @@ use crate::lanes::{Reg, Reg3, Width};
 
 /// Number of the law that pours follow: of contacts, impacts, starts and of how all of it is solved.
 ///
-/// It counts up whenever a pour changes, be it by a bit, whatever the version of the package: data sets, checkpoints,
+/// It counts up whenever the physics of a pour changes, whatever the version of the package: data sets, checkpoints,
 /// models and kept pours state it, so that pours of two laws are never mixed. 1 had impacts one by one; 2 has them as
 /// springs in the limit of infinite stiffness.
 pub const LAW: u32 = 2;
+
+/// Number of the arithmetic that the law is worked out in.
+///
+/// It counts up whenever a pour changes by its rounding or the order of its contacts alone: the same seed is then another
+/// pour of the same law. Data sets and checkpoints state it, so that a batch is not gone on with by another; what is
+/// learned from pours does not depend on it. 1 is double precision throughout.
+pub const ARITHMETIC: u32 = 1;
 
 /// Share of a penetration that is corrected in one substep (Baumgarte).
 pub(crate) const CORRECTION: f64 = 0.2;

@@ -79,7 +79,7 @@ pub use granulcal_scene::{
 };
 pub use health::{Health, MAX_ENERGY_CREATED};
 pub use impact::ImpactWork;
-pub use law::LAW;
+pub use law::{ARITHMETIC, LAW};
 pub use pour::{ConvexGrains, Pour, Status};
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use simulation::Simulation;
