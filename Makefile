@@ -16,7 +16,7 @@ BENCH_VENV := build/bench-venv
 # Sets and dictionaries of words keep one order in every run.
 export PYTHONHASHSEED := 0
 
-.PHONY: help advisories miri demo docs model test test-rust test-python test-long bench-physics bench-features referee lint bench build fuzz clean
+.PHONY: help advisories miri demo docs model test test-rust test-python test-long bench-physics bench-features referee lint workflows bench build fuzz clean
 
 help: ## list the verbs
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -114,6 +114,16 @@ docs: $(VENV)/.native ## the site in build/site: guide, gallery, commands, Pytho
 	cargo doc --workspace --no-deps --locked
 	rm -rf build/site/rust && cp -r $(RUST_PAGES) build/site/rust
 	$(BIN)/python scripts/check_site.py build/site
+
+WORKFLOWS_VENV := build/workflows-venv
+ACTIONLINT := github.com/rhysd/actionlint/cmd/actionlint@v1.7.12
+
+workflows: ## lint the workflows of .github: their schema, what they may do; with Go also actionlint
+	test -x $(WORKFLOWS_VENV)/bin/zizmor || { $(PYTHON) -m venv $(WORKFLOWS_VENV); \
+		$(WORKFLOWS_VENV)/bin/python -m pip install --quiet zizmor check-jsonschema; }
+	$(WORKFLOWS_VENV)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(WORKFLOWS_VENV)/bin/zizmor --offline --quiet .github/workflows
+	if command -v go >/dev/null; then go run $(ACTIONLINT); else echo "actionlint: needs Go; not run"; fi
 
 MODEL_POURS ?= 1000
 MODEL_DATA ?= data/funnel

@@ -7,12 +7,12 @@ it `with shown():`, and nobody else sees them.
 
 import sys
 import time
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TextIO, TypeVar
+from typing import NamedTuple, TextIO, TypeVar
 
-__all__ = ["ProgressLine", "duration", "shown", "steps"]
+__all__ = ["FirstSteps", "ProgressLine", "duration", "first_steps", "shown", "steps"]
 
 _T = TypeVar("_T")
 
@@ -105,6 +105,41 @@ class ProgressLine:
             self._shown = text
 
 
+class FirstSteps(NamedTuple):
+    """What the first steps of a kind took.
+
+    Attributes:
+        before: from the start to the first of them [s].
+        each: one of them, the mean [s].
+        total: how many there are at most.
+    """
+
+    before: float
+    each: float
+    total: int
+
+
+class _EnoughError(Exception):
+    """The steps that were asked for are done."""
+
+
+class _Trial(ProgressLine):
+    """In place of a line: ends the work after its first steps of a kind."""
+
+    def __init__(self, what: str, count: int) -> None:
+        super().__init__()
+        self.what, self.count = what, count
+        self.found: FirstSteps | None = None
+
+    def step(self, what: str, done: int, total: int, since: float) -> None:
+        if what != self.what or done == 0 or self.found is not None:
+            return
+        if done == min(self.count, total):
+            each = (time.monotonic() - since) / done
+            self.found = FirstSteps(since - self._started, each, total)
+            raise _EnoughError
+
+
 _LINE: ContextVar[ProgressLine | None] = ContextVar("_LINE", default=None)
 
 
@@ -139,6 +174,30 @@ def shown(stream: TextIO | None = None) -> Generator[ProgressLine, None, None]:
     finally:
         _LINE.reset(token)
         line.close()
+
+
+def first_steps(what: str, count: int, work: Callable[[], object]) -> FirstSteps:
+    """Runs `work` until its first steps of a kind are done, and returns what they took.
+
+    Args:
+        what: kind of the steps, as `steps` has it.
+        count: how many of them are run.
+        work: loops over `steps` of this kind; nothing of it is kept.
+
+    Raises:
+        ValueError: the work has no such steps.
+    """
+    trial = _Trial(what, count)
+    token = _LINE.set(trial)
+    try:
+        work()
+    except _EnoughError:
+        pass
+    finally:
+        _LINE.reset(token)
+    if trial.found is None:
+        raise ValueError(f"the work has no steps {what!r}")
+    return trial.found
 
 
 def duration(seconds: float) -> str:

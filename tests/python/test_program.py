@@ -1,5 +1,7 @@
 """The command line as one program: help, completions and suggestions know every command."""
 
+import argparse
+import importlib
 import json
 import re
 import subprocess
@@ -9,7 +11,8 @@ from pathlib import Path
 import pytest
 
 import granulcal as gc
-from granulcal.cli import _parser, main
+from granulcal.cli import _parser, _subparsers, main
+from granulcal.pours.pour_time import in_the_middle
 
 ALL = """
 scene simulate generate render features infer fit-sensor pick-colour inspect merge completions
@@ -77,14 +80,36 @@ def test_a_store_is_of_a_cluster(capfd: pytest.CaptureFixture[str]) -> None:
     assert "--ray-store" in capfd.readouterr().err
 
 
-def test_every_command_that_ends_with_results_takes_json() -> None:
-    without = {"demo", "reproduce"}
-    for name, parser in _parser()._actions[-1].choices.items():  # pyright: ignore
-        inner = [a.choices for a in parser._actions if a.choices and hasattr(a, "_parser_class")]
-        parsers = [p for choices in inner for p in choices.values()] or [parser]
-        for each in parsers:
-            flags = {word for action in each._actions for word in action.option_strings}
-            assert name in without or "--json" in flags, each.prog
+# Commands that do not say how long they would take, and why; granulcal-cli has its own list.
+NO_DRY_RUN = {
+    "init": "writes four files",
+    "sample": "five pours, which a trial of three would nearly be",
+    "infer": "evaluates a trained model: seconds",
+    "export material": "writes a file",
+    "export posterior": "writes files",
+    "export scene": "writes files",
+    "export bed": "one pour",
+    "film": "one pour, whose line says how far it is",
+    "record": "as long as the camera takes for its frames",
+}
+
+
+def parsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """Returns the parsers of all commands by name, those of words in words one by one."""
+    found = {}
+    for name, each in _subparsers(parser).items():
+        inner = parsers(each)
+        found |= {f"{name} {word}": p for word, p in inner.items()} or {name: each}
+    return found
+
+
+@pytest.mark.parametrize(("flag", "without"), [("--json", {}), ("--dry-run", NO_DRY_RUN)])
+def test_every_command_takes_json_and_says_how_long_it_would_take(
+    flag: str, without: dict[str, str]
+) -> None:
+    found = parsers(_parser())
+    has = {name for name, parser in found.items() if flag in parser._option_string_actions}
+    assert set(found) - has == set(without)
 
 
 def test_an_engine_needs_the_python_package(capfd: pytest.CaptureFixture[str]) -> None:
@@ -118,3 +143,55 @@ def test_a_dry_run_says_how_long_and_makes_nothing(
     assert main([*words, "--dry-run"]) == 0
     assert capsys.readouterr().out.startswith("about ")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml", "x.bag"]
+
+
+def test_a_dry_run_of_training_and_check_says_how_long_and_makes_nothing(
+    small_data: gc.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    pytest.importorskip("torch")
+    pours, model = str(small_data.path), str(tmp_path / "model")
+    words = ["train", pours, "-o", model]
+    assert main([*words, "--dry-run", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["emulator_s"] > 0 and told["network_s"] > 0
+    assert told["seconds"] == told["emulator_s"] + told["network_s"]
+    assert main([*words, "--method", "emulated", "--dry-run", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["network_s"] == 0
+    assert list(tmp_path.iterdir()) == []
+    assert main([*words, "--method", "emulated"]) == 0
+    capsys.readouterr()
+    assert main(["check", model, "--data", pours, "--dry-run"]) == 0
+    assert capsys.readouterr().out.startswith("about ")
+    assert main(["check", model, "--data", pours, "--dry-run", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["posteriors"] == small_data.is_usable.sum() and told["seconds"] > 0
+
+
+def test_a_dry_run_of_a_report_counts_its_pours(
+    small_data: gc.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    pytest.importorskip("torch")
+    model = gc.BayesSim.fit(small_data, quiet=True, method="emulated")
+    model.save(tmp_path / "model")
+    (tmp_path / "x.bag").write_bytes(b"")
+    words = ["report", str(tmp_path / "model"), str(tmp_path / "x.bag"), "--data"]
+    words += [str(small_data.path), "-o", str(tmp_path / "r.html"), "--seeds", "2", "--draws", "3"]
+    assert main([*words, "--dry-run", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["missing"] == 7
+    assert not (tmp_path / "r.html").exists()
+
+
+def test_a_study_says_how_long_its_archive_takes_and_others_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    assert main(["reproduce", "--json"]) == 0
+    assert "loop_column" in json.loads(capsys.readouterr().out)["studies"]
+    words = ["--data", str(tmp_path), "--out", str(tmp_path / "out"), "--dry-run"]
+    assert main(["reproduce", "sensor", *words]) == 2
+    assert "--dry-run is of studies" in capsys.readouterr().err
+    # The archive's pours come from the scene of the study: no measurement is read for them.
+    for study in ("kinect_mounds", "loop_column", "loop_drum", "loop_rings"):
+        module = importlib.import_module(f"granulcal.experiments.{study}")
+        scene, prior, pours = module.poured(tmp_path)
+        assert in_the_middle(scene, prior).get("grains.count") > 0
+        assert pours >= 600

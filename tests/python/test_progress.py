@@ -2,7 +2,7 @@ import io
 
 import pytest
 
-from granulcal.progress import ProgressLine, duration, shown, steps
+from granulcal.progress import ProgressLine, duration, first_steps, shown, steps
 
 
 class Terminal(io.StringIO):
@@ -55,3 +55,22 @@ def test_a_batch_says_what_is_left_out():
 )
 def test_durations_in_words(seconds, words):
     assert duration(seconds) == words
+
+
+def test_first_steps_end_the_work_and_count_it():
+    done = []
+
+    def work():
+        for item in steps("emulator", range(8)):
+            done.append(item)
+        for _ in steps("network", range(9)):
+            raise AssertionError("never begun")
+
+    found = first_steps("emulator", 3, work)
+    assert done == [0, 1, 2] and found.total == 8
+    assert found.each >= 0 and found.before >= 0
+    # Fewer steps than are asked for are run whole, and end it too.
+    done.clear()
+    assert first_steps("emulator", 20, work).total == 8 and len(done) == 8
+    with pytest.raises(ValueError, match="no steps 'posteriors'"):
+        first_steps("posteriors", 1, lambda: None)

@@ -86,6 +86,33 @@ mod tests {
         Cli::command().debug_assert();
     }
 
+    /// Commands without an option that the others have, and why.
+    const WITHOUT: [(&str, &str, &str); 11] = [
+        ("json", "completions", "what it prints is a script"),
+        ("dry_run", "scene", "no pour"),
+        ("dry_run", "simulate", "one pour, whose line says how far it is"),
+        ("dry_run", "render", "one pour, whose line says how far it is"),
+        ("dry_run", "features", "reads a recording: seconds"),
+        ("dry_run", "infer", "evaluates a trained model: seconds"),
+        ("dry_run", "fit-sensor", "reads recordings: seconds"),
+        ("dry_run", "pick-colour", "reads an image"),
+        ("dry_run", "inspect", "reads a file"),
+        ("dry_run", "merge", "reads files"),
+        ("dry_run", "completions", "no pour"),
+    ];
+
+    #[test]
+    fn every_command_takes_json_and_says_how_long_it_would_take() {
+        for option in ["json", "dry_run"] {
+            for command in Cli::command().get_subcommands() {
+                let name = command.get_name();
+                let has = command.get_arguments().any(|argument| argument.get_id() == option);
+                let is_without = WITHOUT.iter().any(|&(o, word, _)| (o, word) == (option, name));
+                assert!(has != is_without, "{name}: {option}");
+            }
+        }
+    }
+
     /// A path that does not say whether it is read or written escapes the check of `args/paths.rs`.
     #[test]
     fn every_path_says_whether_it_is_read_or_written() {

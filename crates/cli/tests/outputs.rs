@@ -88,6 +88,31 @@ fn the_result_is_printed_even_if_a_file_beside_it_fails() {
     }
 }
 
+#[test]
+fn an_image_is_told_as_json_with_what_its_file_holds() {
+    let place = Place::new();
+    scene(&place);
+    let told = json(&place.expect(0, &["render", "scene.toml", "-o", "d.png", "--json"]));
+    let seen = json(&place.expect(0, &["inspect", "d.png", "--json"]));
+    for key in ["kind", "width", "height"] {
+        assert_eq!(told[key], seen[key], "{key}");
+    }
+    assert_eq!((&told["file"], &told["camera"]), (&"d.png".into(), &"d.toml".into()));
+    assert!(place.at("d.toml").exists());
+}
+
+#[test]
+fn a_scene_is_told_as_json_with_the_numbers_of_its_toml() {
+    let place = Place::new();
+    let words = ["scene", "funnel", "--set", "material.sliding_friction=0.25"];
+    let told = json(&place.expect(0, &[&words[..], &["--json"]].concat()));
+    assert_eq!(told["material"]["sliding_friction"], 0.25);
+    let text = place.expect(0, &words);
+    for (key, value) in told["funnel"].as_object().unwrap() {
+        assert!(text.contains(&format!("{key} = {value}")), "{key} = {value}\n{text}");
+    }
+}
+
 /// A film that grows beyond what there is room for, in the middle of the pour.
 #[cfg(unix)]
 #[test]

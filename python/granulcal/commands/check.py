@@ -1,10 +1,15 @@
 """The word `check`: what a model was made from, and whether its posteriors hold the truth."""
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from granulcal.commands.dry_run import add_dry_run, say_seconds
 from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.paths import READS, writes
+
+if TYPE_CHECKING:
+    from granulcal.bayessim import BayesSim
+    from granulcal.bayessim.training.pairs import TrainingPairs
 
 __all__ = ["add"]
 
@@ -22,26 +27,23 @@ def add(commands: Any) -> None:
         type=writes("plots"),
         help="write coverage.png, sbc.png and training.png to this folder",
     )
+    add_dry_run(parser, by="ten pours of --data")
     parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_run, tells=True)
 
 
 def _run(options: argparse.Namespace) -> int:
     from granulcal.bayessim import BayesSim
-    from granulcal.bayessim.training.pairs import TrainingPairs
-    from granulcal.pours.dataset import Dataset
     from granulcal.progress import shown
     from granulcal.starter.models import model_named
 
     model = BayesSim.load(model_named(options.model))
+    pairs = None if options.data is None else _pairs(options, model)
+    if options.dry_run:
+        return _say_how_long(options, model, pairs)
     print(model.summary)
     calibration = model.calibration
-    if options.data is not None:
-        pairs = TrainingPairs.gather(Dataset.load(options.data), prior=model.prior, fewest=10)
-        if pairs.x_names != model.x_names:
-            raise ValueError(
-                f"{options.data} has the statistics {pairs.x_names}, the model {model.x_names}"
-            )
+    if pairs is not None:
         print(f"on the {len(pairs.theta)} usable pours of {options.data}:")
         with shown():
             calibration = model.check(pairs.theta, pairs.x)
@@ -59,3 +61,26 @@ def _run(options: argparse.Namespace) -> int:
             print("no training.png: the posterior is the emulator's alone, no network was kept")
         print(f"plots written to {options.plots}")
     return DONE if calibration.is_calibrated else UNHEALTHY
+
+
+def _pairs(options: argparse.Namespace, model: "BayesSim") -> "TrainingPairs":
+    from granulcal.bayessim.training.pairs import TrainingPairs
+    from granulcal.pours.dataset import Dataset
+
+    pairs = TrainingPairs.gather(Dataset.load(options.data), prior=model.prior, fewest=10)
+    if pairs.x_names != model.x_names:
+        raise ValueError(
+            f"{options.data} has the statistics {pairs.x_names}, the model {model.x_names}"
+        )
+    return pairs
+
+
+def _say_how_long(
+    options: argparse.Namespace, model: "BayesSim", pairs: "TrainingPairs | None"
+) -> int:
+    from granulcal.bayessim.training.time_needed import check_time
+
+    if pairs is None:
+        return say_seconds(options, 0.0, "the check of the training is shown again")
+    text = f"{len(pairs.theta)} posteriors"
+    return say_seconds(options, check_time(model, pairs), text, posteriors=len(pairs.theta))

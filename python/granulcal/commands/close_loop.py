@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import KEPT, READS, writes
+from granulcal.progress import shown
 
 if TYPE_CHECKING:
     from granulcal.loop.task import Task
@@ -118,16 +119,17 @@ def _close(options: argparse.Namespace) -> int:
     if options.tolerances is not None:
         task = replace(task, tolerances=Tolerances.load(options.tolerances))
     task = _told(task)
-    closed = close_loop(
-        task,
-        options.out,
-        archive=options.archive,
-        budget=options.budget,
-        threads=options.threads,
-        seed=options.seed,
-        pairs=options.pairs,
-        rounds=options.rounds,
-    )
+    with shown():
+        closed = close_loop(
+            task,
+            options.out,
+            archive=options.archive,
+            budget=options.budget,
+            threads=options.threads,
+            seed=options.seed,
+            pairs=options.pairs,
+            rounds=options.rounds,
+        )
     words: list[str | Path] = ["granulcal", "close-loop", path, "-o", options.out]
     for name in ("archive", "tolerances", "pairs", "rounds", "engine"):
         if value := getattr(options, name):

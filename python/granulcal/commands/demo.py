@@ -9,6 +9,7 @@ from typing import Any
 
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import writes
+from granulcal.progress import shown
 
 __all__ = ["add"]
 
@@ -40,9 +41,10 @@ def _run(options: argparse.Namespace) -> int:
 
     if options.dry_run:
         return say_how_long(options, demo_scene(), Prior.default(), options.pours)
-    if not options.json:
-        return main(options.out, pours=options.pours, threads=options.threads)
-    with contextlib.redirect_stdout(sys.stderr):
+    aside = contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext()
+    with aside, shown():
         code = main(options.out, pours=options.pours, threads=options.threads)
+    if not options.json:
+        return code
     print(json.dumps({"report": str(options.out / "report.html")}))
     return code

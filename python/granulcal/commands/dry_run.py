@@ -1,4 +1,4 @@
-"""The flag `--dry-run` of commands that pour: how long it would take, from three pours."""
+"""The flag `--dry-run`: how long a command would take, from three pours or its first steps."""
 
 import argparse
 import json
@@ -14,19 +14,21 @@ if TYPE_CHECKING:
     from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
 
-__all__ = ["add_dry_run", "cost", "say_how_long"]
+__all__ = ["add_dry_run", "cost", "say_how_long", "say_seconds"]
 
 _TRIED = 3
 # Draws of their own: a run that follows is not begun by them.
 _SEED = 97
 
 
-def add_dry_run(parser: argparse.ArgumentParser) -> None:
-    """Adds the flag."""
+def add_dry_run(
+    parser: "argparse.ArgumentParser | argparse._ArgumentGroup", *, by: str = "three pours"
+) -> None:
+    """Adds the flag; `by` is what the time is found from."""
     parser.add_argument(
         "--dry-run",
         action="store_true",
-        help="say how long it would take, from three pours, and make nothing",
+        help=f"say how long it would take, from {by}, and make nothing",
     )
 
 
@@ -58,20 +60,37 @@ def say_how_long(
     """Pours three draws of a prior and says how long `pours` of them would take; returns 0.
 
     Args:
-        options: has `threads` and, for JSON with the words of `generate --dry-run`, `json`.
+        options: may have `threads` and, for JSON with the words of `generate --dry-run`, `json`.
         scene: what would be poured.
         prior: what would be drawn.
         pours: those that are missing, at most.
         engine: another simulator in place of ours, or of the one in use.
     """
-    each, threads = cost(scene, prior, engine=engine), options.threads or os.cpu_count() or 1
-    seconds = pours * each / threads
-    if getattr(options, "json", False):
-        told = {"missing": pours, "threads": threads, "pour_cpu_s": each, "seconds": seconds}
+    threads = getattr(options, "threads", None) or os.cpu_count() or 1
+    each = cost(scene, prior, engine=engine)
+    text = (
+        f"at most {pours} pours, {each:.2f} s of a core each (mean of {_TRIED} pours), "
+        f"{threads} at once"
+    )
+    told = {"missing": pours, "threads": threads, "pour_cpu_s": each}
+    return say_seconds(options, pours * each / threads, text, **told)
+
+
+def say_seconds(options: argparse.Namespace, seconds: float, text: str, **told: object) -> int:
+    """Says how long a command would take; returns 0.
+
+    Args:
+        options: with `json` the answer is a JSON object, at the end where the command `tells`.
+        seconds: the time [s].
+        text: what it consists of.
+        **told: the same for JSON.
+    """
+    told["seconds"] = seconds
+    tells = getattr(options, "tells", False)
+    if tells:
+        options.told |= told
+    if getattr(options, "json", False) and not tells:
         print(json.dumps(told, indent=1))
     else:
-        print(
-            f"about {duration(seconds)}: at most {pours} pours, {each:.2f} s of a core each "
-            f"(mean of {_TRIED} pours), {threads} at once"
-        )
+        print(f"about {duration(seconds)}: {text}")
     return 0

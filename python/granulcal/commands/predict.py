@@ -4,9 +4,14 @@ import argparse
 import json
 import os
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from granulcal.commands.dry_run import add_dry_run, say_seconds
 from granulcal.paths import READS
+from granulcal.progress import shown
+
+if TYPE_CHECKING:
+    from granulcal.pours.scene import Scene
 
 __all__ = ["add"]
 
@@ -62,6 +67,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--level", type=float, default=0.9, help="of the interval (default: 0.9)")
     parser.add_argument("--pours", type=int, default=20, help="simulated pours (default: 20)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="everything as JSON on stdout")
     parser.set_defaults(run=_run)
 
@@ -70,12 +76,18 @@ def _run(options: argparse.Namespace) -> int:
     from granulcal.loop.pours.forward import Forward
     from granulcal.loop.report.models import Models, condition_of
 
-    models = Models.load(options.loop)
-    forward = Forward(options.loop / "pours", options.threads or os.cpu_count() or 1)
+    models, threads = Models.load(options.loop), options.threads or os.cpu_count() or 1
     at = condition_of(options.at)
-    found = models.predict(
-        options.model or "named", at, forward, level=options.level, pours=options.pours
-    )
+    if options.dry_run:
+        return _say_how_long(options, models.scenes(options.model or "named", at), threads)
+    with shown():
+        found = models.predict(
+            options.model or "named",
+            at,
+            Forward(options.loop / "pours", threads),
+            level=options.level,
+            pours=options.pours,
+        )
     if options.json:
         print(json.dumps({"at": at, "verdict": models.verdict, **found.to_dict()}, indent=1))
         return _outcome(models.verdict["kind"])
@@ -87,6 +99,16 @@ def _run(options: argparse.Namespace) -> int:
     ):
         print(f"{name:<24}{middle:>12.5g}{low:>14.5g}{high:>12.5g}")
     return _outcome(models.verdict["kind"])
+
+
+def _say_how_long(options: argparse.Namespace, scenes: "list[Scene]", threads: int) -> int:
+    from granulcal.pours.pour_time import pour_time
+
+    if not scenes:
+        return say_seconds(options, 0.0, "no pours", missing=0)
+    each, pours = pour_time(scenes), options.pours * len(scenes)
+    text = f"at most {pours} pours, {each:.2f} s each, {threads} at once"
+    return say_seconds(options, pours * each / threads, text, missing=pours)
 
 
 def _outcome(kind: str) -> int:

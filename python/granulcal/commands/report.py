@@ -5,6 +5,7 @@ import shlex
 import sys
 from typing import Any
 
+from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
 from granulcal.commands.reading import (
     TRAINING,
@@ -17,6 +18,7 @@ from granulcal.commands.reading import (
     told_outside,
 )
 from granulcal.paths import READS, writes
+from granulcal.progress import shown
 
 __all__ = ["add"]
 
@@ -38,6 +40,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--data", type=READS, help=f"training data (default: {TRAINING} in the model's folder)"
     )
+    add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_run, tells=True)
 
@@ -60,6 +63,10 @@ def _run(options: argparse.Namespace) -> int:
         raise FileNotFoundError(f"{folder} came without its training pours: give some with --data")
     data = Dataset.load(training)
     require_same_scene(model, data.scene)
+    if options.dry_run:
+        # At the mode, at the prior's mean, at draws.
+        pours = 2 * options.seeds + options.draws
+        return say_how_long(options, data.scene, model.prior, pours)
     recordings = open_recordings(options)
     if impossible := violations(data.scene, model.prior, recordings, options.recording):
         options.told |= told_outside(options, impossible)
@@ -70,19 +77,20 @@ def _run(options: argparse.Namespace) -> int:
     words += reading_words(options)
     words += ["-o", str(options.out), "--seeds", str(options.seeds)]
     words += ["--draws", str(options.draws)]
-    found = calibrate(
-        model,
-        data,
-        recordings,
-        report=options.out,
-        seeds=options.seeds,
-        draws=options.draws,
-        threads=options.threads,
-        title=f"Calibration from {names}",
-        summary=f"Parameters of the scene {data.scene.name!r}, inferred from {names} "
-        f"with a model trained on {len(data)} pours.",
-        command=shlex.join(words),
-    )
+    with shown():
+        found = calibrate(
+            model,
+            data,
+            recordings,
+            report=options.out,
+            seeds=options.seeds,
+            draws=options.draws,
+            threads=options.threads,
+            title=f"Calibration from {names}",
+            summary=f"Parameters of the scene {data.scene.name!r}, inferred from {names} "
+            f"with a model trained on {len(data)} pours.",
+            command=shlex.join(words),
+        )
     if not found.misfit.is_inside:
         print(found.misfit)
     print(found.report)

@@ -1,18 +1,21 @@
 """The word `reproduce`: studies of docs/results, repeated."""
 
 import argparse
+import contextlib
 import importlib
+import json
 import os
 import pkgutil
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.cluster import add_cluster, cluster_of
-from granulcal.commands.dry_run import add_dry_run, cost
+from granulcal.commands.dry_run import add_dry_run, cost, say_how_long, say_seconds
 from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.paths import READS, writes
 from granulcal.pours.cluster import spread_over
-from granulcal.progress import duration, shown
+from granulcal.progress import shown
 
 if TYPE_CHECKING:
     from granulcal.experiments.paper.common.outcome import PouredSet
@@ -37,8 +40,14 @@ def add(commands: Any) -> None:
         "--maps", type=READS, help="kinect_mounds: folder of other maps compacted_*.npz"
     )
     parser.add_argument(
-        "--json", type=writes("json"), help="kinect_mounds: file for what each map gave"
+        "--json",
+        type=writes("json"),
+        nargs="?",
+        const=True,
+        metavar="FILE",
+        help="print JSON at the end; kinect_mounds: or write what each map gave to a file",
     )
+    add_dry_run(parser)
     add_cluster(parser)
     paper = parser.add_argument_group("only with the study `paper`")
     paper.add_argument(
@@ -50,8 +59,18 @@ def add(commands: Any) -> None:
         help="write one HTML page of all experiments; those that have run are not run again",
     )
     paper.add_argument("--threads", type=int, help="pours at once (default: all cores)")
-    add_dry_run(paper)
-    parser.set_defaults(run=_run)
+    parser.set_defaults(run=_with_json)
+
+
+def _with_json(options: argparse.Namespace) -> int:
+    """With --json alone what is said on the way goes to stderr."""
+    if options.json is not True:
+        return _run(options)
+    options.told = {}
+    with contextlib.redirect_stdout(sys.stderr):
+        code = _run(options)
+    print(json.dumps({**options.told, "exit_code": code}, indent=1))
+    return code
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -61,27 +80,32 @@ def _run(options: argparse.Namespace) -> int:
     studies = sorted(module.name for module in pkgutil.iter_modules(experiments.__path__))
     if options.study is None:
         print("\n".join(studies))
+        _tell(options, studies=studies)
         return DONE
     if options.study not in studies:
         raise ValueError(f"no study {options.study!r}; there are {', '.join(studies)}")
     if options.study == "paper":
         return _reproduce_paper(options)
-    for name in ("experiment", "quick", "report", "threads", "dry_run"):
+    for name in ("experiment", "quick", "report", "threads"):
         if getattr(options, name):
             raise ValueError(
                 f"{name.replace('_', '-')} belongs to the study 'paper', not to {options.study!r}"
             )
     module = importlib.import_module(f"granulcal.experiments.{options.study}")
     data = options.data or measured_data()
-    extra = {"maps_dir": options.maps, "json_path": options.json}
+    path = options.json if isinstance(options.json, Path) else None
+    extra = {"maps_dir": options.maps, "json_path": path}
     given = {name: value for name, value in extra.items() if value is not None}
     if given and options.study != "kinect_mounds":
-        raise ValueError(f"--maps and --json are of kinect_mounds, not of {options.study}")
+        raise ValueError(f"--maps and --json FILE are of kinect_mounds, not of {options.study}")
     if data is None and options.maps is None:
         raise FileNotFoundError("no measured data: give --data or set $GRANULCAL_DATA")
+    if options.dry_run:
+        return _say_how_long(options, module, data)
     # A study of the loop says whether its verdicts stand.
     with shown(), spread_over(cluster_of(options)):
         stands = module.reproduce(options.out, data, **given)
+    _tell(options, study=options.study, out=str(options.out), stands=stands is not False)
     return UNHEALTHY if stands is False else DONE
 
 
@@ -90,7 +114,7 @@ def _reproduce_paper(options: argparse.Namespace) -> int:
     from granulcal.experiments.paper.common.sizes import FULL, QUICK
 
     if options.dry_run:
-        return _say_how_long(options, QUICK if options.quick else FULL)
+        return _say_how_long_of_paper(options, QUICK if options.quick else FULL)
     with shown(), spread_over(cluster_of(options)):
         reproduce_paper(
             options.out,
@@ -99,10 +123,28 @@ def _reproduce_paper(options: argparse.Namespace) -> int:
             report=options.report,
             threads=options.threads,
         )
+    _tell(options, study="paper", out=str(options.out), experiment=options.experiment)
     return DONE
 
 
-def _say_how_long(options: argparse.Namespace, size: "Size") -> int:
+def _tell(options: argparse.Namespace, **told: object) -> None:
+    if options.json is True:
+        options.told |= told
+
+
+def _say_how_long(options: argparse.Namespace, module: Any, data: Path | None) -> int:
+    """Says what the pours of a study take, if it is one of many pours."""
+    if not hasattr(module, "poured"):
+        raise ValueError(
+            f"--dry-run is of studies with a training set or an archive of pours; {options.study} "
+            "pours a few scenes or none"
+        )
+    scene, prior, pours = module.poured(data)
+    options.tells = options.json is True
+    return say_how_long(options, scene, prior, pours)
+
+
+def _say_how_long_of_paper(options: argparse.Namespace, size: "Size") -> int:
     """Says what the pours of the experiments take, from three pours of each kind of grain."""
     from granulcal.experiments.paper import missing_sets
     from granulcal.prior import Prior
@@ -117,10 +159,10 @@ def _say_how_long(options: argparse.Namespace, size: "Size") -> int:
         counts[text] = counts.get(text, 0) + each.count
     costs = {text: cost(each.scene, Prior.default()) for text, each in first.items()}
     seconds = sum(count * costs[text] for text, count in counts.items()) / threads
-    print(
-        f"about {duration(seconds)}, training apart: {sum(counts.values())} pours in {len(sets)} "
-        f"sets, {threads} at once"
-    )
+    missing = sum(counts.values())
+    told = f"{missing} pours in {len(sets)} sets, {threads} at once, training apart"
+    options.tells = options.json is True
+    say_seconds(options, seconds, told, missing=missing, threads=threads)
     for text, count in counts.items():
         print(f"  {count} pours at {costs[text]:.2f} s of a core, as of {first[text].name}")
     return DONE

@@ -3,9 +3,11 @@
 import argparse
 from typing import Any
 
+from granulcal.commands.dry_run import add_dry_run, say_seconds
 from granulcal.commands.exit_code import DONE
 from granulcal.commands.reading import TRAINING
 from granulcal.paths import READS, writes
+from granulcal.progress import duration
 
 __all__ = ["add"]
 
@@ -35,6 +37,7 @@ def add(commands: Any) -> None:
         help="Gaussians in the mixture of each of the network's five members (default: 5); of "
         "several numbers the one of the best validation loss is kept",
     )
+    add_dry_run(parser, by="its first steps")
     parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_run, tells=True)
 
@@ -49,6 +52,8 @@ def _run(options: argparse.Namespace) -> int:
     settings: dict[str, Any] = {}
     if options.components:
         settings["components"] = tuple(options.components)
+    if options.dry_run:
+        return _say_how_long(options, data, settings)
     with shown():
         model = BayesSim.fit(data, seed=options.seed, method=options.method, **settings)
     model.save(options.out)
@@ -57,3 +62,14 @@ def _run(options: argparse.Namespace) -> int:
     checked = None if model.calibration is None else model.calibration.is_calibrated
     told |= {"model": str(options.out), "pours": len(data), "calibrated": checked}
     return DONE
+
+
+def _say_how_long(options: argparse.Namespace, data: Any, settings: dict[str, Any]) -> int:
+    from granulcal.bayessim.training.time_needed import training_time
+
+    took = training_time(data, seed=options.seed, method=options.method, **settings)
+    text = f"emulator {duration(took.emulator)}, "
+    text += f"network at most {duration(took.network)}, " if took.network else ""
+    text += "the check of its intervals apart"
+    told = {"emulator_s": took.emulator, "network_s": took.network}
+    return say_seconds(options, took.seconds, text, **told)

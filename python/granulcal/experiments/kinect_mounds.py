@@ -188,6 +188,11 @@ def reproduce(
     return results
 
 
+def poured(data: Path | None) -> tuple[Scene, Prior, int]:
+    """Returns scene, prior and number of the training's pours, for `--dry-run`."""
+    return _scene(), _prior(), _POURS
+
+
 def demo(out_dir: Path, data_dir: Path) -> Calibrated:
     """Runs the line on one map with few pours; the report is `out_dir/report.html`."""
     from granulcal.bayessim import BayesSim
@@ -201,9 +206,16 @@ def demo(out_dir: Path, data_dir: Path) -> Calibrated:
     return calibrated
 
 
+def _scene() -> Scene:
+    return Scene.load(_HERE / "kinect_mounds.toml")
+
+
+def _prior() -> Prior:
+    return Prior.load(_HERE / "kinect_mounds_prior.toml")
+
+
 def _training_pours(out_dir: Path, count: int) -> Dataset:
-    scene = Scene.load(_HERE / "kinect_mounds.toml")
-    prior = Prior.load(_HERE / "kinect_mounds_prior.toml")
+    scene, prior = _scene(), _prior()
     each, threads = pour_time([in_the_middle(scene, prior)]), os.cpu_count() or 1
     print(
         f"{count} pours less those that are there: at {each:.1f} s each, {threads} at once, about "

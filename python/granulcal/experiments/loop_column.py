@@ -152,6 +152,12 @@ def _files(data: Path, tests: list[str]) -> tuple[Path, ...]:
     return tuple(data / _RUNOUT / f"{test}.txt" for test in tests)
 
 
+def poured(data: Path) -> tuple[Scene, Prior, int]:
+    """Returns scene, prior and number of the pours, for `--dry-run`."""
+    asked = task(data)
+    return asked.at_first(), asked.prior, _BUDGET
+
+
 def reproduce(out: Path, data: Path) -> bool:
     """Runs the loop; report.html and verdict.json in `out`/loop_column.
 

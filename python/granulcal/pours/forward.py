@@ -11,6 +11,7 @@ from granulcal.bayessim.arrays import as_matrix
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour, simulate
 from granulcal.prior import Prior
+from granulcal.progress import steps
 
 if TYPE_CHECKING:
     from granulcal.bayessim.posterior.posterior import Posterior
@@ -67,4 +68,5 @@ def draws_of(
 def _side_by_side(scenes: Sequence[Scene], seeds: Sequence[int], threads: int | None) -> list[Pour]:
     workers = threads or os.cpu_count() or 1
     with ThreadPoolExecutor(min(workers, max(len(seeds), 1))) as pool:
-        return list(pool.map(lambda scene, seed: simulate(scene, seed=seed), scenes, seeds))
+        pours = pool.map(lambda scene, seed: simulate(scene, seed=seed), scenes, seeds)
+        return [next(pours) for _ in steps("pours", seeds)]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from granulcal.documents import read_bytes
 from granulcal.files import beside
+from granulcal.progress import steps
 
 __all__ = ["PourStore"]
 
@@ -56,8 +57,12 @@ class PourStore:
 
     def make(self, pour: Callable[[Of], Row], of: Iterable[Of]) -> list[Row]:
         """Returns `pour` of each, several at once, in their order."""
+        each = list(of)
         with ThreadPoolExecutor(self.threads) as pool:
-            return list(pool.map(pour, of))
+            rows = pool.map(pour, each)
+            # One pour is a step of whoever asks for it.
+            counted = steps("pours", each) if len(each) > 1 else each
+            return [next(rows) for _ in counted]
 
     def _path(self, name: str) -> Path:
         return self.folder / f"{name}.npz"

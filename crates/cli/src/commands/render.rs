@@ -7,11 +7,12 @@ use granulcal_dataset::{
     CameraFile, Drawn, Observer, Product, View, look, look_from, npy, png, write_height_map,
 };
 use granulcal_scene::{Projection, Scene, ViewSpec};
+use serde_json::{Value, json};
 
 use crate::args::SceneArgs;
 use crate::args::numbers::positive;
 use crate::args::paths::{Reads, Writes, writes};
-use crate::context::{Context, print_line};
+use crate::context::{Context, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
 use crate::run::{Run, Setting};
 use crate::scene::{self, Keep};
@@ -46,6 +47,9 @@ pub struct RenderArgs {
     #[arg(long, default_value_t = granulcal_dataset::png::DEPTH_UNIT, value_name = "METRES",
         value_parser = positive)]
     pub depth_unit: f64,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
 }
 
 impl Run for RenderArgs {
@@ -91,21 +95,45 @@ fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
         None => look(&scene.camera, &drawn, args.seed)?,
     };
     write_view(&args.out, &view, args.depth_unit)?;
-    print_line(&match &view {
+    if args.json {
+        print_json(&as_json(&args.out, &view))?;
+    } else {
+        print_line(&in_words(&args.out, &view))?;
+    }
+    Ok(Outcome::Done)
+}
+
+fn in_words(path: &Path, view: &View) -> String {
+    match view {
         View::Depth(_, image) => {
-            let (path, camera) = (args.out.display(), args.out.with_extension("toml"));
-            format!(
-                "{path}: {}x{} depths, camera in {}",
-                image.width,
-                image.height,
-                camera.display()
-            )
+            let (file, camera) = (path.display(), path.with_extension("toml"));
+            let (width, height) = (image.width, image.height);
+            format!("{file}: {width}x{height} depths, camera in {}", camera.display())
         }
         View::Heights(map) => {
-            format!("{}: {}x{} heights", args.out.display(), map.width, map.height)
+            format!("{}: {}x{} heights", path.display(), map.width, map.height)
         }
-    })?;
-    Ok(Outcome::Done)
+    }
+}
+
+fn as_json(path: &Path, view: &View) -> Value {
+    let file = path.display().to_string();
+    match view {
+        View::Depth(_, image) => json!({
+            "file": file,
+            "kind": "depth image",
+            "camera": path.with_extension("toml").display().to_string(),
+            "width": image.width,
+            "height": image.height,
+        }),
+        View::Heights(map) => json!({
+            "file": file,
+            "kind": "height map",
+            "width": map.width,
+            "height": map.height,
+            "resolution_m": [map.resolution_x, map.resolution_y],
+        }),
+    }
 }
 
 /// Refuses a file name whose ending does not go with the scene's camera, before anything is simulated.

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use crate::args::SceneArgs;
-use crate::context::print_line;
+use crate::context::{print_json, print_line};
 use crate::outcome::Outcome;
 use crate::run::{Run, Setting};
 use crate::scene;
@@ -20,12 +20,19 @@ Example:
 pub struct PrintSceneArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
+    /// Print it as one JSON object instead
+    #[arg(long)]
+    pub json: bool,
 }
 
 impl Run for PrintSceneArgs {
     fn run(&self, _: &Setting<'_>) -> anyhow::Result<Outcome> {
-        let text = scene::load(&self.scene)?.to_toml()?;
-        print_line(text.trim_end())?;
+        let scene = scene::load(&self.scene)?;
+        if self.json {
+            print_json(&scene)?;
+        } else {
+            print_line(scene.to_toml()?.trim_end())?;
+        }
         Ok(Outcome::Done)
     }
 }

@@ -11,6 +11,8 @@ from granulcal.experiments.loop_drum.task import task
 from granulcal.files import write_beside
 from granulcal.loop.close import close_loop
 from granulcal.loop.report.folder import write_report
+from granulcal.pours.scene import Scene
+from granulcal.prior import Prior
 
 __all__ = ["reproduce", "task"]
 
@@ -19,6 +21,12 @@ __all__ = ["reproduce", "task"]
 _BUDGET = 1900
 # Which speeds are fitted; the others are sealed.
 _ASKED = {"both": (15, 45), "fit-15": (15,), "fit-45": (45,)}
+
+
+def poured(data: Path) -> tuple[Scene, Prior, int]:
+    """Returns scene, prior and number of the pours, for `--dry-run`."""
+    asked = task(data)
+    return asked.at_first(), asked.prior, _BUDGET
 
 
 def reproduce(out: Path, data: Path) -> bool:

@@ -39,6 +39,7 @@ from granulcal.loop.pours.forward import Coarse, Forward
 from granulcal.loop.report.models_schema import check_models
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.pours.scene import Scene
+from granulcal.progress import steps
 
 __all__ = ["MODELS", "Maker", "Models", "Prediction", "condition_of"]
 
@@ -242,9 +243,25 @@ class Models:
         makers = self.makers[model]
         rows = [
             self._pours(makers[1 + i % (len(makers) - 1)], at, [_SEED + i], forward)
-            for i in range(pours)
+            for i in steps("pours", range(pours))
         ]
         return self._of_rows(model, np.concatenate(rows), level)
+
+    def scenes(self, model: str, at: Mapping[str, float]) -> list[Scene]:
+        """Returns the scenes that one pour of a prediction needs: none, one, or one of each size.
+
+        Args:
+            model: one of `MODELS`.
+            at: numbers that the condition states.
+        """
+        if model in ("line", "nearest"):
+            return []
+        maker = self.makers["base" if model == "corrected" else model][0]
+        there = {path: value + maker.shifts.get(path, 0.0) for path, value in at.items()}
+        scene = self.scene.with_({**maker.numbers, **there})
+        if self.coarse is None:
+            return [scene]
+        return [scene, scene.with_(self.coarse.numbers)] * self.coarse.repeats
 
     def _unit(self, at: Mapping[str, float]) -> Array:
         return np.array([(at[p] - low) / (high - low) for p, low, high in self.inputs])

@@ -51,6 +51,7 @@ from granulcal.loop.surrogate.columns import (
 from granulcal.loop.surrogate.observation import Observation
 from granulcal.loop.surrogate.shift import Shift
 from granulcal.loop.surrogate.transform import Transform
+from granulcal.progress import steps
 
 __all__ = ["Surrogate"]
 
@@ -194,7 +195,7 @@ class Surrogate:
         dof = 0.0
         gram = design_matrix.T @ design_matrix
         ones = np.ones(count)
-        for j in range(size):
+        for j in steps("surrogate", range(size)):
             fit = fit_blocks(design_matrix, z[:, j], ones, blocks, gram)
             scale = np.exp(scale_matrix @ fit_log_scale(scale_matrix, fit.noise))
             weighted = design_matrix / scale[:, None]

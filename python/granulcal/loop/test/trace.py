@@ -18,6 +18,7 @@ from granulcal.loop.test.residual_test import ResidualTest, residual_test
 from granulcal.loop.test.score import Scores, families
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.verdict import NAMING, Verdict, decide
+from granulcal.progress import steps
 
 __all__ = ["Explanation", "Power", "Trace", "power", "trace"]
 
@@ -306,7 +307,9 @@ def _models(
 ) -> list[tuple[Model, float]]:
     """All singles, pairs if no single is adequate, each with the p of what it leaves."""
     candidates = local.surrogate.design.candidates
-    singles = [fit_single(local, target, base, k, rules, starts) for k in candidates]
+    singles = [
+        fit_single(local, target, base, k, rules, starts) for k in steps("effects", candidates)
+    ]
     singles.sort(key=lambda model: -model.log_probability)
     best = singles[0].log_probability
     tested = [
