@@ -24,8 +24,8 @@ SMALL = {
     "--corrected`": "--corrected --pours 4`",
     # What so few grains make.
     "--ring 0.04 0.073 --pile 0.04 -o plan": "--pile 0.03 -o plan --pours 60 --extrapolate",
-    "simulate examples/drum.toml": "simulate examples/drum.toml --set grains.count=300 "
-    "--set grains.diameter=5e-3 --set start.spacing=5.3e-3 --set end.horizon=0.8",
+    "simulate examples/drum.toml": "simulate examples/drum.toml --set grains.count=400 "
+    "--set grains.diameter=5e-3 --set start.spacing=5.3e-3 --set end.horizon=1.6",
     "-o spill": "-o spill --pours 30 --set grains.count=150",
     "wall.bag --baseline 0.05": "wall.bag --baseline 0.05 --frames 3 --sessions 2",
 }
