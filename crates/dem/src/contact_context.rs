@@ -4,7 +4,8 @@ use granulcal_scene::{Material, Scene, SolverSettings};
 use nalgebra::Vector3;
 
 use crate::contact::ContactLaw;
-use crate::effect::Acting;
+use crate::contact_set::ContactSet;
+use crate::effect::{Acting, EffectContext};
 use crate::parallel::Threads;
 use crate::particles::Particles;
 use crate::path::Reach;
@@ -73,6 +74,13 @@ impl ContactContext {
         Reach { interval, near: NEAR * self.radius, far: self.margin }
     }
 
+    /// What the effects see of a substep with these contacts.
+    pub fn for_effects<'a>(&'a self, [pairs, at_walls]: [&'a ContactSet; 2]) -> EffectContext<'a> {
+        let (walls, gravity, radius, dt) =
+            (&self.walls, self.gravity, self.radius, self.settings.dt);
+        EffectContext { pairs, at_walls, walls, gravity, radius, dt }
+    }
+
     /// The coefficients of a contact between two grains.
     pub fn pair_law(&self, bed: &Particles, i: usize, j: usize) -> ContactLaw {
         let (r_i, r_j) = (bed.radius(i), bed.radius(j));
@@ -88,14 +96,16 @@ impl ContactContext {
     }
 
     fn law(&self, material: &Material, inverse_mass: [f64; 2], lever: [f64; 2]) -> ContactLaw {
-        ContactLaw {
+        let mut law = ContactLaw {
             inverse_mass,
             lever,
             sliding_friction: material.sliding_friction,
             rolling_friction: material.rolling_friction,
             torsional_friction: material.torsional_friction,
             compliance: 0.0,
-            rolling_speed: self.effects.rolling_speed,
-        }
+            rolling_speed: 0.0,
+        };
+        self.effects.change_law(&mut law);
+        law
     }
 }

@@ -284,7 +284,7 @@ fn energy(
         (None, Some(bodies)) => bodies.energy(gravity),
         (None, None) => bed.energy(gravity),
     };
-    around.effects.pad.as_ref().map_or(energy, |pad| energy + pad.energy(bed))
+    energy + around.effects.energy(bed)
 }
 
 #[cfg(test)]

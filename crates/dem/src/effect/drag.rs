@@ -29,9 +29,12 @@
 //! spin is too inert by C_a rho_f / rho; a perfect fluid would not turn. Dimensional screen: drag matters where the
 //! terminal speed is not far above the speed of the fall; for couscous in air at 12 cm it takes 0.6 % of the speed.
 
-use granulcal_scene::{Fluid, Grains};
+use std::sync::Arc;
+
+use granulcal_scene::{Effect, Fluid, Grains, Scene};
 use nalgebra::Vector3;
 
+use super::acts::{Acts, EffectContext};
 use super::pore_surface::{PACKED, PoreSurface};
 use crate::contact_set::ContactSet;
 use crate::particles::Particles;
@@ -43,22 +46,37 @@ const NEWTON_DRAG: f64 = 0.44;
 
 /// What a fluid does to grains of a density.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Drag {
+struct Drag {
     fluid: Fluid,
     /// Mass of a grain with its added mass, over its volume `[kg/m^3]`.
     inertia: f64,
     /// Weight less buoyancy over the weight of the same inertia `[-]`.
-    pub weight: f64,
+    weight: f64,
     /// Mass of a grain over that with its added mass `[-]`.
-    pub inverse_inertia: f64,
+    inverse_inertia: f64,
     /// Acceleration down a slope of 1 by the pressure of a fluid that fills the grains, `rho_f g / 0.6` over the
     /// inertia of a volume of grain `[m/s^2]`.
     push: f64,
 }
 
+/// The fluid of a scene, if there is one.
+pub(super) fn of(scene: &Scene) -> Option<Arc<dyn Acts>> {
+    drag_of(scene).map(|drag| Arc::new(drag) as _)
+}
+
+/// Mass of a grain over its mass with what of the fluid moves with it `[-]`; 1 without a fluid.
+pub(super) fn inverse_inertia(scene: &Scene) -> f64 {
+    drag_of(scene).map_or(1.0, |drag| drag.inverse_inertia)
+}
+
+fn drag_of(scene: &Scene) -> Option<Drag> {
+    let fluid = scene.effects.fluid;
+    fluid.is_on().then(|| Drag::of(fluid, &scene.grains, scene.gravity[2].abs()))
+}
+
 impl Drag {
     /// `gravity`: its magnitude along the vertical `[m/s^2]`.
-    pub fn of(fluid: Fluid, grains: &Grains, gravity: f64) -> Self {
+    fn of(fluid: Fluid, grains: &Grains, gravity: f64) -> Self {
         let inertia = grains.density + fluid.added_mass * fluid.density;
         Self {
             fluid,
@@ -86,18 +104,34 @@ impl Drag {
         [linear, 10.0 / 3.0 * stokes]
     }
 
-    /// What the fluid does to every grain within `dt` `[s]` after `gravity` `[m/s^2]` has acted:
+    /// The rates of [`Drag::rates`] among neighbours.
+    fn crowded_rates(&self, radius: f64, speed: f64, crowd: f64) -> [f64; 2] {
+        let crowd = crowd * self.fluid.crowding;
+        if crowd == 0.0 {
+            return self.rates(radius, speed);
+        }
+        let void = 1.0 - PACKED * crowd;
+        let [linear, angular] = self.rates(radius, void * speed);
+        let Fluid { density, viscosity, .. } = self.fluid;
+        // Where nothing is viscous the exponent is its limit of fast flow.
+        let reynolds = 2.0 * radius * density * void * speed / viscosity;
+        let bell = 1.5 - reynolds.max(f64::MIN_POSITIVE).log10();
+        let exponent = 3.7 - 0.65 * (-0.5 * bell * bell).exp();
+        // One eps is of w, one of the pressure that drives the flow, which acts on the grains as well (model B).
+        [linear * void.powf(-exponent), angular]
+    }
+}
+
+impl Acts for Drag {
+    fn gravity(&self, gravity: Vector3<f64>) -> Vector3<f64> {
+        gravity * self.weight
+    }
+
+    /// What the fluid does to every grain within a substep after gravity has acted:
     /// `v + g dt -> u + (v + g dt - u) / (1 + k(v - u) dt)`, implicit in the velocity, so that no step is too long and
-    /// the terminal speed is exact; and the push of its pressure. Returns the energy that a fluid in motion gives, per
-    /// typical mass `[m^2/s^2]`.
-    pub fn act(
-        &self,
-        bed: &mut Particles,
-        pairs: &ContactSet,
-        gravity: &Vector3<f64>,
-        radius: f64,
-        dt: f64,
-    ) -> f64 {
+    /// the terminal speed is exact; and the push of its pressure. Returns the energy that a fluid in motion gives.
+    fn act_with_gravity(&self, bed: &mut Particles, context: &EffectContext<'_>) -> f64 {
+        let EffectContext { pairs, gravity, radius, dt, .. } = *context;
         let Fluid { crowding, entrained, saturated, .. } = self.fluid;
         let is_alone = crowding == 0.0 && entrained == 0.0 && saturated == 0.0;
         let fall = dt * gravity;
@@ -130,23 +164,6 @@ impl Drag {
             given += bed.kinetic_energy(grain) - energy;
         }
         if is_alone { 0.0 } else { given.max(0.0) }
-    }
-
-    /// The rates of [`Drag::rates`] among neighbours.
-    fn crowded_rates(&self, radius: f64, speed: f64, crowd: f64) -> [f64; 2] {
-        let crowd = crowd * self.fluid.crowding;
-        if crowd == 0.0 {
-            return self.rates(radius, speed);
-        }
-        let void = 1.0 - PACKED * crowd;
-        let [linear, angular] = self.rates(radius, void * speed);
-        let Fluid { density, viscosity, .. } = self.fluid;
-        // Where nothing is viscous the exponent is its limit of fast flow.
-        let reynolds = 2.0 * radius * density * void * speed / viscosity;
-        let bell = 1.5 - reynolds.max(f64::MIN_POSITIVE).log10();
-        let exponent = 3.7 - 0.65 * (-0.5 * bell * bell).exp();
-        // One eps is of w, one of the pressure that drives the flow, which acts on the grains as well (model B).
-        [linear * void.powf(-exponent), angular]
     }
 }
 

@@ -52,7 +52,7 @@ impl Simulation {
         self.act_forces();
         let seen = self.assemble();
         self.resolve_impacts();
-        self.act_pulls();
+        self.act_across_gaps();
         self.assemble_layer();
         if until == Until::Assembled {
             return;
@@ -103,22 +103,19 @@ impl Simulation {
         self.contacts.follow(&self.bed, &self.around);
     }
 
-    /// Lets gravity and drag act.
+    /// Lets gravity act, and what acts with it.
     fn act_forces(&mut self) {
         let dt = self.around.settings.dt;
-        if self.around.effects.vibration.is_some() {
-            // The middle of the substep, where velocities are.
-            self.around.gravity = self.around.effects.gravity_at(self.time() + 0.5 * dt);
-            let shaking = self.around.gravity - self.around.effects.gravity;
-            self.watch.see_work(self.bed.work_of(&shaking, dt));
+        // The middle of the substep, where velocities are.
+        if let Some(gravity) = self.around.effects.gravity_at(self.time() + 0.5 * dt) {
+            self.around.gravity = gravity;
+            let added = gravity - self.around.effects.gravity;
+            self.watch.see_work(self.bed.work_of(&added, dt));
         }
         let (bed, around) = (&mut self.bed, &self.around);
         bed.accelerate(&around.gravity, dt, &around.threads);
-        if let Some(drag) = &around.effects.drag {
-            let pairs = &self.contacts.pairs;
-            let given = drag.act(bed, pairs, &around.gravity, around.radius, dt);
-            self.watch.see_work(given);
-        }
+        let context = around.for_effects([&self.contacts.pairs, &self.contacts.at_walls]);
+        self.watch.see_work(around.effects.act_with_gravity(bed, &context));
         bed.freeze_removed();
     }
 
@@ -145,26 +142,19 @@ impl Simulation {
         }
     }
 
-    /// Lets pulls and films act, after the impacts: what a pull adds in a substep to a closed contact is not an impact.
-    fn act_pulls(&mut self) {
-        if let Some(pull) = &self.around.effects.pull {
-            let (walls, dt) = (&self.around.walls, self.around.settings.dt);
-            let near = [&self.contacts.pairs, &self.contacts.at_walls];
-            pull.act(&mut self.bed, near, walls, &mut self.bridges, dt);
-        }
-        if let Some(film) = &self.around.effects.film {
-            let (walls, dt) = (&self.around.walls, self.around.settings.dt);
-            film.act(&mut self.bed, [&self.contacts.pairs, &self.contacts.at_walls], walls, dt);
-        }
+    /// Lets act what does so across gaps, after the impacts: what a pull adds in a substep to a closed contact is not
+    /// an impact.
+    fn act_across_gaps(&mut self) {
+        let around = &self.around;
+        let context = around.for_effects([&self.contacts.pairs, &self.contacts.at_walls]);
+        around.effects.act_across_gaps(&mut self.bed, &context, &mut self.bridges);
     }
 
     /// Lists the contacts with a soft layer, if there is one.
     fn assemble_layer(&mut self) {
         let (bed, around) = (&self.bed, &self.around);
-        if let Some(pad) = &around.effects.pad {
-            let ground = |grain| around.wall_law(bed, grain, 0);
-            pad.assemble(&mut self.on_layer, bed, around.settings.dt, ground);
-        }
+        let ground = |grain| around.wall_law(bed, grain, 0);
+        around.effects.assemble(&mut self.on_layer, bed, around.settings.dt, &ground);
     }
 
     /// Solves the lasting contacts.
@@ -172,7 +162,7 @@ impl Simulation {
         let Contacts { pairs, at_walls, .. } = &mut self.contacts;
         let (bodies, around) = (&mut self.bed.bodies, &self.around);
         let sets = &mut [pairs, at_walls, &mut self.on_layer];
-        let sets = if around.effects.pad.is_some() { &mut sets[..] } else { &mut sets[..2] };
+        let sets = if around.effects.has_contacts() { &mut sets[..] } else { &mut sets[..2] };
         let settings = &around.settings;
         let still = self.is_quiet.then(|| QUIET_SETTLED * around.gravity.norm() * settings.dt);
         let clumps = self.clumps.as_mut();
