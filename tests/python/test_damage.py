@@ -12,7 +12,7 @@ from granulcal.errors import ModelFormatError, UnverifiedModelWarning
 from granulcal.loop.effects.library import by_name
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.image_rows import ImageRows
-from granulcal.within_budget import KeptPours
+from granulcal.pours.kept_pours import KeptPours
 
 MODEL = Path(__file__).parents[2] / "crates" / "bayessim" / "tests" / "data" / "pile"
 SMALL = {"emulator_features": 8, "method": "emulated"}
