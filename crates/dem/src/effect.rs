@@ -78,19 +78,19 @@ impl Acting {
 
     /// Lets act what does so with gravity, before contacts are looked at; returns the energy that it gives, per typical
     /// mass `[m^2/s^2]`.
-    pub fn act_with_gravity(&self, bed: &mut Particles, context: &EffectContext<'_>) -> f64 {
-        self.effects.iter().map(|effect| effect.act_with_gravity(bed, context)).sum()
+    pub fn act_with_gravity(&self, particles: &mut Particles, context: &EffectContext<'_>) -> f64 {
+        self.effects.iter().map(|effect| effect.act_with_gravity(particles, context)).sum()
     }
 
     /// Lets act what does so across gaps, after the impacts: what a pull adds in a substep to a closed contact is not
     /// an impact.
     pub fn act_across_gaps(
         &self,
-        bed: &mut Particles,
+        particles: &mut Particles,
         context: &EffectContext<'_>,
         bridges: &mut Bridges,
     ) {
-        self.effects.iter().for_each(|effect| effect.act_across_gaps(bed, context, bridges));
+        self.effects.iter().for_each(|effect| effect.act_across_gaps(particles, context, bridges));
     }
 
     /// Whether an effect has contacts of its own.
@@ -103,18 +103,18 @@ impl Acting {
     pub fn assemble(
         &self,
         set: &mut ContactSet,
-        bed: &Particles,
+        particles: &Particles,
         dt: f64,
         ground: &dyn Fn(usize) -> ContactLaw,
     ) {
         for effect in self.effects.iter().filter(|effect| effect.has_contacts()) {
-            effect.assemble(set, bed, dt, ground);
+            effect.assemble(set, particles, dt, ground);
         }
     }
 
     /// What the effects hold as springs do, per typical mass `[m^2/s^2]`.
-    pub fn energy(&self, bed: &Particles) -> f64 {
-        self.effects.iter().map(|effect| effect.energy(bed)).sum()
+    pub fn energy(&self, particles: &Particles) -> f64 {
+        self.effects.iter().map(|effect| effect.energy(particles)).sum()
     }
 }
 

@@ -52,23 +52,23 @@ impl Acts for Attraction {
     /// Pulls all that is near: pairs of grains and grains at walls; bridges form at a touch and go at their rupture.
     fn act_across_gaps(
         &self,
-        bed: &mut Particles,
+        particles: &mut Particles,
         context: &EffectContext<'_>,
         bridges: &mut Bridges,
     ) {
         bridges.next.clear();
         // Velocities change while the pull acts, places do not.
-        let places = bed.places.clone();
-        let between = pairs(context.pairs, &places, bed.period);
-        let count = bed.count() as u32;
+        let places = particles.places.clone();
+        let between = pairs(context.pairs, &places, particles.period);
+        let count = particles.count() as u32;
         for near in between.chain(at_walls(context.at_walls, &places, count, context.walls)) {
             let force = self.force(&near, bridges);
             if force > 0.0 {
                 let impulse = force * context.dt * near.normal;
                 let (i, j) = (near.pair.0 as usize, near.pair.1 as usize);
-                bed.kick(i, &-impulse);
+                particles.kick(i, &-impulse);
                 if !near.is_wall {
-                    bed.kick(j, &impulse);
+                    particles.kick(j, &impulse);
                 }
             }
         }

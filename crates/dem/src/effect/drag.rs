@@ -130,29 +130,29 @@ impl Acts for Drag {
     /// What the fluid does to every grain within a substep after gravity has acted:
     /// `v + g dt -> u + (v + g dt - u) / (1 + k(v - u) dt)`, implicit in the velocity, so that no step is too long and
     /// the terminal speed is exact; and the push of its pressure. Returns the energy that a fluid in motion gives.
-    fn act_with_gravity(&self, bed: &mut Particles, context: &EffectContext<'_>) -> f64 {
+    fn act_with_gravity(&self, particles: &mut Particles, context: &EffectContext<'_>) -> f64 {
         let EffectContext { pairs, gravity, radius, dt, .. } = *context;
         let Fluid { crowding, entrained, saturated, .. } = self.fluid;
         let is_alone = crowding == 0.0 && entrained == 0.0 && saturated == 0.0;
         let fall = dt * gravity;
-        let around = if is_alone { Vec::new() } else { neighbours(bed, pairs, &fall) };
-        let surface = (saturated > 0.0).then(|| PoreSurface::of(bed, radius));
+        let around = if is_alone { Vec::new() } else { neighbours(particles, pairs, &fall) };
+        let surface = (saturated > 0.0).then(|| PoreSurface::of(particles, radius));
         let mut given = 0.0;
-        for grain in 0..bed.count() {
+        for grain in 0..particles.count() {
             let near = around.get(grain).copied().unwrap_or_default();
             let (crowd, mean) = near.crowd_and_mean();
             let share = entrained * crowd;
             let flow = (share + saturated * (1.0 - share)) * mean;
-            let energy = bed.kinetic_energy(grain);
-            let before = bed.velocity(grain) - fall - flow;
+            let energy = particles.kinetic_energy(grain);
+            let before = particles.velocity(grain) - fall - flow;
             let is_dry = saturated == 1.0 && near.count == 0.0;
             let [linear, angular] = if is_dry {
                 [0.0; 2]
             } else {
-                self.crowded_rates(bed.radius(grain), before.norm(), crowd)
+                self.crowded_rates(particles.radius(grain), before.norm(), crowd)
             };
-            let place = bed.position(grain);
-            let body = &mut bed.bodies[grain];
+            let place = particles.position(grain);
+            let body = &mut particles.bodies[grain];
             body.velocity.add(&-flow);
             body.velocity.scale(1.0 / (1.0 + dt * linear));
             body.velocity.add(&flow);
@@ -161,7 +161,7 @@ impl Acts for Drag {
                 let [x, y] = surface.slope(place.x, place.y);
                 body.velocity.add(&(-dt * crowd * self.push * Vector3::new(x, y, 0.0)));
             }
-            given += bed.kinetic_energy(grain) - energy;
+            given += particles.kinetic_energy(grain) - energy;
         }
         if is_alone { 0.0 } else { given.max(0.0) }
     }
@@ -196,22 +196,22 @@ impl Neighbours {
 }
 
 /// The neighbours of every grain, with their velocities before they fell by `fall` `[m/s]` in this substep.
-fn neighbours(bed: &Particles, pairs: &ContactSet, fall: &Vector3<f64>) -> Vec<Neighbours> {
-    let mut around = vec![Neighbours::default(); bed.count()];
+fn neighbours(particles: &Particles, pairs: &ContactSet, fall: &Vector3<f64>) -> Vec<Neighbours> {
+    let mut around = vec![Neighbours::default(); particles.count()];
     for (grain, near) in around.iter_mut().enumerate() {
         // The ground is a neighbour that rests.
-        if bed.position(grain).z < (1.0 + NEIGHBOUR) * bed.radius(grain) {
+        if particles.position(grain).z < (1.0 + NEIGHBOUR) * particles.radius(grain) {
             near.add(&Vector3::zeros());
         }
     }
     for (number, lane) in pairs.lanes() {
         let batch = &pairs.batches[number];
         let (i, j) = (batch.i[lane] as usize, batch.j[lane] as usize);
-        let touching = bed.radius(i) + bed.radius(j);
-        let apart = bed.nearest(bed.position(i) - bed.position(j)).norm();
+        let touching = particles.radius(i) + particles.radius(j);
+        let apart = particles.nearest(particles.position(i) - particles.position(j)).norm();
         if apart - touching < 0.5 * NEIGHBOUR * touching {
-            around[i].add(&(bed.velocity(j) - fall));
-            around[j].add(&(bed.velocity(i) - fall));
+            around[i].add(&(particles.velocity(j) - fall));
+            around[j].add(&(particles.velocity(i) - fall));
         }
     }
     around

@@ -69,18 +69,25 @@ impl Acts for ElasticLayer {
     fn assemble(
         &self,
         set: &mut ContactSet,
-        bed: &Particles,
+        particles: &Particles,
         dt: f64,
         ground: &dyn Fn(usize) -> ContactLaw,
     ) {
-        let gap = |grain: usize| bed.position(grain).z - bed.radius(grain);
-        let comes = |&grain: &usize| gap(grain) + dt * bed.velocity(grain).z.min(0.0) < 0.0;
-        let listed: Vec<ContactKey> =
-            bed.present().filter(comes).map(|i| ContactKey { i: i as u32, partner: 0 }).collect();
+        let gap = |grain: usize| particles.position(grain).z - particles.radius(grain);
+        let comes = |&grain: &usize| gap(grain) + dt * particles.velocity(grain).z.min(0.0) < 0.0;
+        let listed: Vec<ContactKey> = particles
+            .present()
+            .filter(comes)
+            .map(|i| ContactKey { i: i as u32, partner: 0 })
+            .collect();
         let compliance = self.compliance(dt);
-        set.rebuild(&listed, &Blocks::default(), bed.count(), BodyKind::SoftLayer, |contact| {
-            ContactLaw { compliance, ..ground(contact.i as usize) }
-        });
+        set.rebuild(
+            &listed,
+            &Blocks::default(),
+            particles.count(),
+            BodyKind::SoftLayer,
+            |contact| ContactLaw { compliance, ..ground(contact.i as usize) },
+        );
         for batch in &mut set.batches {
             batch.bias = Lanes::splat(f64::INFINITY);
             for lane in batch.lanes() {
@@ -89,10 +96,10 @@ impl Acts for ElasticLayer {
         }
     }
 
-    fn energy(&self, bed: &Particles) -> f64 {
-        let depth = |grain| (bed.radius(grain) - bed.position(grain).z).max(0.0);
+    fn energy(&self, particles: &Particles) -> f64 {
+        let depth = |grain| (particles.radius(grain) - particles.position(grain).z).max(0.0);
         let spring = |grain| 0.5 * self.rigidity * depth(grain) * depth(grain);
-        bed.present().map(spring).sum()
+        particles.present().map(spring).sum()
     }
 }
 

@@ -52,39 +52,39 @@ impl Acts for Film {
     /// Resists what comes together and what parts: pairs of grains and grains at walls.
     fn act_across_gaps(
         &self,
-        bed: &mut Particles,
+        particles: &mut Particles,
         context: &EffectContext<'_>,
         _bridges: &mut Bridges,
     ) {
         // Velocities change while the film acts, places do not.
-        let places = bed.places.clone();
-        let between = pairs(context.pairs, &places, bed.period);
-        let count = bed.count() as u32;
+        let places = particles.places.clone();
+        let between = pairs(context.pairs, &places, particles.period);
+        let count = particles.count() as u32;
         for near in between.chain(at_walls(context.at_walls, &places, count, context.walls)) {
             if near.gap < self.range {
-                self.resist(bed, context.walls, &near, count, context.dt);
+                self.resist(particles, context.walls, &near, count, context.dt);
             }
         }
     }
 }
 
 impl Film {
-    fn resist(&self, bed: &mut Particles, walls: &Walls, near: &Near, count: u32, dt: f64) {
+    fn resist(&self, particles: &mut Particles, walls: &Walls, near: &Near, count: u32, dt: f64) {
         let (i, j) = (near.pair.0 as usize, near.pair.1 as usize);
         let (other, inverse_mass) = if near.is_wall {
             let wall = walls.wall(j - count as usize);
-            (wall.motion_at(&near.point).0, bed.inverse_mass[i])
+            (wall.motion_at(&near.point).0, particles.inverse_mass[i])
         } else {
-            (bed.velocity(j), bed.inverse_mass[i] + bed.inverse_mass[j])
+            (particles.velocity(j), particles.inverse_mass[i] + particles.inverse_mass[j])
         };
-        let opening = (bed.velocity(i) - other).dot(&near.normal);
+        let opening = (particles.velocity(i) - other).dot(&near.normal);
         // The gap at the middle of the substep: with that at its begin a film would take a tenth too little.
         let gap = (near.gap + 0.5 * dt * opening).max(self.roughness);
         let k = self.strength * near.derjaguin.powi(2) / gap * dt;
         let impulse = -k * opening / (1.0 + k * inverse_mass) * near.normal;
-        bed.kick(i, &impulse);
+        particles.kick(i, &impulse);
         if !near.is_wall {
-            bed.kick(j, &-impulse);
+            particles.kick(j, &-impulse);
         }
     }
 }
