@@ -21,7 +21,7 @@ from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.bayessim.training.sequential import infer_within_budget
 from granulcal.files import write_beside
 from granulcal.one_thread import one_thread
-from granulcal.within_budget import KeptPours
+from granulcal.pours.kept_pours import KeptPours
 
 RECORDINGS = 4
 _SEED_OF_RECORDINGS = 7000

@@ -1,31 +1,17 @@
 """A material from recordings with a given number of pours, made for these recordings alone."""
 
-import hashlib
-import json
-import math
-import os
-import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from granulcal import _native
-from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, Text, Whole, read_json
-from granulcal.engines.in_use import law_of_pours
-from granulcal.files import write_beside
 from granulcal.measured.recording import Recording
-from granulcal.pours.forward import scene_at
-from granulcal.pours.left_out import LeftOut
+from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.scene import Scene
-from granulcal.pours.simulate import Pour, simulate
-from granulcal.pours.statistics import NAMES, statistics
-from granulcal.pours.status import NO_GRAINS, UNUSABLE
+from granulcal.pours.statistics import NAMES
 from granulcal.prior import Prior
 
 if TYPE_CHECKING:
@@ -33,149 +19,6 @@ if TYPE_CHECKING:
     from granulcal.engines import Engine
 
 __all__ = ["KeptPours", "calibrate_within"]
-
-Array = NDArray[np.float64]
-
-_POUR = Table(
-    {"theta": ListOf(Number(), least=1), "status": Text(), "x": Maybe(ListOf(Number()))},
-    {"cpu_s": Number()},
-)
-_SCHEMA = Table(
-    {"key": Text(), "pours": Mapping(_POUR)},
-    {"names": ListOf(Text()), "hash": Text(), "law": Whole()},
-)
-# Seeds of pours of one run; data sets' are hashes, and reports' begin at 9000.
-_FIRST_SEED = 40_000_000
-# Longest time for which finished pours are in memory alone [s].
-_KEEP_EVERY_S = 2.0
-
-
-class KeptPours:
-    """Simulator of a scene that keeps every pour in a file, and never makes one twice.
-
-    Args:
-        scene: the scene before the prior's parameters are set.
-        prior: names the parameters.
-        path: the file; rewritten as a whole at most every two seconds, and when a call ends.
-        seed: seed of the run.
-        threads: pours at once; the default is one for each core.
-        progress: called with the number of pours that are kept, after each.
-        observed: keep the statistics that the scene observes in place of the paper's 16.
-        look: what to keep of a pour in place of both: names, and the function that measures them;
-            a ValueError of the function says that too few grains are in view.
-        engine: another simulator in place of ours.
-
-    Raises:
-        ValueError: the file is that of another scene, prior, seed or law, or is damaged.
-    """
-
-    def __init__(
-        self,
-        scene: Scene,
-        prior: Prior,
-        path: Path,
-        *,
-        seed: int = 0,
-        threads: int | None = None,
-        progress: Callable[[int], None] | None = None,
-        observed: bool = False,
-        look: tuple[tuple[str, ...], Callable[[Pour], ArrayLike]] | None = None,
-        engine: "Engine | None" = None,
-    ) -> None:
-        """Reads what is kept already."""
-        own = (scene.observed_names, Pour.observed) if observed else (NAMES, Pour.statistics)
-        self.x_names, self.look = own if look is None else look
-        self.engine = engine
-        self.scene, self.prior, self.path, self.seed = scene, prior, path, seed
-        self.threads, self.progress = threads or os.cpu_count() or 1, progress
-        text = f"{scene.to_toml()}\n{prior.to_toml()}\n{seed}" + ("\nobserved" if observed else "")
-        if look is not None:
-            text += f"\n{', '.join(self.x_names)}"
-        text += "" if engine is None else f"\n{engine.name}"
-        # Another simulator has another law, whatever it is.
-        self.law = law_of_pours() if engine is None else 0
-        self.key = hashlib.sha256(text.encode()).hexdigest()
-        self.rows: dict[str, dict] = self._read() if path.exists() else {}
-
-    def __call__(self, theta: Array, first: int) -> Array:
-        """Returns the statistics of pours at `theta` (b, p), NaN where there are none, (b, s)."""
-        missing = [i for i in range(len(theta)) if not self._is_kept(first + i, theta[i])]
-        with ThreadPoolExecutor(self.threads) as workers:
-            jobs = {workers.submit(self._pour, theta[i], first + i): i for i in missing}
-            written = time.monotonic()
-            try:
-                for job in as_completed(jobs):
-                    self.rows[str(first + jobs[job])] = job.result()
-                    if time.monotonic() - written > _KEEP_EVERY_S:
-                        self._write()
-                        written = time.monotonic()
-                    if self.progress is not None:
-                        self.progress(len(self.rows))
-            except BaseException:
-                workers.shutdown(wait=False, cancel_futures=True)
-                raise
-            finally:
-                if missing:
-                    self._write()
-        kept = [self.rows[str(first + i)]["x"] for i in range(len(theta))]
-        return np.array([[np.nan] * len(self.x_names) if x is None else x for x in kept], float)
-
-    def left_out(self, count: int) -> LeftOut:
-        """Returns how many of the first `count` pours that are kept cannot be used, by why."""
-        kept = [row for index, row in list(self.rows.items()) if int(index) < count]
-        usable = [row["x"] is not None and np.isfinite(row["x"]).all() for row in kept]
-        return LeftOut.of([row["status"] for row in kept], usable)
-
-    def _is_kept(self, index: int, theta: Array) -> bool:
-        row = self.rows.get(str(index))
-        return row is not None and np.allclose(row["theta"], theta, rtol=1e-12, atol=0)
-
-    def _pour(self, theta: Array, index: int) -> dict:
-        scene = scene_at(self.scene, self.prior, theta)
-        seed = _FIRST_SEED + 100_000 * self.seed + index
-        if self.engine is not None:
-            left = self.engine(scene, seed)
-            if not isinstance(left, tuple):
-                x = np.asarray(statistics(left)).tolist()
-                return {"theta": theta.tolist(), "status": "at_rest", "x": x}
-            pour = Pour(scene.native.pour_of(*left, seed), scene, seed)
-        else:
-            pour = simulate(scene, seed=seed)
-        status, x = pour.status, None
-        if status not in UNUSABLE:
-            try:
-                x = np.asarray(self.look(pour), float).tolist()
-            except ValueError:
-                status = NO_GRAINS
-        row = {"theta": theta.tolist(), "status": status, "x": x}
-        # Nobody knows the time of another engine.
-        return {**row, "cpu_s": pour.cpu_seconds} if math.isfinite(pour.cpu_seconds) else row
-
-    def _read(self) -> dict[str, dict]:
-        document = read_json(self.path, _SCHEMA)
-        key, rows = document["key"], document["pours"]
-        if document.get("hash") not in (None, _hash(rows)):
-            raise ValueError(f"{self.path} is damaged: its pours are not those that were written")
-        if document.get("law") != self.law:
-            law = document.get("law")
-            found = "a law of before laws had numbers" if law is None else f"law {law}"
-            raise ValueError(
-                f"{self.path} has pours by {found} of the solver, today's is {self.law}: their "
-                "statistics must not be mixed; give another folder, or remove the file"
-            )
-        if key != self.key:
-            raise ValueError(f"{self.path} has the pours of another scene, prior or seed")
-        return rows
-
-    def _write(self) -> None:
-        document = {"key": self.key, "law": self.law, "names": self.prior.names}
-        write_beside(
-            self.path, json.dumps({**document, "hash": _hash(self.rows), "pours": self.rows})
-        )
-
-
-def _hash(rows: dict[str, dict]) -> str:
-    return _native.hash_bytes(json.dumps(rows, sort_keys=True).encode())
 
 
 def calibrate_within(

@@ -12,6 +12,11 @@ from granulcal import _native, cli
 from granulcal.bayessim import BayesSim
 from granulcal.bayessim.check.identifiability import Identifiability
 
+FIELDS = {
+    "recordings", "parameters", "inside_model", "identifiability", "calibrated", "warnings",
+    "statistics",
+}  # fmt: skip
+OF_INSIDE = {"is_inside", "impossible", "p_value", "joint_p_value", "statistics"}
 SMALL: dict[str, Any] = {
     "features": 8,
     "ensemble": 2,
@@ -53,17 +58,26 @@ def said(capfd, code: int, words: list[str], *, native: bool = False) -> dict:
     return json.loads(out)
 
 
-def test_both_commands_print_the_same_json(model, recording, capfd):
-    words = ["infer", str(model[0]), *recording, "--json"]
-    code = 0 if _is_inside(model[1], recording) else 3
+def both(capfd, code: int, words: list[str]) -> dict:
+    """What both commands print, which is one object to the last field."""
     ours, theirs = said(capfd, code, words), said(capfd, code, words, native=True)
-    assert ours == theirs
-    assert set(ours) == {
-        "recordings", "parameters", "inside_model", "identifiability", "calibrated", "warnings",
-        "statistics",
-    }  # fmt: skip
-    for values in ours["parameters"].values():
+    assert ours == theirs and set(ours) == FIELDS
+    assert set(ours["inside_model"]) == OF_INSIDE
+    return ours
+
+
+@pytest.mark.parametrize("pours", [1, 2])
+def test_both_commands_print_and_write_the_same_json(model, recording, pours, tmp_path, capfd):
+    words = ["infer", str(model[0]), *[recording[0]] * pours, *recording[1:], "--json"]
+    code = 0 if _is_inside(model[1], recording) else 3
+    found = both(capfd, code, words)
+    assert len(found["statistics"]) == len(found["recordings"]) == pours
+    for values in found["parameters"].values():
         assert set(values) == {"mode", "mean", "median", "interval90"}
+    for name, native in (("ours", False), ("theirs", True)):
+        said(capfd, code, [*words, "-o", str(tmp_path / f"{name}.json")], native=native)
+    ours, theirs = (json.loads((tmp_path / f"{n}.json").read_text()) for n in ("ours", "theirs"))
+    assert ours == theirs and len(ours.pop("samples")) == 1000 and ours == found
 
 
 def test_rust_says_what_python_says(model, recording, capfd):
@@ -98,7 +112,8 @@ def test_several_pours_of_a_network_are_multiplied_in_both(small_data, recording
     x = _statistics(made, recording)
     image = recording[0]
     words = ["infer", str(tmp_path / "m"), image, image, *recording[1:], "--json"]
-    found = json.loads(_printed(capfd, words))
+    code = 0 if made.misfit(np.array([x, x])).is_inside else 3
+    found = both(capfd, code, words)
     posterior = made.posterior(np.array([x, x]))
     spread = posterior.sample(2000, seed=1).std(axis=0)
     for i, name in enumerate(posterior.names):
@@ -112,11 +127,10 @@ def test_what_is_outside_is_said_with_exit_code_3(model, small_scene, tmp_path, 
     boxes = np.c_[generator.uniform(-0.6, 0.6, (12, 2)), np.full(12, 0.25)]
     image, toml = camera.record(boxes, np.full(12, 0.25), tmp_path)
     words = ["infer", str(model[0]), str(image), "--camera", str(toml), "--json"]
-    for native in (False, True):
-        found = said(capfd, 3, words, native=native)
-        inside = found["inside_model"]
-        assert inside["is_inside"] is False and found["parameters"] is None
-        assert any("height" in reason for reason in inside["impossible"])
+    found = both(capfd, 3, words)
+    inside = found["inside_model"]
+    assert inside["is_inside"] is False and found["parameters"] is None
+    assert any("height" in reason for reason in inside["impossible"])
     assert cli.main(words[:-1]) == 3
     assert "OUTSIDE THE MODEL" in capfd.readouterr().out
 
@@ -136,11 +150,6 @@ def test_pixels_at_the_edge_are_told_before_a_map_is_refused(model, tmp_path, ca
     assert told is not None, err
     assert cli.main([*words, "--border", told[1]]) in (0, 3)
     assert "at the edge" not in capfd.readouterr().err
-
-
-def _printed(capfd, words: list[str]) -> str:
-    assert cli.main(words) in (0, 3)
-    return capfd.readouterr().out
 
 
 def _statistics(model: BayesSim, recording: list[str]) -> np.ndarray:
@@ -194,6 +203,8 @@ def test_a_pile_that_no_material_explains_is_outside_for_report_and_calibrate(
     image, toml = camera.record(pour.positions, pour.radii, tmp_path / "pile")
     recording = [str(image), "--camera", str(toml)]
     assert not _is_inside(made, recording)
+    found = both(capfd, 3, ["infer", str(folder), *recording, "--json"])
+    assert found["inside_model"]["p_value"] is not None and found["parameters"] is not None
     data = tmp_path / "pours.parquet"
     small_data.save(data)
     page = tmp_path / "r.html"

@@ -149,7 +149,7 @@ def test_an_engine_that_is_installed_pours_what_we_pour(name: str) -> None:
 def test_calibration_pours_in_the_engine(
     small_scene: gc.Scene, small_prior: gc.Prior, tmp_path: Path
 ) -> None:
-    from granulcal.within_budget import KeptPours
+    from granulcal.pours.kept_pours import KeptPours
 
     engine = CallableEngine(lambda scene, seed: scene.start(seed), name="not moved")
     theta = small_prior.sample(2, seed=1)

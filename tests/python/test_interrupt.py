@@ -172,7 +172,7 @@ def test_a_signal_ends_the_command(
 def test_finished_pours_of_an_interrupted_calibration_are_kept(
     small_scene, small_prior, tmp_path: Path
 ) -> None:
-    from granulcal.within_budget import KeptPours
+    from granulcal.pours.kept_pours import KeptPours
 
     kept = KeptPours(small_scene, small_prior, tmp_path / "pours.json", threads=1)
 

@@ -13,7 +13,7 @@ import granulcal as gc
 from granulcal import _native, cli
 from granulcal.bayessim import BayesSim
 from granulcal.errors import OtherLawWarning
-from granulcal.within_budget import KeptPours
+from granulcal.pours.kept_pours import KeptPours
 
 BEFORE = Path(__file__).parents[2] / "crates" / "dataset" / "tests" / "data" / "before_laws"
 QUICK: dict[str, Any] = {

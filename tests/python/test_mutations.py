@@ -17,8 +17,8 @@ from granulcal.loop.effects.tolerance import Tolerances
 from granulcal.loop.report.models import Maker, Models
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.loop.task import Task
+from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.statistics import NAMES
-from granulcal.within_budget import KeptPours
 
 REPOSITORY = Path(__file__).parents[2]
 MODEL = REPOSITORY / "crates" / "bayessim" / "tests" / "data" / "pile"

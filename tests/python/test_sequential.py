@@ -9,9 +9,9 @@ from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.parameter import Parameter
+from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
-from granulcal.within_budget import KeptPours
 
 
 @pytest.fixture(scope="module")

@@ -124,6 +124,32 @@ def test_what_breaks_a_wall_is_named(tmp_path: Path, path: str, text: str, expec
     assert code == 1 and expected in found, found
 
 
+def test_a_public_name_goes_with_a_word_in_the_changelog_alone(tmp_path: Path) -> None:
+    old = '__all__ = ["Kept", "lost"]\nclass Kept:\n    def of(self): ...\n\ndef lost(): ...\n'
+    house(tmp_path, **{"python/granulcal/a.py": old, "CHANGELOG.md": "# Changelog\n"})
+    git = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=a@b"]
+    for words in (["init", "-q"], ["add", "."], ["commit", "-qm", "before"]):
+        subprocess.run([*git, *words], check=True)
+    (tmp_path / "crates/dem/src/lib.rs").write_text("mod law;\nmod pour;\n")
+    (tmp_path / "python/granulcal/a.py").unlink()
+    (tmp_path / "python/granulcal/shelf").mkdir()
+    (tmp_path / "python/granulcal/shelf/a.py").write_text('__all__ = ["Kept"]\nclass Kept: ...\n')
+    names = CHECK.with_name("public_names.py")
+    command = [sys.executable, str(names), "HEAD", "--root", str(tmp_path)]
+
+    def gone() -> list[str]:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == bool(done.stderr), done.stderr
+        return [line.split()[0] for line in done.stderr.splitlines()]
+
+    assert gone() == ["granulcal.a.Kept", "granulcal.a.lost", "granulcal_dem::Law"]
+    table = "| shelf | modules |\n|---|---|\n| `shelf` | `a` |\n\n"
+    (tmp_path / "CHANGELOG.md").write_text(table)
+    assert gone() == ["granulcal.a.Kept.of", "granulcal.a.lost", "granulcal_dem::Law"]
+    (tmp_path / "CHANGELOG.md").write_text(f"{table}`Kept.of`, `a.{{lost, other}}`, `Law`")
+    assert gone() == []
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -34,17 +34,17 @@ widest! {
     /// Refreshes the contacts between grains at the beginning of a substep and lists the possible impacts.
     pub(crate) fn assemble_pairs<W>(
         batches: &mut [Batch],
-        bed: &Particles,
+        particles: &Particles,
         dt: f64,
         candidates: &mut Vec<Candidate>,
     ) -> Seen {
         let mut overlap = Reg::<W>::splat(0.0);
         for batch in batches {
-            let place = |body: u32| W::load_row(&bed.places[body as usize]);
+            let place = |body: u32| W::load_row(&particles.places[body as usize]);
             let (i, j) = (each(&batch.i, place), each(&batch.j, place));
-            let (gap, distance) = pair_geometry::<W>(batch, i, j, bed.period.as_ref(), &mut overlap);
+            let (gap, distance) = pair_geometry::<W>(batch, i, j, particles.period.as_ref(), &mut overlap);
             let gap = empty_lanes_open(batch, gap);
-            let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
+            let velocity = |body: u32| W::load_row(&particles.bodies[body as usize].velocity);
             let v_i = vectors::<W>(each(&batch.i, velocity));
             let v_j = vectors::<W>(each(&batch.j, velocity));
             let dv = v_i - v_j;
@@ -67,7 +67,7 @@ widest! {
     pub(crate) fn assemble_walls<W>(
         set: &mut ContactSet,
         walls: &Walls,
-        bed: &Particles,
+        particles: &Particles,
         dt: f64,
         lost: &mut [bool],
         candidates: &mut Vec<Candidate>,
@@ -75,19 +75,19 @@ widest! {
         let mut seen = Seen::default();
         for number in 0..set.batches.len() {
             let WallGeometry { gap, follows, passing } =
-                wall_geometry(set, number, walls, bed, dt, &mut seen);
+                wall_geometry(set, number, walls, particles, dt, &mut seen);
             let gap = Reg::<W>::load(&gap);
             let (batch, at) = (&mut set.batches[number], &mut set.at_walls[number]);
             for lane in batch.lanes() {
                 lost[batch.i[lane] as usize] |= at.went_through[lane];
             }
-            let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
+            let velocity = |body: u32| W::load_row(&particles.bodies[body as usize].velocity);
             let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
             let w_n = w_n - Reg::load(&follows);
             finish(batch, law::bias_lanes(gap, dt) + Reg::load(&passing));
             let closes = closing_bits(gap, w_n, dt);
             for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
-                let partner = bed.count() as u32 + at.wall[lane];
+                let partner = particles.count() as u32 + at.wall[lane];
                 candidates.push(Candidate { i: batch.i[lane], partner });
             }
         }
@@ -98,24 +98,25 @@ widest! {
 widest! {
     /// Refreshes the batches of pairs in which a grain has had an impact, as they are when the later one of
     /// their last impacts happened.
-    pub(crate) fn refresh_pairs<W>(batches: &mut [Batch], bed: &Particles, dt: f64) {
+    pub(crate) fn refresh_pairs<W>(batches: &mut [Batch], particles: &Particles, dt: f64) {
         for batch in batches {
             let mut clocks = Lanes::ZERO;
             for lane in batch.lanes() {
                 let (i, j) = (batch.i[lane] as usize, batch.j[lane] as usize);
-                clocks.0[lane] = bed.clocks[i].max(bed.clocks[j]);
+                clocks.0[lane] = particles.clocks[i].max(particles.clocks[j]);
             }
             if clocks == Lanes::ZERO {
                 continue;
             }
             let at = |grains: &[u32; LANES]| -> [Row; LANES] {
-                std::array::from_fn(|lane| bed.place_at(grains[lane] as usize, clocks.0[lane]))
+                std::array::from_fn(|lane| particles.place_at(grains[lane] as usize, clocks.0[lane]))
             };
             let (i, j) = (at(&batch.i), at(&batch.j));
             let place = |rows: &[Row; LANES]| each(&LANE_NUMBERS, |lane| W::load_row(&rows[lane as usize]));
             let mut unseen = Reg::splat(0.0);
-            let (gap, distance) = pair_geometry::<W>(batch, place(&i), place(&j), bed.period.as_ref(), &mut unseen);
-            let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
+            let period = particles.period.as_ref();
+            let (gap, distance) = pair_geometry::<W>(batch, place(&i), place(&j), period, &mut unseen);
+            let velocity = |body: u32| W::load_row(&particles.bodies[body as usize].velocity);
             let dv = vectors::<W>(each(&batch.i, velocity)) - vectors(each(&batch.j, velocity));
             let w_n = Reg3::load(&batch.normal).dot(dv);
             let gap = empty_lanes_open(batch, gap);
@@ -127,20 +128,20 @@ widest! {
 
 widest! {
     /// The same for the contacts at walls.
-    pub(crate) fn refresh_walls<W>(set: &mut ContactSet, walls: &Walls, bed: &Particles, dt: f64) {
+    pub(crate) fn refresh_walls<W>(set: &mut ContactSet, walls: &Walls, particles: &Particles, dt: f64) {
         for number in 0..set.batches.len() {
             let mut clocks = Lanes::ZERO;
             for lane in set.batches[number].lanes() {
-                clocks.0[lane] = bed.clocks[set.batches[number].i[lane] as usize];
+                clocks.0[lane] = particles.clocks[set.batches[number].i[lane] as usize];
             }
             if clocks == Lanes::ZERO {
                 continue;
             }
             let WallGeometry { gap, follows, passing } =
-                wall_geometry(set, number, walls, bed, dt, &mut Seen::default());
+                wall_geometry(set, number, walls, particles, dt, &mut Seen::default());
             let gap = Reg::<W>::load(&gap);
             let batch = &mut set.batches[number];
-            let velocity = |body: u32| W::load_row(&bed.bodies[body as usize].velocity);
+            let velocity = |body: u32| W::load_row(&particles.bodies[body as usize].velocity);
             let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
             let w_n = w_n - Reg::load(&follows);
             let bias = law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt);
@@ -221,7 +222,7 @@ fn wall_geometry(
     set: &mut ContactSet,
     number: usize,
     walls: &Walls,
-    bed: &Particles,
+    particles: &Particles,
     dt: f64,
     seen: &mut Seen,
 ) -> WallGeometry {
@@ -230,9 +231,10 @@ fn wall_geometry(
     let mut geometry = WallGeometry { gap: Lanes::splat(f64::INFINITY), follows, passing };
     for lane in batch.lanes() {
         let i = batch.i[lane] as usize;
-        let (surface, place) = (at.wall[lane] as usize, bed.position(i));
-        let (wall, near) = (walls.wall(surface), walls.nearest(surface, &place, bed.clocks[i]));
-        let mut relative = bed.velocity(i);
+        let (surface, place) = (at.wall[lane] as usize, particles.position(i));
+        let (wall, near) =
+            (walls.wall(surface), walls.nearest(surface, &place, particles.clocks[i]));
+        let mut relative = particles.velocity(i);
         if wall.is_moving() && near.distance.is_finite() {
             let touching = place - near.distance * near.normal;
             let velocity = wall.motion_at(&touching).0;
@@ -240,16 +242,16 @@ fn wall_geometry(
             relative -= velocity;
         }
         batch.normal.set(lane, near.normal.into());
-        let gap = near.distance - bed.radius(i);
+        let gap = near.distance - particles.radius(i);
         geometry.gap.0[lane] = gap;
-        let left = dt - bed.clocks[i];
+        let left = dt - particles.clocks[i];
         if near.bends && gap < left * relative.norm() {
-            let end = walls.nearest(surface, &(place + left * bed.velocity(i)), dt);
+            let end = walls.nearest(surface, &(place + left * particles.velocity(i)), dt);
             geometry.passing.0[lane] = passing_of_wall(&near, &end, &relative, left) / dt;
         }
         at.went_through[lane] |= near.side * at.side[lane] < 0;
         at.side[lane] = near.side;
-        seen.penetration = seen.penetration.max(-gap / bed.radius(i));
+        seen.penetration = seen.penetration.max(-gap / particles.radius(i));
     }
     geometry
 }

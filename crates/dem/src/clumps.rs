@@ -129,7 +129,7 @@ impl Clumps {
     }
 
     /// Moves and turns the clumps, once they are joined, and puts their spheres where they belong.
-    pub fn move_on(&mut self, bed: &mut Particles, dt: f64) {
+    pub fn move_on(&mut self, particles: &mut Particles, dt: f64) {
         let members = self.members();
         for number in 0..self.bodies.len() {
             let rigid = self.bodies[number];
@@ -148,8 +148,8 @@ impl Clumps {
             let omega = self.inverse_inertia(&turned) * momentum;
             for (member, offset) in self.shape.offsets.iter().enumerate() {
                 let (sphere, arm) = (number * members + member, turned * offset);
-                bed.places[sphere] = Row::new(&(centre + arm), self.shape.radius);
-                bed.bodies[sphere] = Body {
+                particles.places[sphere] = Row::new(&(centre + arm), self.shape.radius);
+                particles.bodies[sphere] = Body {
                     velocity: Row::new(&(velocity + omega.cross(&arm)), 0.0),
                     spin: Row::new(&(self.shape.radius * omega), 0.0),
                 };
@@ -171,7 +171,7 @@ impl Clumps {
     /// Sets a clump in motion; returns the kinetic energy that this adds, per typical mass `[m^2/s^2]`.
     pub fn set_motion(
         &mut self,
-        bed: &mut Particles,
+        particles: &mut Particles,
         clump: usize,
         velocity: &Vector3<f64>,
         angular: &Vector3<f64>,
@@ -182,7 +182,7 @@ impl Clumps {
         let momentum = turned * local.component_mul(&self.shape.inertia);
         let rigid = &mut self.bodies[clump];
         (rigid.velocity, rigid.momentum) = ((*velocity).into(), momentum.into());
-        self.move_on(bed, 0.0);
+        self.move_on(particles, 0.0);
         self.energy(&Vector3::zeros()) - before
     }
 

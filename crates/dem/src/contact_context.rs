@@ -4,7 +4,8 @@ use granulcal_scene::{Material, Scene, SolverSettings};
 use nalgebra::Vector3;
 
 use crate::contact::ContactLaw;
-use crate::effect::Acting;
+use crate::contact_set::ContactSet;
+use crate::effect::{Acting, EffectContext};
 use crate::parallel::Threads;
 use crate::particles::Particles;
 use crate::path::Reach;
@@ -73,29 +74,38 @@ impl ContactContext {
         Reach { interval, near: NEAR * self.radius, far: self.margin }
     }
 
+    /// What the effects see of a substep with these contacts.
+    pub fn for_effects<'a>(&'a self, [pairs, at_walls]: [&'a ContactSet; 2]) -> EffectContext<'a> {
+        let (walls, gravity, radius, dt) =
+            (&self.walls, self.gravity, self.radius, self.settings.dt);
+        EffectContext { pairs, at_walls, walls, gravity, radius, dt }
+    }
+
     /// The coefficients of a contact between two grains.
-    pub fn pair_law(&self, bed: &Particles, i: usize, j: usize) -> ContactLaw {
-        let (r_i, r_j) = (bed.radius(i), bed.radius(j));
+    pub fn pair_law(&self, particles: &Particles, i: usize, j: usize) -> ContactLaw {
+        let (r_i, r_j) = (particles.radius(i), particles.radius(j));
         let lever = [r_j / (r_i + r_j), r_i / (r_i + r_j)];
-        self.law(&self.material, [bed.inverse_mass[i], bed.inverse_mass[j]], lever)
+        self.law(&self.material, [particles.inverse_mass[i], particles.inverse_mass[j]], lever)
     }
 
     /// The coefficients of a contact between a grain and a wall.
-    pub fn wall_law(&self, bed: &Particles, i: usize, wall: usize) -> ContactLaw {
+    pub fn wall_law(&self, particles: &Particles, i: usize, wall: usize) -> ContactLaw {
         // The spin of a moving wall is in units of the grain's radius, so that its lever is the grain's.
         let lever = if self.has_moving_walls { [1.0, 1.0] } else { [1.0, 0.0] };
-        self.law(&self.walls.wall(wall).material, [bed.inverse_mass[i], 0.0], lever)
+        self.law(&self.walls.wall(wall).material, [particles.inverse_mass[i], 0.0], lever)
     }
 
     fn law(&self, material: &Material, inverse_mass: [f64; 2], lever: [f64; 2]) -> ContactLaw {
-        ContactLaw {
+        let mut law = ContactLaw {
             inverse_mass,
             lever,
             sliding_friction: material.sliding_friction,
             rolling_friction: material.rolling_friction,
             torsional_friction: material.torsional_friction,
             compliance: 0.0,
-            rolling_speed: self.effects.rolling_speed,
-        }
+            rolling_speed: 0.0,
+        };
+        self.effects.change_law(&mut law);
+        law
     }
 }

@@ -65,25 +65,25 @@ impl Contacts {
 
     /// Puts the grains that have left the period in at its other end; returns by how much that changes their energy in
     /// `gravity`, per typical mass `[m^2/s^2]`.
-    pub fn wrap(&mut self, bed: &mut Particles, gravity: &Vector3<f64>) -> f64 {
-        let Some(period) = bed.period else { return 0.0 };
+    pub fn wrap(&mut self, particles: &mut Particles, gravity: &Vector3<f64>) -> f64 {
+        let Some(period) = particles.period else { return 0.0 };
         let mut gained = 0.0;
-        for grain in 0..bed.count() {
-            if let Some(shift) = period.shift(&bed.position(grain)) {
-                bed.places[grain].add(&shift);
+        for grain in 0..particles.count() {
+            if let Some(shift) = period.shift(&particles.position(grain)) {
+                particles.places[grain].add(&shift);
                 if let Some(path) = self.paths.get_mut(grain) {
                     path.from += shift;
                 }
-                gained -= gravity.dot(&shift) / bed.inverse_mass[grain];
+                gained -= gravity.dot(&shift) / particles.inverse_mass[grain];
             }
         }
         gained
     }
 
     /// Lists what may touch in the coming substep.
-    pub fn follow(&mut self, bed: &Particles, around: &ContactContext) {
+    pub fn follow(&mut self, particles: &Particles, around: &ContactContext) {
         if self.paths.is_empty() || self.age >= around.settings.list_period {
-            self.list(bed, around);
+            self.list(particles, around);
             return;
         }
         let now = self.age as f64 * around.settings.dt;
@@ -91,18 +91,18 @@ impl Contacts {
         let (dt, paths) = (around.settings.dt, &self.paths);
         around.threads.gather_ranges(paths.len(), SHARE, &mut self.strayed, |grains, strayed| {
             for grain in grains {
-                let at_end = bed.position(grain) + dt * bed.velocity(grain);
+                let at_end = particles.position(grain) + dt * particles.velocity(grain);
                 if is_off(&(at_end - paths[grain].at(now + dt)), around) {
                     strayed.push(grain as u32);
                 }
             }
         });
-        if (self.strayed.len() + self.renewed) * MANY > bed.count() {
-            self.list(bed, around);
+        if (self.strayed.len() + self.renewed) * MANY > particles.count() {
+            self.list(particles, around);
             return;
         }
         for number in 0..self.strayed.len() {
-            self.renew(self.strayed[number] as usize, now, bed, around);
+            self.renew(self.strayed[number] as usize, now, particles, around);
         }
     }
 
@@ -111,15 +111,15 @@ impl Contacts {
         &mut self,
         grain: usize,
         time: f64,
-        bed: &Particles,
+        particles: &Particles,
         around: &ContactContext,
     ) {
         let dt = around.settings.dt;
         // `assemble` has counted the present substep already.
         let begin = (self.age - 1) as f64 * dt;
-        let end = bed.place_at(grain, dt).vector();
+        let end = particles.place_at(grain, dt).vector();
         if is_off(&(end - self.paths[grain].at(begin + dt)), around) {
-            self.renew(grain, begin + time, bed, around);
+            self.renew(grain, begin + time, particles, around);
         }
     }
 
@@ -131,7 +131,7 @@ impl Contacts {
     /// Gaps, normals and biases of every listed contact; `found` gets what may be an impact.
     pub fn assemble(
         &mut self,
-        bed: &Particles,
+        particles: &Particles,
         around: &ContactContext,
         lost: &mut [bool],
         found: &mut Vec<Candidate>,
@@ -139,41 +139,41 @@ impl Contacts {
         let dt = around.settings.dt;
         self.age += 1;
         let assemble = |batches: &mut [Batch], found: &mut Vec<Candidate>| {
-            assemble::assemble_pairs(batches, bed, dt, found)
+            assemble::assemble_pairs(batches, particles, dt, found)
         };
         let batches = &mut self.pairs.batches;
         let pairs = around.threads.gather(batches, SHARE, found, assemble, Seen::max);
         let walls =
-            assemble::assemble_walls(&mut self.at_walls, &around.walls, bed, dt, lost, found);
+            assemble::assemble_walls(&mut self.at_walls, &around.walls, particles, dt, lost, found);
         pairs.max(walls)
     }
 
     /// The same for the contacts of grains that have had an impact.
-    pub fn assemble_again(&mut self, bed: &Particles, around: &ContactContext) {
+    pub fn assemble_again(&mut self, particles: &Particles, around: &ContactContext) {
         let refresh = |batches: &mut [Batch]| {
-            assemble::refresh_pairs(batches, bed, around.settings.dt);
+            assemble::refresh_pairs(batches, particles, around.settings.dt);
         };
         around.threads.shares(&mut self.pairs.batches, SHARE, refresh, |(), ()| ());
-        assemble::refresh_walls(&mut self.at_walls, &around.walls, bed, around.settings.dt);
+        assemble::refresh_walls(&mut self.at_walls, &around.walls, particles, around.settings.dt);
     }
 
     /// Puts the walls' motion into the bodies that stand for them, one for each contact at a wall.
     ///
     /// A contact sees its second body's surface at `v_j - n x w_j`, so `v_j = v_wall + n x w_j` with
     /// `w_j = r omega_wall`.
-    pub fn move_walls(&self, bed: &mut Particles, around: &ContactContext) {
+    pub fn move_walls(&self, particles: &mut Particles, around: &ContactContext) {
         if !around.has_moving_walls {
             return;
         }
-        bed.resize_wall_bodies(self.at_walls.wall_bodies());
+        particles.resize_wall_bodies(self.at_walls.wall_bodies());
         for (number, lane) in self.at_walls.lanes() {
             let (batch, at) = (&self.at_walls.batches[number], &self.at_walls.at_walls[number]);
             let (grain, normal) = (batch.i[lane] as usize, Vector3::from(batch.normal.get(lane)));
-            let radius = bed.radius(grain);
-            let touching = bed.position(grain) - radius * normal;
+            let radius = particles.radius(grain);
+            let touching = particles.position(grain) - radius * normal;
             let (velocity, omega) = around.walls.wall(at.wall[lane] as usize).motion_at(&touching);
             let spin = radius * omega;
-            bed.bodies[batch.j[lane] as usize] = Body {
+            particles.bodies[batch.j[lane] as usize] = Body {
                 velocity: Row::new(&(velocity + normal.cross(&spin)), 0.0),
                 spin: Row::new(&spin, 0.0),
             };
@@ -182,12 +182,12 @@ impl Contacts {
 
     /// SolveInfo that the walls have done on the grains in the lasting contacts of the substep, per typical mass
     /// `[m^2/s^2]`: impulse times the velocity of the wall, moment times its turning.
-    pub fn work_of_walls(&self, bed: &Particles) -> f64 {
+    pub fn work_of_walls(&self, particles: &Particles) -> f64 {
         let work = |(number, lane): (usize, usize)| {
             let batch = &self.at_walls.batches[number];
             let [normal, lambda_t, lambda_r] = [&batch.normal, &batch.lambda_t, &batch.lambda_r]
                 .map(|l| Vector3::from(l.get(lane)));
-            let body = &bed.bodies[batch.j[lane] as usize];
+            let body = &particles.bodies[batch.j[lane] as usize];
             let spin = body.spin.vector();
             let velocity = body.velocity.vector() - normal.cross(&spin);
             let force = batch.lambda_n.0[lane] * normal + lambda_t;
@@ -202,15 +202,15 @@ impl Contacts {
     }
 
     /// A new list for all grains.
-    fn list(&mut self, bed: &Particles, around: &ContactContext) {
+    fn list(&mut self, particles: &Particles, around: &ContactContext) {
         self.age = 0;
         self.renewed = 0;
-        self.paths = Path::all_of(bed);
+        self.paths = Path::all_of(particles);
         let reach = around.reach();
 
-        self.search.pairs(bed, &self.paths, reach, &around.threads, &mut self.found);
+        self.search.pairs(particles, &self.paths, reach, &around.threads, &mut self.found);
         // Where space repeats the first and the last block are neighbours, which phases do not know: one block.
-        let middles = if bed.period.is_some() { &[] } else { self.search.middles() };
+        let middles = if particles.period.is_some() { &[] } else { self.search.middles() };
         self.blocks.place(middles, self.search.longest(), around.radius);
         // Contacts that will act come first: their batches are full of them, the others are passed over whole.
         let members = around.members as u32;
@@ -224,11 +224,15 @@ impl Contacts {
                 .push(ContactKey { i, partner });
         }
         self.listed.append(&mut self.far);
-        self.pairs.rebuild(&self.listed, &self.blocks, bed.count(), BodyKind::Grain, |contact| {
-            around.pair_law(bed, contact.i as usize, contact.partner as usize)
-        });
+        self.pairs.rebuild(
+            &self.listed,
+            &self.blocks,
+            particles.count(),
+            BodyKind::Grain,
+            |contact| around.pair_law(particles, contact.i as usize, contact.partner as usize),
+        );
 
-        self.list_walls(bed, around, reach);
+        self.list_walls(particles, around, reach);
         self.listed.clear();
         for &(contact, is_near) in &self.near_walls {
             if is_near { &mut self.listed } else { &mut self.far }.push(contact);
@@ -236,19 +240,19 @@ impl Contacts {
         self.listed.append(&mut self.far);
         let second =
             if around.has_moving_walls { BodyKind::MovingWall } else { BodyKind::RestingWall };
-        self.at_walls.rebuild(&self.listed, &self.blocks, bed.count(), second, |contact| {
-            around.wall_law(bed, contact.i as usize, contact.partner as usize)
+        self.at_walls.rebuild(&self.listed, &self.blocks, particles.count(), second, |contact| {
+            around.wall_law(particles, contact.i as usize, contact.partner as usize)
         });
     }
 
     /// Lists the walls within reach of each grain, and whether they may be touched.
-    fn list_walls(&mut self, bed: &Particles, around: &ContactContext, reach: Reach) {
+    fn list_walls(&mut self, particles: &Particles, around: &ContactContext, reach: Reach) {
         self.near_walls.clear();
         let (paths, walls) = (&self.paths, &around.walls);
         let list = |grains: Range<usize>, found: &mut Vec<(ContactKey, bool)>| {
-            for grain in grains.filter(|&grain| !bed.has_left(grain)) {
+            for grain in grains.filter(|&grain| !particles.has_left(grain)) {
                 let Path { from, velocity } = &paths[grain];
-                let near = bed.radius(grain) + reach.near + reach.interval * velocity.norm();
+                let near = particles.radius(grain) + reach.near + reach.interval * velocity.norm();
                 let range = near + around.margin - reach.near;
                 walls.reached(from, range, |surface| {
                     let contact = ContactKey { i: grain as u32, partner: surface as u32 };
@@ -256,9 +260,9 @@ impl Contacts {
                 });
             }
         };
-        around.threads.gather_ranges(bed.count(), SHARE, &mut self.near_walls, list);
-        let (found, near_walls, count) = (&self.found, &self.near_walls, bed.count() as u32);
-        self.partners.rebuild(bed.count(), |add| {
+        around.threads.gather_ranges(particles.count(), SHARE, &mut self.near_walls, list);
+        let (found, near_walls, count) = (&self.found, &self.near_walls, particles.count() as u32);
+        self.partners.rebuild(particles.count(), |add| {
             for pair in found {
                 add(pair.i, pair.j);
                 add(pair.j, pair.i);
@@ -270,18 +274,18 @@ impl Contacts {
     }
 
     /// Gives a grain a new path from `now` `[s]` after the list on and lists what lies on it.
-    fn renew(&mut self, grain: usize, now: f64, bed: &Particles, around: &ContactContext) {
+    fn renew(&mut self, grain: usize, now: f64, particles: &Particles, around: &ContactContext) {
         let settings = &around.settings;
         let left = settings.dt * settings.list_period as f64 - now;
-        let (at, velocity) = (bed.position(grain), bed.velocity(grain));
+        let (at, velocity) = (particles.position(grain), particles.velocity(grain));
         let path = Path { from: at, velocity };
         self.paths[grain] = Path { from: at - now * velocity, velocity };
         self.renewed += 1;
 
-        let ball = Ball::swept(&path, bed.radius(grain), left, around.margin);
+        let ball = Ball::swept(&path, particles.radius(grain), left, around.margin);
         self.around_path.clear();
         self.search.around(&ball, |other| self.around_path.push(other));
-        if let Some(period) = &bed.period {
+        if let Some(period) = &particles.period {
             for step in [period.step(), -period.step()] {
                 let image = Ball { middle: ball.middle + step, ..ball };
                 self.search.around(&image, |other| self.around_path.push(other));
@@ -296,23 +300,23 @@ impl Contacts {
             }
             let theirs = &self.paths[other];
             let theirs = Path { from: theirs.at(now), velocity: theirs.velocity };
-            let limit = bed.radius(grain) + bed.radius(other) + around.margin;
-            if path.comes_within(&theirs, bed, limit, left) {
+            let limit = particles.radius(grain) + particles.radius(other) + around.margin;
+            if path.comes_within(&theirs, particles, limit, left) {
                 let (i, j) = (grain.min(other), grain.max(other));
                 self.partners.add(i, j as u32);
                 self.partners.add(j, i as u32);
                 let contact = ContactKey { i: i as u32, partner: j as u32 };
-                self.pairs.append(contact, false, around.pair_law(bed, i, j));
+                self.pairs.append(contact, false, around.pair_law(particles, i, j));
             }
         }
-        let range = bed.radius(grain) + around.margin + left * velocity.norm();
+        let range = particles.radius(grain) + around.margin + left * velocity.norm();
         let (partners, at_walls) = (&mut self.partners, &mut self.at_walls);
         around.walls.reached(&at, range, |surface| {
-            let partner = (bed.count() + surface) as u32;
+            let partner = (particles.count() + surface) as u32;
             if !partners.has(grain, partner) {
                 partners.add(grain, partner);
                 let contact = ContactKey { i: grain as u32, partner: surface as u32 };
-                at_walls.append(contact, true, around.wall_law(bed, grain, surface));
+                at_walls.append(contact, true, around.wall_law(particles, grain, surface));
             }
         });
     }

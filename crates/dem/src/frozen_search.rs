@@ -9,7 +9,7 @@ use crate::path::{Path, Reach};
 /// The grains of a moment, whose neighbours can be searched again and again.
 #[derive(Clone, Debug)]
 pub struct FrozenSearch {
-    bed: Particles,
+    particles: Particles,
     paths: Vec<Path>,
     reach: Reach,
     threads: Threads,
@@ -18,20 +18,20 @@ pub struct FrozenSearch {
 }
 
 impl FrozenSearch {
-    pub(crate) fn new(bed: Particles, around: &ContactContext) -> Self {
+    pub(crate) fn new(particles: Particles, around: &ContactContext) -> Self {
         Self {
-            paths: Path::all_of(&bed),
+            paths: Path::all_of(&particles),
             reach: around.reach(),
             threads: around.threads.clone(),
             search: PairSearch::default(),
             found: Vec::new(),
-            bed,
+            particles,
         }
     }
 
     /// Lists the pairs that may touch before the next list and returns their number.
     pub fn pairs(&mut self) -> usize {
-        self.search.pairs(&self.bed, &self.paths, self.reach, &self.threads, &mut self.found);
+        self.search.pairs(&self.particles, &self.paths, self.reach, &self.threads, &mut self.found);
         self.found.len()
     }
 }

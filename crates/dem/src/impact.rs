@@ -75,12 +75,12 @@ impl Event {
         pair: Candidate,
         now: f64,
         counts: [u32; 2],
-        bed: &Particles,
+        particles: &Particles,
         around: &ContactContext,
     ) -> Option<Self> {
-        let time = match other_grain(pair, bed) {
-            Some(j) => time_of_pair(pair.i as usize, j, now, bed),
-            None => time_at_wall(pair, now, bed, around),
+        let time = match other_grain(pair, particles) {
+            Some(j) => time_of_pair(pair.i as usize, j, now, particles),
+            None => time_at_wall(pair, now, particles, around),
         };
         let time = time.filter(|&time| time < around.settings.dt)?;
         Some(Self { time, pair, counts })
@@ -127,13 +127,13 @@ impl Impacts {
     /// Leaves each grain that was hit where it was at its last impact (`Particles::clocks`).
     pub fn resolve(
         &mut self,
-        bed: &mut Particles,
+        particles: &mut Particles,
         contacts: &mut Contacts,
         around: &ContactContext,
     ) -> usize {
-        self.counts.resize(bed.count(), 0);
+        self.counts.resize(particles.count(), 0);
         let foreseen = |candidates: &mut [Candidate], found: &mut Vec<Event>| {
-            let event = |&mut pair| Event::next(pair, 0.0, [0; 2], bed, around);
+            let event = |&mut pair| Event::next(pair, 0.0, [0; 2], particles, around);
             found.extend(candidates.iter_mut().filter_map(event));
         };
         let candidates = &mut self.candidates;
@@ -144,10 +144,11 @@ impl Impacts {
             if counts != self.counts_of(pair) {
                 continue;
             }
-            if self.is_early(pair, time, bed, around) {
+            if self.is_early(pair, time, particles, around) {
                 continue;
             }
-            let Some(outcome) = self.cluster.resolve(pair, time, bed, contacts, around) else {
+            let Some(outcome) = self.cluster.resolve(pair, time, particles, contacts, around)
+            else {
                 continue;
             };
             self.work.note(&outcome, self.cluster.hit.len());
@@ -161,10 +162,10 @@ impl Impacts {
                 }
                 // What walls crush is not let go by more of the same in this substep.
                 self.counts[grain] += if outcome.is_cut { MAX_IMPACTS } else { 1 };
-                contacts.follow_after_impact(grain, time, bed, around);
+                contacts.follow_after_impact(grain, time, particles, around);
             }
             for &grain in &hit {
-                self.foresee_all(grain as usize, time, bed, contacts, around);
+                self.foresee_all(grain as usize, time, particles, contacts, around);
             }
             self.cluster.hit = hit;
         }
@@ -181,16 +182,18 @@ impl Impacts {
         &mut self,
         pair: Candidate,
         time: f64,
-        bed: &Particles,
+        particles: &Particles,
         around: &ContactContext,
     ) -> bool {
-        let Some(surface) = (pair.partner as usize).checked_sub(bed.count()) else { return false };
-        let place = bed.place_at(pair.i as usize, time);
+        let Some(surface) = (pair.partner as usize).checked_sub(particles.count()) else {
+            return false;
+        };
+        let place = particles.place_at(pair.i as usize, time);
         let near = around.walls.nearest(surface, &place.vector(), time);
         let (gap, radius) = (near.distance - place.0[3], place.0[3]);
         let is_early = near.bends && gap > TOUCHES * radius;
         if is_early {
-            self.foresee(pair, time, bed, around);
+            self.foresee(pair, time, particles, around);
         }
         is_early
     }
@@ -204,7 +207,7 @@ impl Impacts {
         &mut self,
         grain: usize,
         now: f64,
-        bed: &Particles,
+        particles: &Particles,
         contacts: &Contacts,
         around: &ContactContext,
     ) {
@@ -220,26 +223,32 @@ impl Impacts {
             } else {
                 Candidate { i: grain as u32, partner }
             };
-            self.foresee(pair, now, bed, around);
+            self.foresee(pair, now, particles, around);
         }
     }
 
     /// Queues the impact of a pair, if there is one after `now`.
-    fn foresee(&mut self, pair: Candidate, now: f64, bed: &Particles, around: &ContactContext) {
-        self.queue.extend(Event::next(pair, now, self.counts_of(pair), bed, around));
+    fn foresee(
+        &mut self,
+        pair: Candidate,
+        now: f64,
+        particles: &Particles,
+        around: &ContactContext,
+    ) {
+        self.queue.extend(Event::next(pair, now, self.counts_of(pair), particles, around));
     }
 }
 
-fn other_grain(pair: Candidate, bed: &Particles) -> Option<usize> {
+fn other_grain(pair: Candidate, particles: &Particles) -> Option<usize> {
     let j = pair.partner as usize;
-    (j < bed.count()).then_some(j)
+    (j < particles.count()).then_some(j)
 }
 
 /// When two grains on their straight ways touch fast enough: the root of `|d + w tau| = r_i + r_j`.
-fn time_of_pair(i: usize, j: usize, now: f64, bed: &Particles) -> Option<f64> {
-    let (a, b) = (bed.place_at(i, now), bed.place_at(j, now));
-    let apart = bed.nearest(a.vector() - b.vector());
-    let relative = bed.velocity(i) - bed.velocity(j);
+fn time_of_pair(i: usize, j: usize, now: f64, particles: &Particles) -> Option<f64> {
+    let (a, b) = (particles.place_at(i, now), particles.place_at(j, now));
+    let apart = particles.nearest(a.vector() - b.vector());
+    let relative = particles.velocity(i) - particles.velocity(j);
     let touching = a.0[3] + b.0[3];
     let closing = -apart.dot(&relative);
     if closing <= IMPACT_SPEED * touching {
@@ -261,20 +270,21 @@ fn time_of_pair(i: usize, j: usize, now: f64, bed: &Particles) -> Option<f64> {
 fn time_at_wall(
     pair: Candidate,
     now: f64,
-    bed: &Particles,
+    particles: &Particles,
     around: &ContactContext,
 ) -> Option<f64> {
     let (grain, dt) = (pair.i as usize, around.settings.dt);
-    let surface = pair.partner as usize - bed.count();
-    let place = bed.place_at(grain, now);
+    let surface = pair.partner as usize - particles.count();
+    let place = particles.place_at(grain, now);
     let near = around.walls.nearest(surface, &place.vector(), now);
     if near.distance.is_infinite() {
         return None;
     }
     let gap = near.distance - place.0[3];
     let touching = place.vector() - near.distance * near.normal;
-    let w_n =
-        near.normal.dot(&(bed.velocity(grain) - around.walls.wall(surface).motion_at(&touching).0));
+    let w_n = near
+        .normal
+        .dot(&(particles.velocity(grain) - around.walls.wall(surface).motion_at(&touching).0));
     let fall = near.normal.dot(&around.gravity);
     if gap <= 0.0 {
         return (w_n + fall * (now - 0.5 * dt) < -IMPACT_SPEED).then_some(now);

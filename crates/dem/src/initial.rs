@@ -8,7 +8,7 @@ use crate::particles::Particles;
 use crate::period::Period;
 
 /// The grains where they start, as large and as heavy as the scene says: the spheres of `clumps` if they are not round.
-pub(crate) fn bed(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Particles {
+pub(crate) fn particles(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Particles {
     let radius = scene.grains.radius();
     let (mut places, inverse): (Vec<Row>, f64) = if let Some(clumps) = clumps {
         (clumps.places(), clumps.members() as f64)

@@ -63,7 +63,7 @@ impl PairSearch {
     /// the order depends on the state alone.
     pub fn pairs(
         &mut self,
-        bed: &Particles,
+        particles: &Particles,
         paths: &[Path],
         reach: Reach,
         threads: &Threads,
@@ -73,34 +73,34 @@ impl PairSearch {
         self.starts.clear();
         self.added.clear();
         self.outside.clear();
-        if bed.present().count() < 2 {
+        if particles.present().count() < 2 {
             return;
         }
-        self.sweep_balls(bed, paths, reach);
-        self.sort_into_cells(bed);
+        self.sweep_balls(particles, paths, reach);
+        self.sort_into_cells(particles);
         let search = &*self;
         threads.gather_ranges(self.cells[1] * self.cells[2], ROWS, found, |rows, found| {
             let first = found.len();
             overlapping(search, rows, found);
             keep_from(found, first, |pair| {
-                pair.is_direct(bed, paths) && pair.follow(bed, paths, reach)
+                pair.is_direct(particles, paths) && pair.follow(particles, paths, reach)
             });
         });
-        if let Some(period) = &bed.period {
-            self.across(bed, paths, reach, period, found);
+        if let Some(period) = &particles.period {
+            self.across(particles, paths, reach, period, found);
         }
     }
 
     /// Adds the pairs that come within reach across the end of the period: those whose nearest images are not direct.
     fn across(
         &self,
-        bed: &Particles,
+        particles: &Particles,
         paths: &[Path],
         reach: Reach,
         period: &Period,
         found: &mut Vec<Neighbours>,
     ) {
-        for grain in bed.present() {
+        for grain in particles.present() {
             let path = &paths[grain];
             let (i, middle) = (grain as u32, self.middles[grain] + period.step());
             self.around(&Ball { middle, reach: self.reaches[grain] }, |j| {
@@ -109,7 +109,7 @@ impl PairSearch {
                 let mut pair = Neighbours { i: i.min(j), j: i.max(j), come_near: false };
                 if !period.is_direct(&apart)
                     && period.is_ahead(&apart)
-                    && pair.follow(bed, paths, reach)
+                    && pair.follow(particles, paths, reach)
                 {
                     found.push(pair);
                 }
@@ -176,18 +176,18 @@ impl PairSearch {
         }
     }
 
-    fn sweep_balls(&mut self, bed: &Particles, paths: &[Path], reach: Reach) {
+    fn sweep_balls(&mut self, particles: &Particles, paths: &[Path], reach: Reach) {
         self.middles.clear();
         self.reaches.clear();
         for (grain, path) in paths.iter().enumerate() {
-            let ball = Ball::swept(path, bed.radius(grain), reach.interval, reach.far);
+            let ball = Ball::swept(path, particles.radius(grain), reach.interval, reach.far);
             self.middles.push(ball.middle);
             self.reaches.push(ball.reach);
         }
     }
 
     /// Counting sort by cell. A cell is as wide as the two widest balls reach, so that partners are neighbours.
-    fn sort_into_cells(&mut self, bed: &Particles) {
+    fn sort_into_cells(&mut self, particles: &Particles) {
         let (mut low, mut high) = (self.middles[0], self.middles[0]);
         for middle in &self.middles {
             low = low.inf(middle);
@@ -212,7 +212,7 @@ impl PairSearch {
         self.cell_of.clear();
         let mut count = 0;
         for (grain, middle) in self.middles.iter().enumerate() {
-            if bed.has_left(grain) {
+            if particles.has_left(grain) {
                 self.cell_of.push(u32::MAX);
                 continue;
             }
@@ -357,18 +357,18 @@ pub(crate) struct Neighbours {
 impl Neighbours {
     /// Whether neither is nearer to the other's image.
     #[inline]
-    fn is_direct(&self, bed: &Particles, paths: &[Path]) -> bool {
-        bed.period.is_none_or(|period| {
+    fn is_direct(&self, particles: &Particles, paths: &[Path]) -> bool {
+        particles.period.is_none_or(|period| {
             period.is_direct(&(paths[self.i as usize].from - paths[self.j as usize].from))
         })
     }
 
     /// Whether they are within reach on their paths; notes whether they come near.
     #[inline]
-    fn follow(&mut self, bed: &Particles, paths: &[Path], reach: Reach) -> bool {
+    fn follow(&mut self, particles: &Particles, paths: &[Path], reach: Reach) -> bool {
         let (i, j) = (self.i as usize, self.j as usize);
-        let nearest = paths[i].nearest_squared(&paths[j], bed, reach.interval);
-        let touching = bed.radius(i) + bed.radius(j);
+        let nearest = paths[i].nearest_squared(&paths[j], particles, reach.interval);
+        let touching = particles.radius(i) + particles.radius(j);
         self.come_near = nearest < (touching + reach.near).powi(2);
         nearest < (touching + reach.far).powi(2)
     }

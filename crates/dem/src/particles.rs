@@ -241,33 +241,33 @@ mod tests {
     use super::*;
 
     /// Three grains of different size and mass, in motion.
-    fn bed() -> Particles {
+    fn particles() -> Particles {
         let places = [1e-3, 2e-3, 4e-3].map(|radius| Row([5.0 * radius, 0.0, 0.1, radius]));
-        let mut bed = Particles::new(places.to_vec(), vec![8.0, 1.0, 0.125], None);
-        for (i, body) in bed.bodies[..3].iter_mut().enumerate() {
+        let mut particles = Particles::new(places.to_vec(), vec![8.0, 1.0, 0.125], None);
+        for (i, body) in particles.bodies[..3].iter_mut().enumerate() {
             let i = i as f64;
             body.velocity = Row([1.0 + i, -2.0, 0.5 * i, 0.0]);
             body.spin = Row([0.1, 0.2 * i, -0.3, 0.0]);
         }
-        bed
+        particles
     }
 
     #[test]
     fn spin_is_radius_times_angular_velocity() {
-        let bed = bed();
-        assert_eq!(bed.angular_velocity(2), Vector3::new(0.1, 0.4, -0.3) / 4e-3);
-        assert_eq!(bed.velocity(2), Vector3::new(3.0, -2.0, 1.0));
+        let particles = particles();
+        assert_eq!(particles.angular_velocity(2), Vector3::new(0.1, 0.4, -0.3) / 4e-3);
+        assert_eq!(particles.velocity(2), Vector3::new(3.0, -2.0, 1.0));
     }
 
     #[test]
     fn kinetic_energy_is_that_of_a_solid_sphere() {
-        let bed = bed();
+        let particles = particles();
         for grain in 0..3 {
-            let mass = 1.0 / bed.inverse_mass[grain];
-            let inertia = 0.4 * mass * bed.radius(grain).powi(2);
-            let expected = 0.5 * mass * bed.velocity(grain).norm_squared()
-                + 0.5 * inertia * bed.angular_velocity(grain).norm_squared();
-            assert!((bed.kinetic_energy(grain) / expected - 1.0).abs() < 1e-14);
+            let mass = 1.0 / particles.inverse_mass[grain];
+            let inertia = 0.4 * mass * particles.radius(grain).powi(2);
+            let expected = 0.5 * mass * particles.velocity(grain).norm_squared()
+                + 0.5 * inertia * particles.angular_velocity(grain).norm_squared();
+            assert!((particles.kinetic_energy(grain) / expected - 1.0).abs() < 1e-14);
         }
     }
 
@@ -275,13 +275,13 @@ mod tests {
     fn free_flight_changes_energy_by_half_g_squared_dt_squared() {
         // v += g dt, then x += v dt: the potential drops by m g dt (v + g dt) while the kinetic
         // energy rises by m g dt (v + g dt / 2).
-        let (mut bed, gravity, dt) = (bed(), Vector3::new(0.0, 0.0, -9.81), 1e-3);
-        let before = bed.energy(&gravity);
-        bed.accelerate(&gravity, dt, &Threads::default());
-        bed.move_on(dt);
-        let mass = bed.inverse_mass.iter().map(|m| 1.0 / m).sum::<f64>();
+        let (mut particles, gravity, dt) = (particles(), Vector3::new(0.0, 0.0, -9.81), 1e-3);
+        let before = particles.energy(&gravity);
+        particles.accelerate(&gravity, dt, &Threads::default());
+        particles.move_on(dt);
+        let mass = particles.inverse_mass.iter().map(|m| 1.0 / m).sum::<f64>();
         let expected = -0.5 * mass * (9.81 * dt).powi(2);
-        assert!((bed.energy(&gravity) - before - expected).abs() < 1e-12);
-        assert_eq!(bed.bodies[3], Body::default()); // the resting body feels no gravity
+        assert!((particles.energy(&gravity) - before - expected).abs() < 1e-12);
+        assert_eq!(particles.bodies[3], Body::default()); // the resting body feels no gravity
     }
 }

@@ -30,9 +30,9 @@ impl From<Path> for [[f64; 3]; 2] {
 
 impl Path {
     /// The ways of all grains from now on.
-    pub fn all_of(bed: &Particles) -> Vec<Self> {
-        let path = |i| Self { from: bed.position(i), velocity: bed.velocity(i) };
-        (0..bed.count()).map(path).collect()
+    pub fn all_of(particles: &Particles) -> Vec<Self> {
+        let path = |i| Self { from: particles.position(i), velocity: particles.velocity(i) };
+        (0..particles.count()).map(path).collect()
     }
 
     #[inline]
@@ -42,8 +42,8 @@ impl Path {
 
     /// Square of the least distance of two grains' ways in the next `interval` `[s]`, `[m^2]`.
     #[inline]
-    pub fn nearest_squared(&self, other: &Self, bed: &Particles, interval: f64) -> f64 {
-        let apart = bed.nearest(self.from - other.from);
+    pub fn nearest_squared(&self, other: &Self, particles: &Particles, interval: f64) -> f64 {
+        let apart = particles.nearest(self.from - other.from);
         let relative = self.velocity - other.velocity;
         let closing = -apart.dot(&relative);
         if closing <= 0.0 {
@@ -55,8 +55,14 @@ impl Path {
 
     /// Whether the way comes within `limit` `[m]` of another in the next `interval` `[s]`.
     #[inline]
-    pub fn comes_within(&self, other: &Self, bed: &Particles, limit: f64, interval: f64) -> bool {
-        self.nearest_squared(other, bed, interval) < limit * limit
+    pub fn comes_within(
+        &self,
+        other: &Self,
+        particles: &Particles,
+        limit: f64,
+        interval: f64,
+    ) -> bool {
+        self.nearest_squared(other, particles, interval) < limit * limit
     }
 }
 

@@ -211,16 +211,16 @@ fn motion(body: &Body) -> Vector6<f64> {
 }
 
 impl ContactProblem {
-    /// Reads assembled contacts; `bed` holds the free velocities, without the warm start.
-    pub(crate) fn new(bed: &Particles, contacts: &Contacts, time: f64, dt: f64) -> Self {
-        let free_velocities = bed.bodies[..bed.count()].iter().map(motion).collect();
+    /// Reads assembled contacts; `particles` holds the free velocities, without the warm start.
+    pub(crate) fn new(particles: &Particles, contacts: &Contacts, time: f64, dt: f64) -> Self {
+        let free_velocities = particles.bodies[..particles.count()].iter().map(motion).collect();
         let contacts = lanes(contacts)
-            .map(|(set, number, lane)| FrozenContact::read(set, number, lane, &bed.bodies))
+            .map(|(set, number, lane)| FrozenContact::read(set, number, lane, &particles.bodies))
             .collect();
         let mut problem = Self {
             time,
             dt,
-            inverse_mass: bed.inverse_mass.clone(),
+            inverse_mass: particles.inverse_mass.clone(),
             free_velocities,
             contacts,
             sweeps: 0,

@@ -9,13 +9,13 @@ use crate::particles::Particles;
 
 /// Gives the contacts of a set their restitution: what closes faster than an impact must and touches
 /// within the substep may not leave slower than `-e w_n`. Source: Moreau 1988 as in Acary and Brogliato 2008, 10.1.
-pub(crate) fn rebound(set: &mut ContactSet, bed: &Particles, around: &ContactContext) {
+pub(crate) fn rebound(set: &mut ContactSet, particles: &Particles, around: &ContactContext) {
     let at_walls = set.is_at_walls();
     for number in 0..set.batches.len() {
         for lane in set.batches[number].lanes() {
             let batch = &set.batches[number];
             let (i, j) = (batch.i[lane] as usize, batch.j[lane] as usize);
-            let apart = bed.velocity(i) - bed.velocity(j);
+            let apart = particles.velocity(i) - particles.velocity(j);
             let w_n = Vector3::from(batch.normal.get(lane)).dot(&apart);
             if w_n >= -IMPACT_SPEED || w_n + batch.bias.0[lane] >= 0.0 {
                 continue;

@@ -34,7 +34,7 @@ use crate::wall_load::{self, WallLoad};
 /// its time; solve the lasting contacts; move.
 #[derive(Clone, Debug)]
 pub struct Simulation {
-    bed: Particles,
+    particles: Particles,
     contacts: Contacts,
     around: ContactContext,
     impacts: Impacts,
@@ -44,7 +44,7 @@ pub struct Simulation {
     on_layer: ContactSet,
     /// The bodies that the grains are, if they are not round: several spheres each, or
     clumps: Option<Clumps>,
-    /// convex bodies of one shape, which have a substep of their own; `bed` follows them.
+    /// convex bodies of one shape, which have a substep of their own; `particles` follow them.
     bodies: Option<Bodies>,
     origin: Arc<Origin>,
     substep: usize,
@@ -71,16 +71,20 @@ impl Simulation {
     pub fn new(scene: &Scene, seed: u64) -> Result<Self, DemError> {
         scene.check()?;
         let clumps = Clumps::of(scene, seed);
-        let bed = initial::bed(scene, clumps.as_ref(), seed);
+        let particles = initial::particles(scene, clumps.as_ref(), seed);
         let around = ContactContext::new(scene);
         let gravity = around.gravity;
         let lift = gravity.norm() * scene.grains.radius();
-        let least_scale = (lift + scene.end.kinetic_energy) * bed.count() as f64;
+        let least_scale = (lift + scene.end.kinetic_energy) * particles.count() as f64;
         Ok(Self {
-            watch: HealthWatch::new(bed.count(), energy(&bed, (None, None), &around), least_scale),
+            watch: HealthWatch::new(
+                particles.count(),
+                energy(&particles, (None, None), &around),
+                least_scale,
+            ),
             contacts: Contacts::default(),
             around,
-            bed,
+            particles,
             impacts: Impacts::default(),
             bridges: Bridges::default(),
             on_layer: ContactSet::default(),
@@ -127,28 +131,28 @@ impl Simulation {
 
     /// Centres of the grains `[m]`; as velocities and radii, of those that have not left the scene.
     pub fn positions(&self) -> Vec<Vector3<f64>> {
-        self.bed.present().map(|grain| self.bed.position(grain)).collect()
+        self.particles.present().map(|grain| self.particles.position(grain)).collect()
     }
 
     /// Velocities of the grains `[m/s]`.
     pub fn velocities(&self) -> Vec<Vector3<f64>> {
-        self.bed.present().map(|grain| self.bed.velocity(grain)).collect()
+        self.particles.present().map(|grain| self.particles.velocity(grain)).collect()
     }
 
     /// Angular velocities of the grains `[rad/s]`.
     pub fn angular_velocities(&self) -> Vec<Vector3<f64>> {
-        self.bed.present().map(|grain| self.bed.angular_velocity(grain)).collect()
+        self.particles.present().map(|grain| self.particles.angular_velocity(grain)).collect()
     }
 
     /// Radii of the grains `[m]`.
     pub fn radii(&self) -> Vec<f64> {
-        self.bed.present().map(|grain| self.bed.radius(grain)).collect()
+        self.particles.present().map(|grain| self.particles.radius(grain)).collect()
     }
 
     /// Radii of the grains that have left through the scene's outflow `[m]`.
     pub fn radii_out(&self) -> Vec<f64> {
-        let grains = 0..self.bed.count();
-        grains.filter(|&i| self.bed.has_left(i)).map(|i| self.bed.radius(i)).collect()
+        let grains = 0..self.particles.count();
+        grains.filter(|&i| self.particles.has_left(i)).map(|i| self.particles.radius(i)).collect()
     }
 
     /// Sets a grain (one that is not round, as a whole), by its number at the start, in motion: velocity `[m/s]` and
@@ -166,8 +170,8 @@ impl Simulation {
         velocity: Vector3<f64>,
         angular_velocity: Vector3<f64>,
     ) -> Result<(), DemError> {
-        let count = self.clumps.as_ref().map_or(self.bed.count(), Clumps::count);
-        if grain >= count || self.bed.has_left(grain) {
+        let count = self.clumps.as_ref().map_or(self.particles.count(), Clumps::count);
+        if grain >= count || self.particles.has_left(grain) {
             let allowed = "less than the number of grains, and in the scene";
             return Err(DemError::range("grain", grain as f64, allowed));
         }
@@ -177,14 +181,14 @@ impl Simulation {
             }
         }
         let work = if let Some(clumps) = &mut self.clumps {
-            clumps.set_motion(&mut self.bed, grain, &velocity, &angular_velocity)
+            clumps.set_motion(&mut self.particles, grain, &velocity, &angular_velocity)
         } else if let Some(bodies) = &mut self.bodies {
-            self.bed.set_motion(grain, &velocity, &angular_velocity);
+            self.particles.set_motion(grain, &velocity, &angular_velocity);
             bodies.set_motion(grain, &velocity, &angular_velocity)
         } else {
-            let before = self.bed.kinetic_energy(grain);
-            self.bed.set_motion(grain, &velocity, &angular_velocity);
-            self.bed.kinetic_energy(grain) - before
+            let before = self.particles.kinetic_energy(grain);
+            self.particles.set_motion(grain, &velocity, &angular_velocity);
+            self.particles.kinetic_energy(grain) - before
         };
         self.watch.see_work(work);
         self.contacts.forget_list();
@@ -274,7 +278,7 @@ impl Simulation {
 
 /// Energy of the grains and of what they press in, per typical mass `[m^2/s^2]`.
 fn energy(
-    bed: &Particles,
+    particles: &Particles,
     (clumps, bodies): (Option<&Clumps>, Option<&Bodies>),
     around: &ContactContext,
 ) -> f64 {
@@ -282,9 +286,9 @@ fn energy(
     let energy = match (clumps, bodies) {
         (Some(clumps), _) => clumps.energy(gravity),
         (None, Some(bodies)) => bodies.energy(gravity),
-        (None, None) => bed.energy(gravity),
+        (None, None) => particles.energy(gravity),
     };
-    around.effects.pad.as_ref().map_or(energy, |pad| energy + pad.energy(bed))
+    energy + around.effects.energy(particles)
 }
 
 #[cfg(test)]

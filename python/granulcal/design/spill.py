@@ -12,11 +12,11 @@ from granulcal.design.forecast import SpillForecast
 from granulcal.design.posterior_file import PosteriorDraws
 from granulcal.design.ring_model import HEIGHT, height_prior
 from granulcal.errors import TrainingDataError
+from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 from granulcal.progress import ProgressLine
-from granulcal.within_budget import KeptPours
 
 __all__ = ["design_spill", "forecast_of"]
 

@@ -9,9 +9,7 @@ physics; say the verdict; run the placebo; write the report.
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +25,13 @@ from granulcal.loop.check.checks import (
     recentred,
     trivial,
 )
-from granulcal.loop.check.correction import Correction
-from granulcal.loop.check.coverage import FEWEST_PAIRS, Coverage
+from granulcal.loop.check.coverage import FEWEST_PAIRS
 from granulcal.loop.check.prior_rounds import LOOKS, look_over
-from granulcal.loop.check.standing import Standing, stand
+from granulcal.loop.check.standing import stand
+from granulcal.loop.closed import Closed
 from granulcal.loop.effects.definitions import is_definition
-from granulcal.loop.experiment import Experiment, next_experiment
+from granulcal.loop.experiment import next_experiment
 from granulcal.loop.pours.archive import Archive, ArchivePlan
-from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
 from granulcal.loop.pours.refine import ROUND, Rows, further
@@ -42,8 +39,6 @@ from granulcal.loop.pours.replicates import (
     REPLICATES,
     both,
     error_of,
-    model_faults,
-    model_scene,
     placebo_of,
 )
 from granulcal.loop.pours.time_needed import time_needed
@@ -52,13 +47,10 @@ from granulcal.loop.report.models_of import models_of
 from granulcal.loop.surrogate.observation import Observation
 from granulcal.loop.surrogate.store_surrogate import fit_surrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
-from granulcal.loop.task import FIT, SEALED, Condition, Task
-from granulcal.loop.test.distance import Improvement
+from granulcal.loop.task import FIT, SEALED, Task
 from granulcal.loop.test.thresholds import Thresholds
-from granulcal.loop.test.trace import Explanation, Power, Trace, power, trace
-from granulcal.loop.test.verdict import Verdict
+from granulcal.loop.test.trace import Power, power, trace
 from granulcal.one_thread import one_thread
-from granulcal.pours.scene import Scene
 
 __all__ = ["Closed", "close_loop", "fit_surrogate", "planned"]
 
@@ -68,123 +60,6 @@ Array = NDArray[np.float64]
 _LEAST_BASE, _LEAST_EACH = 300, 40
 # Shares of a budget: the base model has more directions than any one effect.
 _BASE_SHARE = 0.4
-
-
-@dataclass(frozen=True)
-class Closed:
-    """What the loop found.
-
-    Attributes:
-        task: what was asked.
-        standing: the verdict, and what may have overturned that of the fits.
-        trace: fit, gate, refits and verdict on the conditions to fit.
-        power: what could be seen, before the data.
-        fit: error before and after, conditions to fit.
-        sealed: the same of the sealed conditions; None without any.
-        placebo: the same pipeline on pours of the base model at its fit.
-        experiments: which further pours would tell most.
-        pours: that this analysis needed: archive, replicates, placebo.
-        registration: SHA-256 of what was fixed beforehand.
-        measured: statistics of every condition's pours, by name.
-        simulated: of the base and of the augmented model, by condition's name.
-        corrections: what the correction without physics leaves; none where nothing was detected.
-        calibrated: the interval of the named effect's strength by simulated pairs; None without.
-    """
-
-    task: Task
-    standing: Standing
-    trace: Trace
-    power: Power
-    fit: Improvement
-    sealed: Improvement | None
-    placebo: Trace
-    experiments: tuple[Experiment, ...]
-    pours: int
-    registration: str
-    measured: dict[str, Array]
-    simulated: dict[str, tuple[Array, Array]]
-    corrections: tuple[Correction, ...] = ()
-    calibrated: Coverage | None = None
-
-    @property
-    def verdict(self) -> Verdict:
-        """What may be said, once the checks are through."""
-        return self.standing.verdict
-
-    def scene(self, condition: Condition, one: Explanation) -> Scene:
-        """Returns the scene of a model at its best fit under a condition."""
-        return model_scene(self.task, condition, one)
-
-    def faults(self, one: Explanation) -> dict[str, float]:
-        """Returns the faults of the image of a model at its best fit, by kind."""
-        return model_faults(self.task, one)
-
-    def parameters(self) -> dict[str, dict[str, float]]:
-        """Returns the parameters before and after, in their own units.
-
-        How far the missing effect had bent them.
-        """
-        prior = self.task.prior
-        before = from_cube(prior, self.trace.base.theta[None])[0]
-        after = from_cube(prior, self.trace.best.theta[None])[0]
-        return {
-            name: {"before": float(b), "after": float(a)}
-            for name, b, a in zip(prior.names, before, after, strict=True)
-        }
-
-    def strengths(self) -> dict[str, tuple[float, float, float]]:
-        """Low, middle and high of each named effect's number, in the scene's unit.
-
-        Of the verdict's model they are those that its own pours at the fit give; of the effect that
-        simulated pairs were poured for the interval is theirs.
-        """
-        found: dict[str, tuple[float, float, float]] = {}
-        own = self.standing.own
-        for one in self.trace.explanations:
-            strengths, intervals = one.strengths, one.intervals
-            if one is self.trace.best and own is not None:
-                strengths, intervals = own.strengths, own.intervals
-            for name, middle, (low, high) in zip(one.effects, strengths, intervals, strict=True):
-                if one is self.trace.best and self.calibrated is not None:
-                    low, high = self.calibrated.interval
-                if name in self.trace.verdict.named and name not in found:
-                    effect = self.task.effect(name)
-                    if not effect.camera:
-                        ends = sorted((effect.value(low), effect.value(high)))
-                        found[name] = (ends[0], effect.value(middle), ends[1])
-        return found
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns everything for JSON."""
-        verdict = self.verdict
-
-        def squares(improvement: Improvement | None) -> dict[str, float] | None:
-            if improvement is None:
-                return None
-            before, after = improvement.total_before, improvement.total_after
-            return {"before": before.square, "after": after.square}
-
-        return {
-            "verdict": verdict.kind,
-            "named": list(verdict.named),
-            "families": list(verdict.families),
-            "p": verdict.p,
-            "reason": verdict.reason,
-            "strength": self.strengths(),
-            "misfit": {"fit": squares(self.fit), "sealed": squares(self.sealed)},
-            **self.standing.to_dict(),
-            "calibrated": None if self.calibrated is None else self.calibrated.to_dict(),
-            "correction": [one.to_dict() for one in self.corrections],
-            "pours": self.pours,
-            "placebo": {"verdict": self.placebo.verdict.kind, "p": self.placebo.verdict.p},
-            "registration_sha256": self.registration,
-            "fit": self.fit.to_dict(),
-            "sealed": None if self.sealed is None else self.sealed.to_dict(),
-            "parameters": self.parameters(),
-            "next_experiments": [one.to_dict() for one in self.experiments],
-            "power_before_data": self.power.to_dict(),
-            "trace": self.trace.to_dict(),
-        }
 
 
 @one_thread()

@@ -1,4 +1,8 @@
-"""A folder of parts at a URL: a shared path or an object store, by fsspec."""
+"""A folder of parts at a URL: a shared path or an object store, by fsspec.
+
+The parts are those of a batch's data set, on their way from a worker to the folder of the driver,
+which alone keeps them: no second store of pours.
+"""
 
 import uuid
 from typing import Any

@@ -29,9 +29,12 @@
 //! spin is too inert by C_a rho_f / rho; a perfect fluid would not turn. Dimensional screen: drag matters where the
 //! terminal speed is not far above the speed of the fall; for couscous in air at 12 cm it takes 0.6 % of the speed.
 
-use granulcal_scene::{Fluid, Grains};
+use std::sync::Arc;
+
+use granulcal_scene::{Effect, Fluid, Grains, Scene};
 use nalgebra::Vector3;
 
+use super::acts::{Acts, EffectContext};
 use super::pore_surface::{PACKED, PoreSurface};
 use crate::contact_set::ContactSet;
 use crate::particles::Particles;
@@ -43,22 +46,37 @@ const NEWTON_DRAG: f64 = 0.44;
 
 /// What a fluid does to grains of a density.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Drag {
+struct Drag {
     fluid: Fluid,
     /// Mass of a grain with its added mass, over its volume `[kg/m^3]`.
     inertia: f64,
     /// Weight less buoyancy over the weight of the same inertia `[-]`.
-    pub weight: f64,
+    weight: f64,
     /// Mass of a grain over that with its added mass `[-]`.
-    pub inverse_inertia: f64,
+    inverse_inertia: f64,
     /// Acceleration down a slope of 1 by the pressure of a fluid that fills the grains, `rho_f g / 0.6` over the
     /// inertia of a volume of grain `[m/s^2]`.
     push: f64,
 }
 
+/// The fluid of a scene, if there is one.
+pub(super) fn of(scene: &Scene) -> Option<Arc<dyn Acts>> {
+    drag_of(scene).map(|drag| Arc::new(drag) as _)
+}
+
+/// Mass of a grain over its mass with what of the fluid moves with it `[-]`; 1 without a fluid.
+pub(super) fn inverse_inertia(scene: &Scene) -> f64 {
+    drag_of(scene).map_or(1.0, |drag| drag.inverse_inertia)
+}
+
+fn drag_of(scene: &Scene) -> Option<Drag> {
+    let fluid = scene.effects.fluid;
+    fluid.is_on().then(|| Drag::of(fluid, &scene.grains, scene.gravity[2].abs()))
+}
+
 impl Drag {
     /// `gravity`: its magnitude along the vertical `[m/s^2]`.
-    pub fn of(fluid: Fluid, grains: &Grains, gravity: f64) -> Self {
+    fn of(fluid: Fluid, grains: &Grains, gravity: f64) -> Self {
         let inertia = grains.density + fluid.added_mass * fluid.density;
         Self {
             fluid,
@@ -86,52 +104,6 @@ impl Drag {
         [linear, 10.0 / 3.0 * stokes]
     }
 
-    /// What the fluid does to every grain within `dt` `[s]` after `gravity` `[m/s^2]` has acted:
-    /// `v + g dt -> u + (v + g dt - u) / (1 + k(v - u) dt)`, implicit in the velocity, so that no step is too long and
-    /// the terminal speed is exact; and the push of its pressure. Returns the energy that a fluid in motion gives, per
-    /// typical mass `[m^2/s^2]`.
-    pub fn act(
-        &self,
-        bed: &mut Particles,
-        pairs: &ContactSet,
-        gravity: &Vector3<f64>,
-        radius: f64,
-        dt: f64,
-    ) -> f64 {
-        let Fluid { crowding, entrained, saturated, .. } = self.fluid;
-        let is_alone = crowding == 0.0 && entrained == 0.0 && saturated == 0.0;
-        let fall = dt * gravity;
-        let around = if is_alone { Vec::new() } else { neighbours(bed, pairs, &fall) };
-        let surface = (saturated > 0.0).then(|| PoreSurface::of(bed, radius));
-        let mut given = 0.0;
-        for grain in 0..bed.count() {
-            let near = around.get(grain).copied().unwrap_or_default();
-            let (crowd, mean) = near.crowd_and_mean();
-            let share = entrained * crowd;
-            let flow = (share + saturated * (1.0 - share)) * mean;
-            let energy = bed.kinetic_energy(grain);
-            let before = bed.velocity(grain) - fall - flow;
-            let is_dry = saturated == 1.0 && near.count == 0.0;
-            let [linear, angular] = if is_dry {
-                [0.0; 2]
-            } else {
-                self.crowded_rates(bed.radius(grain), before.norm(), crowd)
-            };
-            let place = bed.position(grain);
-            let body = &mut bed.bodies[grain];
-            body.velocity.add(&-flow);
-            body.velocity.scale(1.0 / (1.0 + dt * linear));
-            body.velocity.add(&flow);
-            body.spin.scale(1.0 / (1.0 + dt * angular));
-            if let Some(surface) = &surface {
-                let [x, y] = surface.slope(place.x, place.y);
-                body.velocity.add(&(-dt * crowd * self.push * Vector3::new(x, y, 0.0)));
-            }
-            given += bed.kinetic_energy(grain) - energy;
-        }
-        if is_alone { 0.0 } else { given.max(0.0) }
-    }
-
     /// The rates of [`Drag::rates`] among neighbours.
     fn crowded_rates(&self, radius: f64, speed: f64, crowd: f64) -> [f64; 2] {
         let crowd = crowd * self.fluid.crowding;
@@ -147,6 +119,51 @@ impl Drag {
         let exponent = 3.7 - 0.65 * (-0.5 * bell * bell).exp();
         // One eps is of w, one of the pressure that drives the flow, which acts on the grains as well (model B).
         [linear * void.powf(-exponent), angular]
+    }
+}
+
+impl Acts for Drag {
+    fn gravity(&self, gravity: Vector3<f64>) -> Vector3<f64> {
+        gravity * self.weight
+    }
+
+    /// What the fluid does to every grain within a substep after gravity has acted:
+    /// `v + g dt -> u + (v + g dt - u) / (1 + k(v - u) dt)`, implicit in the velocity, so that no step is too long and
+    /// the terminal speed is exact; and the push of its pressure. Returns the energy that a fluid in motion gives.
+    fn act_with_gravity(&self, particles: &mut Particles, context: &EffectContext<'_>) -> f64 {
+        let EffectContext { pairs, gravity, radius, dt, .. } = *context;
+        let Fluid { crowding, entrained, saturated, .. } = self.fluid;
+        let is_alone = crowding == 0.0 && entrained == 0.0 && saturated == 0.0;
+        let fall = dt * gravity;
+        let around = if is_alone { Vec::new() } else { neighbours(particles, pairs, &fall) };
+        let surface = (saturated > 0.0).then(|| PoreSurface::of(particles, radius));
+        let mut given = 0.0;
+        for grain in 0..particles.count() {
+            let near = around.get(grain).copied().unwrap_or_default();
+            let (crowd, mean) = near.crowd_and_mean();
+            let share = entrained * crowd;
+            let flow = (share + saturated * (1.0 - share)) * mean;
+            let energy = particles.kinetic_energy(grain);
+            let before = particles.velocity(grain) - fall - flow;
+            let is_dry = saturated == 1.0 && near.count == 0.0;
+            let [linear, angular] = if is_dry {
+                [0.0; 2]
+            } else {
+                self.crowded_rates(particles.radius(grain), before.norm(), crowd)
+            };
+            let place = particles.position(grain);
+            let body = &mut particles.bodies[grain];
+            body.velocity.add(&-flow);
+            body.velocity.scale(1.0 / (1.0 + dt * linear));
+            body.velocity.add(&flow);
+            body.spin.scale(1.0 / (1.0 + dt * angular));
+            if let Some(surface) = &surface {
+                let [x, y] = surface.slope(place.x, place.y);
+                body.velocity.add(&(-dt * crowd * self.push * Vector3::new(x, y, 0.0)));
+            }
+            given += particles.kinetic_energy(grain) - energy;
+        }
+        if is_alone { 0.0 } else { given.max(0.0) }
     }
 }
 
@@ -179,22 +196,22 @@ impl Neighbours {
 }
 
 /// The neighbours of every grain, with their velocities before they fell by `fall` `[m/s]` in this substep.
-fn neighbours(bed: &Particles, pairs: &ContactSet, fall: &Vector3<f64>) -> Vec<Neighbours> {
-    let mut around = vec![Neighbours::default(); bed.count()];
+fn neighbours(particles: &Particles, pairs: &ContactSet, fall: &Vector3<f64>) -> Vec<Neighbours> {
+    let mut around = vec![Neighbours::default(); particles.count()];
     for (grain, near) in around.iter_mut().enumerate() {
         // The ground is a neighbour that rests.
-        if bed.position(grain).z < (1.0 + NEIGHBOUR) * bed.radius(grain) {
+        if particles.position(grain).z < (1.0 + NEIGHBOUR) * particles.radius(grain) {
             near.add(&Vector3::zeros());
         }
     }
     for (number, lane) in pairs.lanes() {
         let batch = &pairs.batches[number];
         let (i, j) = (batch.i[lane] as usize, batch.j[lane] as usize);
-        let touching = bed.radius(i) + bed.radius(j);
-        let apart = bed.nearest(bed.position(i) - bed.position(j)).norm();
+        let touching = particles.radius(i) + particles.radius(j);
+        let apart = particles.nearest(particles.position(i) - particles.position(j)).norm();
         if apart - touching < 0.5 * NEIGHBOUR * touching {
-            around[i].add(&(bed.velocity(j) - fall));
-            around[j].add(&(bed.velocity(i) - fall));
+            around[i].add(&(particles.velocity(j) - fall));
+            around[j].add(&(particles.velocity(i) - fall));
         }
     }
     around

@@ -16,8 +16,12 @@
 //! the contact that gives way as in Lacoursiere 2007 (doctoral thesis, Umea), 4.4. The hard ground lies below it and
 //! keeps its own coefficients: no thickness is no layer. Prior of the thickness: uniform over 0 to a radius.
 
-use granulcal_scene::Scene;
+use std::sync::Arc;
 
+use granulcal_scene::{Effect, Scene};
+use nalgebra::Vector3;
+
+use super::acts::Acts;
 use crate::blocks::Blocks;
 use crate::contact::{ContactKey, ContactLaw};
 use crate::contact_set::{BodyKind, ContactSet};
@@ -26,22 +30,25 @@ use crate::particles::Particles;
 
 /// A layer as the solver sees it, over a typical mass.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ElasticLayer {
+struct ElasticLayer {
     /// k `[1/s^2]`
     rigidity: f64,
     /// c `[1/s]`
     damping: f64,
 }
 
-impl ElasticLayer {
-    /// The layer of a scene.
-    pub fn of(scene: &Scene) -> Self {
-        let layer = scene.effects.layer;
-        let weight = nalgebra::Vector3::from(scene.gravity).norm();
+/// The layer of a scene, if there is one.
+pub(super) fn of(scene: &Scene) -> Option<Arc<dyn Acts>> {
+    let layer = scene.effects.layer;
+    let made = || {
+        let weight = Vector3::from(scene.gravity).norm();
         let rigidity = layer.stiffness * weight / scene.grains.radius();
-        Self { rigidity, damping: 2.0 * layer.damping * rigidity.sqrt() }
-    }
+        ElasticLayer { rigidity, damping: 2.0 * layer.damping * rigidity.sqrt() }
+    };
+    layer.is_on().then(|| Arc::new(made()) as _)
+}
 
+impl ElasticLayer {
     /// a `[-]`: how far a contact gives way to an impulse in a substep.
     fn compliance(&self, dt: f64) -> f64 {
         1.0 / (dt * (dt * self.rigidity + self.damping))
@@ -51,24 +58,36 @@ impl ElasticLayer {
     fn bias(&self, gap: f64, dt: f64) -> f64 {
         if gap < 0.0 { self.compliance(dt) * dt * self.rigidity * gap } else { gap / dt }
     }
+}
 
-    /// Lists the grains that are in the layer by the end of a substep of `dt` `[s]`, with what they had before;
-    /// `ground` has the coefficients of a grain on the hard ground.
-    pub fn assemble(
+impl Acts for ElasticLayer {
+    fn has_contacts(&self) -> bool {
+        true
+    }
+
+    /// Lists the grains that are in the layer by the end of a substep of `dt` `[s]`.
+    fn assemble(
         &self,
         set: &mut ContactSet,
-        bed: &Particles,
+        particles: &Particles,
         dt: f64,
-        ground: impl Fn(usize) -> ContactLaw,
+        ground: &dyn Fn(usize) -> ContactLaw,
     ) {
-        let gap = |grain: usize| bed.position(grain).z - bed.radius(grain);
-        let comes = |&grain: &usize| gap(grain) + dt * bed.velocity(grain).z.min(0.0) < 0.0;
-        let listed: Vec<ContactKey> =
-            bed.present().filter(comes).map(|i| ContactKey { i: i as u32, partner: 0 }).collect();
+        let gap = |grain: usize| particles.position(grain).z - particles.radius(grain);
+        let comes = |&grain: &usize| gap(grain) + dt * particles.velocity(grain).z.min(0.0) < 0.0;
+        let listed: Vec<ContactKey> = particles
+            .present()
+            .filter(comes)
+            .map(|i| ContactKey { i: i as u32, partner: 0 })
+            .collect();
         let compliance = self.compliance(dt);
-        set.rebuild(&listed, &Blocks::default(), bed.count(), BodyKind::SoftLayer, |contact| {
-            ContactLaw { compliance, ..ground(contact.i as usize) }
-        });
+        set.rebuild(
+            &listed,
+            &Blocks::default(),
+            particles.count(),
+            BodyKind::SoftLayer,
+            |contact| ContactLaw { compliance, ..ground(contact.i as usize) },
+        );
         for batch in &mut set.batches {
             batch.bias = Lanes::splat(f64::INFINITY);
             for lane in batch.lanes() {
@@ -77,11 +96,10 @@ impl ElasticLayer {
         }
     }
 
-    /// What the layer's springs hold, per typical mass `[m^2/s^2]`.
-    pub fn energy(&self, bed: &Particles) -> f64 {
-        let depth = |grain| (bed.radius(grain) - bed.position(grain).z).max(0.0);
+    fn energy(&self, particles: &Particles) -> f64 {
+        let depth = |grain| (particles.radius(grain) - particles.position(grain).z).max(0.0);
         let spring = |grain| 0.5 * self.rigidity * depth(grain) * depth(grain);
-        bed.present().map(spring).sum()
+        particles.present().map(spring).sum()
     }
 }
 

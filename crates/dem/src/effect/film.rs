@@ -11,17 +11,20 @@
 //! motion round.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use granulcal_scene::{Effect, Scene};
 
+use super::acts::{Acts, EffectContext};
+use super::bridges::Bridges;
+use super::drag;
 use super::near::{Near, at_walls, pairs};
-use crate::contact_set::ContactSet;
 use crate::particles::Particles;
 use crate::wall::Walls;
 
 /// The film of a scene.
 #[derive(Clone, Debug)]
-pub(crate) struct Film {
+struct Film {
     /// F max(h, h_0) / (v_n m R^2) with R = 2 R_eff the radius of Derjaguin `[1/(m s)]`.
     strength: f64,
     /// h_0 and how far it reaches `[m]`.
@@ -29,58 +32,59 @@ pub(crate) struct Film {
     range: f64,
 }
 
-impl Film {
-    /// `inverse_inertia`: mass of a grain over its mass with what of the fluid moves with it.
-    pub fn of(scene: &Scene, inverse_inertia: f64) -> Option<Self> {
-        let (film, radius) = (scene.effects.lubrication, scene.grains.radius());
-        let mass = scene.grains.density * 4.0 / 3.0 * PI * radius.powi(3);
-        film.is_on().then(|| Self {
-            strength: 1.5 * PI * film.viscosity / mass * inverse_inertia,
-            roughness: film.roughness * radius,
-            range: film.range * radius,
-        })
-    }
+/// The film of a scene, if there is one.
+pub(super) fn of(scene: &Scene) -> Option<Arc<dyn Acts>> {
+    let (film, radius) = (scene.effects.lubrication, scene.grains.radius());
+    let mass = scene.grains.density * 4.0 / 3.0 * PI * radius.powi(3);
+    let made = || Film {
+        strength: 1.5 * PI * film.viscosity / mass * drag::inverse_inertia(scene),
+        roughness: film.roughness * radius,
+        range: film.range * radius,
+    };
+    film.is_on().then(|| Arc::new(made()) as _)
+}
 
-    /// How far it reaches `[m]`.
-    pub fn reach(&self) -> f64 {
+impl Acts for Film {
+    fn reach(&self) -> f64 {
         self.range
     }
 
-    /// Resists for `dt` `[s]` what comes together and what parts: pairs of grains and grains at walls.
-    pub fn act(
+    /// Resists what comes together and what parts: pairs of grains and grains at walls.
+    fn act_across_gaps(
         &self,
-        bed: &mut Particles,
-        [pair_set, wall_set]: [&ContactSet; 2],
-        walls: &Walls,
-        dt: f64,
+        particles: &mut Particles,
+        context: &EffectContext<'_>,
+        _bridges: &mut Bridges,
     ) {
         // Velocities change while the film acts, places do not.
-        let places = bed.places.clone();
-        let between = pairs(pair_set, &places, bed.period);
-        let count = bed.count() as u32;
-        for near in between.chain(at_walls(wall_set, &places, count, walls)) {
+        let places = particles.places.clone();
+        let between = pairs(context.pairs, &places, particles.period);
+        let count = particles.count() as u32;
+        for near in between.chain(at_walls(context.at_walls, &places, count, context.walls)) {
             if near.gap < self.range {
-                self.resist(bed, walls, &near, count, dt);
+                self.resist(particles, context.walls, &near, count, context.dt);
             }
         }
     }
+}
 
-    fn resist(&self, bed: &mut Particles, walls: &Walls, near: &Near, count: u32, dt: f64) {
+impl Film {
+    fn resist(&self, particles: &mut Particles, walls: &Walls, near: &Near, count: u32, dt: f64) {
         let (i, j) = (near.pair.0 as usize, near.pair.1 as usize);
         let (other, inverse_mass) = if near.is_wall {
             let wall = walls.wall(j - count as usize);
-            (wall.motion_at(&near.point).0, bed.inverse_mass[i])
+            (wall.motion_at(&near.point).0, particles.inverse_mass[i])
         } else {
-            (bed.velocity(j), bed.inverse_mass[i] + bed.inverse_mass[j])
+            (particles.velocity(j), particles.inverse_mass[i] + particles.inverse_mass[j])
         };
-        let opening = (bed.velocity(i) - other).dot(&near.normal);
+        let opening = (particles.velocity(i) - other).dot(&near.normal);
         // The gap at the middle of the substep: with that at its begin a film would take a tenth too little.
         let gap = (near.gap + 0.5 * dt * opening).max(self.roughness);
         let k = self.strength * near.derjaguin.powi(2) / gap * dt;
         let impulse = -k * opening / (1.0 + k * inverse_mass) * near.normal;
-        bed.kick(i, &impulse);
+        particles.kick(i, &impulse);
         if !near.is_wall {
-            bed.kick(j, &-impulse);
+            particles.kick(j, &-impulse);
         }
     }
 }

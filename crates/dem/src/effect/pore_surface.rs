@@ -30,9 +30,9 @@ pub(super) struct PoreSurface {
 
 impl PoreSurface {
     /// The surface of the grains in the scene; `radius` is that of a typical grain `[m]`.
-    pub fn of(bed: &Particles, radius: f64) -> Self {
+    pub fn of(particles: &Particles, radius: f64) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for place in bed.present().map(|grain| bed.position(grain)) {
+        for place in particles.present().map(|grain| particles.position(grain)) {
             for axis in 0..2 {
                 low[axis] = low[axis].min(place[axis]);
                 high[axis] = high[axis].max(place[axis]);
@@ -47,8 +47,8 @@ impl PoreSurface {
             cells.min(MOST)
         });
         let mut surface = Self { low, cell, counts, heights: vec![0.0; counts[0] * counts[1]] };
-        for grain in bed.present() {
-            let (place, radius) = (bed.position(grain), bed.radius(grain));
+        for grain in particles.present() {
+            let (place, radius) = (particles.position(grain), particles.radius(grain));
             let thickness =
                 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3) / (PACKED * cell * cell);
             // Shared by the four cells whose middles are around it, so that it moves smoothly.

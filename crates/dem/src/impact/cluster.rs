@@ -43,7 +43,7 @@ pub(super) struct Outcome {
 /// What stays the same while an impact is resolved.
 struct Scenery<'a> {
     time: f64,
-    bed: &'a Particles,
+    particles: &'a Particles,
     contacts: &'a Contacts,
     around: &'a ContactContext,
     /// What gravity has done between the middle of the substep, whose velocities we have, and now.
@@ -67,12 +67,12 @@ impl Cluster {
         &mut self,
         pair: Candidate,
         time: f64,
-        bed: &mut Particles,
+        particles: &mut Particles,
         contacts: &Contacts,
         around: &ContactContext,
     ) -> Option<Outcome> {
         let fallen = around.gravity * (time - 0.5 * around.settings.dt);
-        let scenery = Scenery { time, bed, contacts, around, fallen };
+        let scenery = Scenery { time, particles, contacts, around, fallen };
         self.clear();
         let closing = self.strike(pair, &scenery)?;
         let (micro_steps, is_cut) = if self.links.len() == 1 && self.links[0].rolling_damping == 0.0
@@ -84,7 +84,7 @@ impl Cluster {
         };
         self.give_sliding_back();
         let work_of_walls = if around.has_moving_walls { self.work_of_walls(&fallen) } else { 0.0 };
-        let energy_ratio = self.write_back(time, bed, &fallen, work_of_walls);
+        let energy_ratio = self.write_back(time, particles, &fallen, work_of_walls);
         let links = self.links.len();
         Some(Outcome { links, micro_steps, is_cut, work_of_walls, energy_ratio })
     }
@@ -101,7 +101,7 @@ impl Cluster {
     /// Links the pair that meets and what touches either; the closing speed of the pair, if that is an impact's.
     fn strike(&mut self, pair: Candidate, scenery: &Scenery) -> Option<f64> {
         let (i, partner) = (pair.i as usize, pair.partner as usize);
-        let first = self.members.grain(i, scenery.bed);
+        let first = self.members.grain(i, scenery.particles);
         let link = self.link(first, partner, true, scenery)?;
         let closing = -self.members.closing_rate(&link.ends, &link.normal);
         if closing <= IMPACT_SPEED {
@@ -111,7 +111,7 @@ impl Cluster {
         self.links.push(&link);
         self.find_spring(0, closing, scenery.around);
         self.link_all_of(first, Some(pair.partner), scenery);
-        if partner < scenery.bed.count() {
+        if partner < scenery.particles.count() {
             self.link_all_of(second, None, scenery);
         }
         Some(closing)
@@ -139,10 +139,10 @@ impl Cluster {
         strikes: bool,
         scenery: &Scenery,
     ) -> Option<Link> {
-        let Scenery { time, bed, around, fallen, .. } = scenery;
+        let Scenery { time, particles, around, fallen, .. } = scenery;
         let grain = self.members.grain_of(member);
-        let place = bed.place_at(grain, *time);
-        if let Some(surface) = partner.checked_sub(bed.count()) {
+        let place = particles.place_at(grain, *time);
+        if let Some(surface) = partner.checked_sub(particles.count()) {
             let (wall, at) = (around.walls.wall(surface), place.vector());
             let near = around.walls.nearest(surface, &at, *time);
             let (gap, radius) = (near.distance - place.0[3], place.0[3]);
@@ -159,24 +159,24 @@ impl Cluster {
             // A contact sees the surface of its second body at v - n x w.
             let velocity = velocity + near.normal.cross(&spin) - fallen;
             let second = self.members.wall(velocity, spin);
-            let law = around.wall_law(bed, grain, surface);
+            let law = around.wall_law(particles, grain, surface);
             return Some(Link::new([member, second], near.normal, law, &wall.material, strikes));
         }
-        let theirs = bed.place_at(partner, *time);
-        let apart = bed.nearest(place.vector() - theirs.vector());
+        let theirs = particles.place_at(partner, *time);
+        let apart = particles.nearest(place.vector() - theirs.vector());
         let touching = place.0[3] + theirs.0[3];
         let reach = touching * (1.0 + 0.5 * around.material.softness);
         let square = apart.norm_squared();
-        if !strikes && (square > reach * reach || bed.has_left(partner)) {
+        if !strikes && (square > reach * reach || particles.has_left(partner)) {
             return None;
         }
-        let second = self.members.grain(partner, bed);
+        let second = self.members.grain(partner, particles);
         if self.members.is_linked(second) {
             return None;
         }
         let distance = square.sqrt();
         let normal = if distance > 0.0 { apart / distance } else { Vector3::z() };
-        let law = around.pair_law(bed, grain, partner);
+        let law = around.pair_law(particles, grain, partner);
         Some(Link::new([member, second], normal, law, &around.material, strikes))
     }
 
@@ -354,23 +354,23 @@ impl Cluster {
         self.links.iter().map(of).sum()
     }
 
-    /// Puts the new velocities of the grains that were hit into the bed; returns the ratio of their energies.
+    /// Puts the new velocities of the grains that were hit into `particles`; returns the ratio of their energies.
     fn write_back(
         &mut self,
         time: f64,
-        bed: &mut Particles,
+        particles: &mut Particles,
         fallen: &Vector3<f64>,
         work_of_walls: f64,
     ) -> f64 {
         let (mut before, mut after) = (work_of_walls, 0.0);
         for member in self.members.hit() {
             let grain = member.grain;
-            let mass = 1.0 / bed.inverse_mass[grain];
+            let mass = 1.0 / particles.inverse_mass[grain];
             let energy = |v: Vector3<f64>, w: Vector3<f64>| {
                 0.5 * mass * ((v + fallen).norm_squared() + w.norm_squared() / INVERSE_INERTIA)
             };
-            bed.advance(grain, time);
-            let body = &mut bed.bodies[grain];
+            particles.advance(grain, time);
+            let body = &mut particles.bodies[grain];
             before += energy(body.velocity.vector(), body.spin.vector());
             after += energy(member.velocity, member.spin);
             body.velocity.set(&member.velocity);

@@ -40,13 +40,13 @@ impl Members {
     }
 
     /// The member that a grain is.
-    pub fn grain(&mut self, grain: usize, bed: &Particles) -> usize {
-        if self.of_grain.len() < bed.count() {
-            self.of_grain.resize(bed.count(), NONE);
+    pub fn grain(&mut self, grain: usize, particles: &Particles) -> usize {
+        if self.of_grain.len() < particles.count() {
+            self.of_grain.resize(particles.count(), NONE);
         }
         if self.of_grain[grain] == NONE {
             self.of_grain[grain] = self.all.len() as u32;
-            let body = &bed.bodies[grain];
+            let body = &particles.bodies[grain];
             self.all.push(Member {
                 velocity: body.velocity.vector(),
                 spin: body.spin.vector(),

@@ -13,13 +13,14 @@ impl Simulation {
     /// top of its bounce is slow, too, but once, while a pile whose last grain trembles is slow now and then.
     pub(super) fn end_reached(&mut self) -> Option<Status> {
         let until = self.origin.scene.outflow.and_then(|outflow| outflow.until);
-        if until.is_some_and(|percent| 100.0 * self.bed.outflow_fraction() >= percent) {
+        if until.is_some_and(|percent| 100.0 * self.particles.outflow_fraction() >= percent) {
             return Some(Status::RanOut);
         }
         if self.time() < self.origin.scene.moves_until() {
             return None;
         }
-        let energies: Vec<f64> = (0..self.bed.count()).map(|i| self.bed.translation(i)).collect();
+        let energies: Vec<f64> =
+            (0..self.particles.count()).map(|i| self.particles.translation(i)).collect();
         let Some(now) = self.at_rest(&energies) else {
             let is_over = self.time() >= self.origin.scene.end.horizon;
             let how =
@@ -39,11 +40,11 @@ impl Simulation {
             let is_jammed = self.in_funnel().next().is_some();
             Some(if is_jammed { Status::Jammed } else { status })
         };
-        if energies.iter().sum::<f64>() <= threshold * self.bed.present().count() as f64 {
+        if energies.iter().sum::<f64>() <= threshold * self.particles.present().count() as f64 {
             return jammed_or(Status::AtRest);
         }
         let still = |(grain, energy): (usize, &f64)| {
-            let at = self.bed.position(grain);
+            let at = self.particles.position(grain);
             *energy <= threshold || !scene.camera.sees_ground(at.x, at.y)
         };
         if energies.iter().enumerate().all(still) { jammed_or(Status::OutOfView) } else { None }
@@ -67,8 +68,9 @@ impl Simulation {
         let seen = move |place: Vector3<f64>| {
             pose.map_or(place, |pose| pose.inverse_transform_point(&place.into()).coords)
         };
-        let is_held =
-            move |grain| funnel.is_some_and(|f| f.holds(&seen(self.bed.position(grain)), time));
-        self.bed.present().filter(move |&grain| is_held(grain))
+        let is_held = move |grain| {
+            funnel.is_some_and(|f| f.holds(&seen(self.particles.position(grain)), time))
+        };
+        self.particles.present().filter(move |&grain| is_held(grain))
     }
 }

@@ -25,13 +25,13 @@ impl Simulation {
         let mut twin = self.clone();
         let dt = twin.around.settings.dt;
         twin.substep(Until::Assembled);
-        let (bed, contacts) = (&mut twin.bed, &mut twin.contacts);
-        let mut problem = ContactProblem::new(bed, contacts, self.time(), dt);
+        let (particles, contacts) = (&mut twin.particles, &mut twin.contacts);
+        let mut problem = ContactProblem::new(particles, contacts, self.time(), dt);
         while !problem.is_solved() {
-            problem.put_velocities(&mut bed.bodies);
+            problem.put_velocities(&mut particles.bodies);
             let Contacts { pairs, at_walls, .. } = &mut *contacts;
-            nsgs::sweep_plainly(&mut [pairs, at_walls], &mut bed.bodies, SWEEPS_A_LOOK);
-            problem.take_impulses(contacts, &bed.bodies, SWEEPS_A_LOOK);
+            nsgs::sweep_plainly(&mut [pairs, at_walls], &mut particles.bodies, SWEEPS_A_LOOK);
+            problem.take_impulses(contacts, &particles.bodies, SWEEPS_A_LOOK);
         }
         Ok(problem)
     }
@@ -42,11 +42,11 @@ impl Simulation {
         let mut copy = self.clone();
         copy.substep(Until::Assembled);
         let Contacts { pairs, at_walls, .. } = copy.contacts;
-        FrozenSolve::new([pairs, at_walls], copy.bed, self.around.radius)
+        FrozenSolve::new([pairs, at_walls], copy.particles, self.around.radius)
     }
 
     /// The search for pairs of the present state, for studies of its cost; the simulation stays as it is.
     pub fn frozen_search(&self) -> FrozenSearch {
-        FrozenSearch::new(self.bed.clone(), &self.around)
+        FrozenSearch::new(self.particles.clone(), &self.around)
     }
 }

@@ -17,8 +17,8 @@ impl Simulation {
     pub fn check_start(&self) -> Result<(), DemError> {
         if let Some(outflow) = &self.origin.scene.outflow {
             let below = outflow.below;
-            let is_out = |grain: &usize| self.bed.position(*grain).z < below;
-            let grains = self.bed.present().filter(is_out).count();
+            let is_out = |grain: &usize| self.particles.position(*grain).z < below;
+            let grains = self.particles.present().filter(is_out).count();
             if grains > 0 {
                 return Err(DemError::StartBelowOutflow { grains, below });
             }
@@ -27,8 +27,8 @@ impl Simulation {
         around.move_walls(self.time());
         let walls = &around.walls;
         let mut found: Vec<(usize, f64)> = vec![(0, 0.0); walls.count()];
-        for grain in 0..self.bed.count() {
-            let (centre, radius) = (self.bed.position(grain), self.bed.radius(grain));
+        for grain in 0..self.particles.count() {
+            let (centre, radius) = (self.particles.position(grain), self.particles.radius(grain));
             let mut last = None;
             walls.reached(&centre, radius, |surface| {
                 let (wall, near) = (walls.owner(surface), walls.nearest(surface, &centre, 0.0));

@@ -29,7 +29,7 @@ struct State<'a> {
     is_quiet: bool,
     seemed_ended: Option<(Status, usize)>,
     ended: Option<Status>,
-    bed: Cow<'a, Particles>,
+    particles: Cow<'a, Particles>,
     contacts: Cow<'a, Contacts>,
     bridges: Cow<'a, Bridges>,
     on_layer: Cow<'a, ContactSet>,
@@ -79,18 +79,18 @@ impl Simulation {
             return Err(strange("more bytes than a state has"));
         }
         let State { substep, is_quiet, seemed_ended, ended, watch, .. } = state;
-        let (mut bed, contacts, watch) =
-            (state.bed.into_owned(), state.contacts.into_owned(), watch.into_owned());
+        let (mut particles, contacts, watch) =
+            (state.particles.into_owned(), state.contacts.into_owned(), watch.into_owned());
         match (&mut self.clumps, &state.clumps) {
             (Some(clumps), Some(state)) => clumps.take(state).map_err(strange)?,
             (None, None) => {}
             _ => return Err(strange("grains of another shape")),
         }
         let (bridges, on_layer) = (state.bridges.into_owned(), state.on_layer.into_owned());
-        bed.check_like(&self.bed).map_err(strange)?;
-        contacts.check(self.bed.count(), self.around.walls.surfaces()).map_err(strange)?;
-        on_layer.check(self.bed.count(), Some(1)).map_err(strange)?;
-        if !watch.is_of(self.bed.count()) {
+        particles.check_like(&self.particles).map_err(strange)?;
+        contacts.check(self.particles.count(), self.around.walls.surfaces()).map_err(strange)?;
+        on_layer.check(self.particles.count(), Some(1)).map_err(strange)?;
+        if !watch.is_of(self.particles.count()) {
             return Err(strange("health of another number of grains"));
         }
         if substep != header.substep || seemed_ended.is_some_and(|(_, at)| at > substep) {
@@ -98,8 +98,8 @@ impl Simulation {
         }
         self.is_quiet = is_quiet;
         (self.substep, self.seemed_ended, self.ended) = (substep, seemed_ended, ended);
-        bed.period = self.bed.period;
-        (self.bed, self.contacts, self.watch) = (bed, contacts, watch);
+        particles.period = self.particles.period;
+        (self.particles, self.contacts, self.watch) = (particles, contacts, watch);
         (self.bridges, self.on_layer) = (bridges, on_layer);
         self.impacts = Impacts::default();
         Ok(self)
@@ -122,7 +122,7 @@ impl Simulation {
             is_quiet: self.is_quiet,
             seemed_ended: self.seemed_ended,
             ended: self.ended,
-            bed: Cow::Borrowed(&self.bed),
+            particles: Cow::Borrowed(&self.particles),
             contacts: Cow::Borrowed(&self.contacts),
             bridges: Cow::Borrowed(&self.bridges),
             on_layer: Cow::Borrowed(&self.on_layer),

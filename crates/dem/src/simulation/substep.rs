@@ -52,7 +52,7 @@ impl Simulation {
         self.act_forces();
         let seen = self.assemble();
         self.resolve_impacts();
-        self.act_pulls();
+        self.act_across_gaps();
         self.assemble_layer();
         if until == Until::Assembled {
             return;
@@ -71,7 +71,7 @@ impl Simulation {
         }
     }
 
-    /// The substep of convex bodies (docs/theory/bodies.md); the bed follows their centres.
+    /// The substep of convex bodies (docs/theory/bodies.md); the particles follow their centres.
     fn move_bodies(&mut self) {
         let Some(bodies) = &mut self.bodies else { return };
         let (around, watch) = (&self.around, &mut self.watch);
@@ -86,8 +86,8 @@ impl Simulation {
         let (sweeps, unconverged) = (step.sweeps, step.unconverged);
         watch.see_solve(&SolveInfo { sweeps, unconverged, ..SolveInfo::default() });
         for (grain, [centre, velocity, omega]) in bodies.motions().enumerate() {
-            self.bed.places[grain] = Row::new(&centre, self.bed.radius(grain));
-            self.bed.set_motion(grain, &velocity, &omega);
+            self.particles.places[grain] = Row::new(&centre, self.particles.radius(grain));
+            self.particles.set_motion(grain, &velocity, &omega);
             let mut is_lost = false;
             around.walls.reached(&centre, radius, |surface| {
                 is_lost |= around.walls.nearest(surface, &centre, 0.0).distance < 0.0;
@@ -98,81 +98,71 @@ impl Simulation {
 
     /// Lists what may touch, once the grains that have left the period are in at its other end.
     fn follow(&mut self) {
-        let gained = self.contacts.wrap(&mut self.bed, &self.around.effects.gravity);
+        let gained = self.contacts.wrap(&mut self.particles, &self.around.effects.gravity);
         self.watch.see_work(gained);
-        self.contacts.follow(&self.bed, &self.around);
+        self.contacts.follow(&self.particles, &self.around);
     }
 
-    /// Lets gravity and drag act.
+    /// Lets gravity act, and what acts with it.
     fn act_forces(&mut self) {
         let dt = self.around.settings.dt;
-        if self.around.effects.vibration.is_some() {
-            // The middle of the substep, where velocities are.
-            self.around.gravity = self.around.effects.gravity_at(self.time() + 0.5 * dt);
-            let shaking = self.around.gravity - self.around.effects.gravity;
-            self.watch.see_work(self.bed.work_of(&shaking, dt));
+        // The middle of the substep, where velocities are.
+        if let Some(gravity) = self.around.effects.gravity_at(self.time() + 0.5 * dt) {
+            self.around.gravity = gravity;
+            let added = gravity - self.around.effects.gravity;
+            self.watch.see_work(self.particles.work_of(&added, dt));
         }
-        let (bed, around) = (&mut self.bed, &self.around);
-        bed.accelerate(&around.gravity, dt, &around.threads);
-        if let Some(drag) = &around.effects.drag {
-            let pairs = &self.contacts.pairs;
-            let given = drag.act(bed, pairs, &around.gravity, around.radius, dt);
-            self.watch.see_work(given);
-        }
-        bed.freeze_removed();
+        let (particles, around) = (&mut self.particles, &self.around);
+        particles.accelerate(&around.gravity, dt, &around.threads);
+        let context = around.for_effects([&self.contacts.pairs, &self.contacts.at_walls]);
+        self.watch.see_work(around.effects.act_with_gravity(particles, &context));
+        particles.freeze_removed();
     }
 
     /// Gaps, normals and biases of the listed contacts.
     fn assemble(&mut self) -> Seen {
         let found = &mut self.impacts.candidates;
-        self.contacts.assemble(&self.bed, &self.around, self.watch.lost_mut(), found)
+        self.contacts.assemble(&self.particles, &self.around, self.watch.lost_mut(), found)
     }
 
     /// Resolves the impacts, each at its time; those of bodies that turn are a matter of the contact solve.
     fn resolve_impacts(&mut self) {
-        let (bed, contacts, around) = (&mut self.bed, &mut self.contacts, &self.around);
+        let (particles, contacts, around) = (&mut self.particles, &mut self.contacts, &self.around);
         if self.clumps.is_some() {
             self.impacts.candidates.clear();
         }
-        if self.impacts.resolve(bed, contacts, around) > 0 {
-            contacts.assemble_again(bed, around);
-            bed.rewind();
+        if self.impacts.resolve(particles, contacts, around) > 0 {
+            contacts.assemble_again(particles, around);
+            particles.rewind();
         }
-        contacts.move_walls(bed, around);
+        contacts.move_walls(particles, around);
         if self.clumps.is_some() {
-            rebound(&mut contacts.pairs, bed, around);
-            rebound(&mut contacts.at_walls, bed, around);
+            rebound(&mut contacts.pairs, particles, around);
+            rebound(&mut contacts.at_walls, particles, around);
         }
     }
 
-    /// Lets pulls and films act, after the impacts: what a pull adds in a substep to a closed contact is not an impact.
-    fn act_pulls(&mut self) {
-        if let Some(pull) = &self.around.effects.pull {
-            let (walls, dt) = (&self.around.walls, self.around.settings.dt);
-            let near = [&self.contacts.pairs, &self.contacts.at_walls];
-            pull.act(&mut self.bed, near, walls, &mut self.bridges, dt);
-        }
-        if let Some(film) = &self.around.effects.film {
-            let (walls, dt) = (&self.around.walls, self.around.settings.dt);
-            film.act(&mut self.bed, [&self.contacts.pairs, &self.contacts.at_walls], walls, dt);
-        }
+    /// Lets act what does so across gaps, after the impacts: what a pull adds in a substep to a closed contact is not
+    /// an impact.
+    fn act_across_gaps(&mut self) {
+        let around = &self.around;
+        let context = around.for_effects([&self.contacts.pairs, &self.contacts.at_walls]);
+        around.effects.act_across_gaps(&mut self.particles, &context, &mut self.bridges);
     }
 
     /// Lists the contacts with a soft layer, if there is one.
     fn assemble_layer(&mut self) {
-        let (bed, around) = (&self.bed, &self.around);
-        if let Some(pad) = &around.effects.pad {
-            let ground = |grain| around.wall_law(bed, grain, 0);
-            pad.assemble(&mut self.on_layer, bed, around.settings.dt, ground);
-        }
+        let (particles, around) = (&self.particles, &self.around);
+        let ground = |grain| around.wall_law(particles, grain, 0);
+        around.effects.assemble(&mut self.on_layer, particles, around.settings.dt, &ground);
     }
 
     /// Solves the lasting contacts.
     fn solve(&mut self) {
         let Contacts { pairs, at_walls, .. } = &mut self.contacts;
-        let (bodies, around) = (&mut self.bed.bodies, &self.around);
+        let (bodies, around) = (&mut self.particles.bodies, &self.around);
         let sets = &mut [pairs, at_walls, &mut self.on_layer];
-        let sets = if around.effects.pad.is_some() { &mut sets[..] } else { &mut sets[..2] };
+        let sets = if around.effects.has_contacts() { &mut sets[..] } else { &mut sets[..2] };
         let settings = &around.settings;
         let still = self.is_quiet.then(|| QUIET_SETTLED * around.gravity.norm() * settings.dt);
         let clumps = self.clumps.as_mut();
@@ -186,7 +176,7 @@ impl Simulation {
     fn count_work_of_walls(&mut self) {
         if self.around.has_moving_walls {
             let in_impacts = std::mem::take(&mut self.impacts.work_of_walls);
-            self.watch.see_work(in_impacts + self.contacts.work_of_walls(&self.bed));
+            self.watch.see_work(in_impacts + self.contacts.work_of_walls(&self.particles));
         }
     }
 
@@ -194,15 +184,15 @@ impl Simulation {
     fn move_on(&mut self) {
         let dt = self.around.settings.dt;
         match &mut self.clumps {
-            None => self.bed.move_on(dt),
-            Some(clumps) => clumps.move_on(&mut self.bed, dt),
+            None => self.particles.move_on(dt),
+            Some(clumps) => clumps.move_on(&mut self.particles, dt),
         }
     }
 
     /// Looks at the state between two searches: outflow, health and the end rule.
     fn examine(&mut self) {
         if let Some(outflow) = &self.origin.scene.outflow
-            && self.bed.remove_below(outflow.below)
+            && self.particles.remove_below(outflow.below)
         {
             self.contacts.forget_list();
         }
@@ -210,16 +200,16 @@ impl Simulation {
         if looks && self.bodies.is_none() {
             let Contacts { pairs, at_walls, .. } = &mut self.contacts;
             let sets = [pairs, at_walls, &mut self.on_layer];
-            let residual = ResidualSums::of(&sets, &mut self.bed.bodies);
+            let residual = ResidualSums::of(&sets, &mut self.particles.bodies);
             self.watch.see_residual(residual.relative());
         }
         let fall = self.around.effects.gravity.norm() * self.around.radius;
-        self.is_quiet = self.bed.mean_translation() <= QUIET * fall;
+        self.is_quiet = self.particles.mean_translation() <= QUIET * fall;
         if self.bodies.is_none() {
             self.watch.see_contacts(self.contacts.count());
         }
         let grains = (self.clumps.as_ref(), self.bodies.as_ref());
-        self.watch.see_energy(energy(&self.bed, grains, &self.around));
+        self.watch.see_energy(energy(&self.particles, grains, &self.around));
         self.ended = self.end_reached().map(|status| {
             let slack = if self.bodies.is_some() { CORNER_SLACK } else { 1.0 };
             let trusted = self.watch.is_healthy(slack * self.around.settings.max_penetration);

@@ -73,7 +73,7 @@ fn an_impact_that_does_not_happen_moves_no_grain() {
     simulation.step();
     let moved = simulation.positions()[0] - place;
     assert!((moved - dt * simulation.velocities()[0]).norm() < 1e-15, "{moved:?}");
-    assert_eq!(simulation.bed.clocks, [0.0]);
+    assert_eq!(simulation.particles.clocks, [0.0]);
 }
 
 /// A simulation with pairs and walls in its lists.
@@ -91,11 +91,11 @@ fn a_state_that_nobody_has_written_is_refused() {
     let good = flowing();
     assert!(start(&scene()).resume(&good.checkpoint()).is_ok());
     let changes: [(&str, Change); 22] = [
-        ("grains that are not", |s| s.bed.clocks[0] = 1e-4),
-        ("grains that are not", |s| s.bed.places.truncate(9)),
-        ("grains that are not", |s| s.bed.places[3].0[3] = 0.1),
-        ("grains that are not", |s| s.bed.bodies[500].velocity.0[0] = 0.1),
-        ("grains that are not", |s| s.bed.inverse_mass[0] = 2.0),
+        ("grains that are not", |s| s.particles.clocks[0] = 1e-4),
+        ("grains that are not", |s| s.particles.places.truncate(9)),
+        ("grains that are not", |s| s.particles.places[3].0[3] = 0.1),
+        ("grains that are not", |s| s.particles.bodies[500].velocity.0[0] = 0.1),
+        ("grains that are not", |s| s.particles.inverse_mass[0] = 2.0),
         ("another number of grains", |s| s.watch = HealthWatch::new(3, 0.0, 0.0)),
         ("substeps", |s| s.seemed_ended = Some((Status::AtRest, usize::MAX))),
         ("grains that the scene has not", |s| s.contacts.pairs.batches[0].i[0] = 500),

@@ -16,7 +16,7 @@ use crate::solver::solve_info::SolveInfo;
 #[derive(Clone, Debug)]
 pub struct FrozenSolve {
     sets: [ContactSet; 2],
-    bed: Particles,
+    particles: Particles,
     radius: f64,
 }
 
@@ -42,8 +42,8 @@ pub struct FrozenSolution {
 }
 
 impl FrozenSolve {
-    pub(crate) fn new(sets: [ContactSet; 2], bed: Particles, radius: f64) -> Self {
-        Self { sets, bed, radius }
+    pub(crate) fn new(sets: [ContactSet; 2], particles: Particles, radius: f64) -> Self {
+        Self { sets, particles, radius }
     }
 
     /// Number of contacts.
@@ -59,12 +59,12 @@ impl FrozenSolve {
         settings.check()?;
         let mut copy = self.clone();
         let work = copy.run(settings);
-        let Self { mut sets, mut bed, .. } = copy;
-        let residual = ResidualSums::of(&sets.each_mut(), &mut bed.bodies).relative();
+        let Self { mut sets, mut particles, .. } = copy;
+        let residual = ResidualSums::of(&sets.each_mut(), &mut particles.bodies).relative();
         let batches = sets.iter().flat_map(|set| &set.batches);
-        let grains = &bed.bodies[..bed.count()];
+        let grains = &particles.bodies[..particles.count()];
         Ok(FrozenSolution {
-            velocities: (0..bed.count()).map(|grain| bed.velocity(grain)).collect(),
+            velocities: (0..particles.count()).map(|grain| particles.velocity(grain)).collect(),
             spins: grains.iter().map(|body| body.spin.vector()).collect(),
             residual,
             normal_impulse: batches.flat_map(|batch| batch.lambda_n.0).sum(),
@@ -82,19 +82,19 @@ impl FrozenSolve {
         let mut warm = self.clone();
         let mut warm_sets = warm.sets.each_mut();
         for set in &mut warm_sets {
-            solver::nsgs::warm_start(set, &mut warm.bed.bodies, &Threads::default());
+            solver::nsgs::warm_start(set, &mut warm.particles.bodies, &Threads::default());
         }
-        let before = ResidualSums::of(&warm_sets, &mut warm.bed.bodies).squares();
+        let before = ResidualSums::of(&warm_sets, &mut warm.particles.bodies).squares();
         let mut copy = self.clone();
         copy.run(settings);
-        [before, ResidualSums::of(&copy.sets.each_mut(), &mut copy.bed.bodies).squares()]
+        [before, ResidualSums::of(&copy.sets.each_mut(), &mut copy.particles.bodies).squares()]
     }
 
     /// Solves it where it is.
     fn run(&mut self, settings: &SolverSettings) -> SolveInfo {
-        let Self { sets, bed, radius } = self;
+        let Self { sets, particles, radius } = self;
         let threads = Threads::default();
         let sets = &mut sets.each_mut();
-        solver::solve(sets, &mut bed.bodies, settings, None, *radius, None, &threads)
+        solver::solve(sets, &mut particles.bodies, settings, None, *radius, None, &threads)
     }
 }

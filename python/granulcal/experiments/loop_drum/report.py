@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.experiments.loop_drum.task import at_speed
-from granulcal.loop.close import Closed
+from granulcal.loop.closed import Closed
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.predict import predict
 from granulcal.loop.task import SEALED, Condition

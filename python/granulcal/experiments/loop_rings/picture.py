@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.close import Closed
+from granulcal.loop.closed import Closed
 from granulcal.loop.task import FIT
 from granulcal.measured.recording import Recording
 from granulcal.pours.formation_image import height_grid

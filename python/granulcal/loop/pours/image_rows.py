@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from granulcal.loop.effects.library import LibraryEffect
 from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.pours.measures import Measures
+from granulcal.loop.pours.rows import Rows
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
 from granulcal.pours.status import UNUSABLE
@@ -69,27 +70,22 @@ class ImageRows:
             rows = store.make(self._row, of)
             store.keep(_name(chunk), {k: np.array([row[k] for row in rows]) for k in rows[0]})
 
-    def rows(self) -> dict[str, tuple[Array, Array, Array, Array]] | None:
-        """Returns theta, condition, strength (n,) and statistics of the usable pours.
+    def rows(self) -> dict[str, Rows] | None:
+        """Returns the usable pours, with the strength of one effect as the only psi.
 
         Plain ones under the name "", those under an effect under its name; None if pours are
         missing.
         """
-        parts: dict[str, list[tuple[Array, ...]]] = {"": []}
+        parts: dict[str, list[Rows]] = {"": []}
         for chunk in range(self._chunks):
             found = self._read(chunk)
             if found is None:
                 return None
             for name in ("", *(effect.name for effect in self.effects)):
-                x, psi = found[f"x/{name}"], found[f"psi/{name}"]
-                kept = np.isfinite(x).all(axis=1)
-                part = found["theta"][kept], found["condition"][kept], psi[kept], x[kept]
-                parts.setdefault(name, []).append(part)
-        joined: dict[str, tuple[Array, Array, Array, Array]] = {}
-        for name, chunks in parts.items():
-            theta, condition, psi, x = (np.concatenate(c) for c in zip(*chunks, strict=True))
-            joined[name] = theta, condition, psi, x
-        return joined
+                x, psi = found[f"x/{name}"], found[f"psi/{name}"][:, None]
+                rows = Rows(found["theta"], found["condition"], psi, x)
+                parts.setdefault(name, []).append(rows.taken(np.all(np.isfinite(x), axis=1)))
+        return {name: Rows.joined(chunks) for name, chunks in parts.items()}
 
     @property
     def _chunks(self) -> int:

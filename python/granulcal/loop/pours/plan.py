@@ -9,6 +9,7 @@ from granulcal.engines.in_use import law_of_pours, version_of_pours
 from granulcal.loop.effects.design import Design
 from granulcal.loop.effects.library import LibraryEffect, fingerprint
 from granulcal.loop.effects.tolerance import Tolerances
+from granulcal.loop.pours.rows import Rows
 from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
@@ -103,21 +104,13 @@ class ArchivePlan:
 
 
 @dataclass(frozen=True)
-class Pours:
-    """Rows of an archive in unit coordinates.
+class Pours(Rows):
+    """Rows of an archive.
 
     Attributes:
-        theta: shape (n, p).
-        condition: shape (n, q).
-        psi: shape (n, K).
-        x: statistics in their units, shape (n, s).
         names: of the statistics.
         left_out: pours that were not usable, by why.
     """
 
-    theta: Array
-    condition: Array
-    psi: Array
-    x: Array
     names: tuple[str, ...]
     left_out: LeftOut

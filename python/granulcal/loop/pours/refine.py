@@ -15,13 +15,12 @@ Reference:
     Intelligence 243, 2017.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.forward import Forward
+from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.surrogate.fit_draws import draw
@@ -38,23 +37,6 @@ ROUND = (1 + _MODELS) * _EACH
 """Most pours in a round."""
 # Seeds of these pours, apart from those of the archive and of the replicates; of a round, a model.
 _SEED, _ROUND_STEP, _MODEL_STEP = 9_500_021, 10_000, 100
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Pours in unit coordinates, as `archive.Pours` has them.
-
-    Attributes:
-        theta: shape (n, p).
-        condition: shape (n, q).
-        psi: shape (n, K).
-        x: shape (n, s).
-    """
-
-    theta: Array
-    condition: Array
-    psi: Array
-    x: Array
 
 
 def further(
@@ -78,7 +60,7 @@ def _of_model(
     forward: Forward, task: Task, plan: ArchivePlan, fit: Fit, names: list[str], seed: int
 ) -> Rows | None:
     conditions = task.of(FIT)
-    kept: list[tuple[Array, Array, Array, Array]] = []
+    kept: list[Rows] = []
     for i, (theta, strengths) in enumerate(
         zip(*draw(fit, plan.design, _EACH, seed=seed), strict=True)
     ):
@@ -89,8 +71,6 @@ def _of_model(
         if len(found):
             psi = np.zeros(len(plan.design.effects))
             psi[list(fit.active)] = strengths
-            kept.append((theta, plan.unit(condition.at), psi, found[0]))
-    if not kept:
-        return None
-    theta, where, psi, x = (np.array(column) for column in zip(*kept, strict=True))
-    return Rows(theta, where.reshape(len(kept), -1), psi, x)
+            where = plan.unit(condition.at)
+            kept.append(Rows(theta[None], where[None], psi[None], found[:1]))
+    return Rows.joined(kept) if kept else None

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from granulcal.loop.close import Closed
+from granulcal.loop.closed import Closed
 from granulcal.loop.report.page import write_page
 from granulcal.loop.report.tables import write_tables
 

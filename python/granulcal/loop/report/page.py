@@ -9,7 +9,7 @@ import numpy as np
 
 from granulcal.engines.in_use import version_of_pours
 from granulcal.files import write_beside
-from granulcal.loop.close import Closed
+from granulcal.loop.closed import Closed
 from granulcal.loop.effects.image_faults import Frame
 from granulcal.loop.pours.measures import Measures, formation_of
 from granulcal.loop.task import Condition

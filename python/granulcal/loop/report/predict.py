@@ -8,7 +8,7 @@ each draw, so that the spread is that of parameters and of pours together.
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.close import Closed
+from granulcal.loop.closed import Closed
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.fit_draws import draw

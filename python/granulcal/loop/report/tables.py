@@ -19,7 +19,7 @@ import numpy as np
 
 from granulcal.files import beside
 from granulcal.loop.check.trivial import LINE, NEAREST, RESIDUAL
-from granulcal.loop.close import Closed
+from granulcal.loop.closed import Closed
 from granulcal.loop.test.trace import Explanation
 
 __all__ = ["candidates", "conditions", "residuals", "write_tables"]

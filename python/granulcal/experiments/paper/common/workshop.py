@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.files import write_beside
 from granulcal.pours.dataset import Dataset, generate
+from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour
 from granulcal.prior import Prior
 from granulcal.progress import ProgressLine
-from granulcal.within_budget import KeptPours
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim

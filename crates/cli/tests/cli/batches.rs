@@ -1,0 +1,125 @@
+//! Batches of pours: killed, interrupted, in shards, resumed, damaged.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use granulcal_dataset::Dataset;
+
+use crate::place::{Place, json};
+use crate::tiny;
+
+fn rows(path: &Path) -> Dataset {
+    Dataset::open(path).unwrap()
+}
+
+fn assert_same_rows(a: &Path, b: &Path) {
+    let (a, b) = (rows(a), rows(b));
+    assert_eq!(a.rows.len(), b.rows.len());
+    for (a, b) in a.rows.iter().zip(&b.rows) {
+        assert!(a.same_as(b), "{a:?}\n{b:?}");
+    }
+}
+
+#[test]
+fn killed_and_resumed_gives_the_rows_of_an_uninterrupted_run() {
+    let place = Place::new();
+    let args = |out| {
+        let more = ["--set", "grains.count=100", "-o", out];
+        tiny(&["generate", "drop", "default", "-n", "24", "--seed", "5", "--chunk", "2"], &more)
+    };
+    // The prior reaches restitution 1, where a drop may be unhealthy: what counts here are the rows.
+    let finished = |code: Option<i32>| matches!(code, Some(0 | 3));
+    for out in ["whole", "again"] {
+        assert!(finished(place.run(&args(out)).status.code()));
+    }
+    assert_same_rows(&place.at("whole"), &place.at("again"));
+
+    let mut kills = 0;
+    for round in 0.. {
+        let mut command = place.command(&args("killed"));
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let part = place.at(&format!("killed/part-{:06}.parquet", 2 * round + 1));
+        let start = Instant::now();
+        while child.try_wait().unwrap().is_none() && !part.exists() {
+            assert!(start.elapsed() < Duration::from_secs(120));
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        // SIGKILL: no handler runs. The exit code is none unless the batch was faster than the test.
+        let _ = child.kill();
+        match child.wait().unwrap().code() {
+            None => kills += 1,
+            code => {
+                assert!(finished(code), "{code:?}");
+                break;
+            }
+        }
+    }
+    assert!(kills > 0);
+    assert_same_rows(&place.at("whole"), &place.at("killed"));
+    let left: Vec<_> =
+        fs::read_dir(place.at("killed")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert!(left.iter().all(|n| !n.to_string_lossy().ends_with(".tmp")), "{left:?}");
+}
+
+#[test]
+fn an_interrupt_keeps_finished_rows_and_exits_with_130() {
+    let place = Place::new();
+    let args = |n| tiny(&["generate", "drop", "default", "-n", n, "--chunk", "1"], &["-o", "d"]);
+    let mut child = place.command(&args("2000")).stdout(Stdio::piped()).spawn().unwrap();
+    while !place.at("d/part-000001.parquet").exists() {
+        assert!(child.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let finished = rows(&place.at("d")).rows.len();
+    assert!((2..2000).contains(&finished), "{finished}");
+}
+
+#[test]
+fn shards_merge_to_the_whole() {
+    let place = Place::new();
+    let args = |out, shard| {
+        tiny(
+            &["generate", "drop", "default", "-n", "7", "--chunk", "2"],
+            &["-o", out, "--shard", shard],
+        )
+    };
+    for (out, shard) in [("whole", "0/1"), ("a", "0/2"), ("b", "1/2")] {
+        place.expect(0, &args(out, shard));
+    }
+    place.expect(0, &["merge", "a", "b", "-o", "all.parquet"]);
+    assert_same_rows(&place.at("whole"), &place.at("all.parquet"));
+    place.refused(&["merge", "a", "whole", "-o", "x.parquet"], &["row 0", "stands in"]);
+    let facts = json(&place.expect(0, &["inspect", "all.parquet", "--json"]));
+    assert_eq!((&facts["rows"], &facts["seed"]), (&7.into(), &0.into()));
+}
+
+#[test]
+fn other_or_damaged_data_sets_are_named_and_left_alone() {
+    let place = Place::new();
+    let args = |more: &[&'static str]| {
+        [&["generate", "drop", "default", "-n", "4", "--chunk", "2", "-o", "d"], more].concat()
+    };
+    place.expect(0, &tiny(&args(&[]), &[]));
+    place.refused(&tiny(&args(&["--seed", "9"]), &[]), &["the seed is 0, but 9 is given"]);
+    let other = tiny(&args(&["--set", "material.tangential_restitution=0.1"]), &[]);
+    place.refused(&other, &["material.tangential_restitution", "0.1"]);
+    let part = place.at("d/part-000000.parquet");
+    let whole = fs::read(&part).unwrap();
+    for length in [0, 4, whole.len() / 2, whole.len() - 1] {
+        fs::write(&part, &whole[..length]).unwrap();
+        place.refused(&tiny(&args(&[]), &[]), &["part-000000.parquet"]);
+        place.refused(&["inspect", "d"], &["part-000000.parquet"]);
+        assert_eq!(fs::read(&part).unwrap().len(), length);
+    }
+    fs::remove_file(&part).unwrap();
+    place.expect(0, &tiny(&args(&[]), &[]));
+    place.write("foreign.parquet", b"PAR1PAR1");
+    place.refused(&["inspect", "foreign.parquet"], &["foreign.parquet"]);
+    fs::write(place.at("d/manifest.toml"), "format = 1\n").unwrap();
+    place.refused(&["inspect", "d"], &["manifest.toml"]);
+}
