@@ -95,7 +95,7 @@ build: $(VENV)/.native ## the command line (target/release/granulcal-cli) and th
 FUZZ_SECONDS ?= 600
 FUZZ_TARGETS ?= bag mcap png_toml npz model scene prior
 
-fuzz: ## fuzz the readers of recordings, FUZZ_SECONDS (600) on each of FUZZ_TARGETS; installs nightly Rust and cargo-fuzz
+fuzz: $(VENV)/.native ## fuzz the readers of files, FUZZ_SECONDS (600) on each of FUZZ_TARGETS and on tasks; installs nightly Rust and cargo-fuzz
 	rustup run nightly rustc --version >/dev/null 2>&1 || rustup toolchain install nightly --profile minimal
 	cargo fuzz --version >/dev/null 2>&1 || cargo install cargo-fuzz --locked
 	for target in $(FUZZ_TARGETS); do \
@@ -104,6 +104,7 @@ fuzz: ## fuzz the readers of recordings, FUZZ_SECONDS (600) on each of FUZZ_TARG
 			$$(ls -d fuzz/regressions/$$target 2>/dev/null) -- \
 			-max_total_time=$(FUZZ_SECONDS) -max_len=65536 -timeout=30 -rss_limit_mb=1024; \
 	done
+	$(BIN)/python fuzz/task.py $(FUZZ_SECONDS)
 
 # The site has an environment of its own: none of it is needed to use or test granulcal.
 DOCS_VENV := build/docs-venv
