@@ -65,11 +65,15 @@ advisories: ## dependencies with known vulnerabilities; fails for one, is skippe
 		cargo deny --workspace check --disable-fetch advisories; \
 	else echo "advisories: the database cannot be reached; not checked"; fi
 
-# The parts of dem that are unsafe: registers and shared bodies. Slow: small scenes only.
-MIRI_TESTS ?= lanes body
+# The parts of dem that are unsafe: registers, of this machine's baseline and AVX2, and bodies that threads share.
+# Small scenes only, for it is slow. rayon's queues have pointers of integers, of which Miri would warn at length.
+MIRI_TESTS ?= lanes:: body:: threads_that_share
+MIRI := MIRIFLAGS="-Zmiri-disable-isolation -Zmiri-tree-borrows -Zmiri-permissive-provenance -Zmiri-ignore-leaks" \
+	cargo +nightly miri test -p granulcal-dem --lib --locked -- $(MIRI_TESTS)
 miri: ## the unsafe parts of crates/dem under Miri; installs nightly Rust with Miri
 	rustup run nightly cargo miri --version >/dev/null 2>&1 || rustup toolchain install nightly --profile minimal --component miri,rust-src
-	for part in $(MIRI_TESTS); do MIRIFLAGS="-Zmiri-disable-isolation" cargo +nightly miri test -p granulcal-dem --lib -- $$part:: || exit 1; done
+	$(MIRI)
+	RUSTFLAGS="-C target-feature=+avx2,+fma" $(MIRI)
 
 bench: ## criterion benchmarks and one table of them with the bars; see benches/README.md
 	mkdir -p $(CRITERION) && touch $(CRITERION)/.started
@@ -91,7 +95,7 @@ build: $(VENV)/.native ## the command line (target/release/granulcal-cli) and th
 FUZZ_SECONDS ?= 600
 FUZZ_TARGETS ?= bag mcap png_toml npz model scene prior
 
-fuzz: ## fuzz the readers of recordings, FUZZ_SECONDS (600) on each of FUZZ_TARGETS; installs nightly Rust and cargo-fuzz
+fuzz: $(VENV)/.native ## fuzz the readers of files, FUZZ_SECONDS (600) on each of FUZZ_TARGETS and on tasks; installs nightly Rust and cargo-fuzz
 	rustup run nightly rustc --version >/dev/null 2>&1 || rustup toolchain install nightly --profile minimal
 	cargo fuzz --version >/dev/null 2>&1 || cargo install cargo-fuzz --locked
 	for target in $(FUZZ_TARGETS); do \
@@ -100,6 +104,7 @@ fuzz: ## fuzz the readers of recordings, FUZZ_SECONDS (600) on each of FUZZ_TARG
 			$$(ls -d fuzz/regressions/$$target 2>/dev/null) -- \
 			-max_total_time=$(FUZZ_SECONDS) -max_len=65536 -timeout=30 -rss_limit_mb=1024; \
 	done
+	$(BIN)/python fuzz/task.py $(FUZZ_SECONDS)
 
 # The site has an environment of its own: none of it is needed to use or test granulcal.
 DOCS_VENV := build/docs-venv

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal.arrays import read_array
 from granulcal.cli import main
 from granulcal.engines import CallableEngine, CommandEngine, ExportedEngine, engine_named, installed
-from granulcal.engines.files import read_array, read_grains
+from granulcal.engines.files import read_grains
 
 # A simulator of one's own in a dozen lines: a pile that is the steeper, the rougher the grains are.
 SIMULATOR = """\

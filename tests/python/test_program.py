@@ -56,6 +56,12 @@ def test_a_misspelt_word_is_answered_with_the_one_that_was_meant(
     assert done.returncode == 2 and meant in done.stderr
 
 
+def test_an_option_of_another_command_is_not_what_was_meant() -> None:
+    done = _told("sample", "couscous", "-o", "scene.toml")
+    assert done.returncode == 2 and "unrecognized arguments: -o" in done.stderr
+    assert "did you mean" not in done.stderr
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completions_know_the_commands_of_both_halves(shell: str) -> None:
     script = _told("completions", shell).stdout

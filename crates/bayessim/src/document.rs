@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use crate::ModelError;
 use crate::average::{Average, Form};
+use crate::stated_law::StatedLaw;
 
 /// The version that is written now.
 const VERSION: u64 = 4;
@@ -23,9 +24,8 @@ pub struct Document {
     pub x_names: Vec<String>,
     pub config: Config,
     pub scene_toml: Option<String>,
-    /// Absent in models of before laws had numbers.
     #[serde(default)]
-    pub law: Option<u32>,
+    pub law: StatedLaw,
     pub has_network: bool,
     average: Form,
     emulator_weight: f64,

@@ -47,6 +47,7 @@ mod posterior;
 mod quasi;
 mod random;
 mod standardiser;
+mod stated_law;
 mod tensors;
 mod waves;
 
@@ -62,4 +63,5 @@ pub use mixture::Mixture;
 pub use model::Model;
 pub use posterior::{Evidence, Marginal, Posterior, Warning};
 pub use quasi::QuasiUniform;
+pub use stated_law::StatedLaw;
 pub use tensors::{Array, Tensors};

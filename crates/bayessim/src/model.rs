@@ -16,6 +16,7 @@ use crate::misfit::{Misfit, MisfitReference};
 use crate::network::Network;
 use crate::posterior::{Evidence, Posterior, Warning};
 use crate::standardiser::Standardiser;
+use crate::stated_law::StatedLaw;
 use crate::tensors::Tensors;
 
 const DOCUMENT: &str = "model.json";
@@ -30,9 +31,8 @@ pub struct Model {
     pub x_names: Vec<String>,
     /// Scene of the training, TOML.
     pub scene_toml: Option<String>,
-    /// Law of the solver that the pours of the training follow, 0 for those of another simulator; `None` in models of
-    /// before laws had numbers, and in those of no pours.
-    pub law: Option<u32>,
+    /// Law of the solver that the pours of the training follow.
+    pub law: StatedLaw,
     /// Whether the model passed its own check; `None` if there was none.
     pub is_calibrated: Option<bool>,
     /// Whether its files say what they hash to, and do; those of before there were hashes do not.

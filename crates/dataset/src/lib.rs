@@ -26,6 +26,7 @@ mod camera_file;
 mod checkpoint_file;
 mod claims;
 mod contact_problem_file;
+mod contained;
 mod dataset;
 mod depth_frame;
 mod drawn;

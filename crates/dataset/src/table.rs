@@ -19,6 +19,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 use xxhash_rust::xxh3::Xxh3;
 
+use crate::contained::contained;
 use crate::header::{FIRST_ARITHMETIC, Header};
 use crate::row::{Row, RowStatus};
 use crate::{DatasetError, Form, files};
@@ -152,7 +153,9 @@ pub(crate) fn read(path: &Path) -> Result<Table, DatasetError> {
 pub(crate) fn parse(path: &Path, bytes: Vec<u8>) -> Result<Table, DatasetError> {
     let length = bytes.len();
     let parquet = |source| DatasetError::Parquet { path: path.to_owned(), source };
-    let file = SerializedFileReader::new(bytes::Bytes::from(bytes)).map_err(parquet)?;
+    let file = contained(|| SerializedFileReader::new(bytes::Bytes::from(bytes)))
+        .unwrap_or_else(|| Err(ParquetError::General("the metadata cannot be read".to_owned())))
+        .map_err(parquet)?;
     check_ranges(path, &file, length)?;
     let header = read_header(path, &file)?;
     let observed = header.observed();
@@ -251,10 +254,8 @@ fn read_column<T: parquet::data_type::DataType>(
     file: &SerializedFileReader<bytes::Bytes>,
     index: usize,
 ) -> Result<Vec<T::T>, ParquetError> {
-    std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| read_values::<T>(file, index)))
-        .unwrap_or_else(|_| {
-            Err(ParquetError::General(format!("column {index} cannot be unpacked")))
-        })
+    contained(|| read_values::<T>(file, index))
+        .unwrap_or_else(|| Err(ParquetError::General(format!("column {index} cannot be unpacked"))))
 }
 
 fn read_values<T: parquet::data_type::DataType>(

@@ -66,3 +66,40 @@ impl<'a> SharedBodies<'a> {
         W::store_row(spin, &mut body.spin);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::Portable;
+
+    #[test]
+    #[allow(unsafe_code)]
+    fn threads_change_bodies_of_their_own_and_read_the_resting_one() {
+        const COUNT: u32 = 24;
+        let body = |n: u32| {
+            let row = |scale: f64| Row(std::array::from_fn(|i| scale * f64::from(n) + i as f64));
+            Body { velocity: row(1.0), spin: row(-2.0) }
+        };
+        let mut bodies: Vec<Body> = (0..=COUNT).map(body).collect();
+        let shared = SharedBodies::new(&mut bodies);
+        std::thread::scope(|scope| {
+            for thread in 0..3 {
+                let shared = &shared;
+                scope.spawn(move || {
+                    for n in (thread..COUNT).step_by(3) {
+                        // SAFETY: every third body is this thread's; the last is written by none.
+                        unsafe {
+                            let (velocity, _) = shared.load::<Portable>(n);
+                            let (_, resting) = shared.load::<Portable>(COUNT);
+                            shared.store::<Portable>(n, resting, velocity);
+                        }
+                    }
+                });
+            }
+        });
+        for (n, found) in (0..COUNT).zip(&bodies) {
+            assert_eq!(*found, Body { velocity: body(COUNT).spin, spin: body(n).velocity });
+        }
+        assert_eq!(bodies[COUNT as usize], body(COUNT));
+    }
+}

@@ -46,18 +46,42 @@ pub enum FeatureError {
     Sensor(#[from] granulcal_scene::SceneError),
     /// Frames of a flat surface that show something else.
     #[error(
-        "the frames must show something flat: {} % of the pixels lie on one smooth surface (at least 50), \
+        "the frames must show something flat: {} % of the pixels lie on one smooth surface (at least {}), \
          {} % of the {scale} off it on average (at most 5); say with a region where the flat part is",
-        General(on_surface.round()),
+        General((on_surface * 10.0).floor() / 10.0),
+        General(*least),
         General((deviation * 10.0).round() / 10.0)
     )]
     NotFlat {
         /// Pixels with data that lie on the surface [%].
         on_surface: f64,
+        /// Least share of them that is allowed [%].
+        least: f64,
         /// Robust standard deviation of those from the surface [%].
         deviation: f64,
         /// What the deviation is a share of.
         scale: &'static str,
+    },
+    /// A part of a frame of a flat surface that stands off the rest.
+    #[error(
+        "the frames must show something flat: in frame {frame} the {}x{} pixels at x {}, y {} stand {} m {} the smooth \
+         surface of the rest, {} times as far as chance brings a part of it; say with a region where the flat part is",
+        size.0, size.1, place.0, place.1,
+        General((height.abs() * 1e4).round() / 1e4),
+        if *height < 0.0 { "below" } else { "above" },
+        General((ratio * 10.0).round() / 10.0)
+    )]
+    Bump {
+        /// Number of the frame, from 1.
+        frame: usize,
+        /// First column and row of the part `[px]`.
+        place: (usize, usize),
+        /// Its columns and rows `[px]`.
+        size: (usize, usize),
+        /// Largest distance from the surface, towards the camera `[m]`.
+        height: f64,
+        /// The same over the largest that chance gives `[-]`.
+        ratio: f64,
     },
     /// Two arrays that must be equally long are not.
     #[error("{what} must have length {expected}, got {got}")]

@@ -18,7 +18,14 @@ fn every_kind_of_message_with_a_number_is_short() {
     for error in [
         FeatureError::NonFinite { what: "x", index: 1, got: f64::NAN },
         FeatureError::OutOfRange { what: "x", got: -huge, min: tiny, max: huge },
-        FeatureError::NotFlat { on_surface: tiny, deviation: huge, scale: "distance" },
+        FeatureError::NotFlat { on_surface: tiny, least: huge, deviation: huge, scale: "distance" },
+        FeatureError::Bump {
+            frame: 1,
+            place: (1, 2),
+            size: (9, 9),
+            height: huge,
+            ratio: 1.0 / 3e-300,
+        },
         FeatureError::EmptyMask { valid: 1, highest: huge, threshold: tiny },
         FeatureError::DegeneratePlane { got: tiny, min: huge },
     ] {

@@ -161,7 +161,7 @@ def _scene(options: argparse.Namespace) -> int:
 
 
 def _bed(options: argparse.Namespace) -> int:
-    from granulcal.engines.files import read_array
+    from granulcal.arrays import read_array
     from granulcal.export import export_bed
     from granulcal.pours.simulate import simulate
 

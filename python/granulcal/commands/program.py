@@ -3,6 +3,7 @@
 import argparse
 import difflib
 import json
+import sys
 from typing import Any, NoReturn
 
 __all__ = ["Parser", "describe"]
@@ -11,25 +12,34 @@ __all__ = ["Parser", "describe"]
 class Parser(argparse.ArgumentParser):
     """An argument parser that asks `did you mean` when an option is misspelt."""
 
+    def parse_known_args(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, args: Any = None, namespace: Any = None
+    ) -> Any:
+        """Parses, and keeps the words for a message about them."""
+        self._words = sys.argv[1:] if args is None else list(args)
+        return super().parse_known_args(args, namespace)
+
     def error(self, message: str) -> NoReturn:
         """Ends with the message, and the option that is nearest to what was not known."""
         _, mark, unknown = message.partition("unrecognized arguments: ")
         if mark:
-            known = [word for action in self._all_actions() for word in action.option_strings]
+            actions = self._of_words()._actions
+            known = [word for action in actions for word in action.option_strings]
             for word in unknown.split():
                 near = difflib.get_close_matches(word.split("=")[0], known, n=1)
                 if near:
                     message += f"; did you mean {near[0]}?"
         super().error(message)
 
-    def _all_actions(self) -> list[argparse.Action]:
-        found: list[argparse.Action] = []
-        for action in self._actions:
-            found.append(action)
-            if isinstance(action, argparse._SubParsersAction):
-                for parser in action.choices.values():
-                    found += parser._all_actions() if isinstance(parser, Parser) else []
-        return found
+    def _of_words(self) -> argparse.ArgumentParser:
+        """The parser of the command, and of the command in it, that the words name."""
+        parser: argparse.ArgumentParser = self
+        for word in self._words:
+            for action in parser._actions:
+                if isinstance(action, argparse._SubParsersAction) and word in action.choices:
+                    parser = action.choices[word]
+                    break
+        return parser
 
 
 def describe(parser: argparse.ArgumentParser, *, after_help: str) -> str:

@@ -6,7 +6,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from granulcal.engines.files import read_array, read_grains
+from granulcal.arrays import read_array
+from granulcal.engines.files import read_grains
 from granulcal.engines.protocol import Left, left
 from granulcal.pours.scene import Scene
 

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.arrays import read_array
 from granulcal.documents import read_bytes
 
-__all__ = ["read_array", "read_grains"]
+__all__ = ["read_grains"]
 
 Array = NDArray[np.float64]
 NAMES = ("grains.npy", "grains.csv", "grains.dump")
@@ -49,20 +50,6 @@ def _table(path: Path) -> Array:
         except ValueError as error:
             raise ValueError(f"{path}: not a table of numbers: {error}") from None
     return _dump(path)
-
-
-def read_array(path: Path) -> Array:
-    """Returns the array of numbers in a .npy file.
-
-    Raises:
-        ValueError: it is a device, too large, damaged, or holds something else; names the file.
-        OSError: it cannot be read.
-    """
-    try:
-        found = np.lib.format.read_array(io.BytesIO(read_bytes(path)), allow_pickle=False)
-        return np.asarray(found, float)
-    except (ValueError, TypeError, EOFError, MemoryError) as error:
-        raise ValueError(f"{path}: no array of numbers: {error}") from None
 
 
 def _dump(path: Path) -> Array:

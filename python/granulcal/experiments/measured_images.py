@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from granulcal.arrays import read_array
 from granulcal.experiments.sensor import write_d435_camera
 from granulcal.files import write_beside, write_toml
 from granulcal.measured.recording import Formation, Levelled, Recording
@@ -153,14 +154,14 @@ def _sandbox(out_dir: Path, folder: Path) -> Iterator[tuple[str, str, Path, Path
         ("sandbox", "depth_raw_b", "kinect_v2"),
         ("sandbox crop", "frame_cropped", "kinect_v2_crop"),
     ]:
-        millimetres = np.load(folder / f"{name}.npy").astype(np.float64)
+        millimetres = read_array(folder / f"{name}.npy")
         tenths = np.where(millimetres < 6500, 10 * millimetres, 0).round().astype(np.uint16)
         path = out_dir / f"{name}.png"
         Image.fromarray(tenths).save(path)
         yield rig, name, path, out_dir / f"{camera}.toml"
     for name in ("topo_cone", "topo_ring"):
         path = out_dir / f"{name}.npz"
-        heights, side = np.load(folder / f"{name}.npy"), _CROP_RESOLUTION_MM
+        heights, side = read_array(folder / f"{name}.npy"), _CROP_RESOLUTION_MM
         np.savez(path, depthmap=heights, scale="mm", xres=side, yres=side, zres=1.0)
         yield "sandbox crop", name, path, None
 

@@ -82,13 +82,9 @@ def export_scene(
     module, setup, place = _engine(to), Setup.of(scene, seed), Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     written = []
-    if to == "isaac":
-        written.append(place / "pour.usda")
-        isaac.write_stage(setup, written[0])
-    else:
-        for name, text in module.scene(setup, young).items():
-            write_beside(place / name, text)
-            written.append(place / name)
+    for name, text in module.scene(setup, young).items():
+        write_beside(place / name, text)
+        written.append(place / name)
     head = "\n".join([_RUN[to], "", *_head(scene, setup, module)])
     write_beside(place / "README.txt", head + "\n")
     return [*written, place / "README.txt"]

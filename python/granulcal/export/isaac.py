@@ -4,13 +4,12 @@ PhysX has no rolling and no torsional friction of materials. Coefficients of two
 the PhysX material schema says; here as the mean, and grains that meet carry the same.
 """
 
-from pathlib import Path
 from typing import Any
 
 from granulcal.export.mesh import triangles
 from granulcal.export.setup import Contact, Setup
 
-__all__ = ["ENGINE", "NOTES", "material", "write_stage"]
+__all__ = ["ENGINE", "NOTES", "material", "scene"]
 
 ENGINE = "isaac"
 NOTES = (
@@ -35,12 +34,13 @@ def material(setup: Setup, young: float | None = None) -> str:
     )
 
 
-def write_stage(setup: Setup, path: Path) -> None:
-    """Writes the pour as a USD stage.
+def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
+    """Returns the file of a pour, a USD stage as text.
 
     Raises:
         ModuleNotFoundError: usd-core is not installed.
     """
+    del young
     from pxr import (  # pyright: ignore[reportMissingImports]
         Gf,
         Usd,
@@ -50,7 +50,8 @@ def write_stage(setup: Setup, path: Path) -> None:
         Vt,
     )
 
-    stage: Any = Usd.Stage.CreateNew(str(path))
+    # In memory: whoever writes it checks what stands in its place.
+    stage: Any = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     physics = UsdPhysics.Scene.Define(stage, "/physics")
@@ -89,4 +90,4 @@ def write_stage(setup: Setup, path: Path) -> None:
         ball.AddTranslateOp().Set(Gf.Vec3d(*map(float, centre)))
         UsdPhysics.RigidBodyAPI.Apply(ball.GetPrim())
         bind(ball.GetPrim(), grain)
-    stage.GetRootLayer().Save()
+    return {"pour.usda": stage.GetRootLayer().ExportToString()}

@@ -5,16 +5,13 @@ A file is whole or absent. One that is damaged is as good as absent: its pours c
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from io import BytesIO
 from pathlib import Path
 from typing import TypeVar
-from zipfile import BadZipFile
-from zlib import error as zlib_error
 
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.documents import read_bytes
+from granulcal.arrays import read_arrays
 from granulcal.files import beside
 from granulcal.progress import steps
 
@@ -43,10 +40,8 @@ class PourStore:
         if not path.exists():
             return None
         try:
-            # In memory: a reader that stumbles leaves a file open.
-            with np.load(BytesIO(read_bytes(path))) as file:
-                return {key: file[key] for key in file.files}
-        except (ValueError, KeyError, EOFError, OSError, BadZipFile, zlib_error):
+            return read_arrays(path)
+        except (ValueError, OSError):
             return None
 
     def keep(self, name: str, arrays: dict[str, Array]) -> None:

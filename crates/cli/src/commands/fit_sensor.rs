@@ -195,10 +195,20 @@ fn print(found: &SensorFit, checked: Option<&Comparison>) -> anyhow::Result<()> 
         }
     }
     print_line(&format!(
-        "flatness       {:.1} % of the pixels on one surface (at least 50), {:.2} % off it (at most 5)",
+        "flatness       {:.1} % of the pixels on one surface (at least {:.0}), {:.2} % off it (at most 5)",
         100.0 * found.flatness.on_surface,
+        100.0 * found.flatness.least_on_surface(),
         100.0 * found.flatness.deviation
     ))?;
+    print_line(&match found.flatness.bump {
+        Some(ratio) => format!(
+            "largest bump   {ratio:.2} of what chance brings a part of a frame off the rest (at most 1)"
+        ),
+        None => {
+            "largest bump   not known: too few parts of the frames are independent of each other"
+                .to_owned()
+        }
+    })?;
     print_field("noise", found.sensor.noise(), unit)?;
     print_field("fixed pattern", found.sensor.fixed_pattern(), unit)?;
     print_comparison("fitted to", &found.comparison)?;

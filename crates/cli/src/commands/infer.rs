@@ -86,10 +86,7 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
             "note: the model is of an earlier version without hashes: damage in it cannot be found",
         );
     }
-    // A model of pairs that were handed in is of no scene, and of no law.
-    if model.scene_toml.is_some() && !matches!(model.law, Some(0 | LAW)) {
-        let law =
-            model.law.map_or("one of before laws had numbers".to_owned(), |law| law.to_string());
+    if let Some(law) = model.law.other_than(LAW, model.scene_toml.is_some()) {
         note(&format!(
             "warning: the model was trained on pours of another law of the solver, {law}; today's is {LAW}: pours at its \
              posterior are not those that it knows; train again"

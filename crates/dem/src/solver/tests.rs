@@ -263,3 +263,50 @@ proptest! {
         }
     }
 }
+
+/// A row of grains in many blocks, at each other or at a wall, with velocities that nothing orders.
+fn row_of_grains(at_wall: bool) -> (ContactSet, Vec<Body>) {
+    const GRAINS: u32 = 200;
+    let second = if at_wall { BodyKind::RestingWall } else { BodyKind::Grain };
+    let radius = 1e-3;
+    let points: Vec<_> = (0..GRAINS)
+        .map(|n| nalgebra::Vector3::new(2.0 * radius * f64::from(n), 0.0, 0.0))
+        .collect();
+    let mut blocks = Blocks::default();
+    blocks.place(&points, 2.0 * radius, radius);
+    let listed: Vec<_> = (0..GRAINS - u32::from(!at_wall))
+        .map(|i| ContactKey { i, partner: if at_wall { 0 } else { i + 1 } })
+        .collect();
+    let law = if at_wall { wall_law(0.5, 0.1) } else { law(0.5, 0.1) };
+    let mut set = ContactSet::default();
+    set.rebuild(&listed, &blocks, GRAINS as usize, second, |_| law);
+    let along = if at_wall { [0.0, 0.0, 1.0] } else { [-1.0, 0.0, 0.0] };
+    for batch in &mut set.batches {
+        (0..batch.used as usize).for_each(|lane| batch.normal.set(lane, along));
+    }
+    let speed = |n: u32| (f64::from(n) * 0.7).sin();
+    let moving = (0..GRAINS).map(|n| {
+        let v = [speed(n), speed(3 * n + 1), speed(5 * n + 2)];
+        body(v, [speed(7 * n), 0.5 * speed(2 * n), 0.0])
+    });
+    (set, moving.chain([Body::default()]).collect())
+}
+
+#[test]
+fn threads_that_share_bodies_change_no_bit() {
+    let settings = SolverSettings { sweeps: 3, max_sweeps: 3, ..Preset::Default.settings() };
+    for at_wall in [false, true] {
+        let (set, bodies) = row_of_grains(at_wall);
+        let after = |threads: usize| {
+            let (mut set, mut bodies) = (set.clone(), bodies.clone());
+            let threads = Threads::new(threads).unwrap();
+            solve(&mut [&mut set], &mut bodies, &settings, None, 2e-3, None, &threads);
+            bodies
+        };
+        let alone = after(1);
+        // Half of those at the wall leave it, and stay as they were.
+        assert!(alone[..200].iter().zip(&bodies).filter(|(a, b)| a != b).count() > 60);
+        assert_eq!(alone, after(2));
+        assert_eq!(alone, after(3));
+    }
+}

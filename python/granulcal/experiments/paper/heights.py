@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.arrays import read_arrays
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import formations
 from granulcal.experiments.paper.common.eye import Disturbance, Eye
@@ -83,6 +84,7 @@ class Recordings:
 
         Raises:
             FileNotFoundError: they have not been made; the message says how.
+            ValueError: the file is damaged, or holds something else.
         """
         path = (folder / "recordings" if size.is_full else SHIPPED) / f"{name}.npz"
         if not path.exists():
@@ -90,12 +92,21 @@ class Recordings:
                 f"no recordings {path}: make them with `{_MAKER} {path.parent}` in an environment "
                 "that has LAMMPS (benches/paper/README.md)"
             )
-        with np.load(path) as file:
-            # Whole hundredths of a millimetre, to be small; -1 in z is a sphere that left.
-            found = file["positions"].astype(float)
-            found[found[:, :, 2] < 0] = np.nan
-            radii = np.broadcast_to(1e-5 * file["radii"].astype(float), found.shape[:2])
-            return cls(name, file["heights"].astype(float), 1e-5 * found, radii, file["held"])
+        file = read_arrays(path, "heights", "positions", "radii", "held")
+        try:
+            found, heights = file["positions"].astype(float), file["heights"].astype(float)
+            held, radii = file["held"].astype(float), 1e-5 * file["radii"].astype(float)
+            if found.ndim != 3 or found.shape[2] != 3:
+                raise ValueError(f"positions must have the shape (m, n, 3), got {found.shape}")
+            if heights.shape != found.shape[:1] or held.shape != heights.shape:
+                shapes = f"{heights.shape} and {held.shape}"
+                raise ValueError(f"heights and held must have the shape (m,), got {shapes}")
+            radii = np.broadcast_to(radii, found.shape[:2])
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{path}: no recordings of grains: {error}") from None
+        # Whole hundredths of a millimetre, to be small; -1 in z is a sphere that left.
+        found[found[:, :, 2] < 0] = np.nan
+        return cls(name, heights, 1e-5 * found, radii, held)
 
     def at(self, height: float, count: int) -> NDArray[np.intp]:
         """Returns the rows of the first recordings from `height` that emptied the funnel."""

@@ -1,5 +1,6 @@
 """Pours of one model under every condition: what a verdict is held against. None is run twice."""
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.arrays import read_array
 from granulcal.engines.in_use import law_of_pours, version_of_pours
 from granulcal.loop.pours.measures import Measures
 from granulcal.pours.scene import Scene
@@ -55,8 +57,9 @@ class Forward:
             return kept["found"]
         older = self.store.folder / f"{key}.npy"
         if older.exists():
-            # Of before there was a checksum.
-            return np.load(older)
+            # Of before there was a checksum; what is damaged is made again.
+            with contextlib.suppress(ValueError):
+                return read_array(older)
         made = self.store.make(lambda seed: _row(scene, seed, faults), seeds)
         rows = [row for row in made if row is not None]
         self.ran += len(seeds)

@@ -93,19 +93,19 @@ pub(super) fn median(values: &mut [f64]) -> f64 {
 }
 
 /// Monomials in the pixel coordinates scaled to [-1, 1].
-struct Basis {
-    width: usize,
-    height: usize,
-    degree: usize,
+pub(super) struct Basis {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) degree: usize,
 }
 
 impl Basis {
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         (self.degree + 1) * (self.degree + 2) / 2
     }
 
     /// The monomials at pixel (u, v), into `row`.
-    fn at(&self, u: usize, v: usize, row: &mut [f64]) {
+    pub(super) fn at(&self, u: usize, v: usize, row: &mut [f64]) {
         let scaled = |i: usize, side: usize| 2.0 * (i as f64 + 0.5) / side as f64 - 1.0;
         let (x, y) = (scaled(u, self.width), scaled(v, self.height));
         let mut next = row.iter_mut();

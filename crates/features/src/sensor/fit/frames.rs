@@ -6,6 +6,9 @@ use crate::error::{FeatureError, require_in};
 use crate::height_map::HeightMap;
 use crate::region::Region;
 
+/// Share of the distance that no camera resolves.
+const LEAST_STEP: f64 = 1e-6;
+
 /// What is known of the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Optics {
@@ -13,6 +16,56 @@ pub(super) enum Optics {
     Stereo { focal_length: f64, baseline: f64, depth_unit: f64 },
     /// Values are heights `[m]`, or, seen through a lens, inverse depths `[1/m]`.
     TimeOfFlight { resolution: f64, depth_unit: f64, inverse: bool },
+}
+
+impl Optics {
+    /// What distances from the surface are a share of.
+    pub(super) fn scale(&self) -> &'static str {
+        match self {
+            Self::TimeOfFlight { inverse: false, .. } => "longer side",
+            _ => "distance",
+        }
+    }
+
+    /// The error of a value whose trend is known, in the sensor's unit.
+    pub(super) fn error(&self, value: f64, trend: f64) -> f64 {
+        match self {
+            Self::TimeOfFlight { inverse: true, .. } => 1.0 / value - 1.0 / trend,
+            _ => value - trend,
+        }
+    }
+
+    /// How much [`Optics::error`] changes with the value, without its sign.
+    pub(super) fn slope(&self, trend: f64) -> f64 {
+        match self {
+            Self::TimeOfFlight { inverse: true, .. } => 1.0 / (trend * trend),
+            _ => 1.0,
+        }
+    }
+
+    /// The step of what is delivered where the trend is this, in the sensor's unit; of height maps, which say none, a
+    /// millionth of their longer side of `pixels`.
+    pub(super) fn step(&self, trend: f64, pixels: usize) -> f64 {
+        match *self {
+            Self::Stereo { focal_length, baseline, depth_unit } => {
+                (trend * trend / (focal_length * baseline) * depth_unit).max(LEAST_STEP * trend)
+            }
+            Self::TimeOfFlight { inverse: true, depth_unit, .. } => {
+                depth_unit.max(LEAST_STEP / trend)
+            }
+            Self::TimeOfFlight { resolution, .. } => LEAST_STEP * resolution * pixels as f64,
+        }
+    }
+
+    /// How far towards the camera `[m]` a value is that errs by `slope` times `off` from the trend.
+    pub(super) fn height(&self, trend: f64, off: f64) -> f64 {
+        match *self {
+            Self::Stereo { focal_length, baseline, .. } => {
+                focal_length * baseline * (1.0 / trend - 1.0 / (trend + off))
+            }
+            Self::TimeOfFlight { .. } => off,
+        }
+    }
 }
 
 /// Frames of one camera, all of the same size.

@@ -3,6 +3,7 @@
 use granulcal_numbers::scatter;
 use granulcal_scene::round_to;
 
+use super::bump::{self, Bump};
 use super::comparison::Comparison;
 use super::components::Estimator;
 use super::covariance::{self, Split};
@@ -16,19 +17,16 @@ use crate::sensor::DepthSensor;
 use crate::sensor::field::SensorGrid;
 use crate::sensor::field::sample;
 
-/// How flat a region is; refuses one that is not.
-fn require_flat(optics: &Optics, values: &[f64], patch: &Patch) -> Result<Flatness, FeatureError> {
+/// How flat a region of a frame is.
+fn flatness(optics: &Optics, values: &[f64], patch: &Patch, bump: Option<&Bump>) -> Flatness {
     let valid = values.iter().filter(|value| value.is_finite()).count().max(1);
     let on_surface = patch.count() as f64 / valid as f64;
-    let (scale, relative): (_, Box<dyn Fn(f64, f64) -> f64>) = match *optics {
-        Optics::Stereo { .. } => ("distance", Box::new(|residual, trend| residual / trend)),
+    let relative = |residual: f64, trend: f64| match *optics {
+        Optics::Stereo { .. } => residual / trend,
         // The trend is one over the distance.
-        Optics::TimeOfFlight { inverse: true, .. } => {
-            ("distance", Box::new(|residual, trend| residual * trend))
-        }
+        Optics::TimeOfFlight { inverse: true, .. } => residual * trend,
         Optics::TimeOfFlight { resolution, .. } => {
-            let side = resolution * patch.width.max(patch.height) as f64;
-            ("longer side", Box::new(move |residual, _| residual / side))
+            residual / (resolution * patch.width.max(patch.height) as f64)
         }
     };
     let pixels = patch.residual.iter().zip(&patch.trend).zip(&patch.mask);
@@ -37,7 +35,7 @@ fn require_flat(optics: &Optics, values: &[f64], patch: &Patch) -> Result<Flatne
         .map(|((residual, trend), _)| relative(*residual, *trend).abs())
         .collect();
     let deviation = SD_PER_MAD * median(&mut off);
-    Flatness { on_surface, deviation }.require(scale)
+    Flatness { on_surface, deviation, bump: bump.map(|bump| bump.ratio) }
 }
 
 /// Frames of one sensor, their trends and residuals.
@@ -67,20 +65,35 @@ impl<'a> Session<'a> {
         let regions = frames.regions(&settings.regions)?;
         let degree = settings.trend_degree;
         let mut patches = Vec::with_capacity(frames.values.len());
-        let mut flatness = Flatness::BEST;
+        let mut worst = Flatness::BEST;
         for frame in 0..frames.values.len() {
             let mut of = |region: &Region| {
                 let values = frames.cut(frame, region);
                 let error = |v, t| frames.optics.error(v, t);
                 let patch = detrend(&values, region.width, degree, error)?;
-                flatness = flatness.worst(require_flat(&frames.optics, &values, &patch)?);
+                let optics = &frames.optics;
+                let bump = bump::largest(optics, &values, &patch.trend, region.width, degree);
+                let found = flatness(optics, &values, &patch, bump.as_ref());
+                // Of something else altogether nobody needs to know where it stands off.
+                if let Some(bump) = bump.filter(|_| found.is_near()) {
+                    bump.require_chance(frame, region)?;
+                }
+                worst = worst.worst(found.require(optics.scale())?);
                 Ok::<_, FeatureError>(patch)
             };
             patches.push(regions.iter().map(&mut of).collect::<Result<Vec<_>, FeatureError>>()?);
         }
         let shifts = covariance::shifts(&patches, settings.max_shift);
         let max_lag = settings.max_lag;
-        Ok(Self { frames, regions, patches, shifts, flatness, trend_degree: degree, max_lag })
+        Ok(Self {
+            frames,
+            regions,
+            patches,
+            shifts,
+            flatness: worst,
+            trend_degree: degree,
+            max_lag,
+        })
     }
 
     /// How flat the least flat region of all frames is.
@@ -226,14 +239,6 @@ impl<'a> Session<'a> {
 }
 
 impl Optics {
-    /// The error of a value whose trend is known, in the sensor's unit.
-    fn error(&self, value: f64, trend: f64) -> f64 {
-        match self {
-            Self::TimeOfFlight { inverse: true, .. } => 1.0 / value - 1.0 / trend,
-            _ => value - trend,
-        }
-    }
-
     /// The value that is delivered where the trend and an error meet.
     fn disturbed(&self, sensor: &DepthSensor, trend: f64, error: f64) -> f64 {
         match (self, sensor) {
