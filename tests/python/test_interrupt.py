@@ -192,6 +192,8 @@ def test_finished_pours_of_an_interrupted_calibration_are_kept(
 def test_after_a_command_signals_do_what_they_did_before(number: signal.Signals) -> None:
     code = (
         "import os, signal, time\nfrom granulcal import cli\n"
+        # What a shell starts in the background ignores SIGINT.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)\n"
         "assert cli.main(['features', '--list']) == 0\n"
         "assert cli.main(['infer', 'none', 'none.png']) == 2\n"
