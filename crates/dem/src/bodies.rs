@@ -35,13 +35,17 @@ const STREAM: u64 = 0xbb67_ae85_84ca_a73b;
 /// A point is known again within this distance from where it was on its body, in its reach `[-]`.
 const KNOWN: f64 = 0.15;
 
-/// Sweeps over all points of a substep, and the change at which they stop.
+/// When the sweeps over all points of a substep end: the rule of spheres (`solver/nsgs.rs`).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sweeps {
+    /// At least, unless the impulses have settled.
+    pub least: usize,
     /// At most.
     pub most: usize,
-    /// Largest change of an impulse in a sweep over that by gravity in a substep `[-]`.
+    /// Largest change of an impulse in a sweep that has settled `[m/s]`.
     pub settled: f64,
+    /// Fastest that a point may close beyond what its gap allows `[m/s]`.
+    pub closing: f64,
 }
 
 /// Where a point was on its body, and its impulse.
@@ -156,25 +160,30 @@ impl Bodies {
         }
         let mut points = collide::points(&solid, &moving, walls, material, dt);
         for point in &mut points {
-            point.assemble(&moving, dt);
+            point.assemble(&moving);
         }
         let mut step = Step { points: points.len(), ..Step::default() };
         step.deepest = points.iter().map(|point| -point.gap).fold(0.0, f64::max);
         (step.impacts, step.work_of_walls) = impact::resolve(&mut points, &mut moving, dt);
+        for point in &mut points {
+            point.aim(&moving, dt);
+        }
         self.recall(&mut points);
         for point in &points {
             point.give(&mut moving, &point.impulse);
         }
-        let settled = sweeps.settled * dt * gravity.norm();
         step.unconverged = !points.is_empty();
+        let mut has_settled = false;
         while step.sweeps < sweeps.most && !points.is_empty() {
-            let (largest, residual) = sweep(&mut points, &mut moving, step.sweeps % 2 == 1);
+            let worst = sweep(&mut points, &mut moving, step.sweeps % 2 == 1);
             step.sweeps += 1;
-            step.residual = residual;
-            if largest <= settled {
+            step.residual = worst.residual;
+            let is_enough = has_settled || step.sweeps >= sweeps.least;
+            if is_enough && worst.closing <= sweeps.closing {
                 step.unconverged = false;
                 break;
             }
+            has_settled = worst.change <= sweeps.settled;
         }
         let work = |point: &Point| point.impulse.dot(&point.wall_velocity);
         step.work_of_walls += points.iter().map(work).sum::<f64>();
@@ -224,14 +233,26 @@ impl Bodies {
     }
 }
 
-/// Solves every point once, forwards or backwards; returns the largest change of an impulse `[m/s]` and the root mean
-/// square of all changes over that of the normal impulses `[-]`.
-fn sweep(points: &mut [Point], bodies: &mut [Moving], backwards: bool) -> (f64, f64) {
-    let (mut largest, mut changes, mut normals) = (0.0_f64, 0.0, 0.0);
+/// The worst of a sweep.
+#[derive(Clone, Copy, Debug, Default)]
+struct Progress {
+    /// Largest change of an impulse `[m/s]`.
+    change: f64,
+    /// Fastest that a point closed beyond what its gap allows `[m/s]`.
+    closing: f64,
+    /// Root mean square of all changes over that of the normal impulses `[-]`.
+    residual: f64,
+}
+
+/// Solves every point once, forwards or backwards.
+fn sweep(points: &mut [Point], bodies: &mut [Moving], backwards: bool) -> Progress {
+    let (mut worst, mut changes, mut normals) = (Progress::default(), 0.0, 0.0);
     let mut one = |point: &mut Point| {
-        let change = point.solve(bodies, point.bias);
-        largest = largest.max(change);
-        changes += change * change;
+        // One round: the next sweep goes on with it.
+        let change = point.solve(bodies, point.bias, 1);
+        worst.change = worst.change.max(change.impulse);
+        worst.closing = worst.closing.max(change.closing);
+        changes += change.impulse * change.impulse;
         normals += point.normal.dot(&point.impulse).powi(2);
     };
     if backwards {
@@ -239,5 +260,6 @@ fn sweep(points: &mut [Point], bodies: &mut [Moving], backwards: bool) -> (f64, 
     } else {
         points.iter_mut().for_each(&mut one);
     }
-    (largest, if normals > 0.0 { (changes / normals).sqrt() } else { 0.0 })
+    worst.residual = if normals > 0.0 { (changes / normals).sqrt() } else { 0.0 };
+    worst
 }

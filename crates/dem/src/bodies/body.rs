@@ -10,6 +10,7 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::contact::product;
 use granulcal_scene::Solid;
 
 /// Place and motion.
@@ -58,8 +59,12 @@ pub(super) struct Moving {
     pub omega: Vector3<f64>,
     /// Of the tensor of inertia over the mass, in the scene's axes `[1/m^2]`.
     pub inverse_inertia: Matrix3<f64>,
-    /// By how much an impact within the substep moves the body more than its last velocity does `[m]`.
+    /// By how much impacts within the substep move the body more than its last velocity does `[m]`.
     pub shift: Vector3<f64>,
+    /// By how much they turn it more than its last angular velocity does `[rad]`.
+    pub twist: Vector3<f64>,
+    /// When the last of them was, from the begin of the substep, if there was one `[s]`.
+    pub hit: Option<f64>,
 }
 
 impl Moving {
@@ -73,6 +78,8 @@ impl Moving {
             omega: inverse_inertia * Vector3::from(body.momentum),
             inverse_inertia,
             shift: Vector3::zeros(),
+            twist: Vector3::zeros(),
+            hit: None,
         }
     }
 
@@ -81,10 +88,22 @@ impl Moving {
         self.velocity + self.omega.cross(arm)
     }
 
+    /// By how much impacts move its point at `arm` from the centre more than its last velocity does `[m]`.
+    pub fn shift_at(&self, arm: &Vector3<f64>) -> Vector3<f64> {
+        self.shift + self.twist.cross(arm)
+    }
+
+    /// Was hit at `time` `[s]`: until then it went and turned as `before`.
+    pub fn was_hit(&mut self, time: f64, before: &Self) {
+        self.shift += time * (before.velocity - self.velocity);
+        self.twist += time * (before.omega - self.omega);
+        self.hit = Some(time);
+    }
+
     /// Takes an impulse at `arm`.
     pub fn push(&mut self, arm: &Vector3<f64>, impulse: &Vector3<f64>) {
         self.velocity += impulse;
-        self.omega += self.inverse_inertia * arm.cross(impulse);
+        self.omega += product(&self.inverse_inertia, &arm.cross(impulse));
     }
 
     /// What a unit impulse at `arm` does to the velocity there: `1 - [arm] I^-1 [arm]`.
@@ -97,9 +116,9 @@ impl Moving {
     pub fn moved(&self, solid: &Solid, dt: f64) -> RigidBody {
         let local = self.turned.inverse() * self.omega;
         let momentum = self.turned * local.component_mul(&solid.inertia);
-        let half = UnitQuaternion::new(0.5 * dt * self.omega) * self.turned;
+        let half = UnitQuaternion::new(0.5 * (dt * self.omega + self.twist)) * self.turned;
         let omega = inverse_inertia(&half, solid) * momentum;
-        let turned = UnitQuaternion::new(dt * omega) * self.turned;
+        let turned = UnitQuaternion::new(dt * omega + self.twist) * self.turned;
         // Products of unit quaternions stay of unit length to rounding only.
         let turned = UnitQuaternion::new_normalize(turned.into_inner());
         RigidBody {

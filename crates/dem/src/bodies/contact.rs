@@ -12,10 +12,10 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::body::Moving;
-use crate::law::{CORRECTION, CORRECTION_SPEED, SLOP};
+use crate::law::{CORRECTION, CORRECTION_SPEED, PINNED_SPEED, SLOP};
 
-/// Repetitions of the two lines at most.
-const ROUNDS: usize = 30;
+/// Repetitions of the two lines that leave a point by itself exactly solved, at most.
+pub(super) const EXACT: usize = 30;
 /// Change over the impulse at which they stand `[-]`.
 const STANDS: f64 = 1e-10;
 /// No body: a wall.
@@ -71,8 +71,8 @@ impl Point {
         }
     }
 
-    /// Makes the block and the bias.
-    pub fn assemble(&mut self, bodies: &[Moving], dt: f64) {
+    /// Makes the block.
+    pub fn assemble(&mut self, bodies: &[Moving]) {
         self.block = bodies[self.i].response(&self.arm_i);
         if self.j != WALL {
             self.block += bodies[self.j].response(&self.arm_j);
@@ -85,11 +85,35 @@ impl Point {
             (s.dot(&(self.block * s)), s.dot(&(self.block * t)), t.dot(&(self.block * t)));
         let largest = 0.5 * (a + c) + (0.25 * (a - c) * (a - c) + b * b).sqrt();
         self.compliance = [1.0 / n.dot(&(self.block * n)), 1.0 / largest];
-        self.bias = if self.gap >= 0.0 {
-            self.gap / dt
+    }
+
+    /// Sets the bias, from where the last motions of its bodies have begun.
+    ///
+    /// What an impact has parted may be pressed together again in the same substep: then it is asked to part slowly.
+    pub fn aim(&mut self, bodies: &[Moving], dt: f64) {
+        let aside = self.gap_of_last_motion(bodies) - self.gap;
+        self.bias = if self.gap < 0.0 {
+            let push = (CORRECTION * (self.gap + SLOP) / dt).clamp(-CORRECTION_SPEED, 0.0);
+            (push + aside / dt).clamp(-CORRECTION_SPEED, 0.0)
         } else {
-            (CORRECTION * (self.gap + SLOP) / dt).clamp(-CORRECTION_SPEED, 0.0)
+            ((self.gap + aside) / dt).max(if aside == 0.0 { 0.0 } else { -PINNED_SPEED })
         };
+    }
+
+    /// The gap that the last motions of its bodies would have begun with at the begin of the substep `[m]`: bodies that
+    /// an impact has turned back in it come from elsewhere.
+    pub fn gap_of_last_motion(&self, bodies: &[Moving]) -> f64 {
+        let mut aside = bodies[self.i].shift_at(&self.arm_i);
+        if self.j != WALL {
+            aside -= bodies[self.j].shift_at(&self.arm_j);
+        }
+        self.gap + self.normal.dot(&aside)
+    }
+
+    /// When the later of the last impacts of its bodies was, if there was one `[s]`.
+    pub fn last_hit(&self, bodies: &[Moving]) -> Option<f64> {
+        let of_j = if self.j == WALL { None } else { bodies[self.j].hit };
+        bodies[self.i].hit.into_iter().chain(of_j).max_by(f64::total_cmp)
     }
 
     /// Velocity of i relative to j there `[m/s]`.
@@ -109,28 +133,54 @@ impl Point {
         }
     }
 
-    /// Solves the point by itself under a bias; returns how far its impulse has changed `[m/s]`.
-    pub fn solve(&mut self, bodies: &mut [Moving], bias: f64) -> f64 {
+    /// Solves the point by itself under a bias, with at most so many repetitions of the two lines.
+    pub fn solve(&mut self, bodies: &mut [Moving], bias: f64, rounds: usize) -> Change {
         let before = self.impulse;
         let mut u = self.velocity(bodies);
         let n = self.normal;
-        for _ in 0..ROUNDS {
+        let closing = -(n.dot(&u) + bias);
+        for _ in 0..rounds {
             let old = self.impulse;
             let was = n.dot(&old);
             let normal = (was - (n.dot(&u) + bias) * self.compliance[0]).max(0.0);
-            u += self.block * n * (normal - was);
+            if normal == 0.0 && was == 0.0 {
+                self.impulse = Vector3::zeros();
+                break;
+            }
+            u += product(&self.block, &n) * (normal - was);
             let sliding = old - was * n;
             let wanted = sliding - self.compliance[1] * (u - n.dot(&u) * n);
             let (limit, length) = (self.friction * normal, wanted.norm());
             let tangent = if length > limit { wanted * (limit / length) } else { wanted };
-            u += self.block * (tangent - sliding);
+            u += product(&self.block, &(tangent - sliding));
             self.impulse = normal * n + tangent;
             if (self.impulse - old).norm() <= STANDS * self.impulse.norm() {
                 break;
             }
         }
         let change = self.impulse - before;
-        self.give(bodies, &change);
-        change.norm()
+        if change != Vector3::zeros() {
+            self.give(bodies, &change);
+        }
+        Change { impulse: change.norm(), closing }
     }
+}
+
+/// What solving a point has found and done.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Change {
+    /// Of its impulse `[m/s]`.
+    pub impulse: f64,
+    /// How fast it closed before, beyond what its gap allows `[m/s]`.
+    pub closing: f64,
+}
+
+/// `matrix * vector`, which must be inlined in the innermost loop.
+#[inline(always)]
+pub(super) fn product(m: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(
+        m.m11 * v.x + m.m12 * v.y + m.m13 * v.z,
+        m.m21 * v.x + m.m22 * v.y + m.m23 * v.z,
+        m.m31 * v.x + m.m32 * v.y + m.m33 * v.z,
+    )
 }

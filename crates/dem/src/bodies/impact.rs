@@ -16,7 +16,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use super::body::Moving;
-use super::contact::{Point, WALL};
+use super::contact::{EXACT, Point, WALL};
 use crate::law::IMPACT_SPEED;
 
 /// Sweeps over the points of a manifold at most, and the change over the impulse at which they stand.
@@ -67,11 +67,13 @@ fn manifolds(points: &[Point]) -> Vec<Range<usize>> {
     all
 }
 
-/// When the first of the points that are fast enough touches, if one does within the substep `[s]`.
+/// When the first of the points that are fast enough touches, if one does within the substep `[s]`; not before its
+/// bodies were hit the last time.
 fn first_touch(group: &[Point], bodies: &[Moving], dt: f64) -> Option<f64> {
+    let since = group[0].last_hit(bodies).unwrap_or(0.0);
     let of = |point: &Point| {
         let closing = -point.normal.dot(&point.velocity(bodies));
-        let time = point.gap.max(0.0) / closing;
+        let time = (point.gap_of_last_motion(bodies) / closing).max(since);
         (point.restitution > 0.0 && closing > IMPACT_SPEED && time < dt).then_some(time)
     };
     group.iter().filter_map(of).min_by(f64::total_cmp)
@@ -79,10 +81,10 @@ fn first_touch(group: &[Point], bodies: &[Moving], dt: f64) -> Option<f64> {
 
 /// Lets a manifold's bodies bounce; returns what a moving wall has put in.
 fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64 {
-    let (i, j) = (group[0].i, group[0].j);
-    let before = [Some(i), (j != WALL).then_some(j)].map(|k| k.map(|k| bodies[k].velocity));
+    let touched = [Some(group[0].i), (group[0].j != WALL).then_some(group[0].j)];
+    let before = touched.map(|body| body.map(|body| bodies[body]));
     let meets = |point: &Point, bodies: &[Moving]| {
-        point.gap <= -dt * point.normal.dot(&point.velocity(bodies))
+        point.gap_of_last_motion(bodies) <= -dt * point.normal.dot(&point.velocity(bodies))
     };
     let touching: Vec<usize> = (0..group.len()).filter(|&k| meets(&group[k], bodies)).collect();
     for point in group.iter_mut() {
@@ -91,7 +93,7 @@ fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64
     for _ in 0..SWEEPS {
         let (mut changed, mut largest) = (0.0_f64, 0.0_f64);
         for &k in &touching {
-            changed = changed.max(group[k].solve(bodies, 0.0));
+            changed = changed.max(group[k].solve(bodies, 0.0, EXACT).impulse);
             largest = largest.max(group[k].impulse.norm());
         }
         if changed <= STANDS * largest {
@@ -104,11 +106,9 @@ fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64
         group[k].give(bodies, &again);
         work += (group[k].impulse + again).dot(&group[k].wall_velocity);
     }
-    // What the bodies went before the impact they went with the velocity before it.
-    for (k, before) in [i, j].into_iter().zip(before) {
-        if let Some(before) = before {
-            let after = bodies[k].velocity;
-            bodies[k].shift += time * (before - after);
+    for (body, before) in touched.into_iter().zip(before) {
+        if let (Some(body), Some(before)) = (body, before) {
+            bodies[body].was_hit(time, &before);
         }
     }
     // What was given in an impact is no impulse of a lasting contact.

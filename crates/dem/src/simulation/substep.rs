@@ -17,8 +17,6 @@ const QUIET: f64 = 0.0025;
 const QUIET_SETTLED: f64 = 1e-2;
 /// Examinations between two looks at the residual, which costs about a sweep.
 const RESIDUAL_PERIOD: usize = 4;
-/// Change of an impulse of convex bodies in a sweep over that by gravity in a substep at which it has settled `[-]`.
-const SETTLED: f64 = 1e-3;
 
 /// How much deeper than a sphere a convex body may be: a corner that no manifold had before enters by the way of a
 /// substep.
@@ -75,10 +73,19 @@ impl Simulation {
     fn move_bodies(&mut self) {
         let Some(bodies) = &mut self.bodies else { return };
         let (around, watch) = (&self.around, &mut self.watch);
-        let (dt, most) = (around.settings.dt, around.settings.max_sweeps);
-        let sweeps = Sweeps { most, settled: SETTLED };
+        let (settings, radius) = (&around.settings, around.radius);
+        let (dt, scale) = (settings.dt, radius / settings.dt);
+        let (asked, still) = match self.is_quiet {
+            true => (settings.quiet_sweeps, QUIET_SETTLED * around.gravity.norm() * dt),
+            false => (0, 0.0),
+        };
+        let sweeps = Sweeps {
+            least: settings.sweeps.max(asked),
+            most: settings.max_sweeps,
+            settled: still.max(settings.settled * scale),
+            closing: settings.closing * scale,
+        };
         let step = bodies.step(&around.gravity, &around.walls, &around.material, dt, sweeps);
-        let radius = around.radius;
         watch.see_penetration(step.deepest / radius);
         watch.see_residual(step.residual);
         watch.see_contacts(step.points);
