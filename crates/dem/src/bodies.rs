@@ -4,16 +4,20 @@
 //! |---|---|
 //! | `grain_shape` | what a scene states; corners, faces, volume and inertia of it |
 //! | `body` | place, turn, momentum; what an impulse does |
+//! | `around` | shape, walls and material in a substep; how far bodies look for each other |
 //! | `collide` | points of contact |
 //! | `contact` | the law at a point |
 //! | `impact` | impacts, each at its time |
+//! | `rims` | points of contact at the rims of walls |
 
+mod around;
 mod body;
 mod collide;
 mod contact;
 #[cfg(test)]
 mod exams;
 mod impact;
+mod rims;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -23,6 +27,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::turns::turns;
 use crate::wall::Walls;
+use around::Around;
 use body::{Moving, RigidBody};
 use contact::{Point, WALL};
 use granulcal_scene::Material;
@@ -34,6 +39,10 @@ const STREAM: u64 = 0xbb67_ae85_84ca_a73b;
 
 /// A point is known again within this distance from where it was on its body, in its reach `[-]`.
 const KNOWN: f64 = 0.15;
+
+/// How often impacts are resolved in a substep and its points are swept, at most: after each time what is foreseen may
+/// add points.
+const LOOKS: usize = 3;
 
 /// When the sweeps over all points of a substep end: the rule of spheres (`solver/nsgs.rs`).
 #[derive(Clone, Copy, Debug)]
@@ -158,33 +167,34 @@ impl Bodies {
         for body in &mut moving {
             body.velocity += dt * gravity;
         }
-        let mut points = collide::points(&solid, &moving, walls, material, dt);
-        for point in &mut points {
-            point.assemble(&moving);
-        }
-        let mut step = Step { points: points.len(), ..Step::default() };
-        step.deepest = points.iter().map(|point| -point.gap).fold(0.0, f64::max);
-        (step.impacts, step.work_of_walls) = impact::resolve(&mut points, &mut moving, dt);
-        for point in &mut points {
-            point.aim(&moving, dt);
-        }
-        self.recall(&mut points);
-        for point in &points {
-            point.give(&mut moving, &point.impulse);
-        }
-        step.unconverged = !points.is_empty();
-        let mut has_settled = false;
-        while step.sweeps < sweeps.most && !points.is_empty() {
-            let worst = sweep(&mut points, &mut moving, step.sweeps % 2 == 1);
-            step.sweeps += 1;
-            step.residual = worst.residual;
-            let is_enough = has_settled || step.sweeps >= sweeps.least;
-            if is_enough && worst.closing <= sweeps.closing {
-                step.unconverged = false;
+        let around = Around { solid: &solid, walls, material, dt };
+        let mut contacts = collide::contacts(&around, &moving);
+        let mut step = Step::default();
+        let depths = contacts.points.iter().map(|point| -point.gap);
+        step.deepest = depths.fold(0.0, f64::max);
+        for look in 0..LOOKS {
+            contacts.points.iter_mut().for_each(|point| point.assemble(&moving));
+            let (impacts, work) = impact::resolve(&mut contacts.points, &mut moving, dt);
+            step.impacts += impacts;
+            step.work_of_walls += work;
+            if look + 1 == LOOKS || !contacts.foresee(&around, &moving) {
                 break;
             }
-            has_settled = worst.change <= sweeps.settled;
         }
+        self.recall(&mut contacts.points);
+        contacts.points.iter().for_each(|point| point.give(&mut moving, &point.impulse));
+        for look in 0..LOOKS {
+            for point in &mut contacts.points {
+                point.assemble(&moving);
+                point.aim(&moving, dt);
+            }
+            settle(&mut contacts.points, &mut moving, sweeps, &mut step);
+            if look + 1 == LOOKS || !contacts.foresee(&around, &moving) {
+                break;
+            }
+        }
+        let points = contacts.points;
+        step.points = points.len();
         let work = |point: &Point| point.impulse.dot(&point.wall_velocity);
         step.work_of_walls += points.iter().map(work).sum::<f64>();
         self.remember(&points);
@@ -230,6 +240,26 @@ impl Bodies {
             body.kinetic_energy(&self.solid) - gravity.dot(&Vector3::from(body.centre))
         };
         self.all.iter().map(of).sum()
+    }
+}
+
+/// Sweeps over all points by the rule of spheres (`solver/nsgs.rs`).
+fn settle(points: &mut [Point], bodies: &mut [Moving], rule: Sweeps, step: &mut Step) {
+    step.unconverged = !points.is_empty();
+    let mut has_settled = false;
+    for sweeps in 1..=rule.most {
+        if points.is_empty() {
+            return;
+        }
+        let worst = sweep(points, bodies, sweeps % 2 == 0);
+        step.sweeps += 1;
+        step.residual = worst.residual;
+        let is_enough = has_settled || sweeps >= rule.least;
+        if is_enough && worst.closing <= rule.closing {
+            step.unconverged = false;
+            return;
+        }
+        has_settled = worst.change <= rule.settled;
     }
 }
 

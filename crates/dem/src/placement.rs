@@ -1,7 +1,7 @@
 //! Where a moving wall is in a substep, and how fast (docs/theory/contact.md, "Walls that move").
 
 use granulcal_scene::Motion;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 /// Pose of a wall at the begin of a substep, and the pose that it has moved by at the end.
 #[derive(Clone, Debug)]
@@ -76,6 +76,11 @@ impl Placement {
     pub fn seen(&self, x: &Vector3<f64>, now: f64) -> Vector3<f64> {
         let at_begin = x - now * self.velocity_at(x);
         self.pose.rotation.inverse() * (at_begin - self.pose.translation.vector)
+    }
+
+    /// From directions of the scene to those of the stated shape.
+    pub fn stated(&self) -> UnitQuaternion<f64> {
+        self.pose.rotation.inverse()
     }
 
     /// A direction of the stated shape where the wall is now.

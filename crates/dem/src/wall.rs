@@ -3,15 +3,17 @@
 //! Planes, shells and discs are in `wall/surface.rs`, triangles in `wall/facets.rs`.
 
 mod facets;
+mod rim;
 mod surface;
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::placement::Placement;
 use facets::Facets;
 use granulcal_scene::{BoxSide, Material, Motion, Scene, Shape, WallMaterial};
+pub(crate) use rim::Rim;
 pub(crate) use surface::Nearest;
 use surface::{Surface, surfaces};
 
@@ -76,9 +78,24 @@ impl Wall {
         }
     }
 
+    /// Whether it has triangles.
+    pub fn has_facets(&self) -> bool {
+        self.facets.is_some()
+    }
+
     /// Whether it may move.
     pub fn is_moving(&self) -> bool {
         self.placement.is_some()
+    }
+
+    /// A place in the scene seen from where the wall is stated.
+    pub fn seen_at_begin(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        self.placement.as_ref().map_or(*x, |placement| placement.seen(x, 0.0))
+    }
+
+    /// Directions of the scene, seen from where the wall is stated.
+    pub fn stated(&self) -> UnitQuaternion<f64> {
+        self.placement.as_ref().map_or_else(UnitQuaternion::identity, Placement::stated)
     }
 
     /// Velocity and angular velocity in this substep of the wall's point at `x` `[m/s]`, `[rad/s]`.
@@ -97,6 +114,8 @@ pub(crate) struct Walls {
     first: Vec<u32>,
     /// The wall of each surface.
     owner: Vec<u32>,
+    /// Where surfaces end, each with its wall.
+    rims: Vec<(usize, Rim)>,
 }
 
 impl Walls {
@@ -137,7 +156,8 @@ impl Walls {
             first.push(owner.len() as u32);
             owner.resize(owner.len() + wall.count(), number as u32);
         }
-        Self { all, first, owner }
+        let rims = rims(&all);
+        Self { all, first, owner, rims }
     }
 
     /// Number of surfaces.
@@ -148,6 +168,11 @@ impl Walls {
     /// Number of walls.
     pub fn count(&self) -> usize {
         self.all.len()
+    }
+
+    /// The walls' rims, each with its wall, where the walls are stated.
+    pub fn rims(&self) -> impl Iterator<Item = (&Wall, &Rim)> {
+        self.rims.iter().map(|(owner, rim)| (&self.all[*owner], rim))
     }
 
     /// Whether any may move.
@@ -188,6 +213,20 @@ impl Walls {
             wall.reached(centre, range, |number| found(first as usize + number));
         }
     }
+}
+
+/// The rims of all walls: those that rest share what they have in common, one that moves has its own.
+fn rims(all: &[Wall]) -> Vec<(usize, Rim)> {
+    let (mut of_still, mut owners) = (Vec::new(), Vec::new());
+    let mut of_moving = Vec::new();
+    for (number, wall) in all.iter().enumerate() {
+        let mut own = Vec::new();
+        let known = if wall.is_moving() { &mut own } else { &mut of_still };
+        wall.surfaces.iter().for_each(|surface| Rim::gather(surface, known));
+        owners.resize(of_still.len(), number);
+        of_moving.extend(own.into_iter().map(|rim| (number, rim)));
+    }
+    owners.into_iter().zip(of_still).chain(of_moving).collect()
 }
 
 /// The triangles of a box or a mesh.

@@ -10,7 +10,6 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::contact::product;
 use granulcal_scene::Solid;
 
 /// Place and motion.
@@ -83,6 +82,17 @@ impl Moving {
         }
     }
 
+    /// Where it is at the end of a substep if nothing more meets it; its velocities and its inertia are those of now.
+    pub fn foreseen(&self, dt: f64) -> Self {
+        let turned = UnitQuaternion::new(dt * self.omega + self.twist) * self.turned;
+        Self { centre: self.centre + dt * self.velocity + self.shift, turned, ..*self }
+    }
+
+    /// How far the points of one with this reach go within `dt`, at most `[m]`.
+    pub fn way(&self, reach: f64, dt: f64) -> f64 {
+        dt * (self.velocity.norm() + self.omega.norm() * reach)
+    }
+
     /// Velocity of its point at `arm` from the centre `[m/s]`.
     pub fn velocity_at(&self, arm: &Vector3<f64>) -> Vector3<f64> {
         self.velocity + self.omega.cross(arm)
@@ -134,4 +144,14 @@ fn inverse_inertia(turned: &UnitQuaternion<f64>, solid: &Solid) -> Matrix3<f64> 
     let rotation = turned.to_rotation_matrix();
     let inverse = Matrix3::from_diagonal(&solid.inertia.map(|moment| 1.0 / moment));
     rotation.matrix() * inverse * rotation.matrix().transpose()
+}
+
+/// `matrix * vector`, which must be inlined in the innermost loop.
+#[inline(always)]
+pub(super) fn product(m: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(
+        m.m11 * v.x + m.m12 * v.y + m.m13 * v.z,
+        m.m21 * v.x + m.m22 * v.y + m.m23 * v.z,
+        m.m31 * v.x + m.m32 * v.y + m.m33 * v.z,
+    )
 }

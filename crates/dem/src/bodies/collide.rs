@@ -5,47 +5,87 @@ use nalgebra::{UnitQuaternion, Vector3};
 use parry3d_f64::math::{Pose, Rotation};
 use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher as _};
 
+use super::around::Around;
 use super::body::Moving;
 use super::contact::{Point, WALL};
-use crate::wall::Walls;
-use granulcal_scene::Material;
-use granulcal_scene::{Solid, parry};
+use super::rims::at_rims;
+use granulcal_scene::parry;
 
-/// Bodies look for each other at least so far, in their reach `[-]`.
-const LEAST_MARGIN: f64 = 0.02;
+/// What goes farther than this within a substep is looked at where it will be, too, in the least margin `[-]`.
+const FORESEEN: f64 = 0.5;
+/// Gaps of points that bodies turn past are corrected by no less than this, in their reach `[-]`.
+const CORRECTED: f64 = 2e-3;
 
-/// Every point of contact that the next substep may close, in an order that depends on the places alone.
-pub(super) fn points(
-    solid: &Solid,
-    bodies: &[Moving],
-    walls: &Walls,
-    material: &Material,
-    dt: f64,
-) -> Vec<Point> {
-    let mut found = Vec::new();
-    for i in 0..bodies.len() {
-        at_walls(solid, bodies, i, walls, dt, &mut found);
-    }
-    let mut manifold = ContactManifold::<(), ()>::new();
-    for (i, j) in near_pairs(solid, bodies, dt) {
-        between(solid, bodies, (i, j), material, dt, &mut manifold, &mut found);
-    }
-    found
+/// What may meet in a substep, and where.
+pub(super) struct Contacts {
+    /// Pairs whose balls may meet, in rising order.
+    pairs: Vec<(usize, usize)>,
+    /// Those of walls before those of pairs, those of a manifold together, in an order that depends on the places alone.
+    pub points: Vec<Point>,
 }
 
-/// How far a body's points go in a substep relative to those of another, and a little more `[m]`.
-fn margin(solid: &Solid, a: &Moving, b: Option<&Moving>, dt: f64) -> f64 {
-    let apart = b.map_or(a.velocity, |b| a.velocity - b.velocity).norm();
-    let turning = a.omega.norm() + b.map_or(0.0, |b| b.omega.norm());
-    LEAST_MARGIN * solid.reach + dt * (apart + turning * solid.reach)
+/// Every point of contact that the next substep may close, as far as it can be seen where the bodies are.
+pub(super) fn contacts(around: &Around<'_>, bodies: &[Moving]) -> Contacts {
+    let mut points = Vec::new();
+    for i in 0..bodies.len() {
+        at_walls(around, bodies, i, &mut points);
+        at_rims(around, &bodies[i], i, around.range(&bodies[i], None), &mut points);
+    }
+    let pairs = near_pairs(around, bodies);
+    let mut manifold = ContactManifold::new();
+    for &(i, j) in &pairs {
+        let range = around.range(&bodies[i], Some(&bodies[j]));
+        touches(around, bodies, (i, j), range, &mut manifold, |point| points.push(point));
+    }
+    Contacts { pairs, points }
+}
+
+impl Contacts {
+    /// Adds the points at which bodies would lie in something at the end of the substep: a corner that swings in from
+    /// elsewhere is none of those that are nearest at its begin. Returns whether there are any.
+    pub fn foresee(&mut self, around: &Around<'_>, bodies: &[Moving]) -> bool {
+        let known = self.points.len();
+        let mut new = Vec::new();
+        let later: Vec<_> = bodies.iter().map(|body| body.foreseen(around.dt)).collect();
+        let is_far = |range: f64| range > (1.0 + FORESEEN) * around.least();
+        for (i, body) in later.iter().enumerate() {
+            if is_far(around.range(&bodies[i], None)) {
+                at_rims(around, body, i, 0.0, &mut new);
+            }
+        }
+        let mut manifold = ContactManifold::new();
+        for &(i, j) in &self.pairs {
+            if is_far(around.range(&bodies[i], Some(&bodies[j]))) {
+                touches(around, &later, (i, j), 0.0, &mut manifold, |point| new.push(point));
+            }
+        }
+        let (least, mut is_news) = (CORRECTED * around.solid.reach, false);
+        for point in new {
+            let point = point.foreseen(bodies, around.dt);
+            let is_same = |other: &&mut Point| {
+                other.name() == point.name() && other.is_like(&point, around.solid.reach)
+            };
+            match self.points[..known].iter_mut().find(is_same) {
+                // Its bodies turn so far that it gets there sooner than its velocity says.
+                Some(other) if point.gap < other.gap - least => other.gap = point.gap,
+                Some(_) => continue,
+                None => self.points.push(point),
+            }
+            is_news = true;
+        }
+        // Those of a manifold stay together.
+        self.points.sort_by_key(|point| (point.j != WALL, point.name()));
+        is_news
+    }
 }
 
 /// Pairs whose balls may meet, each once, in rising order: sweep along x.
-fn near_pairs(solid: &Solid, bodies: &[Moving], dt: f64) -> Vec<(usize, usize)> {
+fn near_pairs(around: &Around<'_>, bodies: &[Moving]) -> Vec<(usize, usize)> {
     let mut order: Vec<usize> = (0..bodies.len()).collect();
     order.sort_by(|&a, &b| bodies[a].centre.x.total_cmp(&bodies[b].centre.x).then(a.cmp(&b)));
-    let fastest = bodies.iter().map(|b| b.velocity.norm() + b.omega.norm() * solid.reach);
-    let most = 2.0 * solid.reach * (1.0 + LEAST_MARGIN) + 2.0 * dt * fastest.fold(0.0, f64::max);
+    let reach = around.solid.reach;
+    let farthest = bodies.iter().map(|body| body.way(reach, around.dt)).fold(0.0, f64::max);
+    let most = 2.0 * reach + around.least() + 2.0 * farthest;
     let mut pairs = Vec::new();
     for (at, &i) in order.iter().enumerate() {
         for &j in &order[at + 1..] {
@@ -53,7 +93,7 @@ fn near_pairs(solid: &Solid, bodies: &[Moving], dt: f64) -> Vec<(usize, usize)> 
             if offset.x > most {
                 break;
             }
-            let range = 2.0 * solid.reach + margin(solid, &bodies[i], Some(&bodies[j]), dt);
+            let range = 2.0 * reach + around.range(&bodies[i], Some(&bodies[j]));
             if offset.norm_squared() < range * range {
                 pairs.push((i.min(j), i.max(j)));
             }
@@ -63,17 +103,16 @@ fn near_pairs(solid: &Solid, bodies: &[Moving], dt: f64) -> Vec<(usize, usize)> 
     pairs
 }
 
-fn between(
-    solid: &Solid,
+/// Gives the points at which two bodies are nearer than `range`, as parry sees them.
+fn touches(
+    around: &Around<'_>,
     bodies: &[Moving],
     (i, j): (usize, usize),
-    material: &Material,
-    dt: f64,
+    range: f64,
     manifold: &mut ContactManifold<(), ()>,
-    found: &mut Vec<Point>,
+    mut found: impl FnMut(Point),
 ) {
-    let (a, b) = (&bodies[i], &bodies[j]);
-    let range = margin(solid, a, Some(b), dt);
+    let (solid, a, b) = (around.solid, &bodies[i], &bodies[j]);
     let back = a.turned.inverse();
     // In units of the reach.
     let offset = parry(&(back * (b.centre - a.centre) / solid.reach));
@@ -105,33 +144,30 @@ fn between(
         let middle = 0.5 * (a.centre + on_i + b.centre + on_j);
         let mut point = Point::new(i, j, 0, normal, gap);
         (point.arm_i, point.arm_j, point.mark) = (middle - a.centre, middle - b.centre, mark);
-        (point.friction, point.restitution) = (material.sliding_friction, material.restitution);
-        found.push(point);
+        (point.friction, point.restitution) =
+            (around.material.sliding_friction, around.material.restitution);
+        found(point);
     }
 }
 
-fn at_walls(
-    solid: &Solid,
-    bodies: &[Moving],
-    i: usize,
-    walls: &Walls,
-    dt: f64,
-    found: &mut Vec<Point>,
-) {
-    let body = &bodies[i];
-    let range = margin(solid, body, None, dt);
+fn at_walls(around: &Around<'_>, bodies: &[Moving], i: usize, found: &mut Vec<Point>) {
+    let (solid, walls, body) = (around.solid, around.walls, &bodies[i]);
+    let range = around.range(body, None);
     let back = body.turned.inverse();
     walls.reached(&body.centre, solid.reach + range, |surface| {
         let wall = walls.wall(surface);
         let mut touch = |mark: Vector3<f64>| {
             let arm = body.turned * mark;
             let near = walls.nearest(surface, &(body.centre + arm), 0.0);
-            if near.distance > range {
+            // Beyond the end of a shell or a disc it is its rim that touches.
+            let is_at_rim = near.side == 0 && near.distance > 0.0 && !wall.has_facets();
+            if near.distance > range || is_at_rim {
                 return;
             }
             // A corner that has come through a shell is on the other side of it than the centre.
             let from_wall = near.distance * near.normal - arm;
-            let is_through = near.distance > 0.0 && from_wall.dot(&near.normal) < 0.0;
+            let is_through =
+                near.side != 0 && near.distance > 0.0 && from_wall.dot(&near.normal) < 0.0;
             let (gap, normal) = if is_through {
                 (-near.distance, -near.normal)
             } else {

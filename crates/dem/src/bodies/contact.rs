@@ -11,13 +11,16 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::body::Moving;
-use crate::law::{CORRECTION, CORRECTION_SPEED, PINNED_SPEED, SLOP};
+use super::body::{Moving, product};
+use crate::law::{CORRECTION, CORRECTION_SPEED, SLOP};
 
 /// Repetitions of the two lines that leave a point by itself exactly solved, at most.
 pub(super) const EXACT: usize = 30;
 /// Change over the impulse at which they stand `[-]`.
 const STANDS: f64 = 1e-10;
+/// Points of a manifold are one within this distance in the bodies' reach and this cosine of their normals `[-]`.
+const SAME_PLACE: f64 = 0.1;
+const SAME_NORMAL: f64 = 0.99;
 /// No body: a wall.
 pub(super) const WALL: usize = usize::MAX;
 
@@ -71,8 +74,38 @@ impl Point {
         }
     }
 
-    /// Makes the block.
+    /// The bodies and the surface: they name its manifold.
+    pub fn name(&self) -> (usize, usize, usize) {
+        (self.i, self.j, self.surface)
+    }
+
+    /// This point, found where its bodies will be at the end of the substep, as it is now: with the gap from which their
+    /// velocities lead to the one that is foreseen.
+    pub fn foreseen(mut self, bodies: &[Moving], dt: f64) -> Self {
+        let turned_back = |body: &Moving, arm: &Vector3<f64>| {
+            let later = body.foreseen(dt);
+            body.turned * (later.turned.inverse() * arm)
+        };
+        self.arm_i = turned_back(&bodies[self.i], &self.arm_i);
+        if self.j != WALL {
+            self.arm_j = turned_back(&bodies[self.j], &self.arm_j);
+        }
+        self.gap -= dt * self.normal.dot(&self.velocity(bodies));
+        self.gap -= self.gap_of_last_motion(bodies) - self.gap;
+        self
+    }
+
+    /// Whether it says what another of its manifold says, of bodies of this reach `[m]`.
+    pub fn is_like(&self, other: &Self, reach: f64) -> bool {
+        (self.mark - other.mark).norm() < SAME_PLACE * reach
+            && self.normal.dot(&other.normal) > SAME_NORMAL
+    }
+
+    /// Makes the block, once.
     pub fn assemble(&mut self, bodies: &[Moving]) {
+        if self.compliance[0] > 0.0 {
+            return;
+        }
         self.block = bodies[self.i].response(&self.arm_i);
         if self.j != WALL {
             self.block += bodies[self.j].response(&self.arm_j);
@@ -87,16 +120,14 @@ impl Point {
         self.compliance = [1.0 / n.dot(&(self.block * n)), 1.0 / largest];
     }
 
-    /// Sets the bias, from where the last motions of its bodies have begun.
-    ///
-    /// What an impact has parted may be pressed together again in the same substep: then it is asked to part slowly.
+    /// Sets the bias, from where the last motions of its bodies begin.
     pub fn aim(&mut self, bodies: &[Moving], dt: f64) {
         let aside = self.gap_of_last_motion(bodies) - self.gap;
         self.bias = if self.gap < 0.0 {
             let push = (CORRECTION * (self.gap + SLOP) / dt).clamp(-CORRECTION_SPEED, 0.0);
-            (push + aside / dt).clamp(-CORRECTION_SPEED, 0.0)
+            push + aside / dt
         } else {
-            ((self.gap + aside) / dt).max(if aside == 0.0 { 0.0 } else { -PINNED_SPEED })
+            (self.gap + aside) / dt
         };
     }
 
@@ -173,14 +204,4 @@ pub(super) struct Change {
     pub impulse: f64,
     /// How fast it closed before, beyond what its gap allows `[m/s]`.
     pub closing: f64,
-}
-
-/// `matrix * vector`, which must be inlined in the innermost loop.
-#[inline(always)]
-pub(super) fn product(m: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
-    Vector3::new(
-        m.m11 * v.x + m.m12 * v.y + m.m13 * v.z,
-        m.m21 * v.x + m.m22 * v.y + m.m23 * v.z,
-        m.m31 * v.x + m.m32 * v.y + m.m33 * v.z,
-    )
 }

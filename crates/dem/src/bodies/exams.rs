@@ -6,7 +6,7 @@ use super::body::{Moving, RigidBody};
 use super::{Bodies, Step, Sweeps};
 use crate::wall::Walls;
 use crate::{GRAVITY, Material, Scene};
-use granulcal_scene::{GrainShape, Solid};
+use granulcal_scene::{Ends, GrainShape, Shape, Solid, Wall, WallMaterial};
 
 const DT: f64 = 1.0 / 2000.0;
 const SIZE: f64 = 4e-3;
@@ -227,6 +227,25 @@ fn no_energy_is_created_in_a_heap() {
         assert!(deepest < 0.1 * SIZE, "{deepest}");
         let lowest = exam.bodies.all.iter().map(|b| b.centre[2]).fold(f64::MAX, f64::min);
         assert!(lowest > 0.25 * SIZE, "{lowest}");
+    }
+}
+
+#[test]
+fn a_cube_lies_on_the_end_of_a_pipe() {
+    // It is wider than the pipe: no corner of it meets a wall, and no surface of the pipe its faces.
+    let (from, to) = ([0.0; 3], [0.0, 0.0, 0.01]);
+    let pipe = Shape::Cylinder { from, to, radius: 0.35 * SIZE, closed: Ends::None };
+    for aside in [0.0, 0.2 * SIZE] {
+        let mut exam = Exam::new(cube(), 0.5, 0.3);
+        let wall = Wall::fixed(pipe.clone(), WallMaterial::default());
+        exam.walls = Walls::of(&Scene { walls: vec![wall], ..Scene::drop(0.1) });
+        let turned = UnitQuaternion::from_euler_angles(0.1, 0.05, 0.3);
+        exam.put([aside, 0.0, 0.01 + 0.7 * SIZE], turned);
+        exam.run(1.0);
+        let (centre, velocity, omega) = exam.body(0);
+        assert!((centre.z - 0.01 - 0.5 * SIZE).abs() < 0.02 * SIZE, "{centre}");
+        let slow = velocity.norm() < 1e-3 && omega.norm() * SIZE < 2e-3;
+        assert!(slow, "{velocity} {omega}");
     }
 }
 

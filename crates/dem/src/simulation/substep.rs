@@ -75,10 +75,8 @@ impl Simulation {
         let (around, watch) = (&self.around, &mut self.watch);
         let (settings, radius) = (&around.settings, around.radius);
         let (dt, scale) = (settings.dt, radius / settings.dt);
-        let (asked, still) = match self.is_quiet {
-            true => (settings.quiet_sweeps, QUIET_SETTLED * around.gravity.norm() * dt),
-            false => (0, 0.0),
-        };
+        let quiet = (settings.quiet_sweeps, QUIET_SETTLED * around.gravity.norm() * dt);
+        let (asked, still) = if self.is_quiet { quiet } else { (0, 0.0) };
         let sweeps = Sweeps {
             least: settings.sweeps.max(asked),
             most: settings.max_sweeps,

@@ -88,6 +88,22 @@ impl Frustum {
         Self { from, axis, radius_from, generator, middle, reach, owns: [true; 2] }
     }
 
+    /// Unit, from its begin to its end.
+    pub fn axis(&self) -> &Vector3<f64> {
+        &self.axis
+    }
+
+    /// From its begin to its end, along the axis and away from it `[m]`.
+    pub fn generator(&self) -> &Vector2 {
+        &self.generator
+    }
+
+    /// Centres and radii of the circles at its begin and end `[m]`.
+    pub fn ends(&self) -> [(Vector3<f64>, f64); 2] {
+        [[0.0; 2], self.generator.into()]
+            .map(|[along, outward]| (self.from + along * self.axis, self.radius_from + outward))
+    }
+
     fn nearest(&self, centre: &Vector3<f64>) -> Nearest {
         let (near, share) = self.nearest_of_all(centre);
         let is_joined = (share <= 0.0 && !self.owns[0]) || (share >= 1.0 && !self.owns[1]);
@@ -149,8 +165,7 @@ pub(super) fn join_rims<'a>(surfaces: impl Iterator<Item = &'a mut Surface>) {
     let mut known: Vec<(Vector3<f64>, f64)> = Vec::new();
     for surface in surfaces {
         let Surface::Frustum(shell) = surface else { continue };
-        for (end, [along, outward]) in [[0.0; 2], shell.generator.into()].into_iter().enumerate() {
-            let rim = (shell.from + along * shell.axis, shell.radius_from + outward);
+        for (end, rim) in shell.ends().into_iter().enumerate() {
             let is_same = |(centre, radius): &(Vector3<f64>, f64)| {
                 (centre - rim.0).norm() + (radius - rim.1).abs() < SAME * rim.1
             };

@@ -163,6 +163,22 @@ impl Solid {
         }
     }
 
+    /// How far a point of its own axes is above the face that it is highest over, negative inside `[m]`; and that face's
+    /// outward unit normal.
+    pub fn height(&self, point: &Vector3<f64>) -> (f64, Vector3<f64>) {
+        let above =
+            self.faces.iter().map(|(normal, distance)| (normal.dot(point) - distance, *normal));
+        let round = self.round.map(|(radius, _)| {
+            let across = Vector3::new(point.x, 0.0, point.z);
+            let length = across.norm();
+            // On the axis every way out is as long as any other.
+            let outward = if length > 0.0 { across / length } else { Vector3::x() };
+            (length - radius, outward)
+        });
+        let first = (f64::NEG_INFINITY, Vector3::zeros());
+        above.chain(round).fold(first, |most, next| if next.0 > most.0 { next } else { most })
+    }
+
     /// Density-free energy of turning, `omega . I omega / 2 m`, from the angular momentum over the mass in the body's
     /// axes.
     pub fn turning_energy(&self, momentum: &Vector3<f64>) -> f64 {
@@ -260,6 +276,18 @@ mod tests {
         assert!(close(can.volume, std::f64::consts::PI * 4e-6 * 6e-3));
         assert!(close(can.inertia.y, 2e-6));
         assert!(close(can.inertia.x, 1e-6 + 3e-6));
+    }
+
+    #[test]
+    fn heights_are_those_over_the_faces() {
+        let can = of(GrainShape::Cylinder { aspect: 1.5 });
+        let (height, normal) = can.height(&Vector3::new(0.0, 2e-3, 1e-3));
+        assert!(close(height, -1e-3), "{height} {normal}");
+        let (height, normal) = can.height(&Vector3::new(0.0, 1e-3, 3e-3));
+        assert!(close(height, 1e-3) && normal == Vector3::z(), "{height} {normal}");
+        let brick = of(GrainShape::Box { aspect: [1.0, 2.0, 3.0] });
+        let (height, normal) = brick.height(&Vector3::new(1.9e-3, -3.9e-3, 5e-3));
+        assert!((height + 1e-4).abs() < 1e-12 && normal != Vector3::z(), "{height} {normal}");
     }
 
     #[test]

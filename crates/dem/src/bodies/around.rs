@@ -1,0 +1,35 @@
+//! What bodies are of, what is around them in a substep, and how far they look for each other.
+
+use super::body::Moving;
+use crate::wall::Walls;
+use granulcal_scene::{Material, Solid};
+
+/// Bodies look for each other at least so far, in their reach `[-]`.
+const LEAST_MARGIN: f64 = 0.02;
+
+/// What the bodies are of, and what is around them in a substep.
+pub(super) struct Around<'a> {
+    pub solid: &'a Solid,
+    pub walls: &'a Walls,
+    pub material: &'a Material,
+    pub dt: f64,
+}
+
+impl Around<'_> {
+    /// How far bodies look for each other at least `[m]`.
+    pub fn least(&self) -> f64 {
+        LEAST_MARGIN * self.solid.reach
+    }
+
+    /// How far the points of a body go in a substep relative to those of another, and a little more `[m]`.
+    pub fn range(&self, a: &Moving, b: Option<&Moving>) -> f64 {
+        let way = b.map_or_else(
+            || a.way(self.solid.reach, self.dt),
+            |b| {
+                let (apart, turning) = (a.velocity - b.velocity, a.omega.norm() + b.omega.norm());
+                self.dt * (apart.norm() + turning * self.solid.reach)
+            },
+        );
+        self.least() + way
+    }
+}
