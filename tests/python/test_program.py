@@ -13,6 +13,7 @@ import pytest
 
 import granulcal as gc
 from granulcal.cli import _guarded, _parser, _subparsers, main
+from granulcal.commands.counts import pour_count
 from granulcal.pours.pour_time import in_the_middle
 
 ALL = """
@@ -273,3 +274,25 @@ def test_what_is_not_installed_is_told_with_the_extra_that_brings_it(
 
     assert _guarded(absent) == 1
     assert f"pip install 'granulcal[{extra}]'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["calibrate", "drop", "default", "x.bag", "-o", "run", "--budget"],
+        ["close-loop", "loop.toml", "-o", "run", "--budget"],
+        ["report", "funnel", "x.bag", "-o", "x.html", "--seeds"],
+        ["report", "funnel", "x.bag", "-o", "x.html", "--draws"],
+        ["predict", "run", "--at", "funnel.height=0.1", "--pours"],
+        ["design", "rings", "funnel", "--pile", "0.04", "-o", "plan", "--pours"],
+        ["demo", "--out", "demo", "--pours"],
+    ],
+)
+def test_more_pours_than_anybody_waits_for_are_refused(
+    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*words, "2000000000"]) == 2
+    told = capsys.readouterr().err
+    assert "at most 100000 pours, got 2000000000" in told and "GRANULCAL_NO_LIMITS=1" in told
+    monkeypatch.setenv("GRANULCAL_NO_LIMITS", "1")
+    assert pour_count("2000000000") == 2000000000
