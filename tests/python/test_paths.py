@@ -25,6 +25,8 @@ FIRST = {
     "report": "report.html",
     "data_set": "manifest.toml",
 }
+# An ending of those kinds that have no other.
+ENDING = {"film": "gif", "messages": "bag"}
 
 
 def every_command() -> Iterator[tuple[tuple[str, ...], argparse.ArgumentParser]]:
@@ -115,7 +117,7 @@ def test_no_command_replaces_an_input_or_a_toml_of_another_kind(tmp_path, capsys
             folder = tmp_path / f"{'-'.join(words)}-{number}"
             folder.mkdir()
             first = FIRST.get(kind)
-            path = folder if first else folder / "mine.toml"
+            path = folder if first else folder / f"mine.{ENDING.get(kind, 'toml')}"
             victim = folder / first if first else path
             victim.write_text(TEXT)
             lines = [line(words, parser, {output.dest: path}, other)]

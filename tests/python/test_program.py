@@ -8,10 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import granulcal as gc
-from granulcal.cli import _parser, _subparsers, main
+from granulcal.cli import _guarded, _parser, _subparsers, main
+from granulcal.commands.counts import pour_count
 from granulcal.pours.pour_time import in_the_middle
 
 ALL = """
@@ -201,3 +203,96 @@ def test_a_study_says_how_long_its_archive_takes_and_others_are_refused(
         scene, prior, pours = module.poured(tmp_path)
         assert in_the_middle(scene, prior).get("grains.count") > 0
         assert pours >= 600
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["film", "funel", "-o", "x.gif"], "funnel"),
+        (["export", "scene", "funel", "--to", "lammps", "-o", "x"], "funnel"),
+        (["calibrate", "funel", "default", "x.bag", "-o", "run"], "funnel"),
+        (["init", "x", "--scene", "funel"], "funnel"),
+        (["model", "funel"], "funnel"),
+        (["simulate", "funel"], "funnel"),
+        (["generate", "drop", "defalt", "-o", "d"], "default"),
+        (["calibrate", "drop", "defalt", "x.bag", "-o", "run"], "default"),
+        (["export", "scene", "drop", "--to", "lamps", "-o", "x"], "lammps"),
+        (["reproduce", "papr"], "paper"),
+    ],
+)
+def test_a_misspelt_name_is_answered_with_the_one_that_was_meant(
+    words: list[str], meant: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x.bag").write_bytes(b"")
+    assert main(words) == 2
+    assert f"did you mean {meant}?" in capfd.readouterr().err
+
+
+def test_a_file_that_is_not_there_is_named_without_the_number_of_the_error(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.toml"
+    assert main(["film", str(path), "-o", str(tmp_path / "x.gif")]) == 2
+    assert capfd.readouterr().err == f"granulcal: {path}: cannot read: No such file or directory\n"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["export", "scene", "{}", "--to", "lammps", "-o", "out"],
+        ["export", "bed", "{}", "--to", "csv", "-o", "out.csv"],
+        ["film", "{}", "-o", "out.gif"],
+        ["calibrate", "{}", "default", "bag", "--camera", "bag/camera.toml", "-o", "run"],
+    ],
+)
+def test_a_scene_of_more_grains_than_there_is_room_for_is_refused(
+    words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    many = gc.Scene.drop(0.1).with_({"grains.count": 1e12})
+    (tmp_path / "many.toml").write_text(many.to_toml())
+    camera = gc.Camera.overhead(height=0.4, field_width=0.4, pixels=64)
+    grains = np.array([[0.01 * x, 0.01 * y, 0.004] for x in range(5) for y in range(5)])
+    camera.record(grains, np.full(len(grains), 0.004), tmp_path / "bag")
+    filled = [word.format("many.toml") for word in words]
+    assert main(filled) == 2
+    told = capfd.readouterr().err
+    assert "of memory, and" in told and "GRANULCAL_NO_LIMITS=1" in told, told
+    with pytest.raises(ValueError, match="of memory"):
+        many.start(0)
+
+
+@pytest.mark.parametrize(
+    ("module", "extra"), [("pyrealsense2", "realsense"), ("av", "film"), ("torch", "all")]
+)
+def test_what_is_not_installed_is_told_with_the_extra_that_brings_it(
+    module: str, extra: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def absent() -> int:
+        raise ModuleNotFoundError(f"No module named {module!r}", name=module)
+
+    assert _guarded(absent) == 1
+    assert f"pip install 'granulcal[{extra}]'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["calibrate", "drop", "default", "x.bag", "-o", "run", "--budget"],
+        ["close-loop", "loop.toml", "-o", "run", "--budget"],
+        ["report", "funnel", "x.bag", "-o", "x.html", "--seeds"],
+        ["report", "funnel", "x.bag", "-o", "x.html", "--draws"],
+        ["predict", "run", "--at", "funnel.height=0.1", "--pours"],
+        ["design", "rings", "funnel", "--pile", "0.04", "-o", "plan", "--pours"],
+        ["demo", "--out", "demo", "--pours"],
+    ],
+)
+def test_more_pours_than_anybody_waits_for_are_refused(
+    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*words, "2000000000"]) == 2
+    told = capsys.readouterr().err
+    assert "at most 100000 pours, got 2000000000" in told and "GRANULCAL_NO_LIMITS=1" in told
+    monkeypatch.setenv("GRANULCAL_NO_LIMITS", "1")
+    assert pour_count("2000000000") == 2000000000

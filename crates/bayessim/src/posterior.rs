@@ -3,6 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
+use granulcal_numbers::short;
 use rayon::prelude::*;
 
 use crate::average::{Average, Form};
@@ -67,7 +68,10 @@ impl fmt::Display for Warning {
         match self {
             Self::OutOfRange { pour, name, value, low, high } => write!(
                 f,
-                "pour {pour} is outside the training range: {name} = {value:.4e} (trained on {low:.4e} .. {high:.4e})"
+                "pour {pour} is outside the training range: {name} = {} (trained on {} .. {})",
+                short(*value),
+                short(*low),
+                short(*high)
             ),
             Self::MassOutsidePrior { pour, inside } => {
                 write!(f, "pour {pour}: only {inside:.2} of the network's mass is inside the prior")

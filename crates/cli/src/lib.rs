@@ -17,6 +17,7 @@ pub mod interrupt;
 mod outcome;
 mod program;
 mod progress;
+mod rows;
 mod run;
 mod scene;
 mod sides;

@@ -22,6 +22,8 @@ use crate::sides::SideFiles;
 const FUNNEL_HEIGHT: f64 = 0.12;
 /// Drop height of the built-in scene `[m]`.
 const DROP_HEIGHT: f64 = 0.1;
+/// How like a built-in word another must be to be meant for it: 1 for the same, 0 for no letter in its place.
+const NEAR: f64 = 0.6;
 
 /// The scene that the arguments describe.
 ///
@@ -70,8 +72,23 @@ pub fn named(name: &Path) -> anyhow::Result<Scene> {
     Ok(match name.to_str() {
         Some("funnel") => Scene::funnel(FUNNEL_HEIGHT),
         Some("drop") => Scene::drop(DROP_HEIGHT),
-        _ => load_scene(name)?,
+        _ => {
+            refuse_misspelt(name, "scene", &["funnel", "drop"])?;
+            load_scene(name)?
+        }
     })
+}
+
+/// Refuses a word that is no file, and nearly one of those that are built in.
+fn refuse_misspelt(name: &Path, what: &str, built_in: &[&str]) -> Result<(), BadArgument> {
+    let word = name.to_string_lossy();
+    let near = |known: &&&str| strsim::normalized_damerau_levenshtein(&word, known) >= NEAR;
+    match built_in.iter().find(near) {
+        Some(meant) if !name.exists() => Err(BadArgument(format!(
+            "{word:?} is no file and no built-in {what}; did you mean {meant}?"
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// The prior that an argument names.
@@ -81,7 +98,10 @@ pub fn named(name: &Path) -> anyhow::Result<Scene> {
 pub fn prior(path: &Path) -> anyhow::Result<Prior> {
     match path.to_str() {
         Some("default") => Ok(Prior::default()),
-        _ => load_prior(path).with_context(|| format!("reading {}", path.display())),
+        _ => {
+            refuse_misspelt(path, "prior", &["default"])?;
+            load_prior(path).with_context(|| format!("reading {}", path.display()))
+        }
     }
 }
 

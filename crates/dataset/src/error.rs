@@ -25,12 +25,14 @@ pub enum DatasetError {
     },
     /// A file of another kind stands where one is to be written.
     #[error(
-        "{} is left as it is: it is not {allowed}, which would replace it; choose another name, or move it away",
+        "{} is left as it is: it is {found}, and {allowed} would replace it; choose another name, or move it away",
         path.display()
     )]
     Replaces {
         /// The file that is there.
         path: PathBuf,
+        /// The kind of file that it is.
+        found: &'static str,
         /// The kind of file that was to be written.
         allowed: &'static str,
     },

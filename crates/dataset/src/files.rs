@@ -124,7 +124,8 @@ pub(crate) fn require_replaceable(
     if form.fits(&bytes) {
         return Ok(());
     }
-    Err(DatasetError::Replaces { path: target.to_owned(), allowed: form.name() })
+    let found = Form::found(&read_at_most(place, LARGEST_TEXT).unwrap_or(bytes));
+    Err(DatasetError::Replaces { path: target.to_owned(), found, allowed: form.name() })
 }
 
 /// The first bytes of a file, which tell its kind.
@@ -307,6 +308,7 @@ mod tests {
             Form::Pdf,
             Form::Svg,
             Form::Gif,
+            Form::Mp4,
             Form::Bag,
             Form::Export,
         ] {

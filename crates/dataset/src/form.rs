@@ -39,6 +39,8 @@ pub enum Form {
     Svg,
     /// A film of pictures.
     Gif,
+    /// A film.
+    Mp4,
     /// A ROS 1 recording.
     Bag,
     /// Input of another simulator, of many kinds: anything but TOML, which people write by hand.
@@ -65,6 +67,7 @@ impl Form {
             Self::Pdf => "a PDF",
             Self::Svg => "an SVG",
             Self::Gif => "a GIF",
+            Self::Mp4 => "an MP4",
             Self::Bag => "a ROS 1 recording",
             Self::Export => "a file of an export",
         }
@@ -77,6 +80,34 @@ impl Form {
             Self::SensorToml => str::from_utf8(bytes).is_ok_and(is_sensor),
             Self::Export => !str::from_utf8(bytes).is_ok_and(is_toml),
             other => other.begins(bytes),
+        }
+    }
+
+    /// What a file of these bytes is called in messages, as far as they tell it.
+    pub(crate) fn found(bytes: &[u8]) -> &'static str {
+        const TOLD_BY_BYTES: [Form; 13] = [
+            Form::Npy,
+            Form::Npz,
+            Form::Png,
+            Form::Mcap,
+            Form::Checkpoint,
+            Form::Parquet,
+            Form::Pdf,
+            Form::Gif,
+            Form::Mp4,
+            Form::Bag,
+            Form::Json,
+            Form::Html,
+            Form::Svg,
+        ];
+        if let Some(form) = TOLD_BY_BYTES.iter().find(|form| form.begins(bytes)) {
+            return form.name();
+        }
+        match str::from_utf8(bytes) {
+            Ok(text) if is_marked(text) => Form::CameraToml.name(),
+            Ok(text) if is_toml(text) => "TOML",
+            Ok(_) => "text of another kind",
+            Err(_) => "a file of another kind",
         }
     }
 
@@ -109,6 +140,8 @@ impl Form {
             Self::Pdf => head.starts_with(b"%PDF"),
             Self::Svg => text.starts_with("<?xml") || text.starts_with("<svg"),
             Self::Gif => head.starts_with(b"GIF8"),
+            // The length of the first box, four bytes, then its name.
+            Self::Mp4 => head.get(4..8) == Some(b"ftyp"),
             Self::Bag => head.starts_with(b"#ROSBAG"),
             Self::CameraToml | Self::SensorToml | Self::Export => false,
         }
@@ -128,6 +161,7 @@ impl Form {
             "pdf" => Self::Pdf,
             "svg" => Self::Svg,
             "gif" => Self::Gif,
+            "mp4" => Self::Mp4,
             "bag" => Self::Bag,
             "mcap" => Self::Mcap,
             _ => return None,

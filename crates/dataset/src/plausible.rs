@@ -5,7 +5,10 @@
 
 use granulcal_dem::Simulation;
 use granulcal_features::Formation;
+use granulcal_numbers::short;
 use granulcal_scene::{Prior, Scene};
+
+use crate::{DatasetError, Room};
 
 /// Factor on the height in which the grains start.
 const HEIGHT_MARGIN: f64 = 1.5;
@@ -35,21 +38,27 @@ pub struct Limits {
 
 impl Limits {
     /// Those of a scene whose parameters are drawn from `prior`; `None` for one that cannot begin.
-    pub fn of(scene: &Scene, prior: &Prior) -> Option<Self> {
+    ///
+    /// # Errors
+    /// [`DatasetError::NoRoom`] for one whose start alone would fill the memory.
+    pub fn of(scene: &Scene, prior: &Prior) -> Result<Option<Self>, DatasetError> {
         let ends = [0.0, 0.5, 1.0].map(|share| {
             let draw =
                 |p: &granulcal_scene::Parameter| p.distribution.quantile(share_inside(share));
             prior.parameters().iter().map(draw).collect::<Vec<f64>>()
         });
         let drawn = ends.iter().filter_map(|values| prior.apply(scene, values).ok());
-        let all: Vec<_> =
-            drawn.chain([scene.clone()]).filter_map(|scene| Self::of_one(&scene)).collect();
-        all.into_iter().reduce(|a, b| Self {
+        let mut all = Vec::new();
+        for scene in drawn.chain([scene.clone()]) {
+            Room::of_pour(&scene, None).require(None)?;
+            all.extend(Self::of_one(&scene));
+        }
+        Ok(all.into_iter().reduce(|a, b| Self {
             height: a.height.max(b.height),
             volume: a.volume.max(b.volume),
             extent: a.extent.max(b.extent),
             ground_sd: a.ground_sd.max(b.ground_sd),
-        })
+        }))
     }
 
     fn of_one(scene: &Scene) -> Option<Self> {
@@ -72,9 +81,9 @@ impl Limits {
         let mut found = Vec::new();
         let mut compare = |what: &str, unit: &str, value: f64, limit: f64| {
             if value.is_nan() || value > limit {
-                found.push(format!(
-                    "{what} is {value:.3} {unit}, in the scene at most {limit:.3} {unit}"
-                ));
+                let (value, limit) = (short(value), short(limit));
+                found
+                    .push(format!("{what} is {value} {unit}, in the scene at most {limit} {unit}"));
             }
         };
         let height = quantile(points().map(|p| p.z).collect(), HEIGHT_SHARE);

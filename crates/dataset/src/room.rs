@@ -6,6 +6,7 @@
 use std::fs;
 use std::path::Path;
 
+use granulcal_numbers::short;
 use granulcal_scene::Scene;
 
 use crate::DatasetError;
@@ -73,11 +74,8 @@ impl Room {
         }
         let refuse = |what, needed: f64, available: f64| {
             let in_words = |bytes: f64| {
-                if bytes < 1e9 {
-                    format!("{:.3} MB", bytes / 1e6)
-                } else {
-                    format!("{:.3e} GB", bytes / 1e9)
-                }
+                let (size, unit) = if bytes < 1e9 { (1e6, "MB") } else { (1e9, "GB") };
+                format!("{} {unit}", short(bytes / size))
             };
             let (needed, available) = (in_words(needed), in_words(available));
             Err(DatasetError::NoRoom { what, needed, available })
@@ -138,6 +136,7 @@ mod tests {
         let error = Room::of_pour(&many, None).require(None).unwrap_err();
         let message = error.to_string();
         assert!(message.contains("memory") && message.contains(UNLIMITED), "{message}");
+        assert!(message.contains("about 409600 GB of memory"), "{message}");
         assert!(error.is_bad_input());
         let fast = Room::of_pour(&scene, Some(1e12)).require(Some(&folder)).unwrap_err();
         assert!(fast.to_string().contains("disk"), "{fast}");

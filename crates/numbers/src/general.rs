@@ -4,6 +4,7 @@ use std::fmt;
 
 /// Digits that are shown.
 const DIGITS: usize = 10;
+const SHORT: usize = 4;
 
 /// A number as `%g` of C shows it, with ten digits: none that are idle, and an exponent where it is shorter.
 ///
@@ -16,6 +17,17 @@ const DIGITS: usize = 10;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct General(pub f64);
+
+/// The same of four digits, for what is estimated or measured.
+///
+/// ```
+/// assert_eq!(granulcal_numbers::short(2048.375).to_string(), "2048");
+/// assert_eq!(granulcal_numbers::short(0.0123456).to_string(), "0.01235");
+/// ```
+pub fn short(value: f64) -> General {
+    // What is no number has no digits.
+    General(format!("{value:.*e}", SHORT - 1).parse().unwrap_or(value))
+}
 
 impl fmt::Display for General {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

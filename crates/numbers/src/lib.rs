@@ -7,7 +7,7 @@ mod general;
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
-pub use general::General;
+pub use general::{General, short};
 
 /// Increment of SplitMix64.
 const GOLDEN_GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;

@@ -45,7 +45,9 @@ fn os_error(action: &str, path: &str, source: &io::Error) -> PyErr {
     match source.raw_os_error() {
         // Python turns (number, text, file) into FileNotFoundError, PermissionError and their kin.
         Some(number) => {
-            PyOSError::new_err((number, format!("cannot {action}: {source}"), path.to_owned()))
+            let text = source.to_string();
+            let text = text.strip_suffix(&format!(" (os error {number})")).unwrap_or(&text);
+            PyOSError::new_err((number, format!("cannot {action}: {text}"), path.to_owned()))
         }
         None => PyOSError::new_err(format!("cannot {action} {path}: {source}")),
     }

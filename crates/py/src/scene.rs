@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use granulcal_dataset::{Limits, Prior};
+use granulcal_dataset::{Limits, Prior, Room};
 use granulcal_dem as dem;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -61,7 +61,7 @@ impl Scene {
         let found = py.detach(|| {
             let mut settings = recording.inner.segmentation.clone();
             settings.ground_resolution = Some(self.inner.camera.ground_resolution());
-            let Some(limits) = Limits::of(&self.inner, &prior) else { return Ok(Vec::new()) };
+            let Some(limits) = Limits::of(&self.inner, &prior)? else { return Ok(Vec::new()) };
             let formation = recording.inner.formation_with(&settings);
             formation.map(|formation| limits.violations(&formation))
         });
@@ -105,6 +105,7 @@ impl Scene {
         py: Python<'py>,
         seed: u64,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+        Room::of_pour(&self.inner, None).require(None).map_err(error::dataset)?;
         let simulation = dem::Simulation::new(&self.inner, seed).map_err(error::dem)?;
         let positions = array::from_vectors(py, &simulation.positions())?;
         Ok((positions, PyArray1::from_slice(py, &simulation.radii())))

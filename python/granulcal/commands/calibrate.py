@@ -5,6 +5,7 @@ import json
 import sys
 from typing import Any
 
+from granulcal.commands.counts import pour_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
 from granulcal.commands.reading import (
@@ -30,7 +31,9 @@ def add(commands: Any) -> None:
     parser.add_argument("scene", type=READS, help="scene as TOML, or the word funnel")
     parser.add_argument("prior", type=READS, help="prior as TOML, or the word default")
     add_reading(parser)
-    parser.add_argument("--budget", type=int, default=100, help="pours in all (default: 100)")
+    parser.add_argument(
+        "--budget", type=pour_count, default=100, help="pours in all (default: 100)"
+    )
     parser.add_argument(
         "-o", "--out", type=writes("calibration"), required=True, help="folder; holds the pours"
     )

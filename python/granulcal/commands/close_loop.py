@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.cluster import add_cluster, cluster_of
+from granulcal.commands.counts import pour_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import KEPT, READS, writes
 from granulcal.progress import shown
@@ -60,7 +61,9 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--tolerances", type=READS, help="JSON of directions in which the statistics may be off"
     )
-    parser.add_argument("--budget", type=int, default=4000, help="pours, all told (default: 4000)")
+    parser.add_argument(
+        "--budget", type=pour_count, default=4000, help="pours, all told (default: 4000)"
+    )
     parser.add_argument(
         "--pairs",
         type=int,

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from granulcal.commands.counts import pour_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import writes
 from granulcal.progress import shown
@@ -25,7 +26,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--pours",
-        type=int,
+        type=pour_count,
         default=_POURS,
         help="pours to train on; fewer are faster and less sharp (default: %(default)s)",
     )

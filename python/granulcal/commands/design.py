@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from granulcal.commands.counts import pour_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import READS, writes
 
@@ -76,7 +77,9 @@ def _add_common(
         default=heights,
         help=f"heights of the funnel's tip in metres (default: {heights[0]:g} {heights[1]:g})",
     )
-    parser.add_argument("--pours", type=int, default=pours, help=f"how many (default: {pours})")
+    parser.add_argument(
+        "--pours", type=pour_count, default=pours, help=f"how many (default: {pours})"
+    )
     parser.add_argument(
         "-o", "--out", type=writes(kind), required=True, help="folder; holds the pours"
     )

@@ -31,7 +31,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("scene", type=READS, help="TOML, or the word funnel or drop")
     parser.add_argument(
-        "-o", "--out", type=writes("figure"), required=True, help="the film, .gif or .mp4"
+        "-o", "--out", type=writes("film"), required=True, help="the film, .gif or .mp4"
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of the pour (default: 0)")
     parser.add_argument("--fps", type=float, default=15.0, help="frames a second (default: 15)")

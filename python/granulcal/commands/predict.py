@@ -6,6 +6,7 @@ import os
 import sys
 from typing import TYPE_CHECKING, Any
 
+from granulcal.commands.counts import pour_count
 from granulcal.commands.dry_run import add_dry_run, say_seconds
 from granulcal.paths import READS
 from granulcal.progress import shown
@@ -65,7 +66,9 @@ def add(commands: Any) -> None:
         help="which model predicts (default: named, the verdict's)",
     )
     parser.add_argument("--level", type=float, default=0.9, help="of the interval (default: 0.9)")
-    parser.add_argument("--pours", type=int, default=20, help="simulated pours (default: 20)")
+    parser.add_argument(
+        "--pours", type=pour_count, default=20, help="simulated pours (default: 20)"
+    )
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="everything as JSON on stdout")

@@ -1,10 +1,11 @@
 """What the simulator's half must know of the other commands: for help, completions, suggestions."""
 
 import argparse
-import difflib
 import json
 import sys
 from typing import Any, NoReturn
+
+from granulcal.words import did_you_mean
 
 __all__ = ["Parser", "describe"]
 
@@ -26,10 +27,16 @@ class Parser(argparse.ArgumentParser):
             actions = self._of_words()._actions
             known = [word for action in actions for word in action.option_strings]
             for word in unknown.split():
-                near = difflib.get_close_matches(word.split("=")[0], known, n=1)
-                if near:
-                    message += f"; did you mean {near[0]}?"
+                message += did_you_mean(word.split("=")[0], known)
         super().error(message)
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuses a value that is none of its choices, and asks whether the nearest was meant."""
+        try:
+            super()._check_value(action, value)
+        except argparse.ArgumentError as error:
+            error.message += did_you_mean(str(value), map(str, action.choices or ()))
+            raise
 
     def _of_words(self) -> argparse.ArgumentParser:
         """The parser of the command, and of the command in it, that the words name."""

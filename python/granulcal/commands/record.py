@@ -27,7 +27,7 @@ def add(commands: Any) -> None:
         description=_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("out", type=writes("figure"), help=".bag or .mcap")
+    parser.add_argument("out", type=writes("messages"), help=".bag or .mcap")
     parser.add_argument("--frames", type=int, default=10, help="how many (default: 10)")
     parser.add_argument("--topic", help="depth topic of ROS 2, in place of a RealSense")
     parser.add_argument("--camera-topic", help="topic of its lens (default: camera_info beside it)")

@@ -5,6 +5,7 @@ import shlex
 import sys
 from typing import Any
 
+from granulcal.commands.counts import pour_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
 from granulcal.commands.reading import (
@@ -29,10 +30,10 @@ def add(commands: Any) -> None:
     parser = commands.add_parser("report", help=text, description=text)
     add_recordings(parser)
     parser.add_argument("-o", "--out", type=writes("html"), required=True, help="the HTML file")
-    parser.add_argument("--seeds", type=int, default=3, help="pours to compare (default: 3)")
+    parser.add_argument("--seeds", type=pour_count, default=3, help="pours to compare (default: 3)")
     parser.add_argument(
         "--draws",
-        type=int,
+        type=pour_count,
         default=8,
         help="pours at draws of the posterior, for the band of the profile (default: 8)",
     )

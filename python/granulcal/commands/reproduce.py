@@ -16,6 +16,7 @@ from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.paths import READS, writes
 from granulcal.pours.cluster import spread_over
 from granulcal.progress import shown
+from granulcal.words import did_you_mean
 
 if TYPE_CHECKING:
     from granulcal.experiments.paper.common.outcome import PouredSet
@@ -83,7 +84,8 @@ def _run(options: argparse.Namespace) -> int:
         _tell(options, studies=studies)
         return DONE
     if options.study not in studies:
-        raise ValueError(f"no study {options.study!r}; there are {', '.join(studies)}")
+        near = did_you_mean(options.study, studies)
+        raise ValueError(f"no study {options.study!r}; there are {', '.join(studies)}{near}")
     if options.study == "paper":
         return _reproduce_paper(options)
     for name in ("experiment", "quick", "report", "threads"):

@@ -3,13 +3,17 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from os import PathLike
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.words import did_you_mean
 
 __all__ = ["Material", "Scene"]
+
+_BUILT_IN = ("funnel", "drop")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +146,12 @@ class Scene:
             FileNotFoundError: neither the word nor a file.
             ValueError: the file is not a scene; the message names the key.
         """
-        return cls.built_in(str(name)) if str(name) in ("funnel", "drop") else cls.load(name)
+        if str(name) in _BUILT_IN:
+            return cls.built_in(str(name))
+        near = did_you_mean(str(name), _BUILT_IN)
+        if near and not Path(name).exists():
+            raise FileNotFoundError(f"{str(name)!r} is no file and no built-in scene{near}")
+        return cls.load(name)
 
     @classmethod
     def from_toml(cls, text: str) -> "Scene":

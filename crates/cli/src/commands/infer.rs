@@ -104,7 +104,10 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
     if let Some(name) = &args.scene {
         require_same(trained.as_ref(), &scene::named(name)?)?;
     }
-    let limits = trained.as_ref().and_then(|scene| Limits::of(scene, &model.prior));
+    let limits = match &trained {
+        Some(scene) => Limits::of(scene, &model.prior)?,
+        None => None,
+    };
     let ground_resolution = trained.map(|scene| scene.camera.ground_resolution());
     let (mut is_whole, mut impossible) = (true, Vec::new());
     let mut observed = Vec::with_capacity(args.recordings.len());

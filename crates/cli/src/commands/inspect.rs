@@ -16,6 +16,7 @@ use serde_json::{Map, Value, json};
 
 use crate::context::{print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
+use crate::rows::warn_of;
 use crate::run::{Run, Setting};
 pub use args::InspectArgs;
 
@@ -53,12 +54,12 @@ fn inspect(path: &Path, is_whole: &mut bool) -> anyhow::Result<Value> {
         return match Folder::open(path) {
             Ok(Folder::Frames(frames)) => Ok(recording::folder_facts(&frames, is_whole)),
             Ok(Folder::Messages(file)) => recording::facts(&file, is_whole),
-            Err(_) => Ok(dataset_facts(&Dataset::open(path)?)),
+            Err(_) => dataset_facts(path),
         };
     }
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     match ending.as_str() {
-        "parquet" => Ok(dataset_facts(&Dataset::open(path)?)),
+        "parquet" => dataset_facts(path),
         "toml" => toml_facts(path),
         "npy" => {
             let array = npy::read(path)?;
@@ -79,8 +80,10 @@ fn inspect(path: &Path, is_whole: &mut bool) -> anyhow::Result<Value> {
     }
 }
 
-fn dataset_facts(dataset: &Dataset) -> Value {
-    json!({
+fn dataset_facts(path: &Path) -> anyhow::Result<Value> {
+    let dataset = Dataset::open(path)?;
+    warn_of(&dataset);
+    Ok(json!({
         "kind": "data set",
         "rows": dataset.rows.len(),
         "missing": dataset.gaps(NAMED_GAPS),
@@ -93,7 +96,7 @@ fn dataset_facts(dataset: &Dataset) -> Value {
         "cpu_s": dataset.rows.iter().map(|row| row.cpu_s).sum::<f64>(),
         "scene": scene_facts(&dataset.header.scene),
         "prior": prior_facts(&dataset.header.prior),
-    })
+    }))
 }
 
 fn scene_facts(scene: &Scene) -> Value {

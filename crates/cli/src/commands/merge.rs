@@ -7,6 +7,7 @@ use serde_json::json;
 use crate::args::paths::{Reads, Writes, writes};
 use crate::context::{print_json, print_line};
 use crate::outcome::Outcome;
+use crate::rows::warn_of;
 use crate::run::{Run, Setting};
 
 /// How many missing rows are named.
@@ -41,16 +42,7 @@ impl Run for MergeArgs {
 
 fn run(args: &MergeArgs) -> anyhow::Result<Outcome> {
     let dataset = merge(&args.inputs.iter().map(|input| input.to_path_buf()).collect::<Vec<_>>())?;
-    if !dataset.unverified.is_empty() {
-        tracing::warn!(
-            "{} files of an earlier version have no hash of their rows, {} the first: damage in them cannot be found",
-            dataset.unverified.len(),
-            dataset.unverified[0].display()
-        );
-    }
-    if let Some(other) = dataset.header.other_law() {
-        tracing::warn!("the rows were {other}");
-    }
+    warn_of(&dataset);
     dataset.write(&args.out)?;
     let gaps = dataset.gaps(NAMED_GAPS);
     if !gaps.is_empty() {

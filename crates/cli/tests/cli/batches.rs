@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use granulcal_dataset::Dataset;
 
-use crate::place::{Place, json};
+use crate::place::{Place, json, text};
 use crate::tiny;
 
 fn rows(path: &Path) -> Dataset {
@@ -122,4 +122,19 @@ fn other_or_damaged_data_sets_are_named_and_left_alone() {
     place.refused(&["inspect", "foreign.parquet"], &["foreign.parquet"]);
     fs::write(place.at("d/manifest.toml"), "format = 1\n").unwrap();
     place.refused(&["inspect", "d"], &["manifest.toml"]);
+}
+
+#[test]
+fn rows_of_before_laws_had_numbers_are_told_by_who_looks() {
+    let place = Place::new();
+    let before = concat!(env!("CARGO_MANIFEST_DIR"), "/../dataset/tests/data/before_laws");
+    for words in [&["inspect", before, "--json"][..], &["merge", before, "-o", "all.parquet"]] {
+        let output = place.run(words);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        assert!(said.contains("before laws had numbers"), "{said}");
+    }
+    place.expect(0, &tiny(&["generate", "drop", "default", "-n", "1", "-o", "d"], &[]));
+    assert_eq!(text(&place.run(&["inspect", "d", "-q"]).stderr), "");
+    assert!(!text(&place.run(&["inspect", "d"]).stderr).contains("law"));
 }

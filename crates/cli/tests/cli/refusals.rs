@@ -29,6 +29,16 @@ fn bad_scenes_priors_and_options_are_named() {
     place.write("no-path.toml", prior.replace("restitution", "bounciness"));
 
     place.refused(&["simulate", "missing.toml"], &["missing.toml"]);
+    for words in [
+        &["simulate", "funel"][..],
+        &["render", "funel", "-o", "x.png"],
+        &["generate", "funel", "default", "-o", "d"],
+        &["scene", "funel"],
+        &["inspect", "funel", "--contact-problem", "x.npz", "--time", "0.1"],
+    ] {
+        place.refused(words, &["\"funel\"", "did you mean funnel?"]);
+    }
+    place.refused(&["generate", "drop", "defalt", "-o", "d"], &["did you mean default?"]);
     place.refused(&["simulate", "typo.toml"], &["typo.toml", "diametre", "diameter"]);
     place.refused(&["simulate", "negative.toml"], &["grains.diameter", "-0.004", "positive"]);
     place.refused(&["simulate", "truncated.toml"], &["truncated.toml"]);

@@ -13,8 +13,10 @@ pub enum Product {
     File(Form),
     /// A depth image with its camera's TOML beside it, or a height map: the ending says which.
     View,
-    /// A figure, a film or a recording; the ending says what kind, PNG if none.
+    /// A figure; the ending says what kind, PNG if none.
     Figure,
+    /// A file whose ending, one of these, says what kind it is.
+    Ending(&'static [(&'static str, Form)]),
     /// A file or a folder for another simulator.
     Export,
     /// A folder in which these files are written, and others that nobody else has.
@@ -73,13 +75,20 @@ impl Product {
     /// A folder with a report.
     pub const REPORT: Self = Self::Folder(&[("report.html", Form::Html)]);
 
+    /// A pour as pictures.
+    pub const FILM: Self = Self::Ending(&[("gif", Form::Gif), ("mp4", Form::Mp4)]);
+    /// What a camera at this computer records.
+    pub const MESSAGES: Self = Self::Ending(&[("bag", Form::Bag), ("mcap", Form::Mcap)]);
+
     /// A folder of which nothing is known.
     pub const FOLDER: Self = Self::Folder(&[]);
 
-    const WORDS: [(&'static str, Self); 15] = [
+    const WORDS: [(&'static str, Self); 17] = [
         ("json", Self::File(Form::Json)),
         ("html", Self::File(Form::Html)),
         ("figure", Self::Figure),
+        ("film", Self::FILM),
+        ("messages", Self::MESSAGES),
         ("folder", Self::FOLDER),
         ("array", Self::File(Form::Npy)),
         ("export", Self::Export),
@@ -109,6 +118,10 @@ impl Product {
                 let form = ending.and_then(|end| Form::of_ending(&end)).unwrap_or(Form::Png);
                 vec![(path.to_owned(), form)]
             }
+            Self::Ending(endings) => {
+                let form = ending_of(path, endings).into_iter();
+                form.map(|form| (path.to_owned(), form)).collect()
+            }
             Self::Export if path.is_dir() => Vec::new(),
             Self::Export => vec![(path.to_owned(), Form::Export)],
             Self::Folder(names) => {
@@ -128,6 +141,18 @@ impl Product {
         } else if let Err(error) = files::place_of(path) {
             return Some(error.to_string());
         }
+        if let Self::Ending(endings) = self
+            && ending_of(path, endings).is_none()
+        {
+            let allowed: Vec<_> = endings.iter().map(|(word, _)| format!(".{word}")).collect();
+            return Some(format!("{} must end in {}", path.display(), allowed.join(" or ")));
+        }
+        if self == Self::MESSAGES && fs::metadata(path).is_ok_and(|there| there.len() > 0) {
+            return Some(format!(
+                "{} is left as it is: what it records may not be had again; choose another name, or move it away",
+                path.display()
+            ));
+        }
         let there = |above: &&Path| above.exists() || above.as_os_str().is_empty();
         // Some are made with the folders above them: the lowest one that is there counts.
         let folder = match self {
@@ -135,7 +160,9 @@ impl Product {
                 .ancestors()
                 .skip(usize::from(!path.is_dir() && self == Self::Export))
                 .find(there),
-            Self::Figure | Self::File(Form::Html) => path.ancestors().skip(1).find(there),
+            Self::Figure | Self::Ending(_) | Self::File(Form::Html) => {
+                path.ancestors().skip(1).find(there)
+            }
             _ => path.parent(),
         };
         let folder =
@@ -157,6 +184,12 @@ impl Product {
     }
 }
 
+/// The kind of file that the ending of a path says, if it is one of these.
+fn ending_of(path: &Path, endings: &[(&str, Form)]) -> Option<Form> {
+    let ending = path.extension()?;
+    endings.iter().find(|(word, _)| ending.eq_ignore_ascii_case(word)).map(|(_, form)| *form)
+}
+
 impl FromStr for Product {
     type Err = DatasetError;
 
@@ -166,7 +199,7 @@ impl FromStr for Product {
         known.map(|(_, product)| *product).ok_or_else(|| DatasetError::Argument {
             what: "the kind of an output",
             got: format!("{word:?}"),
-            allowed: "json, html, figure, folder, export, model, plots, calibration, loop, rings, spill, recording, report \
+            allowed: "json, html, figure, film, messages, folder, export, model, plots, calibration, loop, rings, spill, recording, report \
                       or data_set",
         })
     }

@@ -115,6 +115,33 @@ fn a_place_that_cannot_be_written_is_named() {
     assert!(message.unwrap_err_text().contains("/proc"));
 }
 
+#[test]
+fn what_is_there_and_what_is_allowed_is_said() {
+    let place = tempfile::tempdir().unwrap();
+    let at = |name: &str| place.path().join(name);
+    fs::write(at("scene.toml"), "name = \"a\"\n").unwrap();
+    fs::write(at("pour.gif"), "{\"a\": 1}").unwrap();
+    fs::write(at("couscous.bag"), b"#ROSBAG V2.0\n").unwrap();
+    for (name, product, said) in [
+        ("scene.toml", Product::FILM, "must end in .gif or .mp4"),
+        ("scene.toml", Product::MESSAGES, "must end in .bag or .mcap"),
+        (
+            "scene.toml",
+            Product::File(Form::Npy),
+            "it is TOML, and an array (.npy) would replace it",
+        ),
+        ("scene.toml", Product::Figure, "it is TOML, and a PNG would replace it"),
+        ("pour.gif", Product::FILM, "it is JSON, and a GIF would replace it"),
+        ("couscous.bag", Product::MESSAGES, "may not be had again"),
+    ] {
+        let message = refusal(&[], &[(&at(name), product)]).unwrap_err_text();
+        assert!(message.contains(said), "{name}: {message}");
+    }
+    assert_eq!(refusal(&[], &[(&at("new.MP4"), Product::FILM)]), None);
+    fs::write(at("empty.bag"), b"").unwrap();
+    assert_eq!(refusal(&[], &[(&at("empty.bag"), Product::MESSAGES)]), None);
+}
+
 /// The refusal that must be there.
 trait Refused {
     fn unwrap_err_text(self) -> String;

@@ -52,6 +52,10 @@ fn output_at(command: &Command, argument: &Arg, folder: &Path) -> (PathBuf, Path
     match product {
         Product::Folder(files) => (folder.to_owned(), folder.join(files[0].0)),
         Product::View => (folder.join("mine.png"), folder.join("mine.toml")),
+        Product::Ending(endings) => {
+            let file = folder.join("mine").with_extension(endings[0].0);
+            (file.clone(), file)
+        }
         Product::File(_) | Product::Figure | Product::Export => {
             (folder.join("mine.toml"), folder.join("mine.toml"))
         }
