@@ -67,6 +67,7 @@ def test_recordings_of_other_shapes_are_refused(tmp_path):
         load(tmp_path)
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no pipes with names")
 def test_what_is_no_plain_file_is_refused(tmp_path):
     path = place(tmp_path)
     os.mkfifo(path)

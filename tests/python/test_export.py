@@ -132,6 +132,7 @@ def test_a_scene_is_a_folder_that_says_how_to_run_it(
     assert any(f"{x:.7g}"[:8] in text for text in files.values())
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_scene_replaces_nothing_but_files_of_its_kind(
     engine: str, scene: gc.Scene, tmp_path: Path

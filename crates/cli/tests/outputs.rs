@@ -50,6 +50,7 @@ fn a_path_that_cannot_be_written_is_named_before_the_pour() {
         let words = ["simulate", "scene.toml", option, "no/such/file.png", "--json"];
         place.refused(&words, &[option, "no/such", "make it first"]);
     }
+    #[cfg(unix)]
     place.refused(&["simulate", "scene.toml", "--positions", "/dev/null"], &["a device"]);
     place.refused(&["generate", "scene.toml", "default", "-o", "scene.toml"], &["a folder"]);
 }
