@@ -96,13 +96,11 @@ fn refuse_misspelt(name: &Path, what: &str, built_in: &[&str]) -> Result<(), Bad
 /// # Errors
 /// What is wrong with the file.
 pub fn prior(path: &Path) -> anyhow::Result<Prior> {
-    match path.to_str() {
-        Some("default") => Ok(Prior::default()),
-        _ => {
-            refuse_misspelt(path, "prior", &["default"])?;
-            load_prior(path).with_context(|| format!("reading {}", path.display()))
-        }
+    if path.to_str() == Some("default") {
+        return Ok(Prior::default());
     }
+    refuse_misspelt(path, "prior", &["default"])?;
+    load_prior(path).with_context(|| format!("reading {}", path.display()))
 }
 
 /// What is kept of a pour while it runs.

@@ -38,7 +38,7 @@ fn bad_scenes_priors_and_options_are_named() {
     ] {
         place.refused(words, &["\"funel\"", "did you mean funnel?"]);
     }
-    place.refused(&["generate", "drop", "defalt", "-o", "d"], &["did you mean default?"]);
+    place.refused(&["generate", "drop", "default2", "-o", "d"], &["did you mean default?"]);
     place.refused(&["simulate", "typo.toml"], &["typo.toml", "diametre", "diameter"]);
     place.refused(&["simulate", "negative.toml"], &["grains.diameter", "-0.004", "positive"]);
     place.refused(&["simulate", "truncated.toml"], &["truncated.toml"]);

@@ -61,7 +61,7 @@ FULL = Size(name="full")
 """The paper's counts, or more."""
 QUICK = Size(
     name="quick",
-    grains=200,
+    grains=120,
     pixels=576,
     downsample=3,
     training=120,
@@ -71,7 +71,7 @@ QUICK = Size(
     sequence=100,
     recordings=(3, 1),
     spills=24,
-    shapes=80,
+    shapes=60,
     subsets=False,
     fit=_SMALL_FIT,
 )
