@@ -34,7 +34,7 @@ class View(NamedTuple):
 
 VIEWS = {
     "funnel": View(at=0.45),
-    "drop": View(at=0.2),
+    "drop": View(at=0.16),
     "drum": View(),
     # 0.15 s after the tube is lifted, 1 s after the gate is drawn.
     "column": View(at=0.43),
