@@ -16,9 +16,18 @@ from matplotlib.collections import EllipseCollection
 
 
 def draw(
-    positions: NDArray[np.float64], diameter: float, out: str, *, from_above: bool, inches: float
+    positions: NDArray[np.float64],
+    diameter: float,
+    out: str,
+    *,
+    from_above: bool,
+    inches: float,
+    metadata: dict[str, str] | None = None,
 ) -> None:
-    """Draws centres, shape (n, 3) [m], as discs in the plane y = 0 or z = 0, the nearest last."""
+    """Draws centres, shape (n, 3) [m], as discs in the plane y = 0 or z = 0, the nearest last.
+
+    What `metadata` says is kept in the picture's file.
+    """
     if from_above:
         positions = positions[:, [0, 2, 1]] * [1, -1, 1]
     x, y, z = 1e3 * positions[np.argsort(positions[:, 1])[::-1]].T
@@ -42,7 +51,8 @@ def draw(
     margin = 1e3 * diameter
     axes.set_xlim(x.min() - margin, x.max() + margin)
     axes.set_ylim(z.min() - margin if from_above else min(0.0, z.min() - margin), z.max() + margin)
-    figure.savefig(out, dpi=80)
+    figure.savefig(out, dpi=80, metadata=metadata)
+    plt.close(figure)
 
 
 def main() -> None:

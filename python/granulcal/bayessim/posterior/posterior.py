@@ -246,9 +246,11 @@ class Posterior:
             return {name: columns[:, :, i] for i, name in enumerate(self.names)}
 
         found = split(self.sample(chains * each, seed))
-        return arviz.from_dict(
-            {"posterior": found, "prior": split(self.prior.sample(chains * each, seed))}
-        )
+        groups = {"posterior": found, "prior": split(self.prior.sample(chains * each, seed))}
+        # Before 1.0, which Python 3.11 has, groups are arguments by their names.
+        if int(arviz.__version__.split(".")[0]) < 1:
+            return arviz.from_dict(**groups)
+        return arviz.from_dict(groups)
 
     def _repr_html_(self) -> str:
         from granulcal.html import page, picture
