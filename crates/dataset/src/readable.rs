@@ -45,14 +45,15 @@ pub fn readable(text: &str) -> Cow<'_, str> {
 }
 
 /// What is wrong with the TOML of a `what` in the file at `path`. Of a file that is not called TOML no line is quoted:
-/// somebody's task may name a scene that is another user's file.
+/// somebody's task may name a scene that is another user's file. Of a link the name of the file counts that it leads to.
 pub(crate) fn toml_error(
     path: &Path,
     what: &'static str,
     text: &str,
     source: Box<toml::de::Error>,
 ) -> DatasetError {
-    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+    let named = path.canonicalize().unwrap_or_default();
+    if named.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
         return DatasetError::Toml { path: path.to_owned(), what, source };
     }
     let before = source.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
@@ -82,12 +83,39 @@ mod tests {
     }
 
     #[test]
+    fn nothing_is_quoted_of_what_is_no_recording() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.png");
+        for (content, found) in
+            [(&b"root:x:0:0:secret"[..], "text"), (b"\x00\xff\x01 secret", "bytes")]
+        {
+            std::fs::write(&path, content).unwrap();
+            let said = crate::Recording::open(&path, &crate::ReadOptions::default())
+                .unwrap_err()
+                .to_string();
+            assert!(
+                said.contains(found) && !said.contains("root") && !said.contains("secret"),
+                "{said}"
+            );
+        }
+    }
+
+    #[test]
     fn nothing_is_quoted_of_a_file_that_is_not_called_toml() {
         let folder = tempfile::tempdir().unwrap();
         let secret = "# users\nroot:x:0:0:secret:/root:/bin/sh\n";
-        for (name, is_quoted) in [("passwd", false), ("mine.toml", true), ("passwd.txt", false)] {
+        let files =
+            [("passwd", false), ("mine.toml", true), ("passwd.txt", false), ("link.toml", false)];
+        for (name, is_quoted) in files {
             let path = folder.path().join(name);
-            std::fs::write(&path, secret).unwrap();
+            if name == "link.toml" {
+                #[cfg(unix)]
+                std::os::unix::fs::symlink(folder.path().join("passwd"), &path).unwrap();
+                #[cfg(not(unix))]
+                continue;
+            } else {
+                std::fs::write(&path, secret).unwrap();
+            }
             let whole = |error: DatasetError| {
                 let mut text = error.to_string();
                 let mut cause: &dyn std::error::Error = &error;

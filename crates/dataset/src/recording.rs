@@ -294,14 +294,17 @@ impl Recording {
     }
 }
 
-/// A file that is no recording.
+/// A file that is no recording. Its bytes are not quoted: a link may lead to another user's file.
 fn other_content(path: &Path, first: &[u8]) -> DatasetError {
     let found = match first {
         [] => "an empty file".to_owned(),
         _ if first.starts_with(b"#ROSBAG V") => {
             format!("{:?}", String::from_utf8_lossy(first).trim())
         }
-        _ => format!("{:?}", String::from_utf8_lossy(first)),
+        _ if first.iter().all(|byte| matches!(byte, b'\t' | b'\n' | b'\r' | b' '..=b'~')) => {
+            "text".to_owned()
+        }
+        _ => "bytes of another kind".to_owned(),
     };
     let allowed = "a ROS 1 bag (#ROSBAG V2.0), MCAP, .npz or .png, or a folder of .png";
     DatasetError::content(path, "the first bytes of a recording", found, allowed)
