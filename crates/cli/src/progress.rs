@@ -31,7 +31,7 @@ impl RowProgress {
             ProgressDrawTarget::hidden()
         };
         let bar = ProgressBar::with_draw_target(None, target);
-        let template = "{bar:32} {pos}/{len} rows, {per_sec}, {eta} left {msg}";
+        let template = "{bar:32} {pos}/{len} rows, {msg}";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
@@ -45,8 +45,6 @@ impl RowProgress {
         let done = resumed + made;
         if self.bar.length() != Some(total) {
             self.bar.set_length(total);
-            self.bar.set_position(resumed);
-            self.bar.reset_eta();
         }
         self.bar.set_position(done);
         let counts =
@@ -56,25 +54,42 @@ impl RowProgress {
             .filter(|(count, _)| *count > 0)
             .map(|(count, what)| format!("{count} {what}"))
             .collect();
-        if !told.is_empty() {
-            self.bar.set_message(format!("({})", told.join(", ")));
-        }
+        let told = if told.is_empty() { String::new() } else { format!(" ({})", told.join(", ")) };
+        let pace = pace(total - done, made, self.started.elapsed());
+        self.bar.set_message(format!("{pace}{told}"));
         if self.lines && self.last_line.elapsed() >= PERIOD {
             self.last_line = Instant::now();
-            let rate = made as f64 / self.started.elapsed().as_secs_f64();
-            let left = if made > 0 {
-                let seconds = Duration::from_secs_f64((total - done) as f64 / rate);
-                format!("{} left", indicatif::HumanDuration(seconds))
-            } else {
-                "no row finished yet".to_owned()
-            };
-            note(&format!("{done}/{total} rows, {rate:.2}/s, {left}"));
+            note(&format!("{done}/{total} rows, {pace}"));
         }
     }
 
     /// Takes the bar away.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// Rows a second and the time that the missing ones take, by the mean of all rows that this run has `made`.
+///
+/// A row may take many seconds: what the last few of them took says little of the rest.
+fn pace(missing: u64, made: u64, elapsed: Duration) -> String {
+    let rate = made as f64 / elapsed.as_secs_f64();
+    let left = Duration::try_from_secs_f64(missing as f64 / rate);
+    match left {
+        Ok(left) if made > 0 => format!("{rate:.2}/s, {} left", in_words(left)),
+        _ => "no row finished yet".to_owned(),
+    }
+}
+
+/// A time in seconds, minutes or hours, as the commands in Python tell it.
+fn in_words(time: Duration) -> String {
+    let seconds = time.as_secs_f64().round();
+    if seconds >= 5400.0 {
+        return format!("{:.1} h", seconds / 3600.0);
+    }
+    match (seconds / 60.0).floor() {
+        0.0 => format!("{seconds} s"),
+        minutes => format!("{minutes} min {:02} s", seconds - 60.0 * minutes),
     }
 }
 
@@ -107,5 +122,29 @@ impl PourProgress {
     /// Takes the line away.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_by_the_mean_of_all_rows() {
+        let after = |seconds| pace(900, 100, Duration::from_secs(seconds));
+        assert_eq!(after(200), "0.50/s, 30 min 00 s left");
+        // A row that takes half a minute longer moves it by as much as it should.
+        assert_eq!(after(230), "0.43/s, 34 min 30 s left");
+        assert_eq!(pace(900, 0, Duration::from_secs(3)), "no row finished yet");
+        assert_eq!(pace(0, 5, Duration::from_secs(10)), "0.50/s, 0 s left");
+    }
+
+    #[test]
+    fn times_have_the_unit_that_fits() {
+        for (seconds, words) in
+            [(0.4, "0 s"), (59.6, "1 min 00 s"), (5399.0, "89 min 59 s"), (5400.0, "1.5 h")]
+        {
+            assert_eq!(in_words(Duration::from_secs_f64(seconds)), words);
+        }
     }
 }
