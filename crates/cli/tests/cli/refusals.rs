@@ -114,7 +114,8 @@ fn bad_recordings_are_named() {
     place.refused(&features("nothing", "camera.toml"), &["nothing", "no .png"]);
     place.write("map.npz", "PK\u{3}\u{4} but not really");
     place.refused(&["features", "map.npz"], &["map.npz"]);
-    place.refused(&["features", "camera.toml"], &["camera.toml", ".npz", "ROS 1 bag", "found text"]);
+    place
+        .refused(&["features", "camera.toml"], &["camera.toml", ".npz", "ROS 1 bag", "found text"]);
     place.write("bad.npy", b"\x93NUMPY\x01\x00");
     let render = tiny(&["render", "drop", "-o", "o.png", "--positions", "bad.npy"], &[]);
     place.refused(&render, &["bad.npy", "truncated"]);
