@@ -14,7 +14,7 @@ use crate::placement::Placement;
 use facets::Facets;
 use granulcal_scene::{BoxSide, Material, Motion, Scene, Shape, WallMaterial};
 pub(crate) use rim::Rim;
-pub(crate) use surface::Nearest;
+pub(crate) use surface::{Nearest, any_normal};
 use surface::{Surface, surfaces};
 
 /// A wall with its resolved material, and where it is if it moves.

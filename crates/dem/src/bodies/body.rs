@@ -62,8 +62,8 @@ pub(super) struct Moving {
     pub shift: Vector3<f64>,
     /// By how much they turn it more than its last angular velocity does `[rad]`.
     pub twist: Vector3<f64>,
-    /// When the last of them was, from the begin of the substep, if there was one `[s]`.
-    pub hit: Option<f64>,
+    /// When the last of them was, from the begin of the substep; 0 if there was none `[s]`.
+    pub hit: f64,
 }
 
 impl Moving {
@@ -78,7 +78,7 @@ impl Moving {
             inverse_inertia,
             shift: Vector3::zeros(),
             twist: Vector3::zeros(),
-            hit: None,
+            hit: 0.0,
         }
     }
 
@@ -107,7 +107,7 @@ impl Moving {
     pub fn was_hit(&mut self, time: f64, before: &Self) {
         self.shift += time * (before.velocity - self.velocity);
         self.twist += time * (before.omega - self.omega);
-        self.hit = Some(time);
+        self.hit = time;
     }
 
     /// Takes an impulse at `arm`.

@@ -141,10 +141,10 @@ impl Point {
         self.gap + self.normal.dot(&aside)
     }
 
-    /// When the later of the last impacts of its bodies was, if there was one `[s]`.
-    pub fn last_hit(&self, bodies: &[Moving]) -> Option<f64> {
-        let of_j = if self.j == WALL { None } else { bodies[self.j].hit };
-        bodies[self.i].hit.into_iter().chain(of_j).max_by(f64::total_cmp)
+    /// When the later of the last impacts of its bodies was, 0 if there was none `[s]`.
+    pub fn last_hit(&self, bodies: &[Moving]) -> f64 {
+        let of_j = if self.j == WALL { 0.0 } else { bodies[self.j].hit };
+        bodies[self.i].hit.max(of_j)
     }
 
     /// Velocity of i relative to j there `[m/s]`.

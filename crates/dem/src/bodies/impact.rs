@@ -70,7 +70,7 @@ fn manifolds(points: &[Point]) -> Vec<Range<usize>> {
 /// When the first of the points that are fast enough touches, if one does within the substep `[s]`; not before its
 /// bodies were hit the last time.
 fn first_touch(group: &[Point], bodies: &[Moving], dt: f64) -> Option<f64> {
-    let since = group[0].last_hit(bodies).unwrap_or(0.0);
+    let since = group[0].last_hit(bodies);
     let of = |point: &Point| {
         let closing = -point.normal.dot(&point.velocity(bodies));
         let time = (point.gap_of_last_motion(bodies) / closing).max(since);

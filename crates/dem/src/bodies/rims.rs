@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use super::around::Around;
 use super::body::Moving;
 use super::contact::{Point, WALL};
-use crate::wall::{Rim, Wall};
+use crate::wall::{Rim, Wall, any_normal};
 use granulcal_scene::Solid;
 
 /// Angles that are looked at within a part of the circle.
@@ -67,7 +67,7 @@ fn nearest(
     }
     // The first direction is towards the body; on the axis any is.
     let is_aside = from_axis > 1e-9 * rim.radius;
-    let first = if is_aside { across / from_axis } else { square_to(&rim.axis) };
+    let first = if is_aside { across / from_axis } else { any_normal(&rim.axis) };
     let frame = [first, rim.axis.cross(&first)];
     let into_body = body.turned.inverse() * wall.stated().inverse();
     let height = |angle: f64| solid.height(&(into_body * (rim.at(&frame, angle)[0] - centre)));
@@ -113,9 +113,4 @@ fn least(from: f64, to: f64, of: impl Fn(f64) -> f64) -> f64 {
     let place = 0.5 * (low + high);
     // Where it is level the first look stands.
     if of(place) < best.1 { place } else { best.0 }
-}
-
-fn square_to(axis: &Vector3<f64>) -> Vector3<f64> {
-    let other = if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
-    axis.cross(&other).normalize()
 }

@@ -5,10 +5,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use super::surface::Surface;
-
-/// How far apart two rims may be to be one, over their radius `[-]`.
-const SAME: f64 = 1e-9;
+use super::surface::{SAME, Surface, is_same_circle};
 
 /// A circle where surfaces of a wall end.
 #[derive(Clone, Debug)]
@@ -31,7 +28,7 @@ impl Rim {
                        radius: f64,
                        into: Vector2<f64>| {
             let is_same = |rim: &&mut Self| {
-                (rim.centre - centre).norm() + (rim.radius - radius).abs() < SAME * radius
+                is_same_circle(&(rim.centre, rim.radius), &(centre, radius))
                     && rim.axis.cross(&axis).norm() < SAME
             };
             match known.iter_mut().find(is_same) {

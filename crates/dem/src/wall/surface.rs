@@ -154,7 +154,8 @@ fn nearest_of_disc(
     Nearest { distance, normal: gap / distance, side: 0, bends: true }
 }
 
-fn any_normal(axis: &Vector3<f64>) -> Vector3<f64> {
+/// A unit vector at right angles to an axis.
+pub(crate) fn any_normal(axis: &Vector3<f64>) -> Vector3<f64> {
     let other = if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
     axis.cross(&other).normalize()
 }
@@ -166,17 +167,19 @@ pub(super) fn join_rims<'a>(surfaces: impl Iterator<Item = &'a mut Surface>) {
     for surface in surfaces {
         let Surface::Frustum(shell) = surface else { continue };
         for (end, rim) in shell.ends().into_iter().enumerate() {
-            let is_same = |(centre, radius): &(Vector3<f64>, f64)| {
-                (centre - rim.0).norm() + (radius - rim.1).abs() < SAME * rim.1
-            };
-            shell.owns[end] = !known.iter().any(is_same);
+            shell.owns[end] = !known.iter().any(|other| is_same_circle(other, &rim));
             known.push(rim);
         }
     }
 }
 
 /// How far apart two rims may be to be one, over their radius `[-]`.
-const SAME: f64 = 1e-9;
+pub(super) const SAME: f64 = 1e-9;
+
+/// Whether two circles about one axis, by their centres and radii, are one.
+pub(super) fn is_same_circle(known: &(Vector3<f64>, f64), other: &(Vector3<f64>, f64)) -> bool {
+    (known.0 - other.0).norm() + (known.1 - other.1).abs() < SAME * other.1
+}
 
 /// The surfaces of a shape, but for those of a mesh.
 pub(crate) fn surfaces(shape: &Shape) -> Vec<Surface> {
