@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from granulcal.measured.formation import Formation
 from granulcal.measured.recording import Recording
 from granulcal.pours.dataset import Dataset
 from granulcal.pours.forward import draws_of, pours_at, scene_at
@@ -92,6 +93,7 @@ def calibrate(
     notes: Sequence[str] = (),
     command: str = "",
     segmentation: Mapping[str, Any] | None = None,
+    diagnostics: Sequence[str] = (),
 ) -> Calibrated:
     """Infers the material of recordings, simulates it and writes the report.
 
@@ -111,6 +113,7 @@ def calibrate(
         command: command line that makes the page again.
         segmentation: options of `Recording.formation` for every recording; the down-sampling is
             matched to the scene's images unless they, or the camera's file, say otherwise.
+        diagnostics: names of the diagnostic statistics that the model was trained on after the 16.
 
     Raises:
         ValueError: no recording, another scene, or a pour without grains in view.
@@ -122,8 +125,9 @@ def calibrate(
     options |= segmentation or {}
     formations = [recording.formation(**options) for recording in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
-    posterior = model.posterior(observed)
-    misfit = model.misfit(observed)
+    known = np.hstack([observed, _diagnostics(formations, data.scene, diagnostics)])
+    posterior = model.posterior(known)
+    misfit = model.misfit(known)
     numbers = range(_FIRST_SEED, _FIRST_SEED + seeds)
     fitted = scene_at(data.scene, model.prior, posterior.mode())
     unfitted = scene_at(data.scene, model.prior, model.prior.mean())
@@ -155,6 +159,17 @@ def calibrate(
         report=page,
         misfit=misfit,
     )
+
+
+def _diagnostics(
+    formations: Sequence[Formation], scene: Scene, names: Sequence[str]
+) -> NDArray[np.float64]:
+    """Returns these diagnostic statistics of each formation, shape (k, len(names))."""
+    if not names:
+        return np.empty((len(formations), 0))
+    diameter = scene.get("grains.diameter")
+    found = [each.diagnostic_statistics(grain_diameter=diameter) for each in formations]
+    return np.array([[row[name] for name in names] for row in found])
 
 
 def _first_difference(trained: Scene, asked: Scene) -> str:

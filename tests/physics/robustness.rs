@@ -35,7 +35,7 @@ fn one_grain_comes_to_rest_where_it_fell() {
 /// One grain let go at `height` `[m]` above the ground, straight down.
 fn drop_one(height: f64) -> Pour {
     let mut scene = drop_of(1, height, Material::default());
-    scene.start = Start::Ball { height, solid_fraction: 0.6, jitter: 0.0 };
+    scene.start = Start::Ball { height, solid_fraction: 0.6, jitter: 0.0, turned: false };
     start(&scene).run()
 }
 
@@ -80,7 +80,7 @@ fn a_grain_that_starts_in_a_wall_is_unhealthy_and_finite() {
 #[test]
 fn grains_between_walls_that_leave_no_room_are_unhealthy_and_finite() {
     let mut scene = drop_of(30, 0.0, Material::default());
-    scene.start = Start::Ball { height: 0.0, solid_fraction: 0.6, jitter: 5e-5 };
+    scene.start = Start::Ball { height: 0.0, solid_fraction: 0.6, jitter: 5e-5, turned: false };
     let normal = [0.0, 0.0, -1.0];
     scene.walls.push(wall(Shape::Plane { point: [0.0, 0.0, 3e-3], normal }));
     scene.end.horizon = 0.2;

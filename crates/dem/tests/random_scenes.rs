@@ -55,7 +55,7 @@ fn begin() -> impl Strategy<Value = (usize, Start)> {
         });
     let ball =
         (count(), 0.0..100.0f64, log(1e-3, 0.74)).prop_map(|(count, height, solid_fraction)| {
-            (count, Start::Ball { height, solid_fraction, jitter: 0.0 })
+            (count, Start::Ball { height, solid_fraction, jitter: 0.0, turned: false })
         });
     // Anywhere: apart, overlapping, in one point, below the ground, far away.
     let extent = prop_oneof![Just(0.0), log(1e-3, 1e2), log(1e2, 1e6)];
@@ -218,8 +218,8 @@ fn scaled_start(start: Start, r: f64) -> Start {
                 base: r * base,
             }
         }
-        Start::Ball { height, solid_fraction, jitter } => {
-            Start::Ball { height: r * height, solid_fraction, jitter }
+        Start::Ball { height, solid_fraction, jitter, turned } => {
+            Start::Ball { height: r * height, solid_fraction, jitter, turned }
         }
         Start::Cylinder { from, to, radius, spacing, jitter } => Start::Cylinder {
             from: from.map(|c| r * c),

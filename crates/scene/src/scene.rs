@@ -119,7 +119,7 @@ impl Scene {
     pub fn drop(height: f64) -> Self {
         Self {
             name: "drop".to_owned(),
-            start: Start::Ball { height, solid_fraction: 0.6, jitter: 5e-5 },
+            start: Start::Ball { height, solid_fraction: 0.6, jitter: 5e-5, turned: false },
             funnel: None,
             ..Self::funnel(0.0)
         }

@@ -1,7 +1,7 @@
 //! Where the grains are when a pour begins.
 
 use granulcal_numbers::half_open;
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
@@ -39,6 +39,9 @@ pub enum Start {
         solid_fraction: f64,
         /// Half width of a uniform seeded displacement along each axis `[m]`.
         jitter: f64,
+        /// Whether the lattice has a random orientation, of the seed: along the axes it leaves heaps with four arms.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        turned: bool,
     },
     /// The inside of a cylinder, filled from its lowest point up on a cubic lattice along its axis: to settle in a
     /// tube, a drum or a hopper.
@@ -75,7 +78,7 @@ impl Start {
                     return Err(SceneError::StartTooSmall { kind: "grid", capacity, count });
                 }
             }
-            &Self::Ball { height, solid_fraction, jitter } => {
+            &Self::Ball { height, solid_fraction, jitter, .. } => {
                 non_negative("start.height", height)?;
                 if !(solid_fraction > 0.0 && solid_fraction <= CLOSEST_PACKING) {
                     let allowed = "in (0, 0.7404]";
@@ -132,6 +135,7 @@ impl Start {
         pose: Option<&Isometry3<f64>>,
         seed: u64,
     ) -> Vec<Vector3<f64>> {
+        let mut random = Pcg64::seed_from_u64(seed);
         let (mut positions, jitter) = match self {
             &Self::Grid { counts, spacing, jitter, base } => {
                 let floor = funnel.map_or(0.0, Funnel::rim_height);
@@ -143,9 +147,10 @@ impl Start {
                 }
                 (points, jitter)
             }
-            &Self::Ball { height, solid_fraction, jitter } => {
+            &Self::Ball { height, solid_fraction, jitter, turned } => {
                 let spacing = lattice_spacing(grains.diameter, solid_fraction);
-                (ball(grains, spacing, height + jitter), jitter)
+                let turn = turned.then(|| orientation(&mut random));
+                (ball(grains, spacing, height + jitter, turn), jitter)
             }
             &Self::Cylinder { from, to, radius, spacing, jitter } => {
                 let mut points = cylinder(grains, from, to, radius, spacing, jitter);
@@ -157,7 +162,6 @@ impl Start {
                 return positions.iter().map(|&position| Vector3::from(position)).collect();
             }
         };
-        let mut random = Pcg64::seed_from_u64(seed);
         for position in &mut positions {
             for axis in 0..3 {
                 position[axis] += jitter * (2.0 * half_open(random.next_u64()) - 1.0);
@@ -228,8 +232,27 @@ fn cylinder(
     points
 }
 
-/// The `count` lattice points nearest to the centre of a face-centred cubic lattice, lowest point at `height`.
-fn ball(grains: &Grains, spacing: f64, height: f64) -> Vec<Vector3<f64>> {
+/// A rotation, all equally likely (Marsaglia 1972: a point of the unit ball in four dimensions).
+///
+/// Square roots and no sines, so that it is the same to the last bit on every machine.
+fn orientation(random: &mut Pcg64) -> UnitQuaternion<f64> {
+    loop {
+        let mut coordinate = || 2.0 * half_open(random.next_u64()) - 1.0;
+        let point = Quaternion::new(coordinate(), coordinate(), coordinate(), coordinate());
+        if (0.01..=1.0).contains(&point.norm_squared()) {
+            return UnitQuaternion::new_normalize(point);
+        }
+    }
+}
+
+/// The `count` lattice points nearest to the centre of a face-centred cubic lattice, which may be turned, lowest point
+/// at `height`.
+fn ball(
+    grains: &Grains,
+    spacing: f64,
+    height: f64,
+    turn: Option<UnitQuaternion<f64>>,
+) -> Vec<Vector3<f64>> {
     let edge = spacing * std::f64::consts::SQRT_2;
     // Four points a cubic cell: this many cells each way hold twice the ball.
     let reach = (3.0 * grains.count as f64 / (8.0 * std::f64::consts::PI)).cbrt().ceil() as i64 + 1;
@@ -248,6 +271,11 @@ fn ball(grains: &Grains, spacing: f64, height: f64) -> Vec<Vector3<f64>> {
     // A stable sort: points at one distance keep the lattice's order on every machine.
     points.sort_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
     points.truncate(grains.count);
+    if let Some(turn) = turn {
+        for point in &mut points {
+            *point = turn * *point;
+        }
+    }
     let lowest = points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
     if lowest.is_finite() {
         let lift = height + grains.radius() - lowest;
@@ -293,6 +321,36 @@ mod tests {
         let extent = points.iter().map(|p| p.x.abs()).fold(0.0, f64::max);
         let expected = (2000.0f64 / 0.6).cbrt() * 0.002;
         assert!((extent + 0.002 - expected).abs() < 0.1 * expected, "{extent} {expected}");
+    }
+
+    #[test]
+    fn a_turned_ball_is_the_same_ball_in_another_orientation() {
+        let mut scene = Scene::drop(0.1);
+        scene.grains.count = 300;
+        let turned = |scene: &Scene, is_turned: bool, seed: u64| {
+            let mut scene = scene.clone();
+            scene.start =
+                Start::Ball { height: 0.1, solid_fraction: 0.6, jitter: 0.0, turned: is_turned };
+            scene.starting_positions(seed)
+        };
+        let (straight, once, again, other) = (
+            turned(&scene, false, 1),
+            turned(&scene, true, 1),
+            turned(&scene, true, 1),
+            turned(&scene, true, 2),
+        );
+        assert_eq!(once, again);
+        let between = |points: &[Vector3<f64>]| (points[0] - points[299]).norm();
+        for points in [&once, &other] {
+            assert!((between(points) - between(&straight)).abs() < 1e-12);
+            assert!((nearest_pair(points) - nearest_pair(&straight)).abs() < 1e-12);
+            let lowest = points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+            assert!((lowest - 0.002 - 0.1).abs() < 1e-12, "{lowest}");
+            assert!((points[0] - points[299] - (straight[0] - straight[299])).norm() > 1e-3);
+        }
+        assert!((once[0] - once[299] - (other[0] - other[299])).norm() > 1e-3);
+        // What is not turned says nothing of it in TOML.
+        assert!(!scene.to_toml().unwrap().contains("turned"));
     }
 
     #[test]

@@ -2,8 +2,9 @@
 
 The maps are the `compacted_*` files of the folder `granular-impact-kinect` (Viera-Lopez et al.,
 MIT). The sand is finer than 1 mm, so 2000 grains of 4 mm stand for the same volume; the height from
-which the ball of sand was let go and the width of the camera's point spread are unknown and
-inferred with the material.
+which the ball of sand was let go, the width of the camera's point spread, what holds clods together
+and how a bed of sand stops grains are unknown and inferred with the material, from the 16
+statistics and the three of `SHAPE`.
 """
 
 import json
@@ -48,7 +49,7 @@ SHAPE = ("patches", "roughness", "shoulder")
 
 _FOLDER = Path("granular-impact-kinect") / "data"
 _HERE = Path(__file__).parent
-_POURS = 600
+_POURS = 800
 _DEMO_POURS = 120
 _DEMO_MAP = "compacted_8"
 _SEED = 1
@@ -162,14 +163,12 @@ def reproduce(
     Raises:
         FileNotFoundError: there is no map.
     """
-    from granulcal.bayessim import BayesSim
-
     folder = maps_dir if data_dir is None or maps_dir is not None else data_dir / _FOLDER
     if folder is None:
         raise FileNotFoundError("neither a folder of maps nor the measured data were given")
     maps = maps_in(folder)
     data = _training_pours(out_dir, _POURS)
-    model = BayesSim.fit(data, seed=_SEED)
+    model = _trained(data)
     model.save(out_dir / "model")
     results, clouds = [], []
     for path in maps:
@@ -195,10 +194,8 @@ def poured(data: Path | None) -> tuple[Scene, Prior, int]:
 
 def demo(out_dir: Path, data_dir: Path) -> Calibrated:
     """Runs the line on one map with few pours; the report is `out_dir/report.html`."""
-    from granulcal.bayessim import BayesSim
-
     data = _training_pours(out_dir, _DEMO_POURS)
-    model = BayesSim.fit(data, seed=_SEED)
+    model = _trained(data)
     path = data_dir / _FOLDER / f"{_DEMO_MAP}.npz"
     calibrated = _calibrate_map(model, data, Recording.open(path), out_dir / "report.html")
     print(_row(_judge(path.stem, Recording.open(path), calibrated, model, data)))
@@ -225,6 +222,22 @@ def _training_pours(out_dir: Path, count: int) -> Dataset:
     return generate(scene, prior, count, seed=_SEED, out=out_dir / "pours")
 
 
+def _trained(data: Dataset) -> "BayesSim":
+    """Returns the model of the 16 statistics and of those that see clods."""
+    from granulcal.bayessim import BayesSim
+
+    columns = [data.diagnostic_names.index(name) for name in SHAPE]
+    return BayesSim.fit(
+        data.theta,
+        np.hstack([data.x, data.diagnostics[:, columns]]),
+        data.prior,
+        _SEED,
+        status=data.status.tolist(),
+        x_names=(*data.x_names, *SHAPE),
+        scene=data.scene_toml,
+    )
+
+
 def _calibrate_map(
     model: "BayesSim", data: Dataset, recording: Recording, report: Path
 ) -> Calibrated:
@@ -239,6 +252,7 @@ def _calibrate_map(
         notes=_NOTES,
         command="granulcal reproduce kinect_mounds",
         segmentation=_SEGMENTATION,
+        diagnostics=SHAPE,
     )
 
 
@@ -267,7 +281,7 @@ def _judge(
         mode_distance=distance(calibrated.pours),
         mean_distance=distance(at_mean),
         warnings=tuple(str(warning) for warning in posterior.warnings),
-        is_inside=model.misfit(observed).is_inside,
+        is_inside=calibrated.misfit.is_inside,
         measured=shape_of_map(recording, data.scene),
         simulated=np.array([shape_of_pour(pour) for pour in calibrated.pours]),
     )

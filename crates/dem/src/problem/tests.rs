@@ -88,7 +88,8 @@ fn a_resting_grain_is_carried_by_its_weight() {
     // One grain at rest on the ground: r_n = g dt, nothing else.
     let mut scene = Scene::drop(0.0);
     scene.grains.count = 1;
-    scene.start = crate::Start::Ball { height: 0.0, solid_fraction: 0.6, jitter: 0.0 };
+    scene.start =
+        crate::Start::Ball { height: 0.0, solid_fraction: 0.6, jitter: 0.0, turned: false };
     let problem = Simulation::new(&scene, 0).unwrap().contact_problem().unwrap();
     let contact = &problem.contacts[0];
     assert_eq!((problem.contacts.len(), contact.partner), (1, Partner::Wall(0)));
