@@ -76,7 +76,7 @@ impl Acting {
         self.effects.iter().fold(restitution, |e, effect| effect.restitution_at(e, speed))
     }
 
-    /// Lets act what does so with gravity, before contacts are looked at; returns the energy that it gives, per typical
+    /// Lets act what does so with gravity, before contacts are assembled; returns the energy that it gives, per typical
     /// mass `[m^2/s^2]`.
     pub fn act_with_gravity(&self, particles: &mut Particles, context: &EffectContext<'_>) -> f64 {
         self.effects.iter().map(|effect| effect.act_with_gravity(particles, context)).sum()
