@@ -29,7 +29,7 @@ use crate::particles::Particles;
 type Plugged = Arc<dyn Acts>;
 
 /// Every effect that acts in a substep, in the order in which they do: what makes it of a scene in which it is on.
-const ALL: [fn(&Scene) -> Option<Plugged>; 8] = [
+const ALL: &[fn(&Scene) -> Option<Plugged>] = &[
     tilt::of,
     drag::of,
     vibration::of,
