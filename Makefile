@@ -53,6 +53,7 @@ lint: $(VENV)/.deps ## format, lints, types, spelling, documentation, licences
 	cargo deny --workspace check bans licenses sources
 	$(MAKE) --no-print-directory advisories
 	$(PYTHON) scripts/walls/check.py
+	$(PYTHON) scripts/prose.py
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/pyright

@@ -15,7 +15,7 @@ import numpy as np
 from loop_pile import HIDDEN, PileLoopToy
 from numpy.typing import NDArray
 
-from granulcal.loop import Discrepancy, Observation, Surrogate
+from granulcal.loop import ConditionPours, Discrepancy, Surrogate
 from granulcal.loop.check.trivial import line_weights
 from granulcal.loop.effects.design import cube_from_normal
 from granulcal.loop.surrogate.baseline import Fit, fit_base
@@ -69,7 +69,7 @@ def one_set(toy: PileLoopToy, surrogate: Surrogate, seed: int, index: int, pours
 
     seen = [pour(theta, h, psi, pours, hidden) for h in FIT]
     stack = StackedMeans.of(
-        surrogate, [Observation.of("", [h], x) for h, x in zip(FIT, seen, strict=True)]
+        surrogate, [ConditionPours.of("", [h], x) for h, x in zip(FIT, seen, strict=True)]
     )
     local, fit = fit_base(surrogate, stack, index)
     found = cube_from_normal(fit.v)

@@ -25,7 +25,7 @@ from loop_study_table import table
 from numpy.typing import NDArray
 
 import granulcal as gc
-from granulcal.loop import Discrepancy, Observation, Surrogate, Thresholds, Trace, compare, trace
+from granulcal.loop import ConditionPours, Discrepancy, Surrogate, Thresholds, Trace, compare, trace
 from granulcal.loop.check.coverage import calibrate
 from granulcal.loop.effects.library import FUNNEL, LibraryEffect
 from granulcal.loop.pours.archive import Archive, ArchivePlan
@@ -102,7 +102,7 @@ def scene(is_small: bool) -> gc.Scene:
     if is_small:
         plain = gc.Scene.from_toml(text[: text.index("[camera.sensor]")])
         return plain.with_({"grains.count": 120, "camera.pixels": 200})
-    # Pixels of 1 mm, half as fine as blind's: a pour is looked at in a third of the time.
+    # Pixels of 1 mm, half as fine as blind's: a pour is examined in a third of the time.
     return gc.Scene.from_toml(text).with_({"camera.pixels": 320})
 
 
@@ -147,10 +147,10 @@ class Study:
         scene = self.plan.scene.with_({**values, "funnel.height": height})
         return self.forward.pours(scene, seeds, faults)
 
-    def observe(self, height: float, rows: Array) -> Observation:
+    def observe(self, height: float, rows: Array) -> ConditionPours:
         """The pours as the loop sees them."""
         low, high = HEIGHTS
-        return Observation.of(f"{100 * height:g} cm", [(height - low) / (high - low)], rows)
+        return ConditionPours.of(f"{100 * height:g} cm", [(height - low) / (high - low)], rows)
 
     def row(self, index: int, truth: Truth) -> dict[str, Any] | None:
         """Returns the row of one set; None if its pours jam."""
@@ -169,8 +169,12 @@ class Study:
             "effects": truth.effects,
             "strengths": truth.strengths,
             "delta": 0.0,
-            "p": found.gate.p,
-            "p_each": [found.gate.p_library, found.gate.p_any, found.gate.p_smooth],
+            "p": found.residual_test.p,
+            "p_each": [
+                found.residual_test.p_library,
+                found.residual_test.p_any,
+                found.residual_test.p_smooth,
+            ],
             "verdict": found.verdict.kind,
             "named": found.verdict.named,
             "families": found.verdict.families,
@@ -194,7 +198,7 @@ class Study:
             self._open(row, found, theta, psi, range(first + 100, first + 100 + MANY))
         return row
 
-    def _delta(self, found: Trace, fresh: list[Observation]) -> float:
+    def _delta(self, found: Trace, fresh: list[ConditionPours]) -> float:
         """Distance of fresh pours from the base fit, paper's statistics, noise taken out."""
         local, fit = found.local, found.base_fit
         stack = StackedMeans.of(self.surrogate, fresh)
@@ -223,7 +227,7 @@ class Study:
         row["kappa"] = None if np.isnan(kappa) else float(kappa)
         row["curve"] = np.round(model.curve[:, ::10], 3).tolist()
         singles = [one for one in found.explanations if len(one.effects) == 1]
-        first = names[candidates[int(found.gate.squares.argmax())]]
+        first = names[candidates[int(found.residual_test.squares.argmax())]]
         row["first"] = singles[0].effects[0] if singles else first
 
     def _widen(self, row: dict[str, Any], found: Trace, index: int) -> None:
@@ -233,7 +237,7 @@ class Study:
             return
         (name,) = best.effects
 
-        def pour(b: int, theta: Array, psi: float) -> list[Observation] | None:
+        def pour(b: int, theta: Array, psi: float) -> list[ConditionPours] | None:
             first = 500_000_000 + 100_000 * index + 100 * b
             sets = [
                 (h, self.pours(theta, h, {name: psi}, range(first, first + POURS))) for h in FIT

@@ -21,7 +21,7 @@ from loop_pile import HIDDEN, LIBRARY, PileLoopToy
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
-from granulcal.loop import Observation, Surrogate, Thresholds, compare, trace
+from granulcal.loop import ConditionPours, Surrogate, Thresholds, compare, trace
 from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.surrogate.baseline import fit_base
 from granulcal.loop.surrogate.stacked_means import StackedMeans
@@ -80,9 +80,9 @@ def one_set(toy: PileLoopToy, surrogate: Surrogate, archive: int, index: int) ->
         rows = np.tile(t, (count, 1)), np.full((count, 1), height), np.tile(p, (count, 1))
         return toy.simulate(*rows, generator, lacking)
 
-    observed = [Observation.of(f"{h:g}", [h], pour(theta, h, psi, POURS, hidden)) for h in FIT]
+    observed = [ConditionPours.of(f"{h:g}", [h], pour(theta, h, psi, POURS, hidden)) for h in FIT]
     found = trace(surrogate, observed, RULES, seed=index)
-    many = [Observation.of(f"{h:g}", [h], pour(theta, h, psi, MANY, hidden)) for h in FIT]
+    many = [ConditionPours.of(f"{h:g}", [h], pour(theta, h, psi, MANY, hidden)) for h in FIT]
     row: dict[str, Any] = {
         "index": index,
         "archive": archive,
@@ -90,15 +90,19 @@ def one_set(toy: PileLoopToy, surrogate: Surrogate, archive: int, index: int) ->
         "effects": truth.effects,
         "strengths": truth.strengths,
         "delta": _delta(surrogate, many),
-        "p": found.gate.p,
-        "p_each": [found.gate.p_library, found.gate.p_any, found.gate.p_smooth],
-        "adjusted": found.gate.adjusted.tolist(),
+        "p": found.residual_test.p,
+        "p_each": [
+            found.residual_test.p_library,
+            found.residual_test.p_any,
+            found.residual_test.p_smooth,
+        ],
+        "adjusted": found.residual_test.adjusted.tolist(),
         "verdict": found.verdict.kind,
         "named": found.verdict.named,
         "models": [
             [one.effects, one.log_probability, one.p_after] for one in found.explanations[:4]
         ],
-        "bartlett": found.gate.factors.tolist(),
+        "bartlett": found.residual_test.factors.tolist(),
         "theta": theta.tolist(),
         "theta_fit": found.base.theta.tolist(),
     }
@@ -109,13 +113,15 @@ def one_set(toy: PileLoopToy, surrogate: Surrogate, archive: int, index: int) ->
         model = fit_single(base[0], stack.means.ravel(), base[1], k, RULES)
         row["strength"] = [float(model.strengths[0]), *model.intervals[0].tolist()]
         best = [m for m in found.explanations if len(m.effects) == 1]
-        row["first"] = best[0].effects[0] if best else library[int(found.gate.squares.argmax())]
+        row["first"] = (
+            best[0].effects[0] if best else library[int(found.residual_test.squares.argmax())]
+        )
     if found.verdict.kind in ("EFFECT", "SET", "EFFECTS", "UNEXPLAINED"):
         row["removed"], row["fallback"] = _removed(toy, surrogate, found, pour, theta, psi, hidden)
     return row
 
 
-def _delta(surrogate: Surrogate, many: list[Observation]) -> float:
+def _delta(surrogate: Surrogate, many: list[ConditionPours]) -> float:
     """Distance that the best base fit leaves, paper's statistics, noise removed."""
     stack = StackedMeans.of(surrogate, many)
     local, fit = fit_base(surrogate, stack, 0)
@@ -155,10 +161,10 @@ def _removed(
     # The correction lives on the transformed scale.
     local = found.local
     stack = StackedMeans.of(
-        surrogate, [Observation.of("", [h], m) for h, m in zip(SEALED, measured, strict=True)]
+        surrogate, [ConditionPours.of("", [h], m) for h, m in zip(SEALED, measured, strict=True)]
     )
     base = StackedMeans.of(
-        surrogate, [Observation.of("", [h], m) for h, m in zip(SEALED, before, strict=True)]
+        surrogate, [ConditionPours.of("", [h], m) for h, m in zip(SEALED, before, strict=True)]
     )
     gp = Discrepancy.of(local, found.base_fit)
     gap = (stack.means - base.means) @ surrogate.from_axes

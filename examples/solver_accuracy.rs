@@ -52,7 +52,7 @@ const EXACT: &str = "accurate";
 
 type Key = (usize, &'static str, u64);
 
-/// Every scheme, from cheap to dear.
+/// Every scheme, from cheap to expensive.
 fn schemes() -> Vec<(&'static str, SolverSettings)> {
     let reference = SolverSettings {
         method: Method::Reference,

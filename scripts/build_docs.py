@@ -126,7 +126,7 @@ def rust() -> str:
         if table.get("lib", {}).get("crate-type") == ["cdylib"]:
             # Python's module: its page is that of Python.
             continue
-        # HTML: the pages are not there yet when the links of Markdown are looked at.
+        # HTML: the pages are not there yet when the links of Markdown are examined.
         place = f"rust/{name.replace('-', '_')}/index.html"
         lines.append(f'| <a href="{place}">{name}</a> | {package["description"]} |')
     return "\n".join([*lines, ""])

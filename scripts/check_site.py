@@ -3,7 +3,7 @@
     python scripts/check_site.py build/site
 
 mkdocs looks at links in Markdown; this looks at the pages as a browser gets them, so that
-generated pages and the links to Rust's documentation are looked at, too. Rust's own pages are left
+generated pages and the links to Rust's documentation are examined, too. Rust's own pages are left
 to rustdoc.
 """
 

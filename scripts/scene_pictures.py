@@ -25,7 +25,7 @@ import side_view  # noqa: E402
 
 
 class View(NamedTuple):
-    """When a scene is looked at [s], what of it is drawn [m], and from where."""
+    """When a scene is examined [s], what of it is drawn [m], and from where."""
 
     at: float | None = None
     within: float = np.inf

@@ -25,7 +25,7 @@ STEP = 0.2
 TORSION = 0.02
 """Torsional friction, the default of `granulcal.Material` [-]."""
 LOOK = 0.02
-"""Time between two looks at rest [s]."""
+"""Time between two checks of rest [s]."""
 SLOW = 0.01
 """Speed below which a sphere counts as resting [m/s]."""
 MAY_MOVE = 2

@@ -30,6 +30,41 @@ class Observed:
     diagnostics: np.ndarray
 
 
+def setup_of(table: dict, material: tuple[float, float, float], height: float, seed: int) -> Setup:
+    """Returns a pour of equal spheres in LAMMPS, started as in a scene's table.
+
+    Args:
+        table: the scene as TOML holds it.
+        material: mu_s, mu_r, e [-].
+        height: of the funnel's tip [m].
+        seed: of the jitter at the start.
+    """
+    grains, start = table["grains"], table["start"]
+    names = ("rim_radius", "stem_radius", "cone_length", "stem_length")
+    funnel = Funnel(height=height, **{name: table["funnel"][name] for name in names})
+    nx, ny, nz = start["counts"]
+    z, y, x = np.indices((nz, ny, nx)).reshape(3, -1)[:, : grains["count"]]
+    corner = np.array([-0.5 * (nx - 1), -0.5 * (ny - 1), 0.0]) * start["spacing"]
+    corner[2] = funnel.rim + start["base"]
+    jitter = np.random.default_rng(seed).uniform(-1.0, 1.0, (len(x), 3)) * start["jitter"]
+    sliding, rolling, restitution = material
+    law = Law(
+        sliding_friction=sliding,
+        rolling_friction=rolling,
+        restitution=restitution,
+        wall_rolling_friction=rolling,
+    )
+    return Setup(
+        centres=start["spacing"] * np.stack([x, y, z], axis=1) + corner + jitter,
+        radii=np.full(len(x), 0.5 * grains["diameter"]),
+        density=grains["density"],
+        grains=law,
+        ground=law,
+        walls=law,
+        funnel=funnel,
+    )
+
+
 @dataclass(frozen=True)
 class Bench:
     """The experiment: scene.toml, read once."""
@@ -61,29 +96,7 @@ class Bench:
             height: of the funnel's tip [m].
             seed: of the jitter at the start.
         """
-        grains, start = self.table["grains"], self.table["start"]
-        funnel = Funnel(**{**self.table["funnel"], "height": height})
-        nx, ny, nz = start["counts"]
-        z, y, x = np.indices((nz, ny, nx)).reshape(3, -1)[:, : grains["count"]]
-        corner = np.array([-0.5 * (nx - 1), -0.5 * (ny - 1), 0.0]) * start["spacing"]
-        corner[2] = funnel.rim + start["base"]
-        jitter = np.random.default_rng(seed).uniform(-1.0, 1.0, (len(x), 3)) * start["jitter"]
-        sliding, rolling, restitution = (float(value) for value in theta)
-        law = Law(
-            sliding_friction=sliding,
-            rolling_friction=rolling,
-            restitution=restitution,
-            wall_rolling_friction=rolling,
-        )
-        return Setup(
-            centres=start["spacing"] * np.stack([x, y, z], axis=1) + corner + jitter,
-            radii=np.full(len(x), 0.5 * grains["diameter"]),
-            density=grains["density"],
-            grains=law,
-            ground=law,
-            walls=law,
-            funnel=funnel,
-        )
+        return setup_of(self.table, tuple(map(float, theta)), height, seed)
 
     def pour(self, theta: np.ndarray, height: float, seed: int) -> gc.Pour:
         """Returns the same pour of granulcal, its default preset."""

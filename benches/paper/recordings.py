@@ -19,8 +19,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "blind"))
 import effects
-from engine import Funnel, Pile, Setup, pour
-from lammps_contact import Law
+from engine import Pile, Setup, pour
+from scene import setup_of
 
 import granulcal as gc
 
@@ -37,31 +37,7 @@ UNIT = 1e-5
 
 def setup(scene: gc.Scene, material: tuple[float, float, float], height: float, seed: int) -> Setup:
     """Returns a pour of equal spheres in LAMMPS, started as in the scene."""
-    table = tomllib.loads(scene.to_toml())
-    grains, start = table["grains"], table["start"]
-    names = ("rim_radius", "stem_radius", "cone_length", "stem_length")
-    funnel = Funnel(height=height, **{name: table["funnel"][name] for name in names})
-    nx, ny, nz = start["counts"]
-    z, y, x = np.indices((nz, ny, nx)).reshape(3, -1)[:, : grains["count"]]
-    corner = np.array([-0.5 * (nx - 1), -0.5 * (ny - 1), 0.0]) * start["spacing"]
-    corner[2] = funnel.rim + start["base"]
-    jitter = np.random.default_rng(seed).uniform(-1.0, 1.0, (len(x), 3)) * start["jitter"]
-    sliding, rolling, restitution = material
-    law = Law(
-        sliding_friction=sliding,
-        rolling_friction=rolling,
-        restitution=restitution,
-        wall_rolling_friction=rolling,
-    )
-    return Setup(
-        centres=start["spacing"] * np.stack([x, y, z], axis=1) + corner + jitter,
-        radii=np.full(len(x), 0.5 * grains["diameter"]),
-        density=grains["density"],
-        grains=law,
-        ground=law,
-        walls=law,
-        funnel=funnel,
-    )
+    return setup_of(tomllib.loads(scene.to_toml()), material, height, seed)
 
 
 def stored(pile: Pile, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -24,7 +24,7 @@ BAR = 5.0
 FEW = 20
 """A pour that leaves more grains than this in the funnel has jammed."""
 FLAT = 6.0
-"""A top below this is no pile: the grains roll until they are looked at [mm]."""
+"""A top below this is no pile: the grains roll until they are examined [mm]."""
 
 Piles = list[dict[str, float]]
 

@@ -148,7 +148,7 @@ def sbibm_priors(task: Any) -> tuple[Prior, Any]:
 
 
 def run_sbibm(options: argparse.Namespace, add: Callable[..., None], done: set[tuple]) -> None:
-    """C2ST against the reference posteriors: 0.5 cannot be told apart, 1 always can."""
+    """C2ST against the reference posteriors: 0.5 cannot be distinguished, 1 always can."""
     import sbibm
     from sbibm.metrics import c2st
 

@@ -24,7 +24,7 @@ FALL = 0.01
 GRAVITY = 9.81
 LANDED = math.sqrt(2.0 * FALL / GRAVITY)
 LOOK = 5e-4
-"""Time between two looks at the centre of mass [s]."""
+"""Time between two checks of the centre of mass [s]."""
 
 
 def heights(count: int) -> np.ndarray:

@@ -20,7 +20,7 @@ HERE = Path(__file__).parent
 RESULTS = HERE / "lammps.csv"
 
 LOOK = 0.01
-"""Time between two looks at rest and overlap [s]."""
+"""Time between two checks of rest and overlap [s]."""
 HORIZON = 3.0
 """When a pour ends at the latest [s]."""
 

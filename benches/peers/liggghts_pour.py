@@ -27,7 +27,7 @@ ROLLING = ("epsd", "epsd2")
 """LIGGGHTS' rolling friction with and without a dashpot beside the moment limit."""
 
 LOOK = 0.02
-"""Time between two looks at rest and overlap [s]."""
+"""Time between two checks of rest and overlap [s]."""
 HORIZON = 2.0
 """When a pour ends at the latest [s]."""
 MESH = Path(__file__).parents[2] / "examples/funnel.stl"

@@ -3,7 +3,7 @@
     python benches/peers/table.py --row P --seed 1
 
 LAMMPS is poured twice, at E = 1e8 Pa, where grains overlap by about 1 % of their diameter, and at
-1e7. `--young 1e7` leaves out the dear one.
+1e7. `--young 1e7` leaves out the expensive one.
 """
 
 import argparse

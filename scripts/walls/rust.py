@@ -1,7 +1,7 @@
 """Which file of a crate uses which: what it names, followed to where that is defined.
 
 A `mod` line alone is no arrow, nor is what is handed on and not used. What is compiled for tests
-alone is not looked at: a test may reach up.
+alone is not examined: a test may reach up.
 """
 
 import re

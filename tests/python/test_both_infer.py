@@ -78,6 +78,9 @@ def test_both_commands_print_and_write_the_same_json(model, recording, pours, tm
         said(capfd, code, [*words, "-o", str(tmp_path / f"{name}.json")], native=native)
     ours, theirs = (json.loads((tmp_path / f"{n}.json").read_text()) for n in ("ours", "theirs"))
     assert ours == theirs and len(ours.pop("samples")) == 1000 and ours == found
+    words += ["--samples", "7", "--seed", "3"]
+    ours, theirs = said(capfd, code, words), said(capfd, code, words, native=True)
+    assert ours == theirs and np.shape(ours["samples"]) == (7, len(found["parameters"]))
 
 
 def test_rust_says_what_python_says(model, recording, capfd):

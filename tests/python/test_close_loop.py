@@ -116,7 +116,7 @@ def test_a_tilted_table_is_found_named_and_removed(
     rows = [row["name"] for row in verdict["sealed_rows"]]
     assert rows == ["nearest condition", "straight line", "base + its own interpolated residual"]
     assert len(verdict["correction"]) == 3
-    assert "after a look at 24 random draws of tilt.y, EFFECT" in told
+    assert "after 24 random draws of tilt.y, EFFECT" in told
     assert "of 19 simulated pairs held" in told
     page = (out / "report.html").read_text()
     assert "What needs no physics, at the sealed conditions" in page

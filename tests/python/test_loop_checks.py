@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from granulcal.loop import Design, Effect, Observation, Surrogate, Thresholds, trace
+from granulcal.loop import ConditionPours, Design, Effect, Surrogate, Thresholds, trace
 from granulcal.loop.check.checks import calibrated
 from granulcal.loop.check.confirm import confirm
 from granulcal.loop.check.correction import Correction, corrections
@@ -45,10 +45,10 @@ class Linear:
         mean = (2 * u - 1) * self.slopes + (1 + c) * (psi * self.direction + alien * self.alien)
         return mean + 0.3 * generator.standard_normal((count, SIZE))
 
-    def observe(self, u: float, psi: float, seed: int, alien: float = 0.0) -> list[Observation]:
+    def observe(self, u: float, psi: float, seed: int, alien: float = 0.0) -> list[ConditionPours]:
         generator = np.random.default_rng(seed)
         return [
-            Observation.of(f"{c:g}", [c], self.pours(u, c, psi, 4, generator, alien))
+            ConditionPours.of(f"{c:g}", [c], self.pours(u, c, psi, 4, generator, alien))
             for c in PLACES
         ]
 
@@ -95,10 +95,10 @@ def test_pairs_stretch_an_interval_that_is_too_short(linear: Linear, surrogate: 
     assert found.verdict.kind == "EFFECT"
     model = found.model_of(found.best)
 
-    def honest(b: int, theta: Array, psi: float) -> list[Observation]:
+    def honest(b: int, theta: Array, psi: float) -> list[ConditionPours]:
         return linear.observe(float(theta[0]), psi, 100 + b)
 
-    def biased(b: int, theta: Array, psi: float) -> list[Observation]:
+    def biased(b: int, theta: Array, psi: float) -> list[ConditionPours]:
         # A simulator that does two standard deviations more than the surrogate knows of.
         return linear.observe(float(theta[0]), psi + 0.5 * width, 100 + b)
 
@@ -211,7 +211,7 @@ def test_the_tables_say_what_the_report_says(linear: Linear, surrogate: Surrogat
     assert len(left) == 3 * SIZE
     before, after = (sum(r[k] ** 2 for r in left) for k in ("before", "after"))
     assert after < 0.5 * before
-    # A gate that stayed shut has no refits, and the model before is the one after.
+    # A residual test that did not reject has no refits, and the model before is the one after.
     none = closed(linear, surrogate, 0.0)
     assert candidates(none)[0]["psi"] is None
     assert all(r["before"] == r["after"] for r in residuals(none))

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop import (
+    ConditionPours,
     Design,
     Discrepancy,
     Effect,
-    Observation,
     Surrogate,
     Thresholds,
     compare,
@@ -83,13 +83,13 @@ class Linear:
 
     def observe(
         self, theta: Array, psi: Array, seed: int, pours: int = 4, alien: float = 0.0
-    ) -> list[Observation]:
+    ) -> list[ConditionPours]:
         generator = np.random.default_rng([seed, 11])
         found = []
         for c in CONDITIONS:
             rows = np.tile(theta, (pours, 1)), np.full((pours, 1), c), np.tile(psi, (pours, 1))
             x = self.simulate(*rows, generator, alien)
-            found.append(Observation.of(f"c = {c:g}", [c], x))
+            found.append(ConditionPours.of(f"c = {c:g}", [c], x))
         return found
 
 
@@ -173,7 +173,7 @@ def test_constants_and_bad_rows_are_left_out_by_name(toy: Linear) -> None:
     found = Surrogate.fit(toy.design, theta, c, psi, x, features=4, names=[*"abcdefghi"])
     assert found.dropped == {"i": "constant"}
     assert (found.excluded, found.size) == (1, 8)
-    seen = Observation.of("here", [0.5], np.tile(np.append(x[6, :8], 4.0), (2, 1)))
+    seen = ConditionPours.of("here", [0.5], np.tile(np.append(x[6, :8], 4.0), (2, 1)))
     assert found.beyond([seen]) == ("i at here: 4, archive 3 to 3",)
 
 
@@ -184,9 +184,9 @@ def test_bad_input_says_what_would_do(toy: Linear, surrogate: Surrogate) -> None
     with pytest.raises(TrainingDataError, match="unit coordinates .0, 1., got 7"):
         Surrogate.fit(toy.design, 7 + 0 * theta, c, psi, x)
     with pytest.raises(ObservationError, match="8.*got .2, 3."):
-        StackedMeans.of(surrogate, [Observation.of("here", [0.5], np.zeros((2, 3)))])
+        StackedMeans.of(surrogate, [ConditionPours.of("here", [0.5], np.zeros((2, 3)))])
     with pytest.raises(ObservationError, match="within the archive's range"):
-        StackedMeans.of(surrogate, [Observation.of("here", [1.5], np.zeros((2, 8)))])
+        StackedMeans.of(surrogate, [ConditionPours.of("here", [1.5], np.zeros((2, 8)))])
 
 
 @pytest.mark.parametrize("pours", [4, 40])

@@ -199,7 +199,7 @@ def test_the_columns_are_read_by_their_outline_and_their_own_errors_have_no_name
     assert [path for path, _, _ in asked.inputs] == ["gravity.2", "observe.front.link"]
     assert asked.at_first().get("observe.front.link") == 1.5
     assert asked.places == ({"gravity.2": -9.81},)
-    # What might be poured next is where the archive is, looked at as the verdict is.
+    # What might be poured next is where the archive is, observed as the verdict is.
     ((label, at),) = _candidates(planned(asked, 996, 0, rounds=1, draws=48))
     assert label == "gravity.2 = -9.81" and at == pytest.approx([1.0, 0.375])
     (one, *_) = asked.under(asked.definitions[3], FIT)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from granulcal.loop import Design, Effect, Observation, Surrogate, Thresholds
+from granulcal.loop import ConditionPours, Design, Effect, Surrogate, Thresholds
 from granulcal.loop.check.recentre import recentre
 from granulcal.loop.effects.design import cube_from_normal
 from granulcal.loop.surrogate.baseline import fit_base
@@ -37,9 +37,9 @@ class Linear:
 
     def observe(
         self, u: float, psi: float, seed: int, count: int, alien: float = 0.0
-    ) -> Observation:
+    ) -> ConditionPours:
         strengths = np.tile([psi, 0.0], (count, 1))
-        return Observation.of(
+        return ConditionPours.of(
             "one", [], self.pours(np.full(count, u), strengths, seed, alien=alien)
         )
 
@@ -79,7 +79,7 @@ def test_fresh_pours_mend_a_strength_and_see_what_is_left(
         plain += low <= TRUTH <= high
         low, high = found.intervals[0]
         held += low <= TRUTH <= high
-        small += found.gate.p <= RULES.adequate
+        small += found.residual_test.p <= RULES.adequate
     if alien:
         # No strength of the first effect explains the alien.
         assert small >= 0.8 * SETS

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
-from granulcal.loop import Design, Effect, Observation, Surrogate, Thresholds, trace
+from granulcal.loop import ConditionPours, Design, Effect, Surrogate, Thresholds, trace
 from granulcal.loop.effects.resolution import Resolution
 from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.pours.forward import Coarse, Forward
@@ -50,13 +50,15 @@ def surrogate() -> Surrogate:
     return Surrogate.fit(DESIGN, theta, condition, psi, x, features=8)
 
 
-def observe(seed: int, *, size: float, tilt: float) -> list[Observation]:
+def observe(seed: int, *, size: float, tilt: float) -> list[ConditionPours]:
     generator = np.random.default_rng(seed)
     rows = []
     for c in (0.0, 0.5, 1.0):
         at = np.full((4, 1), c)
         psi = np.tile([size, tilt], (4, 1))
-        rows.append(Observation.of(f"{c:g}", [c], pours(np.full((4, 1), 0.4), at, psi, generator)))
+        rows.append(
+            ConditionPours.of(f"{c:g}", [c], pours(np.full((4, 1), 0.4), at, psi, generator))
+        )
     return rows
 
 
@@ -65,12 +67,12 @@ def test_real_grains_are_no_finding_and_the_archives_size_would_be(surrogate: Su
     alarms = 0
     for seed in range(8):
         found = trace(surrogate, observe(seed, size=HELD, tilt=0.0), RULES, seed=seed)
-        alarms += found.gate.p <= 0.05
+        alarms += found.residual_test.p <= 0.05
         assert found.base_fit.psi.tolist() == [HELD, 0.0]
         assert abs(float(found.base.theta[0]) - 0.4) < 0.25
     assert alarms <= 2
     # Read against the limit, pours of the archive's own size are something that is left.
-    assert trace(surrogate, observe(1, size=0.0, tilt=0.0), RULES).gate.p <= 0.05
+    assert trace(surrogate, observe(1, size=0.0, tilt=0.0), RULES).residual_test.p <= 0.05
 
 
 def test_an_effect_is_named_at_the_limit(surrogate: Surrogate) -> None:

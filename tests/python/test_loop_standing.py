@@ -11,7 +11,7 @@ import pytest
 from granulcal.cli import main
 from granulcal.errors import ObservationError
 from granulcal.loop import Design, Effect
-from granulcal.loop.check.prior_pours import Look, hypercube
+from granulcal.loop.check.prior_pours import PriorPours, hypercube
 from granulcal.loop.check.recentre import Recentred
 from granulcal.loop.check.standing import Moved, overturned, stand
 from granulcal.loop.check.trivial import LINE, NEAREST, RESIDUAL, Group, line_weights, trivial_rows
@@ -106,8 +106,8 @@ def test_a_wrong_surrogate_takes_every_word_away(before: Verdict) -> None:
 def test_what_its_own_pours_leave_takes_a_name_away() -> None:
     def own(p: float) -> Any:
         empty = np.empty(0)
-        gate = SimpleNamespace(p=p)
-        return Recentred(cast(Any, gate), empty, np.array([0.4]), np.array([[0.3, 0.5]]), 1.0)
+        test = SimpleNamespace(p=p)
+        return Recentred(cast(Any, test), empty, np.array([0.4]), np.array([[0.3, 0.5]]), 1.0)
 
     found = stand(EFFECT, RULES, confirmed=0.5, own=own(0.015))
     assert found.verdict.kind == "UNCONFIRMED" and not found.stands
@@ -117,7 +117,7 @@ def test_what_its_own_pours_leave_takes_a_name_away() -> None:
     said = found.to_dict()["own_pours"]
     assert said == {"p": 0.015, "strengths": [0.4], "intervals": [[0.3, 0.5]], "step": 1.0}
     assert stand(EFFECT, RULES, confirmed=0.5, own=own(0.03)).verdict is EFFECT
-    # NONE names nothing and has the gate's smaller level.
+    # NONE names nothing and has the residual test's smaller level.
     assert stand(NONE, RULES, confirmed=0.5, own=own(0.015)).verdict is NONE
     assert stand(NONE, RULES, confirmed=0.5, own=own(0.005)).verdict.kind == "UNCONFIRMED"
     unexplained = Verdict("UNEXPLAINED", (), (), 0.001, "")
@@ -203,7 +203,9 @@ def test_random_draws_fill_the_prior_and_the_best_come_first() -> None:
     drawn = hypercube(24, 3, seed=5)
     cells = np.sort((drawn * 24).astype(int), axis=0)
     assert np.array_equal(cells, np.tile(np.arange(24)[:, None], (1, 3)))
-    seen = Look(("tilt",), None, np.array([[0.5], [0.2]]), np.array([[0.3], [0.9]]), np.ones(2))
+    seen = PriorPours(
+        ("tilt",), None, np.array([[0.5], [0.2]]), np.array([[0.3], [0.9]]), np.ones(2)
+    )
     starts = seen.starts(Design(("a",), (), (Effect("drag"), Effect("tilt"))))
     assert [start.psi.tolist() for start in starts] == [[0.0, 0.3], [0.0, 0.9]]
     assert starts[0].v == pytest.approx([0.0]) and starts[1].v == pytest.approx([-0.8416], abs=1e-3)

@@ -80,7 +80,7 @@ def test_every_path_says_whether_it_is_read_or_written():
         if action.type is Path or (isinstance(action.default, Path) and not action.type)
     ]
     assert plain == []
-    # Texts that are no paths are known by name: a new one is to be looked at.
+    # Texts that are no paths are known by name: a new one is to be checked.
     texts = {
         action.dest
         for _, parser in every_command()
@@ -156,7 +156,7 @@ def test_a_recorded_camera_does_not_eat_the_measured_one(tmp_path):
 
 
 def test_folders_of_which_nothing_is_known_are_these():
-    """A new command with such a folder is to be looked at: what it writes must replace no input."""
+    """A new command with such a folder is to be checked: what it writes must replace no input."""
     folders = {
         words[0]
         for words, parser in every_command()

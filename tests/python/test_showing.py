@@ -1,4 +1,4 @@
-"""What is made to be looked at: films, notebooks' HTML, ArviZ."""
+"""What is made to be viewed: films, notebooks' HTML, ArviZ."""
 
 import json
 from pathlib import Path

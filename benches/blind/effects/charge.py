@@ -1,6 +1,6 @@
 """Equal charges on all grains, which repel each other; the ground is an insulator.
 
-F_ij = q^2 / (4 pi eps_0 r^2), q = strength pi d^2, over all pairs, looked at every 2 ms.
+F_ij = q^2 / (4 pi eps_0 r^2), q = strength pi d^2, over all pairs, sampled every 2 ms.
 """
 
 from dataclasses import replace

@@ -5,7 +5,7 @@ use std::fmt;
 use cpu_time::ThreadTime;
 use granulcal_dem::Scene;
 
-/// Time between two looks at rest and overlap `[s]`.
+/// Time between two checks of rest and overlap `[s]`.
 const LOOK: f64 = 0.01;
 /// Speed below which a grain counts as resting `[m/s]`.
 const SLOW: f64 = 0.01;

@@ -95,8 +95,8 @@ impl Importance {
         let sums = cumulative(self.weights.iter().copied());
         let is_poor = self.effective_sample_size() < FEWEST_EFFECTIVE;
         let best = 2.38 / (2.0 * coordinates.dimension() as f64).sqrt();
-        // All that is random is drawn first, so that threads may share the walks.
-        let walks: Vec<_> = (0..n)
+        // All that is random is drawn first, so that threads may share the chains.
+        let chains: Vec<_> = (0..n)
             .map(|_| MetropolisChain {
                 from: random.index(&sums),
                 steps: (0..if is_poor { MENDING_STEPS } else { STEPS })
@@ -108,10 +108,10 @@ impl Importance {
                     .collect(),
             })
             .collect();
-        let walk = |scratch: &mut Scratch, walk: &MetropolisChain| {
-            let mut draw = self.draws.row(walk.from).to_vec();
-            let mut height = self.heights[walk.from];
-            for step in &walk.steps {
+        let run = |scratch: &mut Scratch, chain: &MetropolisChain| {
+            let mut draw = self.draws.row(chain.from).to_vec();
+            let mut height = self.heights[chain.from];
+            for step in &chain.steps {
                 let [first, second] = step.between.map(|row| self.draws.row(row));
                 let along = first.iter().zip(second).map(|(a, b)| step.length * (a - b));
                 let tried: Vec<_> = draw.iter().zip(along).map(|(u, along)| u + along).collect();
@@ -125,7 +125,7 @@ impl Importance {
             }
             draw
         };
-        walks.par_iter().map_init(Scratch::default, walk).collect()
+        chains.par_iter().map_init(Scratch::default, run).collect()
     }
 
     /// The same density by a proposal that starts at these draws, and half at what may be known of the

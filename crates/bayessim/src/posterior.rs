@@ -1,4 +1,4 @@
-//! Belief about the free parameters after one or several pours.
+//! Distribution of the free parameters after one or several pours.
 
 use std::fmt;
 use std::sync::Arc;

@@ -122,7 +122,7 @@ mod tests {
                 if kind == TypeId::of::<PathBuf>() || kind == TypeId::of::<OsString>() {
                     found.push(format!("{} {}", command.get_name(), argument.get_id()));
                 }
-                // Texts that are no paths are known by name: a new one is to be looked at.
+                // Texts that are no paths are known by name: a new one is to be checked.
                 let is_text = kind == TypeId::of::<String>();
                 let texts =
                     ["topic", "camera_topic", "colour_topic", "view", "engine", "ray", "ray_store"];

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// How long a command has to end by itself.
 const GRACE: Duration = Duration::from_millis(800);
-/// Time between two looks whether a file is written.
+/// Time between two checks whether a file is written.
 const PATIENCE: Duration = Duration::from_millis(10);
 /// As shells report a process that SIGINT ended.
 const CODE: i32 = 130;

@@ -17,7 +17,7 @@ const READ_FROM_FOLDERS: [&str; 5] =
     ["manifest.toml", "model.json", "weights.safetensors", "training.parquet", "loop.toml"];
 /// Documents that name documents that name files: a task, its scene, the scene's mesh.
 const DEPTH: usize = 3;
-/// Entries of a folder that are looked at.
+/// Entries of a folder that are examined.
 const MOST_ENTRIES: usize = 100_000;
 
 /// How a path is read.

@@ -32,7 +32,7 @@ use crate::row::{Row, RowStatus};
 use crate::{DatasetError, Room, table};
 use chunk::OpenChunk;
 pub use chunk::Progress;
-use folder::{Folder, Plan};
+use folder::{Folder, Remaining};
 pub use gathered::GatheredBatch;
 use granulcal_scene::Prior;
 pub use options::{GenerateOptions, Shard};
@@ -95,7 +95,7 @@ pub fn generate_with(
     let threads = options.threads.min(most_threads());
     Room::of_batch(scene, options.rows, threads, options.chunk).require(Some(out))?;
     let folder = Folder::open(out, header, options)?;
-    let Plan { missing, open, progress } = folder.plan(options)?;
+    let Remaining { missing, open, progress } = folder.remaining(options)?;
     let queue = Mutex::new(Queue::new(missing, options, folder.chunk));
     let batch = Batch { rows: options.rows, folder: &folder, engine, chunks: open, progress };
     batch.run(options, &queue, threads, watch)

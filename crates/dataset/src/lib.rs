@@ -83,7 +83,7 @@ pub use input::ReadSeek;
 pub use mcap_file::{Filmed, record_pour};
 pub use message_file::{Damage, MessageFormat};
 pub use npz::{Npz, write_height_map};
-pub use observe::{Observation, TooFewGrains, View, look, look_from, observe, overhead};
+pub use observe::{Observation, TooFewGrains, View, capture, capture_from, observe, overhead};
 pub use observer::{
     Observed, ObservedStatistic, Observer, POLL_INTERVAL, Series, observed_statistics,
 };

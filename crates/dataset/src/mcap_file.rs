@@ -35,7 +35,7 @@ use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 use stamp::{WORLD, nanoseconds, timestamp};
 
 use crate::files::PendingFile;
-use crate::{DatasetError, Drawn, Form, Observer, VERSION, View, look, look_from};
+use crate::{DatasetError, Drawn, Form, Observer, VERSION, View, capture, capture_from};
 
 const CAMERA: &str = "camera";
 /// Bytes of one grain in `/grains`: x, y, z, radius.
@@ -137,11 +137,11 @@ impl<'a> Recorder<'a> {
         let (positions, radii) = (simulation.positions(), simulation.radii());
         let convex = simulation.convex();
         let drawn = Drawn { positions: &positions, radii: &radii, convex: convex.as_ref() };
-        let view = look(&scene.camera, &drawn, seed);
+        let view = capture(&scene.camera, &drawn, seed);
         let further: Vec<_> = scene
             .views
             .iter()
-            .map(|view| (format!("views/{}", view.name), look_from(view, &drawn)))
+            .map(|view| (format!("views/{}", view.name), capture_from(view, &drawn)))
             .collect();
         let shows_walls = !self.has_walls || walls::move_ever(scene);
         self.has_walls = true;

@@ -134,7 +134,7 @@ impl<'a> Npz<'a> {
 }
 
 /// Most entries that any end record in the last bytes of an archive claims: each costs memory before
-/// it is looked at.
+/// it is examined.
 fn claimed_entries(tail: &[u8]) -> usize {
     let records = tail.windows(12).filter(|bytes| bytes.starts_with(b"PK\x05\x06"));
     records.map(|bytes| usize::from(u16::from_le_bytes([bytes[10], bytes[11]]))).max().unwrap_or(0)

@@ -162,7 +162,11 @@ pub(crate) fn observe_grains(
 ///
 /// # Errors
 /// [`DatasetError::Features`] as [`observe`].
-pub fn look(camera: &CameraSpec, grains: &Drawn<'_>, pour_seed: u64) -> Result<View, DatasetError> {
+pub fn capture(
+    camera: &CameraSpec,
+    grains: &Drawn<'_>,
+    pour_seed: u64,
+) -> Result<View, DatasetError> {
     views(camera, grains, pour_seed).map(|(_, view)| view)
 }
 
@@ -171,7 +175,7 @@ pub fn look(camera: &CameraSpec, grains: &Drawn<'_>, pour_seed: u64) -> Result<V
 ///
 /// # Errors
 /// [`DatasetError::Features`] as [`observe`].
-pub fn look_from(view: &ViewSpec, grains: &Drawn<'_>) -> Result<View, DatasetError> {
+pub fn capture_from(view: &ViewSpec, grains: &Drawn<'_>) -> Result<View, DatasetError> {
     let [width, height] = view.pixels;
     let farthest = FARTHEST * view.distance();
     Camera::looking_at(view.eye.into(), view.target.into(), view.field_width, (width, height))

@@ -100,7 +100,7 @@ impl Observer {
             self.next = missed.max(0.0).ceil() as u64;
         }
         loop {
-            self.look(simulation);
+            self.sample(simulation);
             if simulation.ended().is_some() || simulation.time() + half >= end {
                 break;
             }
@@ -128,7 +128,7 @@ impl Observer {
     }
 
     /// Takes a sample if one is due, and one of the end.
-    fn look(&mut self, simulation: &Simulation) {
+    fn sample(&mut self, simulation: &Simulation) {
         let (time, half) = (simulation.time(), 0.5 * simulation.settings().dt);
         let is_due = time + half >= self.due();
         let is_last = simulation.ended().is_some() && time >= self.begin;

@@ -1,4 +1,4 @@
-//! Pictures of the steps of a segmentation, to be looked at.
+//! Pictures of the steps of a segmentation, to be viewed.
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};

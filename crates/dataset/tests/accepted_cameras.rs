@@ -1,6 +1,6 @@
 //! A camera that a scene accepts can take its image: what is refused is refused before the pour.
 
-use granulcal_dataset::{Drawn, look};
+use granulcal_dataset::{Drawn, capture};
 use granulcal_scene::{
     CameraSpec, DepthSensor, NoiseField, Projection, Scene, StereoSensor, TimeOfFlightSensor,
 };
@@ -60,7 +60,7 @@ fn every_accepted_camera_delivers() {
         for camera in cameras {
             let positions = [Vector3::new(0.0, 0.0, 2e-3)];
             let drawn = Drawn { positions: &positions, radii: &[2e-3], convex: None };
-            let delivered = look(&camera, &drawn, 3);
+            let delivered = capture(&camera, &drawn, 3);
             if is_accepted(&camera) {
                 assert!(delivered.is_ok(), "{camera:?}: {delivered:?}");
                 accepted += 1;

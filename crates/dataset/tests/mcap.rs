@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use foxglove::Decode;
 use foxglove::messages::{CameraCalibration, FrameTransform, PointCloud, RawImage};
 use granulcal_dataset::{
-    Drawn, Lost, Observer, ReadOptions, Recording, Source, Survey, View, look, look_from,
+    Drawn, Lost, Observer, ReadOptions, Recording, Source, Survey, View, capture, capture_from,
     record_pour,
 };
 use granulcal_dem::Simulation;
@@ -79,7 +79,7 @@ fn schemas_counts_stamps_and_bytes_are_those_of_the_pour() {
     let first = f32::from_le_bytes(cloud.data[..4].try_into().unwrap());
     assert_eq!(first, pour.positions[0].x as f32);
 
-    let View::Depth(camera, image) = look(&scene.camera, &Drawn::of(&pour), 4).unwrap() else {
+    let View::Depth(camera, image) = capture(&scene.camera, &Drawn::of(&pour), 4).unwrap() else {
         panic!("the scene has a pinhole camera");
     };
     let depth = RawImage::decode(last["/depth"].as_slice()).unwrap();
@@ -150,7 +150,7 @@ fn further_views_have_topics_of_their_own() {
     assert_eq!(frames.into_iter().collect::<Vec<_>>(), ["camera", "views/side"]);
     let depth = RawImage::decode(last["/views/side/depth"].as_slice()).unwrap();
     assert_eq!((depth.width, depth.height, &*depth.frame_id), (40, 20, "views/side"));
-    let seen = look_from(&scene.views[0], &Drawn::of(&pour)).unwrap();
+    let seen = capture_from(&scene.views[0], &Drawn::of(&pour)).unwrap();
     let View::Depth(_, image) = seen else { panic!("a view is a depth image") };
     let values: Vec<_> =
         depth.data.as_chunks::<4>().0.iter().map(|&raw| f32::from_le_bytes(raw)).collect();

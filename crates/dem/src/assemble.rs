@@ -1,6 +1,6 @@
 //! Assembly of one substep's contact problem: gaps, normals, biases, and which contacts are impacts.
 //!
-//! Reads places and velocities (gravity included), writes the batches.
+//! Reads spheres and velocities (gravity included), writes the batches.
 
 use crate::contact::{Batch, Candidate};
 use crate::contact_set::ContactSet;
@@ -40,8 +40,8 @@ widest! {
     ) -> Seen {
         let mut overlap = Reg::<W>::splat(0.0);
         for batch in batches {
-            let place = |body: u32| W::load_row(&particles.places[body as usize]);
-            let (i, j) = (each(&batch.i, place), each(&batch.j, place));
+            let sphere = |body: u32| W::load_row(&particles.spheres[body as usize]);
+            let (i, j) = (each(&batch.i, sphere), each(&batch.j, sphere));
             let (gap, distance) = pair_geometry::<W>(batch, i, j, particles.period.as_ref(), &mut overlap);
             let gap = empty_lanes_open(batch, gap);
             let velocity = |body: u32| W::load_row(&particles.bodies[body as usize].velocity);
@@ -109,13 +109,13 @@ widest! {
                 continue;
             }
             let at = |grains: &[u32; LANES]| -> [Row; LANES] {
-                std::array::from_fn(|lane| particles.place_at(grains[lane] as usize, clocks.0[lane]))
+                std::array::from_fn(|lane| particles.sphere_at(grains[lane] as usize, clocks.0[lane]))
             };
             let (i, j) = (at(&batch.i), at(&batch.j));
-            let place = |rows: &[Row; LANES]| each(&LANE_NUMBERS, |lane| W::load_row(&rows[lane as usize]));
+            let sphere = |rows: &[Row; LANES]| each(&LANE_NUMBERS, |lane| W::load_row(&rows[lane as usize]));
             let mut unseen = Reg::splat(0.0);
             let period = particles.period.as_ref();
-            let (gap, distance) = pair_geometry::<W>(batch, place(&i), place(&j), period, &mut unseen);
+            let (gap, distance) = pair_geometry::<W>(batch, sphere(&i), sphere(&j), period, &mut unseen);
             let velocity = |body: u32| W::load_row(&particles.bodies[body as usize].velocity);
             let dv = vectors::<W>(each(&batch.i, velocity)) - vectors(each(&batch.j, velocity));
             let w_n = Reg3::load(&batch.normal).dot(dv);
@@ -178,7 +178,7 @@ fn passing<W: Width>(distance: Reg<W>, dv: Reg3<W>, w_n: Reg<W>, dt: f64) -> Reg
     (Reg::splat(0.5 * dt) * across).over(distance.max(Reg::splat(COINCIDENT)))
 }
 
-/// Sets the normals and returns the gaps and distances of a batch of pairs whose grains are at these places.
+/// Sets the normals and returns the gaps and distances of a batch of pairs whose grains are these spheres.
 #[inline(always)]
 fn pair_geometry<W: Width>(
     batch: &mut Batch,

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `grain_shape` | what a scene states; corners, faces, volume and inertia of it |
 //! | `body` | place, turn, momentum; what an impulse does |
-//! | `around` | shape, walls and material in a substep; how far bodies look for each other |
+//! | `around` | shape, walls and material in a substep; how far bodies search for each other |
 //! | `collide` | points of contact |
 //! | `contact` | the law at a point |
 //! | `impact` | impacts, each at its time |
@@ -42,7 +42,7 @@ const KNOWN: f64 = 0.15;
 
 /// How often impacts are resolved in a substep and its points are swept, at most: after each time what is foreseen may
 /// add points.
-const LOOKS: usize = 3;
+const ROUNDS: usize = 3;
 
 /// When the sweeps over all points of a substep end: the rule of spheres (`solver/nsgs.rs`).
 #[derive(Clone, Copy, Debug)]
@@ -172,24 +172,24 @@ impl Bodies {
         let mut step = Step::default();
         let depths = contacts.points.iter().map(|point| -point.gap);
         step.deepest = depths.fold(0.0, f64::max);
-        for look in 0..LOOKS {
+        for round in 0..ROUNDS {
             contacts.points.iter_mut().for_each(|point| point.assemble(&moving));
             let (impacts, work) = impact::resolve(&mut contacts.points, &mut moving, dt);
             step.impacts += impacts;
             step.work_of_walls += work;
-            if look + 1 == LOOKS || !contacts.foresee(&around, &moving) {
+            if round + 1 == ROUNDS || !contacts.foresee(&around, &moving) {
                 break;
             }
         }
         self.recall(&mut contacts.points);
         contacts.points.iter().for_each(|point| point.give(&mut moving, &point.impulse));
-        for look in 0..LOOKS {
+        for round in 0..ROUNDS {
             for point in &mut contacts.points {
                 point.assemble(&moving);
                 point.aim(&moving, dt);
             }
             settle(&mut contacts.points, &mut moving, sweeps, &mut step);
-            if look + 1 == LOOKS || !contacts.foresee(&around, &moving) {
+            if round + 1 == ROUNDS || !contacts.foresee(&around, &moving) {
                 break;
             }
         }

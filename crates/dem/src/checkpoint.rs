@@ -59,7 +59,7 @@ impl CheckpointHeader {
         Self { version: VERSION.to_owned(), scene: scene.clone(), seed, settings, substep }
     }
 
-    /// Reads what a checkpoint is of; the whole of it is looked at, so that damage is found.
+    /// Reads what a checkpoint is of; the whole of it is read, so that damage is found.
     ///
     /// # Errors
     /// [`DemError::NotACheckpoint`], [`DemError::CheckpointLength`], [`DemError::CheckpointDamaged`],

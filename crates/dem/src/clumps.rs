@@ -80,14 +80,14 @@ impl Clumps {
     }
 
     /// Centre and radius of every sphere.
-    pub fn places(&self) -> Vec<Row> {
-        let mut places = Vec::with_capacity(self.bodies.len() * self.members());
+    pub fn spheres(&self) -> Vec<Row> {
+        let mut spheres = Vec::with_capacity(self.bodies.len() * self.members());
         for body in &self.bodies {
             let (centre, turned) = (Vector3::from(body.centre), body.turned());
-            let place = |offset| Row::new(&(centre + turned * offset), self.shape.radius);
-            places.extend(self.shape.offsets.iter().map(place));
+            let sphere = |offset| Row::new(&(centre + turned * offset), self.shape.radius);
+            spheres.extend(self.shape.offsets.iter().map(sphere));
         }
-        places
+        spheres
     }
 
     /// Inverse of the tensor of inertia in the scene's axes `[1/m^2]`.
@@ -148,7 +148,7 @@ impl Clumps {
             let omega = self.inverse_inertia(&turned) * momentum;
             for (member, offset) in self.shape.offsets.iter().enumerate() {
                 let (sphere, arm) = (number * members + member, turned * offset);
-                particles.places[sphere] = Row::new(&(centre + arm), self.shape.radius);
+                particles.spheres[sphere] = Row::new(&(centre + arm), self.shape.radius);
                 particles.bodies[sphere] = Body {
                     velocity: Row::new(&(velocity + omega.cross(&arm)), 0.0),
                     spin: Row::new(&(self.shape.radius * omega), 0.0),

@@ -61,7 +61,7 @@ pub(crate) struct LawLanes {
 pub(crate) struct WallLanes {
     /// Wall of each contact.
     pub wall: [u32; LANES],
-    /// Side of the wall's shell at the last look (see `wall::Nearest::side`).
+    /// Side of the wall's shell at the last search (see `wall::Nearest::side`).
     pub side: [i8; LANES],
     /// Whether the grain's centre has changed sides.
     pub went_through: [bool; LANES],

@@ -14,9 +14,9 @@ use crate::body::Body;
 use crate::contact::{Batch, ContactKey, ContactLaw, LawLanes, WallLanes};
 use crate::lanes::LANES;
 
-/// Colours that a grain's mask can tell apart; contacts beyond them get a batch of their own.
+/// Colours that a grain's mask can distinguish; contacts beyond them get a batch of their own.
 const COLOURS: usize = 63;
-/// Appended batches that are looked through for a free lane.
+/// Appended batches that are searched for a free lane.
 const APPEND_LOOK_BACK: usize = 8;
 
 /// What the second body of every contact of a set is.

@@ -70,7 +70,7 @@ impl Contacts {
         let mut gained = 0.0;
         for grain in 0..particles.count() {
             if let Some(shift) = period.shift(&particles.position(grain)) {
-                particles.places[grain].add(&shift);
+                particles.spheres[grain].add(&shift);
                 if let Some(path) = self.paths.get_mut(grain) {
                     path.from += shift;
                 }
@@ -117,7 +117,7 @@ impl Contacts {
         let dt = around.settings.dt;
         // `assemble` has counted the present substep already.
         let begin = (self.age - 1) as f64 * dt;
-        let end = particles.place_at(grain, dt).vector();
+        let end = particles.sphere_at(grain, dt).vector();
         if is_off(&(end - self.paths[grain].at(begin + dt)), around) {
             self.renew(grain, begin + time, particles, around);
         }

@@ -29,7 +29,7 @@ use crate::particles::Particles;
 type Plugged = Arc<dyn Acts>;
 
 /// Every effect that acts in a substep, in the order in which they do: what makes it of a scene in which it is on.
-const ALL: [fn(&Scene) -> Option<Plugged>; 8] = [
+const ALL: &[fn(&Scene) -> Option<Plugged>] = &[
     tilt::of,
     drag::of,
     vibration::of,
@@ -76,7 +76,7 @@ impl Acting {
         self.effects.iter().fold(restitution, |e, effect| effect.restitution_at(e, speed))
     }
 
-    /// Lets act what does so with gravity, before contacts are looked at; returns the energy that it gives, per typical
+    /// Lets act what does so with gravity, before contacts are assembled; returns the energy that it gives, per typical
     /// mass `[m^2/s^2]`.
     pub fn act_with_gravity(&self, particles: &mut Particles, context: &EffectContext<'_>) -> f64 {
         self.effects.iter().map(|effect| effect.act_with_gravity(particles, context)).sum()

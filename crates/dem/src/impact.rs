@@ -188,9 +188,9 @@ impl Impacts {
         let Some(surface) = (pair.partner as usize).checked_sub(particles.count()) else {
             return false;
         };
-        let place = particles.place_at(pair.i as usize, time);
-        let near = around.walls.nearest(surface, &place.vector(), time);
-        let (gap, radius) = (near.distance - place.0[3], place.0[3]);
+        let sphere = particles.sphere_at(pair.i as usize, time);
+        let near = around.walls.nearest(surface, &sphere.vector(), time);
+        let (gap, radius) = (near.distance - sphere.0[3], sphere.0[3]);
         let is_early = near.bends && gap > TOUCHES * radius;
         if is_early {
             self.foresee(pair, time, particles, around);
@@ -246,7 +246,7 @@ fn other_grain(pair: Candidate, particles: &Particles) -> Option<usize> {
 
 /// When two grains on their straight ways touch fast enough: the root of `|d + w tau| = r_i + r_j`.
 fn time_of_pair(i: usize, j: usize, now: f64, particles: &Particles) -> Option<f64> {
-    let (a, b) = (particles.place_at(i, now), particles.place_at(j, now));
+    let (a, b) = (particles.sphere_at(i, now), particles.sphere_at(j, now));
     let apart = particles.nearest(a.vector() - b.vector());
     let relative = particles.velocity(i) - particles.velocity(j);
     let touching = a.0[3] + b.0[3];
@@ -275,13 +275,13 @@ fn time_at_wall(
 ) -> Option<f64> {
     let (grain, dt) = (pair.i as usize, around.settings.dt);
     let surface = pair.partner as usize - particles.count();
-    let place = particles.place_at(grain, now);
-    let near = around.walls.nearest(surface, &place.vector(), now);
+    let sphere = particles.sphere_at(grain, now);
+    let near = around.walls.nearest(surface, &sphere.vector(), now);
     if near.distance.is_infinite() {
         return None;
     }
-    let gap = near.distance - place.0[3];
-    let touching = place.vector() - near.distance * near.normal;
+    let gap = near.distance - sphere.0[3];
+    let touching = sphere.vector() - near.distance * near.normal;
     let w_n = near
         .normal
         .dot(&(particles.velocity(grain) - around.walls.wall(surface).motion_at(&touching).0));

@@ -12,14 +12,14 @@ use crate::period::Period;
 /// Grains that a thread takes at once.
 const SHARE: usize = if cfg!(test) { 16 } else { 4096 };
 
-/// Grains as arrays. `places` and `bodies` have one entry more than there are grains: the resting body that
+/// Grains as arrays. `spheres` and `bodies` have one entry more than there are grains: the resting body that
 /// walls and empty lanes refer to. Where walls move, further bodies stand for them, one for each contact.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Particles {
     /// Centre and radius of each grain `[m]`.
-    pub places: Vec<Row>,
+    pub spheres: Vec<Row>,
     pub bodies: Vec<Body>,
-    /// How far into the substep each grain's place is `[s]`: the time of its last impact, else 0.
+    /// How far into the substep each grain's sphere is `[s]`: the time of its last impact, else 0.
     pub clocks: Vec<f64>,
     /// Mass of a typical grain over the grain's mass `[-]`; impulses are in units of that mass.
     pub inverse_mass: Vec<f64>,
@@ -32,11 +32,11 @@ pub(crate) struct Particles {
 
 impl Particles {
     /// Grains at rest, each with its centre and radius `[m]` and its inverse mass.
-    pub fn new(mut places: Vec<Row>, inverse_mass: Vec<f64>, period: Option<Period>) -> Self {
+    pub fn new(mut spheres: Vec<Row>, inverse_mass: Vec<f64>, period: Option<Period>) -> Self {
         let count = inverse_mass.len();
-        places.push(Row::default());
+        spheres.push(Row::default());
         Self {
-            places,
+            spheres,
             bodies: vec![Body::default(); count + 1],
             clocks: vec![0.0; count],
             inverse_mass,
@@ -51,13 +51,13 @@ impl Particles {
     /// What is wrong.
     pub fn check_like(&self, start: &Self) -> Result<(), &'static str> {
         let count = start.count();
-        let is_like = self.places.len() == count + 1
+        let is_like = self.spheres.len() == count + 1
             && self.bodies.len() > count
             && self.clocks == start.clocks
             && self.inverse_mass == start.inverse_mass
             && (self.left.is_empty() || self.left.len() == count)
-            && self.places.iter().zip(&start.places).all(|(a, b)| a.0[3] == b.0[3])
-            && self.places[count] == start.places[count]
+            && self.spheres.iter().zip(&start.spheres).all(|(a, b)| a.0[3] == b.0[3])
+            && self.spheres[count] == start.spheres[count]
             && self.bodies[count] == start.bodies[count];
         if is_like { Ok(()) } else { Err("grains that are not the scene's") }
     }
@@ -107,7 +107,7 @@ impl Particles {
     /// Centre of a grain `[m]`.
     #[inline]
     pub fn position(&self, grain: usize) -> Vector3<f64> {
-        self.places[grain].vector()
+        self.spheres[grain].vector()
     }
 
     /// The way between two places, or to the image of one that is nearer where space repeats `[m]`.
@@ -122,7 +122,7 @@ impl Particles {
     /// Radius of a grain `[m]`.
     #[inline]
     pub fn radius(&self, grain: usize) -> f64 {
-        self.places[grain].0[3]
+        self.spheres[grain].0[3]
     }
 
     #[inline]
@@ -202,26 +202,27 @@ impl Particles {
 
     /// Where a grain is at `time` `[s]` into the substep, and its radius.
     #[inline(always)]
-    pub fn place_at(&self, grain: usize, time: f64) -> Row {
-        let mut place = self.places[grain];
+    pub fn sphere_at(&self, grain: usize, time: f64) -> Row {
+        let mut sphere = self.spheres[grain];
         if grain < self.count() {
-            place.add(&((time - self.clocks[grain]) * self.velocity(grain)));
+            sphere.add(&((time - self.clocks[grain]) * self.velocity(grain)));
         }
-        place
+        sphere
     }
 
     /// Takes one grain to `time` `[s]` into the substep.
     pub fn advance(&mut self, grain: usize, time: f64) {
-        self.places[grain] = self.place_at(grain, time);
+        self.spheres[grain] = self.sphere_at(grain, time);
         self.clocks[grain] = time;
     }
 
     /// Takes every grain back to the begin of the substep, to where its present motion would have begun.
     pub fn rewind(&mut self) {
-        for ((place, body), clock) in self.places.iter_mut().zip(&self.bodies).zip(&mut self.clocks)
+        for ((sphere, body), clock) in
+            self.spheres.iter_mut().zip(&self.bodies).zip(&mut self.clocks)
         {
             if *clock != 0.0 {
-                place.add(&(-*clock * body.velocity.vector()));
+                sphere.add(&(-*clock * body.velocity.vector()));
                 *clock = 0.0;
             }
         }
@@ -230,8 +231,8 @@ impl Particles {
     /// x += v dt. Spheres need no orientation.
     pub fn move_on(&mut self, dt: f64) {
         let count = self.count();
-        for (place, body) in self.places[..count].iter_mut().zip(&self.bodies) {
-            place.add(&(dt * body.velocity.vector()));
+        for (sphere, body) in self.spheres[..count].iter_mut().zip(&self.bodies) {
+            sphere.add(&(dt * body.velocity.vector()));
         }
     }
 }
@@ -242,8 +243,8 @@ mod tests {
 
     /// Three grains of different size and mass, in motion.
     fn particles() -> Particles {
-        let places = [1e-3, 2e-3, 4e-3].map(|radius| Row([5.0 * radius, 0.0, 0.1, radius]));
-        let mut particles = Particles::new(places.to_vec(), vec![8.0, 1.0, 0.125], None);
+        let spheres = [1e-3, 2e-3, 4e-3].map(|radius| Row([5.0 * radius, 0.0, 0.1, radius]));
+        let mut particles = Particles::new(spheres.to_vec(), vec![8.0, 1.0, 0.125], None);
         for (i, body) in particles.bodies[..3].iter_mut().enumerate() {
             let i = i as f64;
             body.velocity = Row([1.0 + i, -2.0, 0.5 * i, 0.0]);

@@ -16,10 +16,10 @@ pub(crate) struct Placement {
     reach: (f64, f64),
 }
 
-/// Poses that are looked at for the bound of an interval.
+/// Poses that are tried for the bound of an interval.
 const SAMPLES: usize = 8;
-/// What the looks may miss: a swing's crest lies between two of them.
-const BETWEEN_LOOKS: f64 = 1.2;
+/// What the samples may miss: a swing's crest lies between two of them.
+const BETWEEN_SAMPLES: f64 = 1.2;
 
 impl Placement {
     /// A wall in motion, none for one that is still.
@@ -44,11 +44,11 @@ impl Placement {
     pub fn look_ahead(&mut self, time: f64, interval: f64) {
         let back = self.pose.inverse();
         self.reach = (0.0, 0.0);
-        for look in 1..=SAMPLES {
-            let share = look as f64 / SAMPLES as f64;
+        for sample in 1..=SAMPLES {
+            let share = sample as f64 / SAMPLES as f64;
             let moved = self.motion.pose(time + share * interval) * back;
-            self.reach.0 = self.reach.0.max(BETWEEN_LOOKS * moved.translation.vector.norm());
-            self.reach.1 = self.reach.1.max(BETWEEN_LOOKS * moved.rotation.angle());
+            self.reach.0 = self.reach.0.max(BETWEEN_SAMPLES * moved.translation.vector.norm());
+            self.reach.1 = self.reach.1.max(BETWEEN_SAMPLES * moved.rotation.angle());
         }
     }
 

@@ -15,7 +15,7 @@ use crate::particles::Particles;
 /// Residual at which a solution counts as converged, over the fastest velocity or impulse `[-]`: some
 /// fifty roundings.
 const CONVERGED: f64 = 1e-14;
-/// Sweeps between two looks at the residual, and sweeps at most.
+/// Sweeps between two evaluations of the residual, and sweeps at most.
 pub(crate) const SWEEPS_A_LOOK: usize = 256;
 const MAX_SWEEPS: usize = 1 << 20;
 

@@ -302,8 +302,8 @@ proptest! {
         let lift = gravity.norm() * scene.grains.radius() + scene.end.kinetic_energy;
         let scale = lowest.max(scene.grains.count as f64 * lift);
         let mut resumed = None;
-        let looks = (scene.end.horizon / settings.dt / settings.list_period as f64) as usize + 20;
-        for _ in 0..looks {
+        let searches = (scene.end.horizon / settings.dt / settings.list_period as f64) as usize + 20;
+        for _ in 0..searches {
             simulation.advance(settings.list_period as f64 * settings.dt);
             let now = energy(&simulation, gravity);
             created = created.max(now - lowest);
@@ -313,7 +313,7 @@ proptest! {
                 resumed = Some(Simulation::new(&scene, 1).unwrap().resume(&bytes).unwrap());
             }
         }
-        // The horizon is the end, but for the looks that rest may take.
+        // The horizon is the end, but for the searches that rest may take.
         prop_assert!(simulation.ended().is_some(), "{} s of {}", simulation.time(), scene.end.horizon);
         if let Some(resumed) = resumed {
             prop_assert_eq!(resumed.run().state_hash, simulation.state_hash());

@@ -134,7 +134,7 @@ impl Pour {
         name: &str,
     ) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
         let Some(view) = self.views.iter().find(|view| view.name == name) else { return Ok(None) };
-        let seen = py.detach(|| granulcal_dataset::look_from(view, &Drawn::of(&self.inner)));
+        let seen = py.detach(|| granulcal_dataset::capture_from(view, &Drawn::of(&self.inner)));
         match seen.map_err(error::dataset)? {
             View::Depth(_, image) => {
                 array::matrix(py, image.depth, image.height, image.width).map(Some)

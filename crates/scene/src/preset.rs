@@ -14,7 +14,7 @@ pub use method::{Complementarity, Method, NewtonSettings, ReferenceSettings};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
-    /// For a first look: large steps, penetration below 0.25 radii.
+    /// For a first try: large steps, penetration below 0.25 radii.
     Fast,
     /// For data sets: penetration below 0.1 radii.
     #[default]
@@ -26,7 +26,7 @@ pub enum Preset {
 }
 
 impl Preset {
-    /// Every preset: those of this program from cheap to dear, then the paper's.
+    /// Every preset: those of this program from cheap to expensive, then the paper's.
     pub const ALL: [Self; 4] = [Self::Fast, Self::Default, Self::Accurate, Self::Paper];
 
     /// The word used in TOML, on the command line and in Python.

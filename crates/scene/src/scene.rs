@@ -67,7 +67,7 @@ pub struct Scene {
     /// The depth camera above the ground.
     #[serde(default)]
     pub camera: CameraSpec,
-    /// Further cameras, whose images are looked at and not inferred from.
+    /// Further cameras, whose images are examined and not inferred from.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub views: Vec<ViewSpec>,
     /// What is observed while the pour goes on, and at its end beside the image.

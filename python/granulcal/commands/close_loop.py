@@ -34,12 +34,12 @@ TASK is a TOML file: a scene, a prior of the material, and recordings under at l
     use = "fit"
     recordings = ["04cm/pour-0.png", "04cm/pour-1.png"]
 
-Written to the folder -o: preregistration.json (before any data is looked at), verdict.json,
+Written to the folder -o: preregistration.json (before any data is seen), verdict.json,
 report.html, and the tables conditions, candidates and residuals.parquet. The archive of pours may
 serve many tasks of one scene; all of it is resumed after an interruption. Verdicts: NONE, RESIDUAL
-(not sure enough for a name), EFFECT, SET (not told apart), EFFECTS (two), UNEXPLAINED; and, with
+(not sure enough for a name), EFFECT, SET (not distinguished), EFFECTS (two), UNEXPLAINED; and, with
 exit code 3, UNCONFIRMED (the surrogate is wrong at the fit) and OVERTURNED (by another definition
-of what is looked at, [[definitions]] of the task).
+of what is examined, [[definitions]] of the task).
 """
 # The exit code of what is done and does not stand.
 _FALLEN = 3

@@ -21,6 +21,8 @@ def add(commands: Any) -> None:
     add_recordings(parser)
     parser.add_argument("--border", type=int, help="ignore a frame of so many pixels")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.add_argument("--samples", type=int, help="print so many draws in the JSON")
+    parser.add_argument("--seed", type=int, help="seed of the draws (default 0)")
     parser.add_argument(
         "-o", "--out", type=writes("json"), help="write JSON with samples to this file"
     )
@@ -37,7 +39,7 @@ def _run(options: argparse.Namespace) -> int:
     model = model_named(str(options.model))
     words = ["granulcal", "infer", str(model), *map(str, options.recording)]
     words += reading_words(options)
-    for name in ("scene", "border", "out"):
+    for name in ("scene", "border", "samples", "seed", "out"):
         if getattr(options, name) is not None:
             words.append(f"--{name}={getattr(options, name)}")
     if options.json:

@@ -90,7 +90,7 @@ class ExportedEngine:
     def refuses(self, scene: Scene) -> str | None:
         """Returns what of a scene the engine cannot be told and would leave out, None if nothing.
 
-        What a scene observes is looked at in the grains at rest, as its camera does.
+        What a scene observes is taken of the grains at rest, as its camera does.
         """
         left_out = [name for name in Setup.of(scene).left_out if name.startswith("effects.")]
         return ", ".join(left_out) or None

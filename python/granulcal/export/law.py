@@ -8,6 +8,8 @@ import math
 from dataclasses import dataclass, fields
 from typing import Any
 
+from granulcal.pours.scene import Material
+
 __all__ = [
     "LEAST_WITHOUT_TENSION",
     "POISSON",
@@ -32,29 +34,8 @@ _TANGENTIAL_INERTIA = 3.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contact:
-    """Coefficients of a contact, as `granulcal.Material` has them.
-
-    Attributes:
-        sliding_friction: mu_s [-].
-        rolling_friction: mu_r [-]: the moment mu_r R_eff F_n is withstood.
-        restitution: e [-].
-        tangential_restitution: e_t [-].
-        torsional_friction: mu_t [-]: the moment mu_t R_eff F_n is withstood about the normal.
-        softness, touching_exponent, impact_friction: what an engine's own stiffness and dashpots
-            decide in our impacts [-].
-        rolling_damping: dashpot on rolling over the critical one [-]; 0 is none.
-    """
-
-    sliding_friction: float
-    rolling_friction: float
-    restitution: float
-    tangential_restitution: float = 0.0
-    torsional_friction: float = 0.02
-    softness: float = 0.05
-    touching_exponent: float = 1.0
-    impact_friction: float = 1.0
-    rolling_damping: float = 0.0
+class Contact(Material):
+    """Coefficients of a contact, in the terms of other engines."""
 
     @classmethod
     def of(cls, table: dict[str, Any], default: "Contact | None" = None) -> "Contact":

@@ -6,7 +6,7 @@
 from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.effects.design import Design, Effect
 from granulcal.loop.experiment import Experiment, next_experiment
-from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
@@ -14,12 +14,12 @@ from granulcal.loop.test.trace import Power, Trace, power, trace
 from granulcal.loop.test.verdict import Verdict
 
 __all__ = [
+    "ConditionPours",
     "Design",
     "Discrepancy",
     "Effect",
     "Experiment",
     "Improvement",
-    "Observation",
     "Power",
     "Surrogate",
     "Thresholds",

@@ -1,7 +1,7 @@
 """`close_loop`: from recordings to a verdict, with the error before and after.
 
 The steps are those of docs/theory/loop.md: register what is fixed; fill the archive; say what could
-be seen; fit and test; refit the library; decide; look over the prior; simulate the base and the
+be seen; fit and test; refit the library; decide; pour draws of the prior; simulate the base and the
 augmented model; move every definition; open the sealed conditions once, beside rows that need no
 physics; say the verdict; run the placebo; write the report.
 """
@@ -26,7 +26,7 @@ from granulcal.loop.check.checks import (
     trivial,
 )
 from granulcal.loop.check.coverage import FEWEST_PAIRS
-from granulcal.loop.check.prior_rounds import LOOKS, look_over
+from granulcal.loop.check.prior_rounds import ROUNDS, prior_rounds
 from granulcal.loop.check.standing import stand
 from granulcal.loop.closed import Closed
 from granulcal.loop.effects.definitions import is_definition
@@ -34,17 +34,18 @@ from granulcal.loop.experiment import next_experiment
 from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
-from granulcal.loop.pours.refine import ROUND, Rows, further
+from granulcal.loop.pours.refine import ROUND, further
 from granulcal.loop.pours.replicates import (
     REPLICATES,
     both,
     error_of,
     placebo_of,
 )
+from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.time_needed import time_needed
 from granulcal.loop.preregistration import register
 from granulcal.loop.report.models_of import models_of
-from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.store_surrogate import fit_surrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Task
@@ -90,8 +91,8 @@ def close_loop(
         surrogate: of the same archive, where it has been fitted for another task.
         pairs: simulated pairs that calibrate the interval of a named effect's strength, each as
             many pours as were measured to fit; 19 are the fewest from which 95 % can be read.
-        rounds: of further pours where the fits are, once the gate has opened; each takes up to
-            `refine.ROUND` pours, and everything is asked again afterwards.
+        rounds: of further pours where the fits are, once the residual test has rejected; each
+            takes up to `refine.ROUND` pours, and everything is asked again afterwards.
         say: is told each step.
 
     Raises:
@@ -105,7 +106,7 @@ def close_loop(
         )
     folder, rules = Path(out), thresholds or Thresholds()
     workers = threads or os.cpu_count() or 1
-    plan = planned(task, budget, seed, pairs, rounds, LOOKS * rules.look)
+    plan = planned(task, budget, seed, pairs, rounds, ROUNDS * rules.look)
     names = Measures.of(plan.scene).names
     registration = register(folder, task, plan, rules, seed, names, pairs, rounds)
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
@@ -121,20 +122,20 @@ def close_loop(
     say(_power_table(sights))
 
     measured = {c.name: c.statistics(task.scene) for c in fitted}
-    observed = [Observation.of(c.name, store.plan.unit(c.at), measured[c.name]) for c in fitted]
+    observed = [ConditionPours.of(c.name, store.plan.unit(c.at), measured[c.name]) for c in fitted]
     found = trace(surrogate, observed, rules, seed=seed)
     say(f"the fits say {found.verdict.kind}: {found.verdict.reason}")
 
     forward, more = Forward(folder / "pours", workers), list[Rows]()
     for number in range(rounds):
-        if found.gate.p > rules.name:
+        if found.residual_test.p > rules.name:
             break
         more.extend(further(forward, task, store.plan, found, number, seed))
         surrogate = fit_surrogate(store, seed=seed, say=say, more=more)
         found = trace(surrogate, observed, rules, seed=seed)
         say(f"after pours where the fits are, {found.verdict.kind}: {found.verdict.reason}")
     rounded = sum(len(rows.x) for rows in more)
-    seen = look_over(
+    seen = prior_rounds(
         forward, task, store, found, observed, measured, surrogate, rules, more, seed=seed, say=say
     )
     found, surrogate = seen.trace, seen.surrogate
@@ -143,10 +144,10 @@ def close_loop(
     say(f"fresh pours of the verdict's model: the surrogate is right there with p = {right:.3g}")
     own = recentred(surrogate, store.plan, fitted, found, measured, simulated, rules, seed)
     if own is not None:
-        say(f"they leave of the measured pours what has p = {own.gate.p:.3g}")
+        say(f"they leave of the measured pours what has p = {own.residual_test.p:.3g}")
     elsewhere = moved(task, store.plan, surrogate, rules, seed)
     for one in elsewhere:
-        say(f"looked at as {one.definition}: {one.verdict.kind}, p = {one.verdict.p:.3g}")
+        say(f"defined as {one.definition}: {one.verdict.kind}, p = {one.verdict.p:.3g}")
     wide = calibrated(forward, task, store.plan, surrogate, found, rules, pairs, seed)
     if wide is not None:
         held = f"{wide.held} of {wide.pairs} simulated pairs held by the plain interval"
@@ -170,7 +171,7 @@ def close_loop(
 
     pretended = [(c, placebo_of(forward, task, c, found, seed)) for c in fitted]
     blank = [
-        Observation.of(c.name, store.plan.unit(c.at), rows) for c, rows in pretended if len(rows)
+        ConditionPours.of(c.name, store.plan.unit(c.at), rows) for c, rows in pretended if len(rows)
     ]
     placebo = trace(surrogate, blank, rules, seed=seed + 1)
     say(f"placebo {placebo.verdict.kind}: {placebo.verdict.reason}")
@@ -234,13 +235,13 @@ def planned(
 
 
 def _needed(task: Task, pairs: int, draws: int) -> int:
-    """Pours besides the archive: both models under every condition, the look, placebo and pairs."""
+    """Pours besides the archive: both models, draws of the prior, placebo and pairs."""
     fitted = task.of(FIT)
     measured = sum(len(c.recordings) for c in fitted)
     # A pour in the limit of the grains' size is several of two sizes.
     each, sizes = (1, 1) if task.coarse is None else (2 * task.coarse.repeats, 2)
-    look = (sizes * draws + each * REPLICATES if draws else 0) * len(fitted)
-    return each * (2 * REPLICATES * len(task.conditions) + (1 + pairs) * measured) + look
+    prior = (sizes * draws + each * REPLICATES if draws else 0) * len(fitted)
+    return each * (2 * REPLICATES * len(task.conditions) + (1 + pairs) * measured) + prior
 
 
 def _candidates(plan: ArchivePlan) -> list[tuple[str, Array]]:
@@ -251,9 +252,9 @@ def _candidates(plan: ArchivePlan) -> list[tuple[str, Array]]:
     found = []
     for place in plan.places:
         label = ", ".join(f"{p} = {place[p]:.4g}" for p, _, _ in plan.conditions if p in place)
-        # Looked at as the verdict is.
-        looked = {p: plan.scene.get(p) for p, _, _ in plan.conditions if p not in place}
-        found.append((label, plan.unit({**looked, **place})))
+        # Observed as the verdict is.
+        observed = {p: plan.scene.get(p) for p, _, _ in plan.conditions if p not in place}
+        found.append((label, plan.unit({**observed, **place})))
     if found:
         return found
     for i, (path, low, high) in enumerate(plan.conditions):

@@ -11,7 +11,7 @@ from granulcal.loop.check.coverage import Coverage
 from granulcal.loop.check.standing import Standing
 from granulcal.loop.experiment import Experiment
 from granulcal.loop.pours.cube import from_cube
-from granulcal.loop.pours.replicates import model_faults, model_scene
+from granulcal.loop.pours.replicates import ModelPours, model_faults, model_scene
 from granulcal.loop.task import Condition, Task
 from granulcal.loop.test.distance import Improvement
 from granulcal.loop.test.trace import Explanation, Power, Trace
@@ -30,7 +30,7 @@ class Closed:
     Attributes:
         task: what was asked.
         standing: the verdict, and what may have overturned that of the fits.
-        trace: fit, gate, refits and verdict on the conditions to fit.
+        trace: fit, residual test, refits and verdict on the conditions to fit.
         power: what could be seen, before the data.
         fit: error before and after, conditions to fit.
         sealed: the same of the sealed conditions; None without any.
@@ -55,7 +55,7 @@ class Closed:
     pours: int
     registration: str
     measured: dict[str, Array]
-    simulated: dict[str, tuple[Array, Array]]
+    simulated: dict[str, ModelPours]
     corrections: tuple[Correction, ...] = ()
     calibrated: Coverage | None = None
 

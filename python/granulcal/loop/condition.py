@@ -44,7 +44,7 @@ class Condition:
     averaged: bool = False
 
     def under(self, definition: Definition) -> "Condition":
-        """Returns the condition looked at in the way of a definition."""
+        """Returns the condition by a definition."""
         return replace(
             self,
             at={**self.at, **definition.at},

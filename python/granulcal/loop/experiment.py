@@ -67,7 +67,7 @@ def next_experiment(
 
     Args:
         surrogate: of the archive.
-        found: the trace whose rivals are to be told apart.
+        found: the trace whose rivals are to be distinguished.
         candidates: label and unit coordinates (q,) of each condition.
         pours: how many pours each would have.
     """

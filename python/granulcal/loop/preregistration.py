@@ -1,4 +1,4 @@
-"""What is fixed before the first residual is looked at, in a file with a hash."""
+"""What is fixed before the first residual is seen, in a file with a hash."""
 
 import hashlib
 import json
@@ -78,7 +78,7 @@ def register(
 
 
 def _digests(recordings: tuple[Path, ...]) -> list[str]:
-    """Hashes of the files, so that they cannot be exchanged; nothing of them is looked at."""
+    """Hashes of the files, so that they cannot be exchanged; nothing of them is read."""
     found = []
     for path in recordings:
         files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]

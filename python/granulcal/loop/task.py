@@ -18,7 +18,7 @@ a finding. `tolerances = "tolerances.json"` declares in which directions the sta
 out it is looked for beside the recording. `reading = { width = 0.084 }`, likewise, are arguments of
 `Recording.observed`, or of `Recording.formation` where the scene observes nothing.
 
-`[[definitions]]` are ways to look at the same pours, thresholds and levels moved: the first is the
+`[[definitions]]` are ways to observe the same pours, thresholds and levels moved: the first is the
 one that the verdict is of, and a verdict that another overturns is none; see `definitions.py`.
 
 `[[nuisance]]` tables, written like those of a prior, are numbers of the model that nobody knows and
@@ -114,13 +114,13 @@ class Task:
         scene: the base model.
         prior: of its material.
         conditions: at least one to fit.
-        library: effects to look for.
+        library: effects to test.
         path: the file that it was read from.
         tolerances: of the statistics.
         between: whether the archive's pours lie between the conditions, their numbers drawn
             independently; if not, they are at the conditions alone.
         sealed_in_archive: whether they are at sealed conditions, too; with `between` they must be.
-        definitions: ways to look at the pours, the first is the verdict's; none: the scene's own.
+        definitions: ways to observe the pours, the first is the verdict's; none: the scene's own.
         stated: the conditions as they were before the first definition was put in.
     """
 
@@ -147,8 +147,8 @@ class Task:
         if self.definitions and not self.stated:
             object.__setattr__(self, "stated", self.conditions)
             first = self.definitions[0]
-            looked = tuple(condition.under(first) for condition in self.conditions)
-            object.__setattr__(self, "conditions", looked)
+            observed = tuple(condition.under(first) for condition in self.conditions)
+            object.__setattr__(self, "conditions", observed)
         if self.between and not self.sealed_in_archive:
             raise ObservationError(
                 "sealed_in_archive = false needs between = false: pours that lie between the "
@@ -231,7 +231,7 @@ class Task:
         )
 
     def under(self, definition: Definition, use: str) -> tuple[Condition, ...]:
-        """Returns the conditions of one use, looked at in the way of a definition."""
+        """Returns the conditions of one use, by a definition."""
         return tuple(c.under(definition) for c in self.stated if c.use == use)
 
     def _refuse_fitted(self) -> None:
@@ -289,7 +289,7 @@ class Task:
         return [p for p in self.paths if len({c.at[p] for c in self.conditions}) > 1]
 
     def _told_apart(self, paths: list[str]) -> int:
-        """Number of conditions that the numbers `paths` tell apart."""
+        """Number of conditions that the numbers `paths` distinguish."""
         return len({tuple(c.at[path] for path in paths) for c in self.conditions})
 
     @property

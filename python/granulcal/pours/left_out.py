@@ -1,4 +1,4 @@
-"""Pours that nothing is learnt from, by why: unhealthy, jammed and out of view are told apart."""
+"""Pours that nothing is learnt from, counted by why: unhealthy, jammed, out of view."""
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass

@@ -64,7 +64,7 @@ jitter = {jitter:g}
 """
 
 PRIOR = """\
-# What is unknown, and how far it may be off before the recording is looked at.
+# What is unknown, and how far it may be off before the recording is seen.
 #   granulcal generate scene.toml prior.toml -n 1000 -o pours
 # A path names a number of the scene. Distributions: uniform and log_uniform {low, high}, normal {mean, sd, and low or
 # high to cut it off}, fixed {value}. Narrow it where you know more; what lies outside can never be found.
@@ -122,7 +122,7 @@ scene = "scene.toml"
 prior = "prior.toml"
 camera = "camera.toml"        # of the PNGs
 
-# effects = ["drag", "tilt.x"]          # where to look, by name; all of docs/theory/effects.md if left out
+# effects = ["drag", "tilt.x"]          # what to test, by name; all of docs/theory/effects.md if left out
 # nuisances = {{ "tilt.x" = 0.005 }}      # what may be off by that much and is no finding
 
 [[conditions]]

@@ -13,10 +13,10 @@ use granulcal::dem::{GRAVITY, Material, Simulation, WallMaterial};
 use super::hopper;
 use super::packed::{DIAMETER, tube};
 
-/// Shares of the grains that have left when the loads are looked at first and last: before, the filling still rests
+/// Shares of the grains that have left when the loads are examined first and last: before, the filling still rests
 /// as it was poured, with little friction at the wall.
 const LOOKED_AT: (f64, f64) = (0.2, 0.3);
-/// Time between two looks `[s]`.
+/// Time between two checks `[s]`.
 const LOOK: f64 = 1e-3;
 /// Longest discharge that is waited for `[s]`.
 const PATIENCE: f64 = 30.0;

@@ -12,7 +12,7 @@ use crate::outcome::Outcome;
 use crate::run::{Run, Setting};
 use crate::sides::SideFiles;
 
-/// Share of the ground's sample in the range from which the two cannot be told apart by colour.
+/// Share of the ground's sample in the range from which the two cannot be distinguished by colour.
 const MUCH_GROUND: f64 = 0.05;
 
 /// Pick the range of colours that marks grains from an image

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 use granulcal_dataset::{
-    CameraFile, Drawn, Observer, Product, View, look, look_from, npy, png, write_height_map,
+    CameraFile, Drawn, Observer, Product, View, capture, capture_from, npy, png, write_height_map,
 };
 use granulcal_scene::{Projection, Scene, ViewSpec};
 use serde_json::{Value, json};
@@ -91,8 +91,8 @@ fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
     };
     let drawn = Drawn { positions: &positions, radii: &radii, convex: convex.as_ref() };
     let view = match further {
-        Some(further) => look_from(further, &drawn)?,
-        None => look(&scene.camera, &drawn, args.seed)?,
+        Some(further) => capture_from(further, &drawn)?,
+        None => capture(&scene.camera, &drawn, args.seed)?,
     };
     write_view(&args.out, &view, args.depth_unit)?;
     if args.json {

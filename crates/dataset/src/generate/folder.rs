@@ -25,7 +25,7 @@ pub(super) struct Folder {
 
 /// What is left to do.
 #[derive(Debug, Default)]
-pub(super) struct Plan {
+pub(super) struct Remaining {
     /// Rows that the chunks with a part lack.
     pub(super) missing: BTreeMap<u64, Vec<u64>>,
     /// The chunks with a part that lacks rows.
@@ -84,31 +84,31 @@ impl Folder {
 
     /// Reads and checks the parts that are there; what they lack is left to do. The rows of other chunks are not
     /// listed: there may be billions of them.
-    pub(super) fn plan(&self, options: &GenerateOptions) -> Result<Plan, DatasetError> {
-        let mut plan = Plan::default();
+    pub(super) fn remaining(&self, options: &GenerateOptions) -> Result<Remaining, DatasetError> {
+        let mut remaining = Remaining::default();
         let chunks = options.rows.div_ceil(self.chunk);
-        plan.progress.total = rows_of_shard(options, self.chunk);
+        remaining.progress.total = rows_of_shard(options, self.chunk);
         let is_wanted =
             |chunk: &u64| *chunk < chunks && chunk % options.shard.count == options.shard.index;
         for chunk in manifest::parts(&self.path)?.into_iter().filter(is_wanted) {
             let (first, end) = (chunk * self.chunk, ((chunk + 1) * self.chunk).min(options.rows));
             let (rows, is_verified) = self.read_part(chunk)?;
-            plan.progress.unverified += u64::from(!is_verified);
+            remaining.progress.unverified += u64::from(!is_verified);
             let (kept, beyond): (Vec<_>, Vec<_>) = rows.iter().partition(|row| row.row < end);
-            plan.progress.resumed += kept.len() as u64;
-            plan.progress.beyond += beyond.len() as u64;
+            remaining.progress.resumed += kept.len() as u64;
+            remaining.progress.beyond += beyond.len() as u64;
             for row in &kept {
-                plan.progress.count(row.status);
+                remaining.progress.count(row.status);
             }
             let there: HashSet<_> = kept.iter().map(|row| row.row).collect();
             let missing: Vec<_> = (first..end).filter(|row| !there.contains(row)).collect();
             let left = missing.len() as u64;
-            plan.missing.insert(chunk, missing);
+            remaining.missing.insert(chunk, missing);
             if left > 0 {
-                plan.open.insert(chunk, OpenChunk { rows, left, changed: false });
+                remaining.open.insert(chunk, OpenChunk { rows, left, changed: false });
             }
         }
-        Ok(plan)
+        Ok(remaining)
     }
 
     /// The rows of a part, each checked against what it must have been made from, and whether the part has a hash.

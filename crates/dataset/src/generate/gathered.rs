@@ -6,7 +6,7 @@ use std::path::Path;
 use super::chunk::Progress;
 use super::folder::Folder;
 use super::options::GenerateOptions;
-use super::{Plan, check};
+use super::{Remaining, check};
 use crate::header::Header;
 use crate::{DatasetError, Form, Room, files, manifest};
 use granulcal_scene::Prior;
@@ -37,7 +37,7 @@ impl GatheredBatch {
         let header = Header::new(scene, prior, options.seed)?;
         Room::of_batch(scene, options.rows, 1, options.chunk).require(Some(out))?;
         let folder = Folder::open(out, header, options)?;
-        let Plan { missing: lacking, progress, .. } = folder.plan(options)?;
+        let Remaining { missing: lacking, progress, .. } = folder.remaining(options)?;
         let is_complete = |chunk: &u64| lacking.get(chunk).is_some_and(Vec::is_empty);
         let chunks = options.rows.div_ceil(folder.chunk);
         let missing = (0..chunks).filter(|chunk| !is_complete(chunk)).collect();

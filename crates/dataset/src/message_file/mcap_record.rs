@@ -7,7 +7,7 @@ use mcap::records::{Record, op};
 use mcap::{McapError, McapResult};
 
 /// What `mcap::parse_record` says of a record whose strings lie within it. Of records without use here (attachments,
-/// metadata, indices of messages) only the opcode is looked at.
+/// metadata, indices of messages) only the opcode is examined.
 pub(super) fn parse(op: u8, content: &[u8]) -> McapResult<Record<'_>> {
     let holds = match op {
         // Number; name, encoding.

@@ -28,7 +28,7 @@ impl Images {
     }
 
     /// NaN where too few grains are in view.
-    fn look(&self, positions: &[Vector3<f64>], radii: &[f64]) -> [f64; COUNT] {
+    fn measure(&self, positions: &[Vector3<f64>], radii: &[f64]) -> [f64; COUNT] {
         let is_shown = |x: &Vector3<f64>| self.spec.below.is_none_or(|below| x.z <= below);
         let shown = || positions.iter().zip(radii).filter(|(x, _)| is_shown(x));
         let places: Vec<_> = shown().map(|(x, _)| *x).collect();
@@ -53,14 +53,14 @@ impl Observation for Images {
     fn see(&mut self, frame: &Frame) {
         // A time that no sample has met when the next one is due has the next one's image.
         while self.spec.times.get(self.seen.len()).is_some_and(|t| *t <= frame.time + 1e-9) {
-            self.seen.push(self.look(&frame.positions, &frame.radii));
+            self.seen.push(self.measure(&frame.positions, &frame.radii));
         }
     }
 
     fn values(&self, pour: &Pour) -> Vec<f64> {
         let rest = self.spec.times.len() - self.seen.len();
         let last = if rest > 0 && holds(pour) {
-            self.look(&pour.positions, &pour.radii)
+            self.measure(&pour.positions, &pour.radii)
         } else {
             [f64::NAN; COUNT]
         };

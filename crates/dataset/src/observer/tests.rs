@@ -124,8 +124,8 @@ fn what_has_left_the_scene_has_run_out_and_ends_the_pour() {
     let (pour, observer) = run(&scene);
     assert_eq!((pour.status, pour.positions.len(), pour.radii_out.len()), (Status::RanOut, 0, 1));
     // It passes 20 mm after sqrt(2 32 mm / g) = 80.8 ms.
-    let look = scene.preset.settings().list_period as f64 * scene.preset.settings().dt;
-    assert!((0.0..=look).contains(&(pour.simulated_s - 0.0807)), "{}", pour.simulated_s);
+    let search = scene.preset.settings().list_period as f64 * scene.preset.settings().dt;
+    assert!((0.0..=search).contains(&(pour.simulated_s - 0.0807)), "{}", pour.simulated_s);
     let observed = observer.observed(&pour);
     let (_, share) = observed
         .series

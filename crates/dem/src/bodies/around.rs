@@ -1,10 +1,10 @@
-//! What bodies are of, what is around them in a substep, and how far they look for each other.
+//! What bodies are of, what is around them in a substep, and how far they search for each other.
 
 use super::body::Moving;
 use crate::wall::Walls;
 use granulcal_scene::{Material, Solid};
 
-/// Bodies look for each other at least so far, in their reach `[-]`.
+/// Bodies search for each other at least so far, in their reach `[-]`.
 const LEAST_MARGIN: f64 = 0.02;
 
 /// What the bodies are of, and what is around them in a substep.
@@ -16,7 +16,7 @@ pub(super) struct Around<'a> {
 }
 
 impl Around<'_> {
-    /// How far bodies look for each other at least `[m]`.
+    /// How far bodies search for each other at least `[m]`.
     pub fn least(&self) -> f64 {
         LEAST_MARGIN * self.solid.reach
     }

@@ -11,7 +11,7 @@ use super::contact::{Point, WALL};
 use super::rims::at_rims;
 use granulcal_scene::parry;
 
-/// What goes farther than this within a substep is looked at where it will be, too, in the least margin `[-]`.
+/// What goes farther than this within a substep is examined where it will be, too, in the least margin `[-]`.
 const FORESEEN: f64 = 0.5;
 /// Gaps of points that bodies turn past are corrected by no less than this, in their reach `[-]`.
 const CORRECTED: f64 = 2e-3;

@@ -13,8 +13,8 @@ use super::contact::{Point, WALL};
 use crate::wall::{Rim, Wall, any_normal};
 use granulcal_scene::Solid;
 
-/// Angles that are looked at within a part of the circle.
-const LOOKS: usize = 8;
+/// Angles that are tried within a part of the circle.
+const SAMPLES: usize = 8;
 /// Halvings of the interval about the least of them by golden section: each leaves 0.618 of it.
 const NARROWINGS: usize = 24;
 const GOLDEN: f64 = 0.618_033_988_749_895;
@@ -90,12 +90,12 @@ fn nearest(
     }
 }
 
-/// Where a function is least between two places: the first least of some looks, then golden section about it.
+/// Where a function is least between two places: the first least of some samples, then golden section about it.
 fn least(from: f64, to: f64, of: impl Fn(f64) -> f64) -> f64 {
-    let step = (to - from) / LOOKS as f64;
+    let step = (to - from) / SAMPLES as f64;
     let mut best = (from, of(from));
-    for look in 1..=LOOKS {
-        let place = from + look as f64 * step;
+    for sample in 1..=SAMPLES {
+        let place = from + sample as f64 * step;
         let value = of(place);
         if value < best.1 {
             best = (place, value);
@@ -111,6 +111,6 @@ fn least(from: f64, to: f64, of: impl Fn(f64) -> f64) -> f64 {
         }
     }
     let place = 0.5 * (low + high);
-    // Where it is level the first look stands.
+    // Where it is level the first sample stands.
     if of(place) < best.1 { place } else { best.0 }
 }

@@ -37,9 +37,9 @@ pub(crate) trait Acts: Debug + Send + Sync {
         None
     }
 
-    /// Changes velocities once gravity has acted, before contacts are looked at; returns the energy that it gives, per
+    /// Changes velocities once gravity has acted, before contacts are assembled; returns the energy that it gives, per
     /// typical mass `[m^2/s^2]`.
-    fn act_with_gravity(&self, _bed: &mut Particles, _context: &EffectContext<'_>) -> f64 {
+    fn act_with_gravity(&self, _particles: &mut Particles, _context: &EffectContext<'_>) -> f64 {
         0.0
     }
 
@@ -51,7 +51,7 @@ pub(crate) trait Acts: Debug + Send + Sync {
     /// Changes velocities after the impacts; `bridges` is what is remembered of pairs that have touched.
     fn act_across_gaps(
         &self,
-        _bed: &mut Particles,
+        _particles: &mut Particles,
         _context: &EffectContext<'_>,
         _bridges: &mut Bridges,
     ) {
@@ -74,14 +74,14 @@ pub(crate) trait Acts: Debug + Send + Sync {
     fn assemble(
         &self,
         _set: &mut ContactSet,
-        _bed: &Particles,
+        _particles: &Particles,
         _dt: f64,
         _ground: &dyn Fn(usize) -> ContactLaw,
     ) {
     }
 
     /// What it holds as a spring does, per typical mass `[m^2/s^2]`.
-    fn energy(&self, _bed: &Particles) -> f64 {
+    fn energy(&self, _particles: &Particles) -> f64 {
         0.0
     }
 }

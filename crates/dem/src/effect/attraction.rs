@@ -57,11 +57,11 @@ impl Acts for Attraction {
         bridges: &mut Bridges,
     ) {
         bridges.next.clear();
-        // Velocities change while the pull acts, places do not.
-        let places = particles.places.clone();
-        let between = pairs(context.pairs, &places, particles.period);
+        // Velocities change while the pull acts, spheres do not.
+        let spheres = particles.spheres.clone();
+        let between = pairs(context.pairs, &spheres, particles.period);
         let count = particles.count() as u32;
-        for near in between.chain(at_walls(context.at_walls, &places, count, context.walls)) {
+        for near in between.chain(at_walls(context.at_walls, &spheres, count, context.walls)) {
             let force = self.force(&near, bridges);
             if force > 0.0 {
                 let impulse = force * context.dt * near.normal;

@@ -56,11 +56,11 @@ impl Acts for Film {
         context: &EffectContext<'_>,
         _bridges: &mut Bridges,
     ) {
-        // Velocities change while the film acts, places do not.
-        let places = particles.places.clone();
-        let between = pairs(context.pairs, &places, particles.period);
+        // Velocities change while the film acts, spheres do not.
+        let spheres = particles.spheres.clone();
+        let between = pairs(context.pairs, &spheres, particles.period);
         let count = particles.count() as u32;
-        for near in between.chain(at_walls(context.at_walls, &places, count, context.walls)) {
+        for near in between.chain(at_walls(context.at_walls, &spheres, count, context.walls)) {
             if near.gap < self.range {
                 self.resist(particles, context.walls, &near, count, context.dt);
             }

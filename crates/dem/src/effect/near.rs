@@ -24,13 +24,13 @@ pub(super) struct Near {
 /// The pairs that are listed.
 pub(super) fn pairs(
     set: &ContactSet,
-    places: &[Row],
+    spheres: &[Row],
     period: Option<Period>,
 ) -> impl Iterator<Item = Near> {
     set.lanes().map(move |(number, lane)| {
         let batch = &set.batches[number];
         let (i, j) = (batch.i[lane], batch.j[lane]);
-        let (a, b) = (places[i as usize], places[j as usize]);
+        let (a, b) = (spheres[i as usize], spheres[j as usize]);
         let (direct, [r_i, r_j]) = (a.vector() - b.vector(), [a.0[3], b.0[3]]);
         let apart = period.map_or(direct, |period| period.nearest(direct));
         let distance = apart.norm();
@@ -48,20 +48,20 @@ pub(super) fn pairs(
 /// The grains that are listed at walls.
 pub(super) fn at_walls(
     set: &ContactSet,
-    places: &[Row],
+    spheres: &[Row],
     count: u32,
     walls: &Walls,
 ) -> impl Iterator<Item = Near> {
     set.lanes().map(move |(number, lane)| {
         let (grain, surface) = (set.batches[number].i[lane], set.at_walls[number].wall[lane]);
-        let place = places[grain as usize];
-        let near = walls.nearest(surface as usize, &place.vector(), 0.0);
+        let sphere = spheres[grain as usize];
+        let near = walls.nearest(surface as usize, &sphere.vector(), 0.0);
         Near {
             pair: (grain, count + surface),
-            gap: near.distance - place.0[3],
-            derjaguin: 2.0 * place.0[3],
+            gap: near.distance - sphere.0[3],
+            derjaguin: 2.0 * sphere.0[3],
             normal: near.normal,
-            point: place.vector() - near.distance * near.normal,
+            point: sphere.vector() - near.distance * near.normal,
             is_wall: true,
         }
     })

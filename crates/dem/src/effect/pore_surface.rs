@@ -118,18 +118,18 @@ mod tests {
     #[test]
     fn a_wedge_of_grains_has_the_wedges_slope() {
         // Stacks of grains whose number falls by one from row to row.
-        let (radius, mut places) = (2e-3, Vec::new());
+        let (radius, mut spheres) = (2e-3, Vec::new());
         let cell = 2.0 * radius;
         for a in 0..14 {
             for b in -14..=14 {
                 for c in 0..(14 - a) {
                     let [x, y, z] = [a, b, c].map(|k| cell * f64::from(k));
-                    places.push(Row([x, y, radius + z, radius]));
+                    spheres.push(Row([x, y, radius + z, radius]));
                 }
             }
         }
-        let inverse_mass = vec![1.0; places.len()];
-        let surface = PoreSurface::of(&Particles::new(places, inverse_mass, None), radius);
+        let inverse_mass = vec![1.0; spheres.len()];
+        let surface = PoreSurface::of(&Particles::new(spheres, inverse_mass, None), radius);
         // A grain a cell is a thickness of pi / 6 / 0.6 cells.
         let expected = -std::f64::consts::PI / 3.6;
         for [x, y] in [[0.03, 0.0], [0.027, -0.0071]] {

@@ -141,12 +141,12 @@ impl Cluster {
     ) -> Option<Link> {
         let Scenery { time, particles, around, fallen, .. } = scenery;
         let grain = self.members.grain_of(member);
-        let place = particles.place_at(grain, *time);
+        let sphere = particles.sphere_at(grain, *time);
         if let Some(surface) = partner.checked_sub(particles.count()) {
-            let (wall, at) = (around.walls.wall(surface), place.vector());
+            let (wall, at) = (around.walls.wall(surface), sphere.vector());
             let near = around.walls.nearest(surface, &at, *time);
-            let (gap, radius) = (near.distance - place.0[3], place.0[3]);
-            // Not at hand: the place at the foreseen time may be, by a rounding, past the wall's edge.
+            let (gap, radius) = (near.distance - sphere.0[3], sphere.0[3]);
+            // Not at hand: the sphere at the foreseen time may be, by a rounding, past the wall's edge.
             let touches = strikes || gap <= wall.material.softness * radius;
             if near.distance.is_infinite() || !touches {
                 return None;
@@ -162,9 +162,9 @@ impl Cluster {
             let law = around.wall_law(particles, grain, surface);
             return Some(Link::new([member, second], near.normal, law, &wall.material, strikes));
         }
-        let theirs = particles.place_at(partner, *time);
-        let apart = particles.nearest(place.vector() - theirs.vector());
-        let touching = place.0[3] + theirs.0[3];
+        let theirs = particles.sphere_at(partner, *time);
+        let apart = particles.nearest(sphere.vector() - theirs.vector());
+        let touching = sphere.0[3] + theirs.0[3];
         let reach = touching * (1.0 + 0.5 * around.material.softness);
         let square = apart.norm_squared();
         if !strikes && (square > reach * reach || particles.has_left(partner)) {

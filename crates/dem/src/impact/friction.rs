@@ -139,7 +139,7 @@ impl FrictionBlock {
     }
 
     /// The normal impulse after which sliding or rolling, as they go on now, would be at its least; at most `left`.
-    /// What stands still need not be looked at: its impulse does not change its sense before the other has stopped.
+    /// What stands still need not be examined: its impulse does not change its sense before the other has stopped.
     fn until_change(&self, slip: &Slip, left: f64) -> f64 {
         if self.kappa == 0.0 || self.rolling_speed > 0.0 {
             return left;

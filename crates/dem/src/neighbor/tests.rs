@@ -6,8 +6,8 @@ use super::*;
 use crate::lanes::Row;
 
 fn particles(points: &[([f64; 3], [f64; 3], f64)]) -> Particles {
-    let places = points.iter().map(|&(position, _, radius)| Row::new(&position.into(), radius));
-    let mut particles = Particles::new(places.collect(), vec![1.0; points.len()], None);
+    let spheres = points.iter().map(|&(position, _, radius)| Row::new(&position.into(), radius));
+    let mut particles = Particles::new(spheres.collect(), vec![1.0; points.len()], None);
     for (i, (_, velocity, _)) in points.iter().enumerate() {
         particles.bodies[i].velocity = Row::new(&(*velocity).into(), 0.0);
     }
@@ -35,7 +35,7 @@ proptest! {
         (prop::array::uniform3(-0.03f64..0.03), prop::array::uniform3(-3f64..3.0), 0.0005f64..0.004), 0..120),
         interval in 0f64..0.004, far in 0f64..3.0, is_periodic: bool) {
         let mut particles = particles(&points);
-        particles.places[0].0[0] += far; // one grain far out stretches the grid
+        particles.spheres[0].0[0] += far; // one grain far out stretches the grid
         particles.period = is_periodic.then(|| Period::of(&granulcal_scene::Periodic {
             axis: granulcal_scene::PeriodicAxis::Y, from: -0.03, to: 0.03,
         }));

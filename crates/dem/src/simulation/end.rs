@@ -33,7 +33,7 @@ impl Simulation {
         again.then_some(now)
     }
 
-    /// How the pour would end if it stayed as it looks now.
+    /// How the pour would end if it stayed as it is now.
     fn at_rest(&self, energies: &[f64]) -> Option<Status> {
         let (scene, threshold) = (&self.origin.scene, self.origin.scene.end.kinetic_energy);
         let jammed_or = |status| {

@@ -15,7 +15,7 @@ use crate::solver::solve_info::SolveInfo;
 const QUIET: f64 = 0.0025;
 /// Change of an impulse in a sweep over that by gravity in a substep below which it has settled in a quiet state `[-]`.
 const QUIET_SETTLED: f64 = 1e-2;
-/// Examinations between two looks at the residual, which costs about a sweep.
+/// Examinations between two evaluations of the residual, which cost about a sweep.
 const RESIDUAL_PERIOD: usize = 4;
 
 /// How much deeper than a sphere a convex body may be: a corner that no manifold had before enters by the way of a
@@ -91,7 +91,7 @@ impl Simulation {
         let (sweeps, unconverged) = (step.sweeps, step.unconverged);
         watch.see_solve(&SolveInfo { sweeps, unconverged, ..SolveInfo::default() });
         for (grain, [centre, velocity, omega]) in bodies.motions().enumerate() {
-            self.particles.places[grain] = Row::new(&centre, self.particles.radius(grain));
+            self.particles.spheres[grain] = Row::new(&centre, self.particles.radius(grain));
             self.particles.set_motion(grain, &velocity, &omega);
             let mut is_lost = false;
             around.walls.reached(&centre, radius, |surface| {
@@ -194,15 +194,16 @@ impl Simulation {
         }
     }
 
-    /// Looks at the state between two searches: outflow, health and the end rule.
+    /// Examines the state between two searches: outflow, health and the end rule.
     fn examine(&mut self) {
         if let Some(outflow) = &self.origin.scene.outflow
             && self.particles.remove_below(outflow.below)
         {
             self.contacts.forget_list();
         }
-        let looks = self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period);
-        if looks && self.bodies.is_none() {
+        let is_due =
+            self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period);
+        if is_due && self.bodies.is_none() {
             let Contacts { pairs, at_walls, .. } = &mut self.contacts;
             let sets = [pairs, at_walls, &mut self.on_layer];
             let residual = ResidualSums::of(&sets, &mut self.particles.bodies);

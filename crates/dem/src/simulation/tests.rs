@@ -92,8 +92,8 @@ fn a_state_that_nobody_has_written_is_refused() {
     assert!(start(&scene()).resume(&good.checkpoint()).is_ok());
     let changes: [(&str, Change); 22] = [
         ("grains that are not", |s| s.particles.clocks[0] = 1e-4),
-        ("grains that are not", |s| s.particles.places.truncate(9)),
-        ("grains that are not", |s| s.particles.places[3].0[3] = 0.1),
+        ("grains that are not", |s| s.particles.spheres.truncate(9)),
+        ("grains that are not", |s| s.particles.spheres[3].0[3] = 0.1),
         ("grains that are not", |s| s.particles.bodies[500].velocity.0[0] = 0.1),
         ("grains that are not", |s| s.particles.inverse_mass[0] = 2.0),
         ("another number of grains", |s| s.watch = HealthWatch::new(3, 0.0, 0.0)),

@@ -23,7 +23,7 @@ use crate::solver::nsgs::{self, SweepOptions};
 use crate::solver::residual::ResidualSums;
 use crate::solver::solve_info::SolveInfo;
 
-/// Sweeps between two looks at the residual, which costs a sweep.
+/// Sweeps between two evaluations of the residual, which costs a sweep.
 const LOOK: usize = 8;
 
 /// Iterates to `settings.residual`; the work is unconverged if that takes more than `settings.max_sweeps`.

@@ -5,7 +5,7 @@
 pub(crate) struct SolveInfo {
     /// Passes over all contacts: Gauss-Seidel sweeps and iterations of the linear solver.
     pub sweeps: usize,
-    /// Fastest closing `-(w_n + b)` of a contact at the last look `[m/s]`.
+    /// Fastest closing `-(w_n + b)` of a contact at the last evaluation `[m/s]`.
     pub closing: f64,
     /// Newton steps that the guard has damped or replaced.
     pub guarded: usize,

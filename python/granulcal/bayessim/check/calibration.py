@@ -89,7 +89,7 @@ class Calibration:
 
     @property
     def test_count(self) -> int:
-        """Number of pairs looked at."""
+        """Number of pairs examined."""
         return len(self.posterior_losses)
 
     @property

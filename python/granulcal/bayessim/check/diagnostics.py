@@ -66,7 +66,7 @@ class CoverageCount:
     Attributes:
         level: nominal share.
         inside: truths found inside.
-        total: truths looked at.
+        total: truths examined.
         low: smallest `inside` that chance allows.
         high: largest `inside` that chance allows.
     """

@@ -44,7 +44,7 @@ _SUMMARY_DRAWS = 10_000
 
 
 class Posterior:
-    """Belief about the free parameters after one or several pours.
+    """Distribution of the free parameters after one or several pours.
 
     Parameters are in the prior's own units, one column for each of `names`, and never outside the
     prior's bounds.

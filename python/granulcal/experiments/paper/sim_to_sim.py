@@ -208,7 +208,7 @@ def _notes(found: dict[str, _Found]) -> list[str]:
     left = ", ".join(f"{name}: {each.unusable}" for name, each in found.items())
     return [
         "The paper's rolling friction is read as a length over the effective radius of 1 mm; its "
-        "range then spans six decades, of which most are told apart from their neighbours by "
+        "range then spans six decades, of which most are distinguished from their neighbours by "
         "nothing, hence errors in ln that are larger than with the default prior.",
         "The paper's restitution is known to ± 0.0148. Here the rms error is "
         f"{_rms(first.errors[:, 2]):.3f}, with the paper's prior and solver "

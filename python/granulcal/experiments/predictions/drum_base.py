@@ -63,7 +63,7 @@ class DrumBase:
         self._seeds = [_SEED + i for i in range(seeds)]
 
     def at(self, setting: int, rpm: float, begin: float, end: float) -> Array:
-        """Returns the mean statistics of a setting at a speed, looked at from begin to end [s].
+        """Returns the mean statistics of a setting at a speed, examined from begin to end [s].
 
         Raises:
             ValueError: no usable pour.

@@ -6,16 +6,16 @@ from numpy.typing import NDArray
 from granulcal.loop.check.confirm import confirm
 from granulcal.loop.check.correction import Correction, corrections
 from granulcal.loop.check.coverage import Coverage, calibrate
-from granulcal.loop.check.prior_pours import Look
+from granulcal.loop.check.prior_pours import PriorPours
 from granulcal.loop.check.recentre import Recentred, recentre
 from granulcal.loop.check.standing import Moved
 from granulcal.loop.check.trivial import Group, TrivialRow, trivial_rows
 from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
-from granulcal.loop.pours.replicates import FEWEST, seeds_of_replicates
+from granulcal.loop.pours.replicates import FEWEST, ModelPours, seeds_of_replicates
 from granulcal.loop.pours.scenes import faults_of, scene_of
-from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.test.distance import Improvement, compare
@@ -35,11 +35,11 @@ def confirmed(
     plan: ArchivePlan,
     fitted: tuple[Condition, ...],
     found: Trace,
-    simulated: dict[str, tuple[Array, Array]],
+    simulated: dict[str, ModelPours],
 ) -> float:
     """Returns p of fresh pours of the verdict's model at its fit; NaN where too few are usable."""
-    rows = [(c, simulated[c.name][1]) for c in fitted]
-    fresh = [Observation.of(c.name, plan.unit(c.at), x) for c, x in rows if len(x) >= FEWEST]
+    rows = [(c, simulated[c.name].augmented) for c in fitted]
+    fresh = [ConditionPours.of(c.name, plan.unit(c.at), x) for c, x in rows if len(x) >= FEWEST]
     return confirm(surrogate, found.fit_of(found.best), fresh) if fresh else float("nan")
 
 
@@ -49,16 +49,16 @@ def recentred(
     fitted: tuple[Condition, ...],
     found: Trace,
     measured: dict[str, Array],
-    simulated: dict[str, tuple[Array, Array]],
+    simulated: dict[str, ModelPours],
     rules: Thresholds,
     seed: int,
 ) -> Recentred | None:
     """Returns what pours of the verdict's model at its fit say; None where too few are usable."""
-    told = [c for c in fitted if len(simulated[c.name][1]) >= FEWEST]
+    told = [c for c in fitted if len(simulated[c.name].augmented) >= FEWEST]
     if len(told) < len(fitted):
         return None
-    seen = [Observation.of(c.name, plan.unit(c.at), measured[c.name]) for c in told]
-    fresh = [Observation.of(c.name, plan.unit(c.at), simulated[c.name][1]) for c in told]
+    seen = [ConditionPours.of(c.name, plan.unit(c.at), measured[c.name]) for c in told]
+    fresh = [ConditionPours.of(c.name, plan.unit(c.at), simulated[c.name].augmented) for c in told]
     return recentre(surrogate, found.fit_of(found.best), seen, fresh, rules, seed=seed)
 
 
@@ -78,7 +78,7 @@ def calibrated(
         return None
     (name,) = best.effects
 
-    def pour(b: int, theta: Array, psi: float) -> list[Observation] | None:
+    def pour(b: int, theta: Array, psi: float) -> list[ConditionPours] | None:
         observed = []
         for condition in task.of(FIT):
             scene = scene_of(task, condition, theta, {name: psi})
@@ -87,7 +87,7 @@ def calibrated(
             rows = forward.limit(scene, seeds, faults_of(task, {name: psi}), task.coarse)
             if len(rows) == 0:
                 return None
-            observed.append(Observation.of(condition.name, plan.unit(condition.at), rows))
+            observed.append(ConditionPours.of(condition.name, plan.unit(condition.at), rows))
         return observed
 
     model = found.model_of(best)
@@ -100,16 +100,16 @@ def corrected(
     surrogate: Surrogate,
     found: Trace,
     measured: dict[str, Array],
-    simulated: dict[str, tuple[Array, Array]],
+    simulated: dict[str, ModelPours],
 ) -> tuple[Correction, ...]:
     """Returns what the correction without physics leaves; none where nothing was detected."""
     if found.verdict.kind == "NONE":
         return ()
     measures = Measures.of(task.scene)
     rows = [
-        (c.name, plan.unit(c.at), measured[c.name], simulated[c.name][0])
+        (c.name, plan.unit(c.at), measured[c.name], simulated[c.name].base)
         for c in task.conditions
-        if len(simulated[c.name][0]) >= FEWEST
+        if len(simulated[c.name].base) >= FEWEST
     ]
     return corrections(surrogate, found, rows, measures.names[: measures.head])
 
@@ -117,11 +117,11 @@ def corrected(
 def moved(
     task: Task, plan: ArchivePlan, surrogate: Surrogate, rules: Thresholds, seed: int
 ) -> tuple[Moved, ...]:
-    """Returns the verdicts of the pours to fit, looked at in every other way that was declared."""
+    """Returns the verdicts of the pours to fit, by every other definition that was declared."""
     found = []
     for definition in task.definitions[1:]:
         observed = [
-            Observation.of(c.name, plan.unit(c.at), c.statistics(task.scene))
+            ConditionPours.of(c.name, plan.unit(c.at), c.statistics(task.scene))
             for c in task.under(definition, FIT)
         ]
         there = trace(surrogate, observed, rules, seed=seed)
@@ -133,15 +133,15 @@ def nearer(
     forward: Forward,
     task: Task,
     found: Trace,
-    seen: Look | None,
+    seen: PriorPours | None,
     measured: dict[str, Array],
-    simulated: dict[str, tuple[Array, Array]],
+    simulated: dict[str, ModelPours],
     surrogate: Surrogate,
     seed: int,
 ) -> Improvement | None:
     """Returns the error of the best random draw, poured anew (before), and of the fit (after).
 
-    None where nothing was looked at, or too few pours are usable.
+    None where nothing was poured of the prior, or too few pours are usable.
     """
     if seen is None:
         return None
@@ -152,7 +152,7 @@ def nearer(
         scene = scene_of(task, condition, seen.theta[0], strengths)
         seeds, faults = seeds_of_replicates(seed), faults_of(task, strengths)
         x = forward.limit(scene, seeds, faults, task.coarse)
-        at_fit = simulated[condition.name][1]
+        at_fit = simulated[condition.name].augmented
         if min(len(x), len(at_fit)) < FEWEST:
             return None
         rows.append((condition.name, measured[condition.name], x, at_fit))
@@ -170,7 +170,7 @@ def trivial(
     task: Task,
     plan: ArchivePlan,
     measured: dict[str, Array],
-    simulated: dict[str, tuple[Array, Array]],
+    simulated: dict[str, ModelPours],
     surrogate: Surrogate,
     seed: int,
 ) -> tuple[TrivialRow, ...]:

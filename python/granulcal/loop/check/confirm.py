@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.surrogate.baseline import Fit
+from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
-from granulcal.loop.surrogate.observation import Observation
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 _DRAWS = 4000
 
 
-def confirm(surrogate: Surrogate, fit: Fit, fresh: Sequence[Observation]) -> float:
+def confirm(surrogate: Surrogate, fit: Fit, fresh: Sequence[ConditionPours]) -> float:
     """Returns p of fresh pours of a model at its fit, from `_DRAWS` draws of chi squared."""
     stack = StackedMeans.of(surrogate, fresh)
     local = LinearisedSurrogate.at(surrogate, stack.conditions, stack.counts, fit.v)

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from granulcal.loop.effects.design import LARGEST_Z, cube_from_normal
 from granulcal.loop.surrogate.baseline import Fit, fit_base
-from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.test.refit import Model, fit_single, interval
@@ -90,7 +90,7 @@ def needed_stretch(curve: Array, truth: float, level: float) -> float:
 def calibrate(
     surrogate: Surrogate,
     model: Model,
-    pour: Callable[[int, Array, float], list[Observation] | None],
+    pour: Callable[[int, Array, float], list[ConditionPours] | None],
     thresholds: Thresholds,
     *,
     count: int,

@@ -1,4 +1,4 @@
-r"""A look over the whole prior before a verdict is said: true pours of random draws of the winner.
+r"""The whole prior before a verdict is said: true pours of random draws of the winner.
 
 A fit moves downhill on a surrogate from where the surrogate says; where that is wrong by more than
 it knows, the best place is never visited. So the verdict's model is poured under every condition to
@@ -24,24 +24,24 @@ from numpy.typing import NDArray
 from granulcal.loop.effects.design import Design, normal_from_cube
 from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.forward import Forward
-from granulcal.loop.pours.refine import Rows
+from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.baseline import Start
 from granulcal.loop.task import FIT, Task
 from granulcal.loop.test.trace import Trace
 
-__all__ = ["Look", "hypercube", "look"]
+__all__ = ["PriorPours", "hypercube", "prior_pours"]
 
 Array = NDArray[np.float64]
 
 # Fits begin from so many of the best draws.
 _STARTS = 3
-# Seeds of these pours, apart from those of the archive, of replicates and of rounds; of one look.
-_SEED, _LOOK_STEP = 9_700_009, 5000
+# Seeds of these pours, apart from those of the archive, of replicates, of refinement; of a round.
+_SEED, _ROUND_STEP = 9_700_009, 5000
 
 
 @dataclass(frozen=True)
-class Look:
+class PriorPours:
     """Pours of random draws of a model.
 
     Attributes:
@@ -76,7 +76,7 @@ def hypercube(count: int, dimensions: int, seed: int) -> Array:
     return (cells + generator.random((count, dimensions))) / count
 
 
-def look(
+def prior_pours(
     forward: Forward,
     task: Task,
     plan: ArchivePlan,
@@ -87,7 +87,7 @@ def look(
     count: int,
     number: int,
     seed: int,
-) -> Look:
+) -> PriorPours:
     """Returns pours of `count` random draws of the verdict's model.
 
     Args:
@@ -98,18 +98,18 @@ def look(
         measured: statistics of the pours of every condition to fit, by name.
         spread: standard deviation of the head's statistics over the archive, shape (s,).
         count: of draws.
-        number: of this look, from 0.
+        number: of this round, from 0.
         seed: of the draws and the pours.
     """
     names, known = found.best.effects, [effect.name for effect in plan.design.effects]
     indices = [known.index(name) for name in names]
     effects = [plan.design.effects[k] for k in indices]
     p, conditions = len(plan.prior.names), task.of(FIT)
-    first = _SEED + seed + _LOOK_STEP * number
+    first = _SEED + seed + _ROUND_STEP * number
     drawn = hypercube(count, p + len(effects), first)
     low = np.array([effect.low for effect in effects])
     theta, strengths = drawn[:, :p], low + drawn[:, p:] * (1 - low)
-    kept: list[tuple[Array, Array, Array, Array]] = []
+    kept: list[Rows] = []
     poured: list[tuple[int, list[Array]]] = []
     coarse = task.coarse
     held = np.array([effect.held is not None for effect in plan.design.effects], dtype=bool)
@@ -126,17 +126,18 @@ def look(
                     continue
                 psi = np.where(held, size, 0.0)
                 psi[indices] = strengths[i]
-                kept.append((theta[i], plan.unit(condition.at), psi, x[0]))
+                where = plan.unit(condition.at)
+                kept.append(Rows(theta[i : i + 1], where[None], psi[None], x[:1]))
                 seen.append(x[0])
             if len(seen) == len(sizes):
                 fine, other = seen[0], seen[-1]
                 rows.append(fine + (coarse.held if coarse else 0.0) * (other - fine))
         if len(rows) == len(conditions):
             poured.append((i, rows))
-    whole = _rows(kept)
+    whole = Rows.joined(kept) if kept else None
     if not poured:
         none = np.empty(0)
-        return Look(names, whole, theta[:0], strengths[:0], none)
+        return PriorPours(names, whole, theta[:0], strengths[:0], none)
     size = len(spread)
     squares = np.zeros(len(poured))
     for b, (_, rows) in enumerate(poured):
@@ -145,11 +146,4 @@ def look(
             squares[b] += float(gap @ gap) / len(conditions)
     order = np.argsort(squares)
     chosen = [poured[int(b)][0] for b in order]
-    return Look(names, whole, theta[chosen], strengths[chosen], squares[order])
-
-
-def _rows(kept: list[tuple[Array, Array, Array, Array]]) -> Rows | None:
-    if not kept:
-        return None
-    theta, where, psi, x = (np.array(column) for column in zip(*kept, strict=True))
-    return Rows(theta, where.reshape(len(kept), -1), psi, x)
+    return PriorPours(names, whole, theta[chosen], strengths[chosen], squares[order])

@@ -1,4 +1,4 @@
-"""Looks over the prior until the verdict's model is one that has been looked at."""
+"""Rounds of pours of the prior until the verdict's model is one that was poured."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,49 +6,49 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.check.prior_pours import Look, look
+from granulcal.loop.check.prior_pours import PriorPours, prior_pours
 from granulcal.loop.pours.archive import Archive
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
-from granulcal.loop.pours.refine import Rows
-from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.pours.rows import Rows
+from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.store_surrogate import fit_surrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import Task
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Trace, trace
 
-__all__ = ["LOOKS", "Seen", "look_over"]
+__all__ = ["ROUNDS", "PriorCheck", "prior_rounds"]
 
 Array = NDArray[np.float64]
 
-LOOKS = 2
-"""Most looks: a second one where the first changed the winner."""
+ROUNDS = 2
+"""Most rounds: a second one where the first changed the winner."""
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What is known after the looks.
+class PriorCheck:
+    """What is known after the rounds.
 
     Attributes:
-        trace: of the surrogate that knows the pours of the looks.
+        trace: of the surrogate that knows the pours of the rounds.
         surrogate: that surrogate.
         draws: random draws that were poured of the models in turn.
-        best: the look at the verdict's model; None where nothing was usable, or none was asked for.
+        best: pours of the verdict's model; None where nothing was usable or none was asked for.
     """
 
     trace: Trace
     surrogate: Surrogate
     draws: int
-    best: Look | None
+    best: PriorPours | None
 
 
-def look_over(
+def prior_rounds(
     forward: Forward,
     task: Task,
     store: Archive,
     found: Trace,
-    observed: Sequence[Observation],
+    observed: Sequence[ConditionPours],
     measured: dict[str, Array],
     surrogate: Surrogate,
     rules: Thresholds,
@@ -56,13 +56,13 @@ def look_over(
     *,
     seed: int,
     say: Callable[[str], None],
-) -> Seen:
+) -> PriorCheck:
     """Returns the trace after random draws of its winner were poured; `more` grows by the pours."""
     spread = surrogate.raw_spread[: Measures.of(task.scene).head]
     draws, best = 0, None
-    for number in range(LOOKS if rules.look else 0):
+    for number in range(ROUNDS if rules.look else 0):
         winner = found.best.effects
-        best = look(
+        best = prior_pours(
             forward,
             task,
             store.plan,
@@ -80,7 +80,7 @@ def look_over(
         surrogate = fit_surrogate(store, seed=seed, say=say, more=more)
         found = trace(surrogate, observed, rules, seed=seed, starts=best.starts(store.plan.design))
         say(
-            f"after a look at {rules.look} random draws of "
+            f"after {rules.look} random draws of "
             f"{' + '.join(winner) or 'the base model'}, "
             f"{found.verdict.kind}: {found.verdict.reason}"
         )
@@ -88,4 +88,4 @@ def look_over(
             break
     if best is not None and (best.effects != found.best.effects or len(best.theta) == 0):
         best = None
-    return Seen(found, surrogate, draws, best)
+    return PriorCheck(found, surrogate, draws, best)

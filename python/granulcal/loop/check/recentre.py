@@ -30,8 +30,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.surrogate.baseline import Fit
+from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
-from granulcal.loop.surrogate.observation import Observation
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.test.residual_test import ResidualTest, residual_test
@@ -48,14 +48,14 @@ class Recentred:
     """What fresh pours of a model at its fit say.
 
     Attributes:
-        gate: the test of what is left.
+        residual_test: the test of what is left.
         v: parameters' z-scores after the step, shape (p,).
         strengths: of the model's effects after the step, shape (|A|,).
         intervals: of these, shape (|A|, 2).
         step: length of the step in standard deviations of the moved fit.
     """
 
-    gate: ResidualTest
+    residual_test: ResidualTest
     v: Array
     strengths: Array
     intervals: Array
@@ -64,7 +64,7 @@ class Recentred:
     def to_dict(self) -> dict[str, Any]:
         """Returns it for JSON."""
         return {
-            "p": self.gate.p,
+            "p": self.residual_test.p,
             "strengths": self.strengths.tolist(),
             "intervals": self.intervals.tolist(),
             "step": self.step,
@@ -74,8 +74,8 @@ class Recentred:
 def recentre(
     surrogate: Surrogate,
     fit: Fit,
-    measured: Sequence[Observation],
-    fresh: Sequence[Observation],
+    measured: Sequence[ConditionPours],
+    fresh: Sequence[ConditionPours],
     rules: Thresholds,
     *,
     seed: int = 0,
@@ -103,7 +103,7 @@ def recentre(
     step = np.linalg.solve(normal, white.T @ np.linalg.solve(root, gap) - pull * at)
     there = replace(fit, residual=gap - slopes @ step, slopes=slopes, root=root)
     rest = tuple(k for k in surrogate.design.candidates if k not in fit.active)
-    gate = residual_test(
+    left = residual_test(
         local,
         there,
         Scores.of(local, there, rest),
@@ -121,7 +121,7 @@ def recentre(
         strengths.append(middle)
         intervals.append(ends)
     return Recentred(
-        gate=gate,
+        residual_test=left,
         v=at[: len(fit.v)] + step[: len(fit.v)],
         strengths=np.array(strengths),
         intervals=np.array(intervals).reshape(len(fit.active), 2),

@@ -4,11 +4,11 @@
 |---|---|---|
 | surrogate | fresh pours of the model are where the surrogate says, p > `confirm` | UNCONFIRMED |
 | own pours | they leave nothing of the data: p > `adequate`, for NONE > `name` | UNCONFIRMED |
-| look | no random draw of the model is nearer to the data than its fit | UNCONFIRMED |
+| prior | no random draw of the model is nearer to the data than its fit | UNCONFIRMED |
 | definitions | the same verdict with every threshold and definition moved | OVERTURNED |
 | sealed rows | the named effect beats what needs no physics (`trivial.py`) | said beside the name |
 
-The first and the look hold for every word, NONE as well: nothing may be said from a fit that rests
+The first and the prior hold for every word, NONE as well: nothing may be said from a fit that rests
 where the surrogate is wrong. The last takes no word away, for a name may be right and yet predict
 no better than a straight line; but it is said wherever the name is.
 """
@@ -35,7 +35,7 @@ class Moved:
 
     Attributes:
         definition: its name.
-        verdict: what the same pours say, looked at that way.
+        verdict: what the same pours say, defined that way.
     """
 
     definition: str
@@ -103,7 +103,7 @@ class Standing:
 
 
 def overturned(verdict: Verdict, other: Verdict, name: float) -> bool:
-    """Returns whether `other`, of the same pours looked at otherwise, contradicts `verdict`.
+    """Returns whether `other`, of the same pours defined otherwise, contradicts `verdict`.
 
     Args:
         verdict: the registered one.
@@ -153,8 +153,10 @@ def stand(
         )
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
     least = {"NONE": rules.name, **dict.fromkeys(NAMING, rules.adequate)}.get(before.kind, 0.0)
-    if own is not None and own.gate.p <= least:
-        why = f"its own pours at its fit leave something of the data (p = {own.gate.p:.3g})"
+    if own is not None and own.residual_test.p <= least:
+        why = (
+            f"its own pours at its fit leave something of the data (p = {own.residual_test.p:.3g})"
+        )
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
     if not confirmed > rules.confirm:
         why = (

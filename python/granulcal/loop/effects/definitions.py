@@ -1,4 +1,4 @@
-"""Definitions of what is looked at: thresholds and levels that a verdict must not hang on.
+"""Definitions of what is observed: thresholds and levels that a verdict must not hang on.
 
     [[definitions]]
     name = "outline"                                # the first is the one that the verdict is of
@@ -8,7 +8,7 @@
     at = { "observe.front.link" = 2.0 }
     reading = { cameras = "both" }
 
-`at` are numbers of the scene that say how a pour is looked at (`observe.*`, `camera.*`), `reading`
+`at` are numbers of the scene that say how a pour is observed (`observe.*`, `camera.*`), `reading`
 are arguments with which the recordings are read; both may be moved together. What differs between
 definitions is an input of the archive, like a pour height: every pour has a value of its own
 between the smallest and the largest one, and the surrogate knows all of them. So a further
@@ -27,7 +27,7 @@ _OBSERVING = ("observe.", "camera.")
 
 @dataclass(frozen=True)
 class Definition:
-    """One way to look at the same pours.
+    """One way to observe the same pours.
 
     Attributes:
         name: what tables call it.
@@ -79,7 +79,7 @@ def check_definitions(definitions: tuple[Definition, ...]) -> None:
 
 
 def is_definition(path: str) -> bool:
-    """Returns whether a number of the scene says how a pour is looked at, not what is poured."""
+    """Returns whether a number of the scene says how a pour is observed, not what is poured."""
     return path.startswith(_OBSERVING)
 
 

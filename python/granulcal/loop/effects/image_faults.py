@@ -49,7 +49,7 @@ _REACH, _GRAIN_CIRCLE = 1.5, 1.5
 
 @dataclass(frozen=True)
 class Frame:
-    """An image of a pour: heights of its pixels, and how the camera looks.
+    """An image of a pour: heights of its pixels, and how the camera stands.
 
     Attributes:
         z: heights over the ground [m], NaN is no data, shape (h, w).

@@ -1,4 +1,4 @@
-"""The library of effects that the loop looks for: each a number that the base model lacks.
+"""The library of effects that the loop tests: each a number that the base model lacks.
 
 An effect is a path of the scene, its value when off and its value at full strength, psi = 1. What
 the simulator does with it, with equation and source, is in docs/theory/effects.md.

@@ -124,20 +124,20 @@ class ImageRows:
         nothing = np.full(len(measures.names), np.nan)
         is_usable = pour.status not in UNUSABLE
 
-        def look(faults: dict[str, float]) -> Array:
+        def measure(faults: dict[str, float]) -> Array:
             try:
                 return measures.of_pour(pour, faults) if is_usable else nothing
             except ValueError:
                 # Too few grains in view.
                 return nothing
 
-        found = {"theta": theta, "condition": unit, "psi/": np.array(0.0), "x/": look({})}
+        found = {"theta": theta, "condition": unit, "psi/": np.array(0.0), "x/": measure({})}
         for effect in self.effects:
             own = np.random.default_rng([self.seed, _STREAM, row, crc32(effect.name.encode())])
             psi = own.uniform(-1.0 if effect.is_two_sided else 0.0, 1.0)
             is_read = own.random() < _SHARE
             found[f"psi/{effect.name}"] = np.array(psi)
-            found[f"x/{effect.name}"] = look(effect.faults(psi)) if is_read else nothing
+            found[f"x/{effect.name}"] = measure(effect.faults(psi)) if is_read else nothing
         return found
 
 

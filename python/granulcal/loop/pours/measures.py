@@ -1,4 +1,4 @@
-"""What the loop looks at: the image's statistics, or those that a scene itself observes."""
+"""What the loop compares: the image's statistics, or those that a scene itself observes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

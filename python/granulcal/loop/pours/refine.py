@@ -1,13 +1,14 @@
 r"""Further pours where the fits are, so that the surrogate is right at the models that matter.
 
 An archive is spread over the whole prior and thin at any one place; where its error is as large as
-what is left of a fit, a model looks adequate for want of pours. Once the gate has opened, pours at
+what is left of a fit, a model seems adequate for want of pours. Once the residual test has
+rejected, pours at
 
 $$ w \sim N(\hat w, (J^T V^{-1} J + \Lambda)^{-1}) $$
 
 of the base model and of the most probable ones, under the conditions to fit, join the archive's
-rows, and everything is asked again of the new surrogate. A set without any effect has to pass the
-gate twice to be named: false alarms can only become fewer.
+rows, and everything is asked again of the new surrogate. A set without any effect has to be
+rejected twice to be named: false alarms can only become fewer.
 
 Reference:
     docs/theory/loop.md; sequential design at the posterior: Kandasamy et al., Query efficient
@@ -27,7 +28,7 @@ from granulcal.loop.surrogate.fit_draws import draw
 from granulcal.loop.task import FIT, Task
 from granulcal.loop.test.trace import Trace
 
-__all__ = ["ROUND", "Rows", "further"]
+__all__ = ["ROUND", "further"]
 
 Array = NDArray[np.float64]
 

@@ -1,5 +1,7 @@
 """Pours of the base and of the verdict's model at their fits, and their distance to the data."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,7 @@ from granulcal.pours.scene import Scene
 __all__ = [
     "FEWEST",
     "REPLICATES",
+    "ModelPours",
     "both",
     "error_of",
     "model_faults",
@@ -39,6 +42,18 @@ def seeds_of_replicates(seed: int) -> list[int]:
     return [_SEED + seed + i for i in range(REPLICATES)]
 
 
+class ModelPours(NamedTuple):
+    """Pours of two models under one condition.
+
+    Attributes:
+        base: of the base model, shape (n, s).
+        augmented: of the model with the effects that were found, shape (m, s).
+    """
+
+    base: Array
+    augmented: Array
+
+
 def model_scene(task: Task, condition: Condition, one: Explanation) -> Scene:
     """Returns the scene of a model at its best fit under a condition."""
     strengths = dict(zip(one.effects, one.best_strengths.tolist(), strict=True))
@@ -50,17 +65,15 @@ def model_faults(task: Task, one: Explanation) -> dict[str, float]:
     return faults_of(task, dict(zip(one.effects, one.best_strengths.tolist(), strict=True)))
 
 
-def both(
-    forward: Forward, task: Task, condition: Condition, found: Trace, seed: int
-) -> tuple[Array, Array]:
+def both(forward: Forward, task: Task, condition: Condition, found: Trace, seed: int) -> ModelPours:
     """Returns pours of the base and of the augmented model under a condition."""
     seeds = seeds_of_replicates(seed)
     before = forward.limit(model_scene(task, condition, found.base), seeds, None, task.coarse)
     if found.best is found.base:
-        return before, before
+        return ModelPours(before, before)
     after = model_scene(task, condition, found.best)
     faults = model_faults(task, found.best)
-    return before, forward.limit(after, seeds, faults, task.coarse)
+    return ModelPours(before, forward.limit(after, seeds, faults, task.coarse))
 
 
 def placebo_of(
@@ -75,7 +88,7 @@ def error_of(
     task: Task,
     conditions: tuple[Condition, ...],
     measured: dict[str, Array],
-    simulated: dict[str, tuple[Array, Array]],
+    simulated: dict[str, ModelPours],
     surrogate: Surrogate,
     seed: int,
 ) -> Improvement:
@@ -98,8 +111,8 @@ def error_of(
     return compare(
         [c.name for c in told],
         [measured[c.name][:, :size] for c in told],
-        [simulated[c.name][0][:, :size] for c in told],
-        [simulated[c.name][1][:, :size] for c in told],
+        [simulated[c.name].base[:, :size] for c in told],
+        [simulated[c.name].augmented[:, :size] for c in told],
         spread,
         seed=seed,
     )

@@ -227,9 +227,9 @@ class Models:
             raise ObservationError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
         if not 0 < level < 1:
             raise ObservationError(f"level must be between 0 and 1, got {level}")
-        # How a pour is looked at goes without saying.
-        looked = {p: self.scene.get(p) for p, _, _ in self.inputs if is_definition(p)}
-        at = {**looked, **at}
+        # How a pour is observed goes without saying.
+        observed = {p: self.scene.get(p) for p, _, _ in self.inputs if is_definition(p)}
+        at = {**observed, **at}
         missing = [path for path, _, _ in self.inputs if path not in at]
         if missing:
             raise ObservationError(

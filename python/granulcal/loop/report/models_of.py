@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.cube import from_cube
+from granulcal.loop.pours.replicates import ModelPours
 from granulcal.loop.report.models import Maker, Models
 from granulcal.loop.surrogate.fit_draws import draw
 from granulcal.loop.surrogate.surrogate import Surrogate
@@ -27,7 +28,7 @@ def models_of(
     found: Trace,
     verdict: dict[str, object],
     measured: dict[str, Array],
-    simulated: dict[str, tuple[Array, Array]],
+    simulated: dict[str, ModelPours],
 ) -> Models:
     """Returns what predicts under further conditions.
 
@@ -45,7 +46,7 @@ def models_of(
     for condition in fitted:
         rows = measured[condition.name]
         # One pour borrows the scatter of simulated ones.
-        rows = rows if len(rows) > 1 else simulated[condition.name][0]
+        rows = rows if len(rows) > 1 else simulated[condition.name].base
         scatter.append(rows.std(axis=0, ddof=1))
     return Models(
         scene=task.at_first(),

@@ -27,7 +27,7 @@ _SENTENCES = {
     "EFFECTS": "The grains do something that this model lacks; it takes two effects.",
     "UNEXPLAINED": "The grains do something that neither this model nor any known effect does.",
     "UNCONFIRMED": "Nothing may be said: the fits rest where the surrogate of the pours is wrong.",
-    "OVERTURNED": "Nothing may be said: the verdict hangs on how the pours are looked at.",
+    "OVERTURNED": "Nothing may be said: the verdict depends on how the pours are observed.",
 }
 # Share of an effect that the parameters must not mimic for its interval to hold what it says.
 _QUOTABLE = 0.5

@@ -30,7 +30,7 @@ def predict(
 
     Args:
         closed: the closed loop.
-        condition: the numbers of the scene; its recordings are not looked at.
+        condition: the numbers of the scene; its recordings are not read.
         one: the base model or an explanation of `closed.trace`.
         forward: runs and keeps the pours.
         draws: pours of each kind.

@@ -106,9 +106,9 @@ def candidates(closed: Closed) -> list[Row]:
             "detectable_before": float(sights.detectable[i]),
             "kappa": float(trace.power.kappa[i]),
             "detectable": float(trace.power.detectable[i]),
-            "score_square": float(trace.gate.squares[i]),
-            "one_step_strength": float(trace.gate.strengths[i]),
-            "adjusted_p": float(trace.gate.adjusted[i]),
+            "score_square": float(trace.residual_test.squares[i]),
+            "one_step_strength": float(trace.residual_test.strengths[i]),
+            "adjusted_p": float(trace.residual_test.adjusted[i]),
         }
         rows.append(row | _refit(closed, name, singles.get(name)))
     return rows
@@ -131,7 +131,7 @@ def residuals(closed: Closed) -> list[Row]:
 
 
 def _refit(closed: Closed, name: str, one: Explanation | None) -> Row:
-    """What a refit found; nulls where the gate stayed shut."""
+    """What a refit found; nulls where the residual test did not reject."""
     keys = ("log_probability", "p_after", "psi", "psi_low", "psi_high", "psi_best")
     if one is None:
         return dict.fromkeys((*keys, "is_calibrated", "value", "value_low", "value_high"))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
-from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.surrogate import Surrogate
 
 __all__ = ["StackedMeans"]
@@ -32,7 +32,7 @@ class StackedMeans:
     counts: Array
 
     @classmethod
-    def of(cls, surrogate: Surrogate, observations: Sequence[Observation]) -> "StackedMeans":
+    def of(cls, surrogate: Surrogate, observations: Sequence[ConditionPours]) -> "StackedMeans":
         """Returns the means of `observations`.
 
         Raises:

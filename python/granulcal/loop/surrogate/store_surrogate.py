@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from granulcal.loop.pours.archive import Archive
-from granulcal.loop.pours.refine import Rows
+from granulcal.loop.pours.rows import Rows
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.one_thread import one_thread
 

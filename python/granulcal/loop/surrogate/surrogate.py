@@ -48,7 +48,7 @@ from granulcal.loop.surrogate.columns import (
     uncorrelated_axes,
     usable_statistics,
 )
-from granulcal.loop.surrogate.observation import Observation
+from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.shift import Shift
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.progress import steps
@@ -261,7 +261,7 @@ class Surrogate:
         """C^1/2: y times it is z, shape (m, m)."""
         return np.asarray(np.linalg.inv(self.axes), dtype=np.float64)
 
-    def beyond(self, observations: Sequence[Observation]) -> tuple[str, ...]:
+    def beyond(self, observations: Sequence[ConditionPours]) -> tuple[str, ...]:
         """Returns which observed statistics lie outside the range of all archive pours.
 
         A range is that of the pours, widened by half of itself; statistics that never vary in the

@@ -35,7 +35,7 @@ __all__ = ["Scores", "families"]
 
 Array = NDArray[np.float64]
 
-# Effects this parallel cannot be told apart.
+# Effects this parallel cannot be distinguished.
 PARALLEL = 0.95
 # Range in unit conditions over which an unknown discrepancy is smooth.
 DISCREPANCY_LENGTH = 0.5

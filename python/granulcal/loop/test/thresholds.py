@@ -1,4 +1,4 @@
-"""Every number that turns a p-value or an evidence into a word, fixed before data are looked at."""
+"""Every number that turns a p-value or an evidence into a word, fixed before data are seen."""
 
 from dataclasses import asdict, dataclass
 
@@ -10,15 +10,15 @@ class Thresholds:
     """Thresholds of a verdict; write them down before the first residual.
 
     Attributes:
-        detect: largest p of the gate at which a residual is called detected.
-        name: largest p of the gate at which an effect may be named.
-        adequate: smallest p of the gate after a fit for that fit to count as an explanation.
-        rivals: models within this of the best log evidence are not told apart [nat].
+        detect: largest p of the residual test at which a residual is called detected.
+        name: largest p of the residual test at which an effect may be named.
+        adequate: smallest p of the residual test after a fit that counts as an explanation.
+        rivals: models within this of the best log evidence are not distinguished [nat].
         null_share, single_share: prior probability of no effect, and of one effect; the rest is
             that of two.
         pairs: largest number of pairs of effects that are fitted.
-        replicates: of the gate before any effect is fitted.
-        replicates_after: of the gate after each fit.
+        replicates: of the residual test before any effect is fitted.
+        replicates_after: of the residual test after each fit.
         refits: replicates that are refitted in full to scale the linear ones.
         level: of intervals.
         confirm: smallest p of fresh pours at which the surrogate counts as right at the fit.

@@ -1,4 +1,4 @@
-"""The whole loop on one set of measured pours: fit, gate, refits, adequacy, verdict."""
+"""The whole loop on one set of measured pours: fit, residual test, refits, adequacy, verdict."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.loop.effects.design import cube_from_normal, normal_from_cube
 from granulcal.loop.surrogate.baseline import Fit, Start, fit_base
+from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
-from granulcal.loop.surrogate.observation import Observation
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.test.refit import Model, fit_none, fit_pair, fit_single
@@ -34,7 +34,7 @@ _NEAREST = 3
 
 @dataclass(frozen=True)
 class Power:
-    """What an experiment could see, before its data are looked at.
+    """What an experiment could see, before its data are seen.
 
     Attributes:
         effects: names of the candidates, K of them.
@@ -81,7 +81,7 @@ class Explanation:
         intervals: shape (|A|, 2).
         best_strengths: at the best fit, shape (|A|,).
         log_probability: relative to the model without effects [nat].
-        p_after: of the gate after its fit; NaN if it was too improbable to be tested.
+        p_after: of the residual test after its fit; NaN if it was too improbable to be tested.
         at_end: whether a strength leans on the end of its prior.
     """
 
@@ -114,9 +114,9 @@ class Trace:
 
     Attributes:
         verdict: the word.
-        base: the model without effects; its p_after is that of the gate.
-        explanations: fitted models, most probable first; empty if the gate stayed shut.
-        gate: the test of the base fit.
+        base: the model without effects; its p_after is that of the residual test.
+        explanations: fitted models, most probable first; empty if the residual test did not reject.
+        residual_test: the test of the base fit.
         power: kappa, confusion and detectable strengths at the base fit.
         labels: of the conditions, H of them.
         statistics: names, m of them.
@@ -134,7 +134,7 @@ class Trace:
     verdict: Verdict
     base: Explanation
     explanations: tuple[Explanation, ...]
-    gate: ResidualTest
+    residual_test: ResidualTest
     power: Power
     labels: tuple[str, ...]
     statistics: tuple[str, ...]
@@ -171,7 +171,7 @@ class Trace:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns everything for JSON."""
-        gate = self.gate
+        test = self.residual_test
         return {
             "verdict": {
                 "kind": self.verdict.kind,
@@ -180,16 +180,16 @@ class Trace:
                 "p": self.verdict.p,
                 "reason": self.verdict.reason,
             },
-            "gate": {
-                "p": gate.p,
-                "p_library": gate.p_library,
-                "p_any": gate.p_any,
-                "p_smooth": gate.p_smooth,
-                "bartlett": gate.factors.tolist(),
+            "residual_test": {
+                "p": test.p,
+                "p_library": test.p_library,
+                "p_any": test.p_any,
+                "p_smooth": test.p_smooth,
+                "bartlett": test.factors.tolist(),
                 "effects": list(self.power.effects),
-                "squares": gate.squares.tolist(),
-                "one_step_strengths": gate.strengths.tolist(),
-                "adjusted_p": gate.adjusted.tolist(),
+                "squares": test.squares.tolist(),
+                "one_step_strengths": test.strengths.tolist(),
+                "adjusted_p": test.adjusted.tolist(),
             },
             "base": self.base.to_dict(),
             "theta_sd": self.theta_sd.tolist(),
@@ -207,7 +207,7 @@ class Trace:
 
 def trace(
     surrogate: Surrogate,
-    observations: Sequence[Observation],
+    observations: Sequence[ConditionPours],
     thresholds: Thresholds | None = None,
     *,
     seed: int = 0,
@@ -220,7 +220,7 @@ def trace(
         observations: pours of the fit conditions; sealed ones must not be among them.
         thresholds: fixed beforehand.
         seed: of starts and replicates.
-        starts: where fits begin as well, for example the best of pours that were looked at.
+        starts: where fits begin as well, for example the best of pours of the prior.
 
     Raises:
         ObservationError: pours or conditions that do not fit the archive.
@@ -231,22 +231,22 @@ def trace(
     target = stack.means.ravel()
     local, fit = fit_base(surrogate, stack, seed, starts)
     scores = Scores.of(local, fit, design.candidates)
-    gate = residual_test(
+    test = residual_test(
         local, fit, scores, replicates=rules.replicates, refits=rules.refits, seed=seed
     )
     none = fit_none(fit, rules)
     tested: list[tuple[Model, float]] = []
-    if gate.p <= rules.name and design.candidates:
+    if test.p <= rules.name and design.candidates:
         tested = _models(local, target, fit, rules, seed, starts)
     merged = families(scores)
-    verdict = decide(design, gate, none, tested, rules, merged)
+    verdict = decide(design, test, none, tested, rules, merged)
     explained = sorted(tested, key=lambda pair: -pair[0].log_probability)
     normal = scores.slopes.T @ scores.slopes + np.eye(len(fit.v))
     return Trace(
         verdict=verdict,
-        base=_explain(surrogate, none, none, gate.p),
+        base=_explain(surrogate, none, none, test.p),
         explanations=tuple(_explain(surrogate, m, none, p) for m, p in explained),
-        gate=gate,
+        residual_test=test,
         power=Power.of(surrogate, scores),
         labels=stack.labels,
         statistics=surrogate.names,
@@ -335,7 +335,7 @@ def _models(
 def _after(local: LinearisedSurrogate, model: Model, rules: Thresholds, seed: int) -> float:
     rest = tuple(k for k in local.surrogate.design.candidates if k not in model.effects)
     scores = Scores.of(local, model.fit, rest)
-    gate = residual_test(
+    test = residual_test(
         local,
         model.fit,
         scores,
@@ -343,7 +343,7 @@ def _after(local: LinearisedSurrogate, model: Model, rules: Thresholds, seed: in
         refits=rules.refits // 4,
         seed=seed + 1,
     )
-    return gate.p
+    return test.p
 
 
 def _explain(surrogate: Surrogate, model: Model, none: Model, p: float) -> Explanation:

@@ -2,7 +2,7 @@
 
 | word | when |
 |---|---|
-| NONE | the gate stays shut: p > `detect`; the table of detectable strengths says what could hide |
+| NONE | no rejection: p > `detect`; the table of detectable strengths says what could hide |
 | RESIDUAL | something is left (p <= `detect`), too unsure for a name, or none is the best |
 | EFFECT | every adequate model within `rivals` of the best is of one family |
 | SET | several families are |
@@ -32,9 +32,9 @@ class Verdict:
 
     Attributes:
         kind: one of `KINDS`.
-        named: effects of the finding; for SET all that are not told apart; else none.
+        named: effects of the finding; for SET all that are not distinguished; else none.
         families: of `named`, each once.
-        p: of the gate before any effect was fitted.
+        p: of the residual test before any effect was fitted.
         reason: one sentence with the numbers that decided.
     """
 
@@ -47,7 +47,7 @@ class Verdict:
 
 def decide(
     design: Design,
-    gate: ResidualTest,
+    test: ResidualTest,
     none: Model | None,
     models: list[tuple[Model, float]],
     thresholds: Thresholds,
@@ -57,13 +57,13 @@ def decide(
 
     Args:
         design: names and families.
-        gate: of the fit without effects.
+        test: of the fit without effects.
         none: the model without effects, if any was fitted.
         models: fitted models, each with the p of what it leaves.
         thresholds: what was fixed beforehand.
         merged: groups of effects whose directions are parallel; each counts as one family.
     """
-    p = gate.p
+    p = test.p
     if p > thresholds.detect:
         why = f"nothing is left of the base fit (p = {p:.3g} > {thresholds.detect:g})"
         return Verdict("NONE", (), (), p, why)

@@ -16,7 +16,7 @@ Record some ten frames of it without moving anything, from the distance at which
 camera stands still: what the frames share is its fixed pattern, what differs is its noise.
 
 RECORDING is what `features` reads: a .bag or .mcap of one or more frames, 16-bit depth PNGs or a
-folder of them, with --camera, or .npz height maps. Each frame is looked at by itself. With
+folder of them, with --camera, or .npz height maps. Each frame is taken by itself. With
 --baseline the camera is stereo: errors are px of disparity, and depth errors grow with the
 square of the depth. Without, errors are metres, whatever the depth.
 

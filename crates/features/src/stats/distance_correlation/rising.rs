@@ -3,7 +3,7 @@
 //! \\( \sum_{i<j} |x_j - x_i| |y_j - y_i| \\) differs from the sum without bars, which is a product of
 //! sums, only where y falls: it is twice the sum over rising pairs less the sum without bars.
 
-/// Points of a block within which every pair is looked at: 500 products in vector registers cost less
+/// Points of a block within which every pair is examined: 500 products in vector registers cost less
 /// than the five partings that they replace.
 const BLOCK: usize = 32;
 /// Running sums side by side.

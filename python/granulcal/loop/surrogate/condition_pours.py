@@ -7,13 +7,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.errors import ObservationError
 
-__all__ = ["Observation"]
+__all__ = ["ConditionPours"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Observation:
+class ConditionPours:
     """Pours of one material under one condition.
 
     Attributes:
@@ -27,7 +27,7 @@ class Observation:
     pours: Array
 
     @classmethod
-    def of(cls, label: str, condition: ArrayLike, pours: ArrayLike) -> "Observation":
+    def of(cls, label: str, condition: ArrayLike, pours: ArrayLike) -> "ConditionPours":
         """Returns the observation as arrays.
 
         Raises:
