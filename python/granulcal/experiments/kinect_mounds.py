@@ -317,8 +317,17 @@ def _row(result: MapResult) -> str:
     )
 
 
+def _short(names: Sequence[str]) -> list[str]:
+    """Returns the last word of each path; of those that share it all but the first has two."""
+    last = [name.rpartition(".")[2] for name in names]
+    return [
+        word if word not in last[:i] else ".".join(names[i].split(".")[-2:])
+        for i, word in enumerate(last)
+    ]
+
+
 def _table(results: list[MapResult], names: Sequence[str]) -> str:
-    short = [name.rpartition(".")[2] for name in names]
+    short = _short(names)
     lines = [
         "| map | prior mean | best of training | posterior mode | posterior mean | "
         + " | ".join(f"{name}: mode (90 % interval)" for name in short)
