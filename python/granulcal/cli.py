@@ -175,7 +175,9 @@ def _subparsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentP
 
 @contextlib.contextmanager
 def _interruptible(*, raises: bool = True) -> Iterator[None]:
-    """Lets Ctrl-C or SIGTERM end the process within a second whatever runs, and at once if asked twice.
+    """Lets Ctrl-C end the process within a second whatever runs, and at once if asked twice.
+
+    So do SIGTERM, a terminal that is closed and processor time that is used up.
 
     Each raises a KeyboardInterrupt, too, unless what runs ends by itself when it is asked to.
     """
@@ -187,7 +189,7 @@ def _interruptible(*, raises: bool = True) -> Iterator[None]:
     before = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
     listener = _native.listen_for_signals(f"/dev/fd/{read}")
     handlers = {}
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU):
         # Of a process in the background of a shell that is `nohup` some are ignored, and stay so.
         if signal.getsignal(number) is not signal.SIG_IGN:
             handlers[number] = signal.signal(

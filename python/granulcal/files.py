@@ -44,10 +44,10 @@ def write_toml(path: Path, text: str) -> None:
     replace_text(path, text)
 
 
-def replace_text(path: Path, text: str) -> None:
-    """Writes a whole document or none in the place of one that is the caller's to change."""
+def replace_text(path: Path, text: str | bytes) -> None:
+    """Writes a whole file or none in the place of one that is the caller's to change."""
     with beside(path) as new:
-        new.write_text(text, encoding="utf-8")
+        new.write_bytes(text.encode("utf-8") if isinstance(text, str) else text)
 
 
 def save_figure(figure: "Figure", path: str | PathLike[str], **options: Any) -> None:
@@ -62,12 +62,24 @@ def save_figure(figure: "Figure", path: str | PathLike[str], **options: Any) -> 
 
 @contextmanager
 def beside(path: Path) -> Iterator[Path]:
-    """A new file beside `path`, which takes its place if the block ends well, else is removed."""
+    """A new file beside `path`, which takes its place if the block ends well, else is removed.
+
+    Raises:
+        OSError: it cannot be written; names `path`.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = _new_file(path)
     try:
         yield temporary
         os.replace(temporary, path)
+    except OSError as error:
+        # What writes into an open file knows no name, and the temporary one is not the user's.
+        if error.filename not in (None, str(temporary)):
+            raise
+        if error.errno is None:
+            raise OSError(f"{path}: cannot write: {error}") from error
+        text = f"cannot write: {error.strerror}"
+        raise OSError(error.errno, text, str(path)) from error
     finally:
         temporary.unlink(missing_ok=True)
 

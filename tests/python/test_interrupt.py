@@ -169,6 +169,37 @@ def test_a_signal_ends_the_command(
     assert left == []
 
 
+@pytest.mark.parametrize("number", ["SIGHUP", "SIGXCPU"])
+def test_a_closed_terminal_and_used_up_time_end_the_command(
+    folder: Path, tmp_path: Path, number: str
+) -> None:
+    test_a_signal_ends_the_command(folder, tmp_path, "calibrate", 1, signal.Signals[number])
+
+
+def test_a_second_run_into_the_same_pours_is_refused(
+    small_scene, small_prior, tmp_path: Path
+) -> None:
+    from granulcal.pours.kept_pours import KeptPours
+
+    path = tmp_path / "run" / "pours.json"
+    code = (
+        "import sys, time\nfrom pathlib import Path\nfrom granulcal.pours.one_run import OneRun\n"
+        f"held = OneRun.of(Path({str(path)!r}))\nprint('held', flush=True)\ntime.sleep(600)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as other:
+        try:
+            assert other.stdout is not None and other.stdout.readline() == "held\n"
+            with pytest.raises(BlockingIOError, match="another run is pouring into this file"):
+                KeptPours(small_scene, small_prior, path, threads=1)
+        finally:
+            other.kill()
+            other.wait()
+    # What was killed holds nothing, and one process may look twice.
+    first = KeptPours(small_scene, small_prior, path, threads=1)
+    second = KeptPours(small_scene, small_prior, path, threads=1)
+    assert first.rows == second.rows == {}
+
+
 def test_finished_pours_of_an_interrupted_calibration_are_kept(
     small_scene, small_prior, tmp_path: Path
 ) -> None:

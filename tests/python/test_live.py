@@ -10,7 +10,7 @@ import pytest
 
 import granulcal as gc
 from granulcal.measured.live import RealSense, _frame_of, record
-from granulcal.measured.ros_files import DepthFrame
+from granulcal.measured.ros_files import DepthFrame, write_bag, write_mcap
 
 pytest.importorskip("rosbags")
 LENS = {"width": 64, "height": 48, "fx": 60.0, "fy": 61.0, "cx": 31.5, "cy": 23.5}
@@ -127,3 +127,19 @@ def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
         record(OwnSource(), tmp_path / "x.png")
     with pytest.raises(ValueError, match="frames must be from 1 to 1000, got 0"):
         record(OwnSource(), tmp_path / "x.bag", frames=0)
+
+
+@pytest.mark.parametrize("name", ["couscous.bag", "couscous.mcap"])
+def test_a_recording_that_is_there_stays(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    assert record(OwnSource(), path, frames=2) == 2
+    before = path.read_bytes()
+    source = OwnSource()
+    with pytest.raises(ValueError, match="may not be had again"):
+        record(source, path, frames=2)
+    # Before the camera is asked.
+    assert not source.is_closed
+    write = write_bag if name.endswith("bag") else write_mcap
+    with pytest.raises(ValueError, match="may not be had again"):
+        write(path, source.frames(), LENS)
+    assert path.read_bytes() == before

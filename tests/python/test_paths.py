@@ -1,6 +1,8 @@
 """Every command from the parser itself: it replaces no input and no file of another kind."""
 
 import argparse
+import errno
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -188,9 +190,34 @@ def test_a_sample_replaces_no_document(tmp_path, capsys):
     (tmp_path / "couscous.png").unlink()
     assert cli.main(["sample", str(tmp_path)]) == 2
     assert "couscous.mcap is left as it is" in capsys.readouterr().err
+    # All are looked at before the first is written.
+    assert not (tmp_path / "couscous.png").exists()
     for name in (".sensor.toml", "couscous.bag.part", "couscous.mcap"):
         assert (tmp_path / name).read_text() == TEXT
     assert {path: path.read_text() for path in documents} == documents
+
+
+def test_a_sample_replaces_samples_and_no_recording(tmp_path, capsys):
+    pytest.importorskip("rosbags")
+    words = ["init", str(tmp_path), "--scene", "drop", "--set", "grains.count=20"]
+    assert cli.main([*words, "--preset", "fast"]) == 0
+    again = ["sample", str(tmp_path)]
+    assert cli.main(again) == 0
+    assert cli.main([*again, "--seed", "3"]) == 0
+    for name in ("couscous.bag", "couscous.mcap", "couscous.png", "wall.bag"):
+        path = tmp_path / name
+        mine = path.read_bytes()
+        # One's own recording under the name that the guide gives to it.
+        path.write_bytes(mine + b"\0")
+        before = {each: each.read_bytes() for each in tmp_path.iterdir() if each.is_file()}
+        assert cli.main(again) == 2
+        assert f"{name} is left as it is" in capsys.readouterr().err
+        assert {each: each.read_bytes() for each in before} == before
+        path.write_bytes(mine)
+    (tmp_path / "truth.json").write_text("{}")
+    assert cli.main(again) == 2
+    assert "truth.json" in capsys.readouterr().err
+    assert (tmp_path / "truth.json").read_text() == "{}"
 
 
 def test_the_model_of_a_built_in_scene_replaces_no_other_file(tmp_path, capsys):
@@ -199,6 +226,31 @@ def test_the_model_of_a_built_in_scene_replaces_no_other_file(tmp_path, capsys):
     with pytest.raises(ValueError, match="is left as it is"):
         write_beside(tmp_path / "mine" / "model.json", "{}")
     assert (tmp_path / "mine" / "model.json").read_text() == TEXT
+
+
+def test_a_disk_that_is_full_names_the_file(tmp_path, capsys, monkeypatch):
+    def full(self, data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert cli.main(["init", str(tmp_path / "new")]) == 1
+    error = capsys.readouterr().err
+    assert "scene.toml: cannot write: No space left on device" in error, error
+    assert list((tmp_path / "new").iterdir()) == []
+
+
+def test_samples_that_were_stopped_can_be_made_again(tmp_path, monkeypatch):
+    words = ["init", str(tmp_path), "--scene", "drop", "--set", "grains.count=20"]
+    assert cli.main([*words, "--preset", "fast"]) == 0
+    with monkeypatch.context() as patch:
+
+        def full(*_, **__):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        patch.setattr("granulcal.starter.samples.write_bag", full)
+        assert cli.main(["sample", str(tmp_path)]) == 1
+    assert (tmp_path / "couscous.png").exists()
+    assert cli.main(["sample", str(tmp_path)]) == 0
 
 
 def test_files_of_studies_replace_no_document_that_was_changed(tmp_path):

@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -148,9 +149,32 @@ def test_a_dry_run_says_how_long_and_makes_nothing(
     # As `generate --dry-run` says it.
     assert told["missing"] == 70 and told["threads"] == 2
     assert told["seconds"] == pytest.approx(70 * told["pour_cpu_s"] / 2) and told["seconds"] > 0
+    assert told["extrapolated"] is False
     assert main([*words, "--dry-run"]) == 0
     assert capsys.readouterr().out.startswith("about ")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml", "x.bag"]
+
+
+def test_a_dry_run_of_long_pours_says_what_it_extrapolated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("granulcal.pours.pour_time.PATIENCE_S", 1.5)
+    (tmp_path / "x.bag").write_bytes(b"")
+    # Hours each: they are begun, and no more.
+    scene = gc.Scene.funnel(0.05, count=4000, preset="accurate")
+    scene = scene.with_({"end.horizon": 900.0, "end.kinetic_energy": 1e-300})
+    (tmp_path / "scene.toml").write_text(scene.to_toml())
+    words = ["calibrate", "scene.toml", "default", "x.bag", "-o", "run", "--budget", "70"]
+    begun = time.monotonic()
+    assert main([*words, "--dry-run", "--json"]) == 0
+    assert time.monotonic() - begun < 60
+    told = json.loads(capsys.readouterr().out)
+    assert told["extrapolated"] is True and told["pour_cpu_s"] > 60
+    assert main([*words, "--dry-run"]) == 0
+    said = capsys.readouterr().out
+    assert "a pour was stopped after" in said and "until its horizon of 900 s" in said
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_dry_run_of_training_and_check_says_how_long_and_makes_nothing(

@@ -13,7 +13,7 @@ pub enum ModelError {
     #[error(transparent)]
     File(DatasetError),
     /// `model.json` is cut off, or is the document of something else.
-    #[error("{} is not the document of a model: {source}", path.display())]
+    #[error("{} is not the document of a model", path.display())]
     Document {
         /// The file.
         path: PathBuf,

@@ -117,7 +117,11 @@ fn damaged_models_are_named() {
     let copy = |name: &str| {
         fs::copy(data().join("auto").join(name), place.path().join(name)).unwrap();
     };
-    let refuse = || Model::load(place.path()).unwrap_err().to_string();
+    let refuse = || {
+        let error = Model::load(place.path()).unwrap_err();
+        let cause = std::error::Error::source(&error).map_or_else(String::new, ToString::to_string);
+        format!("{error}: {cause}")
+    };
     assert!(refuse().contains("model.json"));
     copy("model.json");
     assert!(refuse().contains("weights.safetensors"));
@@ -154,7 +158,10 @@ fn damaged_models_are_named() {
         assert!(message.contains(expected), "{from} -> {to}: {message}");
     }
     fs::write(&document, &text[..100]).unwrap();
-    assert!(refuse().contains("model.json"));
+    let message = refuse();
+    assert!(message.contains("model.json"), "{message}");
+    // The cause is told, and told once.
+    assert_eq!(message.matches("EOF while parsing").count(), 1, "{message}");
 }
 
 #[test]

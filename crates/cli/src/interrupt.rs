@@ -1,5 +1,6 @@
-//! Ctrl-C and termination signals: asked once, a command ends by itself, or the process is ended after a second; asked
-//! twice, at once. A file that is just being written is finished first, or removed where it is only half there.
+//! Ctrl-C, termination signals and limits of the shell: asked once, a command ends by itself, or the process is ended
+//! after a second; asked twice, at once. A file that is just being written is finished first, or removed where it is
+//! only half there.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -58,6 +59,25 @@ pub fn handle_signals() {
         }
         asked();
     });
+    #[cfg(unix)]
+    outlive_limits();
+}
+
+/// What a limit of the shell does: a file that is as long as `ulimit -f` allows is one that cannot be written, and
+/// processor time that is used up (`ulimit -t`) stops the command as Ctrl-C does.
+#[cfg(unix)]
+fn outlive_limits() {
+    use signal_hook::consts::{SIGXCPU, SIGXFSZ};
+
+    // A system that does not let them be taken ends the process, as before.
+    let Ok(mut signals) = signal_hook::iterator::Signals::new([SIGXCPU, SIGXFSZ]) else { return };
+    std::thread::spawn(move || {
+        for signal in signals.forever() {
+            if signal == SIGXCPU {
+                asked();
+            }
+        }
+    });
 }
 
 /// Whether the user has not asked to stop.
@@ -88,8 +108,8 @@ fn asked() {
     });
 }
 
-/// Does the same for every byte of SIGINT or SIGTERM that is read from a pipe, until it is closed: Python writes the numbers of
-/// signals into one as soon as they come, whatever the interpreter is busy with.
+/// Does the same for every byte of such a signal that is read from a pipe, until it is closed: Python writes the numbers
+/// of signals into one as soon as they come, whatever the interpreter is busy with.
 ///
 /// What comes after the returned command is dropped is not heard.
 ///
@@ -101,8 +121,8 @@ pub fn listen(pipe: &Path) -> std::io::Result<Armed> {
     std::thread::spawn(move || {
         let mut signal = [0];
         while pipe.read_exact(&mut signal).is_ok() {
-            // SIGINT and SIGTERM, which have these numbers everywhere.
-            if matches!(signal[0], 2 | 15) {
+            // SIGHUP, SIGINT and SIGTERM, which have these numbers everywhere, and SIGXCPU of Linux and macOS.
+            if matches!(signal[0], 1 | 2 | 15 | 24) {
                 asked();
             }
         }

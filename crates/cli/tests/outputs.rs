@@ -55,7 +55,7 @@ fn a_path_that_cannot_be_written_is_named_before_the_pour() {
     place.refused(&["generate", "scene.toml", "default", "-o", "scene.toml"], &["a folder"]);
 }
 
-/// A disk that is full while the files are written: `ulimit -f` makes every file that small.
+/// A disk that is full while the files are written: `ulimit -f` makes every file that small, and sends a signal.
 #[cfg(unix)]
 #[test]
 fn the_result_is_printed_even_if_a_file_beside_it_fails() {
@@ -68,7 +68,7 @@ fn the_result_is_printed_even_if_a_file_beside_it_fails() {
         ("--depth", "d.png"),
         ("--checkpoint", "c"),
     ] {
-        let limited = "trap '' XFSZ; ulimit -f 0; exec \"$0\" \"$@\"";
+        let limited = "ulimit -f 0; exec \"$0\" \"$@\"";
         let binary = env!("CARGO_BIN_EXE_granulcal-cli");
         let output = std::process::Command::new("sh")
             .args(["-c", limited, binary, "simulate", "scene.toml", "--json", option, name])
@@ -121,7 +121,7 @@ fn a_film_that_fails_on_the_way_does_not_stop_the_pour() {
     let place = Place::new();
     scene(&place);
     let whole = json(&place.expect(0, &["simulate", "scene.toml", "--json"]));
-    let limited = "trap '' XFSZ; ulimit -f 64; exec \"$0\" \"$@\"";
+    let limited = "ulimit -f 64; exec \"$0\" \"$@\"";
     let binary = env!("CARGO_BIN_EXE_granulcal-cli");
     let words = ["simulate", "scene.toml", "--json", "--mcap", "p.mcap"];
     let output = std::process::Command::new("sh")
@@ -135,4 +135,42 @@ fn a_film_that_fails_on_the_way_does_not_stop_the_pour() {
     assert!(err.contains("p.mcap") && err.contains("printed all the same"), "{err}");
     assert_eq!(json(&out)["state_hash"], whole["state_hash"]);
     assert_eq!(place.listing(), [place.at("scene.toml")]);
+}
+
+/// Processor time that is used up is no reason to leave half a file behind.
+#[cfg(unix)]
+#[test]
+fn a_limit_of_processor_time_stops_as_ctrl_c_does() {
+    let place = Place::new();
+    let binary = env!("CARGO_BIN_EXE_granulcal-cli");
+    let words = ["simulate", "funnel", "--mcap", "p.mcap", "--set", "grains.count=4000"];
+    let output = std::process::Command::new("sh")
+        .args(["-c", "ulimit -S -t 1; exec \"$0\" \"$@\"", binary])
+        .args(words)
+        .current_dir(place.at(""))
+        .output()
+        .unwrap();
+    let err = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{err}");
+    assert!(err.contains("stopped"), "{err}");
+    assert!(place.listing().is_empty(), "{:?}", place.listing());
+}
+
+/// A recording, a photograph and a height map are not made again by pouring once more.
+#[test]
+fn a_recording_that_granulcal_did_not_write_stays() {
+    let place = Place::new();
+    scene(&place);
+    for (option, name) in [("--mcap", "p.mcap"), ("--depth", "d.png")] {
+        let words = ["simulate", "scene.toml", option, name];
+        place.expect(0, &words);
+        // What a pour wrote is written again.
+        place.expect(0, &words);
+        let mut bytes = fs::read(place.at(name)).unwrap();
+        // The library in the header of the one, a pixel of the other.
+        bytes[26] ^= 1;
+        place.write(name, &bytes);
+        place.refused(&words, &[name, "left as it is", "move it away"]);
+        assert_eq!(fs::read(place.at(name)).unwrap(), bytes, "{name}");
+    }
 }

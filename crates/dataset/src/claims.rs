@@ -7,7 +7,7 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::{DatasetError, files};
+use crate::{DatasetError, Form, files};
 pub use product::Product;
 
 /// Endings of the files that a folder that is a recording is read from.
@@ -69,6 +69,15 @@ impl Claims {
             if let Some(reason) = product.unfit_place(path) {
                 return refuse(reason);
             }
+            if *product == Product::PICTURES
+                && let Some(frame) = foreign_frame(path)
+            {
+                return refuse(format!(
+                    "{} is a depth image that granulcal did not write, and pictures beside it would be read as further \
+                     frames of its recording; choose another folder",
+                    frame.display()
+                ));
+            }
             for (file, form) in product.files(path) {
                 let shown = file.display();
                 let is_read =
@@ -112,6 +121,19 @@ impl Claims {
             "{file} would become a frame of the recording {recording}; choose another folder"
         ))
     }
+}
+
+/// A depth image in a folder that is no work of granulcal.
+fn foreign_frame(folder: &Path) -> Option<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().take(MOST_ENTRIES);
+    let mut pngs = entries
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png")));
+    pngs.find(|path| {
+        // 16 bits of grey, as the first chunk says.
+        let is_depth = files::head(path).is_ok_and(|head| head.get(24..26) == Some(&[16, 0]));
+        is_depth && files::require_replaceable(path, Form::Png, path).is_err()
+    })
 }
 
 /// Adds the files that are read with `path`, each with who reads it.

@@ -32,7 +32,7 @@ pub enum DatasetError {
         /// The file that is there.
         path: PathBuf,
         /// The kind of file that it is.
-        found: &'static str,
+        found: String,
         /// The kind of file that was to be written.
         allowed: &'static str,
     },

@@ -80,7 +80,7 @@ pub fn write_file(path: &Path, form: Form, bytes: &[u8]) -> Result<(), DatasetEr
     WRITING.fetch_add(1, Ordering::SeqCst);
     let write = || {
         let mut file = PendingFile::create(path, form)?;
-        file.write_all(bytes).map_err(DatasetError::io("write", path))?;
+        file.write_all(&form.signed(bytes)).map_err(DatasetError::io("write", path))?;
         file.commit()
     };
     let written = write();
@@ -101,7 +101,8 @@ pub fn remove_temporaries() {
     }
 }
 
-/// Refuses to replace what stands at `place`, unless it is nothing, empty, or of this form; `target` is its name.
+/// Refuses to replace what stands at `place`, unless it is nothing, empty, or one of this form that granulcal
+/// wrote; `target` is its name.
 pub(crate) fn require_replaceable(
     place: &Path,
     form: Form,
@@ -120,16 +121,20 @@ pub(crate) fn require_replaceable(
     if metadata.is_file() && metadata.len() == 0 {
         return Ok(());
     }
-    let bytes = if form.needs_all() { read_at_most(place, LARGEST_TEXT)? } else { head(place)? };
+    // What is larger was not written by granulcal.
+    let most = if form.may_be_foreign() { LARGEST_PART } else { LARGEST_TEXT };
+    let is_too_large = form.may_be_foreign() && metadata.len() > most;
+    let bytes =
+        if form.needs_all() && !is_too_large { read_at_most(place, most)? } else { head(place)? };
     if form.fits(&bytes) {
         return Ok(());
     }
-    let found = Form::found(&read_at_most(place, LARGEST_TEXT).unwrap_or(bytes));
+    let found = form.found_by(&read_at_most(place, LARGEST_TEXT).unwrap_or(bytes));
     Err(DatasetError::Replaces { path: target.to_owned(), found, allowed: form.name() })
 }
 
 /// The first bytes of a file, which tell its kind.
-fn head(path: &Path) -> Result<Vec<u8>, DatasetError> {
+pub(crate) fn head(path: &Path) -> Result<Vec<u8>, DatasetError> {
     let mut bytes = Vec::with_capacity(HEAD as usize);
     open(path)?.take(HEAD).read_to_end(&mut bytes).map_err(DatasetError::io("read", path))?;
     Ok(bytes)
@@ -260,124 +265,4 @@ impl Drop for PendingFile {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_file_is_complete_or_absent() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.json");
-        let mut pending = PendingFile::create(&path, Form::Json).unwrap();
-        pending.write_all(b"half").unwrap();
-        assert!(!path.exists());
-        drop(pending);
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
-        write_file(&path, Form::Json, b"{}").unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"{}");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-    }
-
-    #[test]
-    fn a_folder_is_no_file_to_write() {
-        let folder = tempfile::tempdir().unwrap();
-        let error = write_file(folder.path(), Form::Json, b"").unwrap_err();
-        assert!(error.to_string().contains("a folder"));
-        let missing = folder.path().join("no/such/file");
-        assert!(write_file(&missing, Form::Json, b"").unwrap_err().is_bad_input());
-    }
-
-    #[test]
-    fn a_file_of_another_kind_stays() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("scene.toml");
-        let scene = "name = \"mine\"\n[grains]\ncount = 3\n";
-        for form in [
-            Form::Npy,
-            Form::Npz,
-            Form::Png,
-            Form::Mcap,
-            Form::Checkpoint,
-            Form::Parquet,
-            Form::Safetensors,
-            Form::ManifestToml,
-            Form::CameraToml,
-            Form::SensorToml,
-            Form::Json,
-            Form::Html,
-            Form::Csv,
-            Form::Pdf,
-            Form::Svg,
-            Form::Gif,
-            Form::Mp4,
-            Form::Bag,
-            Form::Export,
-        ] {
-            fs::write(&path, scene).unwrap();
-            let error = write_file(&path, form, b"x").unwrap_err();
-            assert!(matches!(error, DatasetError::Replaces { .. }), "{form:?}: {error}");
-            assert!(error.is_bad_input());
-            assert_eq!(fs::read_to_string(&path).unwrap(), scene);
-        }
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn links_stay_links_and_devices_devices() {
-        use std::os::unix::fs::symlink;
-        let folder = tempfile::tempdir().unwrap();
-        let (real, link) = (folder.path().join("real.json"), folder.path().join("link.json"));
-        fs::write(&real, "{}").unwrap();
-        symlink(&real, &link).unwrap();
-        write_file(&link, Form::Json, b"[1]").unwrap();
-        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
-        assert_eq!(fs::read(&real).unwrap(), b"[1]");
-        let lost = folder.path().join("lost.json");
-        symlink(folder.path().join("nowhere"), &lost).unwrap();
-        let error = write_file(&lost, Form::Json, b"").unwrap_err().to_string();
-        assert!(error.contains("leads nowhere"), "{error}");
-        let error = write_file(Path::new("/dev/null"), Form::Json, b"").unwrap_err().to_string();
-        assert!(error.contains("a device"), "{error}");
-        let error = read(Path::new("/dev/zero")).unwrap_err().to_string();
-        assert!(error.contains("a device") && error.contains("plain file"), "{error}");
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_temporary_file_of_somebody_else_is_left_alone() {
-        let folder = tempfile::tempdir().unwrap();
-        let secret = folder.path().join("secret");
-        fs::write(&secret, "s").unwrap();
-        let pid = std::process::id();
-        let planted = folder.path().join(format!(".a.json.{pid}-0{TEMPORARY}"));
-        std::os::unix::fs::symlink(&secret, &planted).unwrap();
-        write_file(&folder.path().join("a.json"), Form::Json, b"{}").unwrap();
-        assert_eq!(fs::read_to_string(&secret).unwrap(), "s");
-        assert!(fs::symlink_metadata(&planted).unwrap().is_symlink());
-    }
-
-    #[test]
-    fn a_file_that_is_read_only_stays_and_long_names_are_names() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("kept.json");
-        fs::write(&path, "{}").unwrap();
-        let mut permissions = fs::metadata(&path).unwrap().permissions();
-        permissions.set_readonly(true);
-        fs::set_permissions(&path, permissions).unwrap();
-        let error = write_file(&path, Form::Json, b"[]").unwrap_err().to_string();
-        assert!(error.contains("read-only"), "{error}");
-        assert_eq!(fs::read(&path).unwrap(), b"{}");
-        let long = folder.path().join(format!("{}.json", "n".repeat(250)));
-        write_file(&long, Form::Json, b"[]").unwrap();
-        assert_eq!(fs::read(&long).unwrap(), b"[]");
-    }
-
-    #[test]
-    fn what_is_too_large_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("large");
-        File::create(&path).unwrap().set_len(LARGEST_TEXT + 1).unwrap();
-        let error = read_text(&path).unwrap_err().to_string();
-        assert!(error.contains("at most"), "{error}");
-    }
-}
+mod tests;

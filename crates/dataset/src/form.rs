@@ -1,4 +1,9 @@
-//! What kind of file is written, and what it may replace: nothing but a file of its own kind.
+//! What kind of file is written, and what it may replace: nothing but a file of its own kind, and of the kinds that
+//! cameras and people make, too, nothing but what granulcal wrote.
+
+use std::borrow::Cow;
+
+use crate::signature::{self, Signature};
 
 /// What a camera's file begins with that stands beside an image; the hash of the rest follows.
 const MARK: &str = "# Written by granulcal beside an image; once changed it is not replaced. Hash ";
@@ -73,18 +78,66 @@ impl Form {
         }
     }
 
-    /// Whether an existing file of these bytes, or of these first ones, is of this kind.
-    pub(crate) fn fits(self, bytes: &[u8]) -> bool {
+    /// What a file of this kind is called that is not replaced all the same.
+    fn kept(self) -> String {
+        let name = self.name();
         match self {
-            Self::CameraToml => str::from_utf8(bytes).is_ok_and(is_marked),
-            Self::SensorToml => str::from_utf8(bytes).is_ok_and(is_sensor),
-            Self::Export => !str::from_utf8(bytes).is_ok_and(is_toml),
-            other => other.begins(bytes),
+            Self::Bag => format!("{name}, which may not be had again"),
+            Self::Mcap => format!("{name} and no film of a pour"),
+            _ => format!("{name} that granulcal did not write, or that was changed"),
         }
     }
 
+    /// Whether an existing file of these bytes, or of these first ones, is of this kind and may be replaced.
+    pub(crate) fn fits(self, bytes: &[u8]) -> bool {
+        match self {
+            Self::Bag => false,
+            Self::Mcap => signature::is_film(bytes),
+            Self::Html => self.begins(bytes) && signature::is_page(bytes),
+            Self::CameraToml => str::from_utf8(bytes).is_ok_and(is_marked),
+            Self::SensorToml => str::from_utf8(bytes).is_ok_and(is_sensor),
+            Self::Export => !str::from_utf8(bytes).is_ok_and(is_toml),
+            other => match other.signature() {
+                Some(signature) => signature.is_on(bytes),
+                None => other.begins(bytes),
+            },
+        }
+    }
+
+    /// A file as it is written: with the signature, where its kind has one.
+    pub(crate) fn signed(self, bytes: &[u8]) -> Cow<'_, [u8]> {
+        match self.signature() {
+            Some(signature) => signature.put(bytes).into(),
+            None => bytes.into(),
+        }
+    }
+
+    /// What marks a file of this kind that granulcal wrote.
+    fn signature(self) -> Option<Signature> {
+        Some(match self {
+            Self::Png => Signature::Png,
+            Self::Gif => Signature::Gif,
+            Self::Npz => Signature::Npz,
+            Self::Mp4 => Signature::Mp4,
+            Self::Pdf => Signature::Pdf,
+            Self::Svg => Signature::Svg,
+            _ => return None,
+        })
+    }
+
+    /// Whether a large file is none that granulcal wrote: people's films and figures are read in part alone.
+    pub(crate) fn may_be_foreign(self) -> bool {
+        self == Self::Html || self.signature().is_some()
+    }
+
+    /// What a file of these bytes, which this kind must not replace, is called in messages.
+    pub(crate) fn found_by(self, bytes: &[u8]) -> String {
+        let found = Self::found(bytes);
+        if found == self.name() { self.kept() } else { found.to_owned() }
+    }
+
     /// What a file of these bytes is called in messages, as far as they tell it.
-    pub(crate) fn found(bytes: &[u8]) -> &'static str {
+    fn found(bytes: &[u8]) -> &'static str {
         const TOLD_BY_BYTES: [Form; 13] = [
             Form::Npy,
             Form::Npz,
@@ -113,7 +166,7 @@ impl Form {
 
     /// Whether all of a file tells its kind, and not its first bytes.
     pub(crate) fn needs_all(self) -> bool {
-        matches!(self, Self::CameraToml | Self::SensorToml | Self::Export)
+        matches!(self, Self::CameraToml | Self::SensorToml | Self::Export) || self.may_be_foreign()
     }
 
     /// Whether a file of this kind may begin like this.

@@ -59,9 +59,11 @@ mod room;
 mod row;
 mod scene_file;
 mod sensor_file;
+mod signature;
 mod survey;
 mod table;
 mod trajectory_file;
+mod trial;
 
 pub use camera_file::CameraFile;
 pub use checkpoint_file::{read_checkpoint_header, resume_checkpoint, write_checkpoint};
@@ -96,3 +98,4 @@ pub use row::{Row, RowStatus};
 pub use scene_file::{load_prior, load_scene, scene_from_text};
 pub use sensor_file::{load_sensor, save_sensor};
 pub use survey::{Choice, DepthUnit, Lost, Survey, Topic};
+pub use trial::{Trial, try_pour};

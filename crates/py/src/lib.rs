@@ -68,7 +68,7 @@ mod _native {
     #[pymodule_export]
     use crate::scene::Scene;
     #[pymodule_export]
-    use crate::simulate::simulate;
+    use crate::simulate::{simulate, try_pour};
     #[pymodule_export]
     use crate::statistics::{diagnostics, paper16, statistics_table};
 

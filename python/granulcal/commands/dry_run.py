@@ -1,16 +1,18 @@
-"""The flag `--dry-run`: how long a command would take, from three pours or its first steps."""
+"""The flag `--dry-run`: how long a command would take, from three pours or its first steps.
+
+The answer comes within a minute: pours that take longer are stopped and extrapolated.
+"""
 
 import argparse
 import json
-import math
 import os
-import time
 from typing import TYPE_CHECKING
 
 from granulcal.progress import duration
 
 if TYPE_CHECKING:
     from granulcal.engines import Engine
+    from granulcal.pours.pour_time import PourTime
     from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
 
@@ -32,21 +34,22 @@ def add_dry_run(
     )
 
 
-def cost(scene: "Scene", prior: "Prior", *, engine: "Engine | None" = None) -> float:
-    """Returns what a pour costs, the mean of three draws of a prior [s of a core]."""
-    from granulcal.engines import engine_in_use
-    from granulcal.pours.forward import scene_at
-    from granulcal.pours.simulate import simulate
+def cost(
+    scene: "Scene", prior: "Prior", *, engine: "Engine | None" = None, share: int = 1
+) -> "PourTime":
+    """Returns what a pour costs, from three draws of a prior or fewer, if they take long.
 
-    foreign = engine or engine_in_use()
-    took = []
-    for i, theta in enumerate(prior.sample(_TRIED, seed=_SEED)):
-        begun = time.monotonic()
-        pour = simulate(scene_at(scene, prior, theta), seed=_SEED + i, engine=foreign)
-        # Nobody knows the processor's time of another engine.
-        known = foreign is None and math.isfinite(pour.cpu_seconds)
-        took.append(pour.cpu_seconds if known else time.monotonic() - begun)
-    return sum(took) / _TRIED
+    Args:
+        scene: what is poured.
+        prior: what is drawn.
+        engine: another simulator in place of ours, or of the one in use.
+        share: one part in so many of the time that a dry run has.
+    """
+    from granulcal.pours.forward import scene_at
+    from granulcal.pours.pour_time import PATIENCE_S, pour_time
+
+    scenes = [scene_at(scene, prior, theta) for theta in prior.sample(_TRIED, seed=_SEED)]
+    return pour_time(scenes, seed=_SEED, engine=engine, patience=PATIENCE_S / share)
 
 
 def say_how_long(
@@ -57,7 +60,7 @@ def say_how_long(
     *,
     engine: "Engine | None" = None,
 ) -> int:
-    """Pours three draws of a prior and says how long `pours` of them would take; returns 0.
+    """Pours draws of a prior and says how long `pours` of them would take; returns 0.
 
     Args:
         options: may have `threads` and, for JSON with the words of `generate --dry-run`, `json`.
@@ -68,12 +71,10 @@ def say_how_long(
     """
     threads = getattr(options, "threads", None) or os.cpu_count() or 1
     each = cost(scene, prior, engine=engine)
-    text = (
-        f"at most {pours} pours, {each:.2f} s of a core each (mean of {_TRIED} pours), "
-        f"{threads} at once"
-    )
-    told = {"missing": pours, "threads": threads, "pour_cpu_s": each}
-    return say_seconds(options, pours * each / threads, text, **told)
+    text = f"at most {pours} pours, {each}, {threads} at once"
+    told = {"missing": pours, "threads": threads, "pour_cpu_s": each.seconds}
+    told["extrapolated"] = each.cut is not None
+    return say_seconds(options, pours * each.seconds / threads, text, **told)
 
 
 def say_seconds(options: argparse.Namespace, seconds: float, text: str, **told: object) -> int:

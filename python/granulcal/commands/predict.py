@@ -110,8 +110,9 @@ def _say_how_long(options: argparse.Namespace, scenes: "list[Scene]", threads: i
     if not scenes:
         return say_seconds(options, 0.0, "no pours", missing=0)
     each, pours = pour_time(scenes), options.pours * len(scenes)
-    text = f"at most {pours} pours, {each:.2f} s each, {threads} at once"
-    return say_seconds(options, pours * each / threads, text, missing=pours)
+    text = f"at most {pours} pours, {each}, {threads} at once"
+    told = {"missing": pours, "extrapolated": each.cut is not None}
+    return say_seconds(options, pours * each.seconds / threads, text, **told)
 
 
 def _outcome(kind: str) -> int:

@@ -78,6 +78,8 @@ def _run(options: argparse.Namespace) -> int:
     words += reading_words(options)
     words += ["-o", str(options.out), "--seeds", str(options.seeds)]
     words += ["--draws", str(options.draws)]
+    if options.data is not None:
+        words += ["--data", str(options.data)]
     with shown():
         found = calibrate(
             model,

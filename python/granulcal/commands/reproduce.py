@@ -159,12 +159,15 @@ def _say_how_long_of_paper(options: argparse.Namespace, size: "Size") -> int:
         text = each.scene.to_toml()
         first.setdefault(text, each)
         counts[text] = counts.get(text, 0) + each.count
-    costs = {text: cost(each.scene, Prior.default()) for text, each in first.items()}
-    seconds = sum(count * costs[text] for text, count in counts.items()) / threads
+    costs = {
+        text: cost(each.scene, Prior.default(), share=len(first)) for text, each in first.items()
+    }
+    seconds = sum(count * costs[text].seconds for text, count in counts.items()) / threads
     missing = sum(counts.values())
     told = f"{missing} pours in {len(sets)} sets, {threads} at once, training apart"
     options.tells = options.json is True
-    say_seconds(options, seconds, told, missing=missing, threads=threads)
+    cut = any(each.cut is not None for each in costs.values())
+    say_seconds(options, seconds, told, missing=missing, threads=threads, extrapolated=cut)
     for text, count in counts.items():
-        print(f"  {count} pours at {costs[text]:.2f} s of a core, as of {first[text].name}")
+        print(f"  {count} pours as of {first[text].name}: {costs[text]}")
     return DONE

@@ -213,7 +213,7 @@ def _prior() -> Prior:
 
 def _training_pours(out_dir: Path, count: int) -> Dataset:
     scene, prior = _scene(), _prior()
-    each, threads = pour_time([in_the_middle(scene, prior)]), os.cpu_count() or 1
+    each, threads = pour_time([in_the_middle(scene, prior)]).seconds, os.cpu_count() or 1
     print(
         f"{count} pours less those that are there: at {each:.1f} s each, {threads} at once, about "
         f"{duration(count * each / threads)} for all; then {3 * _FORWARD_SEEDS} for each map",

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from granulcal import _native
 from granulcal.measured.ros_files import DepthFrame, write_bag, write_mcap
 
 __all__ = ["RealSense", "Ros2", "Source", "record"]
@@ -156,7 +157,7 @@ def record(source: Source, path: str | PathLike[str], *, frames: int = 10) -> in
         frames: how many.
 
     Raises:
-        ValueError: another name, or no frames asked for.
+        ValueError: another name, one of a file that is there, or no frames asked for.
         OSError: the source delivers nothing.
     """
     if not 1 <= frames <= _MOST_FRAMES:
@@ -164,6 +165,8 @@ def record(source: Source, path: str | PathLike[str], *, frames: int = 10) -> in
     kind = Path(path).suffix.lower()
     if kind not in (".bag", ".mcap"):
         raise ValueError(f"{path} must end in .bag or .mcap")
+    # Before the camera is asked.
+    _native.check_paths([], [("path", path, "messages")])
     delivered = source.frames()
     try:
         taken = [frame for frame, _ in zip(delivered, range(frames), strict=False)]

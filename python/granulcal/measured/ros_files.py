@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.files import replace_text
 
 __all__ = ["DepthFrame", "write_bag", "write_mcap"]
 
@@ -103,17 +104,21 @@ def write_bag(
     lens: dict[str, float],
     *,
     depth_unit: float = 1e-4,
+    replace: bool = False,
 ) -> int:
     """Writes frames as the RealSense viewer saves them, lz4-compressed; returns their number.
 
     Args:
-        path: the .bag file; another recording there is replaced, a file of another kind is not.
+        path: the .bag file.
         frames: depth images of one size.
         lens: width, height, fx, fy, cx, cy [px], the first pixel's centre at 0.
         depth_unit: metres per count.
+        replace: what stands there is the caller's to replace; else it is left as it is, for a
+            recording may not be had again.
 
     Raises:
         ModuleNotFoundError: rosbags is not installed.
+        ValueError: something stands there that is not to be replaced.
     """
     from rosbags.rosbag1 import Writer
 
@@ -138,24 +143,30 @@ def write_bag(
                 picture = ros.image("0", frame.time_ns, "mono16", _counts(frame.depth, depth_unit))
                 write(f"{stream}/image/data", "sensor_msgs/msg/Image", frame.time_ns + 2, picture)
                 count += 1
-        _native.write_file(Path(path), "bag", (folder / "draft.bag").read_bytes())
+        _put(Path(path), (folder / "draft.bag").read_bytes(), replace=replace)
     return count
 
 
 def write_mcap(
-    path: str | PathLike[str], frames: Iterable[DepthFrame], lens: dict[str, float]
+    path: str | PathLike[str],
+    frames: Iterable[DepthFrame],
+    lens: dict[str, float],
+    *,
+    replace: bool = False,
 ) -> int:
     """Writes frames as `ros2 bag record` saves a realsense2_camera node; returns their number.
 
     Depths are 32FC1 in metres, 0 is no data; the lens is sent with each.
 
     Args:
-        path: the .mcap file; another recording there is replaced, a file of another kind is not.
+        path: the .mcap file.
         frames: depth images of one size.
         lens: width, height, fx, fy, cx, cy [px], the first pixel's centre at 0.
+        replace: as for `write_bag`.
 
     Raises:
         ModuleNotFoundError: rosbags is not installed.
+        ValueError: something stands there that is not to be replaced.
     """
     from rosbags.rosbag2 import StoragePlugin, Writer
 
@@ -181,7 +192,7 @@ def write_mcap(
                     data = ros.store.serialize_cdr(message, name)
                     writer.write(connections[topic], frame.time_ns, data)
                 count += 1
-        _native.write_file(Path(path), "mcap", next(folder.glob("*.mcap")).read_bytes())
+        _put(Path(path), next(folder.glob("*.mcap")).read_bytes(), replace=replace)
     return count
 
 
@@ -193,6 +204,19 @@ def _counts(depth: NDArray[np.floating], unit: float) -> Image:
             f"got {np.max(depth):g} m"
         )
     return counts.astype("<u2")
+
+
+def _put(path: Path, data: bytes, *, replace: bool) -> None:
+    """Brings a recording to its place."""
+    if replace:
+        replace_text(path, data)
+        return
+    if path.exists() and path.stat().st_size > 0:
+        raise ValueError(
+            f"{path} is left as it is: what it records may not be had again; choose another name, "
+            "or move it away"
+        )
+    _native.write_file(path, path.suffix.removeprefix("."), data)
 
 
 @contextmanager

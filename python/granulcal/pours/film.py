@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
-from granulcal.files import beside
 from granulcal.pours.scene import Scene
 
 if TYPE_CHECKING:
@@ -134,7 +133,8 @@ def _write_mp4(path: Path, frames: "list[Image.Image]", fps: float) -> None:
     import av
 
     held = [frames[-1]] * round(fps * _HOLD_MS / 1000)
-    with beside(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
+    buffer = BytesIO()
+    with av.open(buffer, "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
         # H.264 has half as many pixels of colour: sides are even.
         stream.width, stream.height = (side - side % 2 for side in frames[0].size)
@@ -143,6 +143,7 @@ def _write_mp4(path: Path, frames: "list[Image.Image]", fps: float) -> None:
             picture = image.convert("RGB").crop((0, 0, stream.width, stream.height))
             container.mux(stream.encode(av.VideoFrame.from_image(picture)))
         container.mux(stream.encode())
+    _native.write_file(path, "mp4", buffer.getvalue())
 
 
 _WRITERS = {".gif": _write_gif, ".mp4": _write_mp4}

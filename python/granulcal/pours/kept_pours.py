@@ -24,6 +24,7 @@ from granulcal.engines.in_use import law_of_pours
 from granulcal.files import write_beside
 from granulcal.pours.forward import scene_at
 from granulcal.pours.left_out import LeftOut
+from granulcal.pours.one_run import OneRun
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour, simulate
 from granulcal.pours.statistics import NAMES, statistics
@@ -68,6 +69,7 @@ class KeptPours:
 
     Raises:
         ValueError: the file is that of another scene, prior, seed or law, or is damaged.
+        BlockingIOError: another process pours into the file.
     """
 
     def __init__(
@@ -96,6 +98,8 @@ class KeptPours:
         # Another simulator has another law, whatever it is.
         self.law = law_of_pours() if engine is None else 0
         self.key = hashlib.sha256(text.encode()).hexdigest()
+        # Before it is read: what another run writes after that would be lost.
+        self._held = OneRun.of(path)
         self.rows: dict[str, dict] = self._read() if path.exists() else {}
 
     def __call__(self, theta: Array, first: int) -> Array:

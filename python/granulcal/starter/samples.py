@@ -1,6 +1,5 @@
 """Recordings of a pour whose material is known, as cameras' software would have written them."""
 
-import json
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,11 +16,11 @@ from granulcal.documents import (
     parse_toml,
     read_bytes,
 )
-from granulcal.files import write_beside
 from granulcal.measured.ros_files import DepthFrame, write_bag, write_mcap
 from granulcal.pours.camera import Camera
 from granulcal.pours.scene import Material, Scene
 from granulcal.pours.simulate import simulate
+from granulcal.starter.truth import require_own, write_truth
 
 __all__ = ["HIDDEN", "Samples", "write_samples"]
 
@@ -45,6 +44,8 @@ _LENS = Table(
     },
     open=True,
 )
+
+_PNG, _MESSAGES = "couscous.png", ("couscous.bag", "wall.bag", "couscous.mcap")
 
 SENSOR = """\
 # The camera of the sample recordings: a stereo camera with a baseline of 5 cm, its errors in px of disparity.
@@ -127,7 +128,11 @@ def write_samples(
 
     Raises:
         FileNotFoundError: the folder has no scene.toml or camera.toml.
+        ValueError: a recording stands there that this did not write, or that was changed.
     """
+    targets = [folder / name for name in (_PNG, *_MESSAGES)]
+    targets += [_of_condition(folder, name, i) for name in conditions or {} for i in range(pours)]
+    require_own(folder, targets)
     scene = Scene.load(folder / "scene.toml").with_material(material)
     path = folder / "camera.toml"
     lens = parse_toml(read_bytes(path, most=LARGEST_DOCUMENT), path)
@@ -138,7 +143,12 @@ def write_samples(
         sensor = Path(place) / "sensor.toml"
         sensor.write_text(SENSOR.format(focal=lens["fx"], unit=_DEPTH_UNIT), encoding="utf-8")
         studio = _Studio(camera.tilted(x_deg=_TILT_DEG[0], y_deg=_TILT_DEG[1]), lens, sensor)
-        return _write(folder, scene, studio, seed, conditions or {}, pours)
+        try:
+            return _write(folder, scene, studio, seed, conditions or {}, pours)
+        finally:
+            # What a full disk has stopped can be made again.
+            there = [path for path in targets if path.exists()]
+            write_truth(folder, scene.material.values(), seed, there)
 
 
 def _write(
@@ -151,30 +161,32 @@ def _write(
 ) -> Samples:
     grains = _poured(scene, seed)
     nothing = (np.zeros((0, 3)), np.zeros(0))
-    written = [folder / "couscous.png"]
+    written = [folder / _PNG]
     _save_png(studio, grains, seed, written[0])
     for name, at in conditions.items():
         for i in range(pours):
-            path = folder / "pours" / f"{name}-{i}.png"
+            path = _of_condition(folder, name, i)
             path.parent.mkdir(exist_ok=True)
             own = seed + 1000 * (i + 1)
             _save_png(studio, _poured(scene.with_(at), own), own, path)
             written.append(path)
     missing = []
-    for name, seen in (("couscous.bag", grains), ("wall.bag", nothing), ("couscous.mcap", grains)):
+    for name, seen in zip(_MESSAGES, (grains, nothing, grains), strict=True):
         path, frames = folder / name, studio.frames(seen, seed + len(name))
         try:
             if path.suffix == ".bag":
-                write_bag(path, frames, studio.lens, depth_unit=_DEPTH_UNIT)
+                write_bag(path, frames, studio.lens, depth_unit=_DEPTH_UNIT, replace=True)
             else:
-                write_mcap(path, frames, studio.lens)
+                write_mcap(path, frames, studio.lens, replace=True)
         except ModuleNotFoundError:
             missing.append(path)
             continue
         written.append(path)
-    truth = {"material": scene.material.values(), "seed": seed}
-    write_beside(folder / "truth.json", json.dumps(truth, indent=1) + "\n")
     return Samples(tuple(written), tuple(missing))
+
+
+def _of_condition(folder: Path, name: str, i: int) -> Path:
+    return folder / "pours" / f"{name}-{i}.png"
 
 
 def _poured(scene: Scene, seed: int) -> tuple[np.ndarray, np.ndarray]:

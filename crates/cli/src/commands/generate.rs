@@ -1,11 +1,10 @@
 //! `generate`: many pours to a folder of Parquet parts.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
-use cpu_time::ThreadTime;
 use granulcal_dataset::{
-    Dataset, GenerateOptions, Observer, Prior, Product, Shard, Summary, generate,
+    Dataset, GenerateOptions, Prior, Product, Shard, Summary, generate, try_pour,
 };
 use granulcal_scene::Scene;
 use serde_json::json;
@@ -18,11 +17,11 @@ use crate::interrupt::keeps_going;
 use crate::outcome::Outcome;
 use crate::progress::RowProgress;
 use crate::run::{Run, Setting};
-use crate::scene::{self, Keep};
-use crate::sides::SideFiles;
+use crate::scene;
 
-/// Pours that a dry run makes.
+/// Pours that a dry run makes, and how long they may take together.
 const TRIED: u64 = 3;
+const PATIENCE: Duration = Duration::from_secs(45);
 
 /// Simulate many pours with parameters drawn from a prior, to Parquet
 #[derive(Debug, Args)]
@@ -108,7 +107,7 @@ fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
         resume: !args.no_resume,
     };
     if args.dry_run {
-        return dry_run(context, args, &scene, &prior, &options);
+        return dry_run(args, &scene, &prior, &options);
     }
     let mut progress = RowProgress::new(context);
     let summary = generate(&scene, &prior, &options, &args.out, &mut |p| {
@@ -121,43 +120,54 @@ fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
 
 /// Pours the first rows, keeps nothing and tells what all of them would take.
 fn dry_run(
-    context: &Context,
     args: &GenerateArgs,
     scene: &Scene,
     prior: &Prior,
     options: &GenerateOptions,
 ) -> anyhow::Result<Outcome> {
     prior.check(scene)?;
-    let tried = options.rows.min(TRIED);
-    let mut cpu_s = 0.0;
-    for row in 0..tried {
-        let scene = prior.apply(scene, &prior.sample(options.seed, row))?;
-        let started = ThreadTime::now();
-        let simulation = scene::start(&scene, row, 1, None)?;
-        let mut observer = Observer::new(&scene);
-        // Nothing is kept beside the pour.
-        let (keep, mut sides) = (Keep::Nothing, SideFiles::default());
-        let pour = scene::pour(context, &scene, row, simulation, &keep, &mut observer, &mut sides)?;
-        if pour.is_none() {
-            return Ok(Outcome::Stopped);
+    let (begun, mut longest) = (Instant::now(), Duration::ZERO);
+    let (mut cpu_s, mut tried, mut cut) = (0.0, 0, None);
+    for row in 0..options.rows.min(TRIED) {
+        let left = PATIENCE.saturating_sub(begun.elapsed());
+        // One that is as long as those before would be stopped.
+        if tried > 0 && left < longest {
+            break;
         }
-        cpu_s += started.elapsed().as_secs_f64();
+        let scene = prior.apply(scene, &prior.sample(options.seed, row))?;
+        let started = Instant::now();
+        let Some(trial) = try_pour(&scene, row, left, &keeps_going)? else {
+            return Ok(Outcome::Stopped);
+        };
+        longest = longest.max(started.elapsed());
+        if trial.has_ended || tried == 0 {
+            cut = (!trial.has_ended).then_some((trial.reached_s, scene.end.horizon));
+            cpu_s += trial.cpu_s;
+            tried += 1;
+        }
     }
     let there = Dataset::open(&args.out).map_or(0, |data| data.rows.len() as u64);
     let missing = options.rows.saturating_sub(there);
-    let pour_s = cpu_s / tried as f64;
+    let pour_s = cpu_s / f64::from(tried);
     let seconds = pour_s * missing as f64 / options.threads as f64;
     if args.json {
         print_json(&json!({
             "missing": missing,
             "threads": options.threads,
             "pour_cpu_s": pour_s,
+            "extrapolated": cut.is_some(),
             "seconds": seconds,
         }))?;
     } else {
+        let from = match cut {
+            Some((reached_s, horizon)) => format!(
+                "a rough guess: a pour was stopped after {reached_s:.3} s of it, at whose pace it would go on until \
+                 its horizon of {horizon} s"
+            ),
+            None => format!("mean of {tried} pours"),
+        };
         print_line(&format!(
-            "about {:.1} min: {missing} rows are missing, {pour_s:.2} s of a core each (mean of {tried} pours), \
-             {} at once",
+            "about {:.1} min: {missing} rows are missing, {pour_s:.2} s of a core each ({from}), {} at once",
             seconds / 60.0,
             options.threads
         ))?;

@@ -25,7 +25,7 @@ fn an_output_is_no_input_by_whatever_name() {
     let place = tempfile::tempdir().unwrap();
     let at = |name: &str| place.path().join(name);
     fs::create_dir(at("sub")).unwrap();
-    fs::write(at("image.png"), b"\x89PNG").unwrap();
+    own_png(&at("image.png"));
     fs::hard_link(at("image.png"), at("twin.png")).unwrap();
     let png = Product::File(Form::Png);
     let read = [(&*at("image.png"), Input::File)];
@@ -79,8 +79,28 @@ fn a_recording_gets_no_frame_and_loses_none() {
     assert!(message.contains("is read"), "{message}");
     assert_eq!(refusal(&read, &[(&frames.join("steps"), Product::PICTURES)]), None);
     // A model's folder is no recording: its plots may lie in it, again and again.
-    fs::write(frames.join("coverage.png"), b"\x89PNG").unwrap();
+    own_png(&frames.join("coverage.png"));
     assert_eq!(refusal(&[(&frames, Input::File)], &[(&frames, Product::PLOTS)]), None);
+}
+
+#[test]
+fn pictures_get_into_no_folder_of_depth_images() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("frames");
+    fs::create_dir(&folder).unwrap();
+    // Pictures of an earlier run are replaced, those of somebody else are not.
+    for name in ["residual.png", "mask.png", "height.png"] {
+        own_png(&folder.join(name));
+    }
+    assert_eq!(refusal(&[], &[(&folder, Product::PICTURES)]), None);
+    let depth = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(1, 1, vec![7u16]).unwrap();
+    depth.save(folder.join("0001.png")).unwrap();
+    let message = refusal(&[], &[(&folder, Product::PICTURES)]).unwrap_err_text();
+    assert!(message.contains("0001.png") && message.contains("further frames"), "{message}");
+    fs::remove_file(folder.join("0001.png")).unwrap();
+    image::RgbImage::new(1, 1).save(folder.join("mask.png")).unwrap();
+    let message = refusal(&[], &[(&folder, Product::PICTURES)]).unwrap_err_text();
+    assert!(message.contains("mask.png") && message.contains("did not write"), "{message}");
 }
 
 #[test]
@@ -140,6 +160,11 @@ fn what_is_there_and_what_is_allowed_is_said() {
     assert_eq!(refusal(&[], &[(&at("new.MP4"), Product::FILM)]), None);
     fs::write(at("empty.bag"), b"").unwrap();
     assert_eq!(refusal(&[], &[(&at("empty.bag"), Product::MESSAGES)]), None);
+}
+
+/// A PNG that granulcal wrote.
+fn own_png(path: &Path) {
+    files::write_file(path, Form::Png, b"\x89PNG\0\0\0\0IEND\xaeB`\x82").unwrap();
 }
 
 /// The refusal that must be there.

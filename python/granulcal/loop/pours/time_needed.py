@@ -28,7 +28,7 @@ def time_needed(task: Task, store: Archive, further: int, threads: int) -> str:
     conditions, missing = task.conditions, store.missing
     chosen = np.unique(np.linspace(0, len(conditions) - 1, _TIMED).round().astype(int))
     middle = in_the_middle(task.scene, task.prior)
-    each = pour_time([middle.with_(conditions[i].at) for i in chosen.tolist()])
+    each = pour_time([middle.with_(conditions[i].at) for i in chosen.tolist()]).seconds
     total = missing + further
     return (
         f"{missing} pours of the archive are missing, {further} follow at most: at {each:.1f} s "
