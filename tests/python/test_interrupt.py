@@ -25,6 +25,9 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSI
 DRIVER = """
 import importlib, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# A job that outlives its terminal (nohup) ignores it, and so would this one.
+if hasattr(signal, "SIGHUP"):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 from granulcal import cli
 owner, name, repeats = {owner!r}, {name!r}, {repeats!r}
 module, _, inner = owner.partition(":")

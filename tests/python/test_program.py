@@ -162,7 +162,7 @@ def test_a_dry_run_of_long_pours_says_what_it_extrapolated(
     monkeypatch.setattr("granulcal.pours.pour_time.PATIENCE_S", 1.5)
     (tmp_path / "x.bag").write_bytes(b"")
     # Hours each: they are begun, and no more.
-    scene = gc.Scene.funnel(0.05, count=4000, preset="accurate")
+    scene = gc.Scene.funnel(0.05, count=2000, preset="accurate")
     scene = scene.with_({"end.horizon": 900.0, "end.kinetic_energy": 1e-300})
     (tmp_path / "scene.toml").write_text(scene.to_toml())
     words = ["calibrate", "scene.toml", "default", "x.bag", "-o", "run", "--budget", "70"]

@@ -143,7 +143,7 @@ fn a_film_that_fails_on_the_way_does_not_stop_the_pour() {
 fn a_limit_of_processor_time_stops_as_ctrl_c_does() {
     let place = Place::new();
     let binary = env!("CARGO_BIN_EXE_granulcal-cli");
-    let words = ["simulate", "funnel", "--mcap", "p.mcap", "--set", "grains.count=4000"];
+    let words = ["simulate", "drop", "--mcap", "p.mcap", "--set", "grains.count=20000"];
     let output = std::process::Command::new("sh")
         .args(["-c", "ulimit -S -t 1; exec \"$0\" \"$@\"", binary])
         .args(words)
