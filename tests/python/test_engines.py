@@ -108,6 +108,8 @@ def test_engines_are_named(command: str) -> None:
     assert engine_named("granulcal.pours.scene:Scene").name == "granulcal.pours.scene:Scene"
     with pytest.raises(ValueError, match="no attribute 'sand'"):
         engine_named("granulcal.pours.scene:sand")
+    with pytest.raises(ValueError, match="'lamps' is no command .* did you mean lammps\\?"):
+        engine_named("lamps")
     with pytest.raises(ValueError, match="engine must be one of lammps"):
         ExportedEngine("sandbox")
 

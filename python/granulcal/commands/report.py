@@ -61,7 +61,8 @@ def _run(options: argparse.Namespace) -> int:
     folder = model_named(options.model)
     training = folder / TRAINING if options.data is None else options.data
     if options.data is None and not training.exists():
-        raise FileNotFoundError(f"{folder} came without its training pours: give some with --data")
+        told = "give some of its scene with --data, as `granulcal generate` makes them"
+        raise FileNotFoundError(f"{folder} came without its training pours: {told}")
     data = Dataset.load(training)
     require_same_scene(model, data.scene)
     if options.dry_run:

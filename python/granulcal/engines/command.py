@@ -53,7 +53,7 @@ class CommandEngine:
                     timeout=self.timeout_s,
                 )
             except (FileNotFoundError, PermissionError) as error:
-                raise ValueError(f"engine {self.name!r}: {error}") from None
+                raise ValueError(f"engine {self.name!r}: {error.strerror}") from None
             except subprocess.TimeoutExpired:
                 raise ValueError(
                     f"engine {self.name!r} took longer than {self.timeout_s} s"

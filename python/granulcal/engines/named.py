@@ -1,10 +1,12 @@
 """The engine that a command line names."""
 
 import importlib
+import shutil
 
 from granulcal.engines.command import CommandEngine
 from granulcal.engines.exported import RUNNERS, ExportedEngine
 from granulcal.engines.protocol import CallableEngine, Engine
+from granulcal.words import did_you_mean
 
 __all__ = ["engine_named"]
 
@@ -17,7 +19,7 @@ def engine_named(text: str) -> Engine:
             `module:function` of a Python function; else a command.
 
     Raises:
-        ValueError: an engine that is not installed, or a function that is not there.
+        ValueError: an engine that is not installed, or a function or command that is not there.
     """
     if text in RUNNERS:
         return ExportedEngine(text)
@@ -28,4 +30,8 @@ def engine_named(text: str) -> Engine:
         except (ImportError, AttributeError) as error:
             raise ValueError(f"engine {text!r}: {error}") from None
         return CallableEngine(found, name=text)
-    return CommandEngine(text)
+    engine = CommandEngine(text)
+    if shutil.which(engine.words[0]) is None:
+        told = f"{text!r} is no command of this machine; engine must be one, module:function"
+        raise ValueError(f"{told} or one of {', '.join(RUNNERS)}{did_you_mean(text, RUNNERS)}")
+    return engine
