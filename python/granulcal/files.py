@@ -13,7 +13,7 @@ from granulcal import _native
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["beside", "replace_text", "save_figure", "write_beside", "write_toml"]
+__all__ = ["beside", "replace_file", "save_figure", "write_beside", "write_toml"]
 
 _TRIES = 100
 
@@ -41,10 +41,10 @@ def write_toml(path: Path, text: str) -> None:
             f"{path} is left as it is: it is not what would be written there; choose another "
             "folder, or move it away"
         )
-    replace_text(path, text)
+    replace_file(path, text)
 
 
-def replace_text(path: Path, text: str | bytes) -> None:
+def replace_file(path: Path, text: str | bytes) -> None:
     """Writes a whole file or none in the place of one that is the caller's to change."""
     with beside(path) as new:
         new.write_bytes(text.encode("utf-8") if isinstance(text, str) else text)

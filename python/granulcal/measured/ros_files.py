@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
-from granulcal.files import replace_text
+from granulcal.files import replace_file
 
 __all__ = ["DepthFrame", "write_bag", "write_mcap"]
 
@@ -209,7 +209,7 @@ def _counts(depth: NDArray[np.floating], unit: float) -> Image:
 def _put(path: Path, data: bytes, *, replace: bool) -> None:
     """Brings a recording to its place."""
     if replace:
-        replace_text(path, data)
+        replace_file(path, data)
         return
     if path.exists() and path.stat().st_size > 0:
         raise ValueError(

@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from granulcal.files import replace_text
+from granulcal.files import replace_file
 from granulcal.measured.recording import Recording
 from granulcal.pours.scene import Scene
 from granulcal.starter.texts import CAMERA, DROP_START, FUNNEL_START, LOOP, PRIOR, SCENE
@@ -118,14 +118,14 @@ def write_folder(
     there = [name for name in FILES if (folder / name).exists()]
     if there and not force:
         raise FileExistsError(f"{folder} has {', '.join(there)} already; --force writes them anew")
-    replace_text(folder / "scene.toml", scene_text(scene, lens))
-    replace_text(folder / "prior.toml", PRIOR)
-    replace_text(folder / "camera.toml", camera_text(lens))
+    replace_file(folder / "scene.toml", scene_text(scene, lens))
+    replace_file(folder / "prior.toml", PRIOR)
+    replace_file(folder / "camera.toml", camera_text(lens))
     path = "funnel.height" if scene == "funnel" else "start.height"
     names = {
         name: json.dumps([f"pours/{name}-{i}.png" for i in range(_POURS)]) for name in CONDITIONS
     }
-    replace_text(
+    replace_file(
         folder / "loop.toml",
         LOOP.format(path=path, **CONDITIONS, low_names=names["low"], high_names=names["high"]),
     )

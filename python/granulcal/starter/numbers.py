@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from granulcal.files import replace_text
+from granulcal.files import replace_file
 from granulcal.pours.scene import Scene
 
 __all__ = ["set_numbers"]
@@ -27,7 +27,7 @@ def set_numbers(path: Path, changes: Mapping[str, float | str]) -> Scene:
     text = "\n".join(lines) + "\n"
     if Scene.from_toml(text) != wanted:
         raise ValueError(f"{path} cannot be changed by line: set {', '.join(changes)} by hand")
-    replace_text(path, text)
+    replace_file(path, text)
     return wanted
 
 
