@@ -1,6 +1,7 @@
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from granulcal.experiments.paper.common.command import (
     find,
     missing_sets,
     reproduce_paper,
+    run_one,
 )
 from granulcal.experiments.paper.common.eye import BARE, Disturbance, Eye
 from granulcal.experiments.paper.common.measure import (
@@ -23,7 +25,7 @@ from granulcal.experiments.paper.common.measure import (
     level_row,
     share_interval,
 )
-from granulcal.experiments.paper.common.outcome import Outcome
+from granulcal.experiments.paper.common.outcome import Outcome, Row
 from granulcal.experiments.paper.common.page import write_page
 from granulcal.experiments.paper.common.sizes import FULL, QUICK, TINY
 from granulcal.experiments.paper.common.workshop import Workshop
@@ -89,6 +91,26 @@ def test_sets_that_are_there_are_not_missing(ran):
     shared = {"default-training", "default-tests"}
     assert shared < everything and "noise" not in everything
     assert shared <= {each.name for each in missing_sets(out, "ablation", size=TINY)}
+
+
+def test_what_a_part_has_found_is_kept_before_the_next_is_run(tmp_path):
+    row = Row(quantity="error", ours="0.1", interval="", count=4)
+
+    def run(workshop: Workshop) -> Outcome:
+        workshop.so_far(Outcome(rows=[row], answer="half of it", missing=["the paper's solver"]))
+        raise KeyboardInterrupt
+
+    stopped = replace(find("sim-to-sim"), run=run)
+    folder = tmp_path / "paper-tiny"
+    with pytest.raises(KeyboardInterrupt):
+        run_one(stopped, folder, size=TINY, quiet=True)
+    loaded = Outcome.load(folder / "sim-to-sim")
+    assert loaded is not None and loaded[0].rows == [row]
+    assert not Outcome.is_complete(folder / "sim-to-sim")
+    names = {each.name for each in missing_sets(tmp_path, "sim-to-sim", size=TINY)}
+    assert names == {each.name for each in find("sim-to-sim").sets(TINY)}
+    page = write_page(folder, experiments(), TINY).read_text(encoding="utf-8")
+    assert "Not run yet: the paper&#39;s solver." in page and "(in part)" in page
 
 
 @pytest.mark.slow

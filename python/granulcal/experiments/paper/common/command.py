@@ -57,7 +57,7 @@ def missing_sets(out: Path, experiment: str | None = None, *, size: Size = FULL)
     wanted = experiments() if experiment is None else [find(experiment)]
     done, missing = {}, {}
     for each in experiments():
-        if Outcome.load(folder / each.name) is not None:
+        if Outcome.is_complete(folder / each.name):
             done |= {one.name: one for one in each.sets(size)}
     for each in wanted:
         missing |= {one.name: one for one in each.sets(size) if one.name not in done}
@@ -98,7 +98,7 @@ def reproduce_paper(
     if not size.is_full and not quiet:
         print(_QUICK_NOTE)
     for each in wanted:
-        if report and experiment is None and Outcome.load(folder / each.name) is not None:
+        if report and experiment is None and Outcome.is_complete(folder / each.name):
             continue
         run_one(each, folder, size=size, threads=threads, quiet=quiet)
     if not report:
@@ -122,21 +122,25 @@ def run_one(
         print(f"{experiment.number} {experiment.name}: {experiment.asks}", flush=True)
     shop = Workshop(folder, experiment.name, size, threads or os.cpu_count() or 1, quiet)
     began = time.monotonic()
-    outcome = experiment.run(shop)
     quick = "" if size.is_full else f" --{size.name}"
-    made: dict[str, Any] = {
-        "command": f"granulcal reproduce paper {experiment.name}{quick} --out {folder.parent}",
-        "size": size.name,
-        "seeds": shop.seeds,
-        "pours": shop.pours,
-        "pours_cpu_s": shop.cpu_s,
-        "this_run_s": time.monotonic() - began,
-        "version": _native.__version__,
-        "at": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-    }
-    outcome.save(shop.own, made)
+
+    def made() -> dict[str, Any]:
+        return {
+            "command": f"granulcal reproduce paper {experiment.name}{quick} --out {folder.parent}",
+            "size": size.name,
+            "seeds": shop.seeds,
+            "pours": shop.pours,
+            "pours_cpu_s": shop.cpu_s,
+            "this_run_s": time.monotonic() - began,
+            "version": _native.__version__,
+            "at": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        }
+
+    shop.so_far = lambda outcome: outcome.save(shop.own, made())
+    outcome = experiment.run(shop)
+    outcome.save(shop.own, made())
     if not quiet:
-        _print(outcome, made)
+        _print(outcome, made())
     return outcome
 
 

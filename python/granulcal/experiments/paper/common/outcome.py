@@ -77,6 +77,7 @@ class Outcome:
         tables: further tables.
         figures: pictures.
         notes: what a reader has to know.
+        missing: parts of the experiment that have not been run yet.
     """
 
     rows: list[Row]
@@ -84,6 +85,7 @@ class Outcome:
     tables: list[Table] = field(default_factory=list)
     figures: list[Figure] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
 
     @classmethod
     def load(cls, folder: Path) -> "tuple[Outcome, dict[str, Any]] | None":
@@ -103,6 +105,12 @@ class Outcome:
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise ValueError(f"{path} is damaged or of another version: {error}") from None
         return outcome, made
+
+    @classmethod
+    def is_complete(cls, folder: Path) -> bool:
+        """Returns whether the experiment has run, with all its parts."""
+        loaded = cls.load(folder)
+        return loaded is not None and not loaded[0].missing
 
     def save(self, folder: Path, made: dict[str, Any]) -> None:
         """Writes result.json to `folder`.

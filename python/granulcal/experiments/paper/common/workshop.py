@@ -23,6 +23,7 @@ from granulcal.progress import ProgressLine
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
+    from granulcal.experiments.paper.common.outcome import Outcome
 
 __all__ = ["Pairs", "Workshop"]
 
@@ -75,6 +76,7 @@ class Workshop:
         pours: pours that the experiment rests on.
         cpu_s: processor time of these pours [s].
         seeds: seed of each set, by name.
+        so_far: keeps what an experiment has found before its last part is run.
     """
 
     folder: Path
@@ -85,6 +87,7 @@ class Workshop:
     pours: int = 0
     cpu_s: float = 0.0
     seeds: dict[str, int] = field(default_factory=dict)
+    so_far: "Callable[[Outcome], None]" = lambda _: None
 
     @property
     def own(self) -> Path:
