@@ -137,6 +137,21 @@ def test_the_words_simulate_and_generate_take_an_engine(
 
 
 # A bar that MuJoCo misses: its grains run twice as far (docs/export.md).
+@pytest.mark.skipif(sys.platform == "win32", reason="the program is a shell script")
+def test_a_lammps_that_is_too_old_is_named(tmp_path: Path) -> None:
+    scene = gc.Scene.drop(0.02, count=4, preset="fast")
+    for version, is_old in (("29 Sep 2021 - Update 2", True), ("22 Jul 2025", False)):
+        program = tmp_path / "lmp"
+        program.write_text(
+            f"#!/bin/sh\necho 'LAMMPS ({version})'; echo 'ERROR: unrecognized'; exit 1\n"
+        )
+        program.chmod(0o755)
+        with pytest.raises(ValueError, match="left no grains: ERROR: unrecognized") as refused:
+            gc.simulate(scene, seed=1, engine=ExportedEngine("lammps", python=str(program)))
+        told = "it is LAMMPS of 29 Sep 2021, older than what is exported for: pip install"
+        assert (told in str(refused.value)) == is_old
+
+
 MUJOCO = pytest.param(
     "mujoco", marks=pytest.mark.xfail(raises=AssertionError, reason="twice as wide")
 )

@@ -1,6 +1,7 @@
 """Engines that run the files of `granulcal export scene`."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -24,6 +25,10 @@ RUNNERS = {
     "chrono": (("python", "pour.py"), "conda install -c projectchrono pychrono"),
 }
 """How each engine runs an exported pour, and where it comes from."""
+
+
+_LAMMPS_YEAR = 2025
+"""Of the LAMMPS that exported pours are tried with."""
 
 
 def _program(word: str) -> str | None:
@@ -126,5 +131,15 @@ class ExportedEngine:
         grains = read_grains(folder)
         # YADE ends by exit codes of its own; what counts is that the grains are there.
         if grains is None:
-            raise ValueError(f"engine {self.engine} left no grains: {last_words(done)}")
+            old = _too_old(self.engine, done.stdout)
+            raise ValueError(f"engine {self.engine} left no grains: {last_words(done)}{old}")
         return grains
+
+
+def _too_old(engine: str, said: str) -> str:
+    """Returns what to do about a LAMMPS that is older than the words of an exported pour, if it is."""
+    version = re.search(r"^LAMMPS \((\d+ \w+ (\d{4}))", said, flags=re.M)
+    if engine != "lammps" or version is None or int(version[2]) >= _LAMMPS_YEAR:
+        return ""
+    _, source = RUNNERS[engine]
+    return f"; it is LAMMPS of {version[1]}, older than what is exported for: {source}"

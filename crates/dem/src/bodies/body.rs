@@ -94,6 +94,7 @@ impl Moving {
     }
 
     /// Velocity of its point at `arm` from the centre `[m/s]`.
+    #[inline(always)]
     pub fn velocity_at(&self, arm: &Vector3<f64>) -> Vector3<f64> {
         self.velocity + self.omega.cross(arm)
     }
@@ -111,6 +112,7 @@ impl Moving {
     }
 
     /// Takes an impulse at `arm`.
+    #[inline(always)]
     pub fn push(&mut self, arm: &Vector3<f64>, impulse: &Vector3<f64>) {
         self.velocity += impulse;
         self.omega += product(&self.inverse_inertia, &arm.cross(impulse));

@@ -60,14 +60,21 @@ impl Contacts {
             }
         }
         let (least, mut is_news) = (CORRECTED * around.solid.reach, false);
+        // Known points by their manifolds, those of one in their order.
+        let mut by_name: Vec<_> = self.points.iter().map(Point::name).zip(0..known).collect();
+        by_name.sort_unstable();
         for point in new {
             let point = point.foreseen(bodies, around.dt);
-            let is_same = |other: &&mut Point| {
-                other.name() == point.name() && other.is_like(&point, around.solid.reach)
-            };
-            match self.points[..known].iter_mut().find(is_same) {
+            let first = by_name.partition_point(|known| known.0 < point.name());
+            let of_manifold = by_name[first..].iter().take_while(|known| known.0 == point.name());
+            let same = of_manifold
+                .map(|&(_, number)| number)
+                .find(|&number| self.points[number].is_like(&point, around.solid.reach));
+            match same {
                 // Its bodies turn so far that it gets there sooner than its velocity says.
-                Some(other) if point.gap < other.gap - least => other.gap = point.gap,
+                Some(number) if point.gap < self.points[number].gap - least => {
+                    self.points[number].gap = point.gap;
+                }
                 Some(_) => continue,
                 None => self.points.push(point),
             }
@@ -79,24 +86,31 @@ impl Contacts {
     }
 }
 
-/// Pairs whose balls may meet, each once, in rising order: sweep along x.
+/// Pairs whose balls may meet, each once, in rising order. Cells are as wide as no two balls that may meet are apart, and
+/// are sorted: a row of them along z is one range.
 fn near_pairs(around: &Around<'_>, bodies: &[Moving]) -> Vec<(usize, usize)> {
-    let mut order: Vec<usize> = (0..bodies.len()).collect();
-    order.sort_by(|&a, &b| bodies[a].centre.x.total_cmp(&bodies[b].centre.x).then(a.cmp(&b)));
     let reach = around.solid.reach;
     let farthest = bodies.iter().map(|body| body.way(reach, around.dt)).fold(0.0, f64::max);
-    let most = 2.0 * reach + around.least() + 2.0 * farthest;
+    let width = 2.0 * reach + around.least() + 2.0 * farthest;
+    let cell_of = |body: &Moving| <[i64; 3]>::from(body.centre.map(|c| (c / width).floor() as i64));
+    let mut cells: Vec<_> = bodies.iter().map(cell_of).zip(0..).collect();
+    cells.sort_unstable();
     let mut pairs = Vec::new();
-    for (at, &i) in order.iter().enumerate() {
-        for &j in &order[at + 1..] {
-            let offset = bodies[j].centre - bodies[i].centre;
-            if offset.x > most {
-                break;
+    for (at, &([x, y, z], i)) in cells.iter().enumerate() {
+        let mut look = |slots: &[([i64; 3], usize)], last: [i64; 3]| {
+            for &(_, j) in slots.iter().take_while(|slot| slot.0 <= last) {
+                let offset = bodies[j].centre - bodies[i].centre;
+                let range = 2.0 * reach + around.range(&bodies[i], Some(&bodies[j]));
+                if offset.norm_squared() < range * range {
+                    pairs.push((i.min(j), i.max(j)));
+                }
             }
-            let range = 2.0 * reach + around.range(&bodies[i], Some(&bodies[j]));
-            if offset.norm_squared() < range * range {
-                pairs.push((i.min(j), i.max(j)));
-            }
+        };
+        // What comes after it in the order: its own row, and those ahead.
+        look(&cells[at + 1..], [x, y, z + 1]);
+        for [x, y] in [[x, y + 1], [x + 1, y - 1], [x + 1, y], [x + 1, y + 1]] {
+            let first = cells.partition_point(|slot| slot.0 < [x, y, z - 1]);
+            look(&cells[first..], [x, y, z + 1]);
         }
     }
     pairs.sort_unstable();

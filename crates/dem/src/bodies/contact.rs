@@ -148,6 +148,7 @@ impl Point {
     }
 
     /// Velocity of i relative to j there `[m/s]`.
+    #[inline(always)]
     pub fn velocity(&self, bodies: &[Moving]) -> Vector3<f64> {
         let of_i = bodies[self.i].velocity_at(&self.arm_i);
         match self.j {
@@ -157,6 +158,7 @@ impl Point {
     }
 
     /// Gives both bodies an impulse.
+    #[inline(always)]
     pub fn give(&self, bodies: &mut [Moving], impulse: &Vector3<f64>) {
         bodies[self.i].push(&self.arm_i, impulse);
         if self.j != WALL {
@@ -165,12 +167,13 @@ impl Point {
     }
 
     /// Solves the point by itself under a bias, with at most so many repetitions of the two lines.
+    #[inline(always)]
     pub fn solve(&mut self, bodies: &mut [Moving], bias: f64, rounds: usize) -> Change {
         let before = self.impulse;
         let mut u = self.velocity(bodies);
         let n = self.normal;
         let closing = -(n.dot(&u) + bias);
-        for _ in 0..rounds {
+        for round in 1..=rounds {
             let old = self.impulse;
             let was = n.dot(&old);
             let normal = (was - (n.dot(&u) + bias) * self.compliance[0]).max(0.0);
@@ -185,7 +188,7 @@ impl Point {
             let tangent = if length > limit { wanted * (limit / length) } else { wanted };
             u += product(&self.block, &(tangent - sliding));
             self.impulse = normal * n + tangent;
-            if (self.impulse - old).norm() <= STANDS * self.impulse.norm() {
+            if round < rounds && (self.impulse - old).norm() <= STANDS * self.impulse.norm() {
                 break;
             }
         }
