@@ -26,7 +26,7 @@ from granulcal.experiments.paper.common.measure import (
     share_interval,
 )
 from granulcal.experiments.paper.common.outcome import Outcome, Row
-from granulcal.experiments.paper.common.page import write_page
+from granulcal.experiments.paper.common.page import write_page, write_tables
 from granulcal.experiments.paper.common.sizes import FULL, QUICK, TINY
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.experiments.paper.heights import SHIPPED as RECORDINGS
@@ -111,6 +111,24 @@ def test_what_a_part_has_found_is_kept_before_the_next_is_run(tmp_path):
     assert names == {each.name for each in find("sim-to-sim").sets(TINY)}
     page = write_page(folder, experiments(), TINY).read_text(encoding="utf-8")
     assert "Not run yet: the paper&#39;s solver." in page and "(in part)" in page
+
+
+def test_tables_hold_every_row_of_what_has_run(ran):
+    text = write_tables(ran[0], experiments()).read_text(encoding="utf-8")
+    lines = text.splitlines()
+    for name in _QUICKEST:
+        loaded = Outcome.load(ran[0] / name)
+        assert loaded is not None
+        outcome, made = loaded
+        assert f"## {find(name).number} {find(name).title}" in lines and outcome.answer in lines
+        assert f"    {made['command']}    # {made['pours']} pours, {made['at']}" in lines
+        tables = [[row.quantity for row in outcome.rows]]
+        tables += [[cells[0] for cells in table.rows] for table in outcome.tables]
+        for quantity in (quantity for table in tables for quantity in table):
+            assert any(line.startswith(f"| {quantity.replace('|', '/')} | ") for line in lines)
+    assert "sim-to-sim" not in text
+    widths = [line.count(" | ") for line in lines if line.startswith("| quantity")]
+    assert widths == [5] * len(_QUICKEST)
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from typing import Any
 
 from granulcal import _native
 from granulcal.experiments.paper.common.outcome import Experiment, Outcome, PouredSet
-from granulcal.experiments.paper.common.page import write_page
+from granulcal.experiments.paper.common.page import write_page, write_tables
 from granulcal.experiments.paper.common.sizes import FULL, Size
 from granulcal.experiments.paper.common.workshop import Workshop
 
@@ -104,8 +104,9 @@ def reproduce_paper(
     if not report:
         return None
     page = write_page(folder, experiments(), size)
+    tables = write_tables(folder, experiments())
     if not quiet:
-        print(f"page: {page}")
+        print(f"page: {page}\ntables: {tables}")
     return page
 
 

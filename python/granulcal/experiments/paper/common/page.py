@@ -1,16 +1,16 @@
-"""One self-contained HTML page of the experiments that have run, tables and figures."""
+"""One self-contained HTML page of the experiments that have run, and their tables as Markdown."""
 
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from granulcal import _native
-from granulcal.experiments.paper.common.outcome import Experiment, Outcome
+from granulcal.experiments.paper.common.outcome import Experiment, Outcome, Table
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.files import write_beside
 from granulcal.report import data_uri, template
 
-__all__ = ["write_page"]
+__all__ = ["write_page", "write_tables"]
 
 _TEMPLATE = "paper.html.j2"
 _PAPER = (
@@ -50,6 +50,43 @@ def write_page(folder: Path, known: list[Experiment], size: Size) -> Path:
     path = folder / "report.html"
     write_beside(path, page)
     return path
+
+
+def write_tables(folder: Path, known: list[Experiment]) -> Path:
+    """Writes results.md into `folder`, the rows and tables of what has run; returns its path.
+
+    Args:
+        folder: of the results of a size.
+        known: every experiment; those that have not run are left out.
+    """
+    parts = []
+    for experiment in known:
+        loaded = Outcome.load(folder / experiment.name)
+        if loaded is None:
+            continue
+        outcome, made = loaded
+        rows = Table(
+            title="",
+            columns=["quantity", "paper", "ours", "judged, with its 95 % interval", "n", ""],
+            rows=[
+                [r.quantity, r.paper, r.ours, r.interval, str(r.count), r.verdict]
+                for r in outcome.rows
+            ],
+        )
+        tables = [f"{table.title}:\n\n{_markdown(table)}" for table in outcome.tables]
+        left = [f"Not run yet: {'; '.join(outcome.missing)}."] if outcome.missing else []
+        how = f"    {made['command']}    # {made['pours']} pours, {made['at']}"
+        title = f"## {experiment.number} {experiment.title}"
+        notes = [f"- {note}" for note in outcome.notes]
+        parts += [title, outcome.answer, *left, how, _markdown(rows), *tables, "\n".join(notes)]
+    path = folder / "results.md"
+    write_beside(path, "\n\n".join(part for part in parts if part) + "\n")
+    return path
+
+
+def _markdown(table: Table) -> str:
+    lines = [table.columns, ["---"] * len(table.columns), *table.rows]
+    return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
 
 
 def _count(parts: list[dict[str, Any]]) -> dict[str, int]:
