@@ -48,13 +48,15 @@ def test_a_result_says_what_was_asked_for():
         training_distance=1.5,
         mode_distance=1.8,
         mean_distance=1.9,
+        floor_distance=1.2,
         warnings=(),
         is_inside=False,
         measured=np.array([12.0, 0.002, 0.9]),
         simulated=np.array([[90.0, 0.001, 0.6], [80.0, 0.0012, 0.62]]),
     )
     row = result.to_dict(["material.sliding_friction"])
-    assert row["L2"]["posterior_mode"] == 1.8 and row["is_inside"] is False
+    assert row["L2"]["posterior_mode"] == 1.8 and row["L2"]["floor"] == 1.2
+    assert row["is_inside"] is False
     assert row["patches"] == {"measured": 12.0, "simulated": [90.0, 80.0]}
     assert row["interval_90"] == {"material.sliding_friction": [0.3, 0.5]}
 

@@ -11,6 +11,7 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,6 +83,7 @@ class MapResult:
         training_distance: the nearest pour of the training set.
         mode_distance: mean over pours at the posterior's mode.
         mean_distance: mean over pours at the posterior's mean.
+        floor_distance: mean between two pours at the posterior's mode: what no parameters undercut.
         warnings: what the posterior warned of.
         is_inside: whether any parameters explain the 16 statistics (`BayesSim.misfit`).
         measured: `patches`, `roughness` [m] and `shoulder` of the map.
@@ -95,6 +97,7 @@ class MapResult:
     training_distance: float
     mode_distance: float
     mean_distance: float
+    floor_distance: float
     warnings: tuple[str, ...]
     is_inside: bool
     measured: NDArray[np.float64]
@@ -113,6 +116,7 @@ class MapResult:
                 "posterior_mean": self.mean_distance,
                 "best_of_training": self.training_distance,
                 "prior_mean": self.prior_distance,
+                "floor": self.floor_distance,
             },
             **shape,
             "is_inside": self.is_inside,
@@ -267,6 +271,9 @@ def _judge(
         each = [standardised_distance(pour.statistics(), observed, scale) for pour in pours]
         return float(np.mean(each))
 
+    pairs = combinations([pour.statistics() for pour in calibrated.pours], 2)
+    between = [standardised_distance(one, other, scale) for one, other in pairs]
+
     posterior = calibrated.posterior
     region = posterior.credible_region(0.9)
     at_mean = pours_at(scene_at(data.scene, prior, posterior.mean()), _MEAN_SEEDS)
@@ -280,6 +287,7 @@ def _judge(
         ),
         mode_distance=distance(calibrated.pours),
         mean_distance=distance(at_mean),
+        floor_distance=float(np.mean(between)),
         warnings=tuple(str(warning) for warning in posterior.warnings),
         is_inside=calibrated.misfit.is_inside,
         measured=shape_of_map(recording, data.scene),
@@ -313,7 +321,7 @@ def _row(result: MapResult) -> str:
     return (
         f"    {result.name:<14} L2: prior mean {result.prior_distance:.2f}, best of training "
         f"{result.training_distance:.2f}, posterior mode {result.mode_distance:.2f}, "
-        f"posterior mean {result.mean_distance:.2f}"
+        f"posterior mean {result.mean_distance:.2f}, floor {result.floor_distance:.2f}"
     )
 
 
@@ -329,17 +337,20 @@ def _short(names: Sequence[str]) -> list[str]:
 def _table(results: list[MapResult], names: Sequence[str]) -> str:
     short = _short(names)
     lines = [
-        "| map | prior mean | best of training | posterior mode | posterior mean | "
+        "| map | prior mean | best of training | posterior mode | posterior mean | floor | "
         + " | ".join(f"{name}: mode (90 % interval)" for name in short)
         + " | warnings |",
-        "|---" * (6 + len(short)) + "|",
+        "|---" * (7 + len(short)) + "|",
     ]
     for r in results:
         cells = [
             f"{mode:.3g} ({low:.2g} to {high:.2g})"
             for mode, (low, high) in zip(r.mode, r.interval, strict=True)
         ]
-        distances = (r.prior_distance, r.training_distance, r.mode_distance, r.mean_distance)
+        distances = (
+            r.prior_distance, r.training_distance, r.mode_distance, r.mean_distance,
+            r.floor_distance,
+        )  # fmt: skip
         numbers = " | ".join(f"{distance:.2f}" for distance in distances)
         lines.append(f"| {r.name} | {numbers} | {' | '.join(cells)} | {len(r.warnings)} |")
     columns = {
@@ -347,6 +358,7 @@ def _table(results: list[MapResult], names: Sequence[str]) -> str:
         "best of training": [r.training_distance for r in results],
         "posterior mode": [r.mode_distance for r in results],
         "posterior mean": [r.mean_distance for r in results],
+        "floor": [r.floor_distance for r in results],
     }
     lines.append("")
     for label, values in columns.items():
