@@ -9,6 +9,7 @@ import pytest
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.experiments import loop_column, loop_drum, loop_rings
+from granulcal.loop.check.prior_rounds import ROUNDS
 from granulcal.loop.close import _candidates, planned
 from granulcal.loop.effects.design import Design, Effect, normal_from_cube
 from granulcal.loop.effects.library import LibraryEffect, by_name
@@ -16,6 +17,7 @@ from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.surrogate.fit_draws import draw
 from granulcal.loop.task import FIT, SEALED, Condition, Task
+from granulcal.loop.test.thresholds import Thresholds
 
 SCENE = """
 name = "small"
@@ -239,6 +241,19 @@ def test_the_rings_effects_fit_their_scene_and_no_map_is_fitted_and_sealed(tmp_p
         effect = entry.at(scene)
         for path, value in effect.numbers(1.0).items():
             assert scene.with_({path: value}).get(path) == value
+
+
+def test_the_budgets_of_the_measured_studies_afford_their_libraries(tmp_path: Path) -> None:
+    draws = ROUNDS * Thresholds().look
+    rings = [loop_rings.task(tmp_path, group) for group in loop_rings.GROUPS]
+    drums = [loop_drum.task(tmp_path, fitted) for fitted in ((15, 45), (15,), (45,))]
+    budget = [study.poured(tmp_path)[2] for study in (loop_rings, loop_drum, loop_column)]
+    for tasks, pours in ((rings, budget[0]), (drums, budget[1])):
+        plans = [planned(asked, pours, 0, draws=draws) for asked in tasks]
+        assert all(plan.pours < pours for plan in plans)
+    rounds = loop_column._ROUNDS
+    plan = planned(loop_column.task(tmp_path), budget[2], 0, rounds=rounds, draws=draws)
+    assert plan.pours < budget[2]
 
 
 def test_an_archive_takes_further_effects_and_keeps_its_pours(tmp_path: Path) -> None:

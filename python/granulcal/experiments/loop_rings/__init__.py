@@ -15,7 +15,7 @@ from granulcal.prior import Prior
 
 __all__ = ["GROUPS", "reproduce", "task"]
 
-_BUDGET = 1000
+_BUDGET = 1400
 
 
 def poured(data: Path) -> tuple[Scene, Prior, int]:
