@@ -19,7 +19,7 @@ from granulcal.progress import shown
 from granulcal.words import did_you_mean
 
 if TYPE_CHECKING:
-    from granulcal.experiments.paper.common.outcome import PouredSet
+    from granulcal.experiments.paper.common.poured_set import PouredSet
     from granulcal.experiments.paper.common.sizes import Size
 
 __all__ = ["add"]

@@ -20,16 +20,11 @@ from numpy.typing import NDArray
 from granulcal.arrays import read_arrays
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import formations
+from granulcal.experiments.paper.common.experiment import Experiment
 from granulcal.experiments.paper.common.eye import Disturbance, Eye
 from granulcal.experiments.paper.common.measure import Published, level_row
-from granulcal.experiments.paper.common.outcome import (
-    Experiment,
-    Figure,
-    Outcome,
-    PouredSet,
-    Row,
-    Table,
-)
+from granulcal.experiments.paper.common.outcome import Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.pours.forward import scene_at

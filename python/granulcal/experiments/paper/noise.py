@@ -9,14 +9,9 @@ metres, as the paper's axes are, beside the coefficient of variation, which has 
 import numpy as np
 
 from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, save
-from granulcal.experiments.paper.common.outcome import (
-    Experiment,
-    Figure,
-    Outcome,
-    PouredSet,
-    Row,
-    Table,
-)
+from granulcal.experiments.paper.common.experiment import Experiment
+from granulcal.experiments.paper.common.outcome import Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.pours.statistics import NAMES, UNITS

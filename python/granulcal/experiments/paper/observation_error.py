@@ -19,15 +19,10 @@ from granulcal.experiments.paper.common.draw import (
     posterior_image,
     save,
 )
+from granulcal.experiments.paper.common.experiment import Experiment
 from granulcal.experiments.paper.common.measure import bootstrap
-from granulcal.experiments.paper.common.outcome import (
-    Experiment,
-    Figure,
-    Outcome,
-    PouredSet,
-    Row,
-    Table,
-)
+from granulcal.experiments.paper.common.outcome import Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 

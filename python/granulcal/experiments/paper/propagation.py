@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, save
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, PouredSet, Row
+from granulcal.experiments.paper.common.experiment import Experiment
+from granulcal.experiments.paper.common.outcome import Figure, Outcome, Row
+from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.pours.statistics import NAMES

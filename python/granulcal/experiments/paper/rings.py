@@ -17,15 +17,10 @@ from granulcal.design.rings import design_rings
 from granulcal.design.spill import design_spill
 from granulcal.errors import ExtrapolationError, UnreachableRingError
 from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, save
+from granulcal.experiments.paper.common.experiment import Experiment
 from granulcal.experiments.paper.common.measure import Published, error_row
-from granulcal.experiments.paper.common.outcome import (
-    Experiment,
-    Figure,
-    Outcome,
-    PouredSet,
-    Row,
-    Table,
-)
+from granulcal.experiments.paper.common.outcome import Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.pours.scene import Scene

@@ -10,15 +10,10 @@ from numpy.typing import NDArray
 
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import ACCENT, SECOND, new_figure, save
+from granulcal.experiments.paper.common.experiment import Experiment
 from granulcal.experiments.paper.common.measure import bootstrap, error_row, share_interval
-from granulcal.experiments.paper.common.outcome import (
-    Experiment,
-    Figure,
-    Outcome,
-    PouredSet,
-    Row,
-    Table,
-)
+from granulcal.experiments.paper.common.outcome import Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.dataset import Dataset

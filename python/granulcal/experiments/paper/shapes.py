@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import formations
+from granulcal.experiments.paper.common.experiment import Experiment
 from granulcal.experiments.paper.common.measure import Published, level_row
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, PouredSet, Table
+from granulcal.experiments.paper.common.outcome import Figure, Outcome, Table
+from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.forward import scene_at

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import ACCENT, formations, new_figure, save
+from granulcal.experiments.paper.common.experiment import Experiment
 from granulcal.experiments.paper.common.eye import Eye
 from granulcal.experiments.paper.common.measure import (
     Published,
@@ -20,14 +21,8 @@ from granulcal.experiments.paper.common.measure import (
     level_row,
     share_interval,
 )
-from granulcal.experiments.paper.common.outcome import (
-    Experiment,
-    Figure,
-    Outcome,
-    PouredSet,
-    Row,
-    Table,
-)
+from granulcal.experiments.paper.common.outcome import Figure, Outcome, Row, Table
+from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.forward import scene_at

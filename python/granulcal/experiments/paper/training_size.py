@@ -4,8 +4,10 @@ import numpy as np
 
 from granulcal.experiments.paper.common import friction
 from granulcal.experiments.paper.common.draw import ACCENT, new_figure, save
+from granulcal.experiments.paper.common.experiment import Experiment
 from granulcal.experiments.paper.common.measure import Published, error_row
-from granulcal.experiments.paper.common.outcome import Experiment, Figure, Outcome, PouredSet, Table
+from granulcal.experiments.paper.common.outcome import Figure, Outcome, Table
+from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
 

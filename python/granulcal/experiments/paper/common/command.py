@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from granulcal import _native
-from granulcal.experiments.paper.common.outcome import Experiment, Outcome, PouredSet
+from granulcal.experiments.paper.common.experiment import Experiment
+from granulcal.experiments.paper.common.outcome import Outcome
 from granulcal.experiments.paper.common.page import write_page, write_tables
+from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import FULL, Size
 from granulcal.experiments.paper.common.workshop import Workshop
 

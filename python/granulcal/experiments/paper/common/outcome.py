@@ -1,19 +1,13 @@
 """What an experiment found: rows beside the paper's numbers, tables, figures, how it was made."""
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from granulcal.files import write_beside
-from granulcal.pours.scene import Scene
 
-if TYPE_CHECKING:
-    from granulcal.experiments.paper.common.sizes import Size
-    from granulcal.experiments.paper.common.workshop import Workshop
-
-__all__ = ["Experiment", "Figure", "Outcome", "PouredSet", "Row", "Table"]
+__all__ = ["Figure", "Outcome", "Row", "Table"]
 
 _RESULT = "result.json"
 
@@ -121,41 +115,3 @@ class Outcome:
         """
         text = json.dumps({**asdict(self), "made": made}, indent=1)
         write_beside(folder / _RESULT, text + "\n")
-
-
-@dataclass(frozen=True)
-class PouredSet:
-    """Pours that an experiment makes, or finds made by another.
-
-    Attributes:
-        name: of the set, below `pours`.
-        count: pours at least; further ones take the place of those that cannot be used.
-        scene: what a pour costs as much as.
-    """
-
-    name: str
-    count: int
-    scene: Scene
-
-
-@dataclass(frozen=True, kw_only=True)
-class Experiment:
-    """One experiment of the paper.
-
-    Attributes:
-        number: its place in the list.
-        name: how the command line calls it.
-        title: its heading.
-        section: the section of the paper.
-        asks: what it asks, in a sentence.
-        run: makes it.
-        sets: the sets of pours that it rests on, of which it may share some with others.
-    """
-
-    number: int
-    name: str
-    title: str
-    section: str
-    asks: str
-    run: "Callable[[Workshop], Outcome]"
-    sets: "Callable[[Size], list[PouredSet]]"

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from granulcal import _native
-from granulcal.experiments.paper.common.outcome import Experiment, Outcome, Table
+from granulcal.experiments.paper.common.experiment import Experiment
+from granulcal.experiments.paper.common.outcome import Outcome, Table
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.files import write_beside
 from granulcal.report import data_uri, template

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.bayessim.posterior.posterior import Posterior
-from granulcal.experiments.paper.common.outcome import PouredSet
+from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.scene import Scene

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from granulcal.experiments.paper.common.outcome import Outcome
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.files import write_beside
 from granulcal.pours.dataset import Dataset, generate
@@ -23,7 +24,6 @@ from granulcal.progress import ProgressLine
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
-    from granulcal.experiments.paper.common.outcome import Outcome
 
 __all__ = ["Pairs", "Workshop"]
 
@@ -87,7 +87,7 @@ class Workshop:
     pours: int = 0
     cpu_s: float = 0.0
     seeds: dict[str, int] = field(default_factory=dict)
-    so_far: "Callable[[Outcome], None]" = lambda _: None
+    so_far: Callable[[Outcome], None] = lambda _: None
 
     @property
     def own(self) -> Path:
