@@ -9,7 +9,8 @@ own and three pours at each of 4, 8 and 12 cm. First the nulls; then rounds, eac
 effect at three strengths, four pairs, and six effects that the library lacks at two strengths.
 Sealed heights are 2, 6 and 10 cm. `--small` has 120 grains, pixels of 1.6 mm without noise, and an
 archive of half the size: minutes on an idle core where the whole study takes an hour. The pours of
-a set are kept in OUT.pours, so that the loop can be run on them again.
+a set are kept in OUT.pours, so that the loop can be run on them again. `--first` numbers the sets
+from there: their materials and seeds are others.
 """
 
 import argparse
@@ -301,13 +302,13 @@ def run(options: argparse.Namespace) -> None:
     study = Study(options.archive, kept, asked, options.threads, options.pairs)
     truths = Truth.all(options.nulls, options.rounds)
     with path.open("a", encoding="utf-8") as file:
-        for index, truth in enumerate(truths):
+        for index, truth in enumerate(truths, start=options.first):
             if index in done:
                 continue
             row = study.row(index, truth)
             file.write(json.dumps(row or {"index": index, "kind": "jammed"}) + "\n")
             file.flush()
-            print(f"\r{index + 1} of {len(truths)}", end="", file=sys.stderr)
+            print(f"\r{index - options.first + 1} of {len(truths)}", end="", file=sys.stderr)
     print(file=sys.stderr)
 
 
@@ -320,6 +321,7 @@ def main() -> None:
     runner.add_argument("--archive", type=Path, required=True)
     runner.add_argument("--nulls", type=int, default=120)
     runner.add_argument("--rounds", type=int, default=4)
+    runner.add_argument("--first", type=int, default=0, help="number of the first set")
     runner.add_argument("--base", type=int, default=1500)
     runner.add_argument("--each", type=int, default=150)
     runner.add_argument("--small", action="store_true")
