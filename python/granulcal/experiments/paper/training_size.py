@@ -89,7 +89,7 @@ def _picture(workshop: Workshop, points: list) -> str:
     for count, errors, _ in points:
         axis.plot(np.full(len(errors), count), errors, ".", color=ACCENT, alpha=0.4)
         rms = np.sqrt(np.mean(errors**2))
-        axis.plot([count] * 2, [-rms, rms], color=ACCENT, lw=3, alpha=0.6)
+        axis.plot([count] * 2, [-rms, rms], color="#d62728", lw=7, alpha=0.3)
     axis.axhline(0, color="0.6", lw=0.6)
     axis.set_xscale("log")
     axis.set_xticks([p[0] for p in points], [str(p[0]) for p in points])

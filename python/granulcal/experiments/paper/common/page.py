@@ -95,6 +95,8 @@ def _count(parts: list[dict[str, Any]]) -> dict[str, int]:
     counts = {"better": 0, "not decided": 0, "worse": 0}
     for part in parts:
         for row in part["outcome"].rows if part["outcome"] else []:
-            if row.verdict in counts:
-                counts[row.verdict] += 1
+            # "not decided" may say why after a colon.
+            verdict = row.verdict.partition(":")[0]
+            if verdict in counts:
+                counts[verdict] += 1
     return counts
