@@ -92,7 +92,9 @@ fn near_pairs(around: &Around<'_>, bodies: &[Moving]) -> Vec<(usize, usize)> {
     let reach = around.solid.reach;
     let farthest = bodies.iter().map(|body| body.way(reach, around.dt)).fold(0.0, f64::max);
     let width = 2.0 * reach + around.least() + 2.0 * farthest;
-    let cell_of = |body: &Moving| <[i64; 3]>::from(body.centre.map(|c| (c / width).floor() as i64));
+    // Far beyond any scene all are of one cell, whose neighbours still have numbers.
+    let cell_of = |c: f64| i64::from((c / width).floor() as i32);
+    let cell_of = |body: &Moving| <[i64; 3]>::from(body.centre.map(cell_of));
     let mut cells: Vec<_> = bodies.iter().map(cell_of).zip(0..).collect();
     cells.sort_unstable();
     let mut pairs = Vec::new();
