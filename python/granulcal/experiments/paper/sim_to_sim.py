@@ -84,16 +84,24 @@ def sets(size: Size) -> list[PouredSet]:
 
 def run(workshop: Workshop) -> Outcome:
     """Infers the tests of every variant; what each finds is kept before the next is poured."""
-    found: dict[str, _Found] = {}
-    for variant in three.VARIANTS[:-1]:
+    first, *others = three.VARIANTS
+    found = {first.name: _infer(workshop, first)}
+    figures = _figures(workshop, found[first.name])
+    for variant in others:
+        workshop.so_far(_outcome(workshop.size, found, figures))
         found[variant.name] = _infer(workshop, variant)
-        workshop.so_far(_outcome(workshop, found))
-    last = three.VARIANTS[-1]
-    found[last.name] = _infer(workshop, last)
-    return _outcome(workshop, found)
+    return _outcome(workshop.size, found, figures)
 
 
-def _outcome(workshop: Workshop, found: dict[str, _Found]) -> Outcome:
+def _figures(workshop: Workshop, first: _Found) -> list[Figure]:
+    """The pictures of the first variant."""
+    return [
+        Figure(file=_pictures(workshop, first), caption="Tests (top) and pours at the estimates."),
+        Figure(file=_scatter(workshop, first), caption="Estimates against truths, default prior."),
+    ]
+
+
+def _outcome(size: Size, found: dict[str, _Found], figures: list[Figure]) -> Outcome:
     """What the variants that have run say."""
     first = found[three.VARIANTS[0].name]
     return Outcome(
@@ -101,21 +109,14 @@ def _outcome(workshop: Workshop, found: dict[str, _Found]) -> Outcome:
             row
             for variant in three.VARIANTS
             if variant.name in found
-            for row in _rows(workshop.size, variant.title, found[variant.name])
+            for row in _rows(size, variant.title, found[variant.name])
         ],
         answer=f"With the default prior the pour at the estimate is {first.again.mean():.2f} from "
         f"the first in L2, a second pour of the true material {first.floor.mean():.2f}; the "
         f"restitution is off by {_rms(first.errors[:, 2]):.3f} (rms), and by "
         f"{_rms(first.alone):.3f} where both frictions are known.",
         tables=[_sharpness(found)],
-        figures=[
-            Figure(
-                file=_pictures(workshop, first), caption="Tests (top) and pours at the estimates."
-            ),
-            Figure(
-                file=_scatter(workshop, first), caption="Estimates against truths, default prior."
-            ),
-        ],
+        figures=figures,
         notes=_notes(found),
         missing=[v.title for v in three.VARIANTS if v.name not in found],
     )

@@ -127,8 +127,8 @@ def run_one(
     began = time.monotonic()
     quick = "" if size.is_full else f" --{size.name}"
 
-    def made() -> dict[str, Any]:
-        return {
+    def keep(outcome: Outcome) -> dict[str, Any]:
+        made = {
             "command": f"granulcal reproduce paper {experiment.name}{quick} --out {folder.parent}",
             "size": size.name,
             "seeds": shop.seeds,
@@ -138,12 +138,14 @@ def run_one(
             "version": _native.__version__,
             "at": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         }
+        outcome.save(shop.own, made)
+        return made
 
-    shop.so_far = lambda outcome: outcome.save(shop.own, made())
+    shop.so_far = keep
     outcome = experiment.run(shop)
-    outcome.save(shop.own, made())
+    made = keep(outcome)
     if not quiet:
-        _print(outcome, made())
+        _print(outcome, made)
     return outcome
 
 

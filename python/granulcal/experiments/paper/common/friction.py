@@ -72,16 +72,13 @@ def training(workshop: Workshop) -> Pairs:
 
 def tests(workshop: Workshop) -> Pairs:
     """Returns usable test pours of independent draws, undisturbed, as many as were asked for."""
-    count, views = workshop.size.tests, {"clean": Disturbance()}
-    wanted = count
-    while True:
-        pours, cpu_s = workshop.pours, workshop.cpu_s
-        theta = PRIOR.sample(wanted, _TEST_SEED)
-        found = _seen(workshop, "friction-tests", theta, _TEST_SEED, views)
-        if len(found) >= count:
-            return view(found, "clean").first(count)
-        workshop.pours, workshop.cpu_s = pours, cpu_s
-        wanted += count - len(found)
+    views = {"clean": Disturbance()}
+
+    def pour(count: int) -> Pairs:
+        theta = PRIOR.sample(count, _TEST_SEED)
+        return _seen(workshop, "friction-tests", theta, _TEST_SEED, views)
+
+    return view(workshop.enough(workshop.size.tests, pour), "clean")
 
 
 def even_tests(workshop: Workshop) -> Pairs:

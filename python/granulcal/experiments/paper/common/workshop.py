@@ -87,7 +87,7 @@ class Workshop:
     pours: int = 0
     cpu_s: float = 0.0
     seeds: dict[str, int] = field(default_factory=dict)
-    so_far: Callable[[Outcome], None] = lambda _: None
+    so_far: Callable[[Outcome], object] = lambda _: None
 
     @property
     def own(self) -> Path:
@@ -133,10 +133,19 @@ class Workshop:
 
     def tests(self, name: str, scene: Scene, prior: Prior, count: int, seed: int) -> Pairs:
         """Returns exactly `count` usable pours; as many more are made as are not usable."""
+        return self.enough(count, lambda n: self.pairs(name, scene, prior, n, seed))
+
+    def enough(self, count: int, pour: Callable[[int], Pairs]) -> Pairs:
+        """Returns the first `count` usable pours of `pour`, which is asked for more until they are.
+
+        Args:
+            count: how many.
+            pour: makes so many pours, the first of which are there already, and returns the usable.
+        """
         wanted = count
         while True:
             pours, cpu_s = self.pours, self.cpu_s
-            found = _usable(self.data(name, scene, prior, wanted, seed))
+            found = pour(wanted)
             if len(found) >= count:
                 return found.first(count)
             self.pours, self.cpu_s = pours, cpu_s
