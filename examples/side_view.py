@@ -17,7 +17,7 @@ from matplotlib.collections import EllipseCollection
 
 def draw(
     positions: NDArray[np.float64],
-    diameter: float,
+    diameter: float | NDArray[np.float64],
     out: str,
     *,
     from_above: bool,
@@ -26,13 +26,16 @@ def draw(
 ) -> None:
     """Draws centres, shape (n, 3) [m], as discs in the plane y = 0 or z = 0, the nearest last.
 
+    `diameter` is that of all, or of each, shape (n,) [m].
+
     What `metadata` says is kept in the picture's file.
     """
     if from_above:
         positions = positions[:, [0, 2, 1]] * [1, -1, 1]
-    x, y, z = 1e3 * positions[np.argsort(positions[:, 1])[::-1]].T
+    nearest_last = np.argsort(positions[:, 1])[::-1]
+    x, y, z = 1e3 * positions[nearest_last].T
     figure, axes = plt.subplots(figsize=(inches, inches), layout="constrained")
-    sizes = np.full(len(x), 1e3 * diameter)
+    sizes = 1e3 * np.broadcast_to(diameter, len(x))[nearest_last]
     shade = plt.get_cmap("copper")(np.interp(-y, (-y.max(), -y.min() + 1e-9), (0.4, 1.0)))
     axes.add_collection(
         EllipseCollection(
@@ -48,7 +51,7 @@ def draw(
         )
     )
     axes.set(xlabel="x [mm]", ylabel="y [mm]" if from_above else "z [mm]", aspect="equal")
-    margin = 1e3 * diameter
+    margin = sizes.max()
     axes.set_xlim(x.min() - margin, x.max() + margin)
     axes.set_ylim(z.min() - margin if from_above else min(0.0, z.min() - margin), z.max() + margin)
     figure.savefig(out, dpi=80, metadata=metadata)

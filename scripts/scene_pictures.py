@@ -29,6 +29,7 @@ class View(NamedTuple):
 
     at: float | None = None
     within: float = np.inf
+    behind: float = -np.inf
     from_above: bool = False
 
 
@@ -43,6 +44,8 @@ VIEWS = {
     "bowl": View(within=0.055),
     "trail": View(from_above=True),
     "scoop": View(within=0.06),
+    # Cut in half.
+    "crater": View(behind=-1e-3),
 }
 
 
@@ -66,9 +69,10 @@ def main() -> int:
         view = VIEWS[name]
         pour = gc.simulate(scene_of(name, view.at), seed=1)
         shown = (np.abs(pour.positions[:, :2]) <= view.within).all(axis=1)
+        shown &= pour.positions[:, 1] >= view.behind
         side_view.draw(
             pour.positions[shown],
-            2 * float(pour.radii[0]),
+            2 * pour.radii[shown],
             str(OUT / f"{name}.png"),
             from_above=view.from_above,
             inches=5.0,

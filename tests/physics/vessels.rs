@@ -183,6 +183,57 @@ fn a_scoop_takes_what_it_holds() {
 }
 
 #[test]
+fn a_ball_that_falls_into_a_bed_leaves_a_crater() {
+    // 6,000 grains 3 cm deep in a tray of 6.8 cm, a ball of 1.5 cm.
+    let scene = with(
+        &example("crater.toml"),
+        &[
+            ("grains.count", 6000.0),
+            ("start.counts.0", 20.0),
+            ("start.counts.1", 20.0),
+            ("walls.0.shape.min.0", -0.034),
+            ("walls.0.shape.min.1", -0.034),
+            ("walls.0.shape.max.0", 0.034),
+            ("walls.0.shape.max.1", 0.034),
+            ("intruder.diameter", 15e-3),
+            ("intruder.position.2", 0.1),
+            ("intruder.velocity.2", -1.0),
+            ("intruder.enters", 0.35),
+            ("end.horizon", 0.7),
+        ],
+    );
+    let intruder = scene.intruder.as_ref().expect("a ball");
+    let mut simulation = Simulation::new(&scene, 1).expect("a valid scene");
+    simulation.advance(intruder.enters - 1e-3);
+    // The mean height of the topmost grains, within a circle or in a ring about the axis.
+    let level = |positions: &[nalgebra::Vector3<f64>], from: f64, to: f64| {
+        let ring = positions.iter().filter(|p| (from..to).contains(&p.x.hypot(p.y)));
+        let mut heights: Vec<f64> = ring.map(|p| p.z).collect();
+        heights.sort_by(f64::total_cmp);
+        let top = &heights[heights.len() * 9 / 10..];
+        top.iter().sum::<f64>() / top.len() as f64
+    };
+    let bed = simulation.positions();
+    assert_eq!(bed.len(), 6000);
+    let surface = level(&bed, 0.0, 0.03) + 1.5e-3;
+    let pour = simulation.run();
+    assert_ne!(pour.status, Status::Unhealthy, "{:?}", pour.health);
+    let (ball, bed) = pour.positions.split_last().expect("the ball is the last");
+    let depth = surface - (ball.z - intruder.radius());
+    // Uehara, Ambroso, Ojha and Durian, PRL 90 (2003) 194301: d = .14 / mu (rho_ball / rho_bed)^1/2 D^2/3 H^1/3 with
+    // the tangent mu of the angle of repose and H from the top of the fall to the bottom of the crater.
+    let fall = 0.1 - intruder.radius() - surface + 1.0 / (2.0 * 9.81);
+    let known = 0.14 / 0.45 * (1.0 / 0.6_f64).sqrt() * intruder.diameter.powf(2.0 / 3.0);
+    let known = known * (fall + depth).cbrt();
+    println!("crater: {:.1} mm deep, {:.1} mm by the law", 1e3 * depth, 1e3 * known);
+    assert!((0.5..1.5).contains(&(depth / known)), "{depth} {known}");
+    // It lies in a hollow with a rim.
+    let rim = level(bed, 0.014, 0.026) + 1.5e-3;
+    println!("rim {:.2} mm above the bed", 1e3 * (rim - surface));
+    assert!(rim > surface + 2e-4, "{rim} {surface}");
+}
+
+#[test]
 fn a_start_in_a_tube_that_is_too_narrow_is_refused() {
     let mut scene = example("column.toml");
     let Start::Cylinder { radius, .. } = &mut scene.start else { panic!("a cylinder") };

@@ -8,7 +8,10 @@ import pytest
 from granulcal import _native
 
 DOCS = Path(__file__).parents[2] / "docs"
-NAMES = ["funnel", "drop", "drum", "column", "hopper", "hopper_round", "bowl", "trail", "scoop"]
+NAMES = [
+    *["funnel", "drop", "drum", "column", "hopper", "hopper_round", "bowl", "trail", "scoop"],
+    "crater",
+]
 
 
 @pytest.mark.parametrize("name", NAMES)

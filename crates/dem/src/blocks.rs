@@ -4,6 +4,9 @@
 //! A contact belongs to the block of its first grain. Blocks are more than twice as wide as a pair is long, so that
 //! no grain has contacts in two blocks whose coordinates agree modulo 2: those form a phase, and its blocks may be
 //! solved at the same time. The order of the solve depends on the blocks, never on the threads.
+//!
+//! A grain much wider than the others has contacts all over: the pairs that it is in are a block and a phase of their
+//! own, the last.
 
 use std::ops::Range;
 
@@ -27,12 +30,15 @@ pub(crate) struct Blocks {
     phases: Vec<Range<usize>>,
     /// Rank of each block, x fastest.
     ranks: Vec<u32>,
+    /// Whether any grain is wide: their pairs have the rank after the last.
+    has_wide: bool,
 }
 
 impl Blocks {
-    /// Puts grains at `points` `[m]` into blocks; no pair is longer than `longest` `[m]`.
-    pub fn place(&mut self, points: &[Vector3<f64>], longest: f64, radius: f64) {
+    /// Puts grains at `points` `[m]` into blocks; no pair is longer than `longest` `[m]`, but for those of `wide` grains.
+    pub fn place(&mut self, points: &[Vector3<f64>], longest: f64, radius: f64, wide: &[u32]) {
         self.of.clear();
+        self.has_wide = !wide.is_empty();
         if points.len() < ONE_BLOCK {
             return;
         }
@@ -53,6 +59,12 @@ impl Blocks {
             let [x, y, z] = [0, 1, 2].map(|axis| ((point[axis] - low[axis]) / width) as usize);
             self.ranks[(z * cells[1] + y) * cells[0] + x]
         }));
+        for &grain in wide {
+            self.of[grain as usize] = self.ranks.len() as u32;
+        }
+        if self.has_wide {
+            self.phases.push(self.ranks.len()..self.ranks.len() + 1);
+        }
     }
 
     /// Ranks blocks by phase.
@@ -83,23 +95,36 @@ impl Blocks {
         one.into_iter().chain(several.iter().cloned())
     }
 
-    /// Orders the contacts by their blocks and leaves their order within a block; returns where each begins.
-    pub fn sort(&self, listed: &[ContactKey], ordered: &mut Vec<ContactKey>) -> Vec<usize> {
+    /// Orders the contacts by their blocks and leaves their order within a block; returns where each begins. Whether they
+    /// are pairs says what their partners are.
+    pub fn sort(
+        &self,
+        listed: &[ContactKey],
+        are_pairs: bool,
+        ordered: &mut Vec<ContactKey>,
+    ) -> Vec<usize> {
         ordered.clear();
         if self.of.is_empty() {
             ordered.extend_from_slice(listed);
             return vec![0, listed.len()];
         }
-        let mut starts = vec![0; self.ranks.len() + 2];
+        // A wide grain's rank is the highest, and goes before that of its partner.
+        let block_of = |contact: &ContactKey| {
+            let of_i = self.of[contact.i as usize];
+            let is_asked = are_pairs && self.has_wide;
+            let of_wide = self.ranks.len() as u32;
+            if is_asked && self.of[contact.partner as usize] == of_wide { of_wide } else { of_i }
+        };
+        let mut starts = vec![0; self.ranks.len() + usize::from(self.has_wide) + 2];
         for contact in listed {
-            starts[self.of[contact.i as usize] as usize + 2] += 1;
+            starts[block_of(contact) as usize + 2] += 1;
         }
         for block in 2..starts.len() {
             starts[block] += starts[block - 1];
         }
         ordered.resize(listed.len(), ContactKey { i: 0, partner: 0 });
         for contact in listed {
-            let slot = &mut starts[self.of[contact.i as usize] as usize + 1];
+            let slot = &mut starts[block_of(contact) as usize + 1];
             ordered[*slot] = *contact;
             *slot += 1;
         }
@@ -124,7 +149,7 @@ mod tests {
     fn blocks_of_a_phase_share_no_grain() {
         let (points, longest) = (points(), 9e-3);
         let mut blocks = Blocks::default();
-        blocks.place(&points, longest, 2e-3);
+        blocks.place(&points, longest, 2e-3, &[]);
         let near = |&(i, j): &(usize, usize)| (points[i] - points[j]).norm() < longest;
         let pairs =
             (0..points.len()).flat_map(|i| (i + 1..points.len().min(i + 230)).map(move |j| (i, j)));
@@ -133,7 +158,7 @@ mod tests {
             .map(|(i, j)| ContactKey { i: i as u32, partner: j as u32 })
             .collect();
         let mut ordered = Vec::new();
-        let starts = blocks.sort(&listed, &mut ordered);
+        let starts = blocks.sort(&listed, true, &mut ordered);
         assert!(blocks.phases().any(|phase| phase.len() > 2));
         for phase in blocks.phases() {
             let mut owner = HashMap::new();
@@ -154,11 +179,11 @@ mod tests {
     #[test]
     fn few_grains_are_one_block_in_their_order() {
         let mut blocks = Blocks::default();
-        blocks.place(&points()[..100], 9e-3, 2e-3);
+        blocks.place(&points()[..100], 9e-3, 2e-3, &[]);
         let listed: Vec<ContactKey> =
             (0..50).rev().map(|i| ContactKey { i, partner: i + 1 }).collect();
         let mut ordered = Vec::new();
-        assert_eq!(blocks.sort(&listed, &mut ordered), [0, 50]);
+        assert_eq!(blocks.sort(&listed, true, &mut ordered), [0, 50]);
         assert_eq!(ordered, listed);
         assert!(blocks.phases().eq(std::iter::once(0..1)));
     }

@@ -140,7 +140,7 @@ impl ContactSet {
         self.laws.clear();
         self.uniform.clear();
         let mut ordered = std::mem::take(&mut self.ordered);
-        let starts = blocks.sort(listed, &mut ordered);
+        let starts = blocks.sort(listed, !at_walls, &mut ordered);
         for phase in blocks.phases() {
             let first = self.parts.len();
             for block in phase {

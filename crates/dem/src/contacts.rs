@@ -211,7 +211,8 @@ impl Contacts {
         self.search.pairs(particles, &self.paths, reach, &around.threads, &mut self.found);
         // Where space repeats the first and the last block are neighbours, which phases do not know: one block.
         let middles = if particles.period.is_some() { &[] } else { self.search.middles() };
-        self.blocks.place(middles, self.search.longest(), around.radius);
+        let (longest, wide) = (self.search.longest(), self.search.wide());
+        self.blocks.place(middles, longest, around.radius, wide);
         // Contacts that will act come first: their batches are full of them, the others are passed over whole.
         let members = around.members as u32;
         if members > 1 {

@@ -8,6 +8,7 @@ use crate::particles::Particles;
 use crate::period::Period;
 
 /// The grains where they start, as large and as heavy as the scene says: the spheres of `clumps` if they are not round.
+/// An intruder is the last.
 pub(crate) fn particles(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Particles {
     let radius = scene.grains.radius();
     let (mut spheres, inverse): (Vec<Row>, f64) = if let Some(clumps) = clumps {
@@ -22,6 +23,10 @@ pub(crate) fn particles(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Pa
             sphere.0[3] = own;
             *inverse = (radius / own).powi(3);
         }
+    }
+    if let Some(intruder) = &scene.intruder {
+        spheres.push(Row::new(&intruder.centre(), intruder.radius()));
+        inverse_mass.push(1.0 / intruder.relative_mass(&scene.grains));
     }
     Particles::new(spheres, inverse_mass, scene.periodic.as_ref().map(Period::of))
 }

@@ -70,12 +70,13 @@ pub use frozen_search::FrozenSearch;
 pub use granulcal_scene::{
     Adhesion, BoxSide, CameraSpec, Capillary, Clump, Complementarity, DepthSensor, Effect, Effects,
     EndRule, Ends, Fluid, Funnel, FunnelPose, GRAVITY, GrainShape, Grains, Ground, GroundUnlike,
-    ImpactSettings, Layer, Lubrication, Mask, Material, Mesh, MeshFile, Method, Motion,
+    ImpactSettings, Intruder, Layer, Lubrication, Mask, Material, Mesh, MeshFile, Method, Motion,
     NewtonSettings, NoiseField, Observe, ObserveDischarge, ObserveFront, ObserveImages,
     ObserveRadius, ObserveSpill, ObserveSurface, Outflow, Outlet, Periodic, PeriodicAxis,
-    Polydispersity, Preset, Projection, ReferenceSettings, RestitutionSpeed, RollingForm, Scene,
-    SceneError, Shape, SolverSettings, Start, StereoSensor, Tilt, TimeOfFlightSensor, Vibration,
-    ViewSpec, Wall, WallMaterial, rolling_friction_from_length, rolling_friction_to_length,
+    Polydispersity, Preset, Projection, ReferenceSettings, RestitutionSpeed, RolledAway,
+    RollingForm, Scene, SceneError, Shape, SolverSettings, Start, StereoSensor, Tilt,
+    TimeOfFlightSensor, Vibration, ViewSpec, Wall, WallMaterial, rolling_friction_from_length,
+    rolling_friction_to_length,
 };
 pub use health::{Health, MAX_ENERGY_CREATED};
 pub use impact::ImpactWork;

@@ -3,7 +3,8 @@
 //! Every grain is a ball swept over the coming interval: centre at mid-interval, radius grown by half
 //! the way it travels and by half the margin. Pairs of such balls that overlap are candidates, and those
 //! that come near on their straight paths are the answer. A dense grid of cells holds the centres, x
-//! fastest, so that neighbouring cells of a row are one range of slots.
+//! fastest, so that neighbouring cells of a row are one range of slots. A ball much wider than the others would make
+//! all cells as wide as itself: it is in none, and is asked for what lies around it.
 
 mod check;
 
@@ -20,6 +21,8 @@ use crate::period::Period;
 
 /// Upper bound of the number of cells: clearing them must stay cheaper than the search itself.
 const MAX_CELLS: f64 = 65_536.0;
+/// A grain wider than this in mean radii is in no cell `[-]`.
+const WIDE: f64 = 4.0;
 /// Balls tested at once.
 const CHUNK: usize = 16;
 /// Rows of cells that a thread takes at once.
@@ -35,8 +38,11 @@ pub(crate) struct PairSearch {
     /// Grains that were added since, each with the next one of its cell; the last of each cell.
     added: Vec<Added>,
     latest: Vec<u32>,
-    /// Added grains that fit into no cell.
+    /// Wide grains, and added ones that fit into no cell.
     outside: Vec<u32>,
+    /// Wide grains in the scene, in rising order.
+    #[serde(skip)]
+    wide: Vec<u32>,
     /// Lower corner of the grid `[m]` and the width of a cell `[m]`.
     corner: [f64; 3],
     edge: f64,
@@ -73,6 +79,7 @@ impl PairSearch {
         self.starts.clear();
         self.added.clear();
         self.outside.clear();
+        self.find_wide(particles);
         if particles.present().count() < 2 {
             return;
         }
@@ -86,8 +93,45 @@ impl PairSearch {
                 pair.is_direct(particles, paths) && pair.follow(particles, paths, reach)
             });
         });
+        self.around_wide(particles, paths, reach, found);
         if let Some(period) = &particles.period {
             self.across(particles, paths, reach, period, found);
+        }
+    }
+
+    fn find_wide(&mut self, particles: &Particles) {
+        let radii = || (0..particles.count()).map(|grain| particles.radius(grain));
+        let limit = WIDE * radii().sum::<f64>() / particles.count() as f64;
+        let wide = particles.present().filter(|&grain| particles.radius(grain) > limit);
+        self.wide.clear();
+        self.wide.extend(wide.map(|grain| grain as u32));
+        self.outside.extend(&self.wide);
+    }
+
+    /// Adds the pairs of wide grains with each other and with those in the cells.
+    fn around_wide(
+        &self,
+        particles: &Particles,
+        paths: &[Path],
+        reach: Reach,
+        found: &mut Vec<Neighbours>,
+    ) {
+        for &wide in &self.wide {
+            let grain = wide as usize;
+            self.around(
+                &Ball { middle: self.middles[grain], reach: self.reaches[grain] },
+                |other| {
+                    // Two wide ones find each other: once is enough.
+                    if other <= wide && self.wide.binary_search(&other).is_ok() {
+                        return;
+                    }
+                    let (i, j) = (wide.min(other), wide.max(other));
+                    let mut pair = Neighbours { i, j, come_near: false };
+                    if pair.is_direct(particles, paths) && pair.follow(particles, paths, reach) {
+                        found.push(pair);
+                    }
+                },
+            );
         }
     }
 
@@ -122,7 +166,12 @@ impl PairSearch {
         &self.middles
     }
 
-    /// How far apart the centres of two overlapping swept balls are at most.
+    /// Grains much wider than the others that are in the scene, in rising order.
+    pub fn wide(&self) -> &[u32] {
+        &self.wide
+    }
+
+    /// How far apart the centres of two overlapping swept balls are at most, if neither is wide.
     pub fn longest(&self) -> f64 {
         self.edge
     }
@@ -188,12 +237,15 @@ impl PairSearch {
 
     /// Counting sort by cell. A cell is as wide as the two widest balls reach, so that partners are neighbours.
     fn sort_into_cells(&mut self, particles: &Particles) {
-        let (mut low, mut high) = (self.middles[0], self.middles[0]);
-        for middle in &self.middles {
-            low = low.inf(middle);
-            high = high.sup(middle);
+        let is_wide = |grain: usize| self.wide.binary_search(&(grain as u32)).is_ok();
+        let mut low = Vector3::repeat(f64::INFINITY);
+        let (mut high, mut widest) = (-low, 0.0);
+        for grain in (0..self.middles.len()).filter(|&grain| !is_wide(grain)) {
+            low = low.inf(&self.middles[grain]);
+            high = high.sup(&self.middles[grain]);
+            widest = f64::max(widest, self.reaches[grain]);
         }
-        let mut edge = 2.0 * self.reaches.iter().copied().fold(0.0, f64::max);
+        let mut edge = 2.0 * widest;
         let extent = high - low;
         let cells = |edge: f64| extent.iter().map(|e| (e / edge).floor() + 1.0).product::<f64>();
         // A wide, thin scatter of grains must not cost a huge grid.
@@ -212,7 +264,7 @@ impl PairSearch {
         self.cell_of.clear();
         let mut count = 0;
         for (grain, middle) in self.middles.iter().enumerate() {
-            if particles.has_left(grain) {
+            if particles.has_left(grain) || is_wide(grain) {
                 self.cell_of.push(u32::MAX);
                 continue;
             }

@@ -80,14 +80,23 @@ impl Particles {
     /// Takes the grains with their centre below `height` `[m]` out of the scene; whether there were any.
     pub fn remove_below(&mut self, height: f64) -> bool {
         let out: Vec<usize> = self.present().filter(|&i| self.position(i).z < height).collect();
-        if !out.is_empty() {
-            self.left.resize(self.count(), false);
-        }
         for &grain in &out {
-            self.left[grain] = true;
-            self.bodies[grain] = Body::default();
+            self.take_out(grain);
         }
         !out.is_empty()
+    }
+
+    /// Takes a grain out of the scene: it stays where it is, at rest.
+    pub fn take_out(&mut self, grain: usize) {
+        self.left.resize(self.count(), false);
+        self.left[grain] = true;
+        self.bodies[grain] = Body::default();
+    }
+
+    /// Lets a grain that was held out into the scene with a velocity `[m/s]`.
+    pub fn let_in(&mut self, grain: usize, velocity: &Vector3<f64>) {
+        self.left[grain] = false;
+        self.set_motion(grain, velocity, &Vector3::zeros());
     }
 
     /// Share of the grains' mass that has left `[-]`.

@@ -3,6 +3,7 @@
 
 mod end;
 mod frozen;
+mod intruder;
 mod start;
 mod state;
 mod substep;
@@ -71,7 +72,8 @@ impl Simulation {
     pub fn new(scene: &Scene, seed: u64) -> Result<Self, DemError> {
         scene.check()?;
         let clumps = Clumps::of(scene, seed);
-        let particles = initial::particles(scene, clumps.as_ref(), seed);
+        let mut particles = initial::particles(scene, clumps.as_ref(), seed);
+        intruder::hold_out(scene, &mut particles);
         let around = ContactContext::new(scene);
         let gravity = around.gravity;
         let lift = gravity.norm() * scene.grains.radius();
@@ -151,7 +153,9 @@ impl Simulation {
 
     /// Radii of the grains that have left through the scene's outflow `[m]`.
     pub fn radii_out(&self) -> Vec<f64> {
-        let grains = 0..self.particles.count();
+        // An intruder that is still to enter has left through nothing.
+        let is_open = self.origin.scene.outflow.is_some();
+        let grains = 0..if is_open { self.particles.count() } else { 0 };
         grains.filter(|&i| self.particles.has_left(i)).map(|i| self.particles.radius(i)).collect()
     }
 

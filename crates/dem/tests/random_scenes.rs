@@ -2,8 +2,9 @@
 //! happened. A scene that was ever found to break something has a test of its own in `tests/physics/robustness.rs`.
 
 use granulcal_dem::{
-    BoxSide, EndRule, Ends, Funnel, Grains, Ground, MAX_ENERGY_CREATED, Material, Motion, Outflow,
-    Periodic, PeriodicAxis, Preset, Scene, Shape, Simulation, Start, Status, Wall, WallMaterial,
+    BoxSide, EndRule, Ends, Funnel, Grains, Ground, Intruder, MAX_ENERGY_CREATED, Material, Motion,
+    Outflow, Periodic, PeriodicAxis, Preset, Scene, Shape, Simulation, Start, Status, Wall,
+    WallMaterial,
 };
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -168,7 +169,9 @@ fn scene() -> impl Strategy<Value = Scene> {
     let period = prop::option::weighted(0.2, (any::<bool>(), -20.0..20.0, 8.0..60.0));
     let until = prop::option::of(prop_oneof![Just(100.0), 1.0..100.0]);
     let outflow = prop::option::weighted(0.2, (-5.0..30.0, until));
-    let rules = (end, period, outflow);
+    let entry = (log(0.2, 20.0), log(0.1, 10.0), vector(-20.0..20.0), vector(-3.0..3.0), 0.0..0.05);
+    let intruder = prop::option::weighted(0.2, entry);
+    let rules = (end, period, outflow, intruder);
     (radius, begin(), prop::option::of(funnel()), walls, gravity(), material(), preset, rules)
         .prop_map(
             |(
@@ -179,7 +182,7 @@ fn scene() -> impl Strategy<Value = Scene> {
                 gravity,
                 material,
                 preset,
-                ((substeps, energy), period, outflow),
+                ((substeps, energy), period, outflow, intruder),
             )| Scene {
                 name: "random".to_owned(),
                 preset,
@@ -187,10 +190,24 @@ fn scene() -> impl Strategy<Value = Scene> {
                 material,
                 grains: Grains { count, diameter: 2.0 * radius, density: 1300.0, shape: None },
                 start: scaled_start(start, radius),
+                // With neither of those two, as the scene's check asks.
+                intruder: intruder.filter(|_| period.is_none() && outflow.is_none()).map(
+                    |(size, density, position, velocity, enters)| Intruder {
+                        diameter: 2.0 * radius * size,
+                        density: 1300.0 * density,
+                        position: position.map(|c| radius * c),
+                        velocity,
+                        enters,
+                    },
+                ),
                 ground: Ground::default(),
                 funnel: funnel.map(|funnel| scaled_funnel(funnel, radius)),
                 walls: walls.into_iter().map(|wall| scaled_wall(wall, radius)).collect(),
-                end: EndRule { horizon: substeps * preset.settings().dt, kinetic_energy: energy },
+                end: EndRule {
+                    horizon: substeps * preset.settings().dt,
+                    kinetic_energy: energy,
+                    ..EndRule::default()
+                },
                 camera: granulcal_dem::CameraSpec::default(),
                 effects: granulcal_dem::Effects::default(),
                 periodic: period.map(|(is_x, from, length)| Periodic {
@@ -328,10 +345,12 @@ proptest! {
             && health.worst_penetration <= settings.max_penetration
             && health.energy_created <= MAX_ENERGY_CREATED;
         prop_assert_eq!(is_sound, pour.status != Status::Unhealthy, "{:?} {:?}", pour.status, health);
-        // Walls that move put energy in, and so does a slope without end; what leaves takes its own with it.
+        // Walls that move put energy in, and so do a slope without end and a ball that enters; what leaves takes its own
+        // with it.
         let is_closed = scene.walls.iter().all(|wall| wall.motion.is_still())
             && scene.periodic.is_none()
-            && scene.outflow.is_none();
+            && scene.outflow.is_none()
+            && scene.intruder.is_none();
         if is_sound && is_closed {
             prop_assert!(created <= MAX_ENERGY_CREATED * scale * (1.0 + 1e-9), "{created} {health:?}");
         }
@@ -339,7 +358,9 @@ proptest! {
             pour.positions.iter().filter(|centre| funnel.holds(centre, 0.0)).count()
         });
         prop_assert_eq!(held, pour.grains_in_funnel);
-        prop_assert_eq!(pour.positions.len() + pour.radii_out.len(), scene.grains.count);
+        let entered = scene.intruder.is_some_and(|ball| ball.enters <= pour.simulated_s - settings.dt);
+        let grains = scene.grains.count + usize::from(entered);
+        prop_assert_eq!(pour.positions.len() + pour.radii_out.len(), grains);
         match pour.status {
             Status::Jammed => prop_assert!(held > 0),
             Status::AtRest | Status::OutOfView => prop_assert_eq!(held, 0),

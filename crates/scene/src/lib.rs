@@ -16,10 +16,12 @@ mod camera;
 mod check;
 mod distribution;
 mod effects;
+mod end;
 mod error;
 mod grain_shape;
 mod grains;
 mod gravity;
+mod intruder;
 mod material;
 mod mesh;
 mod motion;
@@ -40,10 +42,12 @@ mod walls;
 pub use camera::{CameraSpec, MAX_BLUR, MAX_DEPTH_NOISE, MAX_SENSOR_PIXELS, Mask, Projection};
 pub use distribution::Distribution;
 pub use effects::*;
+pub use end::{EndRule, RolledAway};
 pub use error::SceneError;
 pub use grain_shape::{GrainShape, Solid, parry};
 pub use grains::Grains;
 pub use gravity::GRAVITY;
+pub use intruder::Intruder;
 pub use material::{
     Material, WallMaterial, rolling_friction_from_length, rolling_friction_to_length,
 };
@@ -61,7 +65,7 @@ pub use preset::{
     SolverSettings,
 };
 pub use prior::{Keys, Parameter, Prior};
-pub use scene::{EndRule, Scene};
+pub use scene::Scene;
 pub use sensor::{
     DepthSensor, GRAZING_DEG, NoiseField, StereoSensor, TimeOfFlightSensor, round_to,
 };

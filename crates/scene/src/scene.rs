@@ -9,10 +9,12 @@ use serde::{Deserialize, Serialize};
 use crate::camera::{CameraSpec, Projection};
 use crate::check::{finite, positive};
 use crate::effects::{Effect, Effects};
+use crate::end::EndRule;
 use crate::error::SceneError;
 use crate::grain_shape::Solid;
 use crate::grains::Grains;
 use crate::gravity::standard_gravity;
+use crate::intruder::Intruder;
 use crate::material::Material;
 use crate::mesh::MeshFile;
 use crate::motion::Motion;
@@ -43,6 +45,9 @@ pub struct Scene {
     pub grains: Grains,
     /// Where the grains are when the pour begins.
     pub start: Start,
+    /// A ball of another size, if one falls among the grains.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intruder: Option<Intruder>,
     /// The plane z = 0.
     #[serde(default, skip_serializing_if = "Ground::is_plain")]
     pub ground: Ground,
@@ -75,23 +80,6 @@ pub struct Scene {
     pub observe: Option<Observe>,
 }
 
-/// When a pour ends: at rest, with every moving grain out of view, or at the horizon. [`Outflow::until`] may end it
-/// before.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct EndRule {
-    /// Longest simulated time `[s]`.
-    pub horizon: f64,
-    /// Mean kinetic energy of a grain per mass below which the pour is at rest `[m^2/s^2]`.
-    pub kinetic_energy: f64,
-}
-
-impl Default for EndRule {
-    fn default() -> Self {
-        Self { horizon: 4.0, kinetic_energy: 1e-8 }
-    }
-}
-
 impl Scene {
     /// The paper's pour: 2000 grains of 4 mm through a funnel whose tip is `height` `[m]` above the ground.
     pub fn funnel(height: f64) -> Self {
@@ -102,6 +90,7 @@ impl Scene {
             material: Material::default(),
             grains: Grains { count: 2000, diameter: 4e-3, density: 1300.0, shape: None },
             start: Start::Grid { counts: [10, 10, 20], spacing: 8e-3, jitter: 1e-4, base: -4e-3 },
+            intruder: None,
             ground: Ground::default(),
             funnel: Some(Funnel { height, ..Funnel::default() }),
             walls: Vec::new(),
@@ -177,11 +166,13 @@ impl Scene {
         }
     }
 
-    /// When the last wall has come to rest and the last effect that ends has, or the horizon if one never does `[s]`.
+    /// When the last wall has come to rest, the last effect that ends has and the intruder has entered, or the horizon
+    /// if one never does `[s]`.
     pub fn moves_until(&self) -> f64 {
+        let entry = self.intruder.as_ref().map_or(0.0, |intruder| intruder.enters);
         let walls = self.walls.iter().map(|wall| &wall.motion);
         let motions = walls.chain(self.funnel.iter().map(|funnel| &funnel.motion));
-        let last = motions.map(Motion::end).fold(self.effects.acts_until(), f64::max);
+        let last = motions.map(Motion::end).fold(self.effects.acts_until().max(entry), f64::max);
         last.min(self.end.horizon)
     }
 
@@ -237,6 +228,22 @@ impl Scene {
         }
     }
 
+    /// What an intruder cannot be with.
+    fn check_intruder(&self) -> Result<(), SceneError> {
+        let Some(intruder) = &self.intruder else { return Ok(()) };
+        intruder.check(&self.grains)?;
+        let others = [
+            ("grains.shape", self.grains.shape.is_some()),
+            ("effects.clump", self.effects.clump.is_on()),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+        ];
+        match others.into_iter().find(|(_, is_there)| *is_there) {
+            Some((other, _)) => Err(SceneError::Exclude { one: "intruder", other }),
+            None => Ok(()),
+        }
+    }
+
     /// Checks every number of the scene.
     ///
     /// # Errors
@@ -245,8 +252,7 @@ impl Scene {
         self.material.check("material")?;
         positive("grains.diameter", self.grains.diameter)?;
         positive("grains.density", self.grains.density)?;
-        positive("end.horizon", self.end.horizon)?;
-        positive("end.kinetic_energy", self.end.kinetic_energy)?;
+        self.end.check(self)?;
         for (axis, value) in ["x", "y", "z"].iter().zip(self.gravity) {
             finite(&format!("gravity.{axis}"), value)?;
         }
@@ -254,6 +260,7 @@ impl Scene {
         self.effects.check()?;
         self.check_clump()?;
         self.check_shape()?;
+        self.check_intruder()?;
         self.start.check(&self.held_grains())?;
         self.effects.check_method(self.preset.settings().method)?;
         if let Some(funnel) = &self.funnel {

@@ -69,10 +69,10 @@ class Setup:
         """Returns the pour of a scene with a seed.
 
         Raises:
-            ValueError: the scene has moving or meshed walls, a period or an outflow.
+            ValueError: the scene has moving or meshed walls, a period, an outflow or an intruder.
         """
         table = tomllib.loads(scene.to_toml())
-        for key in ("periodic", "outflow"):
+        for key in ("periodic", "outflow", "intruder"):
             if key in table:
                 raise ValueError(
                     f"{scene.name}: `{key}` has no counterpart in other engines' files"

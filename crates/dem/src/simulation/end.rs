@@ -1,12 +1,18 @@
 //! When a pour ends, and how: docs/theory/contact.md, "End and health".
 
+use granulcal_scene::RolledAway;
 use nalgebra::Vector3;
 
 use super::Simulation;
+use crate::law::INVERSE_INERTIA;
 use crate::pour::Status;
 
 /// Samples of the end rule within which a pour must seem ended twice.
 const REST_SAMPLES: usize = 16;
+
+/// How far out of view a grain must have rolled to leave the scene, in its radii, and how high it is at most.
+const BEYOND: f64 = 20.0;
+const LIFTED: f64 = 1.1;
 
 impl Simulation {
     /// How the pour has ended, if it has. It must have seemed so twice within [`REST_SAMPLES`]: a grain at the
@@ -22,10 +28,11 @@ impl Simulation {
         let energies: Vec<f64> =
             (0..self.particles.count()).map(|i| self.particles.translation(i)).collect();
         let Some(now) = self.at_rest(&energies) else {
-            let is_over = self.time() >= self.origin.scene.end.horizon;
-            let how =
-                if self.flow_has_stopped(&energies) { Status::Jammed } else { Status::Horizon };
-            return is_over.then_some(how);
+            if self.time() < self.origin.scene.end.horizon {
+                return None;
+            }
+            let has_stopped = self.flow_has_stopped(&energies);
+            return Some(if has_stopped { Status::Jammed } else { Status::Horizon });
         };
         let window = REST_SAMPLES * self.around.settings.list_period;
         let seen = self.seemed_ended.replace((now, self.substep));
@@ -40,8 +47,12 @@ impl Simulation {
             let is_jammed = self.in_funnel().next().is_some();
             Some(if is_jammed { Status::Jammed } else { status })
         };
-        if energies.iter().sum::<f64>() <= threshold * self.particles.present().count() as f64 {
-            return jammed_or(Status::AtRest);
+        let present = self.particles.present().count();
+        if energies.iter().sum::<f64>() <= threshold * present as f64 {
+            // What has been let go moves on.
+            let lets_go = scene.end.rolled_away == RolledAway::Leave;
+            let moves_on = lets_go && present < self.particles.count();
+            return jammed_or(if moves_on { Status::OutOfView } else { Status::AtRest });
         }
         let still = |(grain, energy): (usize, &f64)| {
             let at = self.particles.position(grain);
@@ -58,6 +69,37 @@ impl Simulation {
             count += 1;
         }
         count > 0 && sum <= self.origin.scene.end.kinetic_energy * f64::from(count)
+    }
+
+    /// Takes the grains that have rolled away out of the scene, if it says so.
+    pub(super) fn let_go(&mut self) {
+        if self.origin.scene.end.rolled_away == RolledAway::Stay {
+            return;
+        }
+        let gone: Vec<usize> =
+            self.particles.present().filter(|&grain| self.has_rolled_away(grain)).collect();
+        if !gone.is_empty() {
+            gone.into_iter().for_each(|grain| self.particles.take_out(grain));
+            self.contacts.forget_list();
+        }
+    }
+
+    /// Whether a grain is on the ground, farther out of view than [`BEYOND`], and will roll on outward: friction takes a
+    /// ball that slides with v and would roll with v_r to (5 v + 2 v_r) / 7, whatever the friction.
+    fn has_rolled_away(&self, grain: usize) -> bool {
+        let (place, radius) = (self.particles.position(grain), self.particles.radius(grain));
+        let across = place.xy();
+        let distance = across.norm();
+        let camera = &self.origin.scene.camera;
+        let inward = across * (1.0 - BEYOND * radius / distance);
+        if place.z > LIFTED * radius || camera.sees_ground(inward.x, inward.y) {
+            return false;
+        }
+        let velocity = self.particles.velocity(grain);
+        let rolling = (radius * self.particles.angular_velocity(grain)).cross(&Vector3::z());
+        // 5 v + 2 v_r for balls, whose 1 / I is 5 / 2.
+        let later = INVERSE_INERTIA * velocity + rolling;
+        across.dot(&later.xy()) > 0.0
     }
 
     /// The grains that are in the funnel, if the scene has one.

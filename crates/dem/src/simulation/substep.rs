@@ -46,6 +46,7 @@ impl Simulation {
             self.count_substep();
             return;
         }
+        self.let_intruder_in();
         self.follow();
         self.act_forces();
         let seen = self.assemble();
@@ -201,6 +202,7 @@ impl Simulation {
         {
             self.contacts.forget_list();
         }
+        self.let_go();
         let is_due =
             self.substep.is_multiple_of(RESIDUAL_PERIOD * self.around.settings.list_period);
         if is_due && self.bodies.is_none() {

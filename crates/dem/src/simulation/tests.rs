@@ -40,6 +40,41 @@ fn a_whole_pour_has_the_same_bits_on_any_number_of_threads() {
 }
 
 #[test]
+fn a_ball_among_the_grains_has_the_same_bits_on_any_number_of_threads_and_from_a_checkpoint() {
+    let mut scene = scene();
+    scene.intruder = Some(granulcal_scene::Intruder {
+        diameter: 0.02,
+        density: 2500.0,
+        position: [0.004, 0.0, 0.06],
+        velocity: [0.0, 0.0, -2.0],
+        enters: 0.11,
+    });
+    let mut alone = start(&scene);
+    let mut states = Vec::new();
+    // Before it enters, while it falls and as it ploughs through the grains.
+    for seconds in [0.1, 0.02, 0.04] {
+        alone.advance(seconds);
+        states.push(alone.checkpoint());
+    }
+    let listed = alone.contacts.pairs.lanes().filter(|&(number, lane)| {
+        alone.contacts.pairs.batches[number].j[lane] as usize == scene.grains.count
+    });
+    assert!(listed.count() > 5, "it touches nothing");
+    alone.advance(0.1);
+    assert_ne!(alone.ended(), Some(Status::Unhealthy), "{:?}", alone.health());
+    for threads in [2, 4] {
+        let mut shared = start(&scene).with_threads(threads).expect("threads");
+        shared.advance(0.26);
+        assert_eq!(shared.state_hash(), alone.state_hash(), "{threads} threads");
+    }
+    for (state, rest) in states.iter().zip([0.16, 0.14, 0.1]) {
+        let mut resumed = start(&scene).resume(state).expect("a checkpoint of it");
+        resumed.advance(rest);
+        assert_eq!(resumed.state_hash(), alone.state_hash());
+    }
+}
+
+#[test]
 fn a_whole_pour_has_the_same_bits_on_any_registers() {
     let mut scene = scene();
     scene.grains.count = 200;
@@ -52,6 +87,30 @@ fn a_whole_pour_has_the_same_bits_on_any_registers() {
         }
         assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:x?}");
     }
+}
+
+#[test]
+fn what_has_rolled_away_leaves_and_what_turns_back_stays() {
+    // Three grains out of view on the ground: one rolls outward, one slides outward with so much backspin that it will
+    // come back, one rolls inward.
+    let mut scene = Scene::drop(0.1);
+    scene.grains.count = 3;
+    let at = |x: f64| [x, 0.0, scene.grains.radius()];
+    scene.start = Start::Positions { positions: vec![at(0.4), at(0.45), at(0.5)] };
+    scene.end.rolled_away = crate::RolledAway::Leave;
+    let mut simulation = start(&scene);
+    let (x, y) = (Vector3::x(), Vector3::y() / scene.grains.radius());
+    for (grain, velocity, rolling) in [(0, 0.3, 0.3), (1, 0.1, -0.5), (2, -0.3, -0.3)] {
+        simulation.set_motion(grain, velocity * x, rolling * y).expect("a grain");
+    }
+    simulation.advance(0.01);
+    let left: Vec<f64> = simulation.positions().iter().map(|p| p.x).collect();
+    assert_eq!(left.len(), 2, "{left:?}");
+    assert!((left[0] - 0.45).abs() < 2e-3 && (left[1] - 0.497).abs() < 2e-3, "{left:?}");
+    let pour = simulation.run();
+    assert_eq!(pour.status, Status::OutOfView, "{:?}", pour.health);
+    assert!(pour.radii_out.is_empty() && pour.positions.len() == 2);
+    assert_eq!(pour.health.energy_created, 0.0);
 }
 
 #[test]

@@ -273,7 +273,7 @@ fn row_of_grains(at_wall: bool) -> (ContactSet, Vec<Body>) {
         .map(|n| nalgebra::Vector3::new(2.0 * radius * f64::from(n), 0.0, 0.0))
         .collect();
     let mut blocks = Blocks::default();
-    blocks.place(&points, 2.0 * radius, radius);
+    blocks.place(&points, 2.0 * radius, radius, &[]);
     let listed: Vec<_> = (0..GRAINS - u32::from(!at_wall))
         .map(|i| ContactKey { i, partner: if at_wall { 0 } else { i + 1 } })
         .collect();
