@@ -139,39 +139,3 @@ impl Dataset {
         gaps
     }
 }
-
-/// Joins data sets of one scene, prior, seed and version, for example the shards of several machines.
-///
-/// # Errors
-/// [`DatasetError::Differs`] names the first difference, [`DatasetError::DuplicateRow`] a row that
-/// stands in two of them, [`DatasetError::Argument`] for no input; else as [`Dataset::open`].
-pub fn merge(inputs: &[PathBuf]) -> Result<Dataset, DatasetError> {
-    let mut merged: Option<Dataset> = None;
-    let mut origin: BTreeMap<u64, &Path> = BTreeMap::new();
-    for input in inputs {
-        let dataset = Dataset::open(input)?;
-        if let Some(merged) = &merged {
-            dataset.header.require_same(input, &merged.header)?;
-        }
-        for row in &dataset.rows {
-            if let Some(first) = origin.insert(row.row, input) {
-                let (first, second) = (first.to_owned(), input.clone());
-                return Err(DatasetError::DuplicateRow { row: row.row, first, second });
-            }
-        }
-        match &mut merged {
-            None => merged = Some(dataset),
-            Some(merged) => {
-                merged.rows.extend(dataset.rows);
-                merged.unverified.extend(dataset.unverified);
-            }
-        }
-    }
-    let mut merged = merged.ok_or(DatasetError::Argument {
-        what: "the number of data sets to merge",
-        got: "0".to_owned(),
-        allowed: "at least 1",
-    })?;
-    merged.rows.sort_by_key(|row| row.row);
-    Ok(merged)
-}

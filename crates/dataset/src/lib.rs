@@ -14,7 +14,8 @@
 //! | [`Observer`] | what a scene observes over time and at its end |
 //! | [`generate()`] | resumable batches |
 //! | [`GatheredBatch`] | batches whose parts are made elsewhere |
-//! | [`Dataset`], [`merge`] | Parquet back into memory |
+//! | [`Dataset`] | Parquet back into memory |
+//! | [`merge`] | shards to one file |
 //! | [`Recording`] | measured height maps and depth images |
 //! | [`Survey`] | what is in a .bag or .mcap |
 //! | [`png`], [`npy`] | 16-bit depth PNG, arrays |
@@ -42,6 +43,7 @@ mod input;
 mod manifest;
 mod mcap_file;
 mod mean;
+mod merge;
 mod mesh_file;
 mod message;
 mod message_file;
@@ -69,7 +71,7 @@ pub use camera_file::CameraFile;
 pub use checkpoint_file::{read_checkpoint_header, resume_checkpoint, write_checkpoint};
 pub use claims::{Claims, Input, Product};
 pub use contact_problem_file::write_contact_problem;
-pub use dataset::{Dataset, merge};
+pub use dataset::Dataset;
 pub use drawn::Drawn;
 pub use engine::{Engine, Outcome, foreign_pour};
 pub use error::DatasetError;
@@ -83,6 +85,7 @@ pub use granulcal_scene::{Distribution, Parameter, Prior};
 pub use header::{Header, VERSION};
 pub use input::ReadSeek;
 pub use mcap_file::{Filmed, record_pour};
+pub use merge::{Merged, merge};
 pub use message_file::{Damage, MessageFormat};
 pub use npz::{Npz, write_height_map};
 pub use observe::{Observation, TooFewGrains, View, capture, capture_from, observe, overhead};

@@ -4,7 +4,8 @@
 
 mod columns;
 
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use granulcal_dem::Health;
@@ -20,6 +21,7 @@ use parquet::schema::types::Type;
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::contained::contained;
+use crate::files::PendingFile;
 use crate::header::{FIRST_ARITHMETIC, Header};
 use crate::row::{Row, RowStatus};
 use crate::{DatasetError, Form, files};
@@ -33,6 +35,10 @@ const LAW_KEY: &str = "granulcal.law";
 const ARITHMETIC_KEY: &str = "granulcal.arithmetic";
 const SEED_KEY: &str = "granulcal.seed";
 const HASH_KEY: &str = "granulcal.hash";
+/// Of a file of several row groups: the hash of each, as if it were a file of its own, separated by spaces.
+const HASHES_KEY: &str = "granulcal.hashes";
+/// Rows of a group of such a file.
+const GROUP: usize = if cfg!(test) { 4 } else { 16_384 };
 /// Bytes that one byte of a packed column may become: a column of one value packs well.
 const MOST_PACKED: i64 = 4096;
 
@@ -95,6 +101,21 @@ fn hash(header: &Header, rows: &[Row], columns: &[Column]) -> String {
 }
 
 fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, ParquetError> {
+    let mut bytes = Vec::new();
+    let stated = (HASH_KEY, hash(header, rows, columns));
+    let mut file = writer(&mut bytes, header, Some(stated), columns)?;
+    write_group(&mut file, rows, columns)?;
+    file.close()?;
+    Ok(bytes)
+}
+
+/// A writer of files with this header.
+fn writer<W: io::Write + Send>(
+    out: W,
+    header: &Header,
+    hash: Option<(&'static str, String)>,
+    columns: &[Column],
+) -> Result<SerializedFileWriter<W>, ParquetError> {
     let fields = columns.iter().map(|c| c.schema().map(Arc::new)).collect::<Result<Vec<_>, _>>()?;
     let schema = Arc::new(Type::group_type_builder("granulcal").with_fields(fields).build()?);
     let law = header.law.map(|law| (LAW_KEY, law.to_string()));
@@ -104,17 +125,22 @@ fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, 
         (VERSION_KEY, header.version.clone()),
         (ARITHMETIC_KEY, header.arithmetic.to_string()),
         (SEED_KEY, header.seed.to_string()),
-        (HASH_KEY, hash(header, rows, columns)),
     ];
-    let metadata =
-        metadata.into_iter().chain(law).map(|(key, value)| KeyValue::new(key.to_owned(), value));
+    let metadata = metadata.into_iter().chain(hash).chain(law);
+    let metadata = metadata.map(|(key, value)| KeyValue::new(key.to_owned(), value));
     let properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_created_by(format!("granulcal {}", header.version))
         .set_key_value_metadata(Some(metadata.collect()))
         .build();
-    let mut bytes = Vec::new();
-    let mut file = SerializedFileWriter::new(&mut bytes, schema, Arc::new(properties))?;
+    SerializedFileWriter::new(out, schema, Arc::new(properties))
+}
+
+fn write_group<W: io::Write + Send>(
+    file: &mut SerializedFileWriter<W>,
+    rows: &[Row],
+    columns: &[Column],
+) -> Result<(), ParquetError> {
     let mut group = file.next_row_group()?;
     for column in columns {
         let Some(mut writer) = group.next_column()? else { break };
@@ -136,8 +162,55 @@ fn encode(header: &Header, rows: &[Row], columns: &[Column]) -> Result<Vec<u8>, 
         writer.close()?;
     }
     group.close()?;
-    file.close()?;
-    Ok(bytes)
+    Ok(())
+}
+
+/// A file that takes rows as they come and keeps some thousand of them in memory: row group after row group.
+pub(crate) struct GroupWriter {
+    file: SerializedFileWriter<PendingFile>,
+    header: Header,
+    columns: Vec<Column>,
+    rows: Vec<Row>,
+    hashes: Vec<String>,
+    path: PathBuf,
+}
+
+impl GroupWriter {
+    /// Begins the file, beside its place.
+    pub(crate) fn create(path: &Path, header: &Header) -> Result<Self, DatasetError> {
+        let columns = columns(&header.prior.names(), &header.observed());
+        let pending = PendingFile::create(path, Form::Parquet)?;
+        let file = writer(pending, header, None, &columns)
+            .map_err(|source| DatasetError::Parquet { path: path.to_owned(), source })?;
+        let (header, path) = (header.clone(), path.to_owned());
+        Ok(Self { file, header, columns, rows: Vec::new(), hashes: Vec::new(), path })
+    }
+
+    /// Takes a row, the next after those that it has.
+    pub(crate) fn push(&mut self, row: Row) -> Result<(), DatasetError> {
+        self.rows.push(row);
+        if self.rows.len() < GROUP { Ok(()) } else { self.end_group() }
+    }
+
+    fn end_group(&mut self) -> Result<(), DatasetError> {
+        self.hashes.push(hash(&self.header, &self.rows, &self.columns));
+        write_group(&mut self.file, &self.rows, &self.columns)
+            .map_err(|source| DatasetError::Parquet { path: self.path.clone(), source })?;
+        self.rows.clear();
+        Ok(())
+    }
+
+    /// Ends the file and brings it to its place.
+    pub(crate) fn commit(mut self) -> Result<(), DatasetError> {
+        if !self.rows.is_empty() || self.hashes.is_empty() {
+            self.end_group()?;
+        }
+        let hashes = self.hashes.join(" ");
+        self.file.append_key_value_metadata(KeyValue::new(HASHES_KEY.to_owned(), hashes));
+        let path = self.path;
+        let pending = self.file.into_inner();
+        pending.map_err(|source| DatasetError::Parquet { path, source })?.commit()
+    }
 }
 
 /// Reads a whole file, every page of it.
@@ -201,9 +274,19 @@ pub(crate) fn parse(path: &Path, bytes: Vec<u8>) -> Result<Table, DatasetError> 
             }
         }
     }
-    let stated = metadata(&file, HASH_KEY);
+    let stated = metadata(&file, HASH_KEY).or_else(|| metadata(&file, HASHES_KEY));
     if let Some(stated) = &stated {
-        let found = hash(&header, &rows, &columns);
+        let groups = file.metadata().row_groups();
+        let mut rest = &rows[..];
+        let mut found = Vec::new();
+        for group in groups {
+            let count = usize::try_from(group.num_rows()).unwrap_or(usize::MAX);
+            // What is no number of rows hashes to nothing.
+            let Some((rows, after)) = rest.split_at_checked(count) else { break };
+            rest = after;
+            found.push(hash(&header, rows, &columns));
+        }
+        let found = found.join(" ");
         if *stated != found {
             let (path, stated) = (path.to_owned(), stated.clone());
             return Err(DatasetError::Damaged { path, what: "the rows", found, stated });

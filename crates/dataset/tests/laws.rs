@@ -55,7 +55,7 @@ fn rows_of_two_laws_are_not_merged() {
     let new = Dataset::open(&out).unwrap();
     assert_eq!((new.header.law, new.header.other_law()), (Some(LAW), None));
     for both in [[before(), out.clone()], [out.clone(), before()]] {
-        let error = merge(&both).unwrap_err();
+        let error = merge(&both, &place.path().join("merged.parquet"), 5).unwrap_err();
         assert!(error.to_string().contains("the law of the solver"), "{error}");
     }
     // Parts of one law under the manifest of another.
@@ -83,5 +83,7 @@ fn rows_of_two_arithmetics_are_neither_gone_on_with_nor_merged() {
     assert!(said.contains(&expected), "{said}");
     // Its parts say what they are themselves, too.
     assert!(Dataset::open(&other).unwrap_err().to_string().contains("the arithmetic"));
-    assert!(merge(&[one, other]).unwrap_err().to_string().contains("the arithmetic"));
+    let out = place.path().join("merged.parquet");
+    let error = merge(&[one, other], &out, 5).unwrap_err().to_string();
+    assert!(error.contains("the arithmetic") && !out.exists(), "{error}");
 }

@@ -28,5 +28,11 @@ pub(crate) fn particles(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Pa
         spheres.push(Row::new(&intruder.centre(), intruder.radius()));
         inverse_mass.push(1.0 / intruder.relative_mass(&scene.grains));
     }
-    Particles::new(spheres, inverse_mass, scene.periodic.as_ref().map(Period::of))
+    let mut particles =
+        Particles::new(spheres, inverse_mass, scene.periodic.as_ref().map(Period::of));
+    if scene.intruder.is_some() {
+        // It is to enter, `simulation/intruder.rs`.
+        particles.take_out(particles.count() - 1);
+    }
+    particles
 }

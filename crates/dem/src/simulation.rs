@@ -72,8 +72,7 @@ impl Simulation {
     pub fn new(scene: &Scene, seed: u64) -> Result<Self, DemError> {
         scene.check()?;
         let clumps = Clumps::of(scene, seed);
-        let mut particles = initial::particles(scene, clumps.as_ref(), seed);
-        intruder::hold_out(scene, &mut particles);
+        let particles = initial::particles(scene, clumps.as_ref(), seed);
         let around = ContactContext::new(scene);
         let gravity = around.gravity;
         let lift = gravity.norm() * scene.grains.radius();

@@ -3,9 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::check::positive;
-use crate::effects::Effect as _;
 use crate::error::SceneError;
-use crate::scene::Scene;
 
 /// When a pour ends: at rest, with every moving grain out of view, or at the horizon. [`crate::Outflow::until`] may end
 /// it before.
@@ -47,56 +45,8 @@ impl Default for EndRule {
 }
 
 impl EndRule {
-    pub(crate) fn check(&self, scene: &Scene) -> Result<(), SceneError> {
+    pub(crate) fn check(&self) -> Result<(), SceneError> {
         positive("end.horizon", self.horizon)?;
-        positive("end.kinetic_energy", self.kinetic_energy)?;
-        if self.rolled_away == RolledAway::Stay {
-            return Ok(());
-        }
-        // What might turn a grain back, what looks at where it is, and bodies that do not roll as balls do.
-        let slopes = scene.gravity[0] != 0.0 || scene.gravity[1] != 0.0 || scene.gravity[2] >= 0.0;
-        let others = [
-            ("walls", !scene.walls.is_empty()),
-            ("gravity that is not along -z", slopes),
-            ("effects.tilt", scene.effects.tilt.is_on()),
-            ("effects.vibration", scene.effects.vibration.is_on()),
-            ("effects.clump", scene.effects.clump.is_on()),
-            ("grains.shape", scene.grains.shape.is_some()),
-            ("observe", scene.observe.is_some()),
-            ("views", !scene.views.is_empty()),
-            ("outflow", scene.outflow.is_some()),
-            ("periodic", scene.periodic.is_some()),
-            ("intruder", scene.intruder.is_some()),
-        ];
-        match others.into_iter().find(|(_, is_there)| *is_there) {
-            Some((other, _)) => {
-                Err(SceneError::Exclude { one: "end.rolled_away = \"leave\"", other })
-            }
-            None => Ok(()),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn grains_leave_only_where_nothing_turns_them_back() {
-        let mut scene = Scene::funnel(0.12);
-        assert!(!scene.to_toml().unwrap().contains("rolled_away"));
-        scene.end.rolled_away = RolledAway::Leave;
-        scene.check().unwrap();
-        assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
-        for (change, name) in [
-            ((|s: &mut Scene| s.gravity[0] = 0.1) as fn(&mut Scene), "gravity"),
-            (|s| s.outflow = Some(crate::Outflow { below: -1.0, until: None }), "outflow"),
-            (|s| s.effects.tilt.x = 0.01, "effects.tilt"),
-        ] {
-            let mut scene = scene.clone();
-            change(&mut scene);
-            let text = scene.check().unwrap_err().to_string();
-            assert!(text.contains("rolled_away") && text.contains(name), "{text}");
-        }
+        positive("end.kinetic_energy", self.kinetic_energy)
     }
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::camera::{CameraSpec, Projection};
 use crate::check::{finite, positive};
 use crate::effects::{Effect, Effects};
-use crate::end::EndRule;
+use crate::end::{EndRule, RolledAway};
 use crate::error::SceneError;
 use crate::grain_shape::Solid;
 use crate::grains::Grains;
@@ -228,6 +228,32 @@ impl Scene {
         }
     }
 
+    /// What grains that leave once they have rolled away cannot be with: what might turn one back, what looks at where it
+    /// is, and bodies that do not roll as balls do.
+    fn check_rolled_away(&self) -> Result<(), SceneError> {
+        let slopes = self.gravity[0] != 0.0 || self.gravity[1] != 0.0 || self.gravity[2] >= 0.0;
+        let others = [
+            ("walls", !self.walls.is_empty()),
+            ("gravity that is not along -z", slopes),
+            ("effects.tilt", self.effects.tilt.is_on()),
+            ("effects.vibration", self.effects.vibration.is_on()),
+            ("effects.clump", self.effects.clump.is_on()),
+            ("grains.shape", self.grains.shape.is_some()),
+            ("observe", self.observe.is_some()),
+            ("views", !self.views.is_empty()),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+            ("intruder", self.intruder.is_some()),
+        ];
+        let leave = self.end.rolled_away == RolledAway::Leave;
+        match others.into_iter().find(|(_, is_there)| *is_there && leave) {
+            Some((other, _)) => {
+                Err(SceneError::Exclude { one: "end.rolled_away = \"leave\"", other })
+            }
+            None => Ok(()),
+        }
+    }
+
     /// What an intruder cannot be with.
     fn check_intruder(&self) -> Result<(), SceneError> {
         let Some(intruder) = &self.intruder else { return Ok(()) };
@@ -252,7 +278,8 @@ impl Scene {
         self.material.check("material")?;
         positive("grains.diameter", self.grains.diameter)?;
         positive("grains.density", self.grains.density)?;
-        self.end.check(self)?;
+        self.end.check()?;
+        self.check_rolled_away()?;
         for (axis, value) in ["x", "y", "z"].iter().zip(self.gravity) {
             finite(&format!("gravity.{axis}"), value)?;
         }
@@ -308,6 +335,25 @@ mod tests {
         let error = Scene::from_toml(&text).unwrap_err();
         let source = std::error::Error::source(&error).unwrap().to_string();
         assert!(source.contains("diametre") && source.contains("diameter"), "{source}");
+    }
+
+    #[test]
+    fn grains_leave_only_where_nothing_turns_them_back() {
+        let mut scene = Scene::funnel(0.12);
+        assert!(!scene.to_toml().unwrap().contains("rolled_away"));
+        scene.end.rolled_away = RolledAway::Leave;
+        scene.check().unwrap();
+        assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+        for (change, name) in [
+            ((|s: &mut Scene| s.gravity[0] = 0.1) as fn(&mut Scene), "gravity"),
+            (|s| s.outflow = Some(Outflow { below: -1.0, until: None }), "outflow"),
+            (|s| s.effects.tilt.x = 0.01, "effects.tilt"),
+        ] {
+            let mut scene = scene.clone();
+            change(&mut scene);
+            let text = scene.check().unwrap_err().to_string();
+            assert!(text.contains("rolled_away") && text.contains(name), "{text}");
+        }
     }
 
     #[test]

@@ -82,7 +82,7 @@ fn inspect(path: &Path, is_whole: &mut bool) -> anyhow::Result<Value> {
 
 fn dataset_facts(path: &Path) -> anyhow::Result<Value> {
     let dataset = Dataset::open(path)?;
-    warn_of(&dataset);
+    warn_of(&dataset.header, &dataset.unverified);
     Ok(json!({
         "kind": "data set",
         "rows": dataset.rows.len(),

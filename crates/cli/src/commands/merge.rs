@@ -1,7 +1,7 @@
 //! `merge`: shards to one file.
 
 use clap::Args;
-use granulcal_dataset::{Form, Product, merge};
+use granulcal_dataset::{Form, Merged, Product, merge};
 use serde_json::json;
 
 use crate::args::paths::{Reads, Writes, writes};
@@ -17,7 +17,8 @@ const NAMED_GAPS: usize = 5;
 #[derive(Debug, Args)]
 #[command(long_about = "\
 Joins folders and files of one data set (same scene, prior, seed and version) into one
-Parquet file, in order of the rows. A row that stands in two of them is an error.
+Parquet file, in order of the rows. A row that stands in two of them is an error. Of
+folders only some parts are in memory at a time, so that a million rows need no more.
 
 Example:
   granulcal-cli merge shard-0/ shard-1/ -o data.parquet")]
@@ -41,16 +42,15 @@ impl Run for MergeArgs {
 }
 
 fn run(args: &MergeArgs) -> anyhow::Result<Outcome> {
-    let dataset = merge(&args.inputs.iter().map(|input| input.to_path_buf()).collect::<Vec<_>>())?;
-    warn_of(&dataset);
-    dataset.write(&args.out)?;
-    let gaps = dataset.gaps(NAMED_GAPS);
+    let inputs: Vec<_> = args.inputs.iter().map(|input| input.to_path_buf()).collect();
+    let Merged { header, rows, gaps, unverified } = merge(&inputs, &args.out, NAMED_GAPS)?;
+    warn_of(&header, &unverified);
     if !gaps.is_empty() {
         tracing::warn!(
             "rows are missing, the first are {gaps:?}; is a shard absent or unfinished?"
         );
     }
-    let (rows, out) = (dataset.rows.len(), args.out.display());
+    let out = args.out.display();
     if args.json {
         print_json(&json!({ "file": out.to_string(), "rows": rows, "complete": gaps.is_empty() }))?;
     } else {

@@ -70,11 +70,27 @@ fn threads_chunks_shards_and_growth_do_not_change_rows() {
     for (name, text) in [("left", "0/2"), ("right", "1/2")] {
         place.make(name, &GenerateOptions { shard: text.parse().unwrap(), ..options(10) });
     }
-    let merged = merge(&[place.at("right"), place.at("left")]).unwrap();
-    assert_same(&whole, &merged);
-    merged.write(&place.at("merged.parquet")).unwrap();
-    assert_same(&whole, &Dataset::open(&place.at("merged.parquet")).unwrap());
-    let twice = merge(&[place.at("left"), place.at("left")]).unwrap_err();
+    let out = place.at("merged.parquet");
+    let merged = merge(&[place.at("right"), place.at("left")], &out, 5).unwrap();
+    assert_eq!((merged.rows, &merged.gaps[..]), (10, &[][..]));
+    // In tests a file of ten rows has three groups.
+    let joined = Dataset::open(&out).unwrap();
+    assert!(joined.unverified.is_empty());
+    assert_same(&whole, &joined);
+    let twice = merge(&[place.at("left"), place.at("left")], &out, 5).unwrap_err();
+    assert_same(&whole, &Dataset::open(&out).unwrap());
+    // Files among folders, whose rows lie between those of the folders; and what is not there is named.
+    whole.write(&place.at("whole.parquet")).unwrap();
+    let again = merge(&[place.at("left"), place.at("whole.parquet")], &out, 5).unwrap_err();
+    assert!(matches!(again, DatasetError::DuplicateRow { row: 0, .. }), "{again}");
+    let odd = Dataset::open(&place.at("right")).unwrap();
+    odd.write(&place.at("odd.parquet")).unwrap();
+    merge(&[place.at("odd.parquet"), place.at("left")], &out, 5).unwrap();
+    assert_same(&whole, &Dataset::open(&out).unwrap());
+    let half = merge(&[place.at("odd.parquet")], &place.at("half.parquet"), 2).unwrap();
+    assert_eq!(half.rows, odd.rows.len());
+    assert_eq!(half.gaps, odd.gaps(2));
+    assert_eq!(half.gaps.len(), 2);
     assert!(matches!(twice, DatasetError::DuplicateRow { row: 0, .. }), "{twice}");
 }
 
@@ -307,5 +323,6 @@ fn one_flipped_bit_is_found_or_changes_nothing() {
     let resumed =
         generate(&small(), &Prior::default(), &options(4), &place.at("whole"), &mut |_| true);
     assert!(resumed.is_err() && Dataset::open(&place.at("whole")).is_err());
-    assert!(merge(&[place.at("whole")]).is_err());
+    let out = place.at("merged.parquet");
+    assert!(merge(&[place.at("whole")], &out, 5).is_err() && !out.exists());
 }

@@ -79,8 +79,10 @@ impl Simulation {
         let gone: Vec<usize> =
             self.particles.present().filter(|&grain| self.has_rolled_away(grain)).collect();
         if !gone.is_empty() {
-            gone.into_iter().for_each(|grain| self.particles.take_out(grain));
             self.contacts.forget_list();
+        }
+        for grain in gone {
+            self.particles.take_out(grain);
         }
     }
 

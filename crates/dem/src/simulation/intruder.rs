@@ -1,18 +1,10 @@
 //! The ball of another size that enters a scene at a time. Until then it is held as a grain that has left is: at rest,
 //! touched by nothing.
 
-use granulcal_scene::{Intruder, Scene};
+use granulcal_scene::Intruder;
 use nalgebra::Vector3;
 
 use super::Simulation;
-use crate::particles::Particles;
-
-/// Holds the scene's intruder, if it has one, out of the scene.
-pub(super) fn hold_out(scene: &Scene, particles: &mut Particles) {
-    if scene.intruder.is_some() {
-        particles.take_out(particles.count() - 1);
-    }
-}
 
 impl Simulation {
     /// Lets the intruder enter when its time has come; the energy that it brings does not count as created.

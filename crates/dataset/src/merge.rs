@@ -1,0 +1,165 @@
+//! Data sets of several machines to one file, of which only as much is in memory as is being joined.
+//!
+//! A *source* is a Parquet file: a part of a folder, or a file that was given. Sources are opened when the rows have come
+//! to their first one, and closed after their last, so that of folders there are some parts in memory, of the file some
+//! thousand rows, and of a given file all of it.
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+
+use crate::DatasetError;
+use crate::header::Header;
+use crate::manifest::{self, Manifest};
+use crate::row::Row;
+use crate::table::{self, GroupWriter, Table};
+
+/// What has been joined.
+#[derive(Clone, Debug)]
+pub struct Merged {
+    /// Scene, prior, seed and version of all.
+    pub header: Header,
+    /// Rows in the file.
+    pub rows: usize,
+    /// The first rows that are missing below the highest index, at most as many as were asked for.
+    pub gaps: Vec<u64>,
+    /// Files that do not say what their rows hash to: see [`crate::Dataset::unverified`].
+    pub unverified: Vec<PathBuf>,
+}
+
+/// Joins data sets of one scene, prior, seed and version, for example the shards of several machines, into one Parquet
+/// file, in order of the rows; names at most `named_gaps` rows that are missing.
+///
+/// # Errors
+/// [`DatasetError::Differs`] names the first difference, [`DatasetError::DuplicateRow`] a row that stands in two of
+/// them, [`DatasetError::Argument`] for no input; else as [`crate::Dataset::open`] and [`crate::Dataset::write`]. The
+/// file is then as it was before.
+pub fn merge(inputs: &[PathBuf], out: &Path, named_gaps: usize) -> Result<Merged, DatasetError> {
+    let (header, mut waiting) = sources(inputs)?;
+    let mut file = GroupWriter::create(out, &header)?;
+    let mut merged = Merged { header, rows: 0, gaps: Vec::new(), unverified: Vec::new() };
+    let mut open: Vec<OpenSource> = Vec::new();
+    // The row that was written last, and where it stood.
+    let mut last: Option<(u64, PathBuf)> = None;
+    loop {
+        // Open whoever may have the next row.
+        let least = loop {
+            let least = (0..open.len()).min_by_key(|&source| open[source].next());
+            let next = least.map_or(u64::MAX, |source| open[source].next());
+            if waiting.front().is_none_or(|source| source.first > next) {
+                break least;
+            }
+            if let Some(source) = waiting.pop_front() {
+                open.extend(source.open(&mut merged)?);
+            }
+        };
+        let Some(least) = least else { break };
+        let source = &mut open[least];
+        let Some(row) = source.rows.pop_front() else { break };
+        let expected = match &last {
+            Some((last, first)) if row.row <= *last => {
+                let (first, second) = (first.clone(), source.input.clone());
+                return Err(DatasetError::DuplicateRow { row: row.row, first, second });
+            }
+            Some((last, _)) => last + 1,
+            None => 0,
+        };
+        let room = named_gaps - merged.gaps.len();
+        merged.gaps.extend((expected..row.row).take(room));
+        last = Some((row.row, source.input.clone()));
+        if source.rows.is_empty() {
+            open.swap_remove(least);
+        }
+        merged.rows += 1;
+        file.push(row)?;
+    }
+    file.commit()?;
+    Ok(merged)
+}
+
+/// A file that is still to be opened.
+#[derive(Debug)]
+struct Source {
+    input: PathBuf,
+    file: PathBuf,
+    /// The lowest row that it may have.
+    first: u64,
+    /// What it has, where that had to be read to know the first.
+    read: Option<Table>,
+}
+
+/// A file that was opened, and those of its rows that are still to come: one at least.
+#[derive(Debug)]
+struct OpenSource {
+    input: PathBuf,
+    rows: VecDeque<Row>,
+}
+
+/// The files of all inputs by their first rows, and what they are of.
+fn sources(inputs: &[PathBuf]) -> Result<(Header, VecDeque<Source>), DatasetError> {
+    let mut found: Option<Header> = None;
+    let mut sources = Vec::new();
+    for input in inputs {
+        let of_input = if input.is_dir() {
+            let Some(Manifest { header, chunk }) = Manifest::read(input)? else {
+                let allowed = "present in the folder of a data set";
+                return Err(DatasetError::content(input, manifest::NAME, "none", allowed));
+            };
+            sources.extend(manifest::parts(input)?.into_iter().map(|number| Source {
+                input: input.clone(),
+                file: manifest::part_path(input, number),
+                first: number.saturating_mul(chunk),
+                read: None,
+            }));
+            header
+        } else {
+            let mut table = table::read(input)?;
+            table.rows.sort_by_key(|row| row.row);
+            let header = table.header.clone();
+            let first = table.rows.first().map_or(0, |row| row.row);
+            let (input, file) = (input.clone(), input.clone());
+            sources.push(Source { input, file, first, read: Some(table) });
+            header
+        };
+        match &found {
+            Some(found) => of_input.require_same(input, found)?,
+            None => found = Some(of_input),
+        }
+    }
+    // Where two begin with the same row the one that was named first is first.
+    sources.sort_by_key(|source| source.first);
+    let header = found.ok_or(DatasetError::Argument {
+        what: "the number of data sets to merge",
+        got: "0".to_owned(),
+        allowed: "at least 1",
+    })?;
+    Ok((header, sources.into()))
+}
+
+impl Source {
+    /// Reads the file; `None` if it has no rows.
+    fn open(self, merged: &mut Merged) -> Result<Option<OpenSource>, DatasetError> {
+        let mut table = match self.read {
+            Some(table) => table,
+            None => table::read(&self.file)?,
+        };
+        merged.header.require_same(&self.file, &table.header)?;
+        if !table.is_verified {
+            merged.unverified.push(self.file.clone());
+        }
+        table.rows.sort_by_key(|row| row.row);
+        if let Some(row) = table.rows.first()
+            && row.row < self.first
+        {
+            let (found, allowed) = (row.row.to_string(), format!("at least {}", self.first));
+            return Err(DatasetError::content(&self.file, "the first row", found, allowed));
+        }
+        let rows: VecDeque<Row> = table.rows.into();
+        Ok((!rows.is_empty()).then_some(OpenSource { input: self.input, rows }))
+    }
+}
+
+impl OpenSource {
+    fn next(&self) -> u64 {
+        self.rows.front().map_or(u64::MAX, |row| row.row)
+    }
+}
