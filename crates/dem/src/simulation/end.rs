@@ -93,7 +93,8 @@ impl Simulation {
         let across = place.xy();
         let distance = across.norm();
         let camera = &self.origin.scene.camera;
-        let inward = across * (1.0 - BEYOND * radius / distance);
+        // No farther in than the axis.
+        let inward = across * (1.0 - BEYOND * radius / distance).max(0.0);
         if place.z > LIFTED * radius || camera.sees_ground(inward.x, inward.y) {
             return false;
         }
