@@ -55,15 +55,14 @@ def build(source: Path, target: Path) -> Path:
 
 
 def pour(binary: Path, scene: str | Path, seed: int, changes: dict[str, float]) -> dict[str, Any]:
-    """Returns what a pour cost and how long it was [s], and how it ended."""
+    """Returns what `simulate` says of a pour: `cpu_s` [s], `status` and more."""
     sets = [word for path, value in changes.items() for word in ("--set", f"{path}={value!r}")]
     command = [binary, "simulate", scene, "--seed", str(seed), "--json", "--quiet", *sets]
     # An unhealthy or jammed pour ends with a code of its own and has cost what it cost.
     told = subprocess.run(command, capture_output=True, text=True, check=False)
     if not told.stdout:
         raise RuntimeError(told.stderr)
-    row = json.loads(told.stdout)
-    return {"cpu_s": row["cpu_s"], "simulated_s": row["simulated_s"], "status": row["status"]}
+    return json.loads(told.stdout)
 
 
 def set_p(folder: Path, seeds: int) -> Iterator[tuple[str | Path, int, dict[str, float]]]:

@@ -38,10 +38,7 @@ impl Dataset {
             dataset.sort(path)?;
             return Ok(dataset);
         }
-        let Some(manifest) = Manifest::read(path)? else {
-            let allowed = "present in the folder of a data set";
-            return Err(DatasetError::content(path, manifest::NAME, "none", allowed));
-        };
+        let manifest = Manifest::of(path)?;
         let header = manifest.header;
         let mut dataset = Self { header, rows: Vec::new(), unverified: Vec::new() };
         for chunk in manifest::parts(path)? {

@@ -65,6 +65,12 @@ impl Manifest {
         Ok(Some(Self { header, chunk }))
     }
 
+    /// Reads the manifest of a folder that must have one.
+    pub(crate) fn of(folder: &Path) -> Result<Self, DatasetError> {
+        let allowed = "present in the folder of a data set";
+        Self::read(folder)?.ok_or_else(|| DatasetError::content(folder, NAME, "none", allowed))
+    }
+
     /// Writes the manifest into its folder.
     pub(crate) fn write(&self, folder: &Path) -> Result<(), DatasetError> {
         let contents = Contents {

@@ -100,10 +100,7 @@ fn sources(inputs: &[PathBuf]) -> Result<(Header, VecDeque<Source>), DatasetErro
     let mut sources = Vec::new();
     for input in inputs {
         let of_input = if input.is_dir() {
-            let Some(Manifest { header, chunk }) = Manifest::read(input)? else {
-                let allowed = "present in the folder of a data set";
-                return Err(DatasetError::content(input, manifest::NAME, "none", allowed));
-            };
+            let Manifest { header, chunk } = Manifest::of(input)?;
             sources.extend(manifest::parts(input)?.into_iter().map(|number| Source {
                 input: input.clone(),
                 file: manifest::part_path(input, number),

@@ -198,10 +198,7 @@ impl Scene {
             ("outflow", self.outflow.is_some()),
             ("periodic", self.periodic.is_some()),
         ];
-        match others.into_iter().find(|(_, is_there)| *is_there && self.effects.clump.is_on()) {
-            Some((other, _)) => Err(SceneError::Exclude { one: "effects.clump", other }),
-            None => Ok(()),
-        }
+        if self.effects.clump.is_on() { exclude("effects.clump", &others) } else { Ok(()) }
     }
 
     /// What convex bodies cannot be with: they have walls, gravity and the plain law.
@@ -222,15 +219,15 @@ impl Scene {
             ("an orthographic camera", self.camera.projection == Projection::Orthographic),
             ("preset paper", self.preset == Preset::Paper),
         ];
-        match others.into_iter().find(|(_, is_there)| *is_there) {
-            Some((other, _)) => Err(SceneError::Exclude { one: "grains.shape", other }),
-            None => Ok(()),
-        }
+        exclude("grains.shape", &others)
     }
 
     /// What grains that leave once they have rolled away cannot be with: what might turn one back, what looks at where it
     /// is, and bodies that do not roll as balls do.
     fn check_rolled_away(&self) -> Result<(), SceneError> {
+        if self.end.rolled_away == RolledAway::Stay {
+            return Ok(());
+        }
         let slopes = self.gravity[0] != 0.0 || self.gravity[1] != 0.0 || self.gravity[2] >= 0.0;
         let others = [
             ("walls", !self.walls.is_empty()),
@@ -245,13 +242,7 @@ impl Scene {
             ("periodic", self.periodic.is_some()),
             ("intruder", self.intruder.is_some()),
         ];
-        let leave = self.end.rolled_away == RolledAway::Leave;
-        match others.into_iter().find(|(_, is_there)| *is_there && leave) {
-            Some((other, _)) => {
-                Err(SceneError::Exclude { one: "end.rolled_away = \"leave\"", other })
-            }
-            None => Ok(()),
-        }
+        exclude("end.rolled_away = \"leave\"", &others)
     }
 
     /// What an intruder cannot be with.
@@ -264,10 +255,7 @@ impl Scene {
             ("outflow", self.outflow.is_some()),
             ("periodic", self.periodic.is_some()),
         ];
-        match others.into_iter().find(|(_, is_there)| *is_there) {
-            Some((other, _)) => Err(SceneError::Exclude { one: "intruder", other }),
-            None => Ok(()),
-        }
+        exclude("intruder", &others)
     }
 
     /// Checks every number of the scene.
@@ -314,6 +302,14 @@ impl Scene {
         }
         check_views(&self.views)?;
         self.camera.check()
+    }
+}
+
+/// Refuses the first of `others` that is there, beside `one`, which is.
+fn exclude(one: &'static str, others: &[(&'static str, bool)]) -> Result<(), SceneError> {
+    match others.iter().find(|(_, is_there)| *is_there) {
+        Some(&(other, _)) => Err(SceneError::Exclude { one, other }),
+        None => Ok(()),
     }
 }
 
