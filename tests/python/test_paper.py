@@ -68,7 +68,7 @@ def _check(folder: Path, name: str) -> None:
     assert loaded is not None, name
     outcome, made = loaded
     assert outcome.rows and outcome.answer and outcome.figures, name
-    assert all(row.verdict in ("", "not judged: small version") for row in outcome.rows)
+    assert all(row.verdict in ("", "not judged: tiny version") for row in outcome.rows)
     assert all(row.count > 0 for row in outcome.rows)
     for figure in outcome.figures:
         data = (folder / name / figure.file).read_bytes()
@@ -231,7 +231,7 @@ def test_rows_have_the_means_intervals_and_verdicts_of_known_numbers():
     assert row.interval.startswith("rms 0.1000 (0.1000 to 0.1000)")
     assert error_row("x", 10 * errors, FULL, paper).verdict == "worse"
     assert error_row("x", errors[:20], FULL, paper).verdict == "not decided: too few tests"
-    assert error_row("x", errors, QUICK, paper).verdict == "not judged: small version"
+    assert error_row("x", errors, QUICK, paper).verdict == "not judged: quick version"
     spread = np.concatenate([np.full(25, 0.2), np.full(25, 0.4)])
     assert level_row("x", spread, FULL, paper).verdict == "not decided"
     assert level_row("x", spread - 0.15, FULL, paper).verdict == "better"

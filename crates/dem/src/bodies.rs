@@ -9,6 +9,7 @@
 //! | `contact` | the law at a point |
 //! | `impact` | impacts, each at its time |
 //! | `rims` | points of contact at the rims of walls |
+//! | `sweeps` | sweeps over all points, eight at a time |
 
 mod around;
 mod body;
@@ -18,8 +19,8 @@ mod contact;
 mod exams;
 mod impact;
 mod rims;
+mod sweeps;
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -29,10 +30,12 @@ use crate::turns::turns;
 use crate::wall::Walls;
 use around::Around;
 use body::{Moving, RigidBody};
-use contact::{Point, WALL};
+use contact::{Point, WALL, rank};
 use granulcal_scene::Material;
 use granulcal_scene::Scene;
 use granulcal_scene::Solid;
+pub(crate) use sweeps::Sweeps;
+use sweeps::{Batches, Settled};
 
 /// Keeps the orientations of a seed apart from its places.
 const STREAM: u64 = 0xbb67_ae85_84ca_a73b;
@@ -44,29 +47,14 @@ const KNOWN: f64 = 0.15;
 /// add points.
 const ROUNDS: usize = 3;
 
-/// When the sweeps over all points of a substep end: the rule of spheres (`solver/nsgs.rs`).
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Sweeps {
-    /// At least, unless the impulses have settled.
-    pub least: usize,
-    /// At most.
-    pub most: usize,
-    /// Largest change of an impulse in a sweep that has settled `[m/s]`.
-    pub settled: f64,
-    /// Fastest that a point may close beyond what its gap allows `[m/s]`.
-    pub closing: f64,
-}
-
-/// Where a point was on its body, and its impulse.
-type Mark = ([f64; 3], [f64; 3]);
-/// The points of each manifold, by its bodies and its wall's surface.
-type Known = BTreeMap<(usize, usize, usize), Vec<Mark>>;
+/// The bodies and the wall's surface of a point's manifold, where the point was on its body, and its impulse.
+type Mark = ((usize, usize, usize), [f64; 3], [f64; 3]);
 
 /// What of the bodies changes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct BodiesState {
     all: Vec<RigidBody>,
-    known: Known,
+    known: Vec<Mark>,
 }
 
 /// What a substep has done.
@@ -90,12 +78,16 @@ pub(crate) struct Step {
 pub(crate) struct Bodies {
     pub solid: Arc<Solid>,
     all: Vec<RigidBody>,
-    known: Known,
+    /// Those with an impulse, in the order of their manifolds.
+    known: Vec<Mark>,
+    // Only their memory goes from substep to substep.
+    points: Vec<Point>,
+    batches: Batches,
 }
 
 impl Bodies {
     fn new(solid: Arc<Solid>, all: Vec<RigidBody>) -> Self {
-        Self { solid, all, known: Known::new() }
+        Self { solid, all, known: Vec::new(), points: Vec::new(), batches: Batches::default() }
     }
 
     /// The bodies of a scene, turned at random, if its grains have a shape.
@@ -145,8 +137,9 @@ impl Bodies {
     /// What is wrong.
     pub fn take(&mut self, state: BodiesState) -> Result<(), &'static str> {
         let count = self.all.len();
-        let is_there = |(i, j, _): &(usize, usize, usize)| *i < count && (*j < count || *j == WALL);
-        if state.all.len() != count || !state.known.keys().all(is_there) {
+        let is_there = |((i, j, _), ..): &Mark| *i < count && (*j < count || *j == WALL);
+        let is_sorted = state.known.is_sorted_by_key(|mark| rank(mark.0));
+        if state.all.len() != count || !is_sorted || !state.known.iter().all(is_there) {
             return Err("another number of bodies");
         }
         (self.all, self.known) = (state.all, state.known);
@@ -168,7 +161,7 @@ impl Bodies {
             body.velocity += dt * gravity;
         }
         let around = Around { solid: &solid, walls, material, dt };
-        let mut contacts = collide::contacts(&around, &moving);
+        let mut contacts = collide::contacts(&around, &moving, std::mem::take(&mut self.points));
         let mut step = Step::default();
         let depths = contacts.points.iter().map(|point| -point.gap);
         step.deepest = depths.fold(0.0, f64::max);
@@ -188,7 +181,11 @@ impl Bodies {
                 point.assemble(&moving);
                 point.aim(&moving, dt);
             }
-            settle(&mut contacts.points, &mut moving, sweeps, &mut step);
+            self.batches.fill(&contacts.points, &moving, &solid);
+            let Settled { sweeps, residual, unconverged } = self.batches.settle(sweeps);
+            step.sweeps += sweeps;
+            (step.residual, step.unconverged) = (residual, unconverged);
+            self.batches.put_back(&mut contacts.points, &mut moving, &solid);
             if round + 1 == ROUNDS || !contacts.foresee(&around, &moving) {
                 break;
             }
@@ -198,6 +195,7 @@ impl Bodies {
         let work = |point: &Point| point.impulse.dot(&point.wall_velocity);
         step.work_of_walls += points.iter().map(work).sum::<f64>();
         self.remember(&points);
+        self.points = points;
         self.all = moving.iter().map(|body| body.moved(&solid, dt)).collect();
         step
     }
@@ -205,17 +203,24 @@ impl Bodies {
     /// Warm start: a point that is where one was begins with its impulse.
     fn recall(&mut self, points: &mut [Point]) {
         let near = KNOWN * self.solid.reach;
+        let (mut is_free, mut first) = (vec![true; self.known.len()], 0);
         for point in points {
-            let name = (point.i, point.j, point.surface);
-            let Some(before) = self.known.get_mut(&name) else { continue };
-            let distances =
-                before.iter().map(|(mark, _)| (Vector3::from(*mark) - point.mark).norm());
-            let nearest = distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+            // Both are in one order.
+            while self.known.get(first).is_some_and(|mark| rank(mark.0) < point.rank()) {
+                first += 1;
+            }
+            let of_manifold = (first..self.known.len())
+                .take_while(|&number| self.known[number].0 == point.name());
+            let nearest = of_manifold
+                .filter(|&number| is_free[number])
+                .map(|number| (number, (Vector3::from(self.known[number].1) - point.mark).norm()))
+                .min_by(|a, b| a.1.total_cmp(&b.1));
             if let Some((number, distance)) = nearest
                 && distance < near
             {
                 // No two points go on from one.
-                let impulse = Vector3::from(before.swap_remove(number).1);
+                is_free[number] = false;
+                let impulse = Vector3::from(self.known[number].2);
                 // The part along the new normal, and what is left across it.
                 let along = point.normal.dot(&impulse);
                 let (normal, across) = (along.max(0.0), impulse - along * point.normal);
@@ -228,10 +233,9 @@ impl Bodies {
 
     fn remember(&mut self, points: &[Point]) {
         self.known.clear();
-        for point in points.iter().filter(|point| point.impulse != Vector3::zeros()) {
-            let name = (point.i, point.j, point.surface);
-            self.known.entry(name).or_default().push((point.mark.into(), point.impulse.into()));
-        }
+        let acting = points.iter().filter(|point| point.impulse != Vector3::zeros());
+        let mark = |point: &Point| (point.name(), point.mark.into(), point.impulse.into());
+        self.known.extend(acting.map(mark));
     }
 
     /// Kinetic and potential energy over the mass of a body `[m^2/s^2]`.
@@ -241,55 +245,4 @@ impl Bodies {
         };
         self.all.iter().map(of).sum()
     }
-}
-
-/// Sweeps over all points by the rule of spheres (`solver/nsgs.rs`).
-fn settle(points: &mut [Point], bodies: &mut [Moving], rule: Sweeps, step: &mut Step) {
-    step.unconverged = !points.is_empty();
-    let mut has_settled = false;
-    for sweeps in 1..=rule.most {
-        if points.is_empty() {
-            return;
-        }
-        let worst = sweep(points, bodies, sweeps % 2 == 0);
-        step.sweeps += 1;
-        step.residual = worst.residual;
-        let is_enough = has_settled || sweeps >= rule.least;
-        if is_enough && worst.closing <= rule.closing {
-            step.unconverged = false;
-            return;
-        }
-        has_settled = worst.change <= rule.settled;
-    }
-}
-
-/// The worst of a sweep.
-#[derive(Clone, Copy, Debug, Default)]
-struct Progress {
-    /// Largest change of an impulse `[m/s]`.
-    change: f64,
-    /// Fastest that a point closed beyond what its gap allows `[m/s]`.
-    closing: f64,
-    /// Root mean square of all changes over that of the normal impulses `[-]`.
-    residual: f64,
-}
-
-/// Solves every point once, forwards or backwards.
-fn sweep(points: &mut [Point], bodies: &mut [Moving], backwards: bool) -> Progress {
-    let (mut worst, mut changes, mut normals) = (Progress::default(), 0.0, 0.0);
-    let mut one = |point: &mut Point| {
-        // One round: the next sweep goes on with it.
-        let change = point.solve(bodies, point.bias, 1);
-        worst.change = worst.change.max(change.impulse);
-        worst.closing = worst.closing.max(change.closing);
-        changes += change.impulse * change.impulse;
-        normals += point.normal.dot(&point.impulse).powi(2);
-    };
-    if backwards {
-        points.iter_mut().rev().for_each(&mut one);
-    } else {
-        points.iter_mut().for_each(&mut one);
-    }
-    worst.residual = if normals > 0.0 { (changes / normals).sqrt() } else { 0.0 };
-    worst
 }

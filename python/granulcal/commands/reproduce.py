@@ -55,6 +55,12 @@ def add(commands: Any) -> None:
         "--quick", action="store_true", help="few grains and few pours; says so, proves nothing"
     )
     paper.add_argument(
+        "--medium",
+        action="store_true",
+        help="400 grains a pour and the paper's counts of tests; for `shapes`, whose pours of 2000 "
+        "grains take minutes each",
+    )
+    paper.add_argument(
         "--report",
         action="store_true",
         help="write one HTML page of all experiments; those that have run are not run again",
@@ -88,7 +94,7 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError(f"no study {options.study!r}; there are {', '.join(studies)}{near}")
     if options.study == "paper":
         return _reproduce_paper(options)
-    for name in ("experiment", "quick", "report", "threads"):
+    for name in ("experiment", "quick", "medium", "report", "threads"):
         if getattr(options, name):
             raise ValueError(
                 f"{name.replace('_', '-')} belongs to the study 'paper', not to {options.study!r}"
@@ -113,15 +119,18 @@ def _run(options: argparse.Namespace) -> int:
 
 def _reproduce_paper(options: argparse.Namespace) -> int:
     from granulcal.experiments.paper import reproduce_paper
-    from granulcal.experiments.paper.common.sizes import FULL, QUICK
+    from granulcal.experiments.paper.common.sizes import FULL, MEDIUM, QUICK
 
+    if options.quick and options.medium:
+        raise ValueError("--quick and --medium are two sizes: give one of them")
+    size = QUICK if options.quick else MEDIUM if options.medium else FULL
     if options.dry_run:
-        return _say_how_long_of_paper(options, QUICK if options.quick else FULL)
+        return _say_how_long_of_paper(options, size)
     with shown(), spread_over(cluster_of(options)):
         reproduce_paper(
             options.out,
             options.experiment,
-            size=QUICK if options.quick else FULL,
+            size=size,
             report=options.report,
             threads=options.threads,
         )

@@ -124,6 +124,12 @@ impl Moving {
         Matrix3::identity() - cross * self.inverse_inertia * cross
     }
 
+    /// `F = R I^(-1/2)`: the inverse inertia in the scene's axes is `F F^T`.
+    pub fn frame(&self, solid: &Solid) -> Matrix3<f64> {
+        let roots = Matrix3::from_diagonal(&solid.inertia.map(|moment| 1.0 / moment.sqrt()));
+        self.turned.to_rotation_matrix().matrix() * roots
+    }
+
     /// The body a substep later.
     pub fn moved(&self, solid: &Solid, dt: f64) -> RigidBody {
         let local = self.turned.inverse() * self.omega;

@@ -9,12 +9,15 @@ use super::around::Around;
 use super::body::Moving;
 use super::contact::{Point, WALL};
 use super::rims::at_rims;
-use granulcal_scene::parry;
+use granulcal_scene::{Solid, parry};
 
 /// What goes farther than this within a substep is examined where it will be, too, in the least margin `[-]`.
 const FORESEEN: f64 = 0.5;
 /// Gaps of points that bodies turn past are corrected by no less than this, in their reach `[-]`.
 const CORRECTED: f64 = 2e-3;
+
+/// Cells along an axis at most.
+const MOST_CELLS: u64 = 1 << 21;
 
 /// What may meet in a substep, and where.
 pub(super) struct Contacts {
@@ -25,8 +28,9 @@ pub(super) struct Contacts {
 }
 
 /// Every point of contact that the next substep may close, as far as it can be seen where the bodies are.
-pub(super) fn contacts(around: &Around<'_>, bodies: &[Moving]) -> Contacts {
-    let mut points = Vec::new();
+/// `points` is a list of before, whose memory is used again.
+pub(super) fn contacts(around: &Around<'_>, bodies: &[Moving], mut points: Vec<Point>) -> Contacts {
+    points.clear();
     for i in 0..bodies.len() {
         at_walls(around, bodies, i, &mut points);
         at_rims(around, &bodies[i], i, around.range(&bodies[i], None), &mut points);
@@ -35,6 +39,9 @@ pub(super) fn contacts(around: &Around<'_>, bodies: &[Moving]) -> Contacts {
     let mut manifold = ContactManifold::new();
     for &(i, j) in &pairs {
         let range = around.range(&bodies[i], Some(&bodies[j]));
+        if are_apart(around.solid, &bodies[i], &bodies[j], range) {
+            continue;
+        }
         touches(around, bodies, (i, j), range, &mut manifold, |point| points.push(point));
     }
     Contacts { pairs, points }
@@ -60,16 +67,13 @@ impl Contacts {
             }
         }
         let (least, mut is_news) = (CORRECTED * around.solid.reach, false);
-        // Known points by their manifolds, those of one in their order.
-        let mut by_name: Vec<_> = self.points.iter().map(Point::name).zip(0..known).collect();
-        by_name.sort_unstable();
         for point in new {
             let point = point.foreseen(bodies, around.dt);
-            let first = by_name.partition_point(|known| known.0 < point.name());
-            let of_manifold = by_name[first..].iter().take_while(|known| known.0 == point.name());
-            let same = of_manifold
-                .map(|&(_, number)| number)
-                .find(|&number| self.points[number].is_like(&point, around.solid.reach));
+            let of_before = &self.points[..known];
+            let first = of_before.partition_point(|known| known.rank() < point.rank());
+            let same = (first..known)
+                .take_while(|&number| of_before[number].rank() == point.rank())
+                .find(|&number| of_before[number].is_like(&point, around.solid.reach));
             match same {
                 // Its bodies turn so far that it gets there sooner than its velocity says.
                 Some(number) if point.gap < self.points[number].gap - least => {
@@ -81,7 +85,9 @@ impl Contacts {
             is_news = true;
         }
         // Those of a manifold stay together.
-        self.points.sort_by_key(|point| (point.j != WALL, point.name()));
+        if self.points.len() > known {
+            self.points.sort_by_key(Point::rank);
+        }
         is_news
     }
 }
@@ -92,31 +98,59 @@ fn near_pairs(around: &Around<'_>, bodies: &[Moving]) -> Vec<(usize, usize)> {
     let reach = around.solid.reach;
     let farthest = bodies.iter().map(|body| body.way(reach, around.dt)).fold(0.0, f64::max);
     let width = 2.0 * reach + around.least() + 2.0 * farthest;
+    let low = bodies.iter().fold(Vector3::repeat(f64::MAX), |low, body| low.inf(&body.centre));
     // Far beyond any scene all are of one cell, whose neighbours still have numbers.
-    let cell_of = |c: f64| i64::from((c / width).floor() as i32);
-    let cell_of = |body: &Moving| <[i64; 3]>::from(body.centre.map(cell_of));
-    let mut cells: Vec<_> = bodies.iter().map(cell_of).zip(0..).collect();
+    let cell_of = |body: &Moving| {
+        let [x, y, z] = <[f64; 3]>::from((body.centre - low) / width)
+            .map(|c| (c as u64 + 1).min(MOST_CELLS - 2));
+        cell(x, y, z)
+    };
+    let mut cells: Vec<_> = bodies.iter().map(cell_of).zip(0_u32..).collect();
     cells.sort_unstable();
     let mut pairs = Vec::new();
-    for (at, &([x, y, z], i)) in cells.iter().enumerate() {
-        let mut look = |slots: &[([i64; 3], usize)], last: [i64; 3]| {
+    for (at, &(of_i, i)) in cells.iter().enumerate() {
+        let body = &bodies[i as usize];
+        let mut look = |slots: &[(u64, u32)], last: u64| {
             for &(_, j) in slots.iter().take_while(|slot| slot.0 <= last) {
-                let offset = bodies[j].centre - bodies[i].centre;
-                let range = 2.0 * reach + around.range(&bodies[i], Some(&bodies[j]));
-                if offset.norm_squared() < range * range {
-                    pairs.push((i.min(j), i.max(j)));
+                let other = &bodies[j as usize];
+                let square = (other.centre - body.centre).norm_squared();
+                if square > width * width {
+                    continue;
+                }
+                let range = 2.0 * reach + around.range(body, Some(other));
+                if square < range * range {
+                    pairs.push(u64::from(i.min(j)) << 32 | u64::from(i.max(j)));
                 }
             }
         };
         // What comes after it in the order: its own row, and those ahead.
-        look(&cells[at + 1..], [x, y, z + 1]);
-        for [x, y] in [[x, y + 1], [x + 1, y - 1], [x + 1, y], [x + 1, y + 1]] {
-            let first = cells.partition_point(|slot| slot.0 < [x, y, z - 1]);
-            look(&cells[first..], [x, y, z + 1]);
+        look(&cells[at + 1..], of_i + 1);
+        let (along_y, along_x) = (cell(0, 1, 0), cell(1, 0, 0));
+        for row in
+            [of_i + along_y, of_i + along_x - along_y, of_i + along_x, of_i + along_x + along_y]
+        {
+            let first = cells.partition_point(|slot| slot.0 < row - 1);
+            look(&cells[first..], row + 1);
         }
     }
     pairs.sort_unstable();
-    pairs
+    pairs.into_iter().map(|pair| ((pair >> 32) as usize, (pair & 0xffff_ffff) as usize)).collect()
+}
+
+/// The number of a cell: in the order of x, then y, then z.
+fn cell(x: u64, y: u64, z: u64) -> u64 {
+    (x * MOST_CELLS + y) * MOST_CELLS + z
+}
+
+/// Whether the boxes around two bodies, along their own axes, are more than `range` apart along the line between their
+/// centres.
+fn are_apart(solid: &Solid, a: &Moving, b: &Moving, range: f64) -> bool {
+    let offset = b.centre - a.centre;
+    let extent = |body: &Moving| {
+        let local = body.turned.inverse_transform_vector(&offset);
+        local.abs().dot(&solid.half_extents)
+    };
+    offset.norm_squared() - extent(a) - extent(b) > range * offset.norm()
 }
 
 /// Gives the points at which two bodies are nearer than `range`, as parry sees them.

@@ -7,22 +7,27 @@
 //! lambda_t = proj(lambda_t - u_t / W_t,  |.| <= mu_s lambda_n)
 //! ```
 //!
-//! Unlike a ball's, the block W couples the normal to the tangent, so that the two lines are repeated until they stand.
+//! Unlike a ball's, the block W couples the normal to the tangent, so that the two lines are repeated until they stand:
+//! by the sweeps over all points, and in an impact over those of its manifold.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::body::{Moving, product};
 use crate::law::{CORRECTION, CORRECTION_SPEED, SLOP};
 
-/// Repetitions of the two lines that leave a point by itself exactly solved, at most.
-pub(super) const EXACT: usize = 30;
-/// Change over the impulse at which they stand `[-]`.
-const STANDS: f64 = 1e-10;
 /// Points of a manifold are one within this distance in the bodies' reach and this cosine of their normals `[-]`.
 const SAME_PLACE: f64 = 0.1;
 const SAME_NORMAL: f64 = 0.99;
 /// No body: a wall.
 pub(super) const WALL: usize = usize::MAX;
+
+/// What points are in the order of.
+pub(super) type Rank = (bool, (usize, usize, usize));
+
+/// The rank of the points of a manifold.
+pub(super) fn rank(name: (usize, usize, usize)) -> Rank {
+    (name.1 != WALL, name)
+}
 
 /// A point of contact.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +54,7 @@ pub(super) struct Point {
     /// On body i `[m/s]`.
     pub impulse: Vector3<f64>,
     /// Reciprocals of the normal element and of the largest tangential eigenvalue of the block.
-    compliance: [f64; 2],
+    pub compliance: [f64; 2],
 }
 
 impl Point {
@@ -77,6 +82,11 @@ impl Point {
     /// The bodies and the surface: they name its manifold.
     pub fn name(&self) -> (usize, usize, usize) {
         (self.i, self.j, self.surface)
+    }
+
+    /// The order of the points: those at walls first, those of a manifold together.
+    pub fn rank(&self) -> Rank {
+        rank(self.name())
     }
 
     /// This point, found where its bodies will be at the end of the substep, as it is now: with the gap from which their
@@ -166,45 +176,21 @@ impl Point {
         }
     }
 
-    /// Solves the point by itself under a bias, with at most so many repetitions of the two lines.
+    /// One round of the two lines, without bias; returns the change of the impulse `[m/s]`.
     #[inline(always)]
-    pub fn solve(&mut self, bodies: &mut [Moving], bias: f64, rounds: usize) -> Change {
-        let before = self.impulse;
-        let mut u = self.velocity(bodies);
-        let n = self.normal;
-        let closing = -(n.dot(&u) + bias);
-        for round in 1..=rounds {
-            let old = self.impulse;
-            let was = n.dot(&old);
-            let normal = (was - (n.dot(&u) + bias) * self.compliance[0]).max(0.0);
-            if normal == 0.0 && was == 0.0 {
-                self.impulse = Vector3::zeros();
-                break;
-            }
-            u += product(&self.block, &n) * (normal - was);
-            let sliding = old - was * n;
-            let wanted = sliding - self.compliance[1] * (u - n.dot(&u) * n);
-            let (limit, length) = (self.friction * normal, wanted.norm());
-            let tangent = if length > limit { wanted * (limit / length) } else { wanted };
-            u += product(&self.block, &(tangent - sliding));
-            self.impulse = normal * n + tangent;
-            if round < rounds && (self.impulse - old).norm() <= STANDS * self.impulse.norm() {
-                break;
-            }
-        }
-        let change = self.impulse - before;
+    pub fn solve(&mut self, bodies: &mut [Moving]) -> f64 {
+        let (n, old, u) = (self.normal, self.impulse, self.velocity(bodies));
+        let was = n.dot(&old);
+        let normal = (was - n.dot(&u) * self.compliance[0]).max(0.0);
+        let u = u + product(&self.block, &n) * (normal - was);
+        let wanted = old - was * n - self.compliance[1] * (u - n.dot(&u) * n);
+        let (limit, length) = (self.friction * normal, wanted.norm());
+        let tangent = if length > limit { wanted * (limit / length) } else { wanted };
+        self.impulse = normal * n + tangent;
+        let change = self.impulse - old;
         if change != Vector3::zeros() {
             self.give(bodies, &change);
         }
-        Change { impulse: change.norm(), closing }
+        change.norm()
     }
-}
-
-/// What solving a point has found and done.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Change {
-    /// Of its impulse `[m/s]`.
-    pub impulse: f64,
-    /// How fast it closed before, beyond what its gap allows `[m/s]`.
-    pub closing: f64,
 }

@@ -16,7 +16,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use super::body::Moving;
-use super::contact::{EXACT, Point, WALL};
+use super::contact::{Point, WALL};
 use crate::law::IMPACT_SPEED;
 
 /// Sweeps over the points of a manifold at most, and the change over the impulse at which they stand.
@@ -30,10 +30,17 @@ const ROUNDS: usize = 8;
 pub(super) fn resolve(points: &mut [Point], bodies: &mut [Moving], dt: f64) -> (usize, f64) {
     let manifolds = manifolds(points);
     let (mut count, mut work) = (0, 0.0);
-    for _ in 0..ROUNDS {
+    // The round in which each body was hit last: what is not due stays so until a body of it is.
+    let mut hit_in = vec![0; bodies.len()];
+    for round in 1..=ROUNDS {
+        let may_be_due = |range: &Range<usize>| {
+            let Point { i, j, .. } = points[range.start];
+            round == 1 || hit_in[i] + 1 == round || (j != WALL && hit_in[j] + 1 == round)
+        };
         let mut due: Vec<(f64, usize)> = manifolds
             .iter()
             .enumerate()
+            .filter(|(_, range)| may_be_due(range))
             .filter_map(|(number, range)| {
                 first_touch(&points[range.clone()], bodies, dt).map(|time| (time, number))
             })
@@ -48,6 +55,10 @@ pub(super) fn resolve(points: &mut [Point], bodies: &mut [Moving], dt: f64) -> (
             if let Some(time) = first_touch(group, bodies, dt) {
                 work += bounce(group, bodies, time, dt);
                 count += 1;
+                hit_in[group[0].i] = round;
+                if group[0].j != WALL {
+                    hit_in[group[0].j] = round;
+                }
             }
         }
     }
@@ -93,7 +104,7 @@ fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64
     for _ in 0..SWEEPS {
         let (mut changed, mut largest) = (0.0_f64, 0.0_f64);
         for &k in &touching {
-            changed = changed.max(group[k].solve(bodies, 0.0, EXACT).impulse);
+            changed = changed.max(group[k].solve(bodies));
             largest = largest.max(group[k].impulse.norm());
         }
         if changed <= STANDS * largest {

@@ -56,17 +56,19 @@ impl<W: Width> Velocities<W> {
     }
 }
 
+/// Velocities and spins of eight bodies.
 #[inline(always)]
-fn pairs<W: Width>(rows: [(W::Quad, W::Quad); LANES]) -> [Reg3<W>; 2] {
+pub(crate) fn pairs<W: Width>(rows: [(W::Quad, W::Quad); LANES]) -> [Reg3<W>; 2] {
     let [a, b, c, d, e, f, g, h] = rows;
     let first = [a.0, b.0, c.0, d.0, e.0, f.0, g.0, h.0];
     let second = [a.1, b.1, c.1, d.1, e.1, f.1, g.1, h.1];
     [vectors(first), vectors(second)]
 }
 
+/// Puts the velocities and spins of the lanes in use back.
 #[inline(always)]
 #[allow(unsafe_code)]
-fn scatter<W: Width>(
+pub(crate) fn scatter<W: Width>(
     used: u32,
     index: &[u32; LANES],
     bodies: &SharedBodies<'_>,

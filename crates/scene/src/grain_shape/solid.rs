@@ -36,6 +36,8 @@ pub struct Solid {
     pub volume: f64,
     /// Moments of inertia about the axes over the mass `[m^2]`.
     pub inertia: Vector3<f64>,
+    /// Half the edges of the box about the centre, along the axes, that holds it `[m]`.
+    pub half_extents: Vector3<f64>,
     /// Radius of the ball about the centre that holds it `[m]`.
     pub reach: f64,
     /// The body scaled so that `reach` is 1: parry's tolerances are absolute.
@@ -89,6 +91,7 @@ impl Solid {
                 squares.z + squares.x,
                 squares.x + squares.y,
             ) / 12.0,
+            half_extents: half,
             reach,
             unit: SharedShape::new(Cuboid::new(parry(&(half / reach)))),
         }
@@ -103,6 +106,7 @@ impl Solid {
             round: Some((radius, half)),
             volume: std::f64::consts::PI * radius * radius * 2.0 * half,
             inertia: Vector3::new(across, radius * radius / 2.0, across),
+            half_extents: Vector3::new(radius, half, radius),
             reach,
             unit: SharedShape::new(Cylinder::new(half / reach, radius / reach)),
         }
@@ -134,6 +138,7 @@ impl Solid {
             .ok_or(SceneError::BadShape { what: "a hull whose faces do not close" })?;
         Ok(Self {
             faces: faces(&corners, &triangles),
+            half_extents: corners.iter().fold(Vector3::zeros(), |most, c| most.sup(&c.abs())),
             corners,
             round: None,
             volume,

@@ -56,7 +56,7 @@ def run(workshop: Workshop) -> Outcome:
                 ours=f"{ratio[i, k]:.2g} ({NAMES[k]})",
                 interval=f"{low:.2g} to {high:.2g}",
                 count=len(groups[i]),
-                verdict=_verdict(low, high, size.is_full),
+                verdict=_verdict(low, high, size),
             )
         )
     return Outcome(
@@ -104,9 +104,9 @@ def _ratio_interval(values: np.ndarray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _verdict(low: float, high: float, is_full: bool) -> str:
-    if not is_full:
-        return "not judged: small version"
+def _verdict(low: float, high: float, size: Size) -> str:
+    if not size.is_full:
+        return f"not judged: {size.name} version"
     return "better" if high < _BAR else "worse" if low > _BAR else "not decided"
 
 

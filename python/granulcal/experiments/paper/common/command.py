@@ -18,12 +18,6 @@ from granulcal.experiments.paper.common.workshop import Workshop
 
 __all__ = ["experiments", "find", "missing_sets", "reproduce_paper", "run_one"]
 
-_QUICK_NOTE = (
-    "This is the small version: few grains and few pours. It shows that everything runs; its "
-    "numbers are not to be compared with the paper's."
-)
-
-
 def experiments() -> list[Experiment]:
     """Returns every experiment, by its number: each module of the package that has one."""
     from granulcal.experiments import paper
@@ -97,8 +91,8 @@ def reproduce_paper(
     """
     folder = _folder(out, size)
     wanted = experiments() if experiment is None else [find(experiment)]
-    if not size.is_full and not quiet:
-        print(_QUICK_NOTE)
+    if size.note and not quiet:
+        print(size.note)
     for each in wanted:
         if report and experiment is None and Outcome.is_complete(folder / each.name):
             continue

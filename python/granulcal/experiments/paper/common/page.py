@@ -42,7 +42,7 @@ def write_page(folder: Path, known: list[Experiment], size: Size) -> Path:
         parts.append(part)
     page = template(_TEMPLATE).render(
         parts=parts,
-        is_full=size.is_full,
+        size=size,
         paper=_PAPER,
         version=_native.__version__,
         made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),

@@ -5,7 +5,7 @@ from typing import Any
 
 from granulcal.pours.scene import Scene
 
-__all__ = ["FULL", "QUICK", "TINY", "Size"]
+__all__ = ["FULL", "MEDIUM", "QUICK", "TINY", "Size"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,7 +13,7 @@ class Size:
     """Counts of everything.
 
     Attributes:
-        name: `full`, `quick` or `tiny`.
+        name: `full`, `medium`, `quick` or `tiny`.
         grains: grains of a pour.
         pixels: of the camera's image, along a side.
         downsample: of them that become one.
@@ -27,6 +27,7 @@ class Size:
         shapes: pours of a training set of grains that are not round.
         subsets: whether the ablation looks at every pair and a hundred random subsets.
         fit: settings of `BayesSim.fit`.
+        note: what is to be said of its numbers, if they do not stand beside the paper's.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Size:
     shapes: int = 1000
     subsets: bool = True
     fit: dict[str, Any] = field(default_factory=dict)
+    note: str = ""
 
     @property
     def is_full(self) -> bool:
@@ -55,10 +57,22 @@ class Size:
         return scene.with_({"camera.pixels": self.pixels, "camera.downsample": self.downsample})
 
 
+_SMALL_NOTE = (
+    "This is the small version: few grains and few pours. It shows that everything runs; its "
+    "numbers are not to be compared with the paper's."
+)
 _SMALL_FIT = {"method": "emulated", "emulator_features": 60}
 
 FULL = Size(name="full")
 """The paper's counts, or more."""
+MEDIUM = Size(
+    name="medium",
+    grains=400,
+    shapes=200,
+    note="Pours of 400 grains and as many tests as the paper has: its numbers are to be compared "
+    "with each other, with the paper's only in kind.",
+)
+"""A fifth of the grains, the paper's counts of tests: what grains that are not round allow."""
 QUICK = Size(
     name="quick",
     grains=120,
@@ -74,6 +88,7 @@ QUICK = Size(
     shapes=60,
     subsets=False,
     fit=_SMALL_FIT,
+    note=_SMALL_NOTE,
 )
 """Few grains and few pours: it shows that everything runs, its numbers compare with nothing."""
 TINY = Size(
@@ -91,5 +106,6 @@ TINY = Size(
     shapes=60,
     subsets=False,
     fit=_SMALL_FIT,
+    note=_SMALL_NOTE,
 )
 """For a test of the code."""
