@@ -62,7 +62,9 @@ impl Contacts {
         }
         let mut manifold = ContactManifold::new();
         for &(i, j) in &self.pairs {
-            if is_far(around.range(&bodies[i], Some(&bodies[j]))) {
+            if is_far(around.range(&bodies[i], Some(&bodies[j])))
+                && !are_apart(around.solid, &later[i], &later[j], 0.0)
+            {
                 touches(around, &later, (i, j), 0.0, &mut manifold, |point| new.push(point));
             }
         }
