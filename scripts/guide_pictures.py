@@ -15,6 +15,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.image
 import matplotlib.pyplot as plt
+from PIL import Image
 
 from granulcal.cli import main as granulcal
 
@@ -75,6 +76,10 @@ def steps() -> None:
             axes.axis("off")
         figure.savefig(OUT / "guide-steps.png")
         plt.close(figure)
+        # Noise of the camera does not compress: 128 colours do.
+        with Image.open(OUT / "guide-steps.png") as picture:
+            few = picture.convert("RGB").quantize(128, dither=Image.Dither.NONE)
+        few.save(OUT / "guide-steps.png", optimize=True)
 
 
 def _run(*words: str) -> None:
