@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use granulcal_dem::{ARITHMETIC, LAW};
+use granulcal_dem::{LAW, arithmetic};
 use granulcal_scene::{Prior, Scene, SceneError};
 
 use crate::{DatasetError, ObservedStatistic, observed_statistics, scene_file};
@@ -49,7 +49,7 @@ impl Header {
             prior: prior.clone(),
             version: VERSION.to_owned(),
             law: Some(LAW),
-            arithmetic: ARITHMETIC,
+            arithmetic: arithmetic(scene),
             seed,
             scene_toml: scene.to_toml().map_err(DatasetError::refused)?,
             prior_toml: prior.to_toml().map_err(DatasetError::Prior)?,

@@ -8,7 +8,7 @@ use toml::Value;
 use xxhash_rust::xxh3::xxh3_128;
 
 use crate::error::DemError;
-use crate::law::{ARITHMETIC, LAW};
+use crate::law::{LAW, arithmetic};
 
 /// What a checkpoint begins with.
 const MAGIC: &[u8] = b"granulcal checkpoint\n";
@@ -109,7 +109,7 @@ pub(crate) fn seal(header: &CheckpointHeader, state: &[u8]) -> Vec<u8> {
     let written = Written {
         version: header.version.clone(),
         law: LAW,
-        arithmetic: ARITHMETIC,
+        arithmetic: arithmetic(&header.scene),
         // Numbers of a scene that a simulation was made of can be written.
         scene: header.scene.to_toml().expect("a checked scene as TOML"),
         seed: header.seed,
@@ -139,17 +139,18 @@ pub(crate) fn open(bytes: &[u8]) -> Result<(CheckpointHeader, &[u8]), DemError> 
     }
     let strange = |_| DemError::CheckpointState { what: "a header that cannot be read" };
     let (written, state): (Written, _) = postcard::take_from_bytes(body).map_err(strange)?;
-    let Written { version, law, arithmetic, scene, seed, settings, substep } = written;
+    let Written { version, law, arithmetic: got, scene, seed, settings, substep } = written;
     if version != VERSION {
         return Err(DemError::CheckpointVersion { got: version, allowed: VERSION });
     }
     if law != LAW {
         return Err(DemError::CheckpointLaw { got: law, allowed: LAW });
     }
-    if arithmetic != ARITHMETIC {
-        return Err(DemError::CheckpointArithmetic { got: arithmetic, allowed: ARITHMETIC });
-    }
     let scene = Scene::parse(&scene)?;
+    let allowed = arithmetic(&scene);
+    if got != allowed {
+        return Err(DemError::CheckpointArithmetic { got, allowed });
+    }
     Ok((CheckpointHeader { version, scene, seed, settings, substep }, state))
 }
 
@@ -238,9 +239,9 @@ mod tests {
     #[test]
     fn another_arithmetic_is_refused_and_named() {
         let mut bytes = simulation().checkpoint();
-        let arithmetic = LEAST - HASH + 1 + VERSION.len() + 1;
-        assert_eq!(u32::from(bytes[arithmetic]), ARITHMETIC);
-        bytes[arithmetic] = 99;
+        let at = LEAST - HASH + 1 + VERSION.len() + 1;
+        assert_eq!(bytes[at], 1);
+        bytes[at] = 99;
         let error = simulation().resume(&sealed(bytes)).unwrap_err();
         assert!(matches!(error, DemError::CheckpointArithmetic { got: 99, .. }), "{error}");
         assert!(error.to_string().contains("arithmetic 99"), "{error}");

@@ -2,6 +2,8 @@
 //!
 //! Pure functions without loops over contacts; docs/theory/contact.md derives them.
 
+use granulcal_scene::Scene;
+
 use crate::lanes::{Reg, Reg3, Width};
 
 /// Number of the law that pours follow: of contacts, impacts, starts and of how all of it is solved.
@@ -11,12 +13,15 @@ use crate::lanes::{Reg, Reg3, Width};
 /// springs in the limit of infinite stiffness.
 pub const LAW: u32 = 2;
 
-/// Number of the arithmetic that the law is worked out in.
+/// Number of the arithmetic that the law is worked out in, of pours of a scene.
 ///
-/// It counts up whenever a pour changes by its rounding or the order of its contacts alone: the same seed is then another
-/// pour of the same law. Data sets and checkpoints state it, so that a batch is not gone on with by another; what is
-/// learned from pours does not depend on it. 1 is double precision throughout.
-pub const ARITHMETIC: u32 = 1;
+/// It counts up whenever such a pour changes by its rounding or the order of its contacts alone: the same seed is then
+/// another pour of the same law. Data sets and checkpoints state it, so that a batch is not gone on with by another; what
+/// is learned from pours does not depend on it. 1 is double precision throughout; grains with a shape are at 2 since
+/// their points are swept eight at a time.
+pub fn arithmetic(scene: &Scene) -> u32 {
+    if scene.grains.shape.is_some() { 2 } else { 1 }
+}
 
 /// Share of a penetration that is corrected in one substep (Baumgarte).
 pub(crate) const CORRECTION: f64 = 0.2;
@@ -83,6 +88,14 @@ mod tests {
     }
 
     const DT: f64 = 1.0 / 2400.0;
+
+    #[test]
+    fn bodies_have_an_arithmetic_of_their_own() {
+        let balls = Scene::funnel(0.12);
+        let mut cubes = balls.clone();
+        cubes.grains.shape = Some(granulcal_scene::GrainShape::Box { aspect: [1.0; 3] });
+        assert_eq!((arithmetic(&balls), arithmetic(&cubes)), (1, 2));
+    }
 
     #[test]
     fn bias_has_its_modes() {

@@ -184,7 +184,7 @@ fn checkpoint_facts(path: &Path) -> anyhow::Result<Value> {
         "kind": "checkpoint",
         "version": header.version,
         "law": granulcal_dem::LAW,
-        "arithmetic": granulcal_dem::ARITHMETIC,
+        "arithmetic": granulcal_dem::arithmetic(&header.scene),
         "seed": header.seed,
         "substeps": header.substep,
         "simulated_s": header.time(),
