@@ -1,6 +1,7 @@
 """What a closed loop predicts under further conditions: `models.json` and `granulcal predict`."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from granulcal.cli import main
 from granulcal.errors import ObservationError
 from granulcal.loop.check.discrepancy import Discrepancy
-from granulcal.loop.pours.forward import Forward
+from granulcal.loop.pours.forward import Coarse, Forward
 from granulcal.loop.report.models import Maker, Models, condition_of
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.pours.scene import Scene
@@ -84,6 +85,13 @@ def test_the_file_holds_everything(models: Models, tmp_path: Path) -> None:
         assert np.array_equal(one.middle, two.middle) and np.array_equal(one.low, two.low)
     with pytest.raises(FileNotFoundError, match="is .* the -o of close-loop"):
         Models.load(tmp_path / "nowhere")
+
+
+def test_real_grains_smaller_than_the_scenes_are_read_again(models: Models, tmp_path: Path) -> None:
+    # psi of the real size lies below that of the scene, 0.
+    coarse = Coarse({"grains.diameter": 3.4e-3, "grains.count": 1283.0}, -1.2)
+    replace(models, coarse=coarse).write(tmp_path)
+    assert Models.load(tmp_path).coarse == coarse
 
 
 def test_lines_and_neighbours_need_no_pour(models: Models, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use serde::{Deserialize, Serialize};
 
-use crate::lanes::{Row, Width};
+use crate::lanes::{LANES, Reg3, Row, Width, each, vectors};
 
 /// Linear and scaled angular velocity of one body, a cache line.
 ///
@@ -64,6 +64,55 @@ impl<'a> SharedBodies<'a> {
         let body = unsafe { &mut *self.first.add(body as usize) };
         W::store_row(velocity, &mut body.velocity);
         W::store_row(spin, &mut body.spin);
+    }
+
+    /// Velocities and spins of eight bodies.
+    ///
+    /// # Safety
+    /// That of [`Self::load`] for each.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub unsafe fn gather<W: Width>(&self, index: &[u32; LANES]) -> [Reg3<W>; 2] {
+        // SAFETY: as the caller promises.
+        let rows = each(index, |body| unsafe { self.load::<W>(body) });
+        let [a, b, c, d, e, f, g, h] = rows;
+        let first = [a.0, b.0, c.0, d.0, e.0, f.0, g.0, h.0];
+        let second = [a.1, b.1, c.1, d.1, e.1, f.1, g.1, h.1];
+        [vectors(first), vectors(second)]
+    }
+
+    /// Puts the velocities and spins of the first `used` of eight bodies back.
+    ///
+    /// # Safety
+    /// That of [`Self::store`] for each of them.
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub unsafe fn scatter<W: Width>(
+        &self,
+        used: u32,
+        index: &[u32; LANES],
+        v: Reg3<W>,
+        w: Reg3<W>,
+    ) {
+        let zero = W::splat(0.0);
+        let velocities = W::rows([v.x.0, v.y.0, v.z.0, zero]);
+        let spins = W::rows([w.x.0, w.y.0, w.z.0, zero]);
+        // SAFETY: as the caller promises.
+        let store = |lane: usize| unsafe {
+            self.store::<W>(index[lane], velocities[lane], spins[lane]);
+        };
+        if used as usize == LANES {
+            store(0);
+            store(1);
+            store(2);
+            store(3);
+            store(4);
+            store(5);
+            store(6);
+            store(7);
+        } else {
+            (0..used as usize).for_each(store);
+        }
     }
 }
 

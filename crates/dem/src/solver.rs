@@ -20,7 +20,7 @@ mod pcr;
 pub(crate) mod reference;
 pub(crate) mod residual;
 pub(crate) mod solve_info;
-pub(crate) mod velocities;
+mod velocities;
 
 /// Solves the contacts of `sets` together, from the impulses that they carry and velocities without them;
 /// `quiet_tolerance` is the change of an impulse that counts as none in a quiet state, if this is one `[m/s]`, `radius`

@@ -16,9 +16,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::body::Moving;
 use super::contact::{Point, WALL};
 use crate::body::{Body, SharedBodies};
-use crate::lanes::{LANES, Lanes, Lanes3, Reg, Reg3, Row, Width, each, widest};
+use crate::lanes::{LANES, Lanes, Lanes3, Reg, Reg3, Row, Width, widest};
 use crate::law::project_ball;
-use crate::solver::velocities::{pairs, scatter};
 use granulcal_scene::Solid;
 
 /// Colours that a body's mask can distinguish; points beyond them get a batch of their own.
@@ -148,7 +147,9 @@ impl Batches {
         bodies.push(Body::default());
         let (colours, starts) = colour(points, moving.len());
         batches.resize_with(starts[COLOURS + 1], || Batch::empty(resting));
-        batches.iter_mut().for_each(|batch| batch.used = 0);
+        for batch in batches.iter_mut() {
+            batch.used = 0;
+        }
         let mut next = starts;
         for ((number, point), colour) in points.iter().enumerate().zip(colours) {
             let at = next[colour];
@@ -167,7 +168,9 @@ impl Batches {
                 next[colour] += 1;
             }
         }
-        batches.iter_mut().for_each(|batch| batch.clear_rest(resting));
+        for batch in batches.iter_mut() {
+            batch.clear_rest(resting);
+        }
     }
 
     /// Sweeps until the rule says that it is enough.
@@ -296,9 +299,9 @@ impl<W: Width> Sums<W> {
 fn solve<W: Width>(batch: &mut Batch, bodies: &SharedBodies<'_>, sums: &mut Sums<W>) {
     let zero = Reg::<W>::splat(0.0);
     // SAFETY: the indices are of bodies that `Batches::fill` has made, and nobody else has them.
-    let body = |body| unsafe { bodies.load::<W>(body) };
-    let [mut v_i, mut s_i] = pairs::<W>(each(&batch.i, body));
-    let [mut v_j, mut s_j] = pairs::<W>(each(&batch.j, body));
+    let gather = |index| unsafe { bodies.gather::<W>(index) };
+    let [mut v_i, mut s_i] = gather(&batch.i);
+    let [mut v_j, mut s_j] = gather(&batch.j);
     let n = Reg3::load(&batch.normal);
     let old = Reg3::load(&batch.impulse);
     // Written out, for an array's own `map` is not inlined into the wide kernels.
@@ -328,8 +331,10 @@ fn solve<W: Width>(batch: &mut Batch, bodies: &SharedBodies<'_>, sums: &mut Sums
     sums.changes = sums.changes + square;
     sums.normals = normal.times_plus(normal, sums.normals);
     new.store(&mut batch.impulse);
-    scatter(batch.used, &batch.i, bodies, v_i, s_i);
-    scatter(batch.used, &batch.j, bodies, v_j, s_j);
+    // SAFETY: as above; no two lanes share a body but the resting one, which gets what it has.
+    let scatter = |index, v, s| unsafe { bodies.scatter::<W>(batch.used, index, v, s) };
+    scatter(&batch.i, v_i, s_i);
+    scatter(&batch.j, v_j, s_j);
 }
 
 /// `rows * vector`.

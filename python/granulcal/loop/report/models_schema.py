@@ -54,7 +54,7 @@ _SCHEMA: Schema = Table(
         "means": _ROWS,
         "scatter": ListOf(ListOf(Number(0)), least=1),
         "pours": ListOf(Number(1), least=1),
-        "coarse": Maybe(Table({"numbers": Mapping(Number()), "held": Number(0, 1)})),
+        "coarse": Maybe(Table({"numbers": Mapping(Number()), "held": Number(high=0)})),
     },
     {"law": Whole(0, 2**32 - 1)},
 )

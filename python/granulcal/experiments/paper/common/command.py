@@ -18,6 +18,7 @@ from granulcal.experiments.paper.common.workshop import Workshop
 
 __all__ = ["experiments", "find", "missing_sets", "reproduce_paper", "run_one"]
 
+
 def experiments() -> list[Experiment]:
     """Returns every experiment, by its number: each module of the package that has one."""
     from granulcal.experiments import paper
