@@ -203,6 +203,7 @@ impl Bodies {
     /// Warm start: a point that is where one was begins with its impulse.
     fn recall(&mut self, points: &mut [Point]) {
         let near = KNOWN * self.solid.reach;
+        debug_assert!(points.is_sorted_by_key(Point::rank));
         let (mut is_free, mut first) = (vec![true; self.known.len()], 0);
         for point in points {
             // Both are in one order.

@@ -23,7 +23,7 @@ const MOST_CELLS: u64 = 1 << 21;
 pub(super) struct Contacts {
     /// Pairs whose balls may meet, in rising order.
     pairs: Vec<(usize, usize)>,
-    /// Those of walls before those of pairs, those of a manifold together, in an order that depends on the places alone.
+    /// In the order of their rank, which depends on the places alone.
     pub points: Vec<Point>,
 }
 
@@ -32,8 +32,10 @@ pub(super) struct Contacts {
 pub(super) fn contacts(around: &Around<'_>, bodies: &[Moving], mut points: Vec<Point>) -> Contacts {
     points.clear();
     for i in 0..bodies.len() {
+        let first = points.len();
         at_walls(around, bodies, i, &mut points);
         at_rims(around, &bodies[i], i, around.range(&bodies[i], None), &mut points);
+        points[first..].sort_by_key(Point::rank);
     }
     let pairs = near_pairs(around, bodies);
     let mut manifold = ContactManifold::new();
@@ -104,7 +106,7 @@ fn near_pairs(around: &Around<'_>, bodies: &[Moving]) -> Vec<(usize, usize)> {
     // Far beyond any scene all are of one cell, whose neighbours still have numbers.
     let cell_of = |body: &Moving| {
         let [x, y, z] = <[f64; 3]>::from((body.centre - low) / width)
-            .map(|c| (c as u64 + 1).min(MOST_CELLS - 2));
+            .map(|c| (c as u64).min(MOST_CELLS - 3) + 1);
         cell(x, y, z)
     };
     let mut cells: Vec<_> = bodies.iter().map(cell_of).zip(0_u32..).collect();

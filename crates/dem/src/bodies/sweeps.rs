@@ -299,14 +299,11 @@ impl<W: Width> Sums<W> {
 fn solve<W: Width>(batch: &mut Batch, bodies: &SharedBodies<'_>, sums: &mut Sums<W>) {
     let zero = Reg::<W>::splat(0.0);
     // SAFETY: the indices are of bodies that `Batches::fill` has made, and nobody else has them.
-    let gather = |index| unsafe { bodies.gather::<W>(index) };
-    let [mut v_i, mut s_i] = gather(&batch.i);
-    let [mut v_j, mut s_j] = gather(&batch.j);
+    let ([mut v_i, mut s_i], [mut v_j, mut s_j]) =
+        unsafe { (bodies.gather::<W>(&batch.i), bodies.gather::<W>(&batch.j)) };
     let n = Reg3::load(&batch.normal);
     let old = Reg3::load(&batch.impulse);
-    // Written out, for an array's own `map` is not inlined into the wide kernels.
-    let rows = |[x, y, z]: &[Lanes3; 3]| [Reg3::load(x), Reg3::load(y), Reg3::load(z)];
-    let (turn_i, turn_j) = (rows(&batch.turn_i), rows(&batch.turn_j));
+    let (turn_i, turn_j) = (load(&batch.turn_i), load(&batch.turn_j));
     let u = v_i - v_j + times(&turn_i, s_i) - times(&turn_j, s_j);
     let closing = zero - (n.dot(u) + Reg::load(&batch.bias));
     let was = n.dot(old);
@@ -332,9 +329,16 @@ fn solve<W: Width>(batch: &mut Batch, bodies: &SharedBodies<'_>, sums: &mut Sums
     sums.normals = normal.times_plus(normal, sums.normals);
     new.store(&mut batch.impulse);
     // SAFETY: as above; no two lanes share a body but the resting one, which gets what it has.
-    let scatter = |index, v, s| unsafe { bodies.scatter::<W>(batch.used, index, v, s) };
-    scatter(&batch.i, v_i, s_i);
-    scatter(&batch.j, v_j, s_j);
+    unsafe {
+        bodies.scatter::<W>(batch.used, &batch.i, v_i, s_i);
+        bodies.scatter::<W>(batch.used, &batch.j, v_j, s_j);
+    }
+}
+
+/// Three rows; written out, for an array's own `map` is not inlined into the wide kernels.
+#[inline(always)]
+fn load<W: Width>([x, y, z]: &[Lanes3; 3]) -> [Reg3<W>; 3] {
+    [Reg3::load(x), Reg3::load(y), Reg3::load(z)]
 }
 
 /// `rows * vector`.

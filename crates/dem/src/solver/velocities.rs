@@ -19,10 +19,9 @@ impl<W: Width> Velocities<W> {
     #[allow(unsafe_code)]
     pub fn gather<const AT_WALLS: bool>(batch: &Batch, bodies: &SharedBodies<'_>) -> Self {
         // SAFETY: the indices are in bounds (`nsgs::for_each_phase`), and a body is another batch's only if it rests.
-        let gather = |index| unsafe { bodies.gather::<W>(index) };
-        let [v_i, w_i] = gather(&batch.i);
+        let [v_i, w_i] = unsafe { bodies.gather::<W>(&batch.i) };
         let rest = Reg3 { x: Reg::splat(0.0), y: Reg::splat(0.0), z: Reg::splat(0.0) };
-        let [v_j, w_j] = if AT_WALLS { [rest; 2] } else { gather(&batch.j) };
+        let [v_j, w_j] = if AT_WALLS { [rest; 2] } else { unsafe { bodies.gather::<W>(&batch.j) } };
         Self { v_i, w_i, v_j, w_j }
     }
 
@@ -30,10 +29,11 @@ impl<W: Width> Velocities<W> {
     #[allow(unsafe_code)]
     pub fn scatter<const AT_WALLS: bool>(&self, batch: &Batch, bodies: &SharedBodies<'_>) {
         // SAFETY: the lanes in use have grains of their own, in bounds, that no other contact of this colour has.
-        let scatter = |index, v, w| unsafe { bodies.scatter::<W>(batch.used, index, v, w) };
-        scatter(&batch.i, self.v_i, self.w_i);
-        if !AT_WALLS {
-            scatter(&batch.j, self.v_j, self.w_j);
+        unsafe {
+            bodies.scatter::<W>(batch.used, &batch.i, self.v_i, self.w_i);
+            if !AT_WALLS {
+                bodies.scatter::<W>(batch.used, &batch.j, self.v_j, self.w_j);
+            }
         }
     }
 
