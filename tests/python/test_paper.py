@@ -27,9 +27,10 @@ from granulcal.experiments.paper.common.measure import (
 )
 from granulcal.experiments.paper.common.outcome import Outcome, Row
 from granulcal.experiments.paper.common.page import write_page, write_tables
-from granulcal.experiments.paper.common.sizes import FULL, QUICK, TINY
+from granulcal.experiments.paper.common.sizes import FULL, MEDIUM, QUICK, TINY
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.experiments.paper.heights import SHIPPED as RECORDINGS
+from granulcal.experiments.paper.heights import Recordings
 from granulcal.experiments.paper.observation_error import _peaks
 from granulcal.experiments.paper.propagation import _least
 
@@ -161,6 +162,12 @@ class _Sources(HTMLParser):
     def handle_starttag(self, tag, attrs):
         self.sections += tag == "section"
         self.found += [value for name, value in attrs if name in ("src", "href") and value]
+
+
+def test_recordings_of_another_number_of_grains_are_not_taken(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"recordings.py .*recordings --grains 400`"):
+        Recordings.load("barley", MEDIUM, tmp_path)
+    assert len(Recordings.load("barley", QUICK, tmp_path).heights)
 
 
 def test_the_page_needs_nothing_else_and_says_that_it_is_small(ran):

@@ -47,6 +47,7 @@ _CALIBRATED_AT = 0.12
 _HEIGHTS = (0.02, 0.04, 0.06, 0.08, 0.10)
 SHIPPED = Path(__file__).parent / "recordings"
 """Recordings of the small version."""
+_SHIPPED_GRAINS = 120
 _MAKER = "python benches/paper/recordings.py"
 _FRAMES = 10
 _KEPT = 5
@@ -81,10 +82,12 @@ class Recordings:
             FileNotFoundError: they have not been made; the message says how.
             ValueError: the file is damaged, or holds something else.
         """
-        path = (folder / "recordings" if size.is_full else SHIPPED) / f"{name}.npz"
+        is_small = size.grains <= _SHIPPED_GRAINS
+        path = (SHIPPED if is_small else folder / "recordings") / f"{name}.npz"
         if not path.exists():
+            maker = f"{_MAKER} {path.parent}" + ("" if size.is_full else f" --grains {size.grains}")
             raise FileNotFoundError(
-                f"no recordings {path}: make them with `{_MAKER} {path.parent}` in an environment "
+                f"no recordings {path}: make them with `{maker}` in an environment "
                 "that has LAMMPS (benches/paper/README.md)"
             )
         file = read_arrays(path, "heights", "positions", "radii", "held")

@@ -105,8 +105,8 @@ def _ratio_interval(values: np.ndarray) -> tuple[float, float]:
 
 
 def _verdict(low: float, high: float, size: Size) -> str:
-    if not size.is_full:
-        return f"not judged: {size.name} version"
+    if size.verdict:
+        return size.verdict
     return "better" if high < _BAR else "worse" if low > _BAR else "not decided"
 
 

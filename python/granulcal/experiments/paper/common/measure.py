@@ -124,8 +124,8 @@ def _verdict(
     low: float, high: float, theirs: float, count: int, paper: Published, size: Size
 ) -> str:
     """Decided only by the whole interval, at a full run of at least as many tests."""
-    if not size.is_full:
-        return f"not judged: {size.name} version"
+    if size.verdict:
+        return size.verdict
     if count < paper.count:
         return "not decided: too few tests"
     if high < theirs:

@@ -51,6 +51,11 @@ class Size:
         """Whether its numbers may stand beside the paper's."""
         return self.name == "full"
 
+    @property
+    def verdict(self) -> str:
+        """The verdict of every row that the size alone forbids to judge; empty at full size."""
+        return "" if self.is_full else f"not judged: {self.name} version"
+
     def scene(self, height: float = 0.12) -> Scene:
         """Returns the paper's pour with this many grains."""
         scene = Scene.funnel(height=height, count=self.grains)
