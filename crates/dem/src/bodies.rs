@@ -185,7 +185,7 @@ impl Bodies {
             let Settled { sweeps, residual, unconverged } = self.batches.settle(sweeps);
             step.sweeps += sweeps;
             (step.residual, step.unconverged) = (residual, unconverged);
-            self.batches.put_back(&mut contacts.points, &mut moving, &solid);
+            self.batches.put_back(&mut contacts.points, &mut moving);
             if round + 1 == ROUNDS || !contacts.foresee(&around, &moving) {
                 break;
             }

@@ -123,17 +123,20 @@ impl Batch {
 /// The points of a substep in batches, with the velocities that they change.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Batches {
-    batches: Vec<Batch>,
+    all: Vec<Batch>,
     /// Velocity and s of every body, then of the resting one and of walls that move.
     bodies: Vec<Body>,
+    /// F of every body.
+    frames: Vec<Matrix3<f64>>,
 }
 
 impl Batches {
     /// Puts assembled points that know their bias and impulse into batches.
     pub fn fill(&mut self, points: &[Point], moving: &[Moving], solid: &Solid) {
-        let Self { batches, bodies } = self;
+        let Self { all: batches, bodies, frames } = self;
         let resting = moving.len() as u32;
-        let frames: Vec<_> = moving.iter().map(|body| body.frame(solid)).collect();
+        frames.clear();
+        frames.extend(moving.iter().map(|body| body.frame(solid)));
         let spin_of = |frame: &Matrix3<f64>, omega: &Vector3<f64>| {
             solid.inertia.component_mul(&(frame.transpose() * omega))
         };
@@ -141,7 +144,7 @@ impl Batches {
             velocity: Row::new(&velocity, 0.0),
             spin: Row::new(&spin, 0.0),
         };
-        let each_body = moving.iter().zip(&frames);
+        let each_body = moving.iter().zip(frames.iter());
         bodies.clear();
         bodies.extend(each_body.map(|(m, frame)| body(m.velocity, spin_of(frame, &m.omega))));
         bodies.push(Body::default());
@@ -175,11 +178,11 @@ impl Batches {
 
     /// Sweeps until the rule says that it is enough.
     pub fn settle(&mut self, rule: Sweeps) -> Settled {
-        let unconverged = !self.batches.is_empty();
+        let unconverged = !self.all.is_empty();
         let mut settled = Settled { sweeps: 0, residual: 0.0, unconverged };
         let mut has_settled = false;
         for sweeps in 1..=if unconverged { rule.most } else { 0 } {
-            let worst = sweep(&mut self.batches, &mut self.bodies, sweeps % 2 == 0);
+            let worst = sweep(&mut self.all, &mut self.bodies, sweeps % 2 == 0);
             settled.sweeps = sweeps;
             settled.residual = worst.residual;
             let is_enough = has_settled || sweeps >= rule.least;
@@ -193,15 +196,15 @@ impl Batches {
     }
 
     /// Hands impulses and velocities back.
-    pub fn put_back(&self, points: &mut [Point], moving: &mut [Moving], solid: &Solid) {
-        for batch in &self.batches {
+    pub fn put_back(&self, points: &mut [Point], moving: &mut [Moving]) {
+        for batch in &self.all {
             for lane in 0..batch.used as usize {
                 points[batch.number[lane] as usize].impulse = batch.impulse.get(lane).into();
             }
         }
-        for (body, solved) in moving.iter_mut().zip(&self.bodies) {
+        for ((body, solved), frame) in moving.iter_mut().zip(&self.bodies).zip(&self.frames) {
             body.velocity = solved.velocity.vector();
-            body.omega = body.frame(solid) * solved.spin.vector();
+            body.omega = frame * solved.spin.vector();
         }
     }
 }
