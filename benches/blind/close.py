@@ -2,21 +2,18 @@
 
     python benches/blind/close.py out/sets --archive out/archive
 
-All sets share one archive and its surrogate, and declare what the engines differ by
-(tolerances.json, of code_pairs.py) as a tolerance; `--undeclared` leaves it out.
+All sets share one archive and its surrogate. Their loop.toml has the free numbers of the contact law
+free in every fit (`law = true`): engines that agree on friction and restitution differ in them.
 """
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 from granulcal.loop.close import close_loop, fit_surrogate, planned
-from granulcal.loop.effects.tolerance import Tolerances
 from granulcal.loop.pours.archive import Archive
 from granulcal.loop.report.folder import write_report
 from granulcal.loop.task import Task
 
-TOLERANCES = Path(__file__).with_name("tolerances.json")
 BUDGET, SEED = 3629, 1
 
 
@@ -25,8 +22,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sets", type=Path)
     parser.add_argument("--archive", type=Path, required=True)
-    parser.add_argument("--undeclared", action="store_true")
-    parser.add_argument("--tolerances", type=Path, default=TOLERANCES)
     parser.add_argument("--report", default="report", help="folder in a set's (default: report)")
     options = parser.parse_args()
     surrogate = None
@@ -35,8 +30,6 @@ def main() -> None:
         if (out / "report.html").exists():
             continue
         task = Task.load(file)
-        if not options.undeclared:
-            task = replace(task, tolerances=Tolerances.load(options.tolerances))
         if surrogate is None:
             store = Archive(options.archive, planned(task, BUDGET, SEED))
             store.fill()

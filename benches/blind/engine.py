@@ -20,7 +20,7 @@ from lammps_contact import Law
 
 YOUNG = 3e6
 """Young's modulus [Pa]: at 8 cm piles differ from those at 1e7 by less than the spread of seeds."""
-STEP = 0.2
+STEP = 0.1
 """Time step over the time of a Rayleigh wave across half of the smallest sphere [-]."""
 TORSION = 0.02
 """Torsional friction, the default of `granulcal.Material` [-]."""

@@ -28,7 +28,7 @@ import granulcal as gc
 CONDITIONS = {"fit": (0.04, 0.08, 0.12), "sealed": (0.02, 0.06, 0.10)}
 """Heights of the funnel's tip [m]."""
 NULLS = 10
-"""Sets without effect in a round."""
+"""Sets without effect in a round, unless told otherwise."""
 OUTSIDE = ("clumps", "charge", "slot", "count", "vibration")
 """Effects that are hard to name: one of each, at the medium strength, in a round."""
 TRIES = 4
@@ -47,10 +47,10 @@ class Planned:
     level: int
 
 
-def plan(seed: int, count: int) -> list[Planned]:
+def plan(seed: int, count: int, nulls: int = NULLS) -> list[Planned]:
     """Returns the first sets: nulls, every effect at three strengths, some odd ones; and again."""
     known = [name for name in effects.load() if name not in OUTSIDE]
-    rounds: list[tuple[str | None, int]] = [(None, 0)] * NULLS
+    rounds: list[tuple[str | None, int]] = [(None, 0)] * nulls
     rounds += [(name, level) for name in known for level in range(3)]
     rounds += [(name, 1) for name in OUTSIDE]
     order = np.random.default_rng([seed, 0]).permutation(MOST)
@@ -79,7 +79,7 @@ def make(planned: Planned, seed: int, pours: int, sets: Path, sealed: Path) -> N
         "seed": [seed, planned.index],
         "conditions": [],
     }
-    lines = ['scene = "scene.toml"', 'prior = "prior.toml"', 'camera = "camera.toml"']
+    lines = ['scene = "scene.toml"', 'prior = "prior.toml"', 'camera = "camera.toml"', "law = true"]
     for use, heights in CONDITIONS.items():
         for height in heights:
             made = []
@@ -160,6 +160,7 @@ def main() -> None:
     parser.add_argument("out", type=Path, help="folder of the sets")
     parser.add_argument("--sealed", type=Path, required=True, help="folder of the answers")
     parser.add_argument("--sets", type=int, default=42)
+    parser.add_argument("--nulls", type=int, default=NULLS, help="of a round: sets without effect")
     parser.add_argument("--first", type=int, default=0, help="sets of the plan to pass over")
     parser.add_argument("--pours", type=int, default=3, help="pours at each height")
     parser.add_argument(
@@ -175,7 +176,7 @@ def main() -> None:
     for folder in (options.out, options.sealed):
         folder.mkdir(parents=True, exist_ok=True)
     seed = seed_of(options.sealed, options.seed)
-    for planned in plan(seed, options.sets)[options.first :]:
+    for planned in plan(seed, options.sets, options.nulls)[options.first :]:
         part, parts = options.part
         if planned.index % parts != part or planned.name in seals(options.out):
             continue
