@@ -2,7 +2,7 @@
 
     granulcal generate funnel default -n 1300 --seed 1 -o pours
     granulcal train pours -o model
-    python benches/ten_pours.py model --out truths
+    python benches/ten_pours.py model --out truths --plot pair.png
 
 Ten materials are drawn, each is poured ten times (minutes on one core; pours that are there are
 not made again), and the posteriors of the first pour and of all ten are held against the truth;
@@ -56,11 +56,16 @@ def main() -> None:
     parser.add_argument("model")
     parser.add_argument("--out", type=Path, default=Path("truths"))
     parser.add_argument("--seed", type=int, default=77)
+    parser.add_argument("--plot", type=Path, help="picture of the posteriors of one material")
+    parser.add_argument("--plotted", type=int, default=0, help="number of that material")
     options = parser.parse_args()
     model = gc.BayesSim.load(options.model)
     found = {1: [], POURS: []}
     for number, truth in enumerate(draw(options.seed)):
         x = pours(truth, options.out / f"{number:02d}.npy", 100 * (number + 1))
+        if options.plot is not None and number == options.plotted:
+            one, ten = model.posterior(x[:1]), model.posterior(x)
+            ten.pair_plot(options.plot, truth=truth, extra=one)
         for k, rows in found.items():
             posterior = model.posterior(x[:k])
             sample = posterior.sample(SAMPLES, seed=1)

@@ -2,8 +2,8 @@
 
     python benches/blind/close.py out/sets --archive out/archive
 
-All sets share one archive and its surrogate. Their loop.toml has the free numbers of the contact law
-free in every fit (`law = true`): engines that agree on friction and restitution differ in them.
+All sets share one archive and its surrogate. Their loop.toml has the free numbers of the contact
+law free in every fit (`law = true`): engines that agree on friction and restitution differ there.
 """
 
 import argparse

@@ -2,9 +2,9 @@
 
     python benches/blind/splash.py --places 40
 
-The heap is what granulcal leaves of scene.toml. In LAMMPS it settles for 0.22 s before it is struck,
-while the grain is still in the air; in granulcal it is at rest. Ways in mm from the moment of the
-blow to 0.4 s after it, mean and standard error over places; `rest` is the heap without a blow.
+The heap is what granulcal leaves of scene.toml. In LAMMPS it settles for 0.22 s before it is
+struck, while the grain is still in the air; in granulcal it is at rest. Ways in mm from the moment
+of the blow to 0.4 s after it, mean and standard error over places; `rest` is the heap without one.
 `striker` is the way of the grain that falls, `sum` that of all others.
 """
 
@@ -61,7 +61,7 @@ def blows(centres: Array, radius: float, places: int) -> list[Blow]:
 
 
 def in_lammps(bench: Bench, centres: Array, blow: Blow | None) -> Array:
-    """Returns the ways [m] since the blow in LAMMPS, shape (n,), the striker last if there is one."""
+    """Returns the ways [m] since the blow in LAMMPS, shape (n,), the striker's last."""
     setup = bench.setup(np.array(MATERIAL), HEIGHT, 0)
     radius = float(setup.radii[0])
     count = len(centres)
@@ -97,9 +97,10 @@ def _places(lammps: engine.lammps) -> NDArray[np.int64]:
 
 def show(name: str, ways: list[Array], radius: float, rest: float) -> None:
     """Prints a row of the table."""
-    rows = np.array(
-        [[1e3 * w[-1], (w[:-1] > radius).sum(), (w[:-1] > 1e-4).sum(), 1e3 * w[:-1].sum()] for w in ways]
-    )
+    struck = np.array(ways)[:, :-1]
+    far, some = ((struck > way).sum(axis=1) for way in (radius, 1e-4))
+    strikers = np.array([way[-1] for way in ways])
+    rows = np.column_stack([1e3 * strikers, far, some, 1e3 * struck.sum(axis=1)])
     mean, error = rows.mean(axis=0), rows.std(axis=0, ddof=1) / np.sqrt(len(rows))
     cells = [f"{m:.3g} ± {s:.1g}" for m, s in zip(mean, error, strict=True)]
     print(f"| {name} | {' | '.join(cells)} | {1e3 * rest:.2g} |", flush=True)
@@ -107,7 +108,7 @@ def show(name: str, ways: list[Array], radius: float, rest: float) -> None:
 
 def in_granulcal(centres: Array, preset: str, blow: Blow | None) -> Array:
     """Returns the same of granulcal; the grain falls from rest."""
-    start = centres if blow is None else np.vstack([centres, blow.at + [0.0, 0.0, FALL]])
+    start = centres if blow is None else np.vstack([centres, blow.at + np.array([0.0, 0.0, FALL])])
     table = {f"material.{name}": value for name, value in zip(PARAMETERS, MATERIAL, strict=True)}
     text = SCENE.read_text()
     rows = ", ".join(f"[{x:.17g}, {y:.17g}, {z:.17g}]" for x, y, z in start)
@@ -116,9 +117,7 @@ def in_granulcal(centres: Array, preset: str, blow: Blow | None) -> Array:
     text = f'{text[:head]}[start]\nkind = "positions"\npositions = [{rows}]\n\n{text[tail:]}'
     # To the horizon, whatever rests: both engines are looked at at one time.
     horizon = float(np.sqrt(2.0 * FALL / G)) + AFTER
-    scene = gc.Scene.from_toml(text).with_(
-        {**table, "preset": preset, "end.horizon": horizon}
-    )
+    scene = gc.Scene.from_toml(text).with_({**table, "preset": preset, "end.horizon": horizon})
     after = gc.simulate(scene, seed=1).positions
     before = centres if blow is None else np.vstack([centres, blow.at])
     return np.linalg.norm(after - before, axis=1)
