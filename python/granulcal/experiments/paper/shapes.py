@@ -7,6 +7,8 @@ no rolling friction, because edges and faces do that work, so that two parameter
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,25 +23,43 @@ from granulcal.experiments.paper.common.poured_set import PouredSet
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.forward import scene_at
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
 from granulcal.prior import Parameter, Prior
+
+if TYPE_CHECKING:
+    from granulcal.bayessim import BayesSim
 
 __all__ = ["EXPERIMENT", "shaped"]
 
 Array = NDArray[np.float64]
 
-_SHAPES = {
-    "cylinders": (
-        '{ kind = "cylinder", aspect = 1.0 }',
-        Published(mean=4.0139, sd=1.0574, count=50),
-    ),
-    "cubes": (
-        '{ kind = "box", aspect = [1.0, 1.0, 1.0] }',
-        Published(mean=1.8301, sd=1.9275, count=50),
-    ),
-}
-_SEED = 601
+
+@dataclass(frozen=True)
+class _Shape:
+    """A shape of grains: its name, TOML's inline table, the paper's number, its seeds' first."""
+
+    name: str
+    table: str
+    paper: Published
+    seed: int
+
+
+_CYLINDERS = _Shape(
+    "cylinders",
+    '{ kind = "cylinder", aspect = 1.0 }',
+    Published(mean=4.0139, sd=1.0574, count=50),
+    601,
+)
+_CUBES = _Shape(
+    "cubes",
+    '{ kind = "box", aspect = [1.0, 1.0, 1.0] }',
+    Published(mean=1.8301, sd=1.9275, count=50),
+    611,
+)
+_SHAPES = (_CUBES, _CYLINDERS)
+"""What takes less time first."""
 _EXAMPLES = 5
 _SLIDING, _RESTITUTION = "material.sliding_friction", "material.restitution"
 _OF_TRUTH = Prior(
@@ -62,64 +82,132 @@ def shaped(scene: Scene, shape: str) -> Scene:
     return Scene.from_toml(scene.to_toml().replace("[grains]\n", f"[grains]\nshape = {shape}\n", 1))
 
 
+@dataclass
+class _Found:
+    """What has been found of a shape so far.
+
+    Attributes:
+        tests: formations of known sliding friction.
+        unexplained: share of them that no spheres explain [-].
+        by_spheres: L2 of spheres at the parameters inferred by the model of spheres, shape (n,).
+        figure: formations beside those of the spheres.
+        floor: L2 of a second pour of each test, shape (n,); None: not poured yet.
+        by_itself: L2 of grains of the shape at what the model of the shape infers, shape (n,).
+        errors: of the sliding friction by that model, shape (n,).
+        unusable: its training pours that could not be used.
+    """
+
+    tests: Pairs
+    unexplained: float
+    by_spheres: Array
+    figure: Figure
+    floor: Array | None = None
+    by_itself: Array | None = None
+    errors: Array | None = None
+    unusable: LeftOut | None = None
+
+
 def sets(size: Size) -> list[PouredSet]:
     """Returns the pours of this experiment."""
     variant = three.VARIANTS[0]
+    spheres = variant.scene(size)
     found = three.sets(size, variant)
-    for name, (shape, _) in _SHAPES.items():
-        spheres = variant.scene(size)
-        scene = shaped(spheres, shape)
+    for shape in _SHAPES:
+        name, scene = shape.name, shaped(spheres, shape.table)
         found += [
             PouredSet(f"{name}-tests", size.tests, scene),
-            PouredSet(f"{name}-training", size.shapes, scene),
             PouredSet(f"{name}-by-spheres", size.tests, spheres),
-            PouredSet(f"{name}-by-{name}", size.tests, scene),
             PouredSet(f"{name}-floor", size.tests, scene),
+            PouredSet(f"{name}-training", size.shapes, scene),
+            PouredSet(f"{name}-by-{name}", size.tests, scene),
         ]
     return found
 
 
 def run(workshop: Workshop) -> Outcome:
-    """Infers both shapes with spheres and with themselves."""
-    size, variant = workshop.size, three.VARIANTS[0]
-    spheres = variant.scene(workshop.size)
-    training, _ = three.training_and_tests(workshop, variant)
+    """Infers both shapes with spheres, then pours each test again, then infers with themselves."""
+    training, _ = three.training_and_tests(workshop, three.VARIANTS[0])
     sd = training.x.std(axis=0, ddof=1)
-    round_model = workshop.model(variant.name, training)
-    rows, cells, figures = [], [], []
-    for number, (name, (shape, paper)) in enumerate(_SHAPES.items()):
-        scene, seed = shaped(spheres, shape), _SEED + 10 * number
-        tests = workshop.tests(f"{name}-tests", scene, _OF_TRUTH, size.tests, seed)
-        right = workshop.pairs(f"{name}-training", scene, _OF_MODEL, size.shapes, seed + 1)
-        right_model = workshop.model(name, right)
-        by_spheres = _again(workshop, f"{name}-by-spheres", round_model.posterior, tests,
-                            spheres, variant.prior, seed + 2)  # fmt: skip
-        by_itself = _again(workshop, f"{name}-by-{name}", right_model.posterior, tests,
-                           scene, _OF_MODEL, seed + 3)  # fmt: skip
-        theta = np.column_stack([tests.theta[:, 0], np.full(len(tests), 0.5)])
-        floor = workshop.poured(f"{name}-floor", scene, _OF_MODEL, theta, seed=seed + 4)
-        distances = [_distances(x, tests.x, sd) for x in (by_spheres[1], by_itself[1], floor)]
-        rows += [
-            level_row(f"L2, {name} by spheres", distances[0], size, paper),
-            level_row(f"L2, {name} by {name}", distances[1], size),
-            level_row(f"L2 of two pours of one material, {name} (floor)", distances[2], size),
-        ]
-        error = by_itself[0][:, 0] - tests.theta[:, 0]
-        cells.append(
-            [
-                name,
-                f"{np.mean([not round_model.misfit(x).is_inside for x in tests.x]):.0%}",
-                f"{error.mean():.3f} ± {error.std(ddof=1):.3f}",
-                str(right.unusable),
-                str(tests.unusable),
-            ]
-        )
-        file = _picture(workshop, name, scene, tests, spheres, variant.prior, by_spheres[0])
-        caption = f"{name} (top), and spheres at the parameters inferred from them (bottom)."
-        figures.append(Figure(file=file, caption=caption))
+    round_model = workshop.model(three.VARIANTS[0].name, training)
+    found: dict[str, _Found] = {}
+    for shape in _SHAPES:
+        found[shape.name] = _by_spheres(workshop, shape, round_model, sd)
+        workshop.so_far(_outcome(workshop.size, found))
+    for shape in _SHAPES:
+        _add_floor(workshop, shape, found[shape.name], sd)
+        workshop.so_far(_outcome(workshop.size, found))
+    for shape in _SHAPES:
+        _add_itself(workshop, shape, found[shape.name], sd)
+        workshop.so_far(_outcome(workshop.size, found))
+    return _outcome(workshop.size, found)
+
+
+def _by_spheres(workshop: Workshop, shape: _Shape, model: "BayesSim", sd: Array) -> _Found:
+    variant = three.VARIANTS[0]
+    spheres = variant.scene(workshop.size)
+    scene, name = shaped(spheres, shape.table), shape.name
+    tests = workshop.tests(f"{name}-tests", scene, _OF_TRUTH, workshop.size.tests, shape.seed)
+    estimates, x = _again(workshop, f"{name}-by-spheres", model.posterior, tests,
+                          spheres, variant.prior, shape.seed + 2)  # fmt: skip
+    file = _picture(workshop, name, scene, tests, spheres, variant.prior, estimates)
+    caption = f"{name} (top), and spheres at the parameters inferred from them (bottom)."
+    return _Found(
+        tests=tests,
+        unexplained=float(np.mean([not model.misfit(x).is_inside for x in tests.x])),
+        by_spheres=_distances(x, tests.x, sd),
+        figure=Figure(file=file, caption=caption),
+    )
+
+
+def _add_floor(workshop: Workshop, shape: _Shape, found: _Found, sd: Array) -> None:
+    tests = found.tests
+    scene = shaped(three.VARIANTS[0].scene(workshop.size), shape.table)
+    theta = np.column_stack([tests.theta[:, 0], np.full(len(tests), 0.5)])
+    name, seed = f"{shape.name}-floor", shape.seed + 4
+    found.floor = _distances(workshop.poured(name, scene, _OF_MODEL, theta, seed=seed), tests.x, sd)
+
+
+def _add_itself(workshop: Workshop, shape: _Shape, found: _Found, sd: Array) -> None:
+    tests, name = found.tests, shape.name
+    scene = shaped(three.VARIANTS[0].scene(workshop.size), shape.table)
+    right = workshop.pairs(
+        f"{name}-training", scene, _OF_MODEL, workshop.size.shapes, shape.seed + 1
+    )
+    model = workshop.model(name, right)
+    estimates, x = _again(workshop, f"{name}-by-{name}", model.posterior, tests,
+                          scene, _OF_MODEL, shape.seed + 3)  # fmt: skip
+    found.by_itself = _distances(x, tests.x, sd)
+    found.errors = estimates[:, 0] - tests.theta[:, 0]
+    found.unusable = right.unusable
+
+
+def _outcome(size: Size, found: dict[str, _Found]) -> Outcome:
+    """What has been found so far."""
+    rows, cells, missing = [], [], []
+    for shape in _SHAPES:
+        name, each = shape.name, found.get(shape.name)
+        if each is None:
+            missing.append(f"{name} by spheres")
+            continue
+        rows.append(level_row(f"L2, {name} by spheres", each.by_spheres, size, shape.paper))
+        if each.by_itself is None:
+            missing.append(f"{name} by {name}")
+        else:
+            rows.append(level_row(f"L2, {name} by {name}", each.by_itself, size))
+        floor = f"L2 of two pours of one material, {name} (floor)"
+        if each.floor is None:
+            missing.append(floor)
+        else:
+            rows.append(level_row(floor, each.floor, size))
+        error = "-"
+        if each.errors is not None:
+            error = f"{each.errors.mean():.3f} ± {each.errors.std(ddof=1):.3f}"
+        unusable = "-" if each.unusable is None else str(each.unusable)
+        cells.append([name, f"{each.unexplained:.0%}", error, unusable, str(each.tests.unusable)])
     return Outcome(
         rows=rows,
         answer="; ".join(f"{row.quantity}: {row.ours}" for row in rows),
+        missing=missing,
         tables=[
             Table(
                 title="The models of the two shapes",
@@ -133,7 +221,7 @@ def run(workshop: Workshop) -> Outcome:
                 rows=cells,
             )
         ],
-        figures=figures,
+        figures=[each.figure for each in found.values()],
         notes=[
             "Distances are in standard deviations of the training set of spheres, as everywhere.",
             "Grains with a shape have the same diameter of 4 mm as the spheres, not the same "
@@ -178,7 +266,7 @@ def _picture(
             (top, scene_at(scene, _OF_TRUTH, truth)),
             (bottom, scene_at(spheres, prior, theta)),
         ):
-            points = simulate(at, seed=_SEED).points()
+            points = simulate(at, seed=_CYLINDERS.seed).points()
             centre = points[:, :2].mean(axis=0) if len(points) else np.zeros(2)
             row.append(points - [*centre, 0.0])
         titles.append(f"sliding friction {truth[0]:.2f}")
