@@ -140,12 +140,18 @@ class _Grain:
         estimates: parameters, own units.
         distances: L2 by height, of every recording with every forward pour.
         floor: L2 between recordings of one height, at 12 cm.
+        outside: whether the model can explain the recordings, in words.
     """
 
     estimates: dict[str, Array]
     distances: dict[str, dict[float, Array]]
     floor: Array
     outside: str
+
+    @property
+    def lacks_a_height(self) -> bool:
+        """Whether a height has no recording or no pour that can be used."""
+        return any(set(at) < {_CALIBRATED_AT, *_HEIGHTS} for at in self.distances.values())
 
 
 def _set_name(name: str, number: int, height: float) -> str:
@@ -208,6 +214,7 @@ def run(workshop: Workshop) -> Outcome:
             "paper, between a recording and a pour; both the distance of their means and the "
             "scatter of single pours are in it.",
             *(f"{name}: {f.outside}" for name, f in found.items()),
+            *([_CLOSED] if any(f.lacks_a_height for f in found.values()) else []),
         ],
     )
 
@@ -254,6 +261,12 @@ def _calibrate(
     words = "can" if misfit.is_inside else "cannot"
     outside = f"the model {words} explain the recordings at 12 cm (p = {misfit.p_value:.2g})."
     return _Grain(chosen, distances, np.array(pairs, dtype=np.float64), outside)
+
+
+_CLOSED = (
+    "None usable: the heap reaches the tip and holds the funnel closed; a recording or a pour of "
+    "that kind is jammed and left out."
+)
 
 
 def _table(name: str, found: _Grain) -> Table:
