@@ -238,11 +238,13 @@ def _calibrate(
         _RECIPES[0]: estimates[best].mean(axis=0),
         _RECIPES[1]: three.estimate(model.posterior(x)),
     }
+    # Once for both recipes: a recording is ten frames of the sensor.
+    measured = {height: seen(height, size.recordings[1]) for height in _HEIGHTS}
+    measured[_CALIBRATED_AT] = x
     distances: dict[str, dict[float, Array]] = {}
     for number, (recipe, theta) in enumerate(chosen.items()):
         at = {}
         for height in (_CALIBRATED_AT, *_HEIGHTS):
-            measured = x if height == _CALIBRATED_AT else seen(height, size.recordings[1])
             poured = workshop.poured(
                 _set_name(name, number, height),
                 scene.with_({"funnel.height": height}),
@@ -251,8 +253,9 @@ def _calibrate(
                 seed=_SEED + 1,
             )
             poured = poured[np.isfinite(poured).all(axis=1)]
-            if len(measured) and len(poured):
-                at[height] = np.linalg.norm((measured[:, None] - poured[None]) / sd, axis=2)
+            if len(measured[height]) and len(poured):
+                apart = (measured[height][:, None] - poured[None]) / sd
+                at[height] = np.linalg.norm(apart, axis=2)
         distances[recipe] = at
     pairs = [
         np.linalg.norm((x[i] - x[j]) / sd) for i in range(len(x)) for j in range(i + 1, len(x))
