@@ -56,18 +56,17 @@ def main() -> None:
     parser.add_argument("model")
     parser.add_argument("--out", type=Path, default=Path("truths"))
     parser.add_argument("--seed", type=int, default=77)
-    parser.add_argument("--plot", type=Path, help="picture of the posteriors of one material")
-    parser.add_argument("--plotted", type=int, default=0, help="number of that material")
+    parser.add_argument("--plot", type=Path, help="picture of the first material's posteriors")
     options = parser.parse_args()
     model = gc.BayesSim.load(options.model)
     found = {1: [], POURS: []}
     for number, truth in enumerate(draw(options.seed)):
         x = pours(truth, options.out / f"{number:02d}.npy", 100 * (number + 1))
-        if options.plot is not None and number == options.plotted:
-            one, ten = model.posterior(x[:1]), model.posterior(x)
-            ten.pair_plot(options.plot, truth=truth, extra=one)
+        posteriors = {k: model.posterior(x[:k]) for k in found}
+        if options.plot is not None and number == 0:
+            posteriors[POURS].pair_plot(options.plot, truth=truth, extra=posteriors[1])
         for k, rows in found.items():
-            posterior = model.posterior(x[:k])
+            posterior = posteriors[k]
             sample = posterior.sample(SAMPLES, seed=1)
             density = posterior.coordinate_log_prob(truth)[0]
             low, high = np.quantile(sample, [0.05, 0.95], axis=0)

@@ -1,7 +1,8 @@
 """A pour in LAMMPS, with hooks for what a grain may do that granulcal's base model does not know.
 
-Contacts are those of benches/peers/lammps_contact.py (`rigid`): Hertz, a dashpot that gives the
-restitution asked for, a critically damped tangential spring, stiff rolling springs. SI units.
+Contacts are those of benches/peers/lammps_contact.py (`stiff_rolling`): Hertz, a dashpot that
+gives the restitution asked for, a critically damped tangential spring, stiff rolling springs. SI
+units.
 """
 
 import math
@@ -19,7 +20,7 @@ import lammps_contact as peers
 from lammps_contact import Law
 
 YOUNG = 3e6
-"""Young's modulus [Pa]: at 8 cm piles differ from those at 1e7 by less than the spread of seeds."""
+"""Young's modulus [Pa]; `stiffness.py` has heaps at others."""
 STEP = 0.1
 """Time step over the time of a Rayleigh wave across half of the smallest sphere [-]."""
 TORSION = 0.02

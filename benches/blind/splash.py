@@ -9,19 +9,18 @@ of the blow to 0.4 s after it, mean and standard error over places; `rest` is th
 """
 
 import argparse
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import engine
 import numpy as np
 from numpy.typing import NDArray
 from scene import PARAMETERS, SCENE, Bench
+from stiffness import HEIGHT, MATERIAL, PRESETS, show
 
 import granulcal as gc
 
 Array = NDArray[np.float64]
 
-MATERIAL, HEIGHT = (0.5, 0.3, 0.3), 0.08
-"""mu_s, mu_r, e [-] and the height of the tip [m]."""
 FALL, TOSS = 0.08, 1.0
 """Height of the fall [m]; speed at which the grain is tossed up to it [m/s]."""
 AFTER = 0.4
@@ -33,20 +32,8 @@ STIFFNESSES = ((3e6, 0.1), (3e7, 0.1))
 G = 9.81
 
 
-@dataclass(frozen=True)
-class Blow:
-    """Where a grain touches the heap [m]: its centre, shape (3,)."""
-
-    at: Array
-
-
-def heap(bench: Bench) -> gc.Pour:
-    """Returns granulcal's heap."""
-    return bench.pour(np.array(MATERIAL), HEIGHT, 1)
-
-
-def blows(centres: Array, radius: float, places: int) -> list[Blow]:
-    """Returns where the grain touches: a sunflower of places over the middle of the heap."""
+def blows(centres: Array, radius: float, places: int) -> list[Array]:
+    """Returns the grain's centre [m] where it touches: a sunflower over the heap's middle."""
     middle = centres[:, :2].mean(axis=0)
     found = []
     for place in range(places):
@@ -56,11 +43,11 @@ def blows(centres: Array, radius: float, places: int) -> list[Blow]:
         apart = np.linalg.norm(centres[:, :2] - xy, axis=1)
         near = apart < 2.0 * radius
         tops = centres[near, 2] + np.sqrt(4.0 * radius**2 - apart[near] ** 2)
-        found.append(Blow(np.array([*xy, tops.max(initial=radius)])))
+        found.append(np.array([*xy, tops.max(initial=radius)]))
     return found
 
 
-def in_lammps(bench: Bench, centres: Array, blow: Blow | None) -> Array:
+def in_lammps(bench: Bench, centres: Array, blow: Array | None) -> Array:
     """Returns the ways [m] since the blow in LAMMPS, shape (n,), the striker's last."""
     setup = bench.setup(np.array(MATERIAL), HEIGHT, 0)
     radius = float(setup.radii[0])
@@ -68,7 +55,7 @@ def in_lammps(bench: Bench, centres: Array, blow: Blow | None) -> Array:
     if blow is not None:
         # Tossed up from below the top of its way, so that the heap has time to settle.
         above = np.array([0.0, 0.0, FALL - TOSS**2 / (2.0 * G)])
-        centres = np.vstack([centres, blow.at + above])
+        centres = np.vstack([centres, blow + above])
     # No funnel is near.
     funnel = replace(setup.funnel, height=0.25)
     radii = np.full(len(centres), radius)
@@ -80,7 +67,7 @@ def in_lammps(bench: Bench, centres: Array, blow: Blow | None) -> Array:
         lammps.command(f"run {round((in_air - 5e-4) / dt)} post no")
         before = np.array(lammps.numpy.extract_atom("x")[_places(lammps)])
         if blow is not None:
-            before[-1] = blow.at
+            before[-1] = blow
         lammps.command(f"run {round(AFTER / dt)} post no")
         after = np.array(lammps.numpy.extract_atom("x")[_places(lammps)])
     finally:
@@ -95,20 +82,16 @@ def _places(lammps: engine.lammps) -> NDArray[np.int64]:
     return np.argsort(lammps.numpy.extract_atom("id")[:count])
 
 
-def show(name: str, ways: list[Array], radius: float, rest: float) -> None:
-    """Prints a row of the table."""
-    struck = np.array(ways)[:, :-1]
-    far, some = ((struck > way).sum(axis=1) for way in (radius, 1e-4))
-    strikers = np.array([way[-1] for way in ways])
-    rows = np.column_stack([1e3 * strikers, far, some, 1e3 * struck.sum(axis=1)])
-    mean, error = rows.mean(axis=0), rows.std(axis=0, ddof=1) / np.sqrt(len(rows))
-    cells = [f"{m:.3g} ± {s:.1g}" for m, s in zip(mean, error, strict=True)]
-    print(f"| {name} | {' | '.join(cells)} | {1e3 * rest:.2g} |", flush=True)
+def measures(ways: Array, radius: float, rest: float) -> list[float]:
+    """Returns a row of the table from the ways [m] of one blow, the striker's last."""
+    struck, striker = ways[:-1], ways[-1]
+    far, some = (float((struck > way).sum()) for way in (radius, 1e-4))
+    return [1e3 * striker, far, some, 1e3 * struck.sum(), 1e3 * rest]
 
 
-def in_granulcal(centres: Array, preset: str, blow: Blow | None) -> Array:
+def in_granulcal(centres: Array, preset: str, blow: Array | None) -> Array:
     """Returns the same of granulcal; the grain falls from rest."""
-    start = centres if blow is None else np.vstack([centres, blow.at + np.array([0.0, 0.0, FALL])])
+    start = centres if blow is None else np.vstack([centres, blow + np.array([0.0, 0.0, FALL])])
     table = {f"material.{name}": value for name, value in zip(PARAMETERS, MATERIAL, strict=True)}
     text = SCENE.read_text()
     rows = ", ".join(f"[{x:.17g}, {y:.17g}, {z:.17g}]" for x, y, z in start)
@@ -119,7 +102,7 @@ def in_granulcal(centres: Array, preset: str, blow: Blow | None) -> Array:
     horizon = float(np.sqrt(2.0 * FALL / G)) + AFTER
     scene = gc.Scene.from_toml(text).with_({**table, "preset": preset, "end.horizon": horizon})
     after = gc.simulate(scene, seed=1).positions
-    before = centres if blow is None else np.vstack([centres, blow.at])
+    before = centres if blow is None else np.vstack([centres, blow])
     return np.linalg.norm(after - before, axis=1)
 
 
@@ -129,19 +112,20 @@ def main() -> None:
     parser.add_argument("--places", type=int, default=40)
     options = parser.parse_args()
     bench = Bench.load()
-    pile = heap(bench)
+    pile = bench.pour(np.array(MATERIAL), HEIGHT, 1)
     centres, radius = pile.positions, float(pile.radii[0])
     at = blows(centres, radius, options.places)
-    print("| engine | striker | moved > R | > 0.1 mm | sum | rest |\n|---|---|---|---|---|---|")
-    for preset in ("default", "accurate"):
+    print("| engine | blows | striker | moved > R | > 0.1 mm | sum | rest |\n" + "|---" * 7 + "|")
+    for preset in PRESETS:
         rest = in_granulcal(centres, preset, None).sum()
         ways = [in_granulcal(centres, preset, blow) for blow in at]
-        show(f"`{preset}`", ways, radius, rest)
+        show(f"`{preset}`", [measures(way, radius, rest) for way in ways])
     for young, step in STIFFNESSES:
         engine.YOUNG, engine.STEP = young, step
         rest = in_lammps(bench, centres, None).sum()
         ways = [in_lammps(bench, centres, blow) for blow in at]
-        show(f"LAMMPS, E {young:.0e} Pa, step {step:g}", ways, radius, rest)
+        rows = [measures(way, radius, rest) for way in ways]
+        show(f"LAMMPS, E {young:.0e} Pa, step {step:g}", rows)
 
 
 if __name__ == "__main__":

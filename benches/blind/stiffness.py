@@ -45,7 +45,7 @@ def measure(centres: NDArray[np.float64]) -> list[float]:
 
 
 def show(name: str, heaps: list[list[float]]) -> None:
-    """Prints a row of the table."""
+    """Prints a row of a table: the number of rows of measures, their means and standard errors."""
     mean, error = np.mean(heaps, axis=0), np.std(heaps, axis=0, ddof=1) / np.sqrt(len(heaps))
     cells = [f"{m:.3g} ± {s:.1g}" for m, s in zip(mean, error, strict=True)]
     print(f"| {name} | {len(heaps)} | {' | '.join(cells)} |", flush=True)

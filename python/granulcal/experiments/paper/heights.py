@@ -54,6 +54,10 @@ _KEPT = 5
 _FORWARD = 5
 _SEED = 701
 _RECIPES = ("the paper's recipe", "all recordings together")
+_NONE_USABLE = (
+    "None usable: every recording or every pour of that height is left out. From 2 cm a heap of "
+    "2000 grains reaches the tip and holds the funnel closed."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +218,7 @@ def run(workshop: Workshop) -> Outcome:
             "paper, between a recording and a pour; both the distance of their means and the "
             "scatter of single pours are in it.",
             *(f"{name}: {f.outside}" for name, f in found.items()),
-            *([_CLOSED] if any(f.lacks_a_height for f in found.values()) else []),
+            *([_NONE_USABLE] if any(f.lacks_a_height for f in found.values()) else []),
         ],
     )
 
@@ -264,12 +268,6 @@ def _calibrate(
     words = "can" if misfit.is_inside else "cannot"
     outside = f"the model {words} explain the recordings at 12 cm (p = {misfit.p_value:.2g})."
     return _Grain(chosen, distances, np.array(pairs, dtype=np.float64), outside)
-
-
-_CLOSED = (
-    "None usable: the heap reaches the tip and holds the funnel closed; a recording or a pour of "
-    "that kind is jammed and left out."
-)
 
 
 def _table(name: str, found: _Grain) -> Table:

@@ -21,6 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.loop.surrogate.inverse import inverse_of
+
 __all__ = ["BlockFit", "fit_blocks"]
 
 Array = NDArray[np.float64]
@@ -69,7 +71,7 @@ def fit_blocks(x: Array, y: Array, scale: Array, blocks: list[slice], gram: Arra
     for _ in range(_ROUNDS):
         precision = gram / variance
         precision[np.diag_indices_from(precision)] += 1 / widths[size]
-        inverse = _inverse(precision)
+        inverse = inverse_of(precision)
         c = inverse @ (along / variance)
         left = y - x @ c
         spread = np.diag(inverse)
@@ -90,11 +92,3 @@ def fit_blocks(x: Array, y: Array, scale: Array, blocks: list[slice], gram: Arra
         left / np.sqrt(1 - leverage),
         float(len(y) - known.sum()),
     )
-
-
-def _inverse(precision: Array) -> Array:
-    """By LAPACK's potrf and potri, a quarter of the work by LU; numpy has no potri."""
-    import torch
-
-    factor = torch.linalg.cholesky(torch.from_numpy(precision))
-    return torch.cholesky_inverse(factor).numpy()

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.bayessim.emulator.basis import Basis
+from granulcal.loop.surrogate.inverse import inverse_of
 
 __all__ = ["Shift"]
 
@@ -131,8 +132,7 @@ def _ridge(
     for _ in range(_ROUNDS if blocks else 0):
         precision = gram / variance
         precision[np.diag_indices_from(precision)] += 1 / np.repeat(widths, size)
-        factor = np.linalg.inv(np.linalg.cholesky(precision))
-        inverse = factor.T @ factor
+        inverse = inverse_of(precision)
         c = inverse @ (along / variance)
         known = 0.0
         for b in range(blocks):
