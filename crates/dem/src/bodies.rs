@@ -6,6 +6,7 @@
 //! | `body` | place, turn, momentum; what an impulse does |
 //! | `around` | shape, walls and material in a substep; how far bodies search for each other |
 //! | `collide` | points of contact |
+//! | `manifold` | where two bodies are nearest, by parry |
 //! | `contact` | the law at a point |
 //! | `impact` | impacts, each at its time |
 //! | `rims` | points of contact at the rims of walls |
@@ -18,6 +19,7 @@ mod contact;
 #[cfg(test)]
 mod exams;
 mod impact;
+mod manifold;
 mod rims;
 mod sweeps;
 

@@ -1,15 +1,14 @@
-//! Where bodies touch each other and the walls: parry's manifolds between bodies, the nearest points of the body's own
-//! corners at walls. The only file of this room that asks parry.
+//! Where bodies touch each other and the walls: manifolds between bodies, the nearest points of the body's own corners at
+//! walls.
 
-use nalgebra::{UnitQuaternion, Vector3};
-use parry3d_f64::math::{Pose, Rotation};
-use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher as _};
+use nalgebra::Vector3;
 
 use super::around::Around;
 use super::body::Moving;
 use super::contact::{Point, WALL};
+use super::manifold::manifold;
 use super::rims::at_rims;
-use granulcal_scene::{Solid, parry};
+use granulcal_scene::Solid;
 
 /// What goes farther than this within a substep is examined where it will be, too, in the least margin `[-]`.
 const FORESEEN: f64 = 0.5;
@@ -38,13 +37,12 @@ pub(super) fn contacts(around: &Around<'_>, bodies: &[Moving], mut points: Vec<P
         points[first..].sort_by_key(Point::rank);
     }
     let pairs = near_pairs(around, bodies);
-    let mut manifold = ContactManifold::new();
     for &(i, j) in &pairs {
         let range = around.range(&bodies[i], Some(&bodies[j]));
         if are_apart(around.solid, &bodies[i], &bodies[j], range) {
             continue;
         }
-        touches(around, bodies, (i, j), range, &mut manifold, |point| points.push(point));
+        touches(around, bodies, (i, j), range, |point| points.push(point));
     }
     Contacts { pairs, points }
 }
@@ -62,12 +60,11 @@ impl Contacts {
                 at_rims(around, body, i, 0.0, &mut new);
             }
         }
-        let mut manifold = ContactManifold::new();
         for &(i, j) in &self.pairs {
             if is_far(around.range(&bodies[i], Some(&bodies[j])))
                 && !are_apart(around.solid, &later[i], &later[j], 0.0)
             {
-                touches(around, &later, (i, j), 0.0, &mut manifold, |point| new.push(point));
+                touches(around, &later, (i, j), 0.0, |point| new.push(point));
             }
         }
         let (least, mut is_news) = (CORRECTED * around.solid.reach, false);
@@ -146,45 +143,30 @@ fn cell(x: u64, y: u64, z: u64) -> u64 {
     (x * MOST_CELLS + y) * MOST_CELLS + z
 }
 
-/// Whether the boxes around two bodies, along their own axes, are more than `range` apart along the line between their
-/// centres.
+/// Whether the boxes or cylinders around two bodies, along their own axes, are more than `range` apart along the line
+/// between their centres.
 fn are_apart(solid: &Solid, a: &Moving, b: &Moving, range: f64) -> bool {
     let offset = b.centre - a.centre;
     let extent = |body: &Moving| {
         let local = body.turned.inverse_transform_vector(&offset);
-        local.abs().dot(&solid.half_extents)
+        match solid.round {
+            Some((radius, half)) => radius * local.x.hypot(local.z) + half * local.y.abs(),
+            None => local.abs().dot(&solid.half_extents),
+        }
     };
     offset.norm_squared() - extent(a) - extent(b) > range * offset.norm()
 }
 
-/// Gives the points at which two bodies are nearer than `range`, as parry sees them.
+/// Gives the points at which two bodies are nearer than `range`.
 fn touches(
     around: &Around<'_>,
     bodies: &[Moving],
     (i, j): (usize, usize),
     range: f64,
-    manifold: &mut ContactManifold<(), ()>,
     mut found: impl FnMut(Point),
 ) {
     let (solid, a, b) = (around.solid, &bodies[i], &bodies[j]);
-    let back = a.turned.inverse();
-    // In units of the reach.
-    let offset = parry(&(back * (b.centre - a.centre) / solid.reach));
-    let pose = Pose::from_parts(offset, rotation(&(back * b.turned)));
-    // What a manifold remembers of the substep before would make the next depend on more than the state.
-    *manifold = ContactManifold::new();
-    let asked = DefaultQueryDispatcher.contact_manifold_convex_convex(
-        &pose,
-        solid.unit.as_ref(),
-        solid.unit.as_ref(),
-        None,
-        None,
-        range / solid.reach,
-        manifold,
-    );
-    if asked.is_err() {
-        return;
-    }
+    let Some(manifold) = manifold(solid, a, b, range) else { return };
     let of = |v: parry3d_f64::math::Vector| Vector3::new(v.x, v.y, v.z);
     let normal = -(a.turned * of(manifold.local_n1));
     for contact in &manifold.points {
@@ -242,8 +224,4 @@ fn at_walls(around: &Around<'_>, bodies: &[Moving], i: usize, found: &mut Vec<Po
             solid.extremes(&-towards, &mut touch);
         }
     });
-}
-
-fn rotation(turned: &UnitQuaternion<f64>) -> Rotation {
-    Rotation::from_xyzw(turned.i, turned.j, turned.k, turned.w)
 }

@@ -73,7 +73,7 @@ FULL = Size(name="full")
 MEDIUM = Size(
     name="medium",
     grains=400,
-    shapes=200,
+    shapes=100,
     note="Pours of 400 grains and as many tests as the paper has: its numbers are to be compared "
     "with each other, with the paper's only in kind.",
 )

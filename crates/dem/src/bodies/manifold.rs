@@ -1,0 +1,152 @@
+//! Where two bodies are nearest, as parry sees them. The only file of this room that asks it.
+//!
+//! The normal comes from the nearest points of the bodies' cores, which are the bodies scaled by 1 - [`SHRUNK`] about
+//! their centres: bodies that rest on each other overlap by a little, and the way out of an overlap takes parry's EPA
+//! several times as long as the way between what is apart takes GJK. Points of contact are those of the whole bodies.
+//! Cores that meet leave it to parry, as boxes do, whose axes it tries in turn.
+
+use nalgebra::UnitQuaternion;
+use parry3d_f64::math::{Pose, Rotation, Vector};
+use parry3d_f64::query::gjk::{CsoPoint, GJKResult, VoronoiSimplex, closest_points};
+use parry3d_f64::query::{
+    ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher as _, TrackedContact,
+};
+use parry3d_f64::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, SupportMap};
+
+use super::body::Moving;
+use granulcal_scene::{Solid, parry};
+
+/// What a body's core lacks of it `[-]`: overlaps up to twice this share of a body's thickness are found by the cores.
+const SHRUNK: f64 = 0.02;
+
+/// Points at which two bodies are near each other, in units of their reach and in the first body's axes.
+pub(super) type Manifold = ContactManifold<(), ()>;
+
+/// The points at which `b` is nearer to `a` than `range`, or a little more. What a manifold remembers of the substep
+/// before would make the next depend on more than the state: it is made anew.
+pub(super) fn manifold(solid: &Solid, a: &Moving, b: &Moving, range: f64) -> Option<Manifold> {
+    let back = a.turned.inverse();
+    let offset = parry(&(back * (b.centre - a.centre) / solid.reach));
+    let pose = Pose::from_parts(offset, rotation(&(back * b.turned)));
+    let (shape, range) = (solid.unit.as_ref(), range / solid.reach);
+    let of_faces = shape.as_polygonal_feature_map().filter(|_| shape.as_cuboid().is_none());
+    if let Some((whole, _)) = of_faces {
+        match by_cores(&pose, whole, range) {
+            Cores::Near(found) => return Some(found),
+            Cores::Apart => return None,
+            Cores::Meet => {}
+        }
+    }
+    let mut found = Manifold::new();
+    DefaultQueryDispatcher
+        .contact_manifold_convex_convex(&pose, shape, shape, None, None, range, &mut found)
+        .ok()?;
+    Some(found)
+}
+
+/// What the cores of two bodies say.
+enum Cores {
+    Apart,
+    Near(Manifold),
+    Meet,
+}
+
+fn by_cores(pose: &Pose, whole: &dyn PolygonalFeatureMap, range: f64) -> Cores {
+    let core = Core(whole);
+    let towards = pose.translation.try_normalize().unwrap_or(Vector::X);
+    let mut simplex = VoronoiSimplex::new();
+    simplex.reset(CsoPoint::from_shapes(pose, &core, &core, towards));
+    let farthest = range + 2.0 * SHRUNK;
+    let (on_1, on_2, normal) =
+        match closest_points(pose, &core, &core, farthest, true, &mut simplex) {
+            GJKResult::ClosestPoints(on_1, on_2, normal) => (on_1, on_2, normal),
+            GJKResult::NoIntersection(_) => return Cores::Apart,
+            GJKResult::Intersection | GJKResult::Proximity(_) => return Cores::Meet,
+        };
+    // A point on a core's surface, scaled, is one of the body's.
+    let on_1 = on_1 / (1.0 - SHRUNK);
+    let on_2 = pose.inverse_transform_point(on_2) / (1.0 - SHRUNK);
+    let against = pose.rotation.inverse() * -normal;
+    let feature = |normal, near| {
+        let mut feature = PolygonalFeature::default();
+        whole.local_support_feature_toward(normal, near, &mut feature);
+        feature
+    };
+    let (one, other) = (feature(normal, on_1), feature(against, on_2));
+    let mut found = Manifold::new();
+    let back = pose.inverse();
+    PolygonalFeature::contacts(pose, &back, normal, against, &one, &other, &mut found, false);
+    let gap = (pose.transform_point(on_2) - on_1).dot(normal);
+    let unknown = PackedFeatureId::UNKNOWN;
+    found.points.push(TrackedContact::new(on_1, on_2, unknown, unknown, gap));
+    (found.local_n1, found.local_n2) = (normal, against);
+    Cores::Near(found)
+}
+
+/// A body without its rind.
+struct Core<'a>(&'a dyn PolygonalFeatureMap);
+
+impl SupportMap for Core<'_> {
+    fn local_support_point(&self, towards: Vector) -> Vector {
+        self.0.local_support_point(towards) * (1.0 - SHRUNK)
+    }
+}
+
+fn rotation(turned: &UnitQuaternion<f64>) -> Rotation {
+    Rotation::from_xyzw(turned.i, turned.j, turned.k, turned.w)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use granulcal_scene::GrainShape;
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+
+    fn turned(q: [f64; 4]) -> UnitQuaternion<f64> {
+        UnitQuaternion::new_normalize(nalgebra::Quaternion::new(q[0] + 1.5, q[1], q[2], q[3]))
+    }
+
+    proptest! {
+        /// Of bodies that overlap by little the cores' way out is as long as the shortest, which EPA finds: no shorter,
+        /// and longer by less than half the rind.
+        #[test]
+        fn cores_find_the_way_out_of_an_overlap(
+            cylinder in any::<bool>(),
+            one in prop::array::uniform4(-1.0..1.0),
+            other in prop::array::uniform4(-1.0..1.0),
+            towards in prop::array::uniform3(-1.0..1.0_f64),
+            depth in 0.001..0.02_f64,
+        ) {
+            let towards = Vector3::from(towards);
+            prop_assume!(towards.norm() > 0.1);
+            let shape = if cylinder {
+                GrainShape::Cylinder { aspect: 1.3 }
+            } else {
+                GrainShape::Superquadric { aspect: [1.0, 0.8, 1.3], exponents: [4.0, 3.0] }
+            };
+            let solid = Solid::new(&shape, 2.0).unwrap();
+            let shape = solid.unit.as_ref();
+            let whole = shape.as_polygonal_feature_map().unwrap().0;
+            let mut pose = Pose::from_parts(
+                parry(&(towards.normalize() * 2.1)),
+                rotation(&(turned(one).inverse() * turned(other))),
+            );
+            let parted = |pose: &Pose| {
+                let at_origin = Pose::IDENTITY;
+                parry3d_f64::query::contact(&at_origin, shape, pose, shape, 3.0).unwrap().unwrap()
+            };
+            // Pushed together along their line until they overlap by the depth.
+            let apart = parted(&pose);
+            pose.translation -= apart.normal1 * (apart.dist + depth);
+            let truth = parted(&pose);
+            prop_assume!(truth.dist < -0.0005 && truth.dist > -0.02);
+            let Cores::Near(found) = by_cores(&pose, whole, 0.1) else {
+                return Err(TestCaseError::fail("the cores meet, or are out of reach"));
+            };
+            let deepest = found.points.iter().map(|p| p.dist).fold(f64::MAX, f64::min);
+            prop_assert!(deepest < truth.dist + 1e-6, "{deepest} {}", truth.dist);
+            prop_assert!(deepest > truth.dist - 0.5 * SHRUNK, "{deepest} {}", truth.dist);
+        }
+    }
+}
