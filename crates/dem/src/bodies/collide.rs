@@ -22,6 +22,8 @@ const MOST_CELLS: u64 = 1 << 21;
 pub(super) struct Contacts {
     /// Pairs whose balls may meet, in rising order.
     pairs: Vec<(usize, usize)>,
+    /// How far each body was taken to go when they were found `[m]`.
+    ways: Vec<f64>,
     /// In the order of their rank, which depends on the places alone.
     pub points: Vec<Point>,
 }
@@ -32,8 +34,9 @@ pub(super) fn contacts(around: &Around<'_>, bodies: &[Moving], mut points: Vec<P
     points.clear();
     for i in 0..bodies.len() {
         let first = points.len();
-        at_walls(around, bodies, i, &mut points);
-        at_rims(around, &bodies[i], i, around.range(&bodies[i], None), &mut points);
+        let range = around.range(&bodies[i], None);
+        at_walls(around, &bodies[i], i, range, &mut points);
+        at_rims(around, &bodies[i], i, range, &mut points);
         points[first..].sort_by_key(Point::rank);
     }
     let pairs = near_pairs(around, bodies);
@@ -44,7 +47,7 @@ pub(super) fn contacts(around: &Around<'_>, bodies: &[Moving], mut points: Vec<P
         }
         touches(around, bodies, (i, j), range, |point| points.push(point));
     }
-    Contacts { pairs, points }
+    Contacts { pairs, ways: ways(around, bodies), points }
 }
 
 impl Contacts {
@@ -53,10 +56,12 @@ impl Contacts {
     pub fn foresee(&mut self, around: &Around<'_>, bodies: &[Moving]) -> bool {
         let known = self.points.len();
         let mut new = Vec::new();
+        self.seek_farther(around, bodies);
         let later: Vec<_> = bodies.iter().map(|body| body.foreseen(around.dt)).collect();
         let is_far = |range: f64| range > (1.0 + FORESEEN) * around.least();
         for (i, body) in later.iter().enumerate() {
             if is_far(around.range(&bodies[i], None)) {
+                at_walls(around, body, i, 0.0, &mut new);
                 at_rims(around, body, i, 0.0, &mut new);
             }
         }
@@ -91,6 +96,21 @@ impl Contacts {
         }
         is_news
     }
+
+    /// Finds the pairs anew if impacts have made a body so fast that it may meet others.
+    fn seek_farther(&mut self, around: &Around<'_>, bodies: &[Moving]) {
+        let now = ways(around, bodies);
+        let slack = 0.5 * around.least();
+        if now.iter().zip(&self.ways).any(|(now, then)| *now > then + slack) {
+            self.pairs = near_pairs(around, bodies);
+            self.ways = now;
+        }
+    }
+}
+
+/// How far each body goes in the substep, at most `[m]`.
+fn ways(around: &Around<'_>, bodies: &[Moving]) -> Vec<f64> {
+    bodies.iter().map(|body| body.way(around.solid.reach, around.dt)).collect()
 }
 
 /// Pairs whose balls may meet, each once, in rising order. Cells are as wide as no two balls that may meet are apart, and
@@ -186,9 +206,8 @@ fn touches(
     }
 }
 
-fn at_walls(around: &Around<'_>, bodies: &[Moving], i: usize, found: &mut Vec<Point>) {
-    let (solid, walls, body) = (around.solid, around.walls, &bodies[i]);
-    let range = around.range(body, None);
+fn at_walls(around: &Around<'_>, body: &Moving, i: usize, range: f64, found: &mut Vec<Point>) {
+    let (solid, walls) = (around.solid, around.walls);
     let back = body.turned.inverse();
     walls.reached(&body.centre, solid.reach + range, |surface| {
         let wall = walls.wall(surface);

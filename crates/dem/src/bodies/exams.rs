@@ -270,3 +270,30 @@ fn spinning_cubes_do_not_enter_each_other() {
     }
     assert!(deepest < 0.04 * SIZE, "{} of a cube", deepest / SIZE);
 }
+
+/// What is out of reach of a body at rest is not, once another strikes it: the ground of a cube, a ball's neighbour.
+#[test]
+fn what_is_struck_enters_nothing() {
+    let struck = |shape: GrainShape, at: [f64; 3]| {
+        let mut exam = Exam::new(shape, 0.3, 0.5);
+        for (number, at) in at.into_iter().enumerate() {
+            // Not quite above each other: GJK has no way out along an axis of two lattices that lie alike.
+            let aside = 0.01 * f64::from(u8::try_from(number).unwrap());
+            let turned = UnitQuaternion::from_euler_angles(0.0, 0.0, 30.0 * aside);
+            exam.put([aside * SIZE, 0.0, at * SIZE], turned);
+            let speed = if number + 1 == 3 { -6.0 } else { 0.0 };
+            exam.bodies.set_motion(number, &Vector3::new(0.0, 0.0, speed), &Vector3::zeros());
+        }
+        let start = exam.energy();
+        for _ in 0..10 {
+            exam.step();
+            let heights: Vec<_> = exam.bodies.all.iter().map(|b| b.centre[2] / SIZE).collect();
+            assert!(heights[0] > 0.49, "{heights:?}");
+            assert!(heights.windows(2).all(|h| h[1] - h[0] > 0.99), "{heights:?}");
+            assert!(exam.energy() <= start * (1.0 + 1e-9), "{} of {start}", exam.energy());
+        }
+    };
+    struck(cube(), [0.6, 1.8, 2.9]);
+    let ball = GrainShape::Superquadric { aspect: [1.0; 3], exponents: [2.0, 2.0] };
+    struck(ball, [9.0, 10.1, 11.2]);
+}
