@@ -32,10 +32,11 @@ def test_profiles_are_compared_without_their_slope():
     assert drum.rms_mm(measured + off, measured) == pytest.approx(np.sqrt(3.0))
 
 
-@pytest.mark.parametrize("name", ["drum", "column", "hopper"])
+@pytest.mark.parametrize("name", ["drum", "column", "hopper", "hopper_cylinders"])
 def test_the_studys_scenes_observe_what_was_measured(name: str):
     scene = gc.Scene.load(_HERE / f"{name}.toml")
     wanted = {"drum": "surface_slope", "column": "front_radius[end]", "hopper": "discharge_rate"}
+    wanted["hopper_cylinders"] = wanted["hopper"]
     assert wanted[name] in scene.observed_names
 
 

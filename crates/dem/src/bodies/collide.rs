@@ -15,6 +15,9 @@ const FORESEEN: f64 = 0.5;
 /// Gaps of points that bodies turn past are corrected by no less than this, in their reach `[-]`.
 const CORRECTED: f64 = 2e-3;
 
+/// Pairs are sought so much farther than a body goes, for the impacts that make it faster, in its reach `[-]`.
+const SLACK: f64 = 0.1;
+
 /// Cells along an axis at most.
 const MOST_CELLS: u64 = 1 << 21;
 
@@ -32,11 +35,11 @@ pub(super) struct Contacts {
 /// `points` is a list of before, whose memory is used again.
 pub(super) fn contacts(around: &Around<'_>, bodies: &[Moving], mut points: Vec<Point>) -> Contacts {
     points.clear();
-    for i in 0..bodies.len() {
+    for (i, body) in bodies.iter().enumerate() {
         let first = points.len();
-        let range = around.range(&bodies[i], None);
-        at_walls(around, &bodies[i], i, range, &mut points);
-        at_rims(around, &bodies[i], i, range, &mut points);
+        let range = around.range(body, None);
+        at_walls(around, body, i, range, &mut points);
+        at_rims(around, body, i, range, &mut points);
         points[first..].sort_by_key(Point::rank);
     }
     let pairs = near_pairs(around, bodies);
@@ -100,7 +103,7 @@ impl Contacts {
     /// Finds the pairs anew if impacts have made a body so fast that it may meet others.
     fn seek_farther(&mut self, around: &Around<'_>, bodies: &[Moving]) {
         let now = ways(around, bodies);
-        let slack = 0.5 * around.least();
+        let slack = SLACK * around.solid.reach;
         if now.iter().zip(&self.ways).any(|(now, then)| *now > then + slack) {
             self.pairs = near_pairs(around, bodies);
             self.ways = now;
@@ -118,7 +121,8 @@ fn ways(around: &Around<'_>, bodies: &[Moving]) -> Vec<f64> {
 fn near_pairs(around: &Around<'_>, bodies: &[Moving]) -> Vec<(usize, usize)> {
     let reach = around.solid.reach;
     let farthest = bodies.iter().map(|body| body.way(reach, around.dt)).fold(0.0, f64::max);
-    let width = 2.0 * reach + around.least() + 2.0 * farthest;
+    let slack = 2.0 * SLACK * reach;
+    let width = 2.0 * reach + around.least() + 2.0 * farthest + slack;
     let low = bodies.iter().fold(Vector3::repeat(f64::MAX), |low, body| low.inf(&body.centre));
     // Far beyond any scene all are of one cell, whose neighbours still have numbers.
     let cell_of = |body: &Moving| {
@@ -138,7 +142,7 @@ fn near_pairs(around: &Around<'_>, bodies: &[Moving]) -> Vec<(usize, usize)> {
                 if square > width * width {
                     continue;
                 }
-                let range = 2.0 * reach + around.range(body, Some(other));
+                let range = 2.0 * reach + around.range(body, Some(other)) + slack;
                 if square < range * range {
                     pairs.push(u64::from(i.min(j)) << 32 | u64::from(i.max(j)));
                 }
