@@ -7,7 +7,7 @@
 
 use nalgebra::UnitQuaternion;
 use parry3d_f64::math::{Pose, Rotation, Vector};
-use parry3d_f64::query::gjk::{CsoPoint, GJKResult, VoronoiSimplex, closest_points};
+use parry3d_f64::query::gjk::{CsoPoint, VoronoiSimplex};
 use parry3d_f64::query::{
     ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher as _, TrackedContact,
 };
@@ -18,6 +18,10 @@ use granulcal_scene::{Solid, parry};
 
 /// What a body's core lacks of it `[-]`: overlaps up to twice this share of a body's thickness are found by the cores.
 const SHRUNK: f64 = 0.02;
+
+/// Distances are found to this, in the bodies' reach `[-]`, in so many steps at most.
+const NEAR: f64 = 1e-5;
+const STEPS: usize = 100;
 
 /// Points at which two bodies are near each other, in units of their reach and in the first body's axes.
 pub(super) type Manifold = ContactManifold<(), ()>;
@@ -52,17 +56,11 @@ enum Cores {
 }
 
 fn by_cores(pose: &Pose, whole: &dyn PolygonalFeatureMap, range: f64) -> Cores {
-    let core = Core(whole);
-    let towards = pose.translation.try_normalize().unwrap_or(Vector::X);
-    let mut simplex = VoronoiSimplex::new();
-    simplex.reset(CsoPoint::from_shapes(pose, &core, &core, towards));
-    let farthest = range + 2.0 * SHRUNK;
-    let (on_1, on_2, normal) =
-        match closest_points(pose, &core, &core, farthest, true, &mut simplex) {
-            GJKResult::ClosestPoints(on_1, on_2, normal) => (on_1, on_2, normal),
-            GJKResult::NoIntersection(_) => return Cores::Apart,
-            GJKResult::Intersection | GJKResult::Proximity(_) => return Cores::Meet,
-        };
+    let (on_1, on_2, normal) = match nearest(pose, &Core(whole), range + 2.0 * SHRUNK) {
+        Nearest::Points(on_1, on_2, normal) => (on_1, on_2, normal),
+        Nearest::Farther => return Cores::Apart,
+        Nearest::Touching => return Cores::Meet,
+    };
     // A point on a core's surface, scaled, is one of the body's.
     let on_1 = on_1 / (1.0 - SHRUNK);
     let on_2 = pose.inverse_transform_point(on_2) / (1.0 - SHRUNK);
@@ -81,6 +79,44 @@ fn by_cores(pose: &Pose, whole: &dyn PolygonalFeatureMap, range: f64) -> Cores {
     found.points.push(TrackedContact::new(on_1, on_2, unknown, unknown, gap));
     (found.local_n1, found.local_n2) = (normal, against);
     Cores::Near(found)
+}
+
+/// What GJK finds.
+enum Nearest {
+    /// The nearest points, in the first body's axes, and the direction from one to the other.
+    Points(Vector, Vector, Vector),
+    Farther,
+    Touching,
+}
+
+/// GJK on two bodies of one shape, with parry's simplex: parry's own loop goes on to 5e-8 of the distance, which takes
+/// curved bodies some 25 steps. The distance between the simplex and the origin is too long, by no more than it is longer
+/// than the way to the plane across it that no body crosses.
+fn nearest(pose: &Pose, body: &Core<'_>, farthest: f64) -> Nearest {
+    let start = pose.translation.try_normalize().unwrap_or(Vector::X);
+    let mut simplex = VoronoiSimplex::new();
+    simplex.reset(CsoPoint::from_shapes(pose, body, body, start));
+    for _ in 0..STEPS {
+        let (towards, distance) = (-simplex.project_origin_and_reduce()).normalize_and_length();
+        if simplex.dimension() == 3 || distance < NEAR {
+            break;
+        }
+        let ahead = CsoPoint::from_shapes(pose, body, body, towards);
+        let least = -towards.dot(ahead.point);
+        if least > farthest {
+            return Nearest::Farther;
+        }
+        if distance - least < NEAR || !simplex.add_point(ahead) {
+            let (mut on_1, mut on_2) = (Vector::ZERO, Vector::ZERO);
+            for number in 0..=simplex.dimension() {
+                let (share, point) = (simplex.proj_coord(number), simplex.point(number));
+                on_1 += point.orig1 * share;
+                on_2 += point.orig2 * share;
+            }
+            return Nearest::Points(on_1, on_2, towards);
+        }
+    }
+    Nearest::Touching
 }
 
 /// A body without its rind.
@@ -145,7 +181,7 @@ mod tests {
                 return Err(TestCaseError::fail("the cores meet, or are out of reach"));
             };
             let deepest = found.points.iter().map(|p| p.dist).fold(f64::MAX, f64::min);
-            prop_assert!(deepest < truth.dist + 1e-6, "{deepest} {}", truth.dist);
+            prop_assert!(deepest < truth.dist + 10.0 * NEAR, "{deepest} {}", truth.dist);
             prop_assert!(deepest > truth.dist - 0.5 * SHRUNK, "{deepest} {}", truth.dist);
         }
     }
