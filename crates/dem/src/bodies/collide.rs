@@ -21,12 +21,15 @@ const SLACK: f64 = 0.1;
 /// Cells along an axis at most.
 const MOST_CELLS: u64 = 1 << 21;
 
+/// Velocity of a body, and how fast it turns its farthest points `[m/s]`.
+type Motion = (Vector3<f64>, f64);
+
 /// What may meet in a substep, and where.
 pub(super) struct Contacts {
     /// Pairs whose balls may meet, in rising order.
     pairs: Vec<(usize, usize)>,
-    /// How far each body was taken to go when they were found `[m]`.
-    ways: Vec<f64>,
+    /// How each body was taken to move when they were found.
+    motions: Vec<Motion>,
     /// In the order of their rank, which depends on the places alone.
     pub points: Vec<Point>,
 }
@@ -50,7 +53,7 @@ pub(super) fn contacts(around: &Around<'_>, bodies: &[Moving], mut points: Vec<P
         }
         touches(around, bodies, (i, j), range, |point| points.push(point));
     }
-    Contacts { pairs, ways: ways(around, bodies), points }
+    Contacts { pairs, motions: motions(around, bodies), points }
 }
 
 impl Contacts {
@@ -100,20 +103,22 @@ impl Contacts {
         is_news
     }
 
-    /// Finds the pairs anew if impacts have made a body so fast that it may meet others.
+    /// Finds the pairs anew if impacts have changed a body's motion so much that it may meet others.
     fn seek_farther(&mut self, around: &Around<'_>, bodies: &[Moving]) {
-        let now = ways(around, bodies);
-        let slack = SLACK * around.solid.reach;
-        if now.iter().zip(&self.ways).any(|(now, then)| *now > then + slack) {
+        let now = motions(around, bodies);
+        let slack = SLACK * around.solid.reach / around.dt;
+        let is_other = |(now, then): (&Motion, &Motion)| {
+            (now.0 - then.0).norm() + (now.1 - then.1).max(0.0) > slack
+        };
+        if now.iter().zip(&self.motions).any(is_other) {
             self.pairs = near_pairs(around, bodies);
-            self.ways = now;
+            self.motions = now;
         }
     }
 }
 
-/// How far each body goes in the substep, at most `[m]`.
-fn ways(around: &Around<'_>, bodies: &[Moving]) -> Vec<f64> {
-    bodies.iter().map(|body| body.way(around.solid.reach, around.dt)).collect()
+fn motions(around: &Around<'_>, bodies: &[Moving]) -> Vec<Motion> {
+    bodies.iter().map(|body| (body.velocity, body.omega.norm() * around.solid.reach)).collect()
 }
 
 /// Pairs whose balls may meet, each once, in rising order. Cells are as wide as no two balls that may meet are apart, and

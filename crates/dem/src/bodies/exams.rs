@@ -271,18 +271,18 @@ fn spinning_cubes_do_not_enter_each_other() {
     assert!(deepest < 0.04 * SIZE, "{} of a cube", deepest / SIZE);
 }
 
-/// What is out of reach of a body at rest is not, once another strikes it: the ground of a cube, a ball's neighbour.
+/// What is out of a body's reach is not once an impact has changed its motion: the ground of a cube that another strikes,
+/// the neighbour of a ball, and a ball that falls behind one which the ground stops.
 #[test]
 fn what_is_struck_enters_nothing() {
-    let struck = |shape: GrainShape, at: [f64; 3]| {
-        let mut exam = Exam::new(shape, 0.3, 0.5);
-        for (number, at) in at.into_iter().enumerate() {
+    let struck = |shape: &GrainShape, bodies: [(f64, f64); 3]| {
+        let mut exam = Exam::new(shape.clone(), 0.3, 0.5);
+        for (number, (height, speed)) in bodies.into_iter().enumerate() {
             // Not quite above each other: GJK has no way out along an axis of two lattices that lie alike.
-            let aside = 0.01 * f64::from(u8::try_from(number).unwrap());
+            let aside = 0.01 * number as f64;
             let turned = UnitQuaternion::from_euler_angles(0.0, 0.0, 30.0 * aside);
-            exam.put([aside * SIZE, 0.0, at * SIZE], turned);
-            let speed = if number + 1 == 3 { -6.0 } else { 0.0 };
-            exam.bodies.set_motion(number, &Vector3::new(0.0, 0.0, speed), &Vector3::zeros());
+            exam.put([aside * SIZE, 0.0, height * SIZE], turned);
+            exam.bodies.set_motion(number, &Vector3::new(0.0, 0.0, -speed), &Vector3::zeros());
         }
         let start = exam.energy();
         for _ in 0..10 {
@@ -293,7 +293,8 @@ fn what_is_struck_enters_nothing() {
             assert!(exam.energy() <= start * (1.0 + 1e-9), "{} of {start}", exam.energy());
         }
     };
-    struck(cube(), [0.6, 1.8, 2.9]);
+    struck(&cube(), [(0.6, 0.0), (1.8, 0.0), (2.9, 6.0)]);
     let ball = GrainShape::Superquadric { aspect: [1.0; 3], exponents: [2.0, 2.0] };
-    struck(ball, [9.0, 10.1, 11.2]);
+    struck(&ball, [(9.0, 0.0), (10.15, 0.0), (11.3, 6.0)]);
+    struck(&ball, [(0.6, 6.0), (1.75, 6.0), (9.0, 0.0)]);
 }
