@@ -20,6 +20,7 @@ _SEED = 1
 _RANGE = (5.0, 50.0)
 # The rolling friction that stands for the shape of a sphere of a cylinder's volume.
 _CYLINDER_ROLLING = 0.3
+_AS_SPHERES = "spheres of their volume"
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class _Series:
         as_sphere = {"grains.diameter": as_wide, "material.rolling_friction": _CYLINDER_ROLLING}
         aspect = self.length / self.diameter
         shaped = Scene.load(_HERE / "hopper_cylinders.toml").with_({"grains.shape.aspect": aspect})
-        return {"spheres of their volume": round_one.with_(as_sphere), "cylinders": shaped}
+        return {_AS_SPHERES: round_one.with_(as_sphere), "cylinders": shaped}
 
 
 _SERIES = (
@@ -124,10 +125,10 @@ def _picture(path: Path, curves: list[tuple[_Curve, list[_Curve]]]) -> None:
         colour = f"C{index}"
         axis.plot(measured.time, measured.volume, ".", color=colour, label=measured.label)
         for found in simulated:
-            style = ":" if found.label == "spheres of their volume" else "-"
+            style = ":" if found.label == _AS_SPHERES else "-"
             axis.plot(found.time, found.volume, style, color=colour)
     axis.set(xlabel="time [s]", ylabel="grains that have run out [L]")
-    title = "points: measured, lines: simulated,\ndotted: as spheres of their volume"
+    title = f"points: measured, lines: simulated,\ndotted: as {_AS_SPHERES}"
     axis.legend(title=title, fontsize=8)
     figure.savefig(path, dpi=80)
     plt.close(figure)
