@@ -13,7 +13,8 @@ class Thresholds:
         detect: largest p of the residual test at which a residual is called detected.
         name: largest p of the residual test at which an effect may be named.
         adequate: smallest p of the residual test after a fit that counts as an explanation.
-        rivals: models within this of the best log evidence are not distinguished [nat].
+        rivals: models within this of the best log evidence are not distinguished, the model
+            without effects among them [nat].
         null_share, single_share: prior probability of no effect, and of one effect; the rest is
             that of two.
         pairs: largest number of pairs of effects that are fitted.

@@ -3,7 +3,7 @@
 | word | when |
 |---|---|
 | NONE | no rejection: p > `detect`; the table of detectable strengths says what could hide |
-| RESIDUAL | something is left (p <= `detect`), too unsure for a name, or none is the best |
+| RESIDUAL | something is left (p <= `detect`), too unsure for a name: none is within `rivals` |
 | EFFECT | every adequate model within `rivals` of the best is of one family |
 | SET | several families are |
 | EFFECTS | the best adequate model needs two effects |
@@ -77,8 +77,11 @@ def decide(
         return Verdict("UNEXPLAINED", (), (), p, why)
     best = max(adequate, key=lambda model: model.log_probability)
     gain = best.log_probability - none.log_probability
-    if gain <= 0:
-        why = f"something is left (p = {p:.3g}), but no effect is more probable than none"
+    if gain <= thresholds.rivals:  # No effect is a rival like any other.
+        why = (
+            f"something is left (p = {p:.3g}), but the best effect is not told from none: "
+            f"{gain:.1f} nat of log probability, {thresholds.rivals:g} asked"
+        )
         return Verdict("RESIDUAL", (), (), p, why)
     if len(best.effects) == 2:
         names = tuple(design.effects[k].name for k in best.effects)

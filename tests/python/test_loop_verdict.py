@@ -1,0 +1,64 @@
+"""From p-values and evidences to a word: no effect is a rival like any other."""
+
+from typing import cast
+
+import numpy as np
+import pytest
+
+from granulcal.loop import Design, Effect
+from granulcal.loop.surrogate.baseline import Fit
+from granulcal.loop.test.refit import Model
+from granulcal.loop.test.residual_test import ResidualTest
+from granulcal.loop.test.thresholds import Thresholds
+from granulcal.loop.test.verdict import Verdict, decide
+
+RULES = Thresholds()
+DESIGN = Design(("mu",), ("height",), (Effect("drag"), Effect("tilt"), Effect("count")))
+
+
+def residual_of(p: float) -> ResidualTest:
+    """Returns a residual test of which only p is asked."""
+    none = np.empty(0)
+    return ResidualTest(p, p, p, p, 0.0, 0.0, 0.0, np.ones(3), (), none, none, none)
+
+
+def model(log_probability: float, *effects: int) -> Model:
+    """Returns a model of which only its effects and its probability are asked."""
+    none = np.empty(0)
+    fit = cast(Fit, None)
+    return Model(effects, fit, log_probability, log_probability, none, none, False, none)
+
+
+def word(*models: tuple[Model, float], p: float = 0.001) -> Verdict:
+    """Returns the verdict where no effect has the log probability 0."""
+    return decide(DESIGN, residual_of(p), model(0.0), list(models), RULES)
+
+
+@pytest.mark.parametrize(
+    ("gain", "kind"), [(-1.0, "RESIDUAL"), (2.9, "RESIDUAL"), (3.1, "EFFECT"), (40.0, "EFFECT")]
+)
+def test_a_name_is_as_far_from_no_effect_as_from_a_rival(gain: float, kind: str) -> None:
+    found = word((model(gain, 0), 0.5), (model(gain - 9.0, 1), 0.5))
+    assert found.kind == kind
+    assert found.named == (("drag",) if kind == "EFFECT" else ())
+    if kind == "RESIDUAL":
+        assert "3 asked" in found.reason
+
+
+def test_rivals_within_reach_are_named_together_the_best_first() -> None:
+    found = word((model(7.0, 0), 0.5), (model(8.0, 1), 0.5), (model(4.0, 2), 0.5))
+    assert (found.kind, found.named) == ("SET", ("tilt", "drag"))
+
+
+def test_a_pair_that_is_best_is_named_whole() -> None:
+    assert word((model(9.0, 0, 2), 0.5), (model(8.0, 1), 0.5)).kind == "EFFECTS"
+
+
+def test_what_leaves_something_is_no_explanation() -> None:
+    assert word((model(30.0, 0), 0.01), (model(5.0, 1), 0.5)).named == ("tilt",)
+    assert word((model(30.0, 0), 0.01)).kind == "UNEXPLAINED"
+
+
+@pytest.mark.parametrize(("p", "kind"), [(0.06, "NONE"), (0.04, "RESIDUAL")])
+def test_what_is_not_rejected_has_no_name(p: float, kind: str) -> None:
+    assert word((model(30.0, 0), 0.5), p=p).kind == kind
