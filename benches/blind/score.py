@@ -19,8 +19,10 @@ from answers import unseal
 from scipy.stats import binomtest
 
 FAMILIES = Path(__file__).parent / "families.toml"
-VERDICTS = ("NONE", "RESIDUAL", "EFFECT", "SET", "EFFECTS", "UNEXPLAINED")
 NAMING = ("EFFECT", "SET", "EFFECTS")
+FALLEN = ("UNCONFIRMED", "OVERTURNED")
+"""What the loop's own checks have taken away: it says nothing, and raises no alarm."""
+VERDICTS = ("NONE", "RESIDUAL", *NAMING, "UNEXPLAINED", *FALLEN)
 STRONG, MIDDLE = 1.0, 0.5
 """Misfits delta = sqrt(D2 before) at which sets are graded [-]."""
 
@@ -123,7 +125,12 @@ class Judged:
     @property
     def is_detected(self) -> bool:
         """Whether the loop says that something is there."""
-        return self.verdict.verdict != "NONE"
+        return self.verdict.verdict not in ("NONE", *FALLEN)
+
+    @property
+    def has_fallen(self) -> bool:
+        """Whether the loop's own checks have taken its word away."""
+        return self.verdict.verdict in FALLEN
 
     @property
     def is_named(self) -> bool:
@@ -177,7 +184,9 @@ def families(path: Path = FAMILIES) -> dict[str, Family]:
     }
 
 
-def judge(sets: Path, sealed: Path, known: dict[str, Family]) -> tuple[list[Judged], list[str]]:
+def judge(
+    sets: Path, sealed: Path, known: dict[str, Family], report: str = "report"
+) -> tuple[list[Judged], list[str]]:
     """Returns the sets that have a verdict, and the names of those that have none.
 
     Raises:
@@ -186,7 +195,7 @@ def judge(sets: Path, sealed: Path, known: dict[str, Family]) -> tuple[list[Judg
     """
     judged, missing = [], []
     for name, answer in sorted(unseal(sealed, sets).items()):
-        file = sets / name / "report" / "verdict.json"
+        file = sets / name / report / "verdict.json"
         if not file.exists():
             missing.append(name)
             continue
@@ -248,6 +257,12 @@ def table(sets: Sequence[Judged]) -> list[tuple[str, str, str, str]]:
     return [
         ("false alarm, null of the other code", "<= 10 %", "<= 20 %",
          share([s.is_detected for s in nulls])),
+        ("the same, of those with a word", "", "",
+         share([s.is_detected for s in nulls if not s.has_fallen])),
+        ("no word (UNCONFIRMED, OVERTURNED), null", "", "",
+         share([s.has_fallen for s in nulls])),
+        ("the same, sets with an effect", "", "",
+         share([s.has_fallen for s in sets if not s.is_null])),
         ("detected, delta >= 1", ">= 98 %", ">= 90 %", share([s.is_detected for s in strong])),
         ("detected, delta .5-1", ">= 75 %", ">= 50 %", share([s.is_detected for s in middle])),
         ("detected, delta < .5", "-", "-", share([s.is_detected for s in weak])),
@@ -273,9 +288,12 @@ def main() -> None:
     parser.add_argument("sets", type=Path)
     parser.add_argument("--sealed", type=Path, required=True)
     parser.add_argument("--families", type=Path, default=FAMILIES)
+    parser.add_argument("--report", default="report", help="folder in a set's (default: report)")
     parser.add_argument("--each", action="store_true", help="a line for each set, truth and all")
     options = parser.parse_args()
-    judged, missing = judge(options.sets, options.sealed, families(options.families))
+    judged, missing = judge(
+        options.sets, options.sealed, families(options.families), options.report
+    )
     print(f"{len(judged)} sets with a verdict, {len(missing)} not analysed\n")
     print("| metric | outstanding | acceptable | measured |\n|---|---|---|---|")
     for row in table(judged):

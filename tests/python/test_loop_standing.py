@@ -103,6 +103,29 @@ def test_a_wrong_surrogate_takes_every_word_away(before: Verdict) -> None:
     assert found.to_dict()["verdict_before_checks"] == before.kind
 
 
+def test_what_the_base_models_own_pours_do_not_leave_is_the_surrogates() -> None:
+    def pours(p: float) -> Any:
+        return cast(Any, SimpleNamespace(residual_test=SimpleNamespace(p=p), to_dict=dict))
+
+    def word(before: Verdict, p: float) -> Verdict:
+        return stand(before, RULES, confirmed=0.5, own=pours(0.5), of_base=pours(p)).verdict
+
+    residual = replace(EFFECT, kind="RESIDUAL", named=(), families=())
+    unexplained = replace(residual, kind="UNEXPLAINED")
+    for before in (EFFECT, residual, unexplained):
+        assert word(before, 0.002) is before
+        assert word(before, 0.06).kind == "NONE"
+        assert "pours of the base model at its fit leave nothing" in word(before, 0.06).reason
+    assert word(residual, 0.03) is residual
+    for before in (EFFECT, unexplained):
+        found = word(before, 0.03)
+        assert (found.kind, found.named) == ("RESIDUAL", ())
+    assert word(NONE, 0.001) is NONE
+    found = stand(EFFECT, RULES, confirmed=0.005, of_base=pours(0.06))
+    assert found.verdict.kind == "UNCONFIRMED"
+    assert found.to_dict()["base_pours_p"] == 0.06
+
+
 def test_what_its_own_pours_leave_takes_a_name_away() -> None:
     def own(p: float) -> Any:
         empty = np.empty(0)

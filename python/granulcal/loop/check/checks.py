@@ -20,7 +20,7 @@ from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
-from granulcal.loop.test.trace import Trace, trace
+from granulcal.loop.test.trace import Explanation, Trace, trace
 
 __all__ = ["calibrated", "confirmed", "corrected", "moved", "nearer", "recentred", "trivial"]
 
@@ -48,18 +48,27 @@ def recentred(
     plan: ArchivePlan,
     fitted: tuple[Condition, ...],
     found: Trace,
+    one: Explanation,
     measured: dict[str, Array],
     simulated: dict[str, ModelPours],
     rules: Thresholds,
     seed: int,
 ) -> Recentred | None:
-    """Returns what pours of the verdict's model at its fit say; None where too few are usable."""
-    told = [c for c in fitted if len(simulated[c.name].augmented) >= FEWEST]
-    if len(told) < len(fitted):
+    """Returns what pours of a model at its fit say of the data; None where too few are usable.
+
+    The model is that of the verdict, or the base model.
+    """
+    pours = {
+        c.name: simulated[c.name].base if one is found.base else simulated[c.name].augmented
+        for c in fitted
+    }
+    if min(map(len, pours.values())) < FEWEST:
         return None
-    seen = [ConditionPours.of(c.name, plan.unit(c.at), measured[c.name]) for c in told]
-    fresh = [ConditionPours.of(c.name, plan.unit(c.at), simulated[c.name].augmented) for c in told]
-    return recentre(surrogate, found.fit_of(found.best), seen, fresh, rules, seed=seed)
+    seen, fresh = (
+        [ConditionPours.of(c.name, plan.unit(c.at), of[c.name]) for c in fitted]
+        for of in (measured, pours)
+    )
+    return recentre(surrogate, found.fit_of(one), seen, fresh, rules, seed=seed)
 
 
 def calibrated(

@@ -2,6 +2,7 @@
 
 | check | what it asks | if it fails |
 |---|---|---|
+| base | its own pours leave something: p <= `detect`, for a name p <= `name` | RESIDUAL, NONE |
 | surrogate | fresh pours of the model are where the surrogate says, p > `confirm` | UNCONFIRMED |
 | own pours | they leave nothing of the data: p > `adequate`, for NONE > `name` | UNCONFIRMED |
 | prior | no random draw of the model is nearer to the data than its fit | UNCONFIRMED |
@@ -60,6 +61,7 @@ class Standing:
         before: the verdict before the checks.
         confirmed: p of fresh pours; NaN where none was usable.
         own: what the model's own pours at its fit say of the data; None where too few are usable.
+        of_base: the same of the base model.
         draws: random draws of the model that were poured.
         nearer: D^2 of the best draw less that of the fit, with 95 %; None where neither was poured.
         moved: verdicts under the other definitions.
@@ -74,6 +76,7 @@ class Standing:
     moved: tuple[Moved, ...]
     trivial: tuple[TrivialRow, ...]
     own: Recentred | None = None
+    of_base: Recentred | None = None
 
     @property
     def stands(self) -> bool:
@@ -94,6 +97,7 @@ class Standing:
             "verdict_before_checks": self.before.kind,
             "confirmed_p": None if self.confirmed != self.confirmed else self.confirmed,
             "own_pours": None if self.own is None else self.own.to_dict(),
+            "base_pours_p": None if self.of_base is None else self.of_base.residual_test.p,
             "random_draws": self.draws,
             "fit_less_best_draw": None if self.nearer is None else -self.nearer.gain,
             "definitions": [one.to_dict() for one in self.moved],
@@ -123,6 +127,7 @@ def stand(
     *,
     confirmed: float,
     own: Recentred | None = None,
+    of_base: Recentred | None = None,
     draws: int = 0,
     nearer: Improvement | None = None,
     moved: Sequence[Moved] = (),
@@ -135,13 +140,14 @@ def stand(
         rules: what was fixed beforehand.
         confirmed: p of fresh pours of the verdict's model; NaN counts as failed.
         own: what these say of the data.
+        of_base: what fresh pours of the base model say of them.
         draws: random draws that were poured.
         nearer: from the best of them (before) to the fit (after), conditions to fit.
         moved: verdicts under other definitions.
         trivial: rows of the sealed conditions.
     """
-    verdict = before
-    against = [one for one in moved if overturned(before, one.verdict, rules.name)]
+    verdict = word = _left_by_base(before, of_base, rules)
+    against = [one for one in moved if overturned(word, one.verdict, rules.name)]
     if against:
         words = ", ".join(f"{one.verdict.kind} under {one.definition}" for one in against)
         verdict = _fallen("OVERTURNED", before, f"{_said(before)}, but {words}")
@@ -152,7 +158,9 @@ def stand(
             f"(D² {best:.3g}, {off:.3g})"
         )
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
-    least = {"NONE": rules.name, **dict.fromkeys(NAMING, rules.adequate)}.get(before.kind, 0.0)
+    least = {"NONE": rules.name, **dict.fromkeys(NAMING, rules.adequate)}.get(word.kind, 0.0)
+    if word is not before:
+        own = of_base
     if own is not None and own.residual_test.p <= least:
         why = (
             f"its own pours at its fit leave something of the data (p = {own.residual_test.p:.3g})"
@@ -165,8 +173,10 @@ def stand(
             else f"the surrogate is wrong at its fit (p = {confirmed:.3g} of fresh pours)"
         )
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
-    found = Standing(verdict, before, confirmed, draws, nearer, tuple(moved), tuple(trivial), own)
-    if found.stands and found.unbeaten:
+    found = Standing(
+        verdict, before, confirmed, draws, nearer, tuple(moved), tuple(trivial), own, of_base
+    )
+    if verdict.kind in NAMING and found.unbeaten:
         rows = " nor ".join(found.unbeaten)
         said = Verdict(
             verdict.kind,
@@ -177,6 +187,20 @@ def stand(
         )
         return replace(found, verdict=said)
     return found
+
+
+def _left_by_base(before: Verdict, of_base: Recentred | None, rules: Thresholds) -> Verdict:
+    """The word that the base model's own pours leave: no surrogate's error may pass for physics."""
+    if of_base is None or before.kind == "NONE":
+        return before
+    p = of_base.residual_test.p
+    leaves = f"{_said(before)}, but pours of the base model at its fit leave"
+    if p > rules.detect:
+        return Verdict("NONE", (), (), before.p, f"{leaves} nothing (p = {p:.3g})")
+    if p > rules.name and before.kind != "RESIDUAL":
+        why = f"{leaves} too little for more (p = {p:.3g}, at most {rules.name:g} asked)"
+        return Verdict("RESIDUAL", (), (), before.p, why)
+    return before
 
 
 def _fallen(kind: str, before: Verdict, why: str) -> Verdict:
