@@ -121,6 +121,9 @@ def test_what_the_base_models_own_pours_do_not_leave_is_the_surrogates() -> None
         found = word(before, 0.03)
         assert (found.kind, found.named) == ("RESIDUAL", ())
     assert word(NONE, 0.001) is NONE
+    # Strengths in a report are those of the model that the fits had named, whatever the word.
+    own = pours(0.5)
+    assert stand(EFFECT, RULES, confirmed=0.5, own=own, of_base=pours(0.06)).own is own
     found = stand(EFFECT, RULES, confirmed=0.005, of_base=pours(0.06))
     assert found.verdict.kind == "UNCONFIRMED"
     assert found.to_dict()["base_pours_p"] == 0.06

@@ -142,14 +142,18 @@ def close_loop(
     simulated = {c.name: both(forward, task, c, found, seed) for c in task.conditions}
     right = confirmed(surrogate, store.plan, fitted, found, simulated)
     say(f"fresh pours of the verdict's model: the surrogate is right there with p = {right:.3g}")
-    own, of_base = (
-        recentred(surrogate, store.plan, fitted, found, one, measured, simulated, rules, seed)
-        for one in (found.best, found.base)
+    of_base = recentred(
+        surrogate, store.plan, fitted, found, found.base, measured, simulated, rules, seed
     )
+    own = of_base
+    if found.best is not found.base:
+        own = recentred(
+            surrogate, store.plan, fitted, found, found.best, measured, simulated, rules, seed
+        )
+        if of_base is not None:
+            say(f"pours of the base model leave what has p = {of_base.residual_test.p:.3g}")
     if own is not None:
         say(f"they leave of the measured pours what has p = {own.residual_test.p:.3g}")
-    if of_base is not None and found.best is not found.base:
-        say(f"pours of the base model leave what has p = {of_base.residual_test.p:.3g}")
     elsewhere = moved(task, store.plan, surrogate, rules, seed)
     for one in elsewhere:
         say(f"defined as {one.definition}: {one.verdict.kind}, p = {one.verdict.p:.3g}")

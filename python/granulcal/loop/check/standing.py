@@ -9,7 +9,8 @@
 | definitions | the same verdict with every threshold and definition moved | OVERTURNED |
 | sealed rows | the named effect beats what needs no physics (`trivial.py`) | said beside the name |
 
-The first and the prior hold for every word, NONE as well: nothing may be said from a fit that rests
+The base model's own pours are asked first, and the other checks are of the word that they leave.
+Surrogate and prior hold for every word, NONE as well: nothing may be said from a fit that rests
 where the surrogate is wrong. The last takes no word away, for a name may be right and yet predict
 no better than a straight line; but it is said wherever the name is.
 """
@@ -159,12 +160,10 @@ def stand(
         )
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
     least = {"NONE": rules.name, **dict.fromkeys(NAMING, rules.adequate)}.get(word.kind, 0.0)
-    if word is not before:
-        own = of_base
-    if own is not None and own.residual_test.p <= least:
-        why = (
-            f"its own pours at its fit leave something of the data (p = {own.residual_test.p:.3g})"
-        )
+    pours = own if word is before else of_base
+    if pours is not None and pours.residual_test.p <= least:
+        left = pours.residual_test.p
+        why = f"its own pours at its fit leave something of the data (p = {left:.3g})"
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
     if not confirmed > rules.confirm:
         why = (
