@@ -11,9 +11,15 @@ Array = NDArray[np.float64]
 def inverse_of(precision: Array) -> Array:
     """Returns the inverse of a positive definite matrix (d, d).
 
-    By LAPACK's potrf and potri, a quarter of the work by LU; numpy has no potri.
+    By LAPACK's potrf and potri, a quarter of the work by LU; numpy has no potri. SciPy's give the
+    same bits wherever the matrix lies in memory, PyTorch's (MKL) do not.
     """
-    import torch
+    from scipy.linalg import get_lapack_funcs
 
-    factor = torch.linalg.cholesky(torch.from_numpy(precision))
-    return torch.cholesky_inverse(factor).numpy()
+    potrf, potri = get_lapack_funcs(("potrf", "potri"), (precision,))
+    factor, failed = potrf(precision, lower=1, clean=0)
+    lower, failed_too = potri(factor, lower=1)
+    if failed or failed_too:
+        raise np.linalg.LinAlgError("the precision matrix is not positive definite")
+    below = np.tril(lower, -1)
+    return np.asarray(below + below.T + np.diag(np.diag(lower)), dtype=np.float64)
