@@ -18,11 +18,10 @@ import numpy as np
 from answers import unseal
 from scipy.stats import binomtest
 
+from granulcal.loop.check.standing import FALLEN
+from granulcal.loop.test.verdict import KINDS, NAMING
+
 FAMILIES = Path(__file__).parent / "families.toml"
-NAMING = ("EFFECT", "SET", "EFFECTS")
-FALLEN = ("UNCONFIRMED", "OVERTURNED")
-"""What the loop's own checks have taken away: it says nothing, and raises no alarm."""
-VERDICTS = ("NONE", "RESIDUAL", *NAMING, "UNEXPLAINED", *FALLEN)
 STRONG, MIDDLE = 1.0, 0.5
 """Misfits delta = sqrt(D2 before) at which sets are graded [-]."""
 
@@ -49,7 +48,7 @@ class Verdict:
     """What the loop has said of a set.
 
     Attributes:
-        verdict: one of `VERDICTS`.
+        verdict: one of `KINDS`.
         named: the loop's effects, the best first.
         strength: low, middle and high by effect, in the loop's units.
         before, after: squared misfit at the fit heights and at the sealed ones [-].
@@ -82,8 +81,8 @@ class Verdict:
             )
         except (KeyError, TypeError, ValueError) as error:
             raise BadVerdictError(f"{path}: {type(error).__name__}: {error}") from error
-        if found.verdict not in VERDICTS:
-            allowed = ", ".join(VERDICTS)
+        if found.verdict not in KINDS:
+            allowed = ", ".join(KINDS)
             raise BadVerdictError(f"{path}: verdict is {found.verdict!r}, allowed: {allowed}")
         if (found.verdict in NAMING) != bool(found.named):
             raise BadVerdictError(f"{path}: {found.verdict} with effects named {found.named}")

@@ -150,10 +150,10 @@ def close_loop(
         own = recentred(
             surrogate, store.plan, fitted, found, found.best, measured, simulated, rules, seed
         )
-        if of_base is not None:
-            say(f"pours of the base model leave what has p = {of_base.residual_test.p:.3g}")
     if own is not None:
         say(f"they leave of the measured pours what has p = {own.residual_test.p:.3g}")
+    if of_base is not None and own is not of_base:
+        say(f"pours of the base model leave what has p = {of_base.residual_test.p:.3g}")
     elsewhere = moved(task, store.plan, surrogate, rules, seed)
     for one in elsewhere:
         say(f"defined as {one.definition}: {one.verdict.kind}, p = {one.verdict.p:.3g}")
