@@ -22,10 +22,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sets", type=Path)
     parser.add_argument("--archive", type=Path, required=True)
+    parser.add_argument(
+        "--part",
+        type=int,
+        nargs=2,
+        default=(0, 1),
+        metavar=("K", "N"),
+        help="of N runs side by side this is the one number K, from 0; start 0 first, alone, until "
+        "it has filled the archive",
+    )
     parser.add_argument("--report", default="report", help="folder in a set's (default: report)")
     options = parser.parse_args()
+    part, parts = options.part
     surrogate = None
-    for file in sorted(options.sets.glob("set-*/loop.toml")):
+    for file in sorted(options.sets.glob("set-*/loop.toml"))[part::parts]:
         out = file.parent / options.report
         if (out / "report.html").exists():
             continue

@@ -4,7 +4,7 @@
 
 Materials are drawn from prior.toml; each is poured once in LAMMPS and six times in granulcal at
 every height, and seen by the same camera without noise. Pours that are there are not made again.
-Writes code_difference.json and code_difference.csv beside this file.
+Writes code_difference.json and code_difference.csv beside this file, or into the folder of --table.
 """
 
 import argparse
@@ -12,6 +12,7 @@ import csv
 import json
 from pathlib import Path
 
+import engine
 import numpy as np
 from answers import write_text
 from engine import pour
@@ -22,7 +23,6 @@ import granulcal as gc
 from granulcal.pours.statistics import DIAGNOSTIC_NAMES, NAMES
 
 HERE = Path(__file__).parent
-NUMBERS, TABLE = HERE / "code_difference.json", HERE / "code_difference.csv"
 SEED = 20_000
 """Of the materials: public, the blind sets have another."""
 OURS = 6
@@ -127,7 +127,7 @@ def left_by_material(theta: np.ndarray, found: dict[float, dict]) -> dict[str, f
     }
 
 
-def write(theta: np.ndarray, found: dict[float, dict]) -> None:
+def write(theta: np.ndarray, found: dict[float, dict], folder: Path) -> None:
     """Writes the numbers that a reader takes for a nuisance, and all differences as a table."""
     head = {
         "names": list(NAMES),
@@ -148,8 +148,9 @@ def write(theta: np.ndarray, found: dict[float, dict]) -> None:
             "diagnostic_mean": _short(s["mean"][16:]),
             "diagnostic_error": _short(s["error"][16:]),
         }
-    write_text(NUMBERS, json.dumps({**head, "heights": heights}) + "\n")
-    with TABLE.open("w", newline="") as file:
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / "code_difference.json", json.dumps({**head, "heights": heights}) + "\n")
+    with (folder / "code_difference.csv").open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["material", *PARAMETERS, "height", *ALL])
         for number, row in enumerate(theta):
@@ -167,10 +168,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--materials", type=int, default=20)
     parser.add_argument("--out", type=Path, default=Path("out/pairs"))
+    parser.add_argument("--young", type=float, default=engine.YOUNG, help="of LAMMPS' grains [Pa]")
+    parser.add_argument("--table", type=Path, default=HERE, help="folder of the two files")
     options = parser.parse_args()
+    engine.YOUNG = options.young
     theta, pairs = collect(options.materials, options.out)
     found = {height: summary(rows) for height, rows in pairs.items()}
-    write(theta, found)
+    write(theta, found, options.table)
     print("| statistic | " + " | ".join(f"{100 * h:g} cm" for h in found) + " |")
     print("|---" * (len(found) + 1) + "|")
     for i, name in enumerate(NAMES):

@@ -18,6 +18,7 @@ from functools import partial
 from pathlib import Path
 
 import effects
+import engine
 import numpy as np
 from answers import seal, seals, write_text
 from engine import Setup, pour
@@ -171,8 +172,10 @@ def main() -> None:
         metavar=("K", "N"),
         help="of N makers side by side this is the one number K, from 0",
     )
+    parser.add_argument("--young", type=float, default=engine.YOUNG, help="of the grains [Pa]")
     parser.add_argument("--seed", type=int, help="of the plan; the default is drawn and sealed")
     options = parser.parse_args()
+    engine.YOUNG = options.young
     for folder in (options.out, options.sealed):
         folder.mkdir(parents=True, exist_ok=True)
     seed = seed_of(options.sealed, options.seed)

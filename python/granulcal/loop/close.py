@@ -1,9 +1,10 @@
 """`close_loop`: from recordings to a verdict, with the error before and after.
 
 The steps are those of docs/theory/loop.md: register what is fixed; fill the archive; say what could
-be seen; fit and test; refit the library; decide; pour draws of the prior; simulate the base and the
-augmented model; move every definition; open the sealed conditions once, beside rows that need no
-physics; say the verdict; run the placebo; write the report.
+be seen; fit and test; refit the library; decide; pour draws of the prior; pour the base and the
+augmented model until the surrogate is right there; move every definition; open the sealed
+conditions once, beside rows that need no physics; say the verdict; run the placebo; write the
+report.
 """
 
 import json
@@ -18,7 +19,6 @@ from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.check.checks import (
     calibrated,
-    confirmed,
     corrected,
     moved,
     nearer,
@@ -26,7 +26,8 @@ from granulcal.loop.check.checks import (
     trivial,
 )
 from granulcal.loop.check.coverage import FEWEST_PAIRS
-from granulcal.loop.check.prior_rounds import ROUNDS, prior_rounds
+from granulcal.loop.check.prior_rounds import ROUNDS, drawn, prior_rounds
+from granulcal.loop.check.settle import settle
 from granulcal.loop.check.standing import stand
 from granulcal.loop.closed import Closed
 from granulcal.loop.effects.definitions import is_definition
@@ -84,7 +85,7 @@ def close_loop(
         task: scene, prior, recordings.
         out: folder of the report; one that was cut off goes on.
         archive: folder of the pours, shared between analyses of one scene; `out`/archive if None.
-        budget: pours, all told.
+        budget: pours, all told; those of a surrogate that is found wrong at its fits come on top.
         threads: pours at once; one for each core if None.
         seed: of everything.
         thresholds: of the verdict.
@@ -138,10 +139,27 @@ def close_loop(
     seen = prior_rounds(
         forward, task, store, found, observed, measured, surrogate, rules, more, seed=seed, say=say
     )
-    found, surrogate = seen.trace, seen.surrogate
-    simulated = {c.name: both(forward, task, c, found, seed) for c in task.conditions}
-    right = confirmed(surrogate, store.plan, fitted, found, simulated)
-    say(f"fresh pours of the verdict's model: the surrogate is right there with p = {right:.3g}")
+    settled = settle(
+        forward,
+        task,
+        store.plan,
+        seen.trace,
+        seen.surrogate,
+        observed,
+        rules,
+        seed=seed,
+        say=say,
+    )
+    found, surrogate = settled.trace, settled.surrogate
+    hidden = task.of(SEALED)
+    simulated = settled.simulated | {
+        c.name: both(forward, task, c, found, settled.seed) for c in hidden
+    }
+    best, draws = seen.best, seen.draws
+    if found.best.effects != seen.trace.best.effects and rules.look:
+        # The winner is another: no random draw of it has been poured.
+        best = drawn(forward, task, store, found, measured, surrogate, rules, seed=seed)
+        draws += rules.look
     of_base = recentred(
         surrogate, store.plan, fitted, found, found.base, measured, simulated, rules, seed
     )
@@ -162,18 +180,18 @@ def close_loop(
         held = f"{wide.held} of {wide.pairs} simulated pairs held by the plain interval"
         say(f"{held}; stretched by {wide.stretch:.3g}")
     fit = error_of(task, fitted, measured, simulated, surrogate, seed)
-    hidden = task.of(SEALED)
     # Opened here, once, after everything that could be chosen has been.
     measured |= {c.name: c.statistics(task.scene) for c in hidden}
     sealed = error_of(task, hidden, measured, simulated, surrogate, seed) if hidden else None
     standing = stand(
         found.verdict,
         rules,
-        confirmed=right,
+        confirmed=settled.confirmed,
+        anchors=settled.anchors,
         own=own,
         of_base=of_base,
-        draws=seen.draws,
-        nearer=nearer(forward, task, found, seen.best, measured, simulated, surrogate, seed),
+        draws=draws,
+        nearer=nearer(forward, task, found, best, measured, simulated, surrogate, seed),
         moved=elsewhere,
         trivial=trivial(task, store.plan, measured, simulated, surrogate, seed),
     )
@@ -195,7 +213,10 @@ def close_loop(
         sealed=sealed,
         placebo=placebo,
         experiments=tuple(experiments),
-        pours=plan.pours + _needed(task, pairs if wide is not None else 0, seen.draws) + rounded,
+        pours=plan.pours
+        + _needed(task, pairs if wide is not None else 0, draws)
+        + rounded
+        + settled.before,
         registration=registration,
         measured=measured,
         simulated=simulated,

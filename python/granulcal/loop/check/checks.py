@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.check.confirm import confirm
 from granulcal.loop.check.correction import Correction, corrections
 from granulcal.loop.check.coverage import Coverage, calibrate
 from granulcal.loop.check.prior_pours import PriorPours
@@ -22,25 +21,12 @@ from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Explanation, Trace, trace
 
-__all__ = ["calibrated", "confirmed", "corrected", "moved", "nearer", "recentred", "trivial"]
+__all__ = ["calibrated", "corrected", "moved", "nearer", "recentred", "trivial"]
 
 Array = NDArray[np.float64]
 
 # Seeds of pairs, apart from those of the archive and of the replicates; of one pair to the next.
 _PAIR_SEED, _PAIR_STEP = 9_000_011, 1000
-
-
-def confirmed(
-    surrogate: Surrogate,
-    plan: ArchivePlan,
-    fitted: tuple[Condition, ...],
-    found: Trace,
-    simulated: dict[str, ModelPours],
-) -> float:
-    """Returns p of fresh pours of the verdict's model at its fit; NaN where too few are usable."""
-    rows = [(c, simulated[c.name].augmented) for c in fitted]
-    fresh = [ConditionPours.of(c.name, plan.unit(c.at), x) for c, x in rows if len(x) >= FEWEST]
-    return confirm(surrogate, found.fit_of(found.best), fresh) if fresh else float("nan")
 
 
 def recentred(

@@ -18,7 +18,7 @@ from granulcal.loop.task import Task
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Trace, trace
 
-__all__ = ["ROUNDS", "PriorCheck", "prior_rounds"]
+__all__ = ["ROUNDS", "PriorCheck", "drawn", "prior_rounds"]
 
 Array = NDArray[np.float64]
 
@@ -89,3 +89,32 @@ def prior_rounds(
     if best is not None and (best.effects != found.best.effects or len(best.theta) == 0):
         best = None
     return PriorCheck(found, surrogate, draws, best)
+
+
+def drawn(
+    forward: Forward,
+    task: Task,
+    store: Archive,
+    found: Trace,
+    measured: dict[str, Array],
+    surrogate: Surrogate,
+    rules: Thresholds,
+    *,
+    seed: int,
+) -> PriorPours | None:
+    """Returns random draws of a winner that came after the rounds; None where none is usable.
+
+    They are for the check alone: the surrogate does not learn from them.
+    """
+    pours = prior_pours(
+        forward,
+        task,
+        store.plan,
+        found,
+        measured,
+        surrogate.raw_spread[: Measures.of(task.scene).head],
+        count=rules.look,
+        number=ROUNDS,
+        seed=seed,
+    )
+    return pours if len(pours.theta) else None

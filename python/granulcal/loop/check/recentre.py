@@ -131,7 +131,8 @@ def recentre(
 
 def _without_error(local: LinearisedSurrogate) -> LinearisedSurrogate:
     """The surrogate's slopes and noise, its mean taken as known."""
-    surrogate = replace(local.surrogate, lack=np.zeros_like(local.surrogate.lack))
+    known = local.surrogate
+    surrogate = replace(known, lack=np.zeros_like(known.lack), anchor=None)
     return replace(
         local,
         surrogate=surrogate,

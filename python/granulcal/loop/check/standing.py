@@ -63,6 +63,7 @@ class Standing:
         confirmed: p of fresh pours; NaN where none was usable.
         own: what the model's own pours at its fit say of the data; None where too few are usable.
         of_base: the same of the base model.
+        anchors: rounds of fresh pours that the surrogate was held by.
         draws: random draws of the model that were poured.
         nearer: D^2 of the best draw less that of the fit, with 95 %; None where neither was poured.
         moved: verdicts under the other definitions.
@@ -78,6 +79,7 @@ class Standing:
     trivial: tuple[TrivialRow, ...]
     own: Recentred | None = None
     of_base: Recentred | None = None
+    anchors: int = 0
 
     @property
     def stands(self) -> bool:
@@ -97,6 +99,7 @@ class Standing:
             "stands": self.stands,
             "verdict_before_checks": self.before.kind,
             "confirmed_p": None if self.confirmed != self.confirmed else self.confirmed,
+            "anchors": self.anchors,
             "own_pours": None if self.own is None else self.own.to_dict(),
             "base_pours_p": None if self.of_base is None else self.of_base.residual_test.p,
             "random_draws": self.draws,
@@ -127,6 +130,7 @@ def stand(
     rules: Thresholds,
     *,
     confirmed: float,
+    anchors: int = 0,
     own: Recentred | None = None,
     of_base: Recentred | None = None,
     draws: int = 0,
@@ -140,7 +144,8 @@ def stand(
         before: the verdict of the fits.
         rules: what was fixed beforehand.
         confirmed: p of fresh pours of the verdict's model; NaN counts as failed.
-        own: what these say of the data.
+        anchors: rounds of fresh pours that the surrogate was held by.
+        own: what the last of these pours say of the data.
         of_base: what fresh pours of the base model say of them.
         draws: random draws that were poured.
         nearer: from the best of them (before) to the fit (after), conditions to fit.
@@ -173,7 +178,16 @@ def stand(
         )
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
     found = Standing(
-        verdict, before, confirmed, draws, nearer, tuple(moved), tuple(trivial), own, of_base
+        verdict=verdict,
+        before=before,
+        confirmed=confirmed,
+        draws=draws,
+        nearer=nearer,
+        moved=tuple(moved),
+        trivial=tuple(trivial),
+        own=own,
+        of_base=of_base,
+        anchors=anchors,
     )
     if verdict.kind in NAMING and found.unbeaten:
         rows = " nor ".join(found.unbeaten)

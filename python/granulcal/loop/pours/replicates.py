@@ -53,6 +53,11 @@ class ModelPours(NamedTuple):
     base: Array
     augmented: Array
 
+    @property
+    def pours(self) -> int:
+        """How many pours these are; one model's are counted once."""
+        return len(self.base) + (len(self.augmented) if self.augmented is not self.base else 0)
+
 
 def model_scene(task: Task, condition: Condition, one: Explanation) -> Scene:
     """Returns the scene of a model at its best fit under a condition."""

@@ -1,12 +1,13 @@
 r"""The surrogate at the conditions of one experiment, and the covariance of its mean pours there.
 
 $$ V(\theta, \psi) = \mathrm{diag}_h \frac{s R_h s}{n_h} \frac{\nu}{\nu - m - 1}
-   + U(\psi) + \lambda s^2 + \sum_{k\ \mathrm{nuisance}} \gamma_k^2 N_k N_k^T $$
+   + U(\psi) + \lambda s^2 + A + \sum_{k\ \mathrm{nuisance}} \gamma_k^2 N_k N_k^T $$
 
 $R_h$ is the correlation of archive rows near the point; U is the posterior covariance of the
 surrogate's mean, shared by all pours of a condition and correlated between conditions; it is a
-polynomial in $\psi$ whose coefficients are taken at one theta. $N_k$ is the direction of a declared
-nuisance. Vectors stack the conditions: entry h m + i is axis i under condition h.
+polynomial in $\psi$ whose coefficients are taken at one theta. A is the noise of an anchor
+(`anchor.py`), $N_k$ the direction of a declared nuisance. Vectors stack the conditions: entry
+h m + i is axis i under condition h.
 """
 
 from dataclasses import dataclass
@@ -168,7 +169,7 @@ class LinearisedSurrogate:
         return total
 
     def error_covariance(self, v: Array, psi: Array) -> Array:
-        """Returns U and what the features cannot follow, shape (H m, H m)."""
+        """Returns U, what the features cannot follow and an anchor's noise, (H m, H m)."""
         if psi.any():
             total = self._error(self.error_root(psi))
             shift = np.tensordot(psi, self.shift_roots, axes=1)
@@ -177,6 +178,9 @@ class LinearisedSurrogate:
             total = self._base_error.copy()
         lack = self.surrogate.lack * self._scales(v, psi) ** 2
         total[np.diag_indices_from(total)] += lack.ravel()
+        if self.surrogate.anchor is not None:
+            of_anchor = self.surrogate.anchor.covariance(self.conditions)
+            total += of_anchor.reshape(total.shape)
         return total
 
     def direction_error(self, k: int) -> Array:

@@ -37,6 +37,7 @@ from granulcal.bayessim.emulator.basis import Basis, learn_length_scales, polyno
 from granulcal.bayessim.emulator.noise import fit_log_scale
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.effects.design import Design
+from granulcal.loop.surrogate.anchor import Anchor
 from granulcal.loop.surrogate.blocks import fit_blocks
 from granulcal.loop.surrogate.columns import (
     _effect_columns,
@@ -93,6 +94,7 @@ class Surrogate:
         is_donor: rows whose residuals make replicates and no covariance, shape (n,).
         dof: rows less coefficients that they decided, mean over statistics.
         excluded: rows that were not finite.
+        anchor: what true pours at a fit have shown; None before any.
     """
 
     design: Design
@@ -118,6 +120,7 @@ class Surrogate:
     is_donor: NDArray[np.bool_]
     dof: float
     excluded: int
+    anchor: Anchor | None = None
 
     @classmethod
     def fit(
@@ -310,6 +313,8 @@ class Surrogate:
         main = self.basis(u)
         width = main.shape[1]
         total = main @ self.coefficients[:, :width].T
+        if self.anchor is not None:
+            total += self.anchor.at(condition)
         active = np.nonzero(psi.any(axis=0))[0]
         if len(active) == 0:
             return total

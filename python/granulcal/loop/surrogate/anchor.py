@@ -1,0 +1,71 @@
+r"""True pours at a fit hold the surrogate there.
+
+Where fresh pours of a model at its fit $(\hat v, \hat\psi)$ are not where the surrogate says, the
+gap is known, within the noise of their mean:
+
+$$ \delta_h = \bar x_h - m(\hat v, c_h, \hat\psi), \qquad
+   \mathrm{cov}\,\delta_h = s R_h s / f_h $$
+
+of f fresh pours of condition h. The anchored surrogate says $m + \delta$: right at the fit within
+that noise, and near it as far as its slopes hold. Its own error stays in the covariance as it was,
+for it is no better away from the fit. Under another condition, the same pours defined otherwise
+among them, the gap is that of a Gaussian process through the known ones,
+
+$$ \delta(c) = k(c)^T K^+ (\delta_1, \dots, \delta_H), \qquad
+   k(c, c') = e^{-|c - c'|^2 / 2 w^2} $$
+
+in unit coordinates; far from all of them it is 0. The pseudo-inverse gives repeats of one condition
+their mean.
+
+Reference:
+    Alexandrov, Dennis, Lewis and Torczon, A trust-region framework for managing the use of
+    approximation models in optimization, Structural Optimization 15, 1998: a cheap model corrected
+    to agree with the true one where the search stands, and again where that leads.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Anchor"]
+
+Array = NDArray[np.float64]
+
+# How far a gap is carried, in unit coordinates: as far as noise counts as near (`linearised.py`).
+_WIDTH = 0.35
+# Directions of K below this are of conditions that are one.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """Gaps between true pours and the surrogate under H conditions.
+
+    Attributes:
+        conditions: shape (H, q).
+        gaps: delta, axes, shape (H, m).
+        covariances: of each, shape (H, m, m).
+    """
+
+    conditions: Array
+    gaps: Array
+    covariances: Array
+
+    def at(self, conditions: Array) -> Array:
+        """Returns delta at rows of conditions, shape (n, m)."""
+        return self._weights(conditions) @ self.gaps
+
+    def covariance(self, conditions: Array) -> Array:
+        """Returns the covariance of `at`, shape (n, m, n, m)."""
+        weights = self._weights(conditions)
+        return np.einsum("ah,bh,hij->aibj", weights, weights, self.covariances)
+
+    def _weights(self, conditions: Array) -> Array:
+        known = np.linalg.pinv(_near(self.conditions, self.conditions), rcond=_SAME, hermitian=True)
+        return _near(conditions, self.conditions) @ known
+
+
+def _near(a: Array, b: Array) -> Array:
+    apart = np.sum((a[:, None, :] - b[None]) ** 2, axis=2)
+    return np.exp(-0.5 * apart / _WIDTH**2)

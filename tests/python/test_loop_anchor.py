@@ -1,0 +1,195 @@
+"""Fresh pours that hold a surrogate where it is wrong."""
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from granulcal.loop import ConditionPours, Design, Effect, Surrogate, Thresholds, trace
+from granulcal.loop.check import settle as module
+from granulcal.loop.check.confirm import confirm
+from granulcal.loop.check.settle import ANCHORS, Settled, anchored, settle
+from granulcal.loop.effects.design import cube_from_normal
+from granulcal.loop.pours.replicates import ModelPours
+from granulcal.loop.surrogate.anchor import Anchor
+from granulcal.loop.test.trace import Explanation, Trace
+
+Array = NDArray[np.float64]
+
+RULES = Thresholds(replicates=300, replicates_after=100, refits=4)
+PLACES = (0.0, 0.5, 1.0)
+SIZE, POURS, FRESH, SETS = 6, 3, 10, 12
+U = 0.4
+
+
+def test_gaps_are_exact_where_they_are_known_and_gone_far_away() -> None:
+    gaps = np.array([[1.0, -2.0], [0.5, 3.0]])
+    anchor = Anchor(np.array([[0.0], [1.0]]), gaps, np.stack([np.eye(2), 4 * np.eye(2)]))
+    assert anchor.at(np.array([[1.0], [0.0]])) == pytest.approx(gaps[::-1])
+    assert np.abs(anchor.at(np.array([[4.0]]))).max() < 1e-9
+    between = anchor.at(np.array([[0.5]]))[0]
+    # By symmetry both have the same weight, below 1/2 for half a unit is more than the width.
+    assert between == pytest.approx(between[0] / 1.5 * (gaps[0] + gaps[1])) and between[0] < 0.75
+    covariance = anchor.covariance(np.array([[0.0], [1.0]]))
+    assert covariance[0, :, 0] == pytest.approx(np.eye(2))
+    assert covariance[1, :, 1] == pytest.approx(4 * np.eye(2))
+    assert covariance[0, :, 1] == pytest.approx(np.zeros((2, 2)), abs=1e-9)
+
+
+@pytest.mark.parametrize("inputs", [0, 1])
+def test_repeats_of_one_condition_have_the_mean_of_their_gaps(inputs: int) -> None:
+    where, gaps = np.full((2, inputs), 0.3), np.array([[1.0, 4.0], [3.0, 0.0]])
+    anchor = Anchor(where, gaps, np.stack([np.eye(2)] * 2))
+    assert anchor.at(where) == pytest.approx(np.tile([2.0, 2.0], (2, 1)))
+    # The mean of two has half the variance, and both rows are this one mean.
+    for i in range(2):
+        for j in range(2):
+            assert anchor.covariance(where)[i, :, j] == pytest.approx(0.5 * np.eye(2))
+
+
+@dataclass(frozen=True)
+class Linear:
+    """x = A (2 u - 1) + psi D (1 + c) + offset B + noise, and its archive's surrogate."""
+
+    slopes: Array
+    direction: Array
+    alien: Array
+
+    def pours(self, u: float, c: float, psi: float, count: int, seed: list[int]) -> Array:
+        mean = (2 * u - 1) * self.slopes + (1 + c) * psi * self.direction
+        noise = 0.3 * np.random.default_rng(seed).standard_normal((count, SIZE))
+        return mean + noise
+
+    def observe(self, psi: float, seed: int) -> list[ConditionPours]:
+        return [
+            ConditionPours.of(f"{c:g}", [c], self.pours(U, c, psi, POURS, [seed, i]))
+            for i, c in enumerate(PLACES)
+        ]
+
+    def surrogate(self, offset: float) -> Surrogate:
+        """Off by `offset` of the alien, which it does not know."""
+        generator = np.random.default_rng(0)
+        u, c, psi = generator.random(300), generator.random(300), np.zeros(300)
+        psi[220:] = generator.random(80)
+        rows = [self.pours(*row, 1, [7, i]) for i, row in enumerate(zip(u, c, psi, strict=True))]
+        x = np.concatenate(rows) + offset * self.alien
+        design = Design(("a",), ("height",), (Effect("first"),))
+        return Surrogate.fit(design, u[:, None], c[:, None], psi[:, None], x, features=4)
+
+
+@pytest.fixture(scope="module")
+def linear() -> Linear:
+    return Linear(*np.random.default_rng(3).standard_normal((3, SIZE)))
+
+
+@pytest.fixture(scope="module")
+def right(linear: Linear) -> Surrogate:
+    return linear.surrogate(0.0)
+
+
+@pytest.fixture(scope="module")
+def wrong(linear: Linear) -> Surrogate:
+    return linear.surrogate(1.0)
+
+
+def settled(
+    linear: Linear,
+    surrogate: Surrogate,
+    psi: float,
+    number: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> tuple[Trace, Settled]:
+    """What the fits say of measured pours, and what they say once the surrogate is held."""
+
+    def both(_: Any, __: Any, condition: Any, found: Trace, seed: int) -> ModelPours:
+        def of(one: Explanation) -> Array:
+            strength = float(one.best_strengths.sum())
+            place = PLACES.index(condition.at)
+            u = float(one.theta[0])
+            return linear.pours(u, condition.at, strength, FRESH, [100 + number, seed, place])
+
+        base = of(found.base)
+        return ModelPours(base, base if found.best is found.base else of(found.best))
+
+    monkeypatch.setattr(module, "both", both)
+    conditions = [SimpleNamespace(name=f"{c:g}", at=c) for c in PLACES]
+    task: Any = SimpleNamespace(of=lambda _: conditions)
+    plan: Any = SimpleNamespace(unit=lambda at: np.array([at]))
+    observed, nothing = linear.observe(psi, number), Any
+    found = trace(surrogate, observed, RULES, seed=number)
+    return found, settle(
+        nothing,  # type: ignore[arg-type]
+        task,
+        plan,
+        found,
+        surrogate,
+        observed,
+        RULES,
+        seed=number,
+        say=lambda _: None,
+    )
+
+
+def test_a_right_surrogate_is_not_moved(
+    linear: Linear, right: Surrogate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moved = 0
+    for number in range(SETS):
+        found, after = settled(linear, right, 0.0, number, monkeypatch)
+        moved += after.anchors > 0
+        assert after.anchors or (after.trace is found and after.surrogate is right)
+        assert after.before == after.anchors * FRESH * len(PLACES)
+    # Each has a chance of 1 in 100.
+    assert moved <= 2
+
+
+def test_pours_at_the_fit_mend_a_wrong_surrogate(
+    linear: Linear, wrong: Surrogate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alarms, kept, confirmed = 0, 0, 0
+    for number in range(SETS):
+        found, after = settled(linear, wrong, 0.0, number, monkeypatch)
+        alarms += found.verdict.kind != "NONE"
+        kept += after.trace.verdict.kind != "NONE"
+        confirmed += after.confirmed > RULES.confirm
+        assert 1 <= after.anchors <= ANCHORS
+    assert alarms >= 0.8 * SETS
+    assert kept <= 2 and confirmed >= SETS - 1
+
+
+def test_an_effect_is_found_by_the_surrogate_that_is_held(
+    linear: Linear, wrong: Surrogate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right_names, errors = 0, []
+    for number in range(SETS):
+        _, after = settled(linear, wrong, 0.6, number, monkeypatch)
+        named = after.trace.verdict.named == ("first",)
+        right_names += named
+        if named:
+            errors.append(float(after.trace.best.strengths[0]) - 0.6)
+    assert right_names >= SETS - 2
+    assert abs(np.mean(errors)) < 0.05
+
+
+def test_an_anchor_is_right_at_its_fit_for_other_pours(linear: Linear, wrong: Surrogate) -> None:
+    found = trace(wrong, linear.observe(0.0, 1), RULES)
+    u = float(cube_from_normal(found.base_fit.v)[0])
+
+    def fresh(seed: int) -> list[ConditionPours]:
+        return [
+            ConditionPours.of(f"{c:g}", [c], linear.pours(u, c, 0.0, FRESH, [900, seed, i]))
+            for i, c in enumerate(PLACES)
+        ]
+
+    held = anchored(wrong, found.base_fit, fresh(0))
+    assert confirm(wrong, found.base_fit, fresh(1)) < 0.001
+    p = [confirm(held, found.base_fit, fresh(i)) for i in range(1, 21)]
+    assert np.mean(np.array(p) < 0.05) <= 0.2
+    # A second anchor takes the place of the first.
+    again = anchored(held, found.base_fit, fresh(0))
+    assert again.anchor is not None and held.anchor is not None
+    assert again.anchor.gaps == pytest.approx(held.anchor.gaps)
+    assert replace(again, anchor=None).coefficients is wrong.coefficients
