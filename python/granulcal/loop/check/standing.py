@@ -3,7 +3,7 @@
 | check | what it asks | if it fails |
 |---|---|---|
 | base | its own pours leave something: p <= `detect`, for a name p <= `name` | RESIDUAL, NONE |
-| surrogate | fresh pours of the model are where the surrogate says, p > `confirm` | UNCONFIRMED |
+| surrogate | it is right at the fit, p > `confirm`, after `settle.py` at the latest | UNCONFIRMED |
 | own pours | they leave nothing of the data: p > `adequate`, for NONE > `name` | UNCONFIRMED |
 | prior | no random draw of the model is nearer to the data than its fit | UNCONFIRMED |
 | definitions | the same verdict with every threshold and definition moved | OVERTURNED |
