@@ -11,6 +11,7 @@ import pytest
 import granulcal as gc
 from granulcal.cli import main
 from granulcal.errors import ObservationError, TrainingDataError
+from granulcal.loop.analysis import Analysis
 from granulcal.loop.close import planned
 from granulcal.loop.effects.library import FUNNEL, by_name, fingerprint
 from granulcal.loop.pours.archive import Archive, ArchivePlan
@@ -19,6 +20,7 @@ from granulcal.loop.pours.measures import Measures
 from granulcal.loop.pours.refine import further
 from granulcal.loop.pours.time_needed import time_needed
 from granulcal.loop.task import Task
+from granulcal.loop.test.thresholds import Thresholds
 from granulcal.pours.camera import Camera
 
 SCENE = """
@@ -191,7 +193,8 @@ def test_further_pours_are_where_the_fits_are(tilted: Path, tmp_path: Path) -> N
 
     found: Any = SimpleNamespace(base_fit=fit(()), models=[SimpleNamespace(fit=fit((tilt,)))])
     forward = Forward(tmp_path, 1)
-    base, tilts = further(forward, task, plan, found, 0, 0)
+    analysis = Analysis(task, plan, forward, Thresholds(), 0, print)
+    base, tilts = further(analysis, found, 0)
     assert forward.ran == 48 and len(base.x) > 20 and len(tilts.x) > 20
     assert not base.psi.any() and not np.delete(tilts.psi, tilt, axis=1).any()
     assert abs(tilts.psi[:, tilt].mean() - 0.4) < 0.1
@@ -203,7 +206,7 @@ def test_further_pours_are_where_the_fits_are(tilted: Path, tmp_path: Path) -> N
     where = Measures.of(task.scene).names.index("mass_cos_1")
     lean = abs(tilts.x[:, where].mean() - base.x[:, where].mean())
     assert lean > 4 * base.x[:, where].std() / len(base.x) ** 0.5
-    again = further(forward, task, plan, found, 0, 0)
+    again = further(analysis, found, 0)
     assert forward.ran == 48 and np.array_equal(again[1].x, tilts.x)
 
 

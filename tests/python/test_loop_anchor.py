@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from granulcal.loop import ConditionPours, Design, Effect, Surrogate, Thresholds, trace
+from granulcal.loop.analysis import Analysis
 from granulcal.loop.check import settle as module
 from granulcal.loop.check.confirm import confirm
 from granulcal.loop.check.settle import ANCHORS, Settled, anchored, settle
@@ -118,19 +119,11 @@ def settled(
     conditions = [SimpleNamespace(name=f"{c:g}", at=c) for c in PLACES]
     task: Any = SimpleNamespace(of=lambda _: conditions)
     plan: Any = SimpleNamespace(unit=lambda at: np.array([at]))
-    observed, nothing = linear.observe(psi, number), Any
+    forward: Any = None
+    analysis = Analysis(task, plan, forward, RULES, number, lambda _: None)
+    observed = linear.observe(psi, number)
     found = trace(surrogate, observed, RULES, seed=number)
-    return found, settle(
-        nothing,  # type: ignore[arg-type]
-        task,
-        plan,
-        found,
-        surrogate,
-        observed,
-        RULES,
-        seed=number,
-        say=lambda _: None,
-    )
+    return found, settle(analysis, surrogate, found, observed)
 
 
 def test_a_right_surrogate_is_not_moved(

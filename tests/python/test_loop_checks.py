@@ -119,7 +119,7 @@ def test_pairs_stretch_an_interval_that_is_too_short(linear: Linear, surrogate: 
 def test_pairs_are_for_a_single_named_effect(linear: Linear, surrogate: Surrogate) -> None:
     nothing = trace(surrogate, linear.observe(0.4, 0.0, 2), RULES)
     none: Any = None
-    assert calibrated(none, none, none, surrogate, nothing, RULES, 20, 0) is None
+    assert calibrated(none, surrogate, nothing, 20) is None
 
 
 def test_fresh_pours_confirm_the_fit_or_not(linear: Linear, surrogate: Surrogate) -> None:

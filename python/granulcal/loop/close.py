@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
+from granulcal.loop.analysis import Analysis
 from granulcal.loop.check.checks import (
     calibrated,
     corrected,
@@ -46,7 +47,6 @@ from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.time_needed import time_needed
 from granulcal.loop.preregistration import register
 from granulcal.loop.report.models_of import models_of
-from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.store_surrogate import fit_surrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Task
@@ -116,70 +116,51 @@ def close_loop(
     say(time_needed(task, store, budget - plan.pours, workers))
     store.fill(threads=threads, say=say)
     surrogate = surrogate or fit_surrogate(store, seed=seed, say=say)
-    fitted = task.of(FIT)
-    counts = [len(condition.recordings) for condition in fitted]
+    analysis = Analysis(task, store.plan, Forward(folder / "pours", workers), rules, seed, say)
+    counts = [len(condition.recordings) for condition in analysis.fitted]
     middle = np.full(len(task.prior.names), 0.5)
-    sights = power(surrogate, middle, [store.plan.unit(c.at) for c in fitted], counts)
+    sights = power(surrogate, middle, [analysis.plan.unit(c.at) for c in analysis.fitted], counts)
     say(_power_table(sights))
 
-    measured = {c.name: c.statistics(task.scene) for c in fitted}
-    observed = [ConditionPours.of(c.name, store.plan.unit(c.at), measured[c.name]) for c in fitted]
+    measured = {c.name: c.statistics(task.scene) for c in analysis.fitted}
+    observed = [analysis.pours(c, measured[c.name]) for c in analysis.fitted]
     found = trace(surrogate, observed, rules, seed=seed)
     say(f"the fits say {found.verdict.kind}: {found.verdict.reason}")
 
-    forward, more = Forward(folder / "pours", workers), list[Rows]()
+    more: list[Rows] = []
     for number in range(rounds):
         if found.residual_test.p > rules.name:
             break
-        more.extend(further(forward, task, store.plan, found, number, seed))
+        more.extend(further(analysis, found, number))
         surrogate = fit_surrogate(store, seed=seed, say=say, more=more)
         found = trace(surrogate, observed, rules, seed=seed)
         say(f"after pours where the fits are, {found.verdict.kind}: {found.verdict.reason}")
     rounded = sum(len(rows.x) for rows in more)
-    seen = prior_rounds(
-        forward, task, store, found, observed, measured, surrogate, rules, more, seed=seed, say=say
-    )
-    settled = settle(
-        forward,
-        task,
-        store.plan,
-        seen.trace,
-        seen.surrogate,
-        observed,
-        rules,
-        seed=seed,
-        say=say,
-    )
+    seen = prior_rounds(analysis, store, surrogate, found, observed, measured, more)
+    settled = settle(analysis, seen.surrogate, seen.trace, observed)
     found, surrogate = settled.trace, settled.surrogate
     hidden = task.of(SEALED)
-    simulated = settled.simulated | {
-        c.name: both(forward, task, c, found, settled.seed) for c in hidden
-    }
+    of_hidden = {c.name: both(analysis.forward, task, c, found, settled.seed) for c in hidden}
+    simulated = settled.simulated | of_hidden
     best, draws = seen.best, seen.draws
     if found.best.effects != seen.trace.best.effects and rules.look:
         # The winner is another: no random draw of it has been poured.
-        best = drawn(forward, task, store, found, measured, surrogate, rules, seed=seed)
-        draws += rules.look
-    of_base = recentred(
-        surrogate, store.plan, fitted, found, found.base, measured, simulated, rules, seed
-    )
-    own = of_base
+        best, draws = drawn(analysis, surrogate, found, measured), draws + rules.look
+    of_base = own = recentred(analysis, surrogate, found, found.base, measured, simulated)
     if found.best is not found.base:
-        own = recentred(
-            surrogate, store.plan, fitted, found, found.best, measured, simulated, rules, seed
-        )
+        own = recentred(analysis, surrogate, found, found.best, measured, simulated)
     if own is not None:
         say(f"they leave of the measured pours what has p = {own.residual_test.p:.3g}")
     if of_base is not None and own is not of_base:
         say(f"pours of the base model leave what has p = {of_base.residual_test.p:.3g}")
-    elsewhere = moved(task, store.plan, surrogate, rules, seed)
-    for one in elsewhere:
-        say(f"defined as {one.definition}: {one.verdict.kind}, p = {one.verdict.p:.3g}")
-    wide = calibrated(forward, task, store.plan, surrogate, found, rules, pairs, seed)
+    elsewhere = moved(analysis, surrogate)
+    for other in elsewhere:
+        say(f"defined as {other.definition}: {other.verdict.kind}, p = {other.verdict.p:.3g}")
+    wide = calibrated(analysis, surrogate, found, pairs)
     if wide is not None:
         held = f"{wide.held} of {wide.pairs} simulated pairs held by the plain interval"
         say(f"{held}; stretched by {wide.stretch:.3g}")
-    fit = error_of(task, fitted, measured, simulated, surrogate, seed)
+    fit = error_of(task, analysis.fitted, measured, simulated, surrogate, seed)
     # Opened here, once, after everything that could be chosen has been.
     measured |= {c.name: c.statistics(task.scene) for c in hidden}
     sealed = error_of(task, hidden, measured, simulated, surrogate, seed) if hidden else None
@@ -191,19 +172,17 @@ def close_loop(
         own=own,
         of_base=of_base,
         draws=draws,
-        nearer=nearer(forward, task, found, best, measured, simulated, surrogate, seed),
+        nearer=nearer(analysis, surrogate, found, best, measured, simulated),
         moved=elsewhere,
-        trivial=trivial(task, store.plan, measured, simulated, surrogate, seed),
+        trivial=trivial(analysis, surrogate, measured, simulated),
     )
     say(f"verdict {standing.verdict.kind}: {standing.verdict.reason}")
 
-    pretended = [(c, placebo_of(forward, task, c, found, seed)) for c in fitted]
-    blank = [
-        ConditionPours.of(c.name, store.plan.unit(c.at), rows) for c, rows in pretended if len(rows)
-    ]
+    pretended = [(c, placebo_of(analysis.forward, task, c, found, seed)) for c in analysis.fitted]
+    blank = [analysis.pours(c, rows) for c, rows in pretended if len(rows)]
     placebo = trace(surrogate, blank, rules, seed=seed + 1)
     say(f"placebo {placebo.verdict.kind}: {placebo.verdict.reason}")
-    experiments = next_experiment(surrogate, found, _candidates(store.plan))
+    experiments = next_experiment(surrogate, found, _candidates(analysis.plan))
     closed = Closed(
         task=task,
         standing=standing,
@@ -220,11 +199,11 @@ def close_loop(
         registration=registration,
         measured=measured,
         simulated=simulated,
-        corrections=corrected(task, store.plan, surrogate, found, measured, simulated),
+        corrections=corrected(analysis, surrogate, found, measured, simulated),
         calibrated=wide,
     )
     said = {"kind": standing.verdict.kind, "named": list(standing.verdict.named)}
-    models_of(task, store.plan, surrogate, found, said, measured, simulated).write(folder)
+    models_of(task, analysis.plan, surrogate, found, said, measured, simulated).write(folder)
     write_beside(folder / "verdict.json", json.dumps(closed.to_dict(), indent=1) + "\n")
     return closed
 

@@ -3,22 +3,20 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.loop.analysis import Analysis
 from granulcal.loop.check.correction import Correction, corrections
 from granulcal.loop.check.coverage import Coverage, calibrate
 from granulcal.loop.check.prior_pours import PriorPours
 from granulcal.loop.check.recentre import Recentred, recentre
 from granulcal.loop.check.standing import Moved
 from granulcal.loop.check.trivial import Group, TrivialRow, trivial_rows
-from granulcal.loop.pours.archive import ArchivePlan
-from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
 from granulcal.loop.pours.replicates import FEWEST, ModelPours, seeds_of_replicates
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.surrogate import Surrogate
-from granulcal.loop.task import FIT, SEALED, Condition, Task
+from granulcal.loop.task import FIT, SEALED
 from granulcal.loop.test.distance import Improvement, compare
-from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Explanation, Trace, trace
 
 __all__ = ["calibrated", "corrected", "moved", "nearer", "recentred", "trivial"]
@@ -30,15 +28,12 @@ _PAIR_SEED, _PAIR_STEP = 9_000_011, 1000
 
 
 def recentred(
+    analysis: Analysis,
     surrogate: Surrogate,
-    plan: ArchivePlan,
-    fitted: tuple[Condition, ...],
     found: Trace,
     one: Explanation,
     measured: dict[str, Array],
     simulated: dict[str, ModelPours],
-    rules: Thresholds,
-    seed: int,
 ) -> Recentred | None:
     """Returns what pours of a model at its fit say of the data; None where too few are usable.
 
@@ -46,52 +41,46 @@ def recentred(
     """
     pours = {
         c.name: simulated[c.name].base if one is found.base else simulated[c.name].augmented
-        for c in fitted
+        for c in analysis.fitted
     }
     if min(map(len, pours.values())) < FEWEST:
         return None
     seen, fresh = (
-        [ConditionPours.of(c.name, plan.unit(c.at), of[c.name]) for c in fitted]
-        for of in (measured, pours)
+        [analysis.pours(c, of[c.name]) for c in analysis.fitted] for of in (measured, pours)
     )
-    return recentre(surrogate, found.fit_of(one), seen, fresh, rules, seed=seed)
+    fit = found.fit_of(one)
+    return recentre(surrogate, fit, seen, fresh, analysis.rules, seed=analysis.seed)
 
 
 def calibrated(
-    forward: Forward,
-    task: Task,
-    plan: ArchivePlan,
-    surrogate: Surrogate,
-    found: Trace,
-    rules: Thresholds,
-    pairs: int,
-    seed: int,
+    analysis: Analysis, surrogate: Surrogate, found: Trace, pairs: int
 ) -> Coverage | None:
     """Returns the interval of the named effect by simulated pairs; None if none were asked for."""
     best = found.best
     if pairs == 0 or len(best.effects) != 1:
         return None
     (name,) = best.effects
+    task, seed = analysis.task, analysis.seed
 
     def pour(b: int, theta: Array, psi: float) -> list[ConditionPours] | None:
         observed = []
-        for condition in task.of(FIT):
+        for condition in analysis.fitted:
             scene = scene_of(task, condition, theta, {name: psi})
             first = _PAIR_SEED + seed + _PAIR_STEP * b
             seeds = range(first, first + len(condition.recordings))
-            rows = forward.limit(scene, seeds, faults_of(task, {name: psi}), task.coarse)
+            faults = faults_of(task, {name: psi})
+            rows = analysis.forward.limit(scene, seeds, faults, task.coarse)
             if len(rows) == 0:
                 return None
-            observed.append(ConditionPours.of(condition.name, plan.unit(condition.at), rows))
+            observed.append(analysis.pours(condition, rows))
         return observed
 
     model = found.model_of(best)
-    return calibrate(surrogate, model, pour, rules, count=pairs, seed=seed)
+    return calibrate(surrogate, model, pour, analysis.rules, count=pairs, seed=seed)
 
 
 def corrected(
-    task: Task,
-    plan: ArchivePlan,
+    analysis: Analysis,
     surrogate: Surrogate,
     found: Trace,
     measured: dict[str, Array],
@@ -100,39 +89,34 @@ def corrected(
     """Returns what the correction without physics leaves; none where nothing was detected."""
     if found.verdict.kind == "NONE":
         return ()
-    measures = Measures.of(task.scene)
+    measures = Measures.of(analysis.task.scene)
     rows = [
-        (c.name, plan.unit(c.at), measured[c.name], simulated[c.name].base)
-        for c in task.conditions
+        (c.name, analysis.plan.unit(c.at), measured[c.name], simulated[c.name].base)
+        for c in analysis.task.conditions
         if len(simulated[c.name].base) >= FEWEST
     ]
     return corrections(surrogate, found, rows, measures.names[: measures.head])
 
 
-def moved(
-    task: Task, plan: ArchivePlan, surrogate: Surrogate, rules: Thresholds, seed: int
-) -> tuple[Moved, ...]:
+def moved(analysis: Analysis, surrogate: Surrogate) -> tuple[Moved, ...]:
     """Returns the verdicts of the pours to fit, by every other definition that was declared."""
-    found = []
+    found, task = [], analysis.task
     for definition in task.definitions[1:]:
         observed = [
-            ConditionPours.of(c.name, plan.unit(c.at), c.statistics(task.scene))
-            for c in task.under(definition, FIT)
+            analysis.pours(c, c.statistics(task.scene)) for c in task.under(definition, FIT)
         ]
-        there = trace(surrogate, observed, rules, seed=seed)
+        there = trace(surrogate, observed, analysis.rules, seed=analysis.seed)
         found.append(Moved(definition.name, there.verdict))
     return tuple(found)
 
 
 def nearer(
-    forward: Forward,
-    task: Task,
+    analysis: Analysis,
+    surrogate: Surrogate,
     found: Trace,
     seen: PriorPours | None,
     measured: dict[str, Array],
     simulated: dict[str, ModelPours],
-    surrogate: Surrogate,
-    seed: int,
 ) -> Improvement | None:
     """Returns the error of the best random draw, poured anew (before), and of the fit (after).
 
@@ -141,12 +125,13 @@ def nearer(
     if seen is None:
         return None
     strengths = dict(zip(seen.effects, seen.strengths[0].tolist(), strict=True))
+    task, seed = analysis.task, analysis.seed
     size = Measures.of(task.scene).head
     rows = []
-    for condition in task.of(FIT):
+    for condition in analysis.fitted:
         scene = scene_of(task, condition, seen.theta[0], strengths)
         seeds, faults = seeds_of_replicates(seed), faults_of(task, strengths)
-        x = forward.limit(scene, seeds, faults, task.coarse)
+        x = analysis.forward.limit(scene, seeds, faults, task.coarse)
         at_fit = simulated[condition.name].augmented
         if min(len(x), len(at_fit)) < FEWEST:
             return None
@@ -162,26 +147,25 @@ def nearer(
 
 
 def trivial(
-    task: Task,
-    plan: ArchivePlan,
+    analysis: Analysis,
+    surrogate: Surrogate,
     measured: dict[str, Array],
     simulated: dict[str, ModelPours],
-    surrogate: Surrogate,
-    seed: int,
 ) -> tuple[TrivialRow, ...]:
     """Returns what needs no physics under the sealed conditions; none without any."""
-    size = Measures.of(task.scene).head
+    size = Measures.of(analysis.task.scene).head
 
     def groups(use: str) -> list[Group]:
         return [
             Group(
                 c.name,
-                plan.unit(c.at),
+                analysis.plan.unit(c.at),
                 measured[c.name][:, :size],
                 *(rows[:, :size] for rows in simulated[c.name]),
             )
-            for c in task.of(use)
+            for c in analysis.task.of(use)
             if min(len(rows) for rows in simulated[c.name]) >= FEWEST
         ]
 
-    return trivial_rows(groups(FIT), groups(SEALED), surrogate.raw_spread[:size], seed=seed)
+    spread = surrogate.raw_spread[:size]
+    return trivial_rows(groups(FIT), groups(SEALED), spread, seed=analysis.seed)

@@ -21,13 +21,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.loop.analysis import Analysis
 from granulcal.loop.effects.design import Design, normal_from_cube
-from granulcal.loop.pours.archive import ArchivePlan
-from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.baseline import Start
-from granulcal.loop.task import FIT, Task
 from granulcal.loop.test.trace import Trace
 
 __all__ = ["PriorPours", "hypercube", "prior_pours"]
@@ -77,35 +75,23 @@ def hypercube(count: int, dimensions: int, seed: int) -> Array:
 
 
 def prior_pours(
-    forward: Forward,
-    task: Task,
-    plan: ArchivePlan,
-    found: Trace,
-    measured: dict[str, Array],
-    spread: Array,
-    *,
-    count: int,
-    number: int,
-    seed: int,
+    analysis: Analysis, found: Trace, measured: dict[str, Array], spread: Array, number: int
 ) -> PriorPours:
-    """Returns pours of `count` random draws of the verdict's model.
+    """Returns pours of as many random draws of the verdict's model as the rules ask.
 
     Args:
-        forward: runs and keeps the pours.
-        task: scene, prior, conditions.
-        plan: of the archive.
+        analysis: what was fixed, and what runs the pours.
         found: the trace whose winner is drawn.
         measured: statistics of the pours of every condition to fit, by name.
         spread: standard deviation of the head's statistics over the archive, shape (s,).
-        count: of draws.
         number: of this round, from 0.
-        seed: of the draws and the pours.
     """
+    task, plan, count = analysis.task, analysis.plan, analysis.rules.look
     names, known = found.best.effects, [effect.name for effect in plan.design.effects]
     indices = [known.index(name) for name in names]
     effects = [plan.design.effects[k] for k in indices]
-    p, conditions = len(plan.prior.names), task.of(FIT)
-    first = _SEED + seed + _ROUND_STEP * number
+    p, conditions = len(plan.prior.names), analysis.fitted
+    first = _SEED + analysis.seed + _ROUND_STEP * number
     drawn = hypercube(count, p + len(effects), first)
     low = np.array([effect.low for effect in effects])
     theta, strengths = drawn[:, :p], low + drawn[:, p:] * (1 - low)
@@ -121,7 +107,7 @@ def prior_pours(
             sizes = {0.0: scene} | ({1.0: scene.with_(coarse.numbers)} if coarse else {})
             seen = []
             for size, sized in sizes.items():
-                x = forward.pours(sized, [first + i], faults)
+                x = analysis.forward.pours(sized, [first + i], faults)
                 if len(x) == 0:
                     continue
                 psi = np.where(held, size, 0.0)

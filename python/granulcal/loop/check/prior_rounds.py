@@ -1,21 +1,19 @@
 """Rounds of pours of the prior until the verdict's model is one that was poured."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.loop.analysis import Analysis
 from granulcal.loop.check.prior_pours import PriorPours, prior_pours
 from granulcal.loop.pours.archive import Archive
-from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
 from granulcal.loop.pours.rows import Rows
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.store_surrogate import fit_surrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
-from granulcal.loop.task import Task
-from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Trace, trace
 
 __all__ = ["ROUNDS", "PriorCheck", "drawn", "prior_rounds"]
@@ -44,35 +42,20 @@ class PriorCheck:
 
 
 def prior_rounds(
-    forward: Forward,
-    task: Task,
+    analysis: Analysis,
     store: Archive,
+    surrogate: Surrogate,
     found: Trace,
     observed: Sequence[ConditionPours],
     measured: dict[str, Array],
-    surrogate: Surrogate,
-    rules: Thresholds,
     more: list[Rows],
-    *,
-    seed: int,
-    say: Callable[[str], None],
 ) -> PriorCheck:
     """Returns the trace after random draws of its winner were poured; `more` grows by the pours."""
-    spread = surrogate.raw_spread[: Measures.of(task.scene).head]
+    rules, seed, say = analysis.rules, analysis.seed, analysis.say
     draws, best = 0, None
     for number in range(ROUNDS if rules.look else 0):
         winner = found.best.effects
-        best = prior_pours(
-            forward,
-            task,
-            store.plan,
-            found,
-            measured,
-            spread,
-            count=rules.look,
-            number=number,
-            seed=seed,
-        )
+        best = prior_pours(analysis, found, measured, _spread(analysis, surrogate), number)
         draws += rules.look
         if best.rows is None:
             break
@@ -92,29 +75,15 @@ def prior_rounds(
 
 
 def drawn(
-    forward: Forward,
-    task: Task,
-    store: Archive,
-    found: Trace,
-    measured: dict[str, Array],
-    surrogate: Surrogate,
-    rules: Thresholds,
-    *,
-    seed: int,
+    analysis: Analysis, surrogate: Surrogate, found: Trace, measured: dict[str, Array]
 ) -> PriorPours | None:
     """Returns random draws of a winner that came after the rounds; None where none is usable.
 
     They are for the check alone: the surrogate does not learn from them.
     """
-    pours = prior_pours(
-        forward,
-        task,
-        store.plan,
-        found,
-        measured,
-        surrogate.raw_spread[: Measures.of(task.scene).head],
-        count=rules.look,
-        number=ROUNDS,
-        seed=seed,
-    )
+    pours = prior_pours(analysis, found, measured, _spread(analysis, surrogate), ROUNDS)
     return pours if len(pours.theta) else None
+
+
+def _spread(analysis: Analysis, surrogate: Surrogate) -> Array:
+    return surrogate.raw_spread[: Measures.of(analysis.task.scene).head]

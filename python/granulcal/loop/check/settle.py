@@ -11,15 +11,14 @@ A surrogate is worst where it stands at the edge of its archive, and there fits 
 round's pours test the anchor of the round before, which has not seen them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.loop.analysis import Analysis
 from granulcal.loop.check.confirm import confirm
-from granulcal.loop.pours.archive import ArchivePlan
-from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.replicates import FEWEST, ModelPours, both
 from granulcal.loop.surrogate.anchor import Anchor
 from granulcal.loop.surrogate.baseline import Fit, Start
@@ -27,7 +26,6 @@ from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
-from granulcal.loop.task import FIT, Condition, Task
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Trace, trace
 
@@ -65,24 +63,17 @@ class Settled:
 
 
 def settle(
-    forward: Forward,
-    task: Task,
-    plan: ArchivePlan,
-    found: Trace,
-    surrogate: Surrogate,
-    observed: Sequence[ConditionPours],
-    rules: Thresholds,
-    *,
-    seed: int,
-    say: Callable[[str], None],
+    analysis: Analysis, surrogate: Surrogate, found: Trace, observed: Sequence[ConditionPours]
 ) -> Settled:
     """Returns the trace, by a surrogate that is right at its fits if pours can make it so."""
-    fitted, before, number = task.of(FIT), 0, 0
+    rules, say, before, number = analysis.rules, analysis.say, 0, 0
     while True:
-        own = seed + _ROUND_STEP * number
-        simulated = {c.name: both(forward, task, c, found, own) for c in fitted}
-        of_base = _usable(plan, fitted, [simulated[c.name].base for c in fitted])
-        of_best = _usable(plan, fitted, [simulated[c.name].augmented for c in fitted])
+        own = analysis.seed + _ROUND_STEP * number
+        simulated = {
+            c.name: both(analysis.forward, analysis.task, c, found, own) for c in analysis.fitted
+        }
+        of_base = _usable(analysis, {name: two.base for name, two in simulated.items()})
+        of_best = _usable(analysis, {name: two.augmented for name, two in simulated.items()})
         fit = found.fit_of(found.best)
         right = confirm(surrogate, fit, of_best) if of_best else float("nan")
         say(
@@ -91,9 +82,10 @@ def settle(
         if number == ANCHORS or not of_base or not right <= rules.confirm:
             return Settled(found, surrogate, simulated, right, number, own, before)
         surrogate = _held(surrogate, found, of_base, of_best, rules)
-        before += sum(both_models.pours for both_models in simulated.values())
+        before += sum(two.pours for two in simulated.values())
         number += 1
-        found = trace(surrogate, observed, rules, seed=seed, starts=(Start(fit.v, fit.psi),))
+        start = Start(fit.v, fit.psi)
+        found = trace(surrogate, observed, rules, seed=analysis.seed, starts=(start,))
         say(f"held by these pours, {found.verdict.kind}: {found.verdict.reason}")
 
 
@@ -126,12 +118,6 @@ def _held(
     return anchored(surrogate, fit, of_best)
 
 
-def _usable(
-    plan: ArchivePlan, fitted: Sequence[Condition], rows: Sequence[Array]
-) -> list[ConditionPours]:
+def _usable(analysis: Analysis, rows: dict[str, Array]) -> list[ConditionPours]:
     """Pours under the conditions where there are enough of them."""
-    return [
-        ConditionPours.of(c.name, plan.unit(c.at), x)
-        for c, x in zip(fitted, rows, strict=True)
-        if len(x) >= FEWEST
-    ]
+    return [analysis.pours(c, rows[c.name]) for c in analysis.fitted if len(rows[c.name]) >= FEWEST]

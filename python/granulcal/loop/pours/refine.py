@@ -19,13 +19,11 @@ Reference:
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.pours.archive import ArchivePlan
-from granulcal.loop.pours.forward import Forward
+from granulcal.loop.analysis import Analysis
 from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.surrogate.fit_draws import draw
-from granulcal.loop.task import FIT, Task
 from granulcal.loop.test.trace import Trace
 
 __all__ = ["ROUND", "further"]
@@ -40,27 +38,24 @@ ROUND = (1 + _MODELS) * _EACH
 _SEED, _ROUND_STEP, _MODEL_STEP = 9_500_021, 10_000, 100
 
 
-def further(
-    forward: Forward, task: Task, plan: ArchivePlan, found: Trace, number: int, seed: int
-) -> list[Rows]:
+def further(analysis: Analysis, found: Trace, number: int) -> list[Rows]:
     """Runs the pours of round `number`; those of effects on the camera's lengths need none."""
+    task, plan = analysis.task, analysis.plan
     free = {effect.name for effect in task.library if effect.camera}
     fits = [found.base_fit, *(model.fit for model in found.models)]
     effects = [[plan.design.effects[k].name for k in fit.active] for fit in fits]
     asked = [(f, e) for f, e in zip(fits, effects, strict=True) if not free & set(e)]
-    first = _SEED + seed + _ROUND_STEP * number
+    first = _SEED + analysis.seed + _ROUND_STEP * number
     made = []
     for i, (fit, names) in enumerate(asked[: 1 + _MODELS]):
-        rows = _of_model(forward, task, plan, fit, names, first + _MODEL_STEP * i)
+        rows = _of_model(analysis, fit, names, first + _MODEL_STEP * i)
         if rows is not None:
             made.append(rows)
     return made
 
 
-def _of_model(
-    forward: Forward, task: Task, plan: ArchivePlan, fit: Fit, names: list[str], seed: int
-) -> Rows | None:
-    conditions = task.of(FIT)
+def _of_model(analysis: Analysis, fit: Fit, names: list[str], seed: int) -> Rows | None:
+    task, plan, conditions = analysis.task, analysis.plan, analysis.fitted
     kept: list[Rows] = []
     for i, (theta, strengths) in enumerate(
         zip(*draw(fit, plan.design, _EACH, seed=seed), strict=True)
@@ -68,7 +63,7 @@ def _of_model(
         condition = conditions[i % len(conditions)]
         own = dict(zip(names, strengths.tolist(), strict=True))
         scene = scene_of(task, condition, theta, own)
-        found = forward.pours(scene, [seed + i], faults_of(task, own))
+        found = analysis.forward.pours(scene, [seed + i], faults_of(task, own))
         if len(found):
             psi = np.zeros(len(plan.design.effects))
             psi[list(fit.active)] = strengths

@@ -1,0 +1,44 @@
+"""What one analysis has fixed before it sees a residual, and what runs its pours."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from granulcal.loop.pours.archive import ArchivePlan
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.surrogate.condition_pours import ConditionPours
+from granulcal.loop.task import FIT, Condition, Task
+from granulcal.loop.test.thresholds import Thresholds
+
+__all__ = ["Analysis"]
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """The constants of one closing of the loop.
+
+    Attributes:
+        task: scene, prior, recordings.
+        plan: of the archive.
+        forward: runs pours and keeps them.
+        rules: thresholds of the verdict.
+        seed: of everything.
+        say: is told each step.
+    """
+
+    task: Task
+    plan: ArchivePlan
+    forward: Forward
+    rules: Thresholds
+    seed: int
+    say: Callable[[str], None]
+
+    @property
+    def fitted(self) -> tuple[Condition, ...]:
+        """Conditions to fit."""
+        return self.task.of(FIT)
+
+    def pours(self, condition: Condition, rows: ArrayLike) -> ConditionPours:
+        """Returns rows of statistics (n, s) as pours of a condition."""
+        return ConditionPours.of(condition.name, self.plan.unit(condition.at), rows)
