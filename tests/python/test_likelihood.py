@@ -1,5 +1,7 @@
 """Emulated likelihood, its several pours, the test of an observation, what can be known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -158,9 +160,33 @@ def test_what_cannot_be_known_is_said():
     assert abs(known.ridge[0]) < 0.1
     average = model.identifiability
     assert average is not None
-    assert any("b where a is low" in line for line in average.blind)
-    assert not any(line.startswith("a ") for line in average.blind)
-    assert "no trace: b where" in str(average)
+    assert average.blind == ("b, wherever in the prior", "c, wherever in the prior")
+    assert "no trace: b, wherever" in str(average)
+
+
+def test_a_part_of_the_prior_without_a_trace_is_named():
+    """The second parameter is seen where the first is high alone."""
+    prior = Prior(
+        Parameter(path=path, distribution="uniform", low=0.0, high=1.0)
+        for path in ("material.friction", "ground.friction")
+    )
+    truth = prior.sample(300, seed=1)
+    first, second = np.full(300, 1.0), np.where(truth[:, 0] > 2 / 3, 2.0, 0.0)
+    known = [np.stack([first, second], axis=1)[i] for i in range(300)]
+    posteriors = [
+        SimpleNamespace(
+            prior=prior,
+            density=SimpleNamespace(
+                identifiability=lambda gains=gains: (gains, np.eye(2), 1.0, [1.0, 0.0], 1.0)
+            ),
+        )
+        for gains in known
+    ]
+    blind = Identifiability.average(posteriors, truth).blind
+    assert [line.split(" (")[0] for line in blind] == [
+        "ground.friction where material.friction is low",
+        "ground.friction where material.friction is middle",
+    ]
 
 
 def test_the_prior_may_differ_from_the_proposal(toy):

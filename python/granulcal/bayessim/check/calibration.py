@@ -20,6 +20,7 @@ from granulcal.bayessim.check.diagnostics import (
     tarp,
 )
 from granulcal.prior import Prior
+from granulcal.short_names import short_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -186,7 +187,7 @@ class Calibration:
 
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
-        short = [name.rsplit(".", 1)[-1] for name in self.names]
+        short = short_names(self.names)
         return [
             plot_coverage(self.coverage, out / "coverage.png"),
             plot_sbc(self.ranks, out / "sbc.png", names=short),

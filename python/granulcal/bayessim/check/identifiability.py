@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from granulcal import _native
 from granulcal.prior import Prior
+from granulcal.short_names import short_names
 
 if TYPE_CHECKING:
     from granulcal.bayessim.posterior.posterior import Posterior
@@ -99,7 +100,7 @@ class Identifiability:
 
     def __str__(self) -> str:
         """A few lines in plain words."""
-        short = [name.rsplit(".", 1)[-1] for name in self.names]
+        short = short_names(self.names)
         told = ", ".join(f"{n} {g:.2f}" for n, g in zip(short, self.gains, strict=True))
         ridge = " ".join(f"{part:+.2f} {n}" for n, part in zip(short, self.ridge, strict=True))
         lines = [
@@ -111,17 +112,20 @@ class Identifiability:
 
 
 def _blind(prior: Prior, gains: Array, truth: Array) -> tuple[str, ...]:
-    """Thirds of one parameter's prior in which another is not informed."""
+    """Thirds of one parameter's prior in which another is not informed; once where all are."""
     ranks = np.argsort(np.argsort(truth, axis=0), axis=0) * 3 // len(truth)
-    found = []
-    for i, name in enumerate(prior.names):
-        for j, other in enumerate(prior.names):
+    short = short_names(prior.names)
+    found: list[str] = []
+    for i, name in enumerate(short):
+        lines, asked = [], 0
+        for j, other in enumerate(short):
             for part, word in enumerate(_PARTS):
                 rows = ranks[:, j] == part
-                if rows.sum() >= 5 and gains[rows, i].mean() < NO_TRACE:
-                    short = name.rsplit(".", 1)[-1], other.rsplit(".", 1)[-1]
-                    found.append(
-                        f"{short[0]} where {short[1]} is {word} "
-                        f"({truth[rows, j].min():.3g} to {truth[rows, j].max():.3g})"
-                    )
+                if rows.sum() < 5:
+                    continue
+                asked += 1
+                if gains[rows, i].mean() < NO_TRACE:
+                    low, high = truth[rows, j].min(), truth[rows, j].max()
+                    lines.append(f"{name} where {other} is {word} ({low:.3g} to {high:.3g})")
+        found += [f"{name}, wherever in the prior"] if len(lines) == asked > 1 else lines
     return tuple(found)

@@ -10,6 +10,7 @@ from granulcal.bayessim.arrays import as_matrix
 from granulcal.bayessim.posterior.marginal import Marginal
 from granulcal.files import save_figure
 from granulcal.prior import Prior
+from granulcal.short_names import short_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,6 +106,7 @@ def _frame(axis: Any, posterior: Drawn, row: int, column: int) -> None:
     from matplotlib.ticker import NullFormatter
 
     parameters = posterior.prior.free
+    labels = [name.replace("_", " ") for name in short_names([p.path for p in parameters])]
     if parameters[column].is_log:
         axis.set_xscale("log")
         axis.xaxis.set_minor_formatter(NullFormatter())
@@ -120,9 +122,9 @@ def _frame(axis: Any, posterior: Drawn, row: int, column: int) -> None:
     is_last = row == len(parameters) - 1
     axis.tick_params(labelsize=8, labelbottom=is_last, labelleft=column == 0 and row != column)
     if is_last:
-        axis.set_xlabel(_label(parameters[column].path), fontsize=9)
+        axis.set_xlabel(labels[column], fontsize=9)
     if column == 0 and row != 0:
-        axis.set_ylabel(_label(parameters[row].path), fontsize=9)
+        axis.set_ylabel(labels[row], fontsize=9)
 
 
 def _draw(axes: Any, posterior: Drawn, colour: str) -> None:
@@ -195,7 +197,3 @@ def _limits(posterior: Drawn, i: int) -> tuple[float, float]:
         low if np.isfinite(low) else float(near[0]),
         high if np.isfinite(high) else float(near[1]),
     )
-
-
-def _label(path: str) -> str:
-    return path.rsplit(".", 1)[-1].replace("_", " ")
