@@ -1,6 +1,7 @@
 """Emulated likelihood, its several pours, the test of an observation, what can be known."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -173,7 +174,7 @@ def test_a_part_of_the_prior_without_a_trace_is_named():
     truth = prior.sample(300, seed=1)
     first, second = np.full(300, 1.0), np.where(truth[:, 0] > 2 / 3, 2.0, 0.0)
     known = [np.stack([first, second], axis=1)[i] for i in range(300)]
-    posteriors = [
+    posteriors: list[Any] = [
         SimpleNamespace(
             prior=prior,
             density=SimpleNamespace(
