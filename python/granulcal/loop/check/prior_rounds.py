@@ -52,10 +52,10 @@ def prior_rounds(
 ) -> PriorCheck:
     """Returns the trace after random draws of its winner were poured; `more` grows by the pours."""
     rules, seed, say = analysis.rules, analysis.seed, analysis.say
-    draws, best = 0, None
+    spread, draws, best = _spread(analysis, surrogate), 0, None
     for number in range(ROUNDS if rules.look else 0):
         winner = found.best.effects
-        best = prior_pours(analysis, found, measured, _spread(analysis, surrogate), number)
+        best = prior_pours(analysis, found, measured, spread, number)
         draws += rules.look
         if best.rows is None:
             break
