@@ -9,6 +9,8 @@ law free in every fit (`law = true`): engines that agree on friction and restitu
 import argparse
 from pathlib import Path
 
+from arguments import add_part
+
 from granulcal.loop.close import close_loop, fit_surrogate, planned
 from granulcal.loop.pours.archive import Archive
 from granulcal.loop.report.folder import write_report
@@ -22,15 +24,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sets", type=Path)
     parser.add_argument("--archive", type=Path, required=True)
-    parser.add_argument(
-        "--part",
-        type=int,
-        nargs=2,
-        default=(0, 1),
-        metavar=("K", "N"),
-        help="of N runs side by side this is the one number K, from 0; start 0 first, alone, until "
-        "it has filled the archive",
-    )
+    add_part(parser, "; start 0 first, alone, until it has filled the archive")
     parser.add_argument("--report", default="report", help="folder in a set's (default: report)")
     options = parser.parse_args()
     part, parts = options.part

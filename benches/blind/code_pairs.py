@@ -15,11 +15,13 @@ from pathlib import Path
 import engine
 import numpy as np
 from answers import write_text
+from arguments import add_young
 from engine import pour
 from make import CONDITIONS, TRIES
 from scene import PARAMETERS, PRIOR, Bench
 
 import granulcal as gc
+from granulcal.files import beside
 from granulcal.pours.statistics import DIAGNOSTIC_NAMES, NAMES
 
 HERE = Path(__file__).parent
@@ -53,9 +55,9 @@ def collect(materials: int, folder: Path) -> tuple[np.ndarray, dict[float, list[
         for height in heights:
             file = folder / f"{number:02d}-{round(1000 * height):03d}.npz"
             if not file.exists():
-                draft = file.with_suffix(".part.npz")
-                np.savez(draft, **pair(bench, row, height, SEED + 100 * number))
-                draft.replace(file)
+                found = pair(bench, row, height, SEED + 100 * number)
+                with beside(file) as draft:
+                    np.savez(draft, **found)
             pairs[height].append(dict(np.load(file)))
         print(f"material {number + 1} of {materials}", flush=True)
     return theta, pairs
@@ -168,7 +170,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--materials", type=int, default=20)
     parser.add_argument("--out", type=Path, default=Path("out/pairs"))
-    parser.add_argument("--young", type=float, default=engine.YOUNG, help="of LAMMPS' grains [Pa]")
+    add_young(parser, engine.YOUNG)
     parser.add_argument("--table", type=Path, default=HERE, help="folder of the two files")
     options = parser.parse_args()
     engine.YOUNG = options.young

@@ -21,6 +21,7 @@ import effects
 import engine
 import numpy as np
 from answers import seal, seals, write_text
+from arguments import add_part, add_young
 from engine import Setup, pour
 from scene import PARAMETERS, PRIOR, SCENE, Bench
 
@@ -164,15 +165,8 @@ def main() -> None:
     parser.add_argument("--nulls", type=int, default=NULLS, help="of a round: sets without effect")
     parser.add_argument("--first", type=int, default=0, help="sets of the plan to pass over")
     parser.add_argument("--pours", type=int, default=3, help="pours at each height")
-    parser.add_argument(
-        "--part",
-        type=int,
-        nargs=2,
-        default=(0, 1),
-        metavar=("K", "N"),
-        help="of N makers side by side this is the one number K, from 0",
-    )
-    parser.add_argument("--young", type=float, default=engine.YOUNG, help="of the grains [Pa]")
+    add_part(parser)
+    add_young(parser, engine.YOUNG)
     parser.add_argument("--seed", type=int, help="of the plan; the default is drawn and sealed")
     options = parser.parse_args()
     engine.YOUNG = options.young

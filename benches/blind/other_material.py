@@ -28,6 +28,8 @@ from scene import PARAMETERS, PRIOR, Bench
 from scipy.optimize import least_squares
 
 import granulcal as gc
+from granulcal.bayessim.emulator.basis import polynomial
+from granulcal.files import beside
 from granulcal.loop.pours.cube import from_cube
 from granulcal.pours.statistics import NAMES
 
@@ -37,17 +39,6 @@ BANK, FRESH = 300, 12
 """Pours of the bank at a height; fresh pours at a fit."""
 SIZE = len(NAMES)
 _STARTS, _STEP = 12, 1e-3
-
-
-def polynomial(u: Array, degree: int) -> Array:
-    """Returns all monomials of u (n, 3) up to a degree, shape (n, d)."""
-    powers = [
-        (i, j, k)
-        for i in range(degree + 1)
-        for j in range(degree + 1 - i)
-        for k in range(degree + 1 - i - j)
-    ]
-    return np.stack([np.prod(u**power, axis=1) for power in powers], axis=1)
 
 
 @dataclass(frozen=True)
@@ -175,9 +166,8 @@ def main() -> None:
         if not file.exists():
             u = np.random.default_rng([SEED, h]).uniform(-1.0, 1.0, (BANK, 3))
             x = pours.rows(u, height, range(50_000 + 1000 * h, 50_000 + 1000 * h + BANK))
-            draft = file.with_suffix(".part.npz")
-            np.savez(draft, u=u, x=x)
-            draft.replace(file)
+            with beside(file) as draft:
+                np.savez(draft, u=u, x=x)
         bank = np.load(file)
         good = np.isfinite(bank["x"]).all(axis=1)
         emulators.append(Emulator.fit(bank["u"][good], bank["x"][good]))

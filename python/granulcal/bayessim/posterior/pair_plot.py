@@ -85,9 +85,12 @@ def pair_plot(
     figure = Figure(figsize=(side, side), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(count, count, squeeze=False)
+    labels = [
+        name.replace("_", " ") for name in short_names([p.path for p in posterior.prior.free])
+    ]
     for row in range(count):
         for column in range(count):
-            _frame(axes[row][column], posterior, row, column)
+            _frame(axes[row][column], posterior, labels, row, column)
     shown = [(posterior, _COLOUR)] + ([(extra, _EXTRA_COLOUR)] if extra is not None else [])
     for each, colour in shown:
         _draw(axes, each, colour)
@@ -98,7 +101,7 @@ def pair_plot(
     return figure
 
 
-def _frame(axis: Any, posterior: Drawn, row: int, column: int) -> None:
+def _frame(axis: Any, posterior: Drawn, labels: list[str], row: int, column: int) -> None:
     """Sets limits, scales and labels of one panel, or hides it above the diagonal."""
     if column > row:
         axis.set_visible(False)
@@ -106,7 +109,6 @@ def _frame(axis: Any, posterior: Drawn, row: int, column: int) -> None:
     from matplotlib.ticker import NullFormatter
 
     parameters = posterior.prior.free
-    labels = [name.replace("_", " ") for name in short_names([p.path for p in parameters])]
     if parameters[column].is_log:
         axis.set_xscale("log")
         axis.xaxis.set_minor_formatter(NullFormatter())

@@ -26,7 +26,6 @@ from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
-from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Trace, trace
 
 __all__ = ["ANCHORS", "Settled", "anchored", "settle"]
@@ -81,7 +80,12 @@ def settle(
         )
         if number == ANCHORS or not of_base or not right <= rules.confirm:
             return Settled(found, surrogate, simulated, right, number, own, before)
-        surrogate = _held(surrogate, found, of_base, of_best, rules)
+        # What is wrong without effects is wrong with them: all models start from the base's mean.
+        base = found.base_fit
+        if fit is base or confirm(surrogate, base, of_base) <= rules.confirm:
+            surrogate = anchored(surrogate, base, of_base)
+        else:
+            surrogate = anchored(surrogate, fit, of_best)
         before += sum(two.pours for two in simulated.values())
         number += 1
         start = Start(fit.v, fit.psi)
@@ -102,20 +106,6 @@ def anchored(surrogate: Surrogate, fit: Fit, fresh: Sequence[ConditionPours]) ->
         covariances=noise[range(count), :, range(count), :],
     )
     return replace(plain, anchor=anchor)
-
-
-def _held(
-    surrogate: Surrogate,
-    found: Trace,
-    of_base: Sequence[ConditionPours],
-    of_best: Sequence[ConditionPours],
-    rules: Thresholds,
-) -> Surrogate:
-    """Held at the base fit if it is wrong there: all models start from the base model's mean."""
-    fit = found.fit_of(found.best)
-    if fit is found.base_fit or confirm(surrogate, found.base_fit, of_base) <= rules.confirm:
-        return anchored(surrogate, found.base_fit, of_base)
-    return anchored(surrogate, fit, of_best)
 
 
 def _usable(analysis: Analysis, rows: dict[str, Array]) -> list[ConditionPours]:

@@ -24,6 +24,7 @@ Reference:
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,8 +63,13 @@ class Anchor:
         return np.einsum("ah,bh,hij->aibj", weights, weights, self.covariances)
 
     def _weights(self, conditions: Array) -> Array:
-        known = np.linalg.pinv(_near(self.conditions, self.conditions), rcond=_SAME, hermitian=True)
-        return _near(conditions, self.conditions) @ known
+        return _near(conditions, self.conditions) @ self._inverse
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """K^+: the mean of every step of a fit asks for it."""
+        among = _near(self.conditions, self.conditions)
+        return np.asarray(np.linalg.pinv(among, rcond=_SAME, hermitian=True), dtype=np.float64)
 
 
 def _near(a: Array, b: Array) -> Array:
