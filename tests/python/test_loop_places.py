@@ -177,14 +177,18 @@ def test_the_drums_walls_turn_together_and_its_effects_fit_the_scene(tmp_path: P
     assert fast["walls.1.motion.rate"] == pytest.approx(3 * np.pi / 2)
     scene = asked.at_first()
     named = [effect.name for effect in asked.library if not effect.nuisance_sd and not effect.held]
-    assert len(named) == 6 and not {"fill", "frame.x", "resolution"} & set(named)
-    (fill,) = (effect for effect in asked.library if effect.name == "fill")
-    assert fill.nuisance_sd == pytest.approx(0.5)
-    assert asked.coarse is not None and asked.coarse.held == pytest.approx(-1.2)
-    # Equal solid volume.
-    assert asked.coarse.numbers["grains.count"] == 1283
-    assert asked.coarse.numbers["start.spacing"] == pytest.approx(2.6e-3 * 3.4 / 2.4)
-    scene.with_(asked.coarse.numbers)
+    assert named == ["cohesion.capillary", "cohesion.dry"]
+    assert asked.coarse is not None and asked.coarse.held == pytest.approx(-5 / 7)
+    assert asked.coarse.numbers["start.spacing"] == pytest.approx(1.85e-3 * 2.4 / 1.7)
+    # Equal volume, at the ends of the fill that every fit has free.
+    (fill,) = (one for one in asked.prior.parameters if one.path == "grains.volume")
+    assert fill.low is not None and fill.high is not None
+    for volume in (fill.low, fill.high):
+        filled = scene.with_({"grains.volume": volume})
+        of_coarse = filled.with_(asked.coarse.numbers)
+        for sized, diameter in ((filled, 1.7e-3), (of_coarse, 2.4e-3)):
+            expected = volume / (np.pi / 6 * diameter**3)
+            assert sized.get("grains.count") == pytest.approx(expected, abs=0.51)
     for entry in asked.library:
         effect = entry.at(scene)
         if effect.is_free or effect.held is not None:

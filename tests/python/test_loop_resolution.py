@@ -119,6 +119,19 @@ def test_sizes_are_numbers_of_the_scene() -> None:
         Resolution.of({"diameter": 1e-3})
 
 
+def test_the_number_of_grains_follows_a_volume_that_is_stated() -> None:
+    text = drop().to_toml()
+    (count,) = (line for line in text.splitlines() if line.startswith("count = "))
+    own = drop().get("grains.diameter")
+    scene = Scene.from_toml(text.replace(count, f"volume = {64 * np.pi / 6 * own**3!r}"))
+    assert scene.get("grains.count") == 64
+    numbers = Resolution(diameter=own / 2, coarse=2 * own).numbers(scene)
+    assert "grains.count" not in numbers and scene.with_(numbers).get("grains.count") == 8
+    # Also where the volume is another than the scene's, as in a fit that has it free.
+    more = scene.with_({"grains.volume": 2 * scene.get("grains.volume")})
+    assert more.with_(numbers).get("grains.count") == 16
+
+
 def test_an_archive_has_both_sizes_and_forward_pours_their_limit(tmp_path: Path) -> None:
     scene = drop()
     own = scene.get("grains.diameter")

@@ -44,6 +44,10 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Path`] if nothing or no number stands there.
     pub fn get(&self, path: &str) -> Result<f64, SceneError> {
+        // Known also where the scene states a volume in its place.
+        if keys(path).eq(["grains", "count"]) {
+            return Ok(self.grains.count as f64);
+        }
         let mut found = &Value::Table(self.tree()?);
         for key in keys(path) {
             found = match found {

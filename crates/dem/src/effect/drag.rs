@@ -221,7 +221,8 @@ fn neighbours(particles: &Particles, pairs: &ContactSet, fall: &Vector3<f64>) ->
 mod tests {
     use super::*;
 
-    const GRAINS: Grains = Grains { count: 1, diameter: 4e-3, density: 2500.0, shape: None };
+    const GRAINS: Grains =
+        Grains { count: 1, volume: None, diameter: 4e-3, density: 2500.0, shape: None };
 
     fn drag(fluid: Fluid) -> Drag {
         Drag::of(fluid, &GRAINS, 9.81)

@@ -126,7 +126,8 @@ fn integrals(centres: &[f64]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    const GRAINS: Grains = Grains { count: 1, diameter: 4e-3, density: 1300.0, shape: None };
+    const GRAINS: Grains =
+        Grains { count: 1, volume: None, diameter: 4e-3, density: 1300.0, shape: None };
 
     #[test]
     fn an_aspect_of_one_is_the_ball() {

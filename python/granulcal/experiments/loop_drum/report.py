@@ -17,9 +17,8 @@ __all__ = ["Speed", "compare_speeds", "table"]
 
 Array = NDArray[np.float64]
 
-# Rounds a minute of speeds without a picture here, and when their mean begins and ends [s]: after
-# as large a turn as at the measured ones.
-_FURTHER = {10: (1.1, 1.5), 30: (0.6, 0.9)}
+# Rounds a minute of speeds without a picture here, and when their mean begins and ends [s].
+_FURTHER = {10: (2.0, 2.6), 30: (1.1, 1.4)}
 _DRAWS = 4
 _SEED = 8_100_011
 

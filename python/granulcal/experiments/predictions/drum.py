@@ -15,8 +15,8 @@ from granulcal.loop.report.models import Models, Prediction
 
 __all__ = ["SPEEDS", "drum_rows", "drum_rows_without_loop"]
 
-SPEEDS = {10: (1.1, 1.5), 20: (0.7, 1.0), 30: (0.6, 0.9), 60: (0.45, 0.75)}
-"""Rounds a minute, and when the mean begins and ends [s]: after turns of 54 to 90 degrees."""
+SPEEDS = {10: (2.0, 2.6), 20: (1.3, 1.7), 30: (1.1, 1.4), 60: (0.9, 1.2)}
+"""Rounds a minute, and when the mean begins and ends [s]: once the surface stands."""
 
 # What is poured; the rows without physics have a file of their own.
 _SIMULATED = ("named", "base", "corrected")

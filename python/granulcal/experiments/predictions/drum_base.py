@@ -26,22 +26,22 @@ __all__ = ["SETTINGS", "DrumBase"]
 
 Array = NDArray[np.float64]
 
-_COUNT = "grains.count"
+_VOLUME = "grains.volume"
 SETTINGS: tuple[dict[str, float], ...] = (
     {
         "material.sliding_friction": 0.72,
         "material.rolling_friction": 0.09,
         "walls.1.material.sliding_friction": 0.5,
-        _COUNT: 3830.0,
+        _VOLUME: 2.772e-5,
     },
     {
         "material.sliding_friction": 0.69,
         "material.rolling_friction": 0.054,
         "walls.1.material.sliding_friction": 0.34,
-        _COUNT: 3757.0,
+        _VOLUME: 2.719e-5,
     },
 )
-"""Friction of grains and end walls, and grains of 2.4 mm: 5 and 3 % more than the authors'."""
+"""Friction of grains and end walls, and the grains' volume: 5 and 3 % more than the authors'."""
 
 _SEED = 8_600_011
 _HALF = 1.645

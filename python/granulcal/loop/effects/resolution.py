@@ -5,7 +5,8 @@ r"""Grains that are larger than the real ones: two sizes in the archive, their l
     coarse = 2.4e-3                         # second size of the archive; the scene's is the first
     scales = { "start.spacing" = 1, "start.jitter" = 1 }   # further numbers, by their power of d
 
-At equal solid volume N goes with $d^{-3}$. To first order in d a mean pour has the error
+At equal solid volume N goes with $d^{-3}$, by itself where the scene states `grains.volume`. To
+first order in d a mean pour has the error
 
 $$ m(d) = m(d_\mathrm{true}) + (d - d_\mathrm{true}) m', $$
 
@@ -35,7 +36,7 @@ __all__ = ["NAME", "Resolution"]
 NAME = "resolution"
 """What the held effect is called."""
 
-_DIAMETER, _COUNT = "grains.diameter", "grains.count"
+_DIAMETER, _COUNT, _VOLUME = "grains.diameter", "grains.count", "grains.volume"
 
 
 @dataclass(frozen=True)
@@ -87,8 +88,9 @@ class Resolution:
         """Returns the numbers of the scene with coarse grains, by path."""
         ratio = self.coarse / scene.get(_DIAMETER)
         found = {path: scene.get(path) * ratio**power for path, power in self.scales.items()}
-        count = float(max(round(scene.get(_COUNT) / ratio**3), 1))
-        return {_DIAMETER: self.coarse, _COUNT: count, **found}
+        if not _states_volume(scene):
+            found[_COUNT] = float(max(round(scene.get(_COUNT) / ratio**3), 1))
+        return {_DIAMETER: self.coarse, **found}
 
     def effect(self, scene: Scene) -> LibraryEffect:
         """Returns the held effect: off at the scene's own size, full at the coarse one."""
@@ -102,3 +104,11 @@ class Resolution:
             also=tuple(sorted(self.numbers(scene).items())),
             held=self.held(scene),
         )
+
+
+def _states_volume(scene: Scene) -> bool:
+    try:
+        scene.get(_VOLUME)
+    except ValueError:
+        return False
+    return True
