@@ -1,0 +1,101 @@
+"""When the surface of the drum of `granulcal reproduce loop_drum` stands; what grains' size does.
+
+    GRANULCAL_DATA=/path/to/measured python benches/drum_surface.py time
+    GRANULCAL_DATA=/path/to/measured python benches/drum_surface.py size
+
+`time` prints slope and heights of one pour, means over a tenth of a second or so, from the begin of
+the turn on. `size` prints what pours of one material, of the same volume, are off from the pictures
+by, over the diameter of their grains; grains of 1.2 mm take 1.5 to 2 minutes a pour. Heights in mm.
+A pour whose overlaps are larger than its preset allows is shown with them.
+"""
+
+import argparse
+import os
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import granulcal as gc
+from granulcal.experiments.loop_drum.task import SPEEDS, at_speed, task
+from granulcal.measured.recording import Recording
+
+Array = NDArray[np.float64]
+
+MATERIAL = {
+    "material.sliding_friction": 0.8,
+    "material.rolling_friction": 0.1,
+    "walls.1.material.sliding_friction": 0.8,
+    "grains.volume": 2.8e-5,
+}
+"""Near what the pictures ask for."""
+SCALED = ("start.spacing", "start.jitter")
+LONG = {15: (0.3, 4.0, 0.3), 45: (0.3, 2.0, 0.15)}
+"""By rounds a minute: from when, to when, and over what time a mean is [s]."""
+
+
+def series(scene: gc.Scene, seed: int) -> tuple[Array, Array, float]:
+    """Returns times, the statistics of each frame and the largest overlap in radii."""
+    pour = gc.simulate(scene, seed=seed)
+    found = [pour.series(name) for name in scene.observed_names]
+    begin = scene.get("observe.begin")
+    return begin + found[0][0], np.array([v for _, v in found]).T, pour.health["worst_penetration"]
+
+
+def over_time(scene: gc.Scene, seed: int) -> None:
+    """Prints slope and heights at both speeds, a row for each step of time."""
+    for rpm, (begin, end, step) in LONG.items():
+        times, values, overlap = series(scene.with_(at_speed(rpm, begin, end)), seed)
+        print(f"\n{rpm} rpm, overlaps up to {overlap:.2f} radii\n")
+        print("| from [s] | slope [deg] | heights |\n|---|---|---|")
+        for start in np.arange(begin, end - 0.5 * step, step):
+            mean = values[(times >= start) & (times < start + step)].mean(axis=0)
+            heights = " ".join(f"{1e3 * z:.1f}" for z in mean[:-1:2])
+            print(f"| {start:.2f} | {mean[-1]:.1f} | {heights} |", flush=True)
+
+
+def over_size(data: Path, scene: gc.Scene, sizes: list[float], seed: int) -> None:
+    """Prints what pours of each size of grains are off from the pictures by."""
+    own = scene.get("grains.diameter")
+    print(
+        "| rpm | diameter [mm] | slope less measured [deg] | rms [mm] | about its mean [mm] |",
+        end="",
+    )
+    print(" heights less measured | overlaps [radii] |\n|---|---|---|---|---|---|---|")
+    for rpm, (begin, end) in SPEEDS.items():
+        there = scene.with_(at_speed(rpm, begin, end))
+        picture = data / "granudrum-mcc" / f"gd_nature_{rpm}rpm_averaged.bmp"
+        measured = np.asarray(Recording.observed(picture, there, width=0.084))
+        for diameter in sizes:
+            scaled = {path: there.get(path) * diameter / own for path in SCALED}
+            sized = there.with_({"grains.diameter": diameter, **scaled})
+            _, values, overlap = series(sized, seed)
+            off = values.mean(axis=0) - measured
+            rms, about = 1e3 * np.sqrt(np.mean(off[:-1] ** 2)), 1e3 * np.std(off[:-1])
+            heights = " ".join(f"{1e3 * z:+.1f}" for z in off[:-1:2])
+            print(
+                f"| {rpm} | {1e3 * diameter:.1f} | {off[-1]:+.1f} | {rms:.2f} | {about:.2f} |",
+                end="",
+            )
+            print(f" {heights} | {overlap:.2f} |", flush=True)
+
+
+def main() -> None:
+    """Prints what was asked for."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("what", choices=("time", "size"))
+    parser.add_argument("--sizes", type=float, nargs="+", default=[3.4e-3, 2.4e-3, 1.7e-3, 1.2e-3])
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    data = Path(os.environ.get("GRANULCAL_DATA", "../shared/data/measured"))
+    scene = task(data).scene.with_(MATERIAL)
+    if asked.what == "time":
+        over_time(scene, asked.seed)
+    else:
+        over_size(data, scene, asked.sizes, asked.seed)
+
+
+if __name__ == "__main__":
+    main()
