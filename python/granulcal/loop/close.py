@@ -30,6 +30,7 @@ from granulcal.loop.check.coverage import FEWEST_PAIRS
 from granulcal.loop.check.prior_rounds import ROUNDS, drawn, prior_rounds
 from granulcal.loop.check.settle import settle
 from granulcal.loop.check.standing import stand
+from granulcal.loop.check.steady import drifts
 from granulcal.loop.closed import Closed
 from granulcal.loop.effects.definitions import is_definition
 from granulcal.loop.experiment import next_experiment
@@ -114,6 +115,8 @@ def close_loop(
 
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
     say(time_needed(task, store, budget - plan.pours, workers))
+    for sentence in drifts(task):
+        say(sentence)
     store.fill(threads=threads, say=say)
     surrogate = surrogate or fit_surrogate(store, seed=seed, say=say)
     analysis = Analysis(task, store.plan, Forward(folder / "pours", workers), rules, seed, say)
