@@ -22,13 +22,13 @@ from granulcal.measured.recording import Recording
 
 Array = NDArray[np.float64]
 
-MATERIAL = {
-    "material.sliding_friction": 0.8,
-    "material.rolling_friction": 0.1,
-    "walls.1.material.sliding_friction": 0.8,
-    "grains.volume": 2.8e-5,
-}
-"""Near what the pictures ask for."""
+MATERIAL = (
+    "material.sliding_friction",
+    "material.rolling_friction",
+    "walls.1.material.sliding_friction",
+    "grains.volume",
+)
+"""What `--at` sets: friction of the grains and of the end walls, and the grains' volume [m^3]."""
 SCALED = ("start.spacing", "start.jitter")
 LONG = {15: (0.3, 4.0, 0.3), 45: (0.3, 2.0, 0.15)}
 """By rounds a minute: from when, to when, and over what time a mean is [s]."""
@@ -87,10 +87,11 @@ def main() -> None:
     )
     parser.add_argument("what", choices=("time", "size"))
     parser.add_argument("--sizes", type=float, nargs="+", default=[3.4e-3, 2.4e-3, 1.7e-3, 1.2e-3])
+    parser.add_argument("--at", type=float, nargs=len(MATERIAL), default=[0.8, 0.1, 0.8, 2.8e-5])
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
     data = Path(os.environ.get("GRANULCAL_DATA", "../shared/data/measured"))
-    scene = task(data).scene.with_(MATERIAL)
+    scene = task(data).scene.with_(dict(zip(MATERIAL, asked.at, strict=True)))
     if asked.what == "time":
         over_time(scene, asked.seed)
     else:

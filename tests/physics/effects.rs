@@ -123,7 +123,7 @@ fn a_bridge_does_not_pull_before_grains_have_touched() {
 /// their gap and their speeds along x.
 fn in_a_film(gap: f64, speeds: [f64; 2], seconds: f64) -> (f64, [f64; 2]) {
     let mut scene = one_grain(0.1, material(0.5, 0.1, 0.5));
-    scene.grains = Grains { count: 2, diameter: 2.0 * RADIUS, density: 2500.0, shape: None };
+    scene.grains = Grains::balls(2, 2.0 * RADIUS, 2500.0);
     scene.start =
         Start::Positions { positions: vec![[0.0, 0.0, 0.1], [2.0 * RADIUS + gap, 0.0, 0.1]] };
     scene.effects.lubrication = Lubrication { viscosity: 0.05, ..Lubrication::default() };
@@ -158,7 +158,7 @@ fn terminal_speed_is_schillers_and_naumanns() {
     // Glycerol, water, and ten times as thick: Re 0.03, 1700, 120.
     for (density, viscosity) in [(1260.0, 1.4), (1000.0, 1e-3), (1000.0, 1e-2)] {
         let mut scene = one_grain(5.0, material(0.5, 0.1, 0.5));
-        scene.grains = Grains { count: 1, diameter: 2.0 * RADIUS, density: 2500.0, shape: None };
+        scene.grains = Grains::balls(1, 2.0 * RADIUS, 2500.0);
         scene.effects.fluid = Fluid { density, viscosity, ..Fluid::default() };
         let speed = -after(&scene, 2.0).velocities()[0].z;
         let reynolds = density * speed * 2.0 * RADIUS / viscosity;
@@ -277,7 +277,7 @@ fn fluid_inside_a_cluster_goes_with_it() {
         positions.extend([[a, b, 1.0], [a, 0.0, 1.0 + b], [0.0, a, 1.0 + b]]);
     }
     let mut scene = one_grain(1.0, material(0.5, 0.1, 0.5));
-    scene.grains = Grains { count: 13, diameter: 2.0 * RADIUS, density: 2500.0, shape: None };
+    scene.grains = Grains::balls(13, 2.0 * RADIUS, 2500.0);
     scene.start = Start::Positions { positions };
     let viscosity = 14.0;
     scene.effects.fluid = Fluid { density: 1260.0, viscosity, entrained: 1.0, ..Fluid::default() };

@@ -17,12 +17,7 @@ pub fn block(counts: [usize; 3], spacing: f64, base: f64, material: Material) ->
         preset: Preset::Default,
         gravity: [0.0, 0.0, -GRAVITY],
         material,
-        grains: Grains {
-            count: counts.iter().product(),
-            diameter: 2.0 * RADIUS,
-            density: 1300.0,
-            shape: None,
-        },
+        grains: Grains::balls(counts.iter().product(), 2.0 * RADIUS, 1300.0),
         start: Start::Grid { counts, spacing, jitter: 0.0, base },
         intruder: None,
         ground: Ground::default(),

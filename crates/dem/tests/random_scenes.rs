@@ -188,13 +188,7 @@ fn scene() -> impl Strategy<Value = Scene> {
                 preset,
                 gravity,
                 material,
-                grains: Grains {
-                    count,
-                    volume: None,
-                    diameter: 2.0 * radius,
-                    density: 1300.0,
-                    shape: None,
-                },
+                grains: Grains::balls(count, 2.0 * radius, 1300.0),
                 start: scaled_start(start, radius),
                 // With neither of those two, as the scene's check asks.
                 intruder: intruder.filter(|_| period.is_none() && outflow.is_none()).map(

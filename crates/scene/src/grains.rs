@@ -88,6 +88,11 @@ fn count_of(volume: f64, diameter: f64) -> Result<usize, String> {
 }
 
 impl Grains {
+    /// So many equal balls.
+    pub const fn balls(count: usize, diameter: f64, density: f64) -> Self {
+        Self { count, volume: None, diameter, density, shape: None }
+    }
+
     /// Radius of a grain `[m]`.
     pub fn radius(&self) -> f64 {
         0.5 * self.diameter

@@ -23,7 +23,7 @@ pub fn scene(positions: &[Vector3<f64>], material: Material, walls: Vec<Wall>) -
         preset: Preset::Default,
         gravity: [0.0, 0.0, -GRAVITY],
         material,
-        grains: Grains { count: positions.len(), diameter: DIAMETER, density: 2500.0, shape: None },
+        grains: Grains::balls(positions.len(), DIAMETER, 2500.0),
         start: Start::Positions { positions: positions.iter().map(|&p| p.into()).collect() },
         intruder: None,
         ground: Ground::default(),

@@ -221,8 +221,7 @@ fn neighbours(particles: &Particles, pairs: &ContactSet, fall: &Vector3<f64>) ->
 mod tests {
     use super::*;
 
-    const GRAINS: Grains =
-        Grains { count: 1, volume: None, diameter: 4e-3, density: 2500.0, shape: None };
+    const GRAINS: Grains = Grains::balls(1, 4e-3, 2500.0);
 
     fn drag(fluid: Fluid) -> Drag {
         Drag::of(fluid, &GRAINS, 9.81)

@@ -126,8 +126,7 @@ fn integrals(centres: &[f64]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    const GRAINS: Grains =
-        Grains { count: 1, volume: None, diameter: 4e-3, density: 1300.0, shape: None };
+    const GRAINS: Grains = Grains::balls(1, 4e-3, 1300.0);
 
     #[test]
     fn an_aspect_of_one_is_the_ball() {
