@@ -54,7 +54,9 @@ def over_time(scene: gc.Scene, seed: int) -> None:
             print(f"| {start:.2f} | {mean[-1]:.1f} | {heights} |", flush=True)
 
 
-def over_size(data: Path, scene: gc.Scene, sizes: list[float], seed: int) -> None:
+def over_size(
+    data: Path, scene: gc.Scene, sizes: list[float], seed: int, picture_of: Path | None
+) -> None:
     """Prints what pours of each size of grains are off from the pictures by."""
     own = scene.get("grains.diameter")
     print(
@@ -62,14 +64,17 @@ def over_size(data: Path, scene: gc.Scene, sizes: list[float], seed: int) -> Non
         end="",
     )
     print(" heights less measured | overlaps [radii] |\n|---|---|---|---|---|---|---|")
+    seen: dict[int, list[tuple[str, Array]]] = {}
     for rpm, (begin, end) in SPEEDS.items():
         there = scene.with_(at_speed(rpm, begin, end))
         picture = data / "granudrum-mcc" / f"gd_nature_{rpm}rpm_averaged.bmp"
         measured = np.asarray(Recording.observed(picture, there, width=0.084))
+        seen[rpm] = [("measured", measured)]
         for diameter in sizes:
             scaled = {path: there.get(path) * diameter / own for path in SCALED}
             sized = there.with_({"grains.diameter": diameter, **scaled})
             _, values, overlap = series(sized, seed)
+            seen[rpm].append((f"grains of {1e3 * diameter:.1f} mm", values.mean(axis=0)))
             off = values.mean(axis=0) - measured
             rms, about = 1e3 * np.sqrt(np.mean(off[:-1] ** 2)), 1e3 * np.std(off[:-1])
             heights = " ".join(f"{1e3 * z:+.1f}" for z in off[:-1:2])
@@ -78,6 +83,30 @@ def over_size(data: Path, scene: gc.Scene, sizes: list[float], seed: int) -> Non
                 end="",
             )
             print(f" {heights} | {overlap:.2f} |", flush=True)
+
+    if picture_of is not None:
+        draw(picture_of, scene, seen)
+
+
+def draw(path: Path, scene: gc.Scene, seen: dict[int, list[tuple[str, Array]]]) -> None:
+    """Draws the surfaces at each speed, the measured one in black."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    places = range(len(scene.observed_names) - 1)
+    x = [1e3 * scene.get(f"observe.surface.x.{i}") for i in places]
+    turn = np.linspace(0.0, 2 * np.pi, 200)
+    figure, axes = plt.subplots(1, len(seen), figsize=(8.2, 4.7), sharey=True, layout="constrained")
+    for axis, (rpm, surfaces) in zip(np.atleast_1d(axes), seen.items(), strict=True):
+        axis.plot(42 * np.cos(turn), 42 * np.sin(turn), color="0.7", lw=1)
+        for label, values in surfaces:
+            axis.plot(x, 1e3 * values[:-1], "k.-" if label == "measured" else "-", label=label)
+        axis.set(title=f"{rpm} rpm", aspect="equal", xlabel="x [mm]")
+        axis.legend(fontsize=8, loc="upper right")
+    np.atleast_1d(axes)[0].set_ylabel("height of the free surface [mm]")
+    figure.savefig(path, dpi=80)
 
 
 def main() -> None:
@@ -89,13 +118,14 @@ def main() -> None:
     parser.add_argument("--sizes", type=float, nargs="+", default=[3.4e-3, 2.4e-3, 1.7e-3, 1.2e-3])
     parser.add_argument("--at", type=float, nargs=len(MATERIAL), default=[0.8, 0.1, 0.8, 2.8e-5])
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--picture", type=Path, help="of size: where to draw the surfaces")
     asked = parser.parse_args()
     data = Path(os.environ.get("GRANULCAL_DATA", "../shared/data/measured"))
     scene = task(data).scene.with_(dict(zip(MATERIAL, asked.at, strict=True)))
     if asked.what == "time":
         over_time(scene, asked.seed)
     else:
-        over_size(data, scene, asked.sizes, asked.seed)
+        over_size(data, scene, asked.sizes, asked.seed, asked.picture)
 
 
 if __name__ == "__main__":
