@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import granulcal as gc
-from granulcal.experiments.loop_drum.task import SPEEDS, at_speed, task
-from granulcal.measured.recording import Recording
+from granulcal.experiments.loop_drum.task import RESOLUTION, at_speed, task
+from granulcal.loop.task import Task
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,6 @@ MATERIAL = (
     "grains.volume",
 )
 """What `--at` sets: friction of the grains and of the end walls, and the grains' volume [m^3]."""
-SCALED = ("start.spacing", "start.jitter")
 LONG = {15: (0.3, 4.0, 0.3), 45: (0.3, 2.0, 0.15)}
 """By rounds a minute: from when, to when, and over what time a mean is [s]."""
 
@@ -55,40 +54,40 @@ def over_time(scene: gc.Scene, seed: int) -> None:
 
 
 def over_size(
-    data: Path, scene: gc.Scene, sizes: list[float], seed: int, picture_of: Path | None
+    asked: Task, scene: gc.Scene, sizes: list[float], seed: int, picture: Path | None
 ) -> None:
     """Prints what pours of each size of grains are off from the pictures by."""
     own = scene.get("grains.diameter")
+    print("| condition | diameter [mm] | slope less measured [deg] | rms [mm] ", end="")
     print(
-        "| rpm | diameter [mm] | slope less measured [deg] | rms [mm] | about its mean [mm] |",
-        end="",
+        "| about its mean [mm] | heights less measured | overlaps [radii] |"
+        + "\n"
+        + "|---" * 7
+        + "|"
     )
-    print(" heights less measured | overlaps [radii] |\n|---|---|---|---|---|---|---|")
-    seen: dict[int, list[tuple[str, Array]]] = {}
-    for rpm, (begin, end) in SPEEDS.items():
-        there = scene.with_(at_speed(rpm, begin, end))
-        picture = data / "granudrum-mcc" / f"gd_nature_{rpm}rpm_averaged.bmp"
-        measured = np.asarray(Recording.observed(picture, there, width=0.084))
-        seen[rpm] = [("measured", measured)]
+    seen: dict[str, list[tuple[str, Array]]] = {}
+    for condition in asked.conditions:
+        there = scene.with_(condition.at)
+        (measured,) = condition.statistics(there)
+        seen[condition.name] = [("measured", measured)]
         for diameter in sizes:
-            scaled = {path: there.get(path) * diameter / own for path in SCALED}
-            sized = there.with_({"grains.diameter": diameter, **scaled})
-            _, values, overlap = series(sized, seed)
-            seen[rpm].append((f"grains of {1e3 * diameter:.1f} mm", values.mean(axis=0)))
-            off = values.mean(axis=0) - measured
-            rms, about = 1e3 * np.sqrt(np.mean(off[:-1] ** 2)), 1e3 * np.std(off[:-1])
-            heights = " ".join(f"{1e3 * z:+.1f}" for z in off[:-1:2])
-            print(
-                f"| {rpm} | {1e3 * diameter:.1f} | {off[-1]:+.1f} | {rms:.2f} | {about:.2f} |",
-                end="",
-            )
-            print(f" {heights} | {overlap:.2f} |", flush=True)
+            scaled = {
+                path: there.get(path) * diameter**power / own**power
+                for path, power in RESOLUTION.scales.items()
+            }
+            _, values, overlap = series(there.with_({"grains.diameter": diameter, **scaled}), seed)
+            mean = values.mean(axis=0)
+            seen[condition.name].append((f"grains of {1e3 * diameter:.1f} mm", mean))
+            *heights, slope = mean - measured
+            off = 1e3 * np.array(heights)
+            cells = [f"{1e3 * diameter:.1f}", f"{slope:+.1f}", f"{np.sqrt(np.mean(off**2)):.2f}"]
+            cells += [f"{off.std():.2f}", " ".join(f"{z:+.1f}" for z in off[::2]), f"{overlap:.2f}"]
+            print(f"| {condition.name} | {' | '.join(cells)} |", flush=True)
+    if picture is not None:
+        draw(picture, scene, seen)
 
-    if picture_of is not None:
-        draw(picture_of, scene, seen)
 
-
-def draw(path: Path, scene: gc.Scene, seen: dict[int, list[tuple[str, Array]]]) -> None:
+def draw(path: Path, scene: gc.Scene, seen: dict[str, list[tuple[str, Array]]]) -> None:
     """Draws the surfaces at each speed, the measured one in black."""
     import matplotlib
 
@@ -99,11 +98,11 @@ def draw(path: Path, scene: gc.Scene, seen: dict[int, list[tuple[str, Array]]]) 
     x = [1e3 * scene.get(f"observe.surface.x.{i}") for i in places]
     turn = np.linspace(0.0, 2 * np.pi, 200)
     figure, axes = plt.subplots(1, len(seen), figsize=(8.2, 4.7), sharey=True, layout="constrained")
-    for axis, (rpm, surfaces) in zip(np.atleast_1d(axes), seen.items(), strict=True):
+    for axis, (name, surfaces) in zip(np.atleast_1d(axes), seen.items(), strict=True):
         axis.plot(42 * np.cos(turn), 42 * np.sin(turn), color="0.7", lw=1)
         for label, values in surfaces:
             axis.plot(x, 1e3 * values[:-1], "k.-" if label == "measured" else "-", label=label)
-        axis.set(title=f"{rpm} rpm", aspect="equal", xlabel="x [mm]")
+        axis.set(title=name, aspect="equal", xlabel="x [mm]")
         axis.legend(fontsize=8, loc="upper right")
     np.atleast_1d(axes)[0].set_ylabel("height of the free surface [mm]")
     figure.savefig(path, dpi=80)
@@ -120,12 +119,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--picture", type=Path, help="of size: where to draw the surfaces")
     asked = parser.parse_args()
-    data = Path(os.environ.get("GRANULCAL_DATA", "../shared/data/measured"))
-    scene = task(data).scene.with_(dict(zip(MATERIAL, asked.at, strict=True)))
+    drum = task(Path(os.environ.get("GRANULCAL_DATA", "../shared/data/measured")))
+    scene = drum.scene.with_(dict(zip(MATERIAL, asked.at, strict=True)))
     if asked.what == "time":
         over_time(scene, asked.seed)
     else:
-        over_size(data, scene, asked.sizes, asked.seed, asked.picture)
+        over_size(drum, scene, asked.sizes, asked.seed, asked.picture)
 
 
 if __name__ == "__main__":

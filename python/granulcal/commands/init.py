@@ -120,7 +120,7 @@ def _sample(options: argparse.Namespace) -> int:
     from granulcal.starter.samples import HIDDEN, write_samples
 
     scene = Scene.load(options.folder / "scene.toml")
-    path = "funnel.height" if _has(scene, "funnel.height") else "start.height"
+    path = "funnel.height" if scene.has("funnel.height") else "start.height"
     material = scene.with_material(HIDDEN).with_(dict(options.set)).material
     more = {} if options.seed is None else {"seed": options.seed}
     found = write_samples(
@@ -138,14 +138,6 @@ def _sample(options: argparse.Namespace) -> int:
         names = ", ".join(path.name for path in found.missing)
         print(f"note: {names} left out: pip install 'granulcal[ros]'", file=sys.stderr)
     return 0
-
-
-def _has(scene: Any, path: str) -> bool:
-    try:
-        scene.get(path)
-    except ValueError:
-        return False
-    return True
 
 
 def assignment(text: str) -> tuple[str, float]:

@@ -115,7 +115,8 @@ def close_loop(
 
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
     say(time_needed(task, store, budget - plan.pours, workers))
-    for sentence in drifts(task):
+    # Told before the first pour; whoever goes on has been told.
+    for sentence in drifts(task) if store.missing else []:
         say(sentence)
     store.fill(threads=threads, say=say)
     surrogate = surrogate or fit_surrogate(store, seed=seed, say=say)

@@ -211,6 +211,14 @@ class Scene:
         """
         return self.native.get(path)
 
+    def has(self, path: str) -> bool:
+        """Returns whether a number stands at `path`."""
+        try:
+            self.native.get(path)
+        except ValueError:
+            return False
+        return True
+
     @property
     def observed_names(self) -> tuple[str, ...]:
         """Names of the statistics that the scene observes, for example `front_radius[0.1]`."""

@@ -45,22 +45,14 @@ def law_numbers(asked: bool | Sequence[str], scene: Scene) -> tuple[Parameter, .
         ObservationError: a name that is none of them, or a number that the scene does not have.
     """
     if isinstance(asked, bool):
-        return tuple(one for one in LAW if asked and _has(scene, one.path))
+        return tuple(one for one in LAW if asked and scene.has(one.path))
     known = {one.path.rpartition(".")[2]: one for one in LAW}
     unknown = [name for name in asked if name not in known]
     if unknown:
         raise ObservationError(f"law has no {', '.join(unknown)}; there are {', '.join(known)}")
-    absent = [name for name in asked if not _has(scene, known[name].path)]
+    absent = [name for name in asked if not scene.has(known[name].path)]
     if absent:
         raise ObservationError(
             f"the contact law of this version has no {', '.join(absent)}: leave them out of law"
         )
     return tuple(one for name, one in known.items() if name in asked)
-
-
-def _has(scene: Scene, path: str) -> bool:
-    try:
-        scene.get(path)
-    except ValueError:
-        return False
-    return True

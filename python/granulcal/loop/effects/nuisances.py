@@ -51,23 +51,13 @@ def declared_nuisances(table: Mapping[str, Any], scene: Scene) -> tuple[LibraryE
             value = value["sd"]
         sds[name] = float(value)
     known = [effect.name for effect in LIBRARY]
-    paths = [name for name in sds if name not in known and _is_path(name, scene)]
+    paths = [name for name in sds if name not in known and "." in name and scene.has(name)]
     named = by_name(name for name in sds if name not in paths)
     found = [effect.declared(sds[effect.name], scene) for effect in named]
     found += [_of_path(path, sds[path], scene) for path in paths]
     return tuple(
         replace(effect, is_shared=shared.get(effect.name, effect.is_shared)) for effect in found
     )
-
-
-def _is_path(name: str, scene: Scene) -> bool:
-    if "." not in name:
-        return False
-    try:
-        scene.get(name)
-    except (KeyError, ValueError):
-        return False
-    return True
 
 
 def _of_path(path: str, sd: float, scene: Scene) -> LibraryEffect:

@@ -88,7 +88,7 @@ class Resolution:
         """Returns the numbers of the scene with coarse grains, by path."""
         ratio = self.coarse / scene.get(_DIAMETER)
         found = {path: scene.get(path) * ratio**power for path, power in self.scales.items()}
-        if not _states_volume(scene):
+        if not scene.has(_VOLUME):
             found[_COUNT] = float(max(round(scene.get(_COUNT) / ratio**3), 1))
         return {_DIAMETER: self.coarse, **found}
 
@@ -104,11 +104,3 @@ class Resolution:
             also=tuple(sorted(self.numbers(scene).items())),
             held=self.held(scene),
         )
-
-
-def _states_volume(scene: Scene) -> bool:
-    try:
-        scene.get(_VOLUME)
-    except ValueError:
-        return False
-    return True
