@@ -22,7 +22,7 @@ fn pair(grains: Material, jitter: f64) -> Scene {
 
 /// Both grains before and after the substep in which they collide, gravity's share taken off the latter.
 fn collide(scene: &Scene, seed: u64) -> ([Motion; 2], [Motion; 2]) {
-    let dt = scene.preset.settings().dt;
+    let dt = scene.settings().dt;
     let mut simulation = Simulation::new(scene, seed).expect("a valid scene");
     let both = |simulation: &_| [motion(simulation, 0), motion(simulation, 1)];
     loop {

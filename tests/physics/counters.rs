@@ -17,7 +17,7 @@ type Counters = (usize, usize, f64, Option<Status>);
 
 /// Simulates `seconds`, or to the end if that comes before.
 fn taken(scene: &Scene, method: Method, seconds: f64) -> Counters {
-    let settings = SolverSettings { method, ..scene.preset.settings() };
+    let settings = SolverSettings { method, ..scene.settings() };
     let start = Simulation::new(scene, 1).expect("a valid scene");
     let mut simulation = start.with_settings(settings).expect("valid settings");
     simulation.advance(seconds);

@@ -113,7 +113,7 @@ fn same_bits_on_any_threads_and_after_a_restart() {
     first.advance(0.0113);
     let mut second = start(&scene).resume(&first.checkpoint()).unwrap();
     while second.time() < 0.02 - 1e-9 {
-        second.advance(scene.preset.settings().dt);
+        second.advance(scene.settings().dt);
     }
     assert!(bits(&whole) == bits(&second));
 }

@@ -13,7 +13,7 @@ fn energy(simulation: &Simulation, dt: f64) -> f64 {
 
 /// Realised restitution of the first impact: the root of the energies after and before it.
 fn realised(scene: &Scene, dt: f64) -> f64 {
-    let settings = SolverSettings { dt, ..scene.preset.settings() };
+    let settings = SolverSettings { dt, ..scene.settings() };
     let mut simulation = start(scene).with_settings(settings).expect("valid settings");
     let before = energy(&simulation, -dt);
     let mut speed = 0.0;

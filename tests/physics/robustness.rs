@@ -135,7 +135,7 @@ fn grains_that_lose_nothing_reach_the_horizon() {
     let mut scene = drop_of(100, 0.05, material(0.0, 0.0, 1.0));
     scene.end.horizon = 0.3;
     // A margin of a radius lists every neighbour in time: no second impact within a substep.
-    let settings = SolverSettings { margin: 1.0, ..scene.preset.settings() };
+    let settings = SolverSettings { margin: 1.0, ..scene.settings() };
     let pour = start(&scene).with_settings(settings).expect("valid settings").run();
     assert_finite(&pour);
     assert_eq!(pour.status, Status::Horizon, "{:?}", pour.health);

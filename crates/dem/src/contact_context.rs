@@ -36,7 +36,7 @@ pub(crate) struct ContactContext {
 
 impl ContactContext {
     pub fn new(scene: &Scene) -> Self {
-        let settings = scene.preset.settings();
+        let settings = scene.settings();
         let walls = Walls::of(scene);
         let (effects, radius) = (Acting::of(scene), scene.grains.radius());
         Self {

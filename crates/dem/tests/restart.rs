@@ -110,14 +110,14 @@ fn a_checkpoint_says_what_it_is_of() {
     substeps(&mut simulation, 17);
     let header = CheckpointHeader::read(&simulation.checkpoint()).unwrap();
     assert_eq!((&header.scene, header.seed, header.substep), (&scene, SEED, 17));
-    assert_eq!(header.settings, scene.preset.settings());
+    assert_eq!(header.settings, scene.settings());
     assert_eq!(header.time(), simulation.time());
 }
 
 #[test]
 fn motion_and_settings_that_were_set_are_kept() {
     let scene = drop(Preset::Default);
-    let settings = SolverSettings { sweeps: 7, ..scene.preset.settings() };
+    let settings = SolverSettings { sweeps: 7, ..scene.settings() };
     let begin = || start(&scene).with_settings(settings).unwrap();
     let mut first = begin();
     substeps(&mut first, 33);
@@ -174,7 +174,7 @@ fn another_pour_is_refused_by_name() {
     assert!(message.contains("scene.preset is \"default\" there, but \"fast\""), "{message}");
     let message = refused(Simulation::new(&scene, SEED + 1).unwrap());
     assert!(message.contains("seed is 3 there, but 4 is given"), "{message}");
-    let settings = SolverSettings { sweeps: 7, ..scene.preset.settings() };
+    let settings = SolverSettings { sweeps: 7, ..scene.settings() };
     let message = refused(start(&scene).with_settings(settings).unwrap());
     assert!(message.contains("settings.sweeps is 4 there, but 7 is given"), "{message}");
     let message = refused(start(&funnel()));

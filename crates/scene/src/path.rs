@@ -48,6 +48,10 @@ impl Scene {
         if keys(path).eq(["grains", "count"]) {
             return Ok(self.grains.count as f64);
         }
+        // Known also where the preset states it.
+        if keys(path).eq(["substep"]) {
+            return Ok(self.settings().dt);
+        }
         let mut found = &Value::Table(self.tree()?);
         for key in keys(path) {
             found = match found {
@@ -202,7 +206,7 @@ fn entry(path: &str, key: &str, count: usize) -> Result<usize, SceneError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Motion, Shape, Wall, WallMaterial};
+    use crate::{Motion, Preset, Shape, Wall, WallMaterial};
 
     #[test]
     fn sets_and_gets_by_path() {
@@ -214,6 +218,37 @@ mod tests {
         assert_eq!(changed.with("grains.count", 100.0).unwrap().grains.count, 100);
         let ground = scene.with("scene.ground.material.restitution", 0.1).unwrap();
         assert_eq!(ground.ground.material.restitution, Some(0.1));
+    }
+
+    #[test]
+    fn a_substep_is_finer_than_the_presets() {
+        let scene = Scene::funnel(0.12);
+        let own = scene.preset.settings();
+        assert_eq!(scene.get("substep").unwrap(), own.dt);
+        let finer = scene.with("substep", 0.3 * own.dt).unwrap();
+        assert_eq!((finer.settings().dt, finer.settings().sweeps), (0.3 * own.dt, own.sweeps));
+        assert_eq!(Scene::from_toml(&finer.to_toml().unwrap()).unwrap(), finer);
+        for wrong in [0.0, -1e-4, f64::NAN, 1.1 * own.dt] {
+            let error = scene.with("substep", wrong).unwrap_err().to_string();
+            assert!(
+                error.starts_with("substep must be positive and at most the preset's"),
+                "{error}"
+            );
+            for preset in Preset::ALL {
+                let steps_a_second = (1.0 / preset.settings().dt).round();
+                let said = [
+                    format!("1/{steps_a_second} of {preset}"),
+                    format!("1/{steps_a_second} s of {preset}"),
+                ];
+                assert!(said.iter().any(|words| error.contains(words)), "{preset}: {error}");
+            }
+        }
+        // 1 / 3333 s fits `default` and not `accurate`.
+        assert!(
+            Scene { preset: Preset::Accurate, ..finer.with("substep", 3e-4).unwrap() }
+                .check()
+                .is_err()
+        );
     }
 
     #[test]

@@ -21,7 +21,7 @@ use crate::motion::Motion;
 use crate::observe::Observe;
 use crate::outflow::Outflow;
 use crate::periodic::Periodic;
-use crate::preset::Preset;
+use crate::preset::{Preset, SolverSettings};
 use crate::start::Start;
 use crate::view::{ViewSpec, check_views};
 use crate::walls::{Funnel, Ground, Shape, Wall};
@@ -35,6 +35,9 @@ pub struct Scene {
     /// Solver settings by name.
     #[serde(default)]
     pub preset: Preset,
+    /// Substep `[s]`, where the preset's is too coarse: small grains, or a strong gravity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub substep: Option<f64>,
     /// Gravity `[m/s^2]`.
     #[serde(default = "standard_gravity")]
     pub gravity: [f64; 3],
@@ -86,6 +89,7 @@ impl Scene {
         Self {
             name: "funnel".to_owned(),
             preset: Preset::Default,
+            substep: None,
             gravity: standard_gravity(),
             material: Material::default(),
             grains: Grains::balls(2000, 4e-3, 1300.0),
@@ -245,6 +249,23 @@ impl Scene {
         exclude("end.rolled_away = \"leave\"", &others)
     }
 
+    /// The preset's settings, at the substep that the scene states, if it does.
+    pub fn settings(&self) -> SolverSettings {
+        let own = self.preset.settings();
+        SolverSettings { dt: self.substep.unwrap_or(own.dt), ..own }
+    }
+
+    /// A substep may be finer than the preset's, whose other settings a coarser one would not fit.
+    fn check_substep(&self) -> Result<(), SceneError> {
+        let Some(substep) = self.substep else { return Ok(()) };
+        if substep > 0.0 && substep <= self.preset.settings().dt {
+            return Ok(());
+        }
+        let allowed = "positive and at most the preset's: 1/900 s of fast, 1/2000 of default, 1/6000 of accurate, 1/600 of \
+                       paper";
+        Err(SceneError::range("substep", substep, allowed))
+    }
+
     /// What an intruder cannot be with.
     fn check_intruder(&self) -> Result<(), SceneError> {
         let Some(intruder) = &self.intruder else { return Ok(()) };
@@ -267,6 +288,7 @@ impl Scene {
         positive("grains.diameter", self.grains.diameter)?;
         positive("grains.density", self.grains.density)?;
         self.end.check()?;
+        self.check_substep()?;
         self.check_rolled_away()?;
         for (axis, value) in ["x", "y", "z"].iter().zip(self.gravity) {
             finite(&format!("gravity.{axis}"), value)?;
@@ -277,14 +299,14 @@ impl Scene {
         self.check_shape()?;
         self.check_intruder()?;
         self.start.check(&self.held_grains())?;
-        self.effects.check_method(self.preset.settings().method)?;
+        self.effects.check_method(self.settings().method)?;
         if let Some(funnel) = &self.funnel {
             funnel.check(&self.material, self.grains.radius())?;
         }
         for (index, wall) in self.walls.iter().enumerate() {
             wall.check(&format!("walls.{index}"), &self.material, &self.grains)?;
         }
-        let (dt, diameter) = (self.preset.settings().dt, self.grains.diameter);
+        let (dt, diameter) = (self.settings().dt, self.grains.diameter);
         let walls = self.walls.iter().enumerate();
         let named = walls.map(|(index, wall)| (format!("walls.{index}"), &wall.motion));
         let funnel = self.funnel.iter().map(|funnel| ("funnel".to_owned(), &funnel.motion));

@@ -92,7 +92,7 @@ pub fn top_of(positions: &[Vector3<f64>]) -> f64 {
 /// Lets the grains come to rest and returns where they are. A packing is prepared with many sweeps, whatever
 /// the preset that is examined on it.
 pub fn settle(scene: &Scene) -> Vec<Vector3<f64>> {
-    let preset = scene.preset.settings();
+    let preset = scene.settings();
     let settings = SolverSettings { sweeps: PREPARING, max_sweeps: 2 * PREPARING, ..preset };
     let mut simulation = start(scene).with_settings(settings).expect("valid settings");
     wait_for_rest(&mut simulation);

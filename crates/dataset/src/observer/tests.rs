@@ -76,7 +76,7 @@ fn a_falling_grain_is_seen_where_it_is() {
     let series = series("discharged");
     assert_eq!((series.unit, series.times[0]), ("%", 0.0));
     let gaps: Vec<_> = series.times.windows(2).map(|t| t[1] - t[0]).collect();
-    let (dt, inner) = (scene.preset.settings().dt, &gaps[..gaps.len() - 1]);
+    let (dt, inner) = (scene.settings().dt, &gaps[..gaps.len() - 1]);
     assert!(inner.iter().all(|gap| (gap - 0.002).abs() <= dt), "{gaps:?}");
     let fell = series.values.iter().position(|&share| share > 0.0).unwrap();
     assert!((series.times[fell] - 0.0514).abs() < 0.0025, "{}", series.times[fell]);
@@ -124,7 +124,7 @@ fn what_has_left_the_scene_has_run_out_and_ends_the_pour() {
     let (pour, observer) = run(&scene);
     assert_eq!((pour.status, pour.positions.len(), pour.radii_out.len()), (Status::RanOut, 0, 1));
     // It passes 20 mm after sqrt(2 32 mm / g) = 80.8 ms.
-    let search = scene.preset.settings().list_period as f64 * scene.preset.settings().dt;
+    let search = scene.settings().list_period as f64 * scene.settings().dt;
     assert!((0.0..=search).contains(&(pour.simulated_s - 0.0807)), "{}", pour.simulated_s);
     let observed = observer.observed(&pour);
     let (_, share) = observed

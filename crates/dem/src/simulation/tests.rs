@@ -135,6 +135,24 @@ fn an_impact_that_does_not_happen_moves_no_grain() {
     assert_eq!(simulation.particles.clocks, [0.0]);
 }
 
+#[test]
+fn a_scene_has_its_own_substep() {
+    let finer = scene().with("substep", 2e-4).expect("finer than that of `default`");
+    let (mut stated, settings) = (start(&finer), *start(&finer).settings());
+    assert_eq!(settings, SolverSettings { dt: 2e-4, ..Preset::Default.settings() });
+    let mut set = start(&scene()).with_settings(settings).expect("valid settings");
+    stated.advance(0.1);
+    set.advance(0.1);
+    assert_eq!(stated.positions(), set.positions());
+    assert!(
+        stated.positions() != {
+            set = start(&scene());
+            set.advance(0.1);
+            set.positions()
+        }
+    );
+}
+
 /// A simulation with pairs and walls in its lists.
 fn flowing() -> Simulation {
     let mut simulation = start(&scene());
