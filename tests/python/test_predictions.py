@@ -11,11 +11,12 @@ from granulcal.experiments.predictions.between_tests import BetweenTests, Told
 from granulcal.experiments.predictions.column_tests import (
     Fronts,
     Test,
+    observing,
     read_fronts,
     read_tests,
     times_of,
 )
-from granulcal.experiments.predictions.columns import column_rows, observing
+from granulcal.experiments.predictions.columns import column_rows
 from granulcal.experiments.predictions.drum import SPEEDS, drum_rows
 from granulcal.experiments.predictions.drum_base import DrumBase
 from granulcal.experiments.predictions.model_error import ModelError

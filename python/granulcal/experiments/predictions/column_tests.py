@@ -4,6 +4,7 @@ A test states gravity, beads and fluid. Fronts are taken at times in units of 1 
 fall of the test's gravity, so that those of all gravities stand in one table.
 """
 
+import re
 from dataclasses import dataclass
 from math import sqrt
 from pathlib import Path
@@ -11,10 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.errors import ObservationError
 from granulcal.measured.run_out import RunOut
 from granulcal.pours.scene import Scene
 
-__all__ = ["Fronts", "Test", "all_tests", "read_fronts", "read_tests", "times_of"]
+__all__ = ["Fronts", "Test", "all_tests", "observing", "read_fronts", "read_tests", "times_of"]
 
 Array = NDArray[np.float64]
 
@@ -109,6 +111,19 @@ def all_tests(data: Path) -> list[Test]:
     tests = read_tests(data / _CONDITIONS)
     further = data.parent / _FURTHER
     return tests + (read_tests(further) if further.exists() else [])
+
+
+def observing(scene: Scene, times: Array) -> Scene:
+    """Returns the scene with its front taken at `times` [s]."""
+    listed = ", ".join(repr(float(t)) for t in times)
+    text, count = re.subn(
+        r"(?ms)(^\[observe\.front\].*?^times = )\[[^\]]*\]",
+        rf"\g<1>[{listed}]",
+        scene.to_toml(),
+    )
+    if count != 1:
+        raise ObservationError("the scene observes no front")
+    return Scene.from_toml(text)
 
 
 def times_of(test: Test) -> Array:

@@ -16,16 +16,22 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.errors import ObservationError
 from granulcal.experiments.predictions.between_tests import MODELS as WITHOUT_PHYSICS
 from granulcal.experiments.predictions.between_tests import BetweenTests, Told
-from granulcal.experiments.predictions.column_tests import Test, all_tests, read_fronts, times_of
+from granulcal.experiments.predictions.column_fit import POINTS, ColumnFit
+from granulcal.experiments.predictions.column_tests import (
+    Test,
+    all_tests,
+    observing,
+    read_fronts,
+    times_of,
+)
 from granulcal.experiments.predictions.model_error import ModelError
+from granulcal.experiments.predictions.saturated_columns import SaturatedColumns
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.models import Models, Prediction
-from granulcal.pours.scene import Scene
 
-__all__ = ["column_rows", "column_rows_without_physics", "observing"]
+__all__ = ["column_rows", "column_rows_without_physics", "saturated_rows"]
 
 Array = NDArray[np.float64]
 
@@ -38,19 +44,6 @@ _FLUID = {
     "effects.lubrication.viscosity": "mu_f",
 }
 _FRONT = re.compile(r"front_radius\[(?P<at>[^\]]+)\]")
-
-
-def observing(scene: Scene, times: Array) -> Scene:
-    """Returns the scene with its front taken at `times` [s]."""
-    listed = ", ".join(repr(float(t)) for t in times)
-    text, count = re.subn(
-        r"(?ms)(^\[observe\.front\].*?^times = )\[[^\]]*\]",
-        rf"\g<1>[{listed}]",
-        scene.to_toml(),
-    )
-    if count != 1:
-        raise ObservationError("the scene observes no front")
-    return Scene.from_toml(text)
 
 
 def column_rows(
@@ -92,6 +85,59 @@ def column_rows_without_physics(
         for model in WITHOUT_PHYSICS:
             rows += _rows_of(model, test, rows_of.tell(model, test))
     return rows
+
+
+def saturated_rows(
+    data: Path, pours: Path, *, say: Callable[[str], None]
+) -> list[tuple[object, ...]]:
+    """Returns rows of `saturated`: one set of numbers for the bench, one for the centrifuge.
+
+    A measured test is told without those of its day.
+    """
+    fronts, columns = read_fronts(data), SaturatedColumns(pours)
+    tests, without_physics = all_tests(data), BetweenTests(fronts)
+    told = dict[str, Told]()
+    for name, spun in (("bench", False), ("centrifuge", True)):
+        fit = ColumnFit(
+            fronts.where(np.array([_is_spun(t) == spun for t in fronts.tests])), columns, name
+        )
+        numbers = ", ".join(f"{path} {value:.3g}" for path, value in fit.unknown.items())
+        say(f"columns, saturated, {name}: {numbers}")
+        late = ", ".join(f"{day} {1e3 * clock:.0f}" for day, clock in fit.clocks.items())
+        say(f"columns, saturated, {name}: clocks late by [ms] {late}")
+        own = [fit.tell_measured(i) for i in range(len(fit.fronts.tests))]
+        lines = [without_physics.tell("between", test) for test in fit.fronts.tests]
+        for model, rows in (("saturated", own), ("between", lines)):
+            rms, end, share = _held(fit.fronts.radius, rows)
+            say(
+                f"columns, {model}, {name}: measured tests told without those of their day with an "
+                f"rms of {rms:.1f} mm, at the end {end:.1f} mm; {share:.0%} in the 90 % intervals"
+            )
+        left = fit.fitted()[:, :-1]
+        say(f"columns, saturated, {name}: the fit leaves {np.sqrt(np.nanmean(left**2)):.1f} mm rms")
+        told |= {t.code: one for t, one in zip(fit.fronts.tests, own, strict=True)}
+        for test in tests:
+            if test.code in told or _is_spun(test) != spun:
+                continue
+            try:
+                told[test.code] = fit.tell(test, range(POINTS, POINTS + _POURS))
+            except ValueError as error:
+                say(f"columns, saturated of {test.code}: no prediction: {error}")
+    return [row for t in tests if t.code in told for row in _rows_of("saturated", t, told[t.code])]
+
+
+def _is_spun(test: Test) -> bool:
+    return test.numbers["N"] > 1.0
+
+
+def _held(measured: Array, rows: list[Told]) -> tuple[float, float, float]:
+    """Root mean square error over the times and at the end [mm], and the share held."""
+    gaps = measured - np.array([one.middle for one in rows])
+    inside = (measured >= np.array([one.low for one in rows])) & (
+        measured <= np.array([one.high for one in rows])
+    )
+    rms = [float(np.sqrt(np.nanmean(part**2))) for part in (gaps[:, :-1], gaps[:, -1])]
+    return rms[0], rms[1], float(inside[np.isfinite(measured)].mean())
 
 
 def _simulated_models(models: Models, say: Callable[[str], None]) -> list[str]:

@@ -1,0 +1,94 @@
+r"""Columns whose beads hold the liquid they stand in: what is known of a test, and its pours.
+
+A test states gravity, beads and liquid, and all of them are taken as stated: the fluid of the model
+fills the beads up to their own surface (`effects.fluid.saturated`), drags them as a packing does,
+and is squeezed out between them (`effects.lubrication`), with the test's own density and viscosity.
+What nobody measured is left: friction of the beads and of the ground, restitution, and how fast the
+tube is lifted (`UNKNOWN`).
+
+Every time of a pour, its substep too, is in units of the test's free fall, $1 / \sqrt N$, so that a
+pour at 28 g is as fine and as long as one at 1 g.
+"""
+
+from collections.abc import Sequence
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.experiments.predictions.column_tests import Test, observing, times_of
+from granulcal.loop.pours.forward import Forward
+from granulcal.pours.scene import Scene
+from granulcal.prior import Parameter, Prior
+
+__all__ = ["UNKNOWN", "SaturatedColumns"]
+
+Array = NDArray[np.float64]
+
+_SCENE = Path(__file__).parents[1] / "loop_column.toml"
+UNKNOWN = Prior(
+    [
+        Parameter(path="material.sliding_friction", distribution="uniform", low=0.05, high=0.8),
+        Parameter(path="material.rolling_friction", distribution="log_uniform", low=5e-3, high=0.3),
+        Parameter(path="material.restitution", distribution="uniform", low=0.2, high=0.9),
+        Parameter(path="walls.0.motion.velocity.2", distribution="log_uniform", low=0.1, high=3.0),
+        Parameter(
+            path="ground.material.sliding_friction", distribution="uniform", low=0.05, high=0.8
+        ),
+        Parameter(
+            path="ground.material.rolling_friction", distribution="log_uniform", low=5e-3, high=0.3
+        ),
+    ]
+)
+"""Friction of beads and ground, restitution, the tube's speed [m/s]."""
+# Times of the scene that go with free fall, and the one that is a rate.
+_TIMES = ("substep", "walls.0.motion.begin", "observe.begin", "end.horizon")
+_RATE = "observe.rate"
+_SEED = 8_700_001
+
+
+class SaturatedColumns:
+    """Pours of tests.
+
+    Args:
+        pours: folder of the kept ones.
+        threads: pours at once.
+    """
+
+    def __init__(self, pours: Path, threads: int = 1) -> None:
+        """Begins or goes on with a folder."""
+        self._forward = Forward(pours, threads)
+        self._scene = Scene.load(_SCENE)
+
+    def scene(self, test: Test) -> Scene:
+        """Returns the test's scene, of which only `UNKNOWN` is not stated."""
+        unit = 1.0 / sqrt(test.numbers["N"])
+        density, viscosity = test.numbers["rho_f"], test.numbers["mu_f"]
+        numbers = test.scene_numbers(self._scene)
+        numbers |= {path: unit * self._scene.get(path) for path in _TIMES}
+        numbers |= {
+            _RATE: self._scene.get(_RATE) / unit,
+            # The tube goes on for as long as anyone looks.
+            "walls.0.motion.end": numbers["end.horizon"],
+            "effects.fluid.density": density,
+            "effects.fluid.viscosity": viscosity,
+            "effects.fluid.crowding": 1.0,
+            "effects.fluid.saturated": 1.0,
+            "effects.lubrication.viscosity": viscosity,
+        }
+        return observing(self._scene, times_of(test)).with_(numbers)
+
+    def fronts(self, test: Test, unknown: Array, seeds: Sequence[int]) -> Array:
+        """Returns the fronts at the test's times and at the end [mm], shape (n, T + 1).
+
+        Args:
+            test: what is poured.
+            unknown: values of `UNKNOWN`, shape (6,).
+            seeds: of pours; those that are not usable have no row.
+        """
+        scene = self.scene(test).with_(dict(zip(UNKNOWN.names, unknown.tolist(), strict=True)))
+        rows = 1e3 * self._forward.pours(scene, [_SEED + seed for seed in seeds])
+        # A body that has fallen apart is no front: the end is the farthest that was one.
+        rows[:, -1] = np.fmax(rows[:, -1], np.nanmax(rows[:, :-1], axis=1))
+        return np.asarray(rows, dtype=np.float64)
