@@ -20,7 +20,7 @@ from pathlib import Path
 from granulcal.experiments.predictions.columns import (
     column_rows,
     column_rows_without_physics,
-    saturated_rows,
+    fitted_rows,
 )
 from granulcal.experiments.predictions.drum import drum_rows, drum_rows_without_loop
 from granulcal.files import write_beside
@@ -41,7 +41,7 @@ def reproduce(out: Path, data: Path) -> None:
     write_csv(folder / "drum.csv", ("model", "rpm", "x_mm", "z_mm", "low", "high"), profiles)
     write_csv(folder / "drum_slopes.csv", ("model", "rpm", "slope_deg", "low", "high"), slopes)
     fronts = column_rows_without_physics(data, say=print)
-    fronts = saturated_rows(data, out / "predictions-pours" / "columns", say=print) + fronts
+    fronts = fitted_rows(data, out / "predictions-pours" / "columns", say=print) + fronts
     column = _models(out / "loop_column", "loop_column")
     if column is not None:
         fronts = column_rows(column, out / "loop_column" / "pours", data, say=print) + fronts

@@ -1,4 +1,4 @@
-r"""One set of numbers for the saturated columns of one apparatus, and how it tells other days.
+r"""One set of numbers for the columns of one apparatus, and how it tells other days.
 
 The fronts $f_i(u, t)$ of a measured test i are emulated by a quadratic polynomial in the six
 coordinates u of `UNKNOWN`, from one pour each at points of a Sobol sequence. With a clock $c$ for
@@ -28,8 +28,8 @@ from scipy.stats import qmc
 from granulcal.bayessim.emulator.basis import polynomial
 from granulcal.bayessim.emulator.ridge import Ridge
 from granulcal.experiments.predictions.between_tests import Told
+from granulcal.experiments.predictions.column_pours import UNKNOWN, ColumnPours
 from granulcal.experiments.predictions.column_tests import Fronts, Test, times_of
-from granulcal.experiments.predictions.saturated_columns import UNKNOWN, SaturatedColumns
 from granulcal.progress import steps
 
 __all__ = ["POINTS", "ColumnFit", "Emulated"]
@@ -43,10 +43,8 @@ _DESIGN_SEED = 5
 _OWN, _CLOCK, _COUNT = 5.0, 0.02, 4.0
 # Radius of the column, and of what is seen of the tube about it; what the cameras see [mm].
 _COLUMN, _TUBE, _SEEN = 54.0, 62.0, 200.0
-_STARTS = 6
+_STARTS = 8
 _HALF = 1.645
-# Tests that are equal in these are poured once.
-_SAME = ("N", "d_p", "rho_f", "mu_f")
 
 
 @dataclass(frozen=True)
@@ -91,18 +89,14 @@ class ColumnFit:
         name: of the apparatus, for the progress.
     """
 
-    def __init__(self, fronts: Fronts, columns: SaturatedColumns, name: str) -> None:
+    def __init__(self, fronts: Fronts, columns: ColumnPours, name: str) -> None:
         """Pours what is missing and fits."""
         self.fronts, self._columns = fronts, columns
-        points = qmc.Sobol(len(UNKNOWN.names), rng=_DESIGN_SEED).random(POINTS)
-        alike: dict[tuple[float, ...], Emulated] = {}
-        emulated = []
-        for test in steps(f"{name}: tests", list(fronts.tests)):
-            key = tuple(test.numbers[column] for column in _SAME)
-            if key not in alike:
-                alike[key] = self._emulated(test, np.asarray(points))
-            emulated.append(alike[key])
-        self.emulated: tuple[Emulated, ...] = tuple(emulated)
+        # Tests of one scene are poured once.
+        scenes = [columns.scene(test) for test in fronts.tests]
+        first = [scenes.index(scene) for scene in scenes]
+        emulated = self._emulate([fronts.tests[i] for i in sorted(set(first))], name)
+        self.emulated: tuple[Emulated, ...] = tuple(emulated[fronts.tests[i].code] for i in first)
         self._days = np.array([test.campaign for test in fronts.tests])
         everything = np.full(len(self._days), True)
         self._all = self._fit(everything)
@@ -149,16 +143,21 @@ class ColumnFit:
         middle = _seen(_late(times_of(test), rows.mean(axis=0), self._all.clock))
         return self._within(test, middle, np.full(len(self._days), True))
 
-    def _emulated(self, test: Test, points: Array) -> Emulated:
-        """Emulator of one pour at each of the points (n, 6)."""
+    def _emulate(self, tests: list[Test], name: str) -> dict[str, Emulated]:
+        """Emulators of one pour at each point, by the code of the test."""
+        points = np.asarray(qmc.Sobol(len(UNKNOWN.names), rng=_DESIGN_SEED).random(POINTS))
         values = UNKNOWN.from_unconstrained(points)
-        rows, kept = [], []
-        for number in steps(f"pours of {test.code}", list(range(len(points)))):
-            found = self._columns.fronts(test, values[number], [number])
-            if len(found):
-                rows.append(found[0])
-                kept.append(number)
-        return Emulated.of(test, points[kept], np.array(rows))
+        asked = [(test, number) for test in tests for number in range(POINTS)]
+        fronts: dict[str, list[Array]] = {test.code: [] for test in tests}
+        kept: dict[str, list[int]] = {test.code: [] for test in tests}
+        for test, number in steps(f"{name}: pours", asked):
+            for front in self._columns.fronts(test, values[number], [number]):
+                fronts[test.code].append(front)
+                kept[test.code].append(number)
+        return {
+            test.code: Emulated.of(test, points[kept[test.code]], np.array(fronts[test.code]))
+            for test in tests
+        }
 
     def _told(self, number: int, fit: "_Fit", clock: float | None = None) -> Array:
         one = self.emulated[number]

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from granulcal.experiments.predictions.between_tests import MODELS as WITHOUT_PHYSICS
 from granulcal.experiments.predictions.between_tests import BetweenTests, Told
 from granulcal.experiments.predictions.column_fit import POINTS, ColumnFit
+from granulcal.experiments.predictions.column_pours import ColumnPours
 from granulcal.experiments.predictions.column_tests import (
     Test,
     all_tests,
@@ -27,11 +28,10 @@ from granulcal.experiments.predictions.column_tests import (
     times_of,
 )
 from granulcal.experiments.predictions.model_error import ModelError
-from granulcal.experiments.predictions.saturated_columns import SaturatedColumns
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.models import Models, Prediction
 
-__all__ = ["column_rows", "column_rows_without_physics", "saturated_rows"]
+__all__ = ["column_rows", "column_rows_without_physics", "fitted_rows"]
 
 Array = NDArray[np.float64]
 
@@ -43,6 +43,8 @@ _FLUID = {
     "effects.fluid.viscosity": "mu_f",
     "effects.lubrication.viscosity": "mu_f",
 }
+FITTED = {"saturated": False, "dry": True}
+"""Models that are fitted to measured tests: whether they are without the liquid."""
 _FRONT = re.compile(r"front_radius\[(?P<at>[^\]]+)\]")
 
 
@@ -87,57 +89,69 @@ def column_rows_without_physics(
     return rows
 
 
-def saturated_rows(
-    data: Path, pours: Path, *, say: Callable[[str], None]
-) -> list[tuple[object, ...]]:
-    """Returns rows of `saturated`: one set of numbers for the bench, one for the centrifuge.
+def fitted_rows(data: Path, pours: Path, *, say: Callable[[str], None]) -> list[tuple[object, ...]]:
+    """Returns rows of `saturated` and `dry`, each fitted to the bench and to the centrifuge.
 
     A measured test is told without those of its day.
     """
-    fronts, columns = read_fronts(data), SaturatedColumns(pours)
-    tests, without_physics = all_tests(data), BetweenTests(fronts)
-    told = dict[str, Told]()
-    for name, spun in (("bench", False), ("centrifuge", True)):
-        fit = ColumnFit(
-            fronts.where(np.array([_is_spun(t) == spun for t in fronts.tests])), columns, name
-        )
-        numbers = ", ".join(f"{path} {value:.3g}" for path, value in fit.unknown.items())
-        say(f"columns, saturated, {name}: {numbers}")
-        late = ", ".join(f"{day} {1e3 * clock:.0f}" for day, clock in fit.clocks.items())
-        say(f"columns, saturated, {name}: clocks late by [ms] {late}")
-        own = [fit.tell_measured(i) for i in range(len(fit.fronts.tests))]
-        lines = [without_physics.tell("between", test) for test in fit.fronts.tests]
-        for model, rows in (("saturated", own), ("between", lines)):
-            rms, end, share = _held(fit.fronts.radius, rows)
-            say(
-                f"columns, {model}, {name}: measured tests told without those of their day with an "
-                f"rms of {rms:.1f} mm, at the end {end:.1f} mm; {share:.0%} in the 90 % intervals"
-            )
-        left = fit.fitted()[:, :-1]
-        say(f"columns, saturated, {name}: the fit leaves {np.sqrt(np.nanmean(left**2)):.1f} mm rms")
-        told |= {t.code: one for t, one in zip(fit.fronts.tests, own, strict=True)}
-        for test in tests:
-            if test.code in told or _is_spun(test) != spun:
-                continue
-            try:
-                told[test.code] = fit.tell(test, range(POINTS, POINTS + _POURS))
-            except ValueError as error:
-                say(f"columns, saturated of {test.code}: no prediction: {error}")
-    return [row for t in tests if t.code in told for row in _rows_of("saturated", t, told[t.code])]
+    fronts, tests = read_fronts(data), all_tests(data)
+    rows = list[tuple[object, ...]]()
+    for model, dry in FITTED.items():
+        columns, told = ColumnPours(pours, dry=dry), dict[str, Told]()
+        for name, spun in (("bench", False), ("centrifuge", True)):
+            its = fronts.where(np.array([_is_spun(test) == spun for test in fronts.tests]))
+            fit = ColumnFit(its, columns, f"{model}, {name}")
+            told |= _fitted(model, fit, [t for t in tests if _is_spun(t) == spun], say)
+            _say_fit(f"columns, {model}, {name}", fit, say)
+        measured = [told[test.code] for test in fronts.tests]
+        say(f"columns, {model}: {_held(fronts.radius, measured)}")
+        rows += [row for t in tests if t.code in told for row in _rows_of(model, t, told[t.code])]
+    return rows
+
+
+def _fitted(
+    model: str, fit: ColumnFit, tests: list[Test], say: Callable[[str], None]
+) -> dict[str, Told]:
+    measured = {test.code: number for number, test in enumerate(fit.fronts.tests)}
+    told = {code: fit.tell_measured(number) for code, number in measured.items()}
+    for test in tests:
+        if test.code in told:
+            continue
+        try:
+            told[test.code] = fit.tell(test, range(POINTS, POINTS + _POURS))
+        except ValueError as error:
+            say(f"columns, {model} of {test.code}: no prediction: {error}")
+    return told
+
+
+def _say_fit(name: str, fit: ColumnFit, say: Callable[[str], None]) -> None:
+    left = fit.fitted()[:, :-1]
+    say(f"{name}: the fit leaves {np.sqrt(np.nanmean(left**2)):.1f} mm rms")
+    say(f"{name}: " + ", ".join(f"{path} {value:.3g}" for path, value in fit.unknown.items()))
+    late = ", ".join(f"{day} {1e3 * clock:.0f}" for day, clock in fit.clocks.items())
+    say(f"{name}: clocks late by [ms] {late}")
+    rows = [fit.tell_measured(number) for number in range(len(fit.fronts.tests))]
+    say(f"{name}: {_held(fit.fronts.radius, rows)}")
+    without_physics = BetweenTests(fit.fronts)
+    rows = [without_physics.tell("between", test) for test in fit.fronts.tests]
+    say(f"{name}, between: {_held(fit.fronts.radius, rows)}")
 
 
 def _is_spun(test: Test) -> bool:
     return test.numbers["N"] > 1.0
 
 
-def _held(measured: Array, rows: list[Told]) -> tuple[float, float, float]:
-    """Root mean square error over the times and at the end [mm], and the share held."""
+def _held(measured: Array, rows: list[Told]) -> str:
+    """What tests are told by that are told without those of their day."""
     gaps = measured - np.array([one.middle for one in rows])
     inside = (measured >= np.array([one.low for one in rows])) & (
         measured <= np.array([one.high for one in rows])
     )
-    rms = [float(np.sqrt(np.nanmean(part**2))) for part in (gaps[:, :-1], gaps[:, -1])]
-    return rms[0], rms[1], float(inside[np.isfinite(measured)].mean())
+    rms, end = (float(np.sqrt(np.nanmean(part**2))) for part in (gaps[:, :-1], gaps[:, -1]))
+    return (
+        f"measured tests told without those of their day with an rms of {rms:.1f} mm, at the end "
+        f"{end:.1f} mm; {inside[np.isfinite(measured)].mean():.0%} in the 90 % intervals"
+    )
 
 
 def _simulated_models(models: Models, say: Callable[[str], None]) -> list[str]:

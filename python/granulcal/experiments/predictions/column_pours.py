@@ -1,10 +1,10 @@
-r"""Columns whose beads hold the liquid they stand in: what is known of a test, and its pours.
+r"""Columns of beads, dry or holding their liquid: what is known of a test, and its pours.
 
 A test states gravity, beads and liquid, and all of them are taken as stated: the fluid of the model
 fills the beads up to their own surface (`effects.fluid.saturated`), drags them as a packing does,
 and is squeezed out between them (`effects.lubrication`), with the test's own density and viscosity.
 What nobody measured is left: friction of the beads and of the ground, restitution, and how fast the
-tube is lifted (`UNKNOWN`).
+tube is lifted (`UNKNOWN`). Dry columns are the same without the liquid.
 
 Every time of a pour, its substep too, is in units of the test's free fall, $1 / \sqrt N$, so that a
 pour at 28 g is as fine and as long as one at 1 g.
@@ -22,7 +22,7 @@ from granulcal.loop.pours.forward import Forward
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 
-__all__ = ["UNKNOWN", "SaturatedColumns"]
+__all__ = ["UNKNOWN", "ColumnPours"]
 
 Array = NDArray[np.float64]
 
@@ -48,35 +48,38 @@ _RATE = "observe.rate"
 _SEED = 8_700_001
 
 
-class SaturatedColumns:
+class ColumnPours:
     """Pours of tests.
 
     Args:
         pours: folder of the kept ones.
-        threads: pours at once.
+        dry: without the liquid.
     """
 
-    def __init__(self, pours: Path, threads: int = 1) -> None:
+    def __init__(self, pours: Path, *, dry: bool = False) -> None:
         """Begins or goes on with a folder."""
-        self._forward = Forward(pours, threads)
+        self._forward, self._dry = Forward(pours, 1), dry
         self._scene = Scene.load(_SCENE)
 
     def scene(self, test: Test) -> Scene:
         """Returns the test's scene, of which only `UNKNOWN` is not stated."""
         unit = 1.0 / sqrt(test.numbers["N"])
-        density, viscosity = test.numbers["rho_f"], test.numbers["mu_f"]
         numbers = test.scene_numbers(self._scene)
         numbers |= {path: unit * self._scene.get(path) for path in _TIMES}
         numbers |= {
             _RATE: self._scene.get(_RATE) / unit,
             # The tube goes on for as long as anyone looks.
             "walls.0.motion.end": numbers["end.horizon"],
-            "effects.fluid.density": density,
-            "effects.fluid.viscosity": viscosity,
-            "effects.fluid.crowding": 1.0,
-            "effects.fluid.saturated": 1.0,
-            "effects.lubrication.viscosity": viscosity,
         }
+        if not self._dry:
+            density, viscosity = test.numbers["rho_f"], test.numbers["mu_f"]
+            numbers |= {
+                "effects.fluid.density": density,
+                "effects.fluid.viscosity": viscosity,
+                "effects.fluid.crowding": 1.0,
+                "effects.fluid.saturated": 1.0,
+                "effects.lubrication.viscosity": viscosity,
+            }
         return observing(self._scene, times_of(test)).with_(numbers)
 
     def fronts(self, test: Test, unknown: Array, seeds: Sequence[int]) -> Array:
