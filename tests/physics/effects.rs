@@ -153,6 +153,58 @@ fn a_film_takes_speed_from_what_comes_together_and_none_from_what_moves_as_one()
     assert!(v[0].abs() < 0.05 && (v[0] + v[1]).abs() < 1e-12, "{v:?}");
 }
 
+/// Two weightless grains side by side along x, `gap` apart, with a film of 0.05 Pa s that resists shear: velocities and
+/// spins after `seconds` of those given.
+fn sheared(motion: [[Vector3<f64>; 2]; 2], gap: f64, seconds: f64) -> [[Vector3<f64>; 2]; 2] {
+    let mut scene = one_grain(0.1, material(0.5, 0.1, 0.5));
+    scene.gravity = [0.0; 3];
+    scene.grains = Grains::balls(2, 2.0 * RADIUS, 2500.0);
+    scene.start =
+        Start::Positions { positions: vec![[0.0, 0.0, 0.1], [2.0 * RADIUS + gap, 0.0, 0.1]] };
+    scene.effects.lubrication =
+        Lubrication { viscosity: 0.05, shear: 1.0, ..Lubrication::default() };
+    let mut simulation = start(&scene);
+    for (grain, [velocity, spin]) in motion.iter().enumerate() {
+        simulation.set_motion(grain, *velocity, *spin).unwrap();
+    }
+    simulation.advance(seconds);
+    let (v, w) = (simulation.velocities(), simulation.angular_velocities());
+    [[v[0], w[0]], [v[1], w[1]]]
+}
+
+#[test]
+fn a_film_takes_speed_from_surfaces_that_slide_and_none_from_what_turns_as_gears() {
+    let mass = 2500.0 * 4.0 / 3.0 * PI * RADIUS.powi(3);
+    let (gap, seconds, speed) = (0.05 * RADIUS, 40.0 * DT, 0.01);
+    let (up, still) = (speed * Vector3::z(), Vector3::zeros());
+    let found = sheared([[up, still], [-up, still]], gap, seconds);
+    // du/dt = -2 (7/2) pi mu a ln(a / h) u / m; the gap hardly opens on so short a way.
+    let rate = 7.0 * PI * 0.05 * RADIUS * (RADIUS / gap).ln() / mass;
+    let slides = |[[v, w], [v_j, w_j]]: [[Vector3<f64>; 2]; 2]| {
+        v.z - v_j.z - RADIUS * ((w + w_j).cross(&-Vector3::x())).z
+    };
+    let left = slides(found) / (2.0 * speed);
+    assert!(left < 0.9, "{left}");
+    assert!((left.ln() / (-rate * seconds) - 1.0).abs() < 0.03, "{left} {}", rate * seconds);
+    // Nothing of the momentum, and of the angular momentum about the middle nothing either.
+    let [[v, w], [v_j, w_j]] = found;
+    assert!((v + v_j).norm() < 1e-15);
+    let arm = RADIUS + 0.5 * gap;
+    let before = -2.0 * arm * -speed;
+    let after = -arm * -(v.z - v_j.z) + 0.4 * RADIUS * RADIUS * (w + w_j).y;
+    assert!((after / before - 1.0).abs() < 0.03, "{after} {before}");
+    // Gears: spins that are opposite have equal surfaces.
+    let turn = Vector3::new(0.0, 5.0, 0.0);
+    assert_eq!(
+        sheared([[still, turn], [still, -turn]], gap, seconds),
+        [[still, turn], [still, -turn]]
+    );
+    // However thick the film, it turns nothing round; so slowly that the pair itself hardly turns.
+    let slow = 1e-3 * up;
+    let thick = slides(sheared([[slow, still], [-slow, still]], 1e-3 * RADIUS, 0.1)) / slow.z;
+    assert!(thick.abs() < 1e-2, "{thick}");
+}
+
 #[test]
 fn terminal_speed_is_schillers_and_naumanns() {
     // Glycerol, water, and ten times as thick: Re 0.03, 1700, 120.

@@ -15,6 +15,7 @@ pub fn block(counts: [usize; 3], spacing: f64, base: f64, material: Material) ->
     Scene {
         name: "block".to_owned(),
         preset: Preset::Default,
+        substep: None,
         gravity: [0.0, 0.0, -GRAVITY],
         material,
         grains: Grains::balls(counts.iter().product(), 2.0 * RADIUS, 1300.0),

@@ -53,17 +53,17 @@ def measured() -> Fronts:
 
 @pytest.fixture(scope="module")
 def fit(tmp_path_factory: pytest.TempPathFactory) -> ColumnFit:
-    return ColumnFit(measured(), Closed(tmp_path_factory.mktemp("pours")), "bench")
+    return ColumnFit(measured(), Closed(tmp_path_factory.mktemp("pours"), "dry"), "bench")
 
 
 def test_clocks_and_fronts_are_found_again(fit: ColumnFit) -> None:
     gaps = fit.fitted()
     # A clock's prior holds it back by a little, and times before the tube is passed are not fitted.
     assert np.sqrt(np.mean(gaps**2)) < 1.5
-    shifts = np.array([fit.clocks[day] - late for day, late in LATE.items()])
+    shifts = np.array([fit.clocks(1)[day] - late for day, late in LATE.items()])
     # What all clocks share a faster tube can be, too.
     assert np.ptp(shifts) < 0.004
-    assert set(fit.unknown) == set(UNKNOWN.names)
+    assert set(fit.unknown(1)) == set(UNKNOWN.names)
 
 
 def test_a_day_is_told_without_itself(fit: ColumnFit) -> None:
@@ -76,7 +76,7 @@ def test_a_day_is_told_without_itself(fit: ColumnFit) -> None:
     changed = Fronts(fit.fronts.tests, fit.fronts.radius.copy())
     same_day = [test.campaign == "20210102" for test in changed.tests]
     changed.radius[same_day] += 15.0
-    again = ColumnFit(changed, Closed(Path("unused")), "bench").tell_measured(day)
+    again = ColumnFit(changed, Closed(Path("unused"), "dry"), "bench").tell_measured(day)
     assert again.middle == pytest.approx(told.middle)
 
 
@@ -100,10 +100,14 @@ def test_an_emulator_reproduces_a_polynomial_and_says_what_it_is_off_by() -> Non
 
 
 def test_a_pour_has_the_liquid_and_the_free_fall_of_its_test(tmp_path: Path) -> None:
-    columns = ColumnPours(tmp_path / "pours")
+    columns = ColumnPours(tmp_path / "pours", "sheared")
     slow, fast = columns.scene(one("a", 1.0, 1e-3)), columns.scene(one("a", 25.0, 5e-2, 6e-3))
     assert fast.get("effects.fluid.viscosity") == fast.get("effects.lubrication.viscosity") == 5e-2
-    assert fast.get("effects.fluid.saturated") == 1.0 and fast.get("gravity.2") == -9.81 * 25
+    assert fast.get("effects.fluid.saturated") == fast.get("effects.lubrication.shear") == 1.0
+    without = ColumnPours(tmp_path / "pours", "saturated").scene(one("a", 1.0, 1e-3))
+    assert without.get("effects.lubrication.shear") == 0.0
+    assert not ColumnPours(tmp_path, "dry").scene(one("a", 1.0, 1e-3)).has("effects.fluid.density")
+    assert fast.get("gravity.2") == -9.81 * 25
     for path in ("substep", "end.horizon", "observe.begin", "walls.0.motion.begin"):
         assert fast.get(path) == pytest.approx(slow.get(path) / 5.0), path
     assert fast.get("grains.count") == round(slow.get("grains.count") * (8 / 6) ** 3)

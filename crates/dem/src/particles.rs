@@ -139,8 +139,14 @@ impl Particles {
         self.bodies[grain].velocity.vector()
     }
 
+    /// Angular velocity times radius `[m/s]`.
+    #[inline]
+    pub fn spin(&self, grain: usize) -> Vector3<f64> {
+        self.bodies[grain].spin.vector()
+    }
+
     pub fn angular_velocity(&self, grain: usize) -> Vector3<f64> {
-        self.bodies[grain].spin.vector() / self.radius(grain)
+        self.spin(grain) / self.radius(grain)
     }
 
     /// Sets velocity `[m/s]` and angular velocity `[rad/s]` of a grain.
@@ -196,6 +202,13 @@ impl Particles {
     pub fn kick(&mut self, grain: usize, impulse: &Vector3<f64>) {
         let step = self.inverse_mass[grain] * impulse;
         self.bodies[grain].velocity.add(&step);
+    }
+
+    /// Adds an impulse over a typical mass `[m/s]` at a grain's surface, where `outwards` is the normal.
+    pub fn kick_at(&mut self, grain: usize, impulse: &Vector3<f64>, outwards: &Vector3<f64>) {
+        self.kick(grain, impulse);
+        let twist = INVERSE_INERTIA * self.inverse_mass[grain] * outwards.cross(impulse);
+        self.bodies[grain].spin.add(&twist);
     }
 
     /// v += g dt.

@@ -21,6 +21,7 @@ pub fn scene(positions: &[Vector3<f64>], material: Material, walls: Vec<Wall>) -
     Scene {
         name: "bulk".to_owned(),
         preset: Preset::Default,
+        substep: None,
         gravity: [0.0, 0.0, -GRAVITY],
         material,
         grains: Grains::balls(positions.len(), DIAMETER, 2500.0),

@@ -1,19 +1,22 @@
-r"""One set of numbers for the columns of one apparatus, and how it tells other days.
+r"""One set of numbers for the beads of all columns, and how it tells tests of other days.
 
 The fronts $f_i(u, t)$ of a measured test i are emulated by a quadratic polynomial in the six
-coordinates u of `UNKNOWN`, from one pour each at points of a Sobol sequence. With a clock $c$ for
-each day,
+coordinates u of `UNKNOWN`, from one pour each at points of a Sobol sequence. What the beads are
+(friction between them, restitution) is the same in every test; the ground and the tube are those of
+the bench (1 g) or of the centrifuge. With a clock $c$ for each day of each apparatus,
 
 $$ \min_{u, c} \sum_{i, t} \frac{(f_i(u, t - c_i) - r_i(t))^2}{(s^2 + e_i(t)^2)\, \max(1, T_i / 4)}
-   + \sum_{day} c^2 / s_c^2 $$
+   + \sum_k \frac{(u_k - 1/2)^2}{1 / 12} + \sum_{day} \frac{c^2}{s_c^2}, \qquad 0 \le u \le 1 $$
 
-with the error e of the emulator (leave one out), s = 5 mm and s_c = 20 ms: the $T_i$ times of one
-front count as four. Until the beads have come out from under the tube all that is seen is the tube,
-and such times are not fitted.
+with the error e of the emulator (leave one out), s = 5 mm and s_c = 20 ms. The $T_i$ times of one
+front count as four, and the uniform priors as normals of their mean and spread: what the fronts do
+not tell stays in the middle. Until the beads have come out from under the tube all that is seen is
+the tube, and such times are not fitted.
 
-A test is told by the fit without its day, at the mean clock of the other days. The error of a row
-is the root mean square of what such rows are off by, at equal times of free fall, and what the
-scatter of the clocks does where gravity is stronger than in the tests that tell the error.
+A test is told by the fit without its day, at the mean clock of the apparatus' other days. The error
+of a row is the root mean square of what such rows are off by, at equal times of free fall and of
+one apparatus, and what the scatter of the clocks does where gravity is stronger than in the tests
+that tell the error.
 """
 
 from collections.abc import Sequence
@@ -32,18 +35,25 @@ from granulcal.experiments.predictions.column_pours import UNKNOWN, ColumnPours
 from granulcal.experiments.predictions.column_tests import Fronts, Test, times_of
 from granulcal.progress import steps
 
-__all__ = ["POINTS", "ColumnFit", "Emulated"]
+__all__ = ["APPARATUS", "POINTS", "SEEN", "TUBE", "ColumnFit", "Emulated", "apparatus"]
 
 Array = NDArray[np.float64]
 
+APPARATUS = ("bench", "centrifuge")
+"""Where tests are made: at one g or above."""
 POINTS = 64
 """Pours of each measured test."""
 _DESIGN_SEED = 5
 # One sd of the model's own error [mm] and of a day's clock [s]; times of a front that count.
 _OWN, _CLOCK, _COUNT = 5.0, 0.02, 4.0
-# Radius of the column, and of what is seen of the tube about it; what the cameras see [mm].
-_COLUMN, _TUBE, _SEEN = 54.0, 62.0, 200.0
+# Radius of the column [mm].
+_COLUMN = 54.0
+TUBE, SEEN = 62.0, 200.0
+"""What is seen before the beads come out from under the tube, and as far as cameras see [mm]."""
 _STARTS = 8
+# Of the unknowns so many are of the beads, the others of the apparatus.
+_OF_BEADS = 3
+_COORDINATES = 2 * len(UNKNOWN.names) - _OF_BEADS
 _HALF = 1.645
 
 
@@ -80,13 +90,26 @@ class Emulated:
         return np.asarray((polynomial(2 * u[None] - 1, 2) @ self.coefficients)[0])
 
 
+@dataclass(frozen=True)
+class _Fit:
+    """Coordinates of both apparatuses, shape (2, 6), and clocks [s] by day and apparatus."""
+
+    u: Array
+    clocks: dict[tuple[str, int], float]
+
+    def clock(self, apparatus: int) -> float:
+        """The mean of all days of an apparatus, 0 where none is known [s]."""
+        known = [clock for (_, its), clock in self.clocks.items() if its == apparatus]
+        return sum(known) / max(1, len(known))
+
+
 class ColumnFit:
-    """The fits of one apparatus: of all its days, and without each of them.
+    """The fit to all days, and those without each of them.
 
     Args:
-        fronts: its measured tests.
+        fronts: measured tests.
         columns: their pours.
-        name: of the apparatus, for the progress.
+        name: of the model, for the progress.
     """
 
     def __init__(self, fronts: Fronts, columns: ColumnPours, name: str) -> None:
@@ -98,37 +121,32 @@ class ColumnFit:
         emulated = self._emulate([fronts.tests[i] for i in sorted(set(first))], name)
         self.emulated: tuple[Emulated, ...] = tuple(emulated[fronts.tests[i].code] for i in first)
         self._days = np.array([test.campaign for test in fronts.tests])
-        everything = np.full(len(self._days), True)
-        self._all = self._fit(everything)
+        self._apparatus = np.array([apparatus(test) for test in fronts.tests])
+        self._all = self._fit(np.full(len(self._days), True))
         self._without = {day: self._fit(self._days != day) for day in sorted(set(self._days))}
-        gaps = [
-            row - self._told(i, self._without[day])
-            for i, (row, day) in enumerate(zip(fronts.radius, self._days, strict=True))
-        ]
-        self.gaps: Array = np.array(gaps)
-        self.clock_sd = float(np.std(list(self._all.clocks.values())))
+        told = [self._told(i, self._without[day]) for i, day in enumerate(self._days)]
+        self.gaps: Array = fronts.radius - np.array(told)
 
-    @property
-    def unknown(self) -> dict[str, float]:
-        """Values of `UNKNOWN` of the fit to all days."""
-        values = UNKNOWN.from_unconstrained(self._all.u[None])[0].tolist()
+    def unknown(self, of: int) -> dict[str, float]:
+        """Returns the values of `UNKNOWN` of an apparatus, by the fit to all days."""
+        values = UNKNOWN.from_unconstrained(self._all.u[of][None])[0].tolist()
         return dict(zip(UNKNOWN.names, values, strict=True))
 
-    @property
-    def clocks(self) -> dict[str, float]:
-        """What each day's clock is late by [s]."""
-        return self._all.clocks
+    def clocks(self, of: int) -> dict[str, float]:
+        """Returns what each day's clock is late by [s]."""
+        return {day: clock for (day, its), clock in self._all.clocks.items() if its == of}
 
     def fitted(self) -> Array:
         """Returns what the fit to all days leaves of the measured fronts [mm], shape (n, T + 1)."""
-        told = [self._told(i, self._all, self.clocks[day]) for i, day in enumerate(self._days)]
+        each = enumerate(zip(self._days, self._apparatus.tolist(), strict=True))
+        told = [self._told(i, self._all, self._all.clocks[day, of]) for i, (day, of) in each]
         return np.asarray(self.fronts.radius - np.array(told))
 
     def tell_measured(self, number: int) -> Told:
         """Returns the front of a measured test, told without its day."""
-        day = self._days[number]
+        test, day = self.fronts.tests[number], self._days[number]
         middle = self._told(number, self._without[day])
-        return self._within(self.fronts.tests[number], middle, self._days != day)
+        return self._within(test, middle, self._days != day)
 
     def tell(self, test: Test, seeds: Sequence[int]) -> Told:
         """Returns the front of a test that was not measured, from pours of its own.
@@ -136,11 +154,12 @@ class ColumnFit:
         Raises:
             ValueError: fewer than two of its pours are usable.
         """
-        unknown = UNKNOWN.from_unconstrained(self._all.u[None])[0]
+        of = apparatus(test)
+        unknown = UNKNOWN.from_unconstrained(self._all.u[of][None])[0]
         rows = self._columns.fronts(test, unknown, seeds)
         if len(rows) < 2:
             raise ValueError(f"{len(rows)} of {len(seeds)} pours are usable, two are needed")
-        middle = _seen(_late(times_of(test), rows.mean(axis=0), self._all.clock))
+        middle = _seen(_late(times_of(test), rows.mean(axis=0), self._all.clock(of)))
         return self._within(test, middle, np.full(len(self._days), True))
 
     def _emulate(self, tests: list[Test], name: str) -> dict[str, Emulated]:
@@ -159,65 +178,69 @@ class ColumnFit:
             for test in tests
         }
 
-    def _told(self, number: int, fit: "_Fit", clock: float | None = None) -> Array:
-        one = self.emulated[number]
-        return _seen(_late(one.times, one.at(fit.u), fit.clock if clock is None else clock))
+    def _told(self, number: int, fit: _Fit, clock: float | None = None) -> Array:
+        one, of = self.emulated[number], int(self._apparatus[number])
+        late = fit.clock(of) if clock is None else clock
+        return _seen(_late(one.times, one.at(fit.u[of]), late))
 
-    def _fit(self, keep: NDArray[np.bool_]) -> "_Fit":
+    def _fit(self, keep: NDArray[np.bool_]) -> _Fit:
         """The most probable numbers and clocks, given the tests for which `keep` (n,) holds."""
-        numbers = np.flatnonzero(keep).tolist()
-        days = sorted(set(self._days[keep]))
-        dimension = len(UNKNOWN.names)
+        days = sorted(set(zip(self._days[keep], self._apparatus[keep].tolist(), strict=True)))
         parts = []
-        for i in numbers:
-            front = self.fronts.radius[i, :-1]
-            used = np.isfinite(front) & (front > _TUBE + _OWN)
+        for i in np.flatnonzero(keep).tolist():
+            front, of = self.fronts.radius[i, :-1], int(self._apparatus[i])
+            used = np.isfinite(front) & (front > TUBE + _OWN)
             error = np.hypot(_OWN, self.emulated[i].error[:-1][used])
             scale = error * max(1.0, sqrt(used.sum() / _COUNT))
-            parts.append((i, days.index(self._days[i]), used, front[used], scale))
+            parts.append((i, of, days.index((self._days[i], of)), used, front[used], scale))
 
         def residuals(p: Array) -> Array:
-            u, clocks = p[:dimension], (_CLOCK * p[dimension:]).tolist()
-            left = [p[dimension:]]
-            for i, day, used, front, scale in parts:
+            u, clocks = _both(p[:_COORDINATES]), (_CLOCK * p[_COORDINATES:]).tolist()
+            left = [(p[:_COORDINATES] - 0.5) * sqrt(12.0), p[_COORDINATES:]]
+            for i, of, day, used, front, scale in parts:
                 one = self.emulated[i]
-                told = _late(one.times, one.at(u), clocks[day])[:-1]
+                told = _late(one.times, one.at(u[of]), clocks[day])[:-1]
                 left.append((told[used] - front) / scale)
             return np.concatenate(left)
 
-        low = np.concatenate([np.zeros(dimension), np.full(len(days), -np.inf)])
-        high = np.concatenate([np.ones(dimension), np.full(len(days), np.inf)])
-        starts = qmc.Sobol(dimension, rng=_DESIGN_SEED + 1).random(_STARTS)
+        clock = np.full(len(days), np.inf)
+        low, high = (
+            np.append(np.zeros(_COORDINATES), -clock),
+            np.append(np.ones(_COORDINATES), clock),
+        )
+        starts = qmc.Sobol(_COORDINATES, rng=_DESIGN_SEED + 1).random(_STARTS)
         found = [
             least_squares(residuals, np.append(u, np.zeros(len(days))), bounds=(low, high))
             for u in starts
         ]
         best = min(found, key=lambda one: one.cost).x
-        clocks = dict(zip(days, (_CLOCK * best[dimension:]).tolist(), strict=True))
-        return _Fit(best[:dimension], clocks)
+        clocks = (_CLOCK * best[_COORDINATES:]).tolist()
+        return _Fit(_both(best[:_COORDINATES]), dict(zip(days, clocks, strict=True)))
 
     def _within(self, test: Test, middle: Array, others: NDArray[np.bool_]) -> Told:
-        """With the error of the rows for which `others` (n,) holds."""
-        gaps = self.gaps[others]
-        square = np.nanmean(gaps**2, axis=0)
+        """With the error of the rows for which `others` (n,) holds, of the test's apparatus."""
+        of = apparatus(test)
+        others = others & (self._apparatus == of)
+        square = np.nanmean(self.gaps[others] ** 2, axis=0)
         # In units of free fall a clock is off by more where gravity is stronger.
-        gravity = float(np.mean([t.numbers["N"] for t in self.fronts.tests]))
-        share = max(0.0, 1.0 - gravity / test.numbers["N"])
-        drift = self.clock_sd * np.append(np.gradient(middle[:-1], times_of(test)), 0.0)
+        gravity = np.mean([t.numbers["N"] for t in self.fronts.tests if apparatus(t) == of])
+        share = max(0.0, 1.0 - float(gravity) / test.numbers["N"])
+        late = np.std(list(self.clocks(of).values()))
+        drift = late * np.append(np.gradient(middle[:-1], times_of(test)), 0.0)
         half = _HALF * np.sqrt(square + share * drift**2)
-        low, middle, high = (np.minimum(v, _SEEN) for v in (middle - half, middle, middle + half))
+        low, middle, high = (np.minimum(v, SEEN) for v in (middle - half, middle, middle + half))
         return Told(middle, low, high)
 
 
-@dataclass(frozen=True)
-class _Fit:
-    u: Array
-    clocks: dict[str, float]
+def apparatus(test: Test) -> int:
+    """Returns 0 for the bench, 1 for the centrifuge."""
+    return int(test.numbers["N"] > 1.0)
 
-    @property
-    def clock(self) -> float:
-        """The mean of all days [s]."""
-        return sum(self.clocks.values()) / len(self.clocks)
+
+def _both(u: Array) -> Array:
+    """Coordinates of both apparatuses, shape (2, 6): the beads are the same."""
+    beads, own = u[:_OF_BEADS], u[_OF_BEADS:].reshape(2, -1)
+    return np.array([np.append(beads, its) for its in own])
 
 
 def _late(times: Array, front: Array, clock: float) -> Array:
@@ -228,4 +251,4 @@ def _late(times: Array, front: Array, clock: float) -> Array:
 
 def _seen(front: Array) -> Array:
     """No less than the tube."""
-    return np.maximum(front, _TUBE)
+    return np.maximum(front, TUBE)

@@ -1,10 +1,14 @@
 r"""Columns of beads, dry or holding their liquid: what is known of a test, and its pours.
 
-A test states gravity, beads and liquid, and all of them are taken as stated: the fluid of the model
-fills the beads up to their own surface (`effects.fluid.saturated`), drags them as a packing does,
-and is squeezed out between them (`effects.lubrication`), with the test's own density and viscosity.
-What nobody measured is left: friction of the beads and of the ground, restitution, and how fast the
-tube is lifted (`UNKNOWN`). Dry columns are the same without the liquid.
+| model | liquid |
+|---|---|
+| `dry` | none |
+| `saturated` | fills the beads to their surface, drags them, is squeezed out between them |
+| `sheared` | the same, and resists surfaces that slide past each other |
+
+A test states gravity, beads and liquid, and all of them are taken as stated: density and viscosity
+of `effects.fluid` and `effects.lubrication` are the test's own. What nobody measured is left:
+friction of the beads and of the ground, restitution, and how fast the tube is lifted (`UNKNOWN`).
 
 Every time of a pour, its substep too, is in units of the test's free fall, $1 / \sqrt N$, so that a
 pour at 28 g is as fine and as long as one at 1 g.
@@ -22,7 +26,7 @@ from granulcal.loop.pours.forward import Forward
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 
-__all__ = ["UNKNOWN", "ColumnPours"]
+__all__ = ["LIQUIDS", "UNKNOWN", "ColumnPours"]
 
 Array = NDArray[np.float64]
 
@@ -42,6 +46,18 @@ UNKNOWN = Prior(
     ]
 )
 """Friction of beads and ground, restitution, the tube's speed [m/s]."""
+_SATURATED = {
+    "effects.fluid.crowding": 1.0,
+    "effects.fluid.saturated": 1.0,
+    # Of the fluid between grains of a solid fraction of 0.6.
+    "effects.fluid.added_mass": 0.4 / 0.6,
+}
+LIQUIDS: dict[str, dict[str, float] | None] = {
+    "sheared": {**_SATURATED, "effects.lubrication.shear": 1.0},
+    "saturated": _SATURATED,
+    "dry": None,
+}
+"""Models by name: numbers of the scene beside the liquid's own; None without a liquid."""
 # Times of the scene that go with free fall, and the one that is a rate.
 _TIMES = ("substep", "walls.0.motion.begin", "observe.begin", "end.horizon")
 _RATE = "observe.rate"
@@ -53,12 +69,12 @@ class ColumnPours:
 
     Args:
         pours: folder of the kept ones.
-        dry: without the liquid.
+        model: one of `LIQUIDS`.
     """
 
-    def __init__(self, pours: Path, *, dry: bool = False) -> None:
+    def __init__(self, pours: Path, model: str) -> None:
         """Begins or goes on with a folder."""
-        self._forward, self._dry = Forward(pours, 1), dry
+        self._forward, self._liquid = Forward(pours, 1), LIQUIDS[model]
         self._scene = Scene.load(_SCENE)
 
     def scene(self, test: Test) -> Scene:
@@ -71,14 +87,13 @@ class ColumnPours:
             # The tube goes on for as long as anyone looks.
             "walls.0.motion.end": numbers["end.horizon"],
         }
-        if not self._dry:
-            density, viscosity = test.numbers["rho_f"], test.numbers["mu_f"]
+        if self._liquid is not None:
+            viscosity = test.numbers["mu_f"]
             numbers |= {
-                "effects.fluid.density": density,
+                "effects.fluid.density": test.numbers["rho_f"],
                 "effects.fluid.viscosity": viscosity,
-                "effects.fluid.crowding": 1.0,
-                "effects.fluid.saturated": 1.0,
                 "effects.lubrication.viscosity": viscosity,
+                **self._liquid,
             }
         return observing(self._scene, times_of(test)).with_(numbers)
 

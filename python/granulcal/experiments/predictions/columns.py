@@ -18,9 +18,15 @@ from numpy.typing import NDArray
 
 from granulcal.experiments.predictions.between_tests import MODELS as WITHOUT_PHYSICS
 from granulcal.experiments.predictions.between_tests import BetweenTests, Told
-from granulcal.experiments.predictions.column_fit import POINTS, ColumnFit
-from granulcal.experiments.predictions.column_pours import ColumnPours
+from granulcal.experiments.predictions.column_fit import (
+    APPARATUS,
+    POINTS,
+    ColumnFit,
+    apparatus,
+)
+from granulcal.experiments.predictions.column_pours import LIQUIDS, ColumnPours
 from granulcal.experiments.predictions.column_tests import (
+    Fronts,
     Test,
     all_tests,
     observing,
@@ -43,8 +49,6 @@ _FLUID = {
     "effects.fluid.viscosity": "mu_f",
     "effects.lubrication.viscosity": "mu_f",
 }
-FITTED = {"saturated": False, "dry": True}
-"""Models that are fitted to measured tests: whether they are without the liquid."""
 _FRONT = re.compile(r"front_radius\[(?P<at>[^\]]+)\]")
 
 
@@ -90,55 +94,48 @@ def column_rows_without_physics(
 
 
 def fitted_rows(data: Path, pours: Path, *, say: Callable[[str], None]) -> list[tuple[object, ...]]:
-    """Returns rows of `saturated` and `dry`, each fitted to the bench and to the centrifuge.
+    """Returns rows of each of `LIQUIDS`, fitted to the measured tests.
 
     A measured test is told without those of its day.
     """
     fronts, tests = read_fronts(data), all_tests(data)
+    measured = {test.code: number for number, test in enumerate(fronts.tests)}
     rows = list[tuple[object, ...]]()
-    for model, dry in FITTED.items():
-        columns, told = ColumnPours(pours, dry=dry), dict[str, Told]()
-        for name, spun in (("bench", False), ("centrifuge", True)):
-            its = fronts.where(np.array([_is_spun(test) == spun for test in fronts.tests]))
-            fit = ColumnFit(its, columns, f"{model}, {name}")
-            told |= _fitted(model, fit, [t for t in tests if _is_spun(t) == spun], say)
-            _say_fit(f"columns, {model}, {name}", fit, say)
-        measured = [told[test.code] for test in fronts.tests]
-        say(f"columns, {model}: {_held(fronts.radius, measured)}")
+    for model in LIQUIDS:
+        fit = ColumnFit(fronts, ColumnPours(pours, model), model)
+        told = {code: fit.tell_measured(number) for code, number in measured.items()}
+        for test in tests:
+            if test.code in told:
+                continue
+            try:
+                told[test.code] = fit.tell(test, range(POINTS, POINTS + _POURS))
+            except ValueError as error:
+                say(f"columns, {model} of {test.code}: no prediction: {error}")
+        _say_fit(model, fit, say)
+        _say_held(model, fronts, [told[code] for code in measured], say)
         rows += [row for t in tests if t.code in told for row in _rows_of(model, t, told[t.code])]
+    line = BetweenTests(fronts)
+    _say_held("between", fronts, [line.tell("between", test) for test in fronts.tests], say)
     return rows
 
 
-def _fitted(
-    model: str, fit: ColumnFit, tests: list[Test], say: Callable[[str], None]
-) -> dict[str, Told]:
-    measured = {test.code: number for number, test in enumerate(fit.fronts.tests)}
-    told = {code: fit.tell_measured(number) for code, number in measured.items()}
-    for test in tests:
-        if test.code in told:
-            continue
-        try:
-            told[test.code] = fit.tell(test, range(POINTS, POINTS + _POURS))
-        except ValueError as error:
-            say(f"columns, {model} of {test.code}: no prediction: {error}")
-    return told
-
-
-def _say_fit(name: str, fit: ColumnFit, say: Callable[[str], None]) -> None:
+def _say_fit(model: str, fit: ColumnFit, say: Callable[[str], None]) -> None:
     left = fit.fitted()[:, :-1]
-    say(f"{name}: the fit leaves {np.sqrt(np.nanmean(left**2)):.1f} mm rms")
-    say(f"{name}: " + ", ".join(f"{path} {value:.3g}" for path, value in fit.unknown.items()))
-    late = ", ".join(f"{day} {1e3 * clock:.0f}" for day, clock in fit.clocks.items())
-    say(f"{name}: clocks late by [ms] {late}")
-    rows = [fit.tell_measured(number) for number in range(len(fit.fronts.tests))]
-    say(f"{name}: {_held(fit.fronts.radius, rows)}")
-    without_physics = BetweenTests(fit.fronts)
-    rows = [without_physics.tell("between", test) for test in fit.fronts.tests]
-    say(f"{name}, between: {_held(fit.fronts.radius, rows)}")
+    say(f"columns, {model}: the fit leaves {np.sqrt(np.nanmean(left**2)):.1f} mm rms")
+    for of, name in enumerate(APPARATUS):
+        numbers = ", ".join(f"{path} {value:.3g}" for path, value in fit.unknown(of).items())
+        say(f"columns, {model}, {name}: {numbers}")
+        late = ", ".join(f"{day} {1e3 * clock:.0f}" for day, clock in fit.clocks(of).items())
+        say(f"columns, {model}, {name}: clocks late by [ms] {late}")
 
 
-def _is_spun(test: Test) -> bool:
-    return test.numbers["N"] > 1.0
+def _say_held(name: str, fronts: Fronts, told: list[Told], say: Callable[[str], None]) -> None:
+    its = np.array([apparatus(test) for test in fronts.tests])
+    say(f"columns, {name}: {_held(fronts.radius, told)}")
+    for of, where in enumerate(APPARATUS):
+        some = [one for one, at in zip(told, its, strict=True) if at == of]
+        if some:
+            say(f"columns, {name}, {where}: {_held(fronts.radius[its == of], some)}")
 
 
 def _held(measured: Array, rows: list[Told]) -> str:
