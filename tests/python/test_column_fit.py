@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from granulcal.experiments.predictions.column_fit import ColumnFit, Emulated
 from granulcal.experiments.predictions.column_pours import UNKNOWN, ColumnPours
 from granulcal.experiments.predictions.column_tests import Fronts, Test, times_of
-from granulcal.experiments.predictions.columns import fitted_rows
+from granulcal.experiments.predictions.fitted_columns import fitted_rows
 
 Array = NDArray[np.float64]
 TRUTH = np.array([0.3, 0.6, 0.5, 0.4, 0.7, 0.5])
@@ -53,7 +53,7 @@ def measured() -> Fronts:
 
 @pytest.fixture(scope="module")
 def fit(tmp_path_factory: pytest.TempPathFactory) -> ColumnFit:
-    return ColumnFit(measured(), Closed(tmp_path_factory.mktemp("pours"), "dry"), "bench")
+    return ColumnFit(measured(), Closed(tmp_path_factory.mktemp("pours"), "saturated"), "bench")
 
 
 def test_clocks_and_fronts_are_found_again(fit: ColumnFit) -> None:
@@ -76,7 +76,7 @@ def test_a_day_is_told_without_itself(fit: ColumnFit) -> None:
     changed = Fronts(fit.fronts.tests, fit.fronts.radius.copy())
     same_day = [test.campaign == "20210102" for test in changed.tests]
     changed.radius[same_day] += 15.0
-    again = ColumnFit(changed, Closed(Path("unused"), "dry"), "bench").tell_measured(day)
+    again = ColumnFit(changed, Closed(Path("unused"), "saturated"), "bench").tell_measured(day)
     assert again.middle == pytest.approx(told.middle)
 
 
@@ -104,6 +104,10 @@ def test_a_pour_has_the_liquid_and_the_free_fall_of_its_test(tmp_path: Path) -> 
     slow, fast = columns.scene(one("a", 1.0, 1e-3)), columns.scene(one("a", 25.0, 5e-2, 6e-3))
     assert fast.get("effects.fluid.viscosity") == fast.get("effects.lubrication.viscosity") == 5e-2
     assert fast.get("effects.fluid.saturated") == fast.get("effects.lubrication.shear") == 1.0
+    clay = Test("a_k", {**one("a", 1.0, 0.1).numbers, "C_v": 0.08}, "k")
+    # Clay thins with shear: thick as a whole, thin between beads.
+    assert columns.scene(clay).get("effects.fluid.viscosity") == 0.1
+    assert columns.scene(clay).get("effects.lubrication.viscosity") == pytest.approx(1.2e-3)
     without = ColumnPours(tmp_path / "pours", "saturated").scene(one("a", 1.0, 1e-3))
     assert without.get("effects.lubrication.shear") == 0.0
     assert not ColumnPours(tmp_path, "dry").scene(one("a", 1.0, 1e-3)).has("effects.fluid.density")

@@ -5,11 +5,12 @@
     granulcal reproduce predictions --out out        # out/predictions/*.csv
 
 Every file has what needs no model at all (`line`, `nearest`, and `between` for columns), told from
-the measurements alone. A loop that has been closed adds the verdict's model (`named`), the base
-model (`base`) and the base model with its own residual (`corrected`); where the drum's has not, the
-last two are of two stated drums (`drum_base.py`: 12 pours, half a minute of one core). Each row has
-the 90 % interval of one measurement. Where a model has nothing to say it has no row, and the
-command says so.
+the measurements alone. The columns' beads are fitted to the measured tests, dry and with their
+liquid (`fitted_columns.py`: 2,600 pours, three quarters of an hour of one core). A loop that has
+been closed adds the verdict's model (`named`), the base model (`base`) and the base model with its
+own residual (`corrected`); where the drum's has not, the last two are of two stated drums
+(`drum_base.py`: 12 pours, three minutes of one core). Each row has the 90 % interval of one
+measurement. Where a model has nothing to say it has no row, and the command says so.
 """
 
 import csv
@@ -17,12 +18,14 @@ import io
 from collections.abc import Sequence
 from pathlib import Path
 
+from granulcal.experiments.predictions.column_picture import draw
+from granulcal.experiments.predictions.column_tests import read_fronts
 from granulcal.experiments.predictions.columns import (
     column_rows,
     column_rows_without_physics,
-    fitted_rows,
 )
 from granulcal.experiments.predictions.drum import drum_rows, drum_rows_without_loop
+from granulcal.experiments.predictions.fitted_columns import fitted_rows
 from granulcal.files import write_beside
 from granulcal.loop.report.models import Models
 
@@ -47,6 +50,7 @@ def reproduce(out: Path, data: Path) -> None:
         fronts = column_rows(column, out / "loop_column" / "pours", data, say=print) + fronts
     header = ("model", "test", "time_s", "radius_mm", "low", "high")
     write_csv(folder / "columns.csv", header, fronts)
+    draw(folder / "columns.png", read_fronts(data), fronts)
     print(folder)
 
 

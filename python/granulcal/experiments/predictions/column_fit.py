@@ -35,7 +35,16 @@ from granulcal.experiments.predictions.column_pours import UNKNOWN, ColumnPours
 from granulcal.experiments.predictions.column_tests import Fronts, Test, times_of
 from granulcal.progress import steps
 
-__all__ = ["APPARATUS", "POINTS", "SEEN", "TUBE", "ColumnFit", "Emulated", "apparatus"]
+__all__ = [
+    "APPARATUS",
+    "POINTS",
+    "SEEN",
+    "TUBE",
+    "ColumnFit",
+    "Emulated",
+    "apparatus",
+    "with_own_clock",
+]
 
 Array = NDArray[np.float64]
 
@@ -235,6 +244,16 @@ class ColumnFit:
 def apparatus(test: Test) -> int:
     """Returns 0 for the bench, 1 for the centrifuge."""
     return int(test.numbers["N"] > 1.0)
+
+
+def with_own_clock(test: Test, seen: Array, told: Array) -> Array:
+    """Returns what a told front leaves of a seen one at the test's best clock, shape (T,).
+
+    The clock is within 60 ms: what is left is the form of the front and not when it was released.
+    """
+    clocks = np.arange(-3.0, 3.01, 0.1) * _CLOCK
+    left = [(seen - _seen(_late(times_of(test), told, clock)))[:-1] for clock in clocks.tolist()]
+    return min(left, key=lambda one: float(np.nanmean(one**2)))
 
 
 def _both(u: Array) -> Array:

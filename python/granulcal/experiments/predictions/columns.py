@@ -18,15 +18,7 @@ from numpy.typing import NDArray
 
 from granulcal.experiments.predictions.between_tests import MODELS as WITHOUT_PHYSICS
 from granulcal.experiments.predictions.between_tests import BetweenTests, Told
-from granulcal.experiments.predictions.column_fit import (
-    APPARATUS,
-    POINTS,
-    ColumnFit,
-    apparatus,
-)
-from granulcal.experiments.predictions.column_pours import LIQUIDS, ColumnPours
 from granulcal.experiments.predictions.column_tests import (
-    Fronts,
     Test,
     all_tests,
     observing,
@@ -37,7 +29,7 @@ from granulcal.experiments.predictions.model_error import ModelError
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.models import Models, Prediction
 
-__all__ = ["column_rows", "column_rows_without_physics", "fitted_rows"]
+__all__ = ["column_rows", "column_rows_without_physics", "rows_of"]
 
 Array = NDArray[np.float64]
 
@@ -69,7 +61,7 @@ def column_rows(
         )
         for test in tests:
             if test.code in told:
-                rows += _rows_of(model, test, error.widened(test, told[test.code]))
+                rows += rows_of(model, test, error.widened(test, told[test.code]))
     for test in tests:
         rows += _corrected(models, test, forward, say)
     return rows
@@ -79,76 +71,18 @@ def column_rows_without_physics(
     data: Path, *, say: Callable[[str], None]
 ) -> list[tuple[object, ...]]:
     """Returns the same rows of `nearest`, `line` and `between`, told from the other tests."""
-    rows_of, rows = BetweenTests(read_fronts(data)), list[tuple[object, ...]]()
+    between, rows = BetweenTests(read_fronts(data)), list[tuple[object, ...]]()
     for model in WITHOUT_PHYSICS:
         for far, of in ((False, "day"), (True, "gravity")):
-            error, end, share = rows_of.held(model, far=far)
+            error, end, share = between.held(model, far=far)
             say(
                 f"columns, {model}: measured tests told without those of their {of} with an rms of "
                 f"{error:.1f} mm, at the end {end:.1f} mm; {share:.0%} in the 90 % intervals"
             )
     for test in all_tests(data):
         for model in WITHOUT_PHYSICS:
-            rows += _rows_of(model, test, rows_of.tell(model, test))
+            rows += rows_of(model, test, between.tell(model, test))
     return rows
-
-
-def fitted_rows(data: Path, pours: Path, *, say: Callable[[str], None]) -> list[tuple[object, ...]]:
-    """Returns rows of each of `LIQUIDS`, fitted to the measured tests.
-
-    A measured test is told without those of its day.
-    """
-    fronts, tests = read_fronts(data), all_tests(data)
-    measured = {test.code: number for number, test in enumerate(fronts.tests)}
-    rows = list[tuple[object, ...]]()
-    for model in LIQUIDS:
-        fit = ColumnFit(fronts, ColumnPours(pours, model), model)
-        told = {code: fit.tell_measured(number) for code, number in measured.items()}
-        for test in tests:
-            if test.code in told:
-                continue
-            try:
-                told[test.code] = fit.tell(test, range(POINTS, POINTS + _POURS))
-            except ValueError as error:
-                say(f"columns, {model} of {test.code}: no prediction: {error}")
-        _say_fit(model, fit, say)
-        _say_held(model, fronts, [told[code] for code in measured], say)
-        rows += [row for t in tests if t.code in told for row in _rows_of(model, t, told[t.code])]
-    line = BetweenTests(fronts)
-    _say_held("between", fronts, [line.tell("between", test) for test in fronts.tests], say)
-    return rows
-
-
-def _say_fit(model: str, fit: ColumnFit, say: Callable[[str], None]) -> None:
-    left = fit.fitted()[:, :-1]
-    say(f"columns, {model}: the fit leaves {np.sqrt(np.nanmean(left**2)):.1f} mm rms")
-    for of, name in enumerate(APPARATUS):
-        numbers = ", ".join(f"{path} {value:.3g}" for path, value in fit.unknown(of).items())
-        say(f"columns, {model}, {name}: {numbers}")
-        late = ", ".join(f"{day} {1e3 * clock:.0f}" for day, clock in fit.clocks(of).items())
-        say(f"columns, {model}, {name}: clocks late by [ms] {late}")
-
-
-def _say_held(name: str, fronts: Fronts, told: list[Told], say: Callable[[str], None]) -> None:
-    its = np.array([apparatus(test) for test in fronts.tests])
-    say(f"columns, {name}: {_held(fronts.radius, told)}")
-    for of, where in enumerate(APPARATUS):
-        some = [one for one, at in zip(told, its, strict=True) if at == of]
-        if some:
-            say(f"columns, {name}, {where}: {_held(fronts.radius[its == of], some)}")
-
-
-def _held(measured: Array, rows: list[Told]) -> str:
-    """What tests are told by that are told without those of their day."""
-    gaps = measured - np.array([one.middle for one in rows])
-    inside = (measured >= np.array([one.low for one in rows])) & (
-        measured <= np.array([one.high for one in rows])
-    )
-    rms, end = (float(np.sqrt(np.nanmean(part**2))) for part in (gaps[:, :-1], gaps[:, -1]))
-    return (
-        f"measured tests told without those of their day with an rms of {rms:.1f} mm, at the end "
-        f"{end:.1f} mm; {inside[np.isfinite(measured)].mean():.0%} in the 90 % intervals"
-    )
 
 
 def _simulated_models(models: Models, say: Callable[[str], None]) -> list[str]:
@@ -175,7 +109,8 @@ def _simulated(
     return Told(1e3 * found.middle, 1e3 * found.low, 1e3 * found.high)
 
 
-def _rows_of(model: str, test: Test, told: Told) -> list[tuple[object, ...]]:
+def rows_of(model: str, test: Test, told: Told) -> list[tuple[object, ...]]:
+    """Returns a row for each time and for the end, in s and mm."""
     times = [*times_of(test).tolist(), "end"]
     columns = zip(times, told.middle, told.low, told.high, strict=True)
     return [(model, test.code, t, float(m), float(a), float(b)) for t, m, a, b in columns]
