@@ -186,6 +186,7 @@ fn scene() -> impl Strategy<Value = Scene> {
             )| Scene {
                 name: "random".to_owned(),
                 preset,
+                substep: None,
                 gravity,
                 material,
                 grains: Grains::balls(count, 2.0 * radius, 1300.0),

@@ -75,6 +75,7 @@ def _say_held(name: str, fronts: Fronts, told: list[Told], say: Callable[[str], 
     its = np.array([apparatus(test) for test in fronts.tests])
     parts = [("", np.full(len(told), True))]
     parts += [(f" {where}", its == of) for of, where in enumerate(APPARATUS)]
+    parts.append((" liquids but clay", np.array([test.fluid != "k" for test in fronts.tests])))
     for where, keep in parts:
         each = [number for number in np.flatnonzero(keep).tolist()]
         if not each:
