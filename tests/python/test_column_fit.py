@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from granulcal.experiments.predictions.between_tests import Told
 from granulcal.experiments.predictions.column_fit import ColumnFit, Emulated
 from granulcal.experiments.predictions.column_pours import UNKNOWN, ColumnPours
 from granulcal.experiments.predictions.column_tests import Fronts, Test, times_of
-from granulcal.experiments.predictions.fitted_columns import fitted_rows
+from granulcal.experiments.predictions.fitted_columns import fitted_rows, half_and_half
 
 Array = NDArray[np.float64]
 TRUTH = np.array([0.3, 0.6, 0.5, 0.4, 0.7, 0.5])
@@ -97,6 +98,15 @@ def test_an_emulator_reproduces_a_polynomial_and_says_what_it_is_off_by() -> Non
     exact, off = Emulated.of(test, points, rows), Emulated.of(test, points, noisy)
     assert exact.error.max() < 0.5 and 2.0 < np.median(off.error) < 7.0
     assert exact.at(TRUTH) == pytest.approx(front(test, TRUTH), abs=1.0)
+
+
+def test_two_rows_together_are_as_wide_as_they_disagree() -> None:
+    one, other = (Told(np.array([v]), np.array([v - 3.29]), np.array([v])) for v in (100.0, 110.0))
+    both = half_and_half(one, other)
+    assert both.middle == 105.0
+    # Variances of 4 each, and 25 for the means.
+    assert both.middle - both.low == pytest.approx(1.645 * np.sqrt(29.0))
+    assert half_and_half(one, one).low == pytest.approx(one.low)
 
 
 def test_a_pour_has_the_liquid_and_the_free_fall_of_its_test(tmp_path: Path) -> None:

@@ -39,7 +39,6 @@ __all__ = [
     "APPARATUS",
     "POINTS",
     "SEEN",
-    "TUBE",
     "ColumnFit",
     "Emulated",
     "apparatus",
@@ -57,8 +56,10 @@ _DESIGN_SEED = 5
 _OWN, _CLOCK, _COUNT = 5.0, 0.02, 4.0
 # Radius of the column [mm].
 _COLUMN = 54.0
-TUBE, SEEN = 62.0, 200.0
-"""What is seen before the beads come out from under the tube, and as far as cameras see [mm]."""
+# What is seen until the beads come out from under the tube [mm].
+_TUBE = 62.0
+SEEN = 200.0
+"""As far as cameras see [mm]."""
 _STARTS = 8
 # Of the unknowns so many are of the beads, the others of the apparatus.
 _OF_BEADS = 3
@@ -198,7 +199,7 @@ class ColumnFit:
         parts = []
         for i in np.flatnonzero(keep).tolist():
             front, of = self.fronts.radius[i, :-1], int(self._apparatus[i])
-            used = np.isfinite(front) & (front > TUBE + _OWN)
+            used = np.isfinite(front) & (front > _TUBE + _OWN)
             error = np.hypot(_OWN, self.emulated[i].error[:-1][used])
             scale = error * max(1.0, sqrt(used.sum() / _COUNT))
             parts.append((i, of, days.index((self._days[i], of)), used, front[used], scale))
@@ -270,4 +271,4 @@ def _late(times: Array, front: Array, clock: float) -> Array:
 
 def _seen(front: Array) -> Array:
     """No less than the tube."""
-    return np.maximum(front, TUBE)
+    return np.maximum(front, _TUBE)

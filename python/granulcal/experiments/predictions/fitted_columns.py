@@ -1,5 +1,10 @@
 """Fronts of columns by models that are fitted to the measured tests (`column_fit.py`).
 
+| model | front of a test |
+|---|---|
+| `sheared`, `saturated`, `dry` | that of beads with and without their liquid (`column_pours.py`) |
+| `both` | `sheared` and `between` at equal weights |
+
 A measured test is told without those of its day, and so are the rows without physics beside it. How
 far that is from what was seen is said twice: as told, and at each test's own clock, which nobody
 can tell beforehand.
@@ -16,48 +21,80 @@ from granulcal.experiments.predictions.between_tests import BetweenTests, Told
 from granulcal.experiments.predictions.column_fit import (
     APPARATUS,
     POINTS,
+    SEEN,
     ColumnFit,
     apparatus,
     with_own_clock,
 )
 from granulcal.experiments.predictions.column_pours import LIQUIDS, ColumnPours
-from granulcal.experiments.predictions.column_tests import Fronts, all_tests, read_fronts
+from granulcal.experiments.predictions.column_tests import Fronts, Test, all_tests, read_fronts
 from granulcal.experiments.predictions.columns import rows_of
 
-__all__ = ["fitted_rows"]
+__all__ = ["fitted_rows", "half_and_half"]
 
 Array = NDArray[np.float64]
 
 # Of a test that was not measured.
 _POURS = 4
+_HALF = 1.645
 
 
 def fitted_rows(data: Path, pours: Path, *, say: Callable[[str], None]) -> list[tuple[object, ...]]:
-    """Returns rows of each of `LIQUIDS`, fitted to the measured tests.
+    """Returns rows of each of `LIQUIDS`, fitted to the measured tests, and of `both`.
 
     A measured test is told without those of its day.
     """
     fronts, tests = read_fronts(data), all_tests(data)
-    measured = {test.code: number for number, test in enumerate(fronts.tests)}
-    rows = list[tuple[object, ...]]()
-    for model in LIQUIDS:
-        fit = ColumnFit(fronts, ColumnPours(pours, model), model)
-        told = {code: fit.tell_measured(number) for code, number in measured.items()}
-        for test in tests:
-            if test.code in told:
-                continue
-            try:
-                told[test.code] = fit.tell(test, range(POINTS, POINTS + _POURS))
-            except ValueError as error:
-                say(f"columns, {model} of {test.code}: no prediction: {error}")
-        _say_fit(model, fit, say)
-        _say_held(model, fronts, [told[code] for code in measured], say)
-        rows += [row for t in tests if t.code in told for row in rows_of(model, t, told[t.code])]
+    told = {model: _fitted(model, fronts, tests, pours, say) for model in LIQUIDS}
     without_physics = BetweenTests(fronts)
     for model in WITHOUT_PHYSICS:
-        told_so = [without_physics.tell(model, test) for test in fronts.tests]
-        _say_held(model, fronts, told_so, say)
-    return rows
+        told[model] = {test.code: without_physics.tell(model, test) for test in tests}
+    told["both"] = {
+        code: half_and_half(one, told["between"][code]) for code, one in told["sheared"].items()
+    }
+    for model, each in told.items():
+        _say_held(model, fronts, [each[test.code] for test in fronts.tests], say)
+    return [
+        row
+        for model in ("both", *LIQUIDS)
+        for test in tests
+        if test.code in told[model]
+        for row in rows_of(model, test, told[model][test.code])
+    ]
+
+
+def half_and_half(one: Told, other: Told) -> Told:
+    """Returns what two rows say together: the mixture of both normals at equal weights."""
+    middle = 0.5 * (one.middle + other.middle)
+    square = 0.5 * (_sd(one) ** 2 + _sd(other) ** 2) + 0.25 * (one.middle - other.middle) ** 2
+    half = _HALF * np.sqrt(square)
+    return Told(middle, middle - half, np.minimum(middle + half, SEEN))
+
+
+def _sd(told: Told) -> Array:
+    # Upper ends stop where cameras do.
+    return (told.middle - told.low) / _HALF
+
+
+def _fitted(
+    model: str,
+    fronts: Fronts,
+    tests: list[Test],
+    pours: Path,
+    say: Callable[[str], None],
+) -> dict[str, Told]:
+    """Returns what a model says of every test of which two pours are usable."""
+    fit = ColumnFit(fronts, ColumnPours(pours, model), model)
+    told = {test.code: fit.tell_measured(i) for i, test in enumerate(fronts.tests)}
+    for test in tests:
+        if test.code in told:
+            continue
+        try:
+            told[test.code] = fit.tell(test, range(POINTS, POINTS + _POURS))
+        except ValueError as error:
+            say(f"columns, {model} of {test.code}: no prediction: {error}")
+    _say_fit(model, fit, say)
+    return told
 
 
 def _say_fit(model: str, fit: ColumnFit, say: Callable[[str], None]) -> None:
