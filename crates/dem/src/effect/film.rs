@@ -81,16 +81,13 @@ impl Film {
     fn resist(&self, particles: &mut Particles, walls: &Walls, near: &Near, count: u32, dt: f64) {
         let (i, j) = (near.pair.0 as usize, near.pair.1 as usize);
         let normal = near.normal;
-        // Velocity of the other's centre and of its surface.
-        let (other, surface, inverse_mass) = if near.is_wall {
-            let wall = walls.wall(j - count as usize).motion_at(&near.point).0;
-            (wall, wall, particles.inverse_mass[i])
+        let (other, inverse_mass) = if near.is_wall {
+            let wall = walls.wall(j - count as usize);
+            (wall.motion_at(&near.point).0, particles.inverse_mass[i])
         } else {
-            let (velocity, masses) = (particles.velocity(j), &particles.inverse_mass);
-            (velocity, velocity + particles.spin(j).cross(&normal), masses[i] + masses[j])
+            (particles.velocity(j), particles.inverse_mass[i] + particles.inverse_mass[j])
         };
-        let apart = particles.velocity(i) - other;
-        let opening = apart.dot(&normal);
+        let opening = (particles.velocity(i) - other).dot(&normal);
         // The gap at the middle of the substep: with that at its begin a film would take a tenth too little.
         let gap = (near.gap + 0.5 * dt * opening).max(self.roughness);
         let k = self.strength * near.derjaguin.powi(2) / gap * dt;
@@ -100,6 +97,9 @@ impl Film {
             particles.kick(j, &-impulse);
         }
         if self.shear > 0.0 {
+            // The surface of a wall moves as its point does, that of a grain turns as well.
+            let surface =
+                if near.is_wall { other } else { other + particles.spin(j).cross(&normal) };
             let sliding = particles.velocity(i) - particles.spin(i).cross(&normal) - surface;
             let sliding = sliding - sliding.dot(&normal) * normal;
             let other = (!near.is_wall).then(|| particles.radius(j));

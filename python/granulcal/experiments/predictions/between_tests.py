@@ -17,7 +17,7 @@ gravity at which nothing was measured, from those of the other gravities. A meas
 a part in its own prediction, nor has its day. No front is told beyond what the cameras see.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from granulcal.experiments.predictions.column_tests import Fronts, Test
 
-__all__ = ["MODELS", "BetweenTests", "Told"]
+__all__ = ["MODELS", "BetweenTests", "Told", "held"]
 
 Array = NDArray[np.float64]
 
@@ -36,6 +36,7 @@ _VISCOSITY, _BY_GRAVITY, _CLAY, _DAY, _NOISE = 0.30, 0.45, 0.37, 0.45, 0.50
 # Powers of 1 / N; 0 is the logarithm.
 _POWERS = (0.0, 0.5, 1.0)
 _PLANE_POWER = 0.5
+# Standard deviations from the middle of a 90 % interval to its ends.
 _HALF = 1.645
 # Least scatter of the tests at one time, and what the cameras see [mm].
 _LEAST, _SEEN = 1.0, 200.0
@@ -48,6 +49,18 @@ class Told:
     middle: Array
     low: Array
     high: Array
+
+    @classmethod
+    def of(cls, middle: Array, sd: Array) -> "Told":
+        """Returns the 90 % interval about `middle`, none of it beyond what the cameras see."""
+        half = _HALF * sd
+        low, middle, high = (np.minimum(v, _SEEN) for v in (middle - half, middle, middle + half))
+        return cls(middle, low, high)
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviation [mm]; of the lower end, for the upper one stops where cameras do."""
+        return np.asarray((self.middle - self.low) / _HALF)
 
 
 @dataclass(frozen=True)
@@ -107,9 +120,7 @@ class BetweenTests:
         factor = _root(self._errors[model][others])
         if is_far:
             factor = max(factor, _root(self._far[model][others]))
-        half = _HALF * factor * sd
-        low, middle, high = (np.minimum(v, _SEEN) for v in (middle - half, middle, middle + half))
-        return Told(middle, low, high)
+        return Told.of(middle, factor * sd)
 
     def held(self, model: str, *, far: bool = False) -> tuple[float, float, float]:
         """Returns root mean square error [mm] over the times and at the end, and the share held.
@@ -117,13 +128,7 @@ class BetweenTests:
         Over all measured tests, each told without those of its day (`far`: of its gravity).
         """
         told = [self.tell(model, test, far=far) for test in self.fronts.tests]
-        seen = self.fronts.radius
-        gap = seen - np.array([one.middle for one in told])
-        inside = (seen >= np.array([one.low for one in told])) & (
-            seen <= np.array([one.high for one in told])
-        )
-        share = float(inside[np.isfinite(seen)].mean())
-        return _root(gap[:, :-1]), _root(gap[:, -1]), share
+        return held(self.fronts.radius, told)
 
     def _of(self, name: str, groups: NDArray[np.generic]) -> Array:
         """Errors over the row's own s, each group told from the others, shape (n, T + 1)."""
@@ -134,6 +139,21 @@ class BetweenTests:
                 middle, sd = MODELS[name](known, test, self.spread)
                 found[i] = (self.fronts.radius[i] - middle) / sd
         return found
+
+
+def held(seen: Array, told: Sequence[Told]) -> tuple[float, float, float]:
+    """Returns root mean square error [mm] over the times and at the end, and the share held.
+
+    Args:
+        seen: measured fronts, shape (n, T + 1).
+        told: what was told of each.
+    """
+    gap = seen - np.array([one.middle for one in told])
+    inside = (seen >= np.array([one.low for one in told])) & (
+        seen <= np.array([one.high for one in told])
+    )
+    share = float(inside[np.isfinite(seen)].mean())
+    return _root(gap[:, :-1]), _root(gap[:, -1]), share
 
 
 def _root(values: Array) -> float:

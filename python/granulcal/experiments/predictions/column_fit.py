@@ -38,7 +38,6 @@ from granulcal.progress import steps
 __all__ = [
     "APPARATUS",
     "POINTS",
-    "SEEN",
     "ColumnFit",
     "Emulated",
     "apparatus",
@@ -58,13 +57,10 @@ _OWN, _CLOCK, _COUNT = 5.0, 0.02, 4.0
 _COLUMN = 54.0
 # What is seen until the beads come out from under the tube [mm].
 _TUBE = 62.0
-SEEN = 200.0
-"""As far as cameras see [mm]."""
 _STARTS = 8
 # Of the unknowns so many are of the beads, the others of the apparatus.
 _OF_BEADS = 3
 _COORDINATES = 2 * len(UNKNOWN.names) - _OF_BEADS
-_HALF = 1.645
 
 
 @dataclass(frozen=True)
@@ -214,10 +210,8 @@ class ColumnFit:
             return np.concatenate(left)
 
         clock = np.full(len(days), np.inf)
-        low, high = (
-            np.append(np.zeros(_COORDINATES), -clock),
-            np.append(np.ones(_COORDINATES), clock),
-        )
+        low = np.append(np.zeros(_COORDINATES), -clock)
+        high = np.append(np.ones(_COORDINATES), clock)
         starts = qmc.Sobol(_COORDINATES, rng=_DESIGN_SEED + 1).random(_STARTS)
         found = [
             least_squares(residuals, np.append(u, np.zeros(len(days))), bounds=(low, high))
@@ -237,9 +231,7 @@ class ColumnFit:
         share = max(0.0, 1.0 - float(gravity) / test.numbers["N"])
         late = np.std(list(self.clocks(of).values()))
         drift = late * np.append(np.gradient(middle[:-1], times_of(test)), 0.0)
-        half = _HALF * np.sqrt(square + share * drift**2)
-        low, middle, high = (np.minimum(v, SEEN) for v in (middle - half, middle, middle + half))
-        return Told(middle, low, high)
+        return Told.of(middle, np.sqrt(square + share * drift**2))
 
 
 def apparatus(test: Test) -> int:

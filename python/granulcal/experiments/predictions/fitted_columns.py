@@ -17,11 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.experiments.predictions.between_tests import MODELS as WITHOUT_PHYSICS
-from granulcal.experiments.predictions.between_tests import BetweenTests, Told
+from granulcal.experiments.predictions.between_tests import BetweenTests, Told, held
 from granulcal.experiments.predictions.column_fit import (
     APPARATUS,
     POINTS,
-    SEEN,
     ColumnFit,
     apparatus,
     with_own_clock,
@@ -36,7 +35,6 @@ Array = NDArray[np.float64]
 
 # Of a test that was not measured.
 _POURS = 4
-_HALF = 1.645
 
 
 def fitted_rows(data: Path, pours: Path, *, say: Callable[[str], None]) -> list[tuple[object, ...]]:
@@ -66,14 +64,8 @@ def fitted_rows(data: Path, pours: Path, *, say: Callable[[str], None]) -> list[
 def half_and_half(one: Told, other: Told) -> Told:
     """Returns what two rows say together: the mixture of both normals at equal weights."""
     middle = 0.5 * (one.middle + other.middle)
-    square = 0.5 * (_sd(one) ** 2 + _sd(other) ** 2) + 0.25 * (one.middle - other.middle) ** 2
-    half = _HALF * np.sqrt(square)
-    return Told(middle, middle - half, np.minimum(middle + half, SEEN))
-
-
-def _sd(told: Told) -> Array:
-    # Upper ends stop where cameras do.
-    return (told.middle - told.low) / _HALF
+    square = 0.5 * (one.sd**2 + other.sd**2) + 0.25 * (one.middle - other.middle) ** 2
+    return Told.of(middle, np.sqrt(square))
 
 
 def _fitted(
@@ -114,22 +106,17 @@ def _say_held(name: str, fronts: Fronts, told: list[Told], say: Callable[[str], 
     parts += [(f" {where}", its == of) for of, where in enumerate(APPARATUS)]
     parts.append((" liquids but clay", np.array([test.fluid != "k" for test in fronts.tests])))
     for where, keep in parts:
-        each = [number for number in np.flatnonzero(keep).tolist()]
+        each = np.flatnonzero(keep).tolist()
         if not each:
             continue
-        seen = fronts.radius[each]
-        gaps = seen - np.array([told[i].middle for i in each])
-        inside = (seen >= np.array([told[i].low for i in each])) & (
-            seen <= np.array([told[i].high for i in each])
-        )
+        error, end, share = held(fronts.radius[each], [told[i] for i in each])
         form = [
             with_own_clock(fronts.tests[i], fronts.radius[i], told[i].middle).tolist() for i in each
         ]
         say(
-            f"columns, {name},{where} without the tests of its day: rms {_root(gaps[:, :-1]):.1f} "
-            f"mm, with each test's own clock {_root(np.array(form)):.1f} mm, at the end "
-            f"{_root(gaps[:, -1]):.1f} mm; {inside[np.isfinite(seen)].mean():.0%} in the 90 % "
-            "intervals"
+            f"columns, {name},{where} without the tests of its day: rms {error:.1f} mm, with "
+            f"each test's own clock {_root(np.array(form)):.1f} mm, at the end {end:.1f} mm; "
+            f"{share:.0%} in the 90 % intervals"
         )
 
 
