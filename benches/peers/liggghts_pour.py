@@ -12,8 +12,11 @@ for LIGGGHTS has no cone.
 
 import argparse
 import resource
+import signal
 import subprocess
 import tempfile
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +31,10 @@ ROLLING = ("epsd", "epsd2")
 
 LOOK = 0.02
 """Time between two checks of rest and overlap [s]."""
-HORIZON = 2.0
+HORIZON = 3.0
 """When a pour ends at the latest [s]."""
+HEAD = 9
+"""Lines before the grains of a look; the fourth has their number."""
 MESH = Path(__file__).parents[2] / "examples/funnel.stl"
 """The funnel [mm], binary: 80 bytes of text, the number of triangles, the triangles."""
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -90,16 +95,26 @@ run {round(HORIZON / elastic.dt)}
 """
 
 
-def frames(path: Path) -> list[np.ndarray]:
-    """Returns positions and velocities of every look, each of shape (n, 6) [m, m/s]."""
-    found, lines = [], iter(path.read_text().splitlines())
-    for line in lines:
-        if line.startswith("ITEM: NUMBER OF ATOMS"):
-            count = int(next(lines))
-            while not next(lines).startswith("ITEM: ATOMS"):
-                pass
-            found.append(np.array([next(lines).split()[1:] for _ in range(count)], dtype=float))
-    return found
+def frames(path: Path, engine: subprocess.Popen[bytes]) -> Iterator[np.ndarray]:
+    """Yields positions and velocities of every look as it is written, (n, 6) [m, m/s]."""
+    lines: list[str] = []
+    written, rest = 0, ""
+    while True:
+        ended = engine.poll() is not None
+        if path.exists():
+            with path.open() as file:
+                file.seek(written)
+                text = file.read()
+                written = file.tell()
+            *whole, rest = (rest + text).split("\n")
+            lines += whole
+        while len(lines) >= HEAD and len(lines) >= HEAD + int(lines[3]):
+            count = HEAD + int(lines[3])
+            yield np.array([line.split()[1:] for line in lines[HEAD:count]], dtype=float)
+            lines = lines[count:]
+        if ended:
+            return
+        time.sleep(0.5)
 
 
 def worst_overlap(looks: list[np.ndarray]) -> float:
@@ -115,34 +130,30 @@ def worst_overlap(looks: list[np.ndarray]) -> float:
 
 
 def pour(law: Law, elastic: Elastic, seed: int, rolling_model: str) -> dict[str, float]:
-    """Returns what a pour ends with: lengths in mm over centres (max z: the top), times in s.
-
-    The processor time is the share of the whole run up to the time of rest.
-    """
+    """Returns what a pour ends with: lengths in mm over centres (max z: the top), times in s."""
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         (place / "funnel.stl").write_text(funnel())
         (place / "in.pour").write_text(script(law, elastic, seed, rolling_model))
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(
-            ["liggghts", "-in", "in.pour"],
-            cwd=place,
-            check=True,
-            stdout=subprocess.DEVNULL,
+        engine = subprocess.Popen(
+            ["liggghts", "-in", "in.pour"], cwd=place, stdout=subprocess.DEVNULL
         )
+        looks = []
+        for look in frames(place / "looks.txt", engine):
+            looks.append(look)
+            if is_at_rest((len(looks) - 1) * LOOK, look[:, 3:]):
+                engine.kill()
+                break
+        if engine.wait() not in (0, -signal.SIGKILL):
+            raise RuntimeError(f"LIGGGHTS ended with {engine.returncode}")
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        looks = frames(place / "looks.txt")
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    rest = next(
-        (k for k, look in enumerate(looks) if is_at_rest(k * LOOK, look[:, 3:])),
-        len(looks) - 1,
-    )
-    end = looks[rest][:, :3]
+    end = looks[-1][:, :3]
     return {
-        "rest_s": rest * LOOK,
-        "cpu_s": cpu * rest / (len(looks) - 1),
+        "rest_s": (len(looks) - 1) * LOOK,
+        "cpu_s": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
         **measure(end),
-        "worst_overlap": worst_overlap(looks[: rest + 1]),
+        "worst_overlap": worst_overlap(looks),
         "lost": 2000 - len(end),
     }
 

@@ -1,5 +1,6 @@
 """The files of predictions: which rows they have, and what stands in them."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from granulcal.experiments.predictions.column_tests import (
 )
 from granulcal.experiments.predictions.columns import column_rows
 from granulcal.experiments.predictions.drum import SPEEDS, drum_rows
-from granulcal.experiments.predictions.drum_base import DrumBase
+from granulcal.experiments.predictions.drum_base import SETTINGS, DrumBase
 from granulcal.experiments.predictions.model_error import ModelError
 from granulcal.loop.report.models import Maker, Models
 from granulcal.pours.scene import Scene
@@ -256,8 +257,8 @@ def test_between_two_speeds_stands_a_line_and_its_interval_knows_other_forms() -
 class BentDrum(DrumBase):
     """A drum whose bed bends with the square of the speed, off by a line that it cannot know."""
 
-    def at(self, setting: int, rpm: float, begin: float, end: float) -> np.ndarray:
-        return np.array([0.0, 30.0 + 2.0 * setting + 0.006 * rpm**2])
+    def at(self, setting: Mapping[str, float], rpm: float, begin: float, end: float) -> np.ndarray:
+        return np.array([0.0, 30.0 + 2.0 * SETTINGS.index(setting) + 0.006 * rpm**2])
 
 
 def test_a_base_model_with_its_own_residual_keeps_the_bend_that_a_line_lacks(
@@ -269,7 +270,7 @@ def test_a_base_model_with_its_own_residual_keeps_the_bend_that_a_line_lacks(
     drum, speeds = BentDrum.__new__(BentDrum), np.array([15.0, 45.0])
     values = np.array([truth(15), truth(45)])
     for rpm in (10, 30, 60):
-        told = drum.tell(rpm, (0.0, 1.0), speeds, values, [0.0, None])
+        told = drum.tell(SETTINGS, rpm, (0.0, 1.0), speeds, values, [0.0, None])
         middle, low, high = told["corrected"]
         assert middle == pytest.approx(truth(rpm)) and (low < truth(rpm)).all()
         assert (high > truth(rpm)).all()

@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 
 from granulcal.experiments.loop_drum.task import task
 
-__all__ = ["MODELS", "between_speeds", "in_drum", "read_pictures"]
+__all__ = ["HEIGHT", "MODELS", "SLOPE", "between_speeds", "in_drum", "read_pictures"]
 
 Array = NDArray[np.float64]
 
 # Of one picture: thresholds of 40 to 60 % move heights by 0.3 mm and the slope by 0.2 degrees, and
 # its middle and its turn are known to as much.
-_HEIGHT, _SLOPE = 0.4e-3, 0.5
+HEIGHT, SLOPE = 0.4e-3, 0.5
+"""One sd of a picture: of its heights [m] and of its slope [degrees]."""
 _HALF = 1.645
 _RADIUS = 0.042
 _FORMS: tuple[Callable[[float], float], ...] = (np.log, np.square)
@@ -51,7 +52,7 @@ def between_speeds(
         rpm: the speed.
         places: x of each height [m]; None for the slope, s of them.
     """
-    noise = np.array([_SLOPE if x is None else _HEIGHT for x in places])
+    noise = np.array([SLOPE if x is None else HEIGHT for x in places])
     line = _through(lambda n: n, speeds, values, rpm)
     if model == "line":
         share = _share(lambda n: n, speeds, rpm)

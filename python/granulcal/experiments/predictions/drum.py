@@ -4,12 +4,15 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from granulcal.experiments.loop_drum.task import at_speed
 from granulcal.experiments.predictions.between_speeds import (
     MODELS as WITHOUT_PHYSICS,
 )
 from granulcal.experiments.predictions.between_speeds import between_speeds, read_pictures
 from granulcal.experiments.predictions.drum_base import DrumBase
+from granulcal.experiments.predictions.drum_fit import DrumFit
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.models import Models, Prediction
 
@@ -49,12 +52,12 @@ def drum_rows_without_loop(
 ) -> tuple[list[tuple[object, ...]], list[tuple[object, ...]]]:
     """Returns the same rows of `line` and `nearest`, told from the pictures alone.
 
-    With a folder of `pours`, those of `base` and `corrected` of two stated drums come first.
+    With a folder of `pours`, those of `base` and `corrected` of the drum fitted to them come first.
     """
     speeds, names, values = read_pictures(data)
     matches = [_PLACE.fullmatch(name) for name in names]
     places = [None if found is None else float(found["x"]) for found in matches]
-    base = None if pours is None else DrumBase(data, pours)
+    base, settings = None if pours is None else DrumBase(data, pours), ()
     if base is not None:
         for model, (height, slope, share) in base.held(SPEEDS, speeds, places).items():
             say(
@@ -62,10 +65,12 @@ def drum_rows_without_loop(
                 f"with an rms of {1e3 * height:.2f} mm and {slope:.1f} degrees; {share:.0%} in the "
                 "90 % intervals"
             )
+        is_slope = np.array([x is None for x in places])
+        settings = DrumFit(base, speeds, values, is_slope, say=say).settings
     profiles: list[tuple[object, ...]] = []
     slopes: list[tuple[object, ...]] = []
     for rpm, window in SPEEDS.items():
-        told = {} if base is None else base.tell(rpm, window, speeds, values, places)
+        told = {} if base is None else base.tell(settings, rpm, window, speeds, values, places)
         told |= {m: between_speeds(m, speeds, values, rpm, places) for m in WITHOUT_PHYSICS}
         for model, found in told.items():
             more, slope = _rows(model, rpm, Prediction(model, names, *found, 0.9))

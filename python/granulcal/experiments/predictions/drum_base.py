@@ -1,14 +1,17 @@
-r"""The drum's base model at speeds without a picture, without a closed loop: two stated drums.
+r"""The drum's base model at speeds without a picture, without a closed loop.
 
 | model | at a speed |
 |---|---|
-| `base` | pours of the drum at two stated settings, their mean |
+| `base` | pours of the drum at the settings of `drum_fit.py`, their mean |
 | `corrected` | each of these plus its own residual, on the straight line through both pictures |
 
-The settings are near the pictures and are not fitted to them: what they share is how the bed bends
-with speed, which two pictures cannot tell. So `base` has the largest residual of the two pictures
-as its error, and `corrected` what both settings differ by and what the residual does in the forms
-of `between_speeds.py` in place of the line.
+What settings share is how the bed bends with speed, which two pictures cannot tell. So `base` has
+the largest residual of the two pictures as its error, and `corrected` what the settings differ by
+and what the residual does in the forms of `between_speeds.py` in place of the line.
+
+How far `corrected` may be trusted is asked of simulated drums: two stated settings, near the
+pictures and not fitted to them, each told at a speed from its own surfaces at the pictures' speeds
+and from the pours of the other.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,7 +44,7 @@ SETTINGS: tuple[dict[str, float], ...] = (
         _VOLUME: 2.95e-5,
     },
 )
-"""Friction of grains and end walls, and the grains' volume, of grains of 1.7 mm."""
+"""Stated drums: friction of grains and end walls, the grains' volume, of grains of 1.7 mm."""
 
 _SEED = 8_600_011
 _HALF = 1.645
@@ -58,23 +61,23 @@ class DrumBase:
 
     def __init__(self, data: Path, pours: Path, *, seeds: int = 1) -> None:
         """Begins; nothing is poured yet."""
-        self._scene = task(data).scene
+        self.scene = task(data).scene
         self._forward = Forward(pours, 1)
         self._seeds = [_SEED + i for i in range(seeds)]
 
-    def at(self, setting: int, rpm: float, begin: float, end: float) -> Array:
+    def at(self, setting: Mapping[str, float], rpm: float, begin: float, end: float) -> Array:
         """Returns the mean statistics of a setting at a speed, examined from begin to end [s].
 
         Raises:
             ValueError: no usable pour.
         """
-        scene = self._scene.with_({**SETTINGS[setting], **at_speed(rpm, begin, end)})
+        scene = self.scene.with_({**setting, **at_speed(rpm, begin, end)})
         rows = self._forward.pours(scene, self._seeds)
         if not len(rows):
-            raise ValueError(f"setting {setting + 1} of the drum has no usable pour at {rpm} rpm")
+            raise ValueError(f"the drum has no usable pour at {rpm} rpm with {dict(setting)}")
         return np.asarray(rows.mean(axis=0), dtype=np.float64)
 
-    def pictured(self, setting: int, speeds: Array) -> Array:
+    def pictured(self, setting: Mapping[str, float], speeds: Array) -> Array:
         """Returns a setting's statistics at the pictures' speeds, shape (2, s)."""
         return np.array([self.at(setting, n, *PICTURED[int(n)]) for n in speeds.tolist()])
 
@@ -97,13 +100,13 @@ class DrumBase:
         is_slope = np.array([x is None for x in places])
         gaps: dict[str, list[Array]] = {"line": [], "corrected": []}
         inside: dict[str, list[NDArray[np.bool_]]] = {"line": [], "corrected": []}
-        for truth in range(len(SETTINGS)):
+        for truth in SETTINGS:
             values = self.pictured(truth, speeds)
-            others = [one for one in range(len(SETTINGS)) if one != truth]
+            others = [one for one in SETTINGS if one is not truth]
             for rpm, window in windows.items():
                 there = self.at(truth, rpm, *window)
                 rows = {"line": between_speeds("line", speeds, values, rpm, places)}
-                rows |= self.tell(rpm, window, speeds, values, places, settings=others)
+                rows |= self.tell(others, rpm, window, speeds, values, places)
                 for model in gaps:
                     middle, low, high = rows[model]
                     gaps[model].append(there - middle)
@@ -117,23 +120,22 @@ class DrumBase:
 
     def tell(
         self,
+        settings: Sequence[Mapping[str, float]],
         rpm: float,
         window: tuple[float, float],
         speeds: Array,
         values: Array,
         places: Sequence[float | None],
-        *,
-        settings: Sequence[int] = range(len(SETTINGS)),
     ) -> dict[str, tuple[Array, Array, Array]]:
         """Returns middle, low and high of `base` and `corrected`, shape (s,) each.
 
         Args:
+            settings: numbers of the scene, by path.
             rpm: the speed.
             window: from when to when the mean is taken [s].
             speeds: of the pictures, shape (2,).
             values: their heights [m] and slope [degrees], shape (2, s).
             places: x of each height [m]; None for the slope, s of them.
-            settings: which of `SETTINGS`.
         """
         plain, moved, low, high, gaps = [], [], [], [], []
         for setting in settings:
