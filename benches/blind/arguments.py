@@ -2,7 +2,24 @@
 
 import argparse
 
-__all__ = ["add_part", "add_young"]
+__all__ = ["add_law", "add_part", "add_young"]
+
+
+def add_law(parser: argparse.ArgumentParser) -> None:
+    """Adds `--law NAME=NUMBER ...`, further numbers of granulcal's material."""
+    parser.add_argument(
+        "--law",
+        type=_number,
+        nargs="+",
+        default=[],
+        metavar="NAME=NUMBER",
+        help="of granulcal's material, such as rolling_damping=0.7",
+    )
+
+
+def _number(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    return name, float(value)
 
 
 def add_part(parser: argparse.ArgumentParser, more: str = "") -> None:

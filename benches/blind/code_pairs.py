@@ -1,8 +1,10 @@
-"""What another engine alone changes: matched pours of LAMMPS and granulcal, without any effect.
+"""What another engine alone changes: matched pours of it and of granulcal, without any effect.
 
     python benches/blind/code_pairs.py --materials 20 --out out/pairs
+    python benches/blind/code_pairs.py --engine epsd2 --heights 0.04 0.08 0.12 --out out/liggghts
 
-Materials are drawn from prior.toml; each is poured once in LAMMPS and six times in granulcal at
+Materials are drawn from prior.toml; each is poured once in LAMMPS, or in LIGGGHTS with the rolling
+friction that `--engine` names, and six times in granulcal at
 every height, and seen by the same camera without noise. Pours that are there are not made again.
 Writes code_difference.json and code_difference.csv beside this file, or into the folder of --table.
 """
@@ -10,13 +12,15 @@ Writes code_difference.json and code_difference.csv beside this file, or into th
 import argparse
 import csv
 import json
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import engine
+import liggghts_engine
 import numpy as np
 from answers import write_text
-from arguments import add_young
-from engine import pour
+from arguments import add_law, add_young
 from make import CONDITIONS, TRIES
 from scene import PARAMETERS, PRIOR, Bench
 
@@ -30,10 +34,21 @@ SEED = 20_000
 OURS = 6
 """Pours of granulcal of a material at a height."""
 ALL = (*NAMES, *DIAGNOSTIC_NAMES)
+HEIGHTS = sorted(height for group in CONDITIONS.values() for height in group)
+"""Of the funnel's tip [m]."""
+
+Engine = Callable[[engine.Setup], engine.Pile]
+ENGINES: dict[str, Engine] = {
+    "lammps": engine.pour,
+    **{name: partial(liggghts_engine.pour, rolling=name) for name in liggghts_engine.ROLLING},
+}
+"""LAMMPS, and LIGGGHTS by its rolling friction."""
 
 
-def pair(bench: Bench, theta: np.ndarray, height: float, seed: int) -> dict[str, np.ndarray]:
-    """Returns the statistics of a LAMMPS pour (56,) and of granulcal pours (k, 56)."""
+def pair(
+    bench: Bench, pour: Engine, theta: np.ndarray, height: float, seed: int
+) -> dict[str, np.ndarray]:
+    """Returns the statistics of the other engine's pour (56,) and of granulcal pours (k, 56)."""
     for attempt in range(TRIES):
         pile = pour(bench.setup(theta, height, seed + attempt))
         if pile.held == 0:
@@ -45,17 +60,18 @@ def pair(bench: Bench, theta: np.ndarray, height: float, seed: int) -> dict[str,
     return {"theirs": rows[0], "ours": rows[1:], "held": np.array(pile.held)}
 
 
-def collect(materials: int, folder: Path) -> tuple[np.ndarray, dict[float, list[dict]]]:
+def collect(
+    bench: Bench, pour: Engine, materials: int, heights: list[float], folder: Path
+) -> tuple[np.ndarray, dict[float, list[dict]]]:
     """Returns the materials (m, 3) and the pairs of every height, made where they are missing."""
     folder.mkdir(parents=True, exist_ok=True)
-    bench, theta = Bench.load(), gc.Prior.load(PRIOR).sample(materials, seed=SEED)
-    heights = sorted(height for group in CONDITIONS.values() for height in group)
+    theta = gc.Prior.load(PRIOR).sample(materials, seed=SEED)
     pairs: dict[float, list[dict]] = {height: [] for height in heights}
     for number, row in enumerate(theta):
         for height in heights:
             file = folder / f"{number:02d}-{round(1000 * height):03d}.npz"
             if not file.exists():
-                found = pair(bench, row, height, SEED + 100 * number)
+                found = pair(bench, pour, row, height, SEED + 100 * number)
                 with beside(file) as draft:
                     np.savez(draft, **found)
             pairs[height].append(dict(np.load(file)))
@@ -64,7 +80,7 @@ def collect(materials: int, folder: Path) -> tuple[np.ndarray, dict[float, list[
 
 
 def summary(pairs: list[dict]) -> dict:
-    """Returns the differences of a height, LAMMPS less granulcal, in sds of granulcal's seeds.
+    """Returns the differences of a height, theirs less granulcal's, in sds of granulcal's seeds.
 
     `sd`: of a statistic from seed to seed, pooled over the materials (56,). `mean`: of the
     difference over the materials (56,), `error` its standard error. `covariance`: of the difference
@@ -129,13 +145,13 @@ def left_by_material(theta: np.ndarray, found: dict[float, dict]) -> dict[str, f
     }
 
 
-def write(theta: np.ndarray, found: dict[float, dict], folder: Path) -> None:
+def write(theta: np.ndarray, found: dict[float, dict], theirs: str, folder: Path) -> None:
     """Writes the numbers that a reader takes for a nuisance, and all differences as a table."""
     head = {
         "names": list(NAMES),
         "diagnostic_names": list(DIAGNOSTIC_NAMES),
         "unit": "standard deviations of a pour of granulcal from seed to seed, sd",
-        "difference": "LAMMPS less granulcal",
+        "difference": f"{theirs} less granulcal",
         "prior": PRIOR.name,
     }
     heights = {}
@@ -171,12 +187,17 @@ def main() -> None:
     parser.add_argument("--materials", type=int, default=20)
     parser.add_argument("--out", type=Path, default=Path("out/pairs"))
     add_young(parser, engine.YOUNG)
-    parser.add_argument("--table", type=Path, default=HERE, help="folder of the two files")
+    add_law(parser)
+    parser.add_argument("--engine", choices=ENGINES, default="lammps")
+    parser.add_argument("--heights", type=float, nargs="+", default=HEIGHTS, help="of the tip [m]")
+    parser.add_argument("--table", type=Path, help="folder of the two files; here for LAMMPS")
     options = parser.parse_args()
     engine.YOUNG = options.young
-    theta, pairs = collect(options.materials, options.out)
+    bench, pour = Bench.load(dict(options.law)), ENGINES[options.engine]
+    theta, pairs = collect(bench, pour, options.materials, options.heights, options.out)
     found = {height: summary(rows) for height, rows in pairs.items()}
-    write(theta, found, options.table)
+    table = options.table or (HERE if options.engine == "lammps" else options.out)
+    write(theta, found, options.engine, table)
     print("| statistic | " + " | ".join(f"{100 * h:g} cm" for h in found) + " |")
     print("|---" * (len(found) + 1) + "|")
     for i, name in enumerate(NAMES):

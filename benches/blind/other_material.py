@@ -1,8 +1,9 @@
-r"""What no other material of granulcal explains of LAMMPS' pours: chi squared over n.
+r"""What no other material of granulcal explains of another engine's pours: chi squared over n.
 
     python benches/blind/other_material.py out/pairs --out out/materials
+    python benches/blind/other_material.py out/liggghts --out out/by-law --law impact_friction=1.16
 
-Takes the pairs that `code_pairs.py` has made. For one pour of LAMMPS of a material at each of the
+Takes the pairs that `code_pairs.py` has made. For one pour of theirs of a material at each of the
 three heights to fit, y,
 
     m(theta), s(theta), R   means (cubic), spreads (quadratic) and correlation of granulcal's pours,
@@ -12,7 +13,7 @@ three heights to fit, y,
     chi2 = |y - x - J d|^2 in (s R s (1 + 1/FRESH))^-1 at its least, d a last step by the slopes J
 
 and chi2 / (n - 3) over the 16 statistics at three heights, n = 48, is 1 where another material
-explains all. Beside it stands the same of a pour of granulcal in place of LAMMPS', which has to be
+explains all. Beside it stands the same of a pour of granulcal in place of theirs, which has to be
 1 within its scatter.
 """
 
@@ -21,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from arguments import add_law
 from code_pairs import SEED
 from make import CONDITIONS
 from numpy.typing import NDArray
@@ -132,9 +134,9 @@ def left(emulators: list[Emulator], y: Array, u: Array, fresh: list[Array]) -> f
 class Pours:
     """granulcal's pours, seen by the camera without noise, over the cube of the prior."""
 
-    def __init__(self) -> None:
-        """Reads the experiment."""
-        self.bench, self.prior = Bench.load(), gc.Prior.load(PRIOR)
+    def __init__(self, law: dict[str, float]) -> None:
+        """Reads the experiment; `law` are further numbers of the material."""
+        self.bench, self.prior = Bench.load(law), gc.Prior.load(PRIOR)
 
     def theta(self, u: Array) -> Array:
         """Returns mu_s, mu_r, e (n, 3) of u (n, 3)."""
@@ -157,9 +159,10 @@ def main() -> None:
     parser.add_argument("pairs", type=Path, help="folder of code_pairs.py")
     parser.add_argument("--out", type=Path, required=True, help="folder of the bank")
     parser.add_argument("--materials", type=int, default=20)
+    add_law(parser)
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    pours, heights = Pours(), CONDITIONS["fit"]
+    pours, heights = Pours(dict(options.law)), CONDITIONS["fit"]
     emulators = []
     for h, height in enumerate(heights):
         file = options.out / f"bank-{round(1000 * height):03d}.npz"
@@ -172,7 +175,7 @@ def main() -> None:
         good = np.isfinite(bank["x"]).all(axis=1)
         emulators.append(Emulator.fit(bank["u"][good], bank["x"][good]))
     theta = gc.Prior.load(PRIOR).sample(options.materials, seed=SEED)
-    print("| material | " + " | ".join(PARAMETERS) + " | nearest | LAMMPS | granulcal |")
+    print("| material | " + " | ".join(PARAMETERS) + " | nearest | other engine | granulcal |")
     print("|---" * (len(PARAMETERS) + 4) + "|")
     theirs, ours = [], []
     for number, row in enumerate(theta):
@@ -200,7 +203,7 @@ def main() -> None:
             cells.append((at, f"{kept[-1]:.2f}"))
         own = " | ".join(f"{value:.3g}" for value in row)
         print(f"| {number} | {own} | {cells[0][0]} | {cells[0][1]} | {cells[1][1]} |", flush=True)
-    for name, found in (("LAMMPS", theirs), ("granulcal", ours)):
+    for name, found in (("the other engine", theirs), ("granulcal", ours)):
         values = np.array(found)
         error = values.std(ddof=1) / np.sqrt(len(values))
         met = f"at most 1.2 in {(values <= 1.2).sum()} of {len(values)}"

@@ -1,7 +1,7 @@
 """The pour of scene.toml for LAMMPS, and what the scene's camera sees of its piles."""
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -67,14 +67,15 @@ def setup_of(table: dict, material: tuple[float, float, float], height: float, s
 
 @dataclass(frozen=True)
 class Bench:
-    """The experiment: scene.toml, read once."""
+    """The experiment: scene.toml, read once; further numbers of granulcal's material, by name."""
 
     text: str
+    law: dict[str, float] = field(default_factory=dict)
 
     @classmethod
-    def load(cls) -> "Bench":
-        """Returns the experiment of this folder."""
-        return cls(SCENE.read_text())
+    def load(cls, law: dict[str, float] | None = None) -> "Bench":
+        """Returns the experiment of this folder; granulcal's pours have further numbers `law`."""
+        return cls(SCENE.read_text(), law or {})
 
     @cached_property
     def table(self) -> dict:
@@ -100,7 +101,7 @@ class Bench:
 
     def pour(self, theta: np.ndarray, height: float, seed: int) -> gc.Pour:
         """Returns the same pour of granulcal, its default preset."""
-        values = dict(zip(PARAMETERS, map(float, theta), strict=True))
+        values = dict(zip(PARAMETERS, map(float, theta), strict=True)) | self.law
         changes = {f"material.{name}": value for name, value in values.items()}
         scene = gc.Scene.from_toml(self.text).with_({**changes, "funnel.height": height})
         return gc.simulate(scene, seed=seed)

@@ -1,8 +1,11 @@
-"""Pours the rows of rows.py in granulcal and compares the piles with LAMMPS' in lammps.csv.
+"""Pours the rows of rows.py in granulcal and compares the piles with those of another engine.
 
     python benches/peers/compare.py --presets default accurate --seeds 4
+    python benches/peers/compare.py --presets default --engine liggghts --settings epsd2
 
-LAMMPS itself is not needed. Differences are of the means over seeds, with their standard error.
+The other engine itself is not needed: its piles are in lammps.csv or liggghts.csv. LIGGGHTS has no
+torsion, and its dashpots pull: `LAWS` has what granulcal's material is told of each. Differences
+are of the means over seeds, with their standard error.
 """
 
 import argparse
@@ -16,7 +19,16 @@ from rows import rows
 
 import granulcal as gc
 
-RESULTS = Path(__file__).parent / "lammps.csv"
+HERE = Path(__file__).parent
+LAWS: dict[tuple[str, str], dict[str, float]] = {
+    ("liggghts", "epsd"): {
+        "torsional_friction": 0.0,
+        "rolling_damping": 0.7,
+        "impact_friction": 1.16,
+    },
+    ("liggghts", "epsd2"): {"torsional_friction": 0.0, "impact_friction": 1.16},
+}
+"""Numbers of granulcal's law by engine and settings; of LAMMPS torsion is as strong as rolling."""
 MEASURES = ("max_z", "mean_z", "mean_r", "r95")
 COMPARED = ("mean_z", "mean_r", "r95")
 BAR = 5.0
@@ -29,25 +41,27 @@ FLAT = 6.0
 Piles = list[dict[str, float]]
 
 
-def scene_of(law: Law) -> gc.Scene:
-    """Returns the funnel with the coefficients of a row."""
+def scene_of(law: Law, numbers: dict[str, float] | None) -> gc.Scene:
+    """Returns the funnel with the coefficients of a row and further numbers of the law."""
+    torsion = {"torsional_friction": law.rolling_friction}  # as in the LAMMPS rows
     material = gc.Material(
         sliding_friction=law.sliding_friction,
         rolling_friction=law.rolling_friction,
         restitution=law.restitution,
-        torsional_friction=law.rolling_friction,  # as in the LAMMPS rows
+        **(torsion if numbers is None else numbers),
     )
+    kinds = ("rolling", "torsional") if numbers is None else ("rolling",)
     at_walls = {
         f"{wall}.material.{kind}_friction": law.wall_rolling_friction
         for wall in ("ground", "funnel")
-        for kind in ("rolling", "torsional")
+        for kind in kinds
     }
     return gc.Scene.funnel(height=0.12).with_material(material).with_(at_walls)
 
 
-def of_granulcal(law: Law, preset: str, seeds: int) -> Piles:
+def of_granulcal(scene: gc.Scene, preset: str, seeds: int) -> Piles:
     """Returns our piles of a row, one for each seed."""
-    pours = (gc.simulate(scene_of(law), seed=seed + 1, preset=preset) for seed in range(seeds))
+    pours = (gc.simulate(scene, seed=seed + 1, preset=preset) for seed in range(seeds))
     return [
         {
             **measure(pour.positions),
@@ -59,9 +73,9 @@ def of_granulcal(law: Law, preset: str, seeds: int) -> Piles:
     ]
 
 
-def of_lammps(row: str, settings: str, young: str) -> Piles:
-    """Returns LAMMPS' piles of a row."""
-    with RESULTS.open() as file:
+def of_other(engine: str, row: str, settings: str, young: str) -> Piles:
+    """Returns the other engine's piles of a row."""
+    with (HERE / f"{engine}.csv").open() as file:
         return [
             {
                 name: float(value)
@@ -130,8 +144,9 @@ def main() -> None:
     parser.add_argument("--rows", nargs="+", choices=laws, default=list(laws))
     parser.add_argument("--presets", nargs="+", default=["default", "accurate"])
     parser.add_argument("--seeds", type=int, default=4)
-    parser.add_argument("--settings", default="rigid", help="LAMMPS' settings in lammps.csv")
-    parser.add_argument("--young", default="1e+07", help="Young's modulus in lammps.csv [Pa]")
+    parser.add_argument("--engine", choices=("lammps", "liggghts"), default="lammps")
+    parser.add_argument("--settings", default="rigid", help="the other engine's, as in its file")
+    parser.add_argument("--young", default="1e+07", help="Young's modulus in its file [Pa]")
     options = parser.parse_args()
     head = (
         "row|mu_s|mu_r (/ walls)|e|engine|pours|jammed|max z|mean z|mean r|95 % r|overlap %|CPU s"
@@ -140,11 +155,15 @@ def main() -> None:
     print("|---" * 13 + "|")
     met: dict[str, list[bool]] = {preset: [] for preset in options.presets}
     for row in options.rows:
-        law, theirs = laws[row], of_lammps(row, options.settings, options.young)
+        law, of = laws[row], (options.engine, options.settings)
+        theirs, scene = (
+            of_other(options.engine, row, options.settings, options.young),
+            scene_of(law, LAWS.get(of)),
+        )
         if theirs:
-            print(line("LAMMPS", theirs, row, law, None), flush=True)
+            print(line(options.engine.upper(), theirs, row, law, None), flush=True)
         for preset in options.presets:
-            ours = of_granulcal(law, preset, options.seeds)
+            ours = of_granulcal(scene, preset, options.seeds)
             print(line(f"`{preset}`", ours, row, law, theirs), flush=True)
             if any(pile["unhealthy"] for pile in ours):
                 print(f"row {row}: {preset} was unhealthy")

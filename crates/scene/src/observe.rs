@@ -73,6 +73,9 @@ pub struct ObserveFront {
     /// largest; 0 for a front by `level` `[-]`.
     #[serde(default)]
     pub link: f64,
+    /// Whether the radius is taken at the end of the pour, too.
+    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    pub end: bool,
 }
 
 /// The share of the grains' mass that is below a height, against time.
@@ -124,6 +127,15 @@ pub struct ObserveImages {
 
 fn half() -> f64 {
     0.5
+}
+
+const fn yes() -> bool {
+    true
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+const fn is_yes(value: &bool) -> bool {
+    *value
 }
 
 impl Observe {
@@ -226,7 +238,13 @@ mod tests {
     use crate::Scene;
 
     fn scene() -> Scene {
-        let front = ObserveFront { axis: [0.0; 2], times: vec![0.1, 0.2], level: 0.5, link: 1.5 };
+        let front = ObserveFront {
+            axis: [0.0; 2],
+            times: vec![0.1, 0.2],
+            level: 0.5,
+            link: 1.5,
+            end: true,
+        };
         let discharge = ObserveDischarge { below: 0.0, times: vec![1.0], jammed_below: 50.0 };
         let observe = Observe {
             rate: 100.0,

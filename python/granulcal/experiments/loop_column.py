@@ -6,7 +6,8 @@ glycerol at 1 g and 4.6 g. Thin fluids at 4.6 g were not tracked to their end an
 
 from pathlib import Path
 
-from granulcal.loop.close import Closed, close_loop
+from granulcal.experiments.fronts_picture import draw_fronts
+from granulcal.loop.close import close_loop
 from granulcal.loop.effects.definitions import Definition
 from granulcal.loop.effects.law import law_numbers
 from granulcal.loop.effects.library import LibraryEffect, by_name
@@ -28,8 +29,6 @@ _ROUNDS = 1
 _BUDGET = 900 + _ROUNDS * ROUND
 # Free numbers of the contact law: two dimensions more are what the archive can bear.
 _WANTED = ("touching_exponent", "softness")
-# Pours of a model that was not the verdict's, for the picture.
-_DRAWN, _SEED = 5, 8_200_007
 # In this order, so that an archive that is cut short has the fluids.
 _EFFECTS = (
     "ground.sliding",
@@ -171,48 +170,6 @@ def reproduce(out: Path, data: Path) -> bool:
         command=f"granulcal reproduce loop_column --out {out}",
         title="Columns of beads in water and glycerol, modelled dry",
     )
-    _picture(folder / "fronts.png", closed, Forward(folder / "pours", 1))
+    draw_fronts(folder / "fronts.png", closed, Forward(folder / "pours", 1))
     print(folder / "fronts.png")
     return closed.standing.stands
-
-
-def _picture(path: Path, closed: Closed, forward: Forward) -> None:
-    """Draws the fronts of every condition: measured, of the base model, of the best other one."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    trace = closed.trace
-    best = trace.best
-    if best is trace.base and trace.explanations:
-        # Nothing is adequate: the most probable model all the same.
-        best = trace.explanations[0]
-    # front_radius[0.1] and so on; that at the end is last.
-    times = [float(name.split("[")[1][:-1]) for name in closed.task.scene.observed_names[:-1]]
-    figure, axes = plt.subplots(
-        2, 3, figsize=(10.5, 6.2), sharex=True, sharey="row", layout="constrained"
-    )
-    for axis, condition in zip(axes.flat, closed.task.conditions, strict=False):
-        before, after = closed.simulated[condition.name]
-        if best is not trace.best:
-            after = forward.pours(closed.scene(condition, best), range(_SEED, _SEED + _DRAWN))
-        drawn = [("base model", before, "C0")]
-        if best is not trace.base:
-            drawn.append((f"with {' + '.join(best.effects)}", after, "C1"))
-        for label, rows, colour in drawn:
-            fronts = 1e3 * rows[:, : len(times)]
-            low, high = fronts.min(axis=0), fronts.max(axis=0)
-            axis.fill_between(times, low, high, color=colour, alpha=0.25, lw=0)
-            axis.plot(times, fronts.mean(axis=0), color=colour, label=label)
-        for number, row in enumerate(1e3 * closed.measured[condition.name]):
-            label = "measured" if number == 0 else None
-            axis.plot(times, row[: len(times)], "k.-", lw=0.8, label=label)
-        axis.set_title(f"{condition.name} ({'fitted' if condition.use == FIT else condition.use})")
-    for axis in axes[-1]:
-        axis.set_xlabel("time [s]")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("radius of the front [mm]")
-    axes.flat[0].legend(fontsize=8, loc="upper left")
-    figure.savefig(path, dpi=80)
-    plt.close(figure)

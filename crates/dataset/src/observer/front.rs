@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 
 use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 
-/// `front_radius[t]` at the stated times, and `front_radius[end]`.
+/// `front_radius[t]` at the stated times, and `front_radius[end]` unless it is left out.
 #[derive(Debug)]
 pub(super) struct Front {
     spec: ObserveFront,
@@ -36,7 +36,9 @@ impl Observation for Front {
         let times = self.spec.times.iter();
         let mut all: Vec<_> =
             times.map(|t| statistic(t.to_string(), format!("{t} s after the begin"))).collect();
-        all.push(statistic("end".to_owned(), "at the end".to_owned()));
+        if self.spec.end {
+            all.push(statistic("end".to_owned(), "at the end".to_owned()));
+        }
         all
     }
 
@@ -53,7 +55,7 @@ impl Observation for Front {
     fn values(&self, pour: &Pour) -> Vec<f64> {
         let at = |&time: &f64| self.series.at(time, holds(pour));
         let end = self.series.values.last().copied().unwrap_or(f64::NAN);
-        self.spec.times.iter().map(at).chain([end]).collect()
+        self.spec.times.iter().map(at).chain(self.spec.end.then_some(end)).collect()
     }
 
     fn series(&self) -> &[Series] {

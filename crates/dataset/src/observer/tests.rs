@@ -23,7 +23,13 @@ fn scene() -> Scene {
             slope_within: 0.01,
             level: 0.5,
         }),
-        front: Some(ObserveFront { axis: [0.03, 0.0], times: vec![0.05], level: 0.5, link: 0.0 }),
+        front: Some(ObserveFront {
+            axis: [0.03, 0.0],
+            times: vec![0.05],
+            level: 0.5,
+            link: 0.0,
+            end: true,
+        }),
         discharge: Some(ObserveDischarge {
             below: 0.027,
             times: vec![0.03, 0.1, 0.3],
@@ -80,6 +86,19 @@ fn a_falling_grain_is_seen_where_it_is() {
     assert!(inner.iter().all(|gap| (gap - 0.002).abs() <= dt), "{gaps:?}");
     let fell = series.values.iter().position(|&share| share > 0.0).unwrap();
     assert!((series.times[fell] - 0.0514).abs() < 0.0025, "{}", series.times[fell]);
+}
+
+#[test]
+fn a_front_that_is_not_seen_to_its_end_has_none() {
+    let mut scene = scene();
+    scene.observe.as_mut().unwrap().front.as_mut().unwrap().end = false;
+    let (pour, observer) = run(&scene);
+    let names: Vec<_> = observed_statistics(&scene).into_iter().map(|s| s.name).collect();
+    assert!(names.contains(&"front_radius[0.05]".to_owned()), "{names:?}");
+    assert!(!names.contains(&"front_radius[end]".to_owned()), "{names:?}");
+    let found = observer.observed(&pour);
+    assert!((value(&scene, &found, "front_radius[0.05]") - 0.002).abs() < 5.1e-4);
+    assert_eq!(value(&scene, &found, "spilled"), 1.0);
 }
 
 #[test]

@@ -29,7 +29,7 @@ from granulcal.loop.pours.forward import Forward
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 
-__all__ = ["LIQUIDS", "UNKNOWN", "ColumnPours"]
+__all__ = ["LIQUIDS", "UNKNOWN", "ColumnPours", "column_scene", "known_liquid"]
 
 Array = NDArray[np.float64]
 
@@ -68,6 +68,34 @@ _SEED = 8_700_001
 _WATER = 1e-3
 
 
+def column_scene(test: Test, model: str) -> Scene:
+    """Returns a test's scene by one of `LIQUIDS`, of which only `UNKNOWN` is not stated."""
+    base, liquid = Scene.load(_SCENE), LIQUIDS[model]
+    unit = 1.0 / sqrt(test.numbers["N"])
+    numbers = test.scene_numbers(base)
+    numbers |= {path: unit * base.get(path) for path in _TIMES}
+    numbers |= {
+        _RATE: base.get(_RATE) / unit,
+        # The tube goes on for as long as anyone looks.
+        "walls.0.motion.end": numbers["end.horizon"],
+    }
+    if liquid is not None:
+        numbers |= {**known_liquid(test), **liquid}
+    return observing(base, times_of(test)).with_(numbers)
+
+
+def known_liquid(test: Test) -> dict[str, float]:
+    """Returns density and viscosity of a test's liquid, in its films too, by path."""
+    film = test.numbers["mu_f"]
+    if test.fluid == "k":
+        film = _WATER * (1.0 + 2.5 * test.numbers["C_v"])
+    return {
+        "effects.fluid.density": test.numbers["rho_f"],
+        "effects.fluid.viscosity": test.numbers["mu_f"],
+        "effects.lubrication.viscosity": film,
+    }
+
+
 class ColumnPours:
     """Pours of tests.
 
@@ -78,27 +106,11 @@ class ColumnPours:
 
     def __init__(self, pours: Path, model: str) -> None:
         """Begins or goes on with a folder."""
-        self._forward, self._liquid = Forward(pours, 1), LIQUIDS[model]
-        self._scene = Scene.load(_SCENE)
+        self._forward, self._model = Forward(pours, 1), model
 
     def scene(self, test: Test) -> Scene:
         """Returns the test's scene, of which only `UNKNOWN` is not stated."""
-        unit = 1.0 / sqrt(test.numbers["N"])
-        numbers = test.scene_numbers(self._scene)
-        numbers |= {path: unit * self._scene.get(path) for path in _TIMES}
-        numbers |= {
-            _RATE: self._scene.get(_RATE) / unit,
-            # The tube goes on for as long as anyone looks.
-            "walls.0.motion.end": numbers["end.horizon"],
-        }
-        if self._liquid is not None:
-            numbers |= {
-                "effects.fluid.density": test.numbers["rho_f"],
-                "effects.fluid.viscosity": test.numbers["mu_f"],
-                "effects.lubrication.viscosity": _of_a_film(test),
-                **self._liquid,
-            }
-        return observing(self._scene, times_of(test)).with_(numbers)
+        return column_scene(test, self._model)
 
     def fronts(self, test: Test, unknown: Array, seeds: Sequence[int]) -> Array:
         """Returns the fronts at the test's times and at the end [mm], shape (n, T + 1).
@@ -113,10 +125,3 @@ class ColumnPours:
         # A body that has fallen apart is no front: the end is the farthest that was one.
         rows[:, -1] = np.fmax(rows[:, -1], np.nanmax(rows[:, :-1], axis=1))
         return np.asarray(rows, dtype=np.float64)
-
-
-def _of_a_film(test: Test) -> float:
-    """Viscosity of the liquid between two beads [Pa s]."""
-    if test.fluid == "k":
-        return _WATER * (1.0 + 2.5 * test.numbers["C_v"])
-    return test.numbers["mu_f"]

@@ -113,12 +113,13 @@ def all_tests(data: Path) -> list[Test]:
     return tests + (read_tests(further) if further.exists() else [])
 
 
-def observing(scene: Scene, times: Array) -> Scene:
-    """Returns the scene with its front taken at `times` [s]."""
+def observing(scene: Scene, times: Array, *, end: bool = True) -> Scene:
+    """Returns the scene with its front taken at `times` [s], and at the end or not."""
     listed = ", ".join(repr(float(t)) for t in times)
+    more = "" if end else "\nend = false"
     text, count = re.subn(
         r"(?ms)(^\[observe\.front\].*?^times = )\[[^\]]*\]",
-        rf"\g<1>[{listed}]",
+        rf"\g<1>[{listed}]{more}",
         scene.to_toml(),
     )
     if count != 1:

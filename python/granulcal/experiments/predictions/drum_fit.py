@@ -49,7 +49,7 @@ UNKNOWN = Prior(
     ]
 )
 """Friction of the grains and of the end walls, and the grains' volume [m^3]."""
-POINTS = 40
+POINTS = 32
 """Pours of 1.7 mm at each speed."""
 ROUNDS = 5
 """Pours of the true size at each speed."""
