@@ -8,7 +8,7 @@ import pytest
 
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
-from granulcal.experiments import loop_column, loop_drum, loop_rings
+from granulcal.experiments import loop_centrifuge, loop_column, loop_drum, loop_rings
 from granulcal.loop.check.prior_rounds import ROUNDS
 from granulcal.loop.close import _candidates, planned
 from granulcal.loop.effects.design import Design, Effect, normal_from_cube
@@ -217,6 +217,49 @@ def test_the_columns_are_read_by_their_outline_and_their_own_errors_have_no_name
     for entry in asked.library:
         if not entry.is_free:
             assert scene.with_(entry.at(scene).numbers(1.0)).get(entry.path) == entry.full
+
+
+TESTS = """TestCode N rpm G r_0 d_p rho_p IF C_v rho_f mu_f
+20210804_08g_050g_050_050_005 4.6 47 45.2 0.054 0.008 2632 g 0.404 1120 0.005
+20220411_08g_500g_050_050_005 4.6 47 45.2 0.054 0.008 2632 g 0.742 1204 0.052
+20220411_08g_1500g_050_050_005 4.6 47 45.2 0.054 0.008 2632 g 0.847 1228 0.157
+20220411_08g_1000g_050_050_005 4.6 47 45.2 0.054 0.008 2632 g 0.812 1220 0.105
+20211124_08g_010w_050_050_005 4.6 47 45.2 0.054 0.008 2632 w 0 1000 0.001
+20211124_08g_010k_050_050_005 4.6 47 45.2 0.054 0.008 2632 k 0.04 1165 0.0167
+20211126_08g_020k_050_050_005 4.6 47 45.2 0.054 0.008 2632 k 0.086 1330 0.0617
+"""
+
+
+def test_columns_in_the_centrifuge_hold_each_their_own_liquid_and_have_no_end(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "column-collapse-webb"
+    folder.mkdir()
+    (folder / "Experimental_Conditions.txt").write_text(TESTS)
+    asked = loop_centrifuge.task(tmp_path)
+    scene = asked.at_first()
+    assert scene.get("gravity.2") == -45.2 and scene.get("effects.fluid.saturated") == 1.0
+    # What is looked for is off, and what the liquid is known to be is no unknown.
+    assert scene.get("effects.lubrication.shear") == 0.0
+    assert not any(name.startswith("effects.") for name in asked.prior.names)
+    assert len(asked.places) == 3 and [len(c.recordings) for c in asked.conditions[3:]] == [
+        1,
+        1,
+        2,
+        2,
+    ]
+    # In clay's films is its water with what is left of the clay at any rate.
+    clay = asked.conditions[6].at
+    assert clay["effects.lubrication.viscosity"] == pytest.approx(1e-3 * (1 + 2.5 * 0.086))
+    assert clay["effects.fluid.viscosity"] == 0.0617
+    times = [float(name[len("front_radius[") : -1]) for name in scene.observed_names]
+    assert len(times) == 9 and scene.get("end.horizon") > scene.get("observe.begin") + times[-1]
+    for entry in asked.library:
+        if not entry.is_free:
+            assert scene.with_(entry.at(scene).numbers(1.0)).get(entry.path) == entry.full
+    draws = ROUNDS * Thresholds().look
+    _, _, budget = loop_centrifuge.poured(tmp_path)
+    assert planned(asked, budget, 0, rounds=1, draws=draws).pours < budget
 
 
 def test_draws_around_a_fit_have_its_spread_and_stay_in_the_prior() -> None:

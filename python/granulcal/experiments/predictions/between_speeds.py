@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.experiments.loop_drum.task import task
+from granulcal.experiments.predictions.interval import HALF_90
 
 __all__ = ["HEIGHT", "MODELS", "SLOPE", "between_speeds", "in_drum", "read_pictures"]
 
@@ -27,7 +28,6 @@ Array = NDArray[np.float64]
 # its middle and its turn are known to as much.
 HEIGHT, SLOPE = 0.4e-3, 0.5
 """One sd of a picture: of its heights [m] and of its slope [degrees]."""
-_HALF = 1.645
 _RADIUS = 0.042
 _FORMS: tuple[Callable[[float], float], ...] = (np.log, np.square)
 
@@ -56,7 +56,7 @@ def between_speeds(
     line = _through(lambda n: n, speeds, values, rpm)
     if model == "line":
         share = _share(lambda n: n, speeds, rpm)
-        own = _HALF * noise * np.sqrt(share**2 + (1 - share) ** 2 + 1.0)
+        own = HALF_90 * noise * np.sqrt(share**2 + (1 - share) ** 2 + 1.0)
         others = np.array([line, *(_through(form, speeds, values, rpm) for form in _FORMS)])
         middle = line
         low = line - np.hypot(line - others.min(axis=0), own)
@@ -67,7 +67,7 @@ def between_speeds(
         middle = values[near].mean(axis=0)
         # Where both are equally near, as far as half of what they differ by.
         reach = np.abs(line - middle) if near.sum() == 1 else 0.5 * np.abs(np.diff(values, axis=0))
-        half = np.hypot(np.ravel(reach), _HALF * np.sqrt(2.0) * noise)
+        half = np.hypot(np.ravel(reach), HALF_90 * np.sqrt(2.0) * noise)
         low, high = middle - half, middle + half
     return in_drum((middle, low, high), places)
 

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.experiments.predictions.column_tests import Fronts, Test
+from granulcal.experiments.predictions.interval import HALF_90
 
 __all__ = ["MODELS", "BetweenTests", "Told", "held"]
 
@@ -37,7 +38,6 @@ _VISCOSITY, _BY_GRAVITY, _CLAY, _DAY, _NOISE = 0.30, 0.45, 0.37, 0.45, 0.50
 _POWERS = (0.0, 0.5, 1.0)
 _PLANE_POWER = 0.5
 # Standard deviations from the middle of a 90 % interval to its ends.
-_HALF = 1.645
 # Least scatter of the tests at one time, and what the cameras see [mm].
 _LEAST, _SEEN = 1.0, 200.0
 
@@ -53,14 +53,14 @@ class Told:
     @classmethod
     def of(cls, middle: Array, sd: Array) -> "Told":
         """Returns the 90 % interval about `middle`, none of it beyond what the cameras see."""
-        half = _HALF * sd
+        half = HALF_90 * sd
         low, middle, high = (np.minimum(v, _SEEN) for v in (middle - half, middle, middle + half))
         return cls(middle, low, high)
 
     @property
     def sd(self) -> Array:
         """Standard deviation [mm]; of the lower end, for the upper one stops where cameras do."""
-        return np.asarray((self.middle - self.low) / _HALF)
+        return np.asarray((self.middle - self.low) / HALF_90)
 
 
 @dataclass(frozen=True)

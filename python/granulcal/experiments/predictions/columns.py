@@ -35,7 +35,6 @@ Array = NDArray[np.float64]
 
 # Of each model for each test, at as many draws of the fit.
 _POURS = 4
-_HALF = 1.645
 _FLUID = {
     "effects.fluid.density": "rho_f",
     "effects.fluid.viscosity": "mu_f",

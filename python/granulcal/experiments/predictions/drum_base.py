@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from granulcal.experiments.loop_drum.task import SPEEDS as PICTURED
 from granulcal.experiments.loop_drum.task import at_speed, task
 from granulcal.experiments.predictions.between_speeds import between_speeds, in_drum
+from granulcal.experiments.predictions.interval import HALF_90
 from granulcal.loop.pours.forward import Forward
 
 __all__ = ["SETTINGS", "DrumBase"]
@@ -47,7 +48,6 @@ SETTINGS: tuple[dict[str, float], ...] = (
 """Stated drums: friction of grains and end walls, the grains' volume, of grains of 1.7 mm."""
 
 _SEED = 8_600_011
-_HALF = 1.645
 
 
 class DrumBase:
@@ -148,7 +148,7 @@ class DrumBase:
             high.append(there + above)
             gaps.append(np.abs(residual).max(axis=0))
         base, corrected = np.mean(plain, axis=0), np.mean(moved, axis=0)
-        half = _HALF * np.mean(gaps, axis=0)
+        half = HALF_90 * np.mean(gaps, axis=0)
         told = {
             "base": (base, base - half, base + half),
             "corrected": (corrected, np.min(low, axis=0), np.max(high, axis=0)),

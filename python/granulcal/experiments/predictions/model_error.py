@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from granulcal.experiments.predictions.between_tests import Told
 from granulcal.experiments.predictions.column_tests import Fronts, Test
+from granulcal.experiments.predictions.interval import HALF_90
 
 __all__ = ["ModelError"]
 
 Array = NDArray[np.float64]
-
-_HALF = 1.645
 
 
 class ModelError:
@@ -37,7 +36,7 @@ class ModelError:
 
     def widened(self, test: Test, told: Told) -> Told:
         """Returns what is told of a test with the model's error in its interval."""
-        square = ((told.high - told.low) / (2 * _HALF)) ** 2
+        square = ((told.high - told.low) / (2 * HALF_90)) ** 2
         others = np.array([t.campaign != test.campaign for t in self._tests], dtype=bool)
         if others.any():
             gaps = self._gaps[others]
@@ -48,7 +47,7 @@ class ModelError:
             if len(known):
                 place = np.searchsorted(known, np.arange(len(each)), side="right") - 1
                 square = square + each[known[np.maximum(place, 0)]]
-        half = _HALF * np.sqrt(square)
+        half = HALF_90 * np.sqrt(square)
         return Told(told.middle, told.middle - half, told.middle + half)
 
     def held(self, told: Mapping[str, Told]) -> tuple[float, float]:
