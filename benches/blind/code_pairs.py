@@ -12,15 +12,13 @@ Writes code_difference.json and code_difference.csv beside this file, or into th
 import argparse
 import csv
 import json
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import engine
-import liggghts_engine
 import numpy as np
 from answers import write_text
 from arguments import add_law, add_young
+from engines import ENGINES, Engine, add_engine
 from make import CONDITIONS, TRIES
 from scene import PARAMETERS, PRIOR, Bench
 
@@ -36,13 +34,6 @@ OURS = 6
 ALL = (*NAMES, *DIAGNOSTIC_NAMES)
 HEIGHTS = sorted(height for group in CONDITIONS.values() for height in group)
 """Of the funnel's tip [m]."""
-
-Engine = Callable[[engine.Setup], engine.Pile]
-ENGINES: dict[str, Engine] = {
-    "lammps": engine.pour,
-    **{name: partial(liggghts_engine.pour, rolling=name) for name in liggghts_engine.ROLLING},
-}
-"""LAMMPS, and LIGGGHTS by its rolling friction."""
 
 
 def pair(
@@ -188,7 +179,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out/pairs"))
     add_young(parser, engine.YOUNG)
     add_law(parser)
-    parser.add_argument("--engine", choices=ENGINES, default="lammps")
+    add_engine(parser)
     parser.add_argument("--heights", type=float, nargs="+", default=HEIGHTS, help="of the tip [m]")
     parser.add_argument("--table", type=Path, help="folder of the two files; here for LAMMPS")
     options = parser.parse_args()

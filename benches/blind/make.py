@@ -1,6 +1,8 @@
 """Makes blind sets: recordings for `granulcal close-loop`, and sealed answers somewhere else.
 
     python benches/blind/make.py out/sets --sealed out/sealed --sets 42
+    python benches/blind/make.py out/liggghts --sealed out/answers --sets 30 --nulls 30 \
+        --engine epsd2 --young 1e7
 
 A set is a folder with `loop.toml`, scene, prior and depth images. Nothing in it says what the truth
 has. Sets that are there are not made again, so it goes on where it was stopped.
@@ -22,7 +24,8 @@ import engine
 import numpy as np
 from answers import seal, seals, write_text
 from arguments import add_part, add_young
-from engine import Setup, pour
+from engine import Pile, Setup
+from engines import ENGINES, Engine, add_engine
 from scene import PARAMETERS, PRIOR, SCENE, Bench
 
 import granulcal as gc
@@ -60,8 +63,8 @@ def plan(seed: int, count: int, nulls: int = NULLS) -> list[Planned]:
     return [Planned(i, f"set-{order[i]:03d}", *pair) for i, pair in enumerate(what)]
 
 
-def make(planned: Planned, seed: int, pours: int, sets: Path, sealed: Path) -> None:
-    """Makes one set and seals its answer."""
+def make(planned: Planned, pour: Engine, seed: int, pours: int, sets: Path, sealed: Path) -> None:
+    """Makes one set of an engine's pours and seals its answer."""
     bench, random = Bench.load(), np.random.default_rng([seed, 1, planned.index])
     theta = gc.Prior.load(PRIOR).sample(1, seed=int(random.integers(2**31)))[0]
     effect = None if planned.effect is None else effects.load()[planned.effect]
@@ -93,7 +96,7 @@ def make(planned: Planned, seed: int, pours: int, sets: Path, sealed: Path) -> N
                     with_effect = partial(_apply, effect, strength, of_effect)
                     setups = map(with_effect, setups)
                 image = f"{round(100 * height):02d}cm/pour-{number}.png"
-                made.append(_recorded(bench, setups, draft, image, seeds[-1]))
+                made.append(_recorded(bench, map(pour, setups), draft, image, seeds[-1]))
             answer["conditions"].append({"height": height, "use": use, "pours": made})
             images = [one["recording"] for one in made if "recording" in one]
             if images:
@@ -120,11 +123,10 @@ def _apply(effect: effects.Effect, strength: float, seed: int, setup: Setup) -> 
     return effect.apply(setup, strength, np.random.default_rng(seed))
 
 
-def _recorded(bench: Bench, setups: Iterator[Setup], folder: Path, image: str, noise: int) -> dict:
+def _recorded(bench: Bench, piles: Iterator[Pile], folder: Path, image: str, noise: int) -> dict:
     """Records the first pour that leaves no grain in the funnel; returns what to seal of it."""
     tries, held = 0, 0
-    for tries, setup in enumerate(setups, start=1):
-        pile = pour(setup)
+    for tries, pile in enumerate(piles, start=1):
         held = pile.held
         if held == 0:
             bench.record(pile, folder, image, noise)
@@ -167,6 +169,7 @@ def main() -> None:
     parser.add_argument("--pours", type=int, default=3, help="pours at each height")
     add_part(parser)
     add_young(parser, engine.YOUNG)
+    add_engine(parser)
     parser.add_argument("--seed", type=int, help="of the plan; the default is drawn and sealed")
     options = parser.parse_args()
     engine.YOUNG = options.young
@@ -178,7 +181,7 @@ def main() -> None:
         if planned.index % parts != part or planned.name in seals(options.out):
             continue
         began = time.monotonic()
-        make(planned, seed, options.pours, options.out, options.sealed)
+        make(planned, ENGINES[options.engine], seed, options.pours, options.out, options.sealed)
         # No name and no number of the plan: nothing that is printed may give an answer away.
         took = time.monotonic() - began
         print(f"{len(seals(options.out))} sets, the last in {took:.0f} s", flush=True)
