@@ -33,6 +33,14 @@ pub(crate) enum BodyKind {
     SoftLayer,
 }
 
+/// Where the coefficients of the contacts of a list come from.
+pub(crate) enum Laws<F> {
+    /// All are alike.
+    One(ContactLaw),
+    /// Each has its own.
+    Each(F),
+}
+
 /// All contacts of a kind (pairs of grains, or grains at walls), block after block and in it colour after colour.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct ContactSet {
@@ -119,14 +127,14 @@ impl ContactSet {
     /// Replaces the list: puts the contacts of each block into batches, colour after colour, and hands the impulses
     /// on.
     ///
-    /// `second` says what `partner` means; `law` gives a contact's coefficients.
+    /// `second` says what `partner` means.
     pub fn rebuild(
         &mut self,
         listed: &[ContactKey],
         blocks: &Blocks,
         grains: usize,
         second: BodyKind,
-        law: impl Fn(&ContactKey) -> ContactLaw,
+        laws: &Laws<impl Fn(&ContactKey) -> ContactLaw>,
     ) {
         self.collect_carried(grains);
         let at_walls = second != BodyKind::Grain;
@@ -139,6 +147,11 @@ impl ContactSet {
         self.phases.clear();
         self.laws.clear();
         self.uniform.clear();
+        if let Laws::One(law) = laws {
+            // The entry that an empty batch names.
+            self.laws.push(LawLanes::uniform(law));
+            self.uniform.push(Some(*law));
+        }
         let mut ordered = std::mem::take(&mut self.ordered);
         let starts = blocks.sort(listed, !at_walls, &mut ordered);
         for phase in blocks.phases() {
@@ -146,7 +159,7 @@ impl ContactSet {
             for block in phase {
                 let contacts = &ordered[starts[block]..starts[block + 1]];
                 if !contacts.is_empty() {
-                    self.add_part(contacts, at_walls, &law);
+                    self.add_part(contacts, at_walls, laws);
                 }
             }
             if self.parts.len() > first {
@@ -162,7 +175,7 @@ impl ContactSet {
         &mut self,
         contacts: &[ContactKey],
         at_walls: bool,
-        law: &impl Fn(&ContactKey) -> ContactLaw,
+        laws: &Laws<impl Fn(&ContactKey) -> ContactLaw>,
     ) {
         let begin = self.batches.len();
         self.colour(contacts, at_walls);
@@ -173,7 +186,9 @@ impl ContactSet {
             let slot = next[colour];
             next[colour] += if colour == COLOURS { LANES } else { 1 };
             let (number, lane) = (slot / LANES, slot % LANES);
-            self.set_law(number, lane, law(contact));
+            if let Laws::Each(law) = laws {
+                self.set_law(number, lane, law(contact));
+            }
             let j = if at_walls { self.wall_body(number, lane) } else { contact.partner };
             let batch = &mut self.batches[number];
             batch.used += 1;

@@ -13,7 +13,7 @@ use crate::blocks::Blocks;
 use crate::body::Body;
 use crate::contact::{Batch, Candidate, ContactKey};
 use crate::contact_context::ContactContext;
-use crate::contact_set::{BodyKind, ContactSet};
+use crate::contact_set::{BodyKind, ContactSet, Laws};
 use crate::lanes::Row;
 use crate::neighbor::{Neighbours, PairSearch};
 use crate::particles::Particles;
@@ -225,13 +225,14 @@ impl Contacts {
                 .push(ContactKey { i, partner });
         }
         self.listed.append(&mut self.far);
-        self.pairs.rebuild(
-            &self.listed,
-            &self.blocks,
-            particles.count(),
-            BodyKind::Grain,
-            |contact| around.pair_law(particles, contact.i as usize, contact.partner as usize),
-        );
+        let law = |i, j| around.pair_law(particles, i, j);
+        let laws = if particles.are_alike() {
+            Laws::One(law(0, 0))
+        } else {
+            Laws::Each(|pair: &ContactKey| law(pair.i as usize, pair.partner as usize))
+        };
+        let (pairs, kind) = (&mut self.pairs, BodyKind::Grain);
+        pairs.rebuild(&self.listed, &self.blocks, particles.count(), kind, &laws);
 
         self.list_walls(particles, around, reach);
         self.listed.clear();
@@ -241,9 +242,10 @@ impl Contacts {
         self.listed.append(&mut self.far);
         let second =
             if around.has_moving_walls { BodyKind::MovingWall } else { BodyKind::RestingWall };
-        self.at_walls.rebuild(&self.listed, &self.blocks, particles.count(), second, |contact| {
+        let laws = Laws::Each(|contact: &ContactKey| {
             around.wall_law(particles, contact.i as usize, contact.partner as usize)
         });
+        self.at_walls.rebuild(&self.listed, &self.blocks, particles.count(), second, &laws);
     }
 
     /// Lists the walls within reach of each grain, and whether they may be touched.

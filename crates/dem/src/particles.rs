@@ -134,6 +134,14 @@ impl Particles {
         self.spheres[grain].0[3]
     }
 
+    /// Whether all grains have one radius and one mass, and there are any.
+    pub fn are_alike(&self) -> bool {
+        let (radii, masses) = (self.spheres.iter().map(|row| row.0[3]), &self.inverse_mass);
+        let mut radii = radii.take(self.count());
+        let Some(first) = radii.next() else { return false };
+        radii.all(|radius| radius == first) && masses.iter().all(|mass| *mass == masses[0])
+    }
+
     #[inline]
     pub fn velocity(&self, grain: usize) -> Vector3<f64> {
         self.bodies[grain].velocity.vector()

@@ -26,7 +26,13 @@ fn lanes_of_a_batch_share_no_grain_and_no_contact_is_lost() {
     // 80 grains that all touch need more colours than a mask holds.
     let listed = all_pairs(80);
     let mut set = ContactSet::default();
-    set.rebuild(&listed, &Blocks::default(), 80, BodyKind::Grain, |_| law(0.5));
+    set.rebuild(
+        &listed,
+        &Blocks::default(),
+        80,
+        BodyKind::Grain,
+        &Laws::Each(|_: &ContactKey| law(0.5)),
+    );
     assert_eq!(set.len(), listed.len());
     let mut found = Vec::new();
     for batch in &set.batches {
@@ -42,12 +48,27 @@ fn lanes_of_a_batch_share_no_grain_and_no_contact_is_lost() {
 }
 
 #[test]
+fn one_law_of_all_is_what_each_would_have_had() {
+    let (mut one, mut each) = (ContactSet::default(), ContactSet::default());
+    let (listed, blocks) = (all_pairs(9), Blocks::default());
+    let all: Laws<fn(&ContactKey) -> ContactLaw> = Laws::One(law(0.5));
+    one.rebuild(&listed, &blocks, 9, BodyKind::Grain, &all);
+    each.rebuild(&listed, &blocks, 9, BodyKind::Grain, &Laws::Each(|_: &ContactKey| law(0.5)));
+    // One that comes between two lists may differ.
+    for set in [&mut one, &mut each] {
+        set.append(ContactKey { i: 0, partner: 8 }, false, law(0.7));
+    }
+    assert_eq!(one.laws, each.laws);
+    let of = |set: &ContactSet| set.batches.iter().map(|b| (b.i, b.j, b.law)).collect::<Vec<_>>();
+    assert_eq!(of(&one), of(&each));
+}
+
+#[test]
 fn impulses_and_laws_follow_their_contact() {
     let mut set = ContactSet::default();
     let friction = |contact: &ContactKey| f64::from(contact.i) + 0.01 * f64::from(contact.partner);
-    set.rebuild(&all_pairs(9), &Blocks::default(), 9, BodyKind::Grain, |contact| {
-        law(friction(contact))
-    });
+    let laws = Laws::Each(|contact: &ContactKey| law(friction(contact)));
+    set.rebuild(&all_pairs(9), &Blocks::default(), 9, BodyKind::Grain, &laws);
     for batch in &mut set.batches {
         for lane in batch.lanes() {
             batch.lambda_n.0[lane] = f64::from(batch.i[lane] * 100 + batch.j[lane]);
@@ -56,7 +77,7 @@ fn impulses_and_laws_follow_their_contact() {
     // The next list has fewer contacts in another order.
     let mut fewer: Vec<ContactKey> = all_pairs(9).into_iter().filter(|c| c.partner != 4).collect();
     fewer.reverse();
-    set.rebuild(&fewer, &Blocks::default(), 9, BodyKind::Grain, |contact| law(friction(contact)));
+    set.rebuild(&fewer, &Blocks::default(), 9, BodyKind::Grain, &laws);
     assert_eq!(set.len(), fewer.len());
     for batch in &set.batches {
         for lane in batch.lanes() {

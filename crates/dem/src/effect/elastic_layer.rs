@@ -24,7 +24,7 @@ use nalgebra::Vector3;
 use super::acts::Acts;
 use crate::blocks::Blocks;
 use crate::contact::{ContactKey, ContactLaw};
-use crate::contact_set::{BodyKind, ContactSet};
+use crate::contact_set::{BodyKind, ContactSet, Laws};
 use crate::lanes::Lanes;
 use crate::particles::Particles;
 
@@ -81,13 +81,9 @@ impl Acts for ElasticLayer {
             .map(|i| ContactKey { i: i as u32, partner: 0 })
             .collect();
         let compliance = self.compliance(dt);
-        set.rebuild(
-            &listed,
-            &Blocks::default(),
-            particles.count(),
-            BodyKind::SoftLayer,
-            |contact| ContactLaw { compliance, ..ground(contact.i as usize) },
-        );
+        let law = |contact: &ContactKey| ContactLaw { compliance, ..ground(contact.i as usize) };
+        let (blocks, count) = (Blocks::default(), particles.count());
+        set.rebuild(&listed, &blocks, count, BodyKind::SoftLayer, &Laws::Each(law));
         for batch in &mut set.batches {
             batch.bias = Lanes::splat(f64::INFINITY);
             for lane in batch.lanes() {

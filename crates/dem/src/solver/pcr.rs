@@ -112,7 +112,7 @@ mod tests {
     use super::*;
     use crate::blocks::Blocks;
     use crate::contact::{ContactKey, ContactLaw};
-    use crate::contact_set::BodyKind;
+    use crate::contact_set::{BodyKind, Laws};
     use crate::lanes::LANES;
 
     /// Axis of the normal of each contact of the triangle.
@@ -123,7 +123,7 @@ mod tests {
     fn triangle() -> ContactSet {
         let listed = [(0, 1), (0, 2), (1, 2)].map(|(i, partner)| ContactKey { i, partner });
         let mut set = ContactSet::default();
-        set.rebuild(&listed, &Blocks::default(), 3, BodyKind::Grain, |contact| ContactLaw {
+        let laws = Laws::Each(|contact: &ContactKey| ContactLaw {
             inverse_mass: [contact.i, contact.partner].map(|grain| [1.0, 2.0, 0.5][grain as usize]),
             lever: [0.3, 0.7],
             sliding_friction: 0.5,
@@ -132,6 +132,7 @@ mod tests {
             compliance: 0.0,
             rolling_speed: 0.0,
         });
+        set.rebuild(&listed, &Blocks::default(), 3, BodyKind::Grain, &laws);
         for (batch, axis) in set.batches.iter_mut().zip(AXES) {
             let mut normal = [0.0; 3];
             normal[axis] = 1.0;

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::blocks::Blocks;
 use crate::contact::{ContactKey, ContactLaw};
-use crate::contact_set::BodyKind;
+use crate::contact_set::{BodyKind, Laws};
 use crate::lanes::Row;
 use crate::solver::residual::ResidualSums;
 use crate::{Material, Scene, Simulation};
@@ -16,7 +16,7 @@ fn contact(at_wall: bool, bias: f64, law: ContactLaw) -> ContactSet {
     let mut set = ContactSet::default();
     let listed = [ContactKey { i: 0, partner: u32::from(!at_wall) }];
     let second = if at_wall { BodyKind::RestingWall } else { BodyKind::Grain };
-    set.rebuild(&listed, &Blocks::default(), 2, second, |_| law);
+    set.rebuild(&listed, &Blocks::default(), 2, second, &Laws::Each(|_: &ContactKey| law));
     set.batches[0].normal.set(0, [0.0, 0.0, 1.0]);
     set.batches[0].bias.0[0] = bias;
     set
@@ -279,7 +279,7 @@ fn row_of_grains(at_wall: bool) -> (ContactSet, Vec<Body>) {
         .collect();
     let law = if at_wall { wall_law(0.5, 0.1) } else { law(0.5, 0.1) };
     let mut set = ContactSet::default();
-    set.rebuild(&listed, &blocks, GRAINS as usize, second, |_| law);
+    set.rebuild(&listed, &blocks, GRAINS as usize, second, &Laws::Each(|_: &ContactKey| law));
     let along = if at_wall { [0.0, 0.0, 1.0] } else { [-1.0, 0.0, 0.0] };
     for batch in &mut set.batches {
         (0..batch.used as usize).for_each(|lane| batch.normal.set(lane, along));
