@@ -10,16 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from granulcal.experiments.fronts_picture import draw_fronts
+from granulcal.experiments.fronts import DEFINITIONS, NUISANCES, TENSIONS, close_fronts
 from granulcal.experiments.predictions.column_pours import UNKNOWN, column_scene, known_liquid
 from granulcal.experiments.predictions.column_tests import Test, observing, read_tests
-from granulcal.loop.close import close_loop
-from granulcal.loop.effects.definitions import Definition
 from granulcal.loop.effects.library import LibraryEffect, by_name
 from granulcal.loop.effects.nuisances import declared_nuisances
-from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.refine import ROUND
-from granulcal.loop.report.folder import write_report
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
@@ -34,54 +30,20 @@ _AFTER = 0.01
 _ROUNDS = 1
 _BUDGET = 1600 + _ROUNDS * ROUND
 _EFFECTS = ("restitution.tangential", "restitution.speed")
-_OWN_EFFECTS = (
-    LibraryEffect(
-        name="film.shear",
-        path="effects.lubrication.shear",
-        doc="the film between beads resists surfaces that slide past each other; share of theory",
-    ),
-    LibraryEffect(
-        name="tension.capillary",
-        family="cohesion",
-        path="effects.capillary.tension",
-        full=0.15,
-        unit="N/m",
-        also=(("effects.capillary.walls", 0.0),),
-        doc="liquid bridges between beads; surface tension",
-    ),
-    LibraryEffect(
-        name="tension.dry",
-        family="cohesion",
-        path="effects.adhesion.tension",
-        full=0.15,
-        unit="N/m",
-        also=(("effects.adhesion.walls", 0.0),),
-        doc="adhesion of touching beads; surface energy",
-    ),
-    LibraryEffect(
-        name="torsion",
-        path="material.torsional_friction",
-        off=0.02,
-        full=0.3,
-        doc="torsional friction between beads",
-    ),
+# Nothing is free in theory: the share is 1.
+_FILM = LibraryEffect(
+    name="film.shear",
+    path="effects.lubrication.shear",
+    doc="the film between beads resists surfaces that slide past each other; share of theory",
 )
-"""What the base model may lack; the film's share has nothing free in theory: it is 1."""
+_TORSION = LibraryEffect(
+    name="torsion",
+    path="material.torsional_friction",
+    off=0.02,
+    full=0.3,
+    doc="torsional friction between beads",
+)
 
-# Own errors, as of the columns at 1 g.
-_NUISANCES = {
-    "clock.offset": {"sd": 0.02, "shared": False},
-    "clock.scale": 0.02,
-    "length.scale": 0.02,
-}
-_LINK = "observe.front.link"
-_DEFINITIONS = (
-    Definition("outline, links of 1.5", {_LINK: 1.5}),
-    Definition("outline, links of 1.2", {_LINK: 1.2}),
-    Definition("outline, links of 2", {_LINK: 2.0}),
-    Definition("camera 1 alone", {_LINK: 1.5}, {"camera": 1}),
-    Definition("camera 2 alone", {_LINK: 1.5}, {"camera": 2}),
-)
 _END = "_050_050_005"
 # Name and tests of each condition: one liquid, one gravity.
 _FITTED = (
@@ -111,15 +73,17 @@ def task(data: Path) -> Task:
         for use, group in ((FIT, _FITTED), (SEALED, _SEALED))
         for name, codes in group
     ]
+    effects = (_FILM, *TENSIONS, _TORSION, *by_name(_EFFECTS))
+    library = (*effects, *declared_nuisances(NUISANCES, scene))
     return Task(
         scene,
         Prior(UNKNOWN.parameters),
         tuple(conditions),
-        (*_OWN_EFFECTS, *by_name(_EFFECTS), *declared_nuisances(_NUISANCES, scene)),
+        library,
         # Density and viscosity of a liquid go together.
         between=False,
         sealed_in_archive=False,
-        definitions=_DEFINITIONS,
+        definitions=DEFINITIONS,
     )
 
 
@@ -143,14 +107,11 @@ def reproduce(out: Path, data: Path) -> bool:
 
     Returns whether the verdict stands.
     """
-    folder = out / "loop_centrifuge"
-    closed = close_loop(task(data), folder, budget=_BUDGET, rounds=_ROUNDS)
-    write_report(
-        closed,
-        folder,
+    return close_fronts(
+        task(data),
+        out / "loop_centrifuge",
         command=f"granulcal reproduce loop_centrifuge --out {out}",
         title="Columns of beads at 4.6 g with the liquid that they stand in",
+        budget=_BUDGET,
+        rounds=_ROUNDS,
     )
-    draw_fronts(folder / "fronts.png", closed, Forward(folder / "pours", 1))
-    print(folder / "fronts.png")
-    return closed.standing.stands

@@ -6,15 +6,11 @@ glycerol at 1 g and 4.6 g. Thin fluids at 4.6 g were not tracked to their end an
 
 from pathlib import Path
 
-from granulcal.experiments.fronts_picture import draw_fronts
-from granulcal.loop.close import close_loop
-from granulcal.loop.effects.definitions import Definition
+from granulcal.experiments.fronts import DEFINITIONS, NUISANCES, TENSIONS, close_fronts
 from granulcal.loop.effects.law import law_numbers
-from granulcal.loop.effects.library import LibraryEffect, by_name
+from granulcal.loop.effects.library import by_name
 from granulcal.loop.effects.nuisances import declared_nuisances
-from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.refine import ROUND
-from granulcal.loop.report.folder import write_report
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
@@ -38,43 +34,6 @@ _EFFECTS = (
     "fluid.lubrication",
     "ground.rolling",
     "restitution.tangential",
-)
-# Tension in N/m: as multiples of a bead's weight it would grow with gravity.
-_TENSIONS = (
-    LibraryEffect(
-        name="tension.capillary",
-        family="cohesion",
-        path="effects.capillary.tension",
-        full=0.15,
-        unit="N/m",
-        also=(("effects.capillary.walls", 0.0),),
-        doc="liquid bridges between beads; surface tension",
-    ),
-    LibraryEffect(
-        name="tension.dry",
-        family="cohesion",
-        path="effects.adhesion.tension",
-        full=0.15,
-        unit="N/m",
-        also=(("effects.adhesion.walls", 0.0),),
-        doc="adhesion of touching beads; surface energy",
-    ),
-)
-# Own errors: fronts of one condition are shifted by 25 to 50 ms from campaign to campaign, frames
-# are told at 240 a second, lengths are read off a wide lens.
-_NUISANCES = {
-    "clock.offset": {"sd": 0.02, "shared": False},
-    "clock.scale": 0.02,
-    "length.scale": 0.02,
-}
-# The outline, with longer and shorter links, and what each camera alone saw.
-_LINK = "observe.front.link"
-_DEFINITIONS = (
-    Definition("outline, links of 1.5", {_LINK: 1.5}),
-    Definition("outline, links of 1.2", {_LINK: 1.2}),
-    Definition("outline, links of 2", {_LINK: 2.0}),
-    Definition("camera 1 alone", {_LINK: 1.5}, {"camera": 1}),
-    Definition("camera 2 alone", {_LINK: 1.5}, {"camera": 2}),
 )
 # Name, gravity, tests, density and viscosity of the fluid: of Experimental_Conditions.txt.
 _FITTED = (
@@ -128,7 +87,7 @@ def task(data: Path) -> Task:
     ]
     conditions = (*fitted, *sealed)
     effects = (one for name in _EFFECTS for one in by_name([name]))
-    library = (*_TENSIONS, *effects, *declared_nuisances(_NUISANCES, scene))
+    library = (*TENSIONS, *effects, *declared_nuisances(NUISANCES, scene))
     return Task(
         scene,
         prior,
@@ -137,7 +96,7 @@ def task(data: Path) -> Task:
         # Every fit is at 1 g.
         between=False,
         sealed_in_archive=False,
-        definitions=_DEFINITIONS,
+        definitions=DEFINITIONS,
     )
 
 
@@ -162,14 +121,11 @@ def reproduce(out: Path, data: Path) -> bool:
 
     Returns whether the verdict stands.
     """
-    folder = out / "loop_column"
-    closed = close_loop(task(data), folder, budget=_BUDGET, rounds=_ROUNDS)
-    write_report(
-        closed,
-        folder,
+    return close_fronts(
+        task(data),
+        out / "loop_column",
         command=f"granulcal reproduce loop_column --out {out}",
         title="Columns of beads in water and glycerol, modelled dry",
+        budget=_BUDGET,
+        rounds=_ROUNDS,
     )
-    draw_fronts(folder / "fronts.png", closed, Forward(folder / "pours", 1))
-    print(folder / "fronts.png")
-    return closed.standing.stands
