@@ -171,7 +171,8 @@ fn scene() -> impl Strategy<Value = Scene> {
     let outflow = prop::option::weighted(0.2, (-5.0..30.0, until));
     let entry = (log(0.2, 20.0), log(0.1, 10.0), vector(-20.0..20.0), vector(-3.0..3.0), 0.0..0.05);
     let intruder = prop::option::weighted(0.2, entry);
-    let rules = (end, period, outflow, intruder);
+    let finer = prop::option::weighted(0.3, 0.05..1.0);
+    let rules = (end, period, outflow, intruder, finer);
     (radius, begin(), prop::option::of(funnel()), walls, gravity(), material(), preset, rules)
         .prop_map(
             |(
@@ -182,11 +183,11 @@ fn scene() -> impl Strategy<Value = Scene> {
                 gravity,
                 material,
                 preset,
-                ((substeps, energy), period, outflow, intruder),
+                ((substeps, energy), period, outflow, intruder, finer),
             )| Scene {
                 name: "random".to_owned(),
                 preset,
-                substep: None,
+                substep: finer.map(|share: f64| share * preset.settings().dt),
                 gravity,
                 material,
                 grains: Grains::balls(count, 2.0 * radius, 1300.0),
@@ -205,7 +206,7 @@ fn scene() -> impl Strategy<Value = Scene> {
                 funnel: funnel.map(|funnel| scaled_funnel(funnel, radius)),
                 walls: walls.into_iter().map(|wall| scaled_wall(wall, radius)).collect(),
                 end: EndRule {
-                    horizon: substeps * preset.settings().dt,
+                    horizon: substeps * finer.unwrap_or(1.0) * preset.settings().dt,
                     kinetic_energy: energy,
                     ..EndRule::default()
                 },
