@@ -47,7 +47,7 @@ SETTINGS: tuple[dict[str, float], ...] = (
 )
 """Stated drums: friction of grains and end walls, the grains' volume, of grains of 1.7 mm."""
 
-_SEED = 8_600_011
+_SEED, _TRIES = 8_600_011, 3
 
 
 class DrumBase:
@@ -56,26 +56,26 @@ class DrumBase:
     Args:
         data: folder of measured data.
         pours: folder of the kept pours.
-        seeds: pours of each setting at each speed.
     """
 
-    def __init__(self, data: Path, pours: Path, *, seeds: int = 1) -> None:
+    def __init__(self, data: Path, pours: Path) -> None:
         """Begins; nothing is poured yet."""
         self.scene = task(data).scene
         self._forward = Forward(pours, 1)
-        self._seeds = [_SEED + i for i in range(seeds)]
 
     def at(self, setting: Mapping[str, float], rpm: float, begin: float, end: float) -> Array:
-        """Returns the mean statistics of a setting at a speed, examined from begin to end [s].
+        """Returns the statistics of a setting at a speed, examined from begin to end [s].
+
+        Of the first usable pour.
 
         Raises:
-            ValueError: no usable pour.
+            ValueError: none of `_TRIES` pours is usable.
         """
         scene = self.scene.with_({**setting, **at_speed(rpm, begin, end)})
-        rows = self._forward.pours(scene, self._seeds)
-        if not len(rows):
-            raise ValueError(f"the drum has no usable pour at {rpm} rpm with {dict(setting)}")
-        return np.asarray(rows.mean(axis=0), dtype=np.float64)
+        for seed in range(_SEED, _SEED + _TRIES):
+            for row in self._forward.pours(scene, [seed]):
+                return np.asarray(row, dtype=np.float64)
+        raise ValueError(f"the drum has no usable pour at {rpm} rpm with {dict(setting)}")
 
     def pictured(self, setting: Mapping[str, float], speeds: Array) -> Array:
         """Returns a setting's statistics at the pictures' speeds, shape (2, s)."""

@@ -59,7 +59,7 @@ _DESIGN_SEED = 7
 _STARTS = 8
 _COUNT = 4.0
 # Largest substep [s] at which the pours of the true size overlap by less than `default` allows.
-_SUBSTEP = 1.0 / 3000.0
+_SUBSTEP = 1.0 / 5000.0
 
 
 def true_size(drum: DrumBase) -> dict[str, float]:
