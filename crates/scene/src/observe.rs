@@ -171,6 +171,10 @@ impl Observe {
                 let allowed = "0, or from 1 to 10 sums of two radii";
                 return Err(SceneError::range("observe.front.link", front.link, allowed));
             }
+            if front.times.is_empty() && !front.end {
+                let allowed = "at least one time where observe.front.end is false";
+                return Err(SceneError::range("observe.front.times", 0.0, allowed));
+            }
         }
         if let Some(discharge) = &self.discharge {
             finite("observe.discharge.below", discharge.below)?;
@@ -266,6 +270,17 @@ mod tests {
         assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
         let changed = scene.with("observe.front.times.1", 0.3).unwrap();
         assert_eq!(changed.get("observe.front.times.1").unwrap(), 0.3);
+    }
+
+    #[test]
+    fn a_front_without_its_end_needs_a_time() {
+        let mut scene = scene();
+        scene.observe.as_mut().unwrap().front.as_mut().unwrap().end = false;
+        scene.check().unwrap();
+        assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+        scene.observe.as_mut().unwrap().front.as_mut().unwrap().times.clear();
+        let error = scene.check().unwrap_err().to_string();
+        assert!(error.contains("observe.front.times must be at least one time"), "{error}");
     }
 
     #[test]
