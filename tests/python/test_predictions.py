@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from granulcal.experiments.predictions import columns, write_csv
+from granulcal.experiments import loop_drum
+from granulcal.experiments.predictions import columns, drum_fit, write_csv
 from granulcal.experiments.predictions.between_speeds import between_speeds
 from granulcal.experiments.predictions.between_tests import BetweenTests, Told
 from granulcal.experiments.predictions.column_tests import (
@@ -282,6 +283,41 @@ def test_a_base_model_with_its_own_residual_keeps_the_bend_that_a_line_lacks(
     found = drum.held({rpm: (0.0, 1.0) for rpm in (10, 30)}, speeds, [0.0, None])
     assert found["corrected"] == pytest.approx((0.0, 0.0, 1.0), abs=1e-9)
     assert found["line"][1] == pytest.approx(0.006 * np.sqrt((175**2 + 225**2) / 2))
+
+
+class SizedDrum(DrumBase):
+    """A drum whose surface is straight in the unknowns, and another one for larger grains."""
+
+    def at(self, setting: Mapping[str, float], rpm: float, begin: float, end: float) -> np.ndarray:
+        values = np.array([[setting[name] for name in drum_fit.UNKNOWN.names]])
+        u = drum_fit.UNKNOWN.to_unconstrained(values)[0]
+        if "grains.diameter" not in setting:
+            if u[0] > 0.9:
+                raise ValueError("no usable pour")
+            u = u + np.array([0.15, -0.1, 0.0, 0.1])
+        slope = 30.0 + 0.2 * rpm + 20 * u[0] + (10 + 0.1 * rpm) * u[1]
+        return np.array([1e-2 * (u[3] + 0.02 * rpm * u[2]), 1e-2 * (u[3] - u[2]), slope])
+
+
+def test_a_drum_is_fitted_at_the_true_size_through_larger_grains() -> None:
+    drum, speeds = SizedDrum.__new__(SizedDrum), np.array([15.0, 45.0])
+    drum.scene = loop_drum.task(Path("nowhere")).scene
+    true = drum_fit.true_size(drum)
+    assert true["grains.diameter"] == 1.2e-3 and drum.scene.get("grains.diameter") == 1.7e-3
+    assert true["start.spacing"] == pytest.approx(1.85e-3 * 1.2 / 1.7)
+    truth = np.array([[0.4, 0.5, 0.6, 0.7]])
+    named = drum_fit.UNKNOWN.from_unconstrained(truth)[0].tolist()
+    at = {**dict(zip(drum_fit.UNKNOWN.names, named, strict=True)), **true}
+    values = drum.pictured(at, speeds)
+    told: list[str] = []
+    is_slope = np.array([False, False, True])
+    fit = drum_fit.DrumFit(drum, speeds, values, is_slope, say=told.append)
+    # Larger grains alone would be off by 1 mm and 2 degrees; the rounds go on from there.
+    first, *_, last = (float(line.rpartition(" ")[2]) for line in told)
+    assert len(told) == drum_fit.ROUNDS and first > 10 * max(last, 0.1)
+    best = drum.pictured(fit.settings[0], speeds)
+    assert best == pytest.approx(values, abs=0.3) and len(fit.settings) == drum_fit.KEPT
+    assert np.abs(best - values)[:, :2].max() < 4e-4
 
 
 def test_drum_models_that_have_nothing_to_say_are_named(tmp_path: Path) -> None:

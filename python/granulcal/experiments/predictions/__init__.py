@@ -8,9 +8,10 @@ Every file has what needs no model at all (`line`, `nearest`, and `between` for 
 the measurements alone. The columns' beads are fitted to the measured tests, dry and with their
 liquid (`fitted_columns.py`: 2,600 pours, three quarters of an hour of one core). A loop that has
 been closed adds the verdict's model (`named`), the base model (`base`) and the base model with its
-own residual (`corrected`); where the drum's has not, the last two are of two stated drums
-(`drum_base.py`: 12 pours, three minutes of one core). Each row has the 90 % interval of one
-measurement. Where a model has nothing to say it has no row, and the command says so.
+own residual (`corrected`); where the drum's has not, the last two are of the drum fitted to both
+pictures at the true size of its grains (`drum_fit.py`: 94 pours, an hour of one core). Each row has
+the 90 % interval of one measurement. Where a model has nothing to say it has no row, and the
+command says so.
 """
 
 import csv
