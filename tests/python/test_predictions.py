@@ -320,6 +320,23 @@ def test_a_drum_is_fitted_at_the_true_size_through_larger_grains() -> None:
     assert np.abs(best - values)[:, :2].max() < 4e-4
 
 
+def test_a_drum_without_a_usable_pour_of_the_true_size_has_no_setting() -> None:
+    class Unhealthy(SizedDrum):
+        def at(
+            self, setting: Mapping[str, float], rpm: float, begin: float, end: float
+        ) -> np.ndarray:
+            if "grains.diameter" in setting:
+                raise ValueError("no usable pour")
+            return super().at(setting, rpm, begin, end)
+
+    drum, speeds = Unhealthy.__new__(Unhealthy), np.array([15.0, 45.0])
+    drum.scene = loop_drum.task(Path("nowhere")).scene
+    values, told = np.array([[0.01, 0.0, 40.0], [0.01, 0.0, 50.0]]), []
+    is_slope = np.array([False, False, True])
+    fit = drum_fit.DrumFit(drum, speeds, values, is_slope, say=told.append)
+    assert fit.settings == () and "no usable pour; the fit ends here" in told[0]
+
+
 def test_drum_models_that_have_nothing_to_say_are_named(tmp_path: Path) -> None:
     rate = 2 * np.pi / 60
     inputs = (("walls.0.motion.rate", 15 * rate, 45 * rate),)

@@ -70,7 +70,7 @@ def true_size(drum: DrumBase) -> dict[str, float]:
 
 
 class DrumFit:
-    """The fit, and its settings from the best on.
+    """The fit, and its settings from the best on; none where no pour was usable.
 
     Args:
         drum: its pours.
@@ -98,7 +98,11 @@ class DrumFit:
         for number in range(ROUNDS):
             u = self._best(shift)
             setting = {**_named(u), **size}
-            poured = drum.pictured(setting, speeds)
+            try:
+                poured = drum.pictured(setting, speeds)
+            except ValueError as error:
+                say(f"drum of 1.2 mm, round {number + 1}: {error}; the fit ends here")
+                break
             shift = poured - self._at(u)
             misfit = float(np.sum(self._scaled(poured) ** 2))
             tried.append((misfit, setting))
