@@ -70,11 +70,9 @@ def drum_rows_without_loop(
     profiles: list[tuple[object, ...]] = []
     slopes: list[tuple[object, ...]] = []
     for rpm, window in SPEEDS.items():
-        told = (
-            {}
-            if base is None or not settings
-            else base.tell(settings, rpm, window, speeds, values, places)
-        )
+        told = {}
+        if base is not None and settings:
+            told |= base.tell(settings, rpm, window, speeds, values, places)
         told |= {m: between_speeds(m, speeds, values, rpm, places) for m in WITHOUT_PHYSICS}
         for model, found in told.items():
             more, slope = _rows(model, rpm, Prediction(model, names, *found, 0.9))
