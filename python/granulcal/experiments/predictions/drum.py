@@ -57,7 +57,8 @@ def drum_rows_without_loop(
     speeds, names, values = read_pictures(data)
     matches = [_PLACE.fullmatch(name) for name in names]
     places = [None if found is None else float(found["x"]) for found in matches]
-    base, settings = None if pours is None else DrumBase(data, pours), ()
+    base = None if pours is None else DrumBase(data, pours)
+    settings: tuple[dict[str, float], ...] = ()
     if base is not None:
         for model, (height, slope, share) in base.held(SPEEDS, speeds, places).items():
             say(
@@ -70,10 +71,11 @@ def drum_rows_without_loop(
     profiles: list[tuple[object, ...]] = []
     slopes: list[tuple[object, ...]] = []
     for rpm, window in SPEEDS.items():
-        told = {}
-        if base is not None and settings:
-            told |= base.tell(settings, rpm, window, speeds, values, places)
-        told |= {m: between_speeds(m, speeds, values, rpm, places) for m in WITHOUT_PHYSICS}
+        plain = {m: between_speeds(m, speeds, values, rpm, places) for m in WITHOUT_PHYSICS}
+        if base is None or not settings:
+            told = plain
+        else:
+            told = base.tell(settings, rpm, window, speeds, values, places) | plain
         for model, found in told.items():
             more, slope = _rows(model, rpm, Prediction(model, names, *found, 0.9))
             profiles += more
