@@ -217,7 +217,11 @@ def test_a_study_says_how_long_its_archive_takes_and_others_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
     assert main(["reproduce", "--json"]) == 0
-    assert "loop_column" in json.loads(capsys.readouterr().out)["studies"]
+    studies = json.loads(capsys.readouterr().out)["studies"]
+    assert "loop_column" in studies
+    for study in studies:
+        module = importlib.import_module(f"granulcal.experiments.{study}")
+        assert hasattr(module, "reproduce") or hasattr(module, "reproduce_paper"), study
     words = ["--data", str(tmp_path), "--out", str(tmp_path / "out"), "--dry-run"]
     assert main(["reproduce", "sensor", *words]) == 2
     assert "--dry-run is of studies" in capsys.readouterr().err

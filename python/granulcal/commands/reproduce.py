@@ -84,7 +84,9 @@ def _run(options: argparse.Namespace) -> int:
     from granulcal import experiments
     from granulcal.demo import measured_data
 
-    studies = sorted(module.name for module in pkgutil.iter_modules(experiments.__path__))
+    # What studies share begins with an underscore.
+    names = (module.name for module in pkgutil.iter_modules(experiments.__path__))
+    studies = sorted(name for name in names if not name.startswith("_"))
     if options.study is None:
         print("\n".join(studies))
         _tell(options, studies=studies)

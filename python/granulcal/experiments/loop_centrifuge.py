@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from granulcal.experiments.fronts import DEFINITIONS, NUISANCES, TENSIONS, close_fronts
+from granulcal.experiments._fronts import DEFINITIONS, NUISANCES, TENSIONS, close_fronts
 from granulcal.experiments.predictions.column_pours import UNKNOWN, column_scene, known_liquid
 from granulcal.experiments.predictions.column_tests import Test, observing, read_tests
 from granulcal.loop.effects.library import LibraryEffect, by_name

@@ -6,7 +6,7 @@ glycerol at 1 g and 4.6 g. Thin fluids at 4.6 g were not tracked to their end an
 
 from pathlib import Path
 
-from granulcal.experiments.fronts import DEFINITIONS, NUISANCES, TENSIONS, close_fronts
+from granulcal.experiments._fronts import DEFINITIONS, NUISANCES, TENSIONS, close_fronts
 from granulcal.loop.effects.law import law_numbers
 from granulcal.loop.effects.library import by_name
 from granulcal.loop.effects.nuisances import declared_nuisances
