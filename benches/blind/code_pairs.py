@@ -1,11 +1,11 @@
 """What another engine alone changes: matched pours of it and of granulcal, without any effect.
 
     python benches/blind/code_pairs.py --materials 20 --out out/pairs
-    python benches/blind/code_pairs.py --engine epsd2 --heights 0.04 0.08 0.12 --out out/liggghts
+    python benches/blind/code_pairs.py --engine epsd2 --young 1e7 --out out/liggghts
 
 Materials are drawn from prior.toml; each is poured once in LAMMPS, or in LIGGGHTS with the rolling
-friction that `--engine` names, and six times in granulcal at
-every height, and seen by the same camera without noise. Pours that are there are not made again.
+friction that `--engine` names, and six times in granulcal at every height, and seen by the same
+camera without noise. Pours that are there are not made again.
 Writes code_difference.json and code_difference.csv beside this file, or into the folder of --table.
 """
 

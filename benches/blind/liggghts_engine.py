@@ -9,15 +9,25 @@ from itertools import pairwise
 
 import liggghts
 import numpy as np
-from engine import EARLIEST, HORIZON, MAY_MOVE, SLOW, VIEW, Funnel, Pile, Setup, Stiffness
+from engine import (
+    BOX,
+    EARLIEST,
+    HORIZON,
+    MAY_MOVE,
+    SLOW,
+    VIEW,
+    Funnel,
+    Pile,
+    Setup,
+    Stiffness,
+    pile_of,
+)
 from liggghts import ROLLING
 
 __all__ = ["ROLLING", "pour", "triangles"]
 
 SIDES = 64
 """Of the funnel."""
-BOX = 0.6
-"""Half width of the box; what leaves it is lost [m]."""
 
 
 def triangles(funnel: Funnel) -> np.ndarray:
@@ -71,11 +81,8 @@ def pour(setup: Setup, rolling: str) -> Pile:
     )
     looks, cpu = liggghts.pour(what, _is_at_rest)
     centres = looks[-1][:, :3]
-    near = np.hypot(centres[:, 0], centres[:, 1]) < setup.funnel.rim_radius
-    held = int((near & (centres[:, 2] > setup.funnel.height)).sum())
     radii = np.full(len(centres), stiffness.radius)
-    rest = (len(looks) - 1) * liggghts.LOOK
-    return Pile(centres, radii, held, len(setup.radii) - len(centres), rest, cpu)
+    return pile_of(setup, centres, radii, (len(looks) - 1) * liggghts.LOOK, cpu)
 
 
 def _is_at_rest(time: float, look: np.ndarray) -> bool:

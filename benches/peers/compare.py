@@ -156,10 +156,8 @@ def main() -> None:
     met: dict[str, list[bool]] = {preset: [] for preset in options.presets}
     for row in options.rows:
         law, of = laws[row], (options.engine, options.settings)
-        theirs, scene = (
-            of_other(options.engine, row, options.settings, options.young),
-            scene_of(law, LAWS.get(of)),
-        )
+        theirs = of_other(options.engine, row, options.settings, options.young)
+        scene = scene_of(law, LAWS.get(of))
         if theirs:
             print(line(options.engine.upper(), theirs, row, law, None), flush=True)
         for preset in options.presets:

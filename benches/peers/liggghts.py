@@ -19,6 +19,8 @@ from pathlib import Path
 import numpy as np
 from lammps_contact import POISSON, Law
 
+from granulcal.export.mesh import Mesh, stl
+
 ROLLING = ("epsd", "epsd2")
 """LIGGGHTS' rolling friction with and without a dashpot beside the moment limit."""
 LOOK = 0.02
@@ -58,13 +60,8 @@ class Input:
 
     def stl(self) -> str:
         """Returns the funnel as text of an STL file."""
-        lines = ["solid funnel"]
-        for a, b, c in self.triangles:
-            normal = np.cross(b - a, c - a)
-            lines += ["facet normal {} {} {}".format(*normal / np.linalg.norm(normal))]
-            lines += ["outer loop", *("vertex {:.9g} {:.9g} {:.9g}".format(*x) for x in (a, b, c))]
-            lines += ["endloop", "endfacet"]
-        return "\n".join([*lines, "endsolid funnel", ""])
+        corners = self.triangles.reshape(-1, 3)
+        return stl(Mesh(corners, np.arange(len(corners)).reshape(-1, 3)), "funnel")
 
     def script(self) -> str:
         """Returns LIGGGHTS' words: type 1 are grains, type 2 is every wall."""

@@ -84,11 +84,11 @@ def _draw(path: Path, closed: Closed, forward: Forward) -> None:
     within = [name.partition("[")[2][:-1] for name in closed.task.scene.observed_names]
     times = [float(time) for time in within if time != "end"]
     conditions = closed.task.conditions
-    rows = ceil(len(conditions) / _COLUMNS)
+    lines = ceil(len(conditions) / _COLUMNS)
     figure, axes = plt.subplots(
-        rows,
+        lines,
         _COLUMNS,
-        figsize=(10.5, 3.1 * rows),
+        figsize=(10.5, 3.1 * lines),
         sharex=True,
         sharey="row",
         squeeze=False,
