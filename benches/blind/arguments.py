@@ -13,7 +13,7 @@ def add_law(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="NAME=NUMBER",
-        help="of granulcal's material, such as rolling_damping=0.7",
+        help="of granulcal's material, such as rolling_dashpot=0.7",
     )
 
 

@@ -23,7 +23,7 @@ HERE = Path(__file__).parent
 LAWS: dict[tuple[str, str], dict[str, float]] = {
     ("liggghts", "epsd"): {
         "torsional_friction": 0.0,
-        "rolling_damping": 0.7,
+        "rolling_dashpot": 0.87,
         "impact_friction": 1.16,
     },
     ("liggghts", "epsd2"): {"torsional_friction": 0.0, "impact_friction": 1.16},

@@ -25,6 +25,7 @@ mod restitution;
 mod rim;
 mod robustness;
 mod rolling;
+mod rolling_dashpot;
 mod scenes;
 mod solvers;
 mod splash;

@@ -31,11 +31,13 @@ impl Seen {
 }
 
 widest! {
-    /// Refreshes the contacts between grains at the beginning of a substep and lists the possible impacts.
+    /// Refreshes the contacts between grains at the beginning of a substep of length `dt` `[s]` and lists the possible
+    /// impacts, which close at `impact_speed` `[m/s]` at least.
     pub(crate) fn assemble_pairs<W>(
         batches: &mut [Batch],
         particles: &Particles,
         dt: f64,
+        impact_speed: f64,
         candidates: &mut Vec<Candidate>,
     ) -> Seen {
         let mut overlap = Reg::<W>::splat(0.0);
@@ -50,7 +52,7 @@ widest! {
             let dv = v_i - v_j;
             let w_n = Reg3::load(&batch.normal).dot(dv);
             finish(batch, law::bias_lanes(gap, dt) + passing(distance, dv, w_n, dt));
-            let closes = closing_bits(gap, w_n, dt);
+            let closes = closing_bits(gap, w_n, dt, impact_speed);
             for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
                 candidates.push(Candidate { i: batch.i[lane], partner: batch.j[lane] });
             }
@@ -69,6 +71,7 @@ widest! {
         walls: &Walls,
         particles: &Particles,
         dt: f64,
+        impact_speed: f64,
         lost: &mut [bool],
         candidates: &mut Vec<Candidate>,
     ) -> Seen {
@@ -85,7 +88,7 @@ widest! {
             let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
             let w_n = w_n - Reg::load(&follows);
             finish(batch, law::bias_lanes(gap, dt) + Reg::load(&passing));
-            let closes = closing_bits(gap, w_n, dt);
+            let closes = closing_bits(gap, w_n, dt, impact_speed);
             for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
                 let partner = particles.count() as u32 + at.wall[lane];
                 candidates.push(Candidate { i: batch.i[lane], partner });
@@ -152,10 +155,10 @@ widest! {
 
 /// Which lanes would close within the substep faster than an impact must.
 #[inline(always)]
-fn closing_bits<W: Width>(gap: Reg<W>, w_n: Reg<W>, dt: f64) -> u32 {
+fn closing_bits<W: Width>(gap: Reg<W>, w_n: Reg<W>, dt: f64, impact_speed: f64) -> u32 {
     let zero = Reg::<W>::splat(0.0);
     let end = gap + Reg::splat(dt) * w_n;
-    W::less_bits(end.0, zero.0) & W::less_bits(w_n.0, Reg::<W>::splat(-law::IMPACT_SPEED).0)
+    W::less_bits(end.0, zero.0) & W::less_bits(w_n.0, Reg::<W>::splat(-impact_speed).0)
 }
 
 /// An infinite gap, hence an infinite bias and no impulse, where there is no contact.

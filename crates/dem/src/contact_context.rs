@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use crate::contact::ContactLaw;
 use crate::contact_set::ContactSet;
 use crate::effect::{Acting, EffectContext};
+use crate::law::{DAMPED_IMPACT_SPEED, IMPACT_SPEED};
 use crate::parallel::Threads;
 use crate::particles::Particles;
 use crate::path::Reach;
@@ -21,6 +22,8 @@ pub(crate) struct ContactContext {
     /// Whether any wall may move.
     pub has_moving_walls: bool,
     pub material: Material,
+    /// Approach below which an impact is left to the contact solve `[m/s]`.
+    pub impact_speed: f64,
     /// Gravity in the present substep `[m/s^2]`.
     pub gravity: Vector3<f64>,
     pub effects: Acting,
@@ -39,10 +42,12 @@ impl ContactContext {
         let settings = scene.settings();
         let walls = Walls::of(scene);
         let (effects, radius) = (Acting::of(scene), scene.grains.radius());
+        let is_damped = scene.material.rolling_dashpot > 0.0 || walls.any_damps_rolling();
         Self {
             has_moving_walls: walls.any_moving(),
             walls,
             material: scene.material,
+            impact_speed: if is_damped { DAMPED_IMPACT_SPEED } else { IMPACT_SPEED },
             gravity: effects.gravity,
             members: scene.effects.clump.members(),
             settings,

@@ -136,15 +136,16 @@ impl Contacts {
         lost: &mut [bool],
         found: &mut Vec<Candidate>,
     ) -> Seen {
-        let dt = around.settings.dt;
+        let (dt, speed) = (around.settings.dt, around.impact_speed);
         self.age += 1;
         let assemble = |batches: &mut [Batch], found: &mut Vec<Candidate>| {
-            assemble::assemble_pairs(batches, particles, dt, found)
+            assemble::assemble_pairs(batches, particles, dt, speed, found)
         };
         let batches = &mut self.pairs.batches;
         let pairs = around.threads.gather(batches, SHARE, found, assemble, Seen::max);
+        let at_walls = &mut self.at_walls;
         let walls =
-            assemble::assemble_walls(&mut self.at_walls, &around.walls, particles, dt, lost, found);
+            assemble::assemble_walls(at_walls, &around.walls, particles, dt, speed, lost, found);
         pairs.max(walls)
     }
 

@@ -1,14 +1,14 @@
 //! Impacts within a substep: one after the other, each at its own time (docs/theory/contact.md, box 1).
 //!
 //! Between impacts grains move straight on, as in event-driven simulation. A pair that approaches faster than
-//! [`IMPACT_SPEED`] and meets before the substep ends collides, together with every contact that is closed then
+//! an impact must (`ContactContext::impact_speed`) and meets before the substep ends collides, together with every contact that is closed then
 //! (`impact/cluster.rs`); what is slower is left to the contact solve.
 
 mod cluster;
 mod friction;
 mod links;
 mod members;
-mod rolling_damping;
+mod rolling_spring;
 mod spring;
 
 use std::cmp::Ordering;
@@ -17,7 +17,6 @@ use std::collections::BinaryHeap;
 use crate::contact::Candidate;
 use crate::contact_context::ContactContext;
 use crate::contacts::Contacts;
-use crate::law::IMPACT_SPEED;
 use crate::particles::Particles;
 
 use cluster::{Cluster, Outcome};
@@ -79,7 +78,7 @@ impl Event {
         around: &ContactContext,
     ) -> Option<Self> {
         let time = match other_grain(pair, particles) {
-            Some(j) => time_of_pair(pair.i as usize, j, now, particles),
+            Some(j) => time_of_pair(pair.i as usize, j, now, particles, around.impact_speed),
             None => time_at_wall(pair, now, particles, around),
         };
         let time = time.filter(|&time| time < around.settings.dt)?;
@@ -244,14 +243,14 @@ fn other_grain(pair: Candidate, particles: &Particles) -> Option<usize> {
     (j < particles.count()).then_some(j)
 }
 
-/// When two grains on their straight ways touch fast enough: the root of `|d + w tau| = r_i + r_j`.
-fn time_of_pair(i: usize, j: usize, now: f64, particles: &Particles) -> Option<f64> {
+/// When two grains on their straight ways touch, at `least` so fast `[m/s]`: the root of `|d + w tau| = r_i + r_j`.
+fn time_of_pair(i: usize, j: usize, now: f64, particles: &Particles, least: f64) -> Option<f64> {
     let (a, b) = (particles.sphere_at(i, now), particles.sphere_at(j, now));
     let apart = particles.nearest(a.vector() - b.vector());
     let relative = particles.velocity(i) - particles.velocity(j);
     let touching = a.0[3] + b.0[3];
     let closing = -apart.dot(&relative);
-    if closing <= IMPACT_SPEED * touching {
+    if closing <= least * touching {
         return None;
     }
     let excess = apart.norm_squared() - touching * touching;
@@ -260,7 +259,7 @@ fn time_of_pair(i: usize, j: usize, now: f64, particles: &Particles) -> Option<f
     }
     let discriminant = closing * closing - relative.norm_squared() * excess;
     // At the touch the approach is the root of the discriminant over the distance of the centres.
-    if discriminant <= (IMPACT_SPEED * touching).powi(2) {
+    if discriminant <= (least * touching).powi(2) {
         return None;
     }
     Some(now + excess / (closing + discriminant.sqrt()))
@@ -287,12 +286,12 @@ fn time_at_wall(
         .dot(&(particles.velocity(grain) - around.walls.wall(surface).motion_at(&touching).0));
     let fall = near.normal.dot(&around.gravity);
     if gap <= 0.0 {
-        return (w_n + fall * (now - 0.5 * dt) < -IMPACT_SPEED).then_some(now);
+        return (w_n + fall * (now - 0.5 * dt) < -around.impact_speed).then_some(now);
     }
     // gap + w_n tau - fall / 2 (time (dt - time) - now (dt - now)) = 0 for time = now + tau.
     let speed = -(w_n + fall * (now - 0.5 * dt));
     let discriminant = speed * speed - 2.0 * fall * gap;
-    if discriminant <= IMPACT_SPEED * IMPACT_SPEED {
+    if discriminant <= around.impact_speed * around.impact_speed {
         return None;
     }
     let root = discriminant.sqrt();

@@ -34,6 +34,8 @@ pub(crate) const CORRECTION_SPEED: f64 = 0.5;
 pub(crate) const PINNED_SPEED: f64 = 0.1;
 /// Approach below which an impact is inelastic `[m/s]`: a matter of the contact solve, not of `impact`.
 pub(crate) const IMPACT_SPEED: f64 = 0.05;
+/// The same where a dashpot acts on rolling, which brakes a grain however slowly it is met `[m/s]`.
+pub(crate) const DAMPED_IMPACT_SPEED: f64 = 0.01;
 
 /// Inverse moment of inertia of a sphere times its mass and squared radius, 5/2.
 pub(crate) const INVERSE_INERTIA: f64 = 2.5;

@@ -180,6 +180,11 @@ impl Walls {
         self.all.iter().any(Wall::is_moving)
     }
 
+    /// Whether any has a dashpot on rolling.
+    pub fn any_damps_rolling(&self) -> bool {
+        self.all.iter().any(|wall| wall.material.rolling_dashpot > 0.0)
+    }
+
     /// Where the walls that may move are.
     pub fn placements(&mut self) -> impl Iterator<Item = &mut Placement> {
         self.all.iter_mut().filter_map(|wall| wall.placement.as_mut())

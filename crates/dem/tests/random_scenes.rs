@@ -41,7 +41,8 @@ fn material() -> impl Strategy<Value = Material> {
             softness: law.0,
             touching_exponent: law.1,
             impact_friction: law.2,
-            rolling_damping: law.3,
+            rolling_dashpot: law.3,
+            ..Material::default()
         },
     )
 }

@@ -16,7 +16,7 @@ use crate::error::SceneError;
 /// | `softness` | delta / R | - | `[0, 0.2]` |
 /// | `touching_exponent` | q | - | `[0, 10]` |
 /// | `impact_friction` | - | - | `[0, 10]` |
-/// | `rolling_damping` | x_r | - | `[0, 10]` |
+/// | `rolling_dashpot` | x_r | - | `[0, 10]` |
 ///
 /// `rolling_friction` limits the rolling moment by `mu_r R_eff F_n`, `torsional_friction` the moment about the
 /// normal by `mu_t R_eff F_n`, `R_eff = r_i r_j / (r_i + r_j)` for a pair and `r` at a wall (Ai et al. 2011);
@@ -49,11 +49,18 @@ pub struct Material {
     /// other engines count into |F_n|.
     #[serde(default = "one")]
     pub impact_friction: f64,
-    /// Dashpot on rolling during an impact, beside the moment limit and not bounded by it, as a share of the critical
-    /// one `[-]`: LIGGGHTS' `epsd` (`coefficientRollingViscousDamping`).
+    /// Dashpot on rolling during an impact, beside a spring that reaches the moment limit, as a share of the critical
+    /// one `[-]`: LIGGGHTS' `epsd` (`coefficientRollingViscousDamping`). With one, slower impacts count as impacts.
     #[serde(default)]
+    pub rolling_dashpot: f64,
+    /// 0: the name of `rolling_dashpot` while it was another law. Scenes of then state it.
+    #[doc(hidden)]
+    #[serde(default, skip_serializing)]
     pub rolling_damping: f64,
 }
+
+/// What a scene may state of the dashpot by its former name.
+const FORMER_DASHPOT: &str = "0: it is rolling_dashpot now, and between grains twice as strong";
 
 /// Softness where none is stated: that of the engines that pile grains in rows (docs/theory/contact.md).
 const SOFTNESS: f64 = 0.05;
@@ -86,6 +93,7 @@ impl Default for Material {
             softness: SOFTNESS,
             touching_exponent: 1.0,
             impact_friction: 1.0,
+            rolling_dashpot: 0.0,
             rolling_damping: 0.0,
         }
     }
@@ -117,7 +125,8 @@ impl Material {
         in_range(name, "softness", self.softness, 0.2, "in [0, 0.2]")?;
         in_range(name, "touching_exponent", self.touching_exponent, 10.0, "in [0, 10]")?;
         in_range(name, "impact_friction", self.impact_friction, 10.0, "in [0, 10]")?;
-        in_range(name, "rolling_damping", self.rolling_damping, 10.0, "in [0, 10]")?;
+        in_range(name, "rolling_dashpot", self.rolling_dashpot, 10.0, "in [0, 10]")?;
+        in_range(name, "rolling_damping", self.rolling_damping, 0.0, FORMER_DASHPOT)?;
         in_range(name, "restitution", self.restitution, 1.0, "in [0, 1]")?;
         in_range(name, "tangential_restitution", self.tangential_restitution, 1.0, "in [0, 1]")
     }
@@ -153,6 +162,10 @@ pub struct WallMaterial {
     pub impact_friction: Option<f64>,
     /// Dashpot on rolling of grain on wall during an impact `[-]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rolling_dashpot: Option<f64>,
+    /// 0, as a material's.
+    #[doc(hidden)]
+    #[serde(default, skip_serializing)]
     pub rolling_damping: Option<f64>,
 }
 
@@ -175,6 +188,7 @@ impl WallMaterial {
             softness: self.softness.unwrap_or(grains.softness),
             touching_exponent: self.touching_exponent.unwrap_or(grains.touching_exponent),
             impact_friction: self.impact_friction.unwrap_or(grains.impact_friction),
+            rolling_dashpot: self.rolling_dashpot.unwrap_or(grains.rolling_dashpot),
             rolling_damping: self.rolling_damping.unwrap_or(grains.rolling_damping),
         }
     }
@@ -214,6 +228,9 @@ mod tests {
         assert_eq!(error, "material.sliding_friction must be in [0, 10], got -0.3");
         assert!(Material::new(0.5, f64::NAN, 0.5).is_err());
         assert!(Material::new(0.5, 0.1, 1.01).is_err());
+        let former = Material { rolling_damping: 0.7, ..Material::default() };
+        let error = former.check("material").unwrap_err().to_string();
+        assert!(error.contains("rolling_damping must be 0: it is rolling_dashpot now"), "{error}");
     }
 
     #[test]

@@ -187,7 +187,7 @@ def _head(scene: Scene, setup: Setup, module: ModuleType) -> list[str]:
         "  softness, touching_exponent, impact_friction: the engine's own stiffness and dashpots decide them"
     )
     if module is not liggghts:
-        lines.append("  rolling_damping: only LIGGGHTS' epsd has it")
+        lines.append("  rolling_dashpot: only LIGGGHTS' epsd has it")
     if setup.left_out:
         lines.append(f"Left out: {', '.join(setup.left_out)}")
     return lines

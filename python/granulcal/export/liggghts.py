@@ -1,7 +1,7 @@
 """LIGGGHTS 3.8: `pair_style gran model hertz tangential history` with rolling friction.
 
 Rolling: `epsd2` limits the moment to mu R_eff F_n, so mu is our mu_r; `epsd` has a dashpot beside it, which
-is our rolling_damping and stops lone grains sooner. Damping: the normal dashpot may pull a parting contact
+is our rolling_dashpot and stops lone grains sooner. Damping: the normal dashpot may pull a parting contact
 and then gives the e that it is told, whatever the speed.
 """
 
@@ -41,7 +41,7 @@ def material(setup: Setup, young: float | None = None) -> str:
     dashpot = ""
     if rolling == "epsd":
         name = "coefficientRollingViscousDamping"
-        dashpot = f"fix           m6 all property/global {name} peratomtypepair {n} {pairs('rolling_damping')}\n"
+        dashpot = f"fix           m6 all property/global {name} peratomtypepair {n} {pairs('rolling_dashpot')}\n"
     table = f"peratomtypepair {n}"
     return f"""\
 fix           m1 all property/global youngsModulus peratomtype {kinds}
@@ -57,7 +57,7 @@ timestep      {stiffness.dt:.6g}
 
 def _rolling(setup: Setup) -> str:
     laws = (setup.grains, setup.ground, *(body.law for body in setup.walls))
-    return "epsd" if any(each.rolling_damping > 0 for each in laws) else "epsd2"
+    return "epsd" if any(each.rolling_dashpot > 0 for each in laws) else "epsd2"
 
 
 def _stiffness(setup: Setup, young: float | None) -> Stiffness:

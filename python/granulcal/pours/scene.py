@@ -33,7 +33,7 @@ class Material:
         touching_exponent: contacts that touched before a blow have the restitution e^q, q [-], in
             [0, 10].
         impact_friction: friction cones in impacts over those in lasting contacts [-], in [0, 10].
-        rolling_damping: dashpot on rolling in impacts over the critical one [-], in [0, 10].
+        rolling_dashpot: dashpot on rolling in impacts over the critical one [-], in [0, 10].
 
     Examples:
         >>> Material(sliding_friction=0.5, rolling_friction=0.1, restitution=0.5).restitution
@@ -48,7 +48,7 @@ class Material:
     softness: float = 0.05
     touching_exponent: float = 1.0
     impact_friction: float = 1.0
-    rolling_damping: float = 0.0
+    rolling_dashpot: float = 0.0
 
     def values(self) -> dict[str, float]:
         """Returns the coefficients by their path in a scene."""

@@ -14,7 +14,7 @@ use super::spring::Spring;
 use crate::contact::Candidate;
 use crate::contact_context::ContactContext;
 use crate::contacts::Contacts;
-use crate::law::{IMPACT_SPEED, INVERSE_INERTIA};
+use crate::law::INVERSE_INERTIA;
 use crate::particles::Particles;
 
 /// How long an impact lasts at most, in 1/omega: walls that close on a grain never let go. What still closes then is
@@ -75,8 +75,8 @@ impl Cluster {
         let scenery = Scenery { time, particles, contacts, around, fallen };
         self.clear();
         let closing = self.strike(pair, &scenery)?;
-        let (micro_steps, is_cut) = if self.links.len() == 1 && self.links[0].rolling_damping == 0.0
-        {
+        let is_alone = self.links.len() == 1 && self.links[0].rolling_spring.is_none();
+        let (micro_steps, is_cut) = if is_alone {
             self.collide_alone(closing);
             (0, false)
         } else {
@@ -104,7 +104,7 @@ impl Cluster {
         let first = self.members.grain(i, scenery.particles);
         let link = self.link(first, partner, true, scenery)?;
         let closing = -self.members.closing_rate(&link.ends, &link.normal);
-        if closing <= IMPACT_SPEED {
+        if closing <= scenery.around.impact_speed {
             return None;
         }
         let second = link.ends[1];
@@ -216,7 +216,12 @@ impl Cluster {
         // A force, so that it does not depend on how finely time is cut.
         let enough = settings.stopping_speed * settings.micro_step;
         let mut rubbed = 0;
-        let period = (FRICTION_PERIOD / settings.micro_step).round().max(1.0) as usize;
+        // A rolling spring has a motion of its own to follow.
+        let period = if self.links.iter().any(|link| link.rolling_spring.is_some()) {
+            1
+        } else {
+            (FRICTION_PERIOD / settings.micro_step).round().max(1.0) as usize
+        };
         let most = (LONGEST / settings.micro_step) as usize;
         for micro_step in 0..most {
             let begin = self.links.len();
@@ -257,7 +262,7 @@ impl Cluster {
         let link = &mut self.links[number];
         let closing = -self.members.closing_rate(&link.ends, &link.normal);
         let Some(spring) = link.spring else {
-            if closing > IMPACT_SPEED {
+            if closing > around.impact_speed {
                 self.find_spring(number, closing, around);
                 return self.press_on(number, h, around);
             }
@@ -281,24 +286,23 @@ impl Cluster {
         for number in 0..self.links.len() {
             let push = std::mem::take(&mut self.links[number].pushed);
             if push > 0.0 {
+                self.roll_on_spring(number, push, time);
                 let link = &self.links[number];
                 let friction = link.block.act(&self.members.slip(link), push);
                 self.rub_with(number, &friction);
                 self.links[number].total.normal += push;
-                if self.links[number].rolling_damping > 0.0 {
-                    self.damp_rolling(number, push, time);
-                }
             }
         }
     }
 
-    /// Lets the dashpot on rolling act.
-    fn damp_rolling(&mut self, number: usize, push: f64, time: f64) {
+    /// Lets the rolling spring of a link that has one act.
+    fn roll_on_spring(&mut self, number: usize, push: f64, time: f64) {
         let r = self.members.slip(&self.links[number]).r;
         let link = &mut self.links[number];
-        let rows = [link.rolling_damping, link.block.rolling, link.block.a_r, link.compliance_n];
-        let m = link.rolling_spring.act(&r, push, time, rows);
-        self.rub_with(number, &Friction { m, ..Friction::default() });
+        if let Some(spring) = &mut link.rolling_spring {
+            let m = spring.act(&r, push, time);
+            self.rub_with(number, &Friction { m, ..Friction::default() });
+        }
     }
 
     /// Applies and notes friction of a link.

@@ -6,7 +6,7 @@ use granulcal_scene::Material;
 use nalgebra::Vector3;
 
 use super::friction::{Friction, FrictionBlock};
-use super::rolling_damping::RollingSpring;
+use super::rolling_spring::RollingSpring;
 use crate::contact::ContactLaw;
 
 /// Cosine of the angle between facets that count as one wall: 30 degrees.
@@ -35,8 +35,8 @@ pub(super) struct Link {
     /// What it is raised to here: 1 for the pair that strikes `[-]`.
     pub exponent: f64,
     pub tangential_restitution: f64,
-    pub rolling_damping: f64,
-    pub rolling_spring: RollingSpring,
+    /// What resists rolling in place of the block's cone, where the material has a dashpot.
+    pub rolling_spring: Option<RollingSpring>,
     pub total: Total,
 }
 
@@ -59,21 +59,26 @@ impl Link {
         material: &Material,
         strikes: bool,
     ) -> Self {
+        let compliance_n = 1.0 / (law.inverse_mass[0] + law.inverse_mass[1]);
+        let mut block = FrictionBlock::new(&law, material.impact_friction);
+        let rolling_spring = (material.rolling_dashpot > 0.0).then(|| {
+            let cones = [law.rolling_friction, std::mem::take(&mut block.rolling)];
+            RollingSpring::new(cones, material.rolling_dashpot, block.a_r, compliance_n)
+        });
         Self {
             ends,
             normal,
             spring: None,
             compression: 0.0,
             pushed: 0.0,
-            compliance_n: 1.0 / (law.inverse_mass[0] + law.inverse_mass[1]),
+            compliance_n,
             inverse_mass: law.inverse_mass,
             lever: law.lever,
-            block: FrictionBlock::new(&law, material.impact_friction),
+            block,
             restitution: material.restitution,
             exponent: if strikes { 1.0 } else { material.touching_exponent },
             tangential_restitution: material.tangential_restitution,
-            rolling_damping: material.rolling_damping,
-            rolling_spring: RollingSpring::default(),
+            rolling_spring,
             total: Total::default(),
         }
     }

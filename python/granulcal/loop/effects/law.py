@@ -13,7 +13,7 @@ has them free in every fit, with the priors below, sampled in every pour of its 
 | `softness` | log-uniform 0.005 to 0.1 | gap that counts as touching, over the radius |
 | `torsional_friction` | log-uniform 0.01 to 0.4 | resistance to spinning about the normal |
 | `impact_friction` | uniform 1 to 1.2 | friction cones in impacts: dashpots that pull |
-| `rolling_damping` | uniform 0 to 1 | a dashpot on rolling beside the moment limit |
+| `rolling_dashpot` | uniform 0 to 1 | rolling in impacts by a spring and a dashpot |
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ LAW: tuple[Parameter, ...] = (
     Parameter(path="material.softness", distribution="log_uniform", low=0.005, high=0.1),
     Parameter(path="material.torsional_friction", distribution="log_uniform", low=0.01, high=0.4),
     Parameter(path="material.impact_friction", distribution="uniform", low=1.0, high=1.2),
-    Parameter(path="material.rolling_damping", distribution="uniform", low=0.0, high=1.0),
+    Parameter(path="material.rolling_dashpot", distribution="uniform", low=0.0, high=1.0),
 )
 """All of them, with their priors."""
 
