@@ -10,7 +10,12 @@ import pytest
 import granulcal as gc
 from granulcal.cli import main
 from granulcal.export import ENGINES, export_bed, export_material, export_scene
-from granulcal.export.law import damping_ratio, nominal_restitution, restitution_of
+from granulcal.export.law import (
+    damping_ratio,
+    nominal_restitution,
+    pulling_duration,
+    restitution_of,
+)
 from granulcal.export.mesh import triangles
 from granulcal.export.mujoco import solref
 from granulcal.export.setup import Setup
@@ -89,6 +94,32 @@ def test_the_other_engines_have_their_own_rolling(scene: gc.Scene) -> None:
     gazebo = ENGINES["gazebo"].material(setup)
     twist = float(re.findall("<coefficient>([^<]+)", gazebo)[0])
     assert 3 * math.pi / 16 * RADIUS * twist == pytest.approx(0.02 * RADIUS / 2)
+
+
+@pytest.mark.parametrize("e", [0.14, 0.3, 0.62, 0.9])
+def test_a_contact_that_pulls_lasts_longer_by_the_formula(e: float) -> None:
+    # LIGGGHTS' Hertz contact with k = sqrt(d), and ours with k = 1, both until they part.
+    h, duration = 2e-4, []
+    pulling, ours = damping_ratio(e, tension=True), damping_ratio(e, tension=False)
+    for hertz in (True, False):
+        d, speed, lasted, force = 0.0, 1.0, 0.0, 0.0
+        while lasted == 0.0 or (d > 0.0 if hertz else force > 0.0):
+            root = math.sqrt(d) if hertz else 1.0
+            dashpot = 2 * math.sqrt(1.25 * root) * pulling if hertz else 2 * ours
+            force = root * d + dashpot * speed
+            speed -= h * force
+            d = max(d + h * speed, 0.0)
+            lasted += h * math.sqrt(root)
+        duration.append(lasted)
+    assert duration[0] / duration[1] == pytest.approx(pulling_duration(e), rel=5e-3)
+
+
+def test_liggghts_dashpot_is_ours_over_that(scene: gc.Scene) -> None:
+    damped = scene.with_({"material.rolling_dashpot": 0.87, "material.restitution": 0.3})
+    text = ENGINES["liggghts"].material(Setup.of(damped))
+    assert words(text, "coefficientRollingViscousDamping peratomtypepair", 2)[1] == pytest.approx(
+        0.7, abs=1e-3
+    )
 
 
 def test_mujocos_contact_is_the_spring_that_rebounds_so() -> None:

@@ -18,6 +18,7 @@ __all__ = [
     "critical_tangential_damping",
     "damping_ratio",
     "nominal_restitution",
+    "pulling_duration",
     "restitution_of",
 ]
 
@@ -127,6 +128,23 @@ def damping_ratio(restitution: float, *, tension: bool, overdamped: bool = False
         beta = 0.5 * (low + high)
         low, high = (beta, high) if restitution_of(beta) > wanted else (low, beta)
     return 0.5 * (low + high)
+
+
+def pulling_duration(restitution: float) -> float:
+    """Returns how long a Hertz contact whose dashpot pulls lasts, over one of ours [-].
+
+    Both counted in the rate of their spring, time sqrt(k / m) with Hertz' secant k. In that time
+    Hertz' contact with a dashpot in proportion to the root of its stiffness is a linear one in
+    overlap^(5/4), of rate sqrt(5/4): it lasts sqrt((pi^2 + ln^2 e) / (5/4)). Ours lets go after
+    -ln(e) / beta.
+
+    Args:
+        restitution: e of both; below 0.01 it is taken as 0.01.
+    """
+    decrement = -math.log(max(restitution, _LEAST_RESTITUTION))
+    beta = damping_ratio(restitution, tension=False, overdamped=True)
+    ours = decrement / beta if decrement > 1e-9 else math.pi
+    return math.hypot(math.pi, decrement) / math.sqrt(1.25) / ours
 
 
 def nominal_restitution(beta: float) -> float:

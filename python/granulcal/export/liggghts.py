@@ -1,7 +1,7 @@
 """LIGGGHTS 3.8: `pair_style gran model hertz tangential history` with rolling friction.
 
 Rolling: `epsd2` limits the moment to mu R_eff F_n, so mu is our mu_r; `epsd` has a dashpot beside it, which
-is our rolling_dashpot and stops lone grains sooner. Damping: the normal dashpot may pull a parting contact
+is our rolling_dashpot over how much longer its contacts last, and stops lone grains sooner. Damping: the normal dashpot may pull a parting contact
 and then gives the e that it is told, whatever the speed.
 """
 
@@ -67,6 +67,8 @@ def _stiffness(setup: Setup, young: float | None) -> Stiffness:
 
 def _value(of: Contact, name: str) -> float:
     value = float(getattr(of, name))
+    if name == "rolling_dashpot":
+        return value / law.pulling_duration(max(of.restitution, _LEAST_RESTITUTION))
     return max(value, _LEAST_RESTITUTION) if name == "restitution" else value
 
 
