@@ -297,12 +297,11 @@ impl Cluster {
 
     /// Lets the rolling spring of a link that has one act.
     fn roll_on_spring(&mut self, number: usize, push: f64, time: f64) {
+        let Some(mut spring) = self.links[number].rolling_spring else { return };
         let r = self.members.slip(&self.links[number]).r;
-        let link = &mut self.links[number];
-        if let Some(spring) = &mut link.rolling_spring {
-            let m = spring.act(&r, push, time);
-            self.rub_with(number, &Friction { m, ..Friction::default() });
-        }
+        let m = spring.act(&r, push, time);
+        self.links[number].rolling_spring = Some(spring);
+        self.rub_with(number, &Friction { m, ..Friction::default() });
     }
 
     /// Applies and notes friction of a link.
