@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from lammps_contact import Law
+from liggghts import DASHPOT
 from pile import measure
 from rows import rows
 
@@ -24,7 +25,7 @@ HERE = Path(__file__).parent
 LAWS: dict[tuple[str, str], dict[str, float]] = {
     ("liggghts", "epsd"): {
         "torsional_friction": 0.0,
-        "rolling_dashpot": 0.7 * pulling_duration(0.3),
+        "rolling_dashpot": DASHPOT * pulling_duration(0.3),
         "impact_friction": 1.16,
     },
     ("liggghts", "epsd2"): {"torsional_friction": 0.0, "impact_friction": 1.16},

@@ -23,10 +23,20 @@ from granulcal.export.mesh import Mesh, stl
 
 ROLLING = ("epsd", "epsd2")
 """LIGGGHTS' rolling friction with and without a dashpot beside the moment limit."""
+DASHPOT = 0.7
+"""Of `epsd`, over the critical [-]."""
 LOOK = 0.02
 """Time between two checks of rest and overlap [s]."""
 LEAST_RESTITUTION = 0.05
 """LIGGGHTS refuses less."""
+OPENING = """
+atom_style granular
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+units si"""
+"""The words that every input begins with."""
 HEAD = 9
 """Lines before the grains of a look; the fourth has their number."""
 
@@ -72,13 +82,7 @@ class Input:
             "create_atoms 1 single {:.9g} {:.9g} {:.9g} units box".format(*x) for x in self.centres
         )
         words = f"model hertz tangential history rolling_friction {self.rolling}"
-        return f"""
-atom_style granular
-atom_modify map array
-boundary f f f
-newton off
-communicate single vel yes
-units si
+        return f"""{OPENING}
 region box block {-wide} {wide} {-wide} {wide} -0.01 {self.top} units box
 create_box 2 box
 neighbor 0.001 bin
@@ -88,7 +92,7 @@ fix m2 all property/global poissonsRatio peratomtype {POISSON} {POISSON}
 fix m3 all property/global coefficientRestitution {pairs} {e} {e} {e} {e}
 fix m4 all property/global coefficientFriction {pairs} {" ".join([f"{law.sliding_friction}"] * 4)}
 fix m5 all property/global coefficientRollingFriction {pairs} {rolling}
-fix m6 all property/global coefficientRollingViscousDamping {pairs} 0.7 0.7 0.7 0.7
+fix m6 all property/global coefficientRollingViscousDamping {pairs} {" ".join([f"{DASHPOT}"] * 4)}
 pair_style gran {words}
 pair_coeff * *
 timestep {self.dt}

@@ -14,12 +14,14 @@ from pathlib import Path
 import numpy as np
 from lammps_contact import DENSITY, POISSON, RADIUS, Elastic
 from lammps_impact import ROLLING, SPEED, table
+from liggghts import DASHPOT, OPENING
+from liggghts import ROLLING as MODELS
 
 FRICTIONS = (0.05, 0.1, 0.3, 0.6)
 """mu_r [-]."""
 RATIOS = (*ROLLING, 5.0)
 """Rolling over normal velocity before the impact [-]."""
-RESTITUTION, DASHPOT, GRAVITY = 0.3, 0.7, 9.81
+RESTITUTION, GRAVITY = 0.3, 9.81
 NO_FRICTION = 1e-9
 """LIGGGHTS refuses 0."""
 ELASTIC = Elastic(step=0.05)
@@ -78,13 +80,7 @@ def script(
     pairs = "peratomtypepair 1"
     sliding = NO_FRICTION if longer == 1 else 0.5
     ground = f"fix ground all wall/gran {words} primitive type 1 zplane 0.0" if has_ground else ""
-    return f"""
-atom_style granular
-atom_modify map array
-boundary f f f
-newton off
-communicate single vel yes
-units si
+    return f"""{OPENING}
 region box block -0.5 0.5 -0.02 0.02 -0.02 0.04 units box
 create_box 1 box
 neighbor 0.001 bin
@@ -147,7 +143,7 @@ def main() -> None:
             f"{friction:g}",
             *(f"{kept(at, model, friction, ratio):.2f}" for ratio in RATIOS),
         ]
-        for model in ("epsd", "epsd2")
+        for model in MODELS
         for at in ("wall", "pair")
         for friction in FRICTIONS
     ]
@@ -155,7 +151,7 @@ def main() -> None:
     table("Share of the rolling velocity kept, by rolling over normal velocity", head, lines)
     lines = [
         [model, f"{friction:g}", f"{speed:g}", f"{slowed(model, friction, speed):.3f}"]
-        for model in ("epsd", "epsd2")
+        for model in MODELS
         for friction, speed in LEVEL
     ]
     head = ["rolling", "mu_r", "m/s", "over 5/7 mu_r g"]

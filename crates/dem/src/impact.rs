@@ -1,8 +1,8 @@
 //! Impacts within a substep: one after the other, each at its own time (docs/theory/contact.md, box 1).
 //!
 //! Between impacts grains move straight on, as in event-driven simulation. A pair that approaches faster than an impact
-//! must (`ContactContext::impact_speed`) and meets before the substep ends collides, together with every contact that is
-//! closed then (`impact/cluster.rs`); what is slower is left to the contact solve.
+//! must (`ContactContext::impact_speed`) and meets before the substep ends collides, together with every contact that
+//! is closed then (`impact/cluster.rs`); what is slower is left to the contact solve.
 
 mod cluster;
 mod friction;

@@ -68,7 +68,7 @@ def _stiffness(setup: Setup, young: float | None) -> Stiffness:
 def _value(of: Contact, name: str) -> float:
     value = float(getattr(of, name))
     if name == "rolling_dashpot":
-        return value / law.pulling_duration(max(of.restitution, _LEAST_RESTITUTION))
+        return value / law.pulling_duration(_value(of, "restitution"))
     return max(value, _LEAST_RESTITUTION) if name == "restitution" else value
 
 

@@ -97,16 +97,21 @@ mod tests {
 
     const TIME: f64 = 0.1;
 
+    impl RollingSpring {
+        /// Of the roll and of what is stored.
+        fn energy(&self, r: &Vector3<f64>) -> f64 {
+            0.5 * (r.norm_squared() / self.a_r + self.stiffness * self.y.norm_squared())
+        }
+    }
+
     /// Share of a unit of rolling that a half wave of normal force `push sin t` leaves, in steps of `TIME`.
     fn kept(mut spring: RollingSpring, push: f64) -> f64 {
         let mut r = Vector3::x();
         for step in 0..(std::f64::consts::PI / TIME) as usize {
             let pushed = push * libm::sin((step as f64 + 0.5) * TIME) * TIME;
-            let before =
-                0.5 * (r.norm_squared() / spring.a_r + spring.stiffness * spring.y.norm_squared());
+            let before = spring.energy(&r);
             r += spring.a_r * spring.act(&r, pushed, TIME);
-            let after =
-                0.5 * (r.norm_squared() / spring.a_r + spring.stiffness * spring.y.norm_squared());
+            let after = spring.energy(&r);
             assert!(after <= before * (1.0 + 1e-12), "step {step}: {before} to {after}");
         }
         r.x
