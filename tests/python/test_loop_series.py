@@ -122,6 +122,21 @@ def test_numbers_of_the_law_are_free_where_the_scene_has_them() -> None:
         law_numbers(["magnetism"], scene)
 
 
+def test_numbers_of_the_law_that_clumps_do_not_read_are_not_free_with_them() -> None:
+    clumps = Scene.funnel(height=0.1).with_({"effects.clump.aspect": 1.5})
+    (torsion,) = law_numbers(True, clumps)
+    assert torsion.path == "material.torsional_friction"
+    with pytest.raises(ObservationError, match=r"leave softness out of law: .*effects.clump"):
+        law_numbers(["softness"], clumps)
+    conditions = (Condition("all", {}, FIT, (Path("a"), Path("b"), Path("c"))),)
+    round_grains, clump = Scene.funnel(height=0.1), by_name(["clump", "drag"])
+    free = Prior([*prior().parameters, *law_numbers(["impact_friction"], round_grains)])
+    with pytest.raises(ObservationError, match=r"clump can be no candidate .*impact_friction"):
+        Task(round_grains, free, conditions, clump)
+    free = Prior([*prior().parameters, torsion])
+    assert Task(round_grains, free, conditions, clump).library == clump
+
+
 def test_a_number_that_every_fit_has_is_no_candidate() -> None:
     law = Parameter(
         path="effects.restitution_speed.exponent", distribution="uniform", low=0.0, high=0.3

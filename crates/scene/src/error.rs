@@ -78,6 +78,22 @@ pub enum SceneError {
         /// Table of the other.
         other: &'static str,
     },
+    /// A number of round grains' impacts that grains of another shape do not read.
+    #[error(
+        "{name} must be {} with {body}, whose impacts do not read it, got {}",
+        General(*allowed),
+        General(*got)
+    )]
+    OfRoundGrains {
+        /// Path of the number.
+        name: String,
+        /// The value found.
+        got: f64,
+        /// Its default, the one value that such a scene may state.
+        allowed: f64,
+        /// What makes the grains another shape: `effects.clump` or `grains.shape`.
+        body: &'static str,
+    },
     /// An effect that the solver's method does not know.
     #[error("{effect} needs the method nsgs (every preset but paper), got {got}")]
     EffectNeedsMethod {

@@ -130,6 +130,29 @@ impl Material {
         in_range(name, "restitution", self.restitution, 1.0, "in [0, 1]")?;
         in_range(name, "tangential_restitution", self.tangential_restitution, 1.0, "in [0, 1]")
     }
+
+    /// Refuses what grains that are not round do not read: numbers of impacts that come one after another in a time of
+    /// their own, as only balls' do.
+    ///
+    /// # Errors
+    /// [`SceneError::OfRoundGrains`] names the first that is not at its default, and `body`, which is there.
+    pub(crate) fn check_bodies(&self, name: &str, body: &'static str) -> Result<(), SceneError> {
+        let plain = Self::default();
+        let numbers = [
+            ("tangential_restitution", self.tangential_restitution, plain.tangential_restitution),
+            ("softness", self.softness, plain.softness),
+            ("touching_exponent", self.touching_exponent, plain.touching_exponent),
+            ("impact_friction", self.impact_friction, plain.impact_friction),
+            ("rolling_dashpot", self.rolling_dashpot, plain.rolling_dashpot),
+        ];
+        match numbers.iter().find(|(_, got, allowed)| got != allowed) {
+            Some(&(field, got, allowed)) => {
+                let name = format!("{name}.{field}");
+                Err(SceneError::OfRoundGrains { name, got, allowed, body })
+            }
+            None => Ok(()),
+        }
+    }
 }
 
 /// The coefficients of a wall that differ from the grains'; what is absent is the grains'.

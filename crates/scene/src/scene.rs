@@ -226,6 +226,24 @@ impl Scene {
         exclude("grains.shape", &others)
     }
 
+    /// Refuses numbers of balls' impacts, the grains' or a wall's, where grains are not round.
+    fn check_bodies(&self) -> Result<(), SceneError> {
+        let body = match (self.effects.clump.is_on(), &self.grains.shape) {
+            (true, _) => self.effects.clump.path(),
+            (false, Some(_)) => "grains.shape",
+            (false, None) => return Ok(()),
+        };
+        let walls = self.walls.iter().enumerate();
+        let named = walls.map(|(index, wall)| (format!("walls.{index}.material"), wall.material));
+        let funnel = self.funnel.iter().map(|f| ("funnel.material".to_owned(), f.material));
+        let ground = std::iter::once(("ground.material".to_owned(), self.ground.material));
+        self.material.check_bodies("material", body)?;
+        ground
+            .chain(funnel)
+            .chain(named)
+            .try_for_each(|(name, wall)| wall.over(&self.material).check_bodies(&name, body))
+    }
+
     /// What grains that leave once they have rolled away cannot be with: what might turn one back, what looks at where it
     /// is, and bodies that do not roll as balls do.
     fn check_rolled_away(&self) -> Result<(), SceneError> {
@@ -297,6 +315,7 @@ impl Scene {
         self.effects.check()?;
         self.check_clump()?;
         self.check_shape()?;
+        self.check_bodies()?;
         self.check_intruder()?;
         self.start.check(&self.held_grains())?;
         self.effects.check_method(self.settings().method)?;
@@ -353,6 +372,31 @@ mod tests {
         let error = Scene::from_toml(&text).unwrap_err();
         let source = std::error::Error::source(&error).unwrap().to_string();
         assert!(source.contains("diametre") && source.contains("diameter"), "{source}");
+    }
+
+    #[test]
+    fn what_only_balls_impacts_read_is_refused_by_name_of_other_grains() {
+        let shape = crate::GrainShape::Box { aspect: [1.0, 1.0, 2.0] };
+        for (body, clump, shape) in
+            [("effects.clump", 1.5, None), ("grains.shape", 1.0, Some(shape))]
+        {
+            let mut plain = Scene::drop(0.1);
+            plain.effects.clump.aspect = clump;
+            plain.grains.shape = shape;
+            plain.check().unwrap();
+            for (path, value) in [
+                ("material.tangential_restitution", 0.3),
+                ("material.softness", 0.01),
+                ("material.touching_exponent", 0.5),
+                ("material.impact_friction", 1.1),
+                ("material.rolling_dashpot", 0.7),
+                ("ground.material.softness", 0.0),
+            ] {
+                let said = plain.with(path, value).unwrap_err().to_string();
+                assert!(said.contains(path) && said.contains(body), "{said}");
+                Scene::drop(0.1).with(path, value).unwrap();
+            }
+        }
     }
 
     #[test]

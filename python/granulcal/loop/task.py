@@ -157,6 +157,7 @@ class Task:
         require_image(self.scene, (effect.name for effect in self.library if effect.image))
         require_series(self.scene, ((e.name, e.series) for e in self.library if e.series))
         self._refuse_fitted()
+        self._refuse_unlike()
         given = set(self.conditions[0].at) if self.conditions else set()
         meant = tuple(e for e in self.library if not e.shift or e.path in given)
         # An effect on a condition that this task does not have.
@@ -246,6 +247,28 @@ class Task:
                     f"{effect.name} is the number {effect.path}, which the prior has free in every "
                     "fit: it can be no finding; leave it out of effects"
                 )
+
+    def _refuse_unlike(self) -> None:
+        """Refuses candidates that do not go with the material's numbers that are free.
+
+        Raises:
+            ObservationError: the effect, and the number that it does not go with.
+        """
+        drawn = zip(self.prior.names, self.prior.sample(1, seed=0)[0].tolist(), strict=True)
+        material = {path: value for path, value in drawn if path.startswith("material.")}
+        for effect in self.library:
+            numbers = effect.at(self.scene).numbers(1.0)
+            try:
+                self.scene.with_(numbers)
+            except ValueError:
+                continue  # What the scene is poured with decides.
+            try:
+                self.scene.with_({**material, **numbers})
+            except ValueError as error:
+                raise ObservationError(
+                    f"{effect.name} can be no candidate with numbers that every fit has free: "
+                    f"{error}; leave it out of effects, or the number out of law and prior"
+                ) from error
 
     def of(self, use: str) -> tuple[Condition, ...]:
         """Returns the conditions of one use."""

@@ -38,21 +38,31 @@ def law_numbers(asked: bool | Sequence[str], scene: Scene) -> tuple[Parameter, .
     """Returns the free numbers of the contact law that a task asks for.
 
     Args:
-        asked: names, the last words of the paths; True for all that the scene has, False for none.
+        asked: names, the last words of the paths; True for all that the scene takes, False for
+            none.
         scene: the scene.
 
     Raises:
-        ObservationError: a name that is none of them, or a number that the scene does not have.
+        ObservationError: a name that is none of them, or a number that the scene does not take.
     """
     if isinstance(asked, bool):
-        return tuple(one for one in LAW if asked and scene.has(one.path))
+        return tuple(one for one in LAW if asked and _refusal(one, scene) is None)
     known = {one.path.rpartition(".")[2]: one for one in LAW}
     unknown = [name for name in asked if name not in known]
     if unknown:
         raise ObservationError(f"law has no {', '.join(unknown)}; there are {', '.join(known)}")
-    absent = [name for name in asked if not scene.has(known[name].path)]
-    if absent:
-        raise ObservationError(
-            f"the contact law of this version has no {', '.join(absent)}: leave them out of law"
-        )
+    for name in asked:
+        refusal = _refusal(known[name], scene)
+        if refusal is not None:
+            raise ObservationError(f"leave {name} out of law: {refusal}") from refusal
     return tuple(one for name, one in known.items() if name in asked)
+
+
+def _refusal(number: Parameter, scene: Scene) -> ValueError | None:
+    """Returns why a scene does not take the number: grains that are not round do not know all."""
+    try:
+        for value in number.bounds:
+            scene.with_({number.path: value})
+    except ValueError as error:
+        return error
+    return None
