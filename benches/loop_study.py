@@ -10,7 +10,8 @@ effect at three strengths, four pairs, and six effects that the library lacks at
 Sealed heights are 2, 6 and 10 cm. `--small` has 120 grains, pixels of 1.6 mm without noise, and an
 archive of half the size: minutes on an idle core where the whole study takes an hour. The pours of
 a set are kept in OUT.pours, so that the loop can be run on them again. `--first` numbers the sets
-from there: their materials and seeds are others.
+from there: their materials and seeds are others. `--checks` asks what `close-loop` asks before a
+word stands (loop_study_checks.py): 30 to 60 further pours a set.
 """
 
 import argparse
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from loop_study_checks import Checks
 from loop_study_table import table
 from numpy.typing import NDArray
 
@@ -35,6 +37,7 @@ from granulcal.loop.pours.forward import Forward
 from granulcal.loop.surrogate.baseline import fit_base
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.test.refit import fit_single
+from granulcal.loop.test.verdict import NAMING
 from granulcal.pours.statistics import NAMES
 
 Array = NDArray[np.float64]
@@ -124,7 +127,14 @@ class Study:
     """Sets of one archive."""
 
     def __init__(
-        self, archive: Path, kept: Path, plan: ArchivePlan, threads: int, pairs: int = 0
+        self,
+        archive: Path,
+        kept: Path,
+        plan: ArchivePlan,
+        threads: int,
+        pairs: int = 0,
+        *,
+        is_checked: bool = False,
     ) -> None:
         """Fills the archive and fits its surrogate."""
         self.plan, self.pairs = plan, pairs
@@ -135,6 +145,8 @@ class Study:
             self.plan.design, rows.theta, rows.condition, rows.psi, rows.x, names=rows.names
         )
         self.forward = Forward(kept, threads)
+        named = {_name(height): height for height in FIT}
+        self.checks = Checks(plan, named, POURS, self.forward, RULES) if is_checked else None
 
     def pours(self, theta: Array, height: float, psi: dict[str, float], seeds: range) -> Array:
         """Pours of a material (unit coordinates) with effects."""
@@ -151,7 +163,7 @@ class Study:
     def observe(self, height: float, rows: Array) -> ConditionPours:
         """The pours as the loop sees them."""
         low, high = HEIGHTS
-        return ConditionPours.of(f"{100 * height:g} cm", [(height - low) / (high - low)], rows)
+        return ConditionPours.of(_name(height), [(height - low) / (high - low)], rows)
 
     def row(self, index: int, truth: Truth) -> dict[str, Any] | None:
         """Returns the row of one set; None if its pours jam."""
@@ -183,6 +195,10 @@ class Study:
             "theta": theta.tolist(),
             "theta_fit": found.base.theta.tolist(),
         }
+        held = found
+        if self.checks is not None:
+            named = {_name(h): rows for h, rows in zip(FIT, sets, strict=True)}
+            row["final"], held = self.checks.of(self.surrogate, found, named, observed, first + 200)
         if truth.kind == "null":
             return row
         fresh = [self.pours(theta, h, psi, range(first + 50, first + 50 + FRESH)) for h in FIT]
@@ -194,9 +210,10 @@ class Study:
         if truth.kind == "single":
             self._grade(row, found, StackedMeans.of(self.surrogate, observed))
             self._widen(row, found, index)
-        is_named = found.verdict.kind in ("EFFECT", "SET", "EFFECTS")
-        if (is_named and index % 2 == 0) or found.verdict.kind == "UNEXPLAINED":
-            self._open(row, found, theta, psi, range(first + 100, first + 100 + MANY))
+        for words, one in ((row, found), (row.get("final", row), held)):
+            is_named = words["verdict"] in NAMING
+            if (is_named and index % 2 == 0) or words["verdict"] == "UNEXPLAINED":
+                self._open(words, one, theta, psi, range(first + 100, first + 100 + MANY))
         return row
 
     def _delta(self, found: Trace, fresh: list[ConditionPours]) -> float:
@@ -290,6 +307,10 @@ class Study:
         row["fallback"] = 1 - now / was if was > 0 else None
 
 
+def _name(height: float) -> str:
+    return f"{100 * height:g} cm"
+
+
 def run(options: argparse.Namespace) -> None:
     """Appends the rows that are not there yet."""
     path: Path = options.out
@@ -299,7 +320,9 @@ def run(options: argparse.Namespace) -> None:
     half = 2 if options.small else 1
     asked = plan(options.base // half, options.each // half, options.small)
     kept = path.with_suffix(".pours")
-    study = Study(options.archive, kept, asked, options.threads, options.pairs)
+    study = Study(
+        options.archive, kept, asked, options.threads, options.pairs, is_checked=options.checks
+    )
     truths = Truth.all(options.nulls, options.rounds)
     with path.open("a", encoding="utf-8") as file:
         for index, truth in enumerate(truths, start=options.first):
@@ -326,6 +349,7 @@ def main() -> None:
     runner.add_argument("--each", type=int, default=150)
     runner.add_argument("--small", action="store_true")
     runner.add_argument("--pairs", type=int, default=0, help="simulated pairs of a named effect")
+    runner.add_argument("--checks", action="store_true", help="what a word has to stand")
     runner.add_argument("--threads", type=int, default=2)
     commands.add_parser("table").add_argument("paths", type=Path, nargs="+")
     options = parser.parse_args()

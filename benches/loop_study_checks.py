@@ -1,0 +1,101 @@
+"""What `close-loop` asks before a word of the fits stands, for a set of `loop_study.py`.
+
+Pours of the base model and of the verdict's at their fits, that hold the surrogate where it is
+wrong; whether those pours leave anything of the set; what is left of the word then. Not asked are
+random draws of the prior, whose pours and new surrogate cost as much as the set and all else, and
+other definitions, of which the study has none.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.loop import ConditionPours, Surrogate, Thresholds, Trace
+from granulcal.loop.analysis import Analysis
+from granulcal.loop.check.checks import recentred
+from granulcal.loop.check.settle import settle
+from granulcal.loop.check.standing import stand
+from granulcal.loop.pours.archive import ArchivePlan
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.task import FIT, Condition, Task
+
+__all__ = ["Checks"]
+
+Array = NDArray[np.float64]
+
+
+class Checks:
+    """The checks of one study.
+
+    Args:
+        plan: of its archive.
+        heights: of the conditions to fit [m], by name.
+        pours: of a set under each of them.
+        forward: pours and keeps.
+        rules: thresholds of a verdict.
+    """
+
+    def __init__(
+        self,
+        plan: ArchivePlan,
+        heights: dict[str, float],
+        pours: int,
+        forward: Forward,
+        rules: Thresholds,
+    ) -> None:
+        """States the task that every set of the study is."""
+        ((path, _, _),) = plan.conditions
+        # A set's pours are at hand: there is nothing to be read.
+        conditions = tuple(
+            Condition(name, {path: h}, FIT, tuple(Path(name, str(i)) for i in range(pours)))
+            for name, h in heights.items()
+        )
+        self.task = Task(plan.scene, plan.prior, conditions, plan.library)
+        self.plan, self.forward, self.rules = plan, forward, rules
+
+    def of(
+        self,
+        surrogate: Surrogate,
+        found: Trace,
+        sets: dict[str, Array],
+        observed: list[ConditionPours],
+        seed: int,
+    ) -> tuple[dict[str, Any], Trace]:
+        """Returns the word that stands, with the numbers it rests on, and the trace that is held.
+
+        Args:
+            surrogate: of the study's archive.
+            found: what it says of the set.
+            sets: the set's statistics (n, s) by name of the condition.
+            observed: the same as the loop sees them.
+            seed: of the fresh pours.
+        """
+        analysis = Analysis(self.task, self.plan, self.forward, self.rules, seed, lambda _: None)
+        settled = settle(analysis, surrogate, found, observed)
+        held, simulated = settled.trace, settled.simulated
+        known = analysis, settled.surrogate, held
+        of_base = own = recentred(*known, held.base, sets, simulated)
+        if held.best is not held.base:
+            own = recentred(*known, held.best, sets, simulated)
+        standing = stand(
+            held.verdict,
+            self.rules,
+            confirmed=settled.confirmed,
+            anchors=settled.anchors,
+            own=own,
+            of_base=of_base,
+        )
+        word: dict[str, Any] = {
+            "verdict": standing.verdict.kind,
+            "named": standing.verdict.named,
+            "families": standing.verdict.families,
+            "fits": held.verdict.kind,
+            "best": held.best.effects,
+            "anchors": settled.anchors,
+            "confirmed": settled.confirmed,
+            "own": None if own is None else own.to_dict(),
+            "base_p": None if of_base is None else of_base.residual_test.p,
+        }
+        return word, held
