@@ -48,6 +48,7 @@ from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.time_needed import time_needed
 from granulcal.loop.preregistration import register
 from granulcal.loop.report.models_of import models_of
+from granulcal.loop.surrogate.conditioned import conditioned
 from granulcal.loop.surrogate.store_surrogate import fit_surrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Task
@@ -131,16 +132,19 @@ def close_loop(
     found = trace(surrogate, observed, rules, seed=seed)
     say(f"the fits say {found.verdict.kind}: {found.verdict.reason}")
 
-    more: list[Rows] = []
+    rounded = 0
     for number in range(rounds):
         if found.residual_test.p > rules.name:
             break
-        more.extend(further(analysis, found, number))
-        surrogate = fit_surrogate(store, seed=seed, say=say, more=more)
+        parts = further(analysis, found, number)
+        if not parts:
+            break
+        more = Rows.joined(parts)
+        rounded += len(more)
+        surrogate = conditioned(surrogate, more)
         found = trace(surrogate, observed, rules, seed=seed)
         say(f"after pours where the fits are, {found.verdict.kind}: {found.verdict.reason}")
-    rounded = sum(len(rows.x) for rows in more)
-    seen = prior_rounds(analysis, store, surrogate, found, observed, measured, more)
+    seen = prior_rounds(analysis, surrogate, found, observed, measured)
     settled = settle(analysis, seen.surrogate, seen.trace, observed)
     found, surrogate = settled.trace, settled.surrogate
     hidden = task.of(SEALED)

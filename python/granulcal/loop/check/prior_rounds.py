@@ -8,11 +8,9 @@ from numpy.typing import NDArray
 
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.check.prior_pours import PriorPours, prior_pours
-from granulcal.loop.pours.archive import Archive
 from granulcal.loop.pours.measures import Measures
-from granulcal.loop.pours.rows import Rows
 from granulcal.loop.surrogate.condition_pours import ConditionPours
-from granulcal.loop.surrogate.store_surrogate import fit_surrogate
+from granulcal.loop.surrogate.conditioned import conditioned
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.test.trace import Trace, trace
 
@@ -43,14 +41,12 @@ class PriorCheck:
 
 def prior_rounds(
     analysis: Analysis,
-    store: Archive,
     surrogate: Surrogate,
     found: Trace,
     observed: Sequence[ConditionPours],
     measured: dict[str, Array],
-    more: list[Rows],
 ) -> PriorCheck:
-    """Returns the trace after random draws of its winner were poured; `more` grows by the pours."""
+    """Returns the trace after random draws of its winner were poured."""
     rules, seed, say = analysis.rules, analysis.seed, analysis.say
     spread, draws, best = _spread(analysis, surrogate), 0, None
     for number in range(ROUNDS if rules.look else 0):
@@ -59,9 +55,9 @@ def prior_rounds(
         draws += rules.look
         if best.rows is None:
             break
-        more.append(best.rows)
-        surrogate = fit_surrogate(store, seed=seed, say=say, more=more)
-        found = trace(surrogate, observed, rules, seed=seed, starts=best.starts(store.plan.design))
+        surrogate = conditioned(surrogate, best.rows)
+        starts = best.starts(analysis.plan.design)
+        found = trace(surrogate, observed, rules, seed=seed, starts=starts)
         say(
             f"after {rules.look} random draws of "
             f"{' + '.join(winner) or 'the base model'}, "

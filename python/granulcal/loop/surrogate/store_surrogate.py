@@ -1,11 +1,8 @@
-"""The surrogate of all pours of an archive, and of those that were made where the fits are."""
+"""The surrogate of all pours of an archive."""
 
-from collections.abc import Callable, Sequence
-
-import numpy as np
+from collections.abc import Callable
 
 from granulcal.loop.pours.archive import Archive
-from granulcal.loop.pours.rows import Rows
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.one_thread import one_thread
 
@@ -13,19 +10,10 @@ __all__ = ["fit_surrogate"]
 
 
 @one_thread()
-def fit_surrogate(
-    store: Archive,
-    *,
-    seed: int,
-    say: Callable[[str], None] = print,
-    more: Sequence[Rows] = (),
-) -> Surrogate:
-    """Returns the surrogate of all pours of an archive, and of `more`."""
-    rows, design = store.pours(), store.plan.design
-    whole = [rows, *more]
-    theta = np.concatenate([part.theta for part in whole])
-    condition = np.concatenate([part.condition for part in whole])
-    psi = np.concatenate([part.psi for part in whole])
-    x = np.concatenate([part.x for part in whole])
-    say(f"surrogate of {len(x)} pours (left out: {rows.left_out})")
-    return Surrogate.fit(design, theta, condition, psi, x, names=rows.names, seed=seed)
+def fit_surrogate(store: Archive, *, seed: int, say: Callable[[str], None] = print) -> Surrogate:
+    """Returns the surrogate of all pours of an archive."""
+    rows = store.pours()
+    say(f"surrogate of {len(rows)} pours (left out: {rows.left_out})")
+    return Surrogate.fit(
+        store.plan.design, rows.theta, rows.condition, rows.psi, rows.x, names=rows.names, seed=seed
+    )

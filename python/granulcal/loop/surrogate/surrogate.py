@@ -54,16 +54,17 @@ from granulcal.loop.surrogate.shift import Shift
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.progress import steps
 
-__all__ = ["Surrogate"]
+__all__ = ["DONOR_SHARE", "Surrogate"]
 
 Array = NDArray[np.float64]
 
 _FEATURES = 96
 _SCALE_FEATURES = 10
 _SCALE_STRETCH = 2.0
-# Rows of the archive whose residuals are kept from R, to make replicates of.
-_DONOR_SHARE = 0.35
 _LEAST_ROWS = 60
+
+DONOR_SHARE = 0.35
+"""Rows whose residuals are kept from R, to make replicates of."""
 
 
 @dataclass(frozen=True)
@@ -210,7 +211,7 @@ class Surrogate:
             scales[:, j] = scale
             dof += fit.dof / size
         noise /= np.sqrt(np.mean(np.clip(noise, -6, 6) ** 2, axis=0))
-        is_donor = np.random.default_rng(seed).random(count) < _DONOR_SHARE
+        is_donor = np.random.default_rng(seed).random(count) < DONOR_SHARE
         return cls(
             design=design,
             names=tuple(labels[j] for j in columns),
