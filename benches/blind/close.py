@@ -44,6 +44,7 @@ def main() -> None:
             archive=options.archive,
             budget=BUDGET,
             seed=SEED,
+            pairs=0,
             surrogate=surrogate,
             say=lambda line: None,
         )

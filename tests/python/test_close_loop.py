@@ -214,8 +214,11 @@ def test_a_budget_that_is_too_small_says_what_is_enough(
     tilted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["close-loop", str(tilted), "-o", str(tmp_path / "out"), "--budget", "100"]
-    assert main(words) == 2
+    assert main([*words, "--pairs", "0"]) == 2
     assert "562 would be enough" in capsys.readouterr().err
+    # Twenty simulated pairs, as many pours each as were measured to fit.
+    assert main(words) == 2
+    assert f"{562 + 20 * 6} would be enough" in capsys.readouterr().err
     assert main([*words, "--pairs", "7"]) == 2
     assert "pairs must be 0, or at least 19 to read 95 % from, got 7" in capsys.readouterr().err
 

@@ -20,8 +20,8 @@ SMALL = {
     "--budget 100": "--budget 60",
     "-o report.html": "-o report.html --seeds 1 --draws 2",
     # The least that its library of effects affords.
-    "close-loop loop.toml -o loop": "close-loop loop.toml -o loop --budget 1100",
-    "budget=4000": "budget=1100",
+    "close-loop loop.toml -o loop": "close-loop loop.toml -o loop --budget 1300",
+    "budget=4000": "budget=1300",
     "--corrected`": "--corrected --pours 4`",
     # What so few grains make.
     "--ring 0.04 0.073 --pile 0.04 -o plan": "--pile 0.03 -o plan --pours 60 --extrapolate",

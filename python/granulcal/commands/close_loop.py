@@ -67,9 +67,9 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--pairs",
         type=int,
-        default=0,
+        default=20,
         help="simulated pairs that calibrate the interval of a named effect's strength, of the "
-        "budget; at least 19 (default: none)",
+        "budget; at least 19, or 0 for the interval of the model's own pours (default: 20)",
     )
     parser.add_argument(
         "--rounds",

@@ -61,7 +61,7 @@ def close_fronts(
 
     Returns whether the verdict stands.
     """
-    closed = close_loop(asked, folder, budget=budget, rounds=rounds)
+    closed = close_loop(asked, folder, budget=budget, rounds=rounds, pairs=0)
     write_report(closed, folder, command=command, title=title)
     _draw(folder / "fronts.png", closed, Forward(folder / "pours", 1))
     print(folder / "fronts.png")

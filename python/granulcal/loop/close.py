@@ -10,6 +10,7 @@ report.
 import json
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,10 +57,12 @@ from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Power, power, trace
 from granulcal.one_thread import one_thread
 
-__all__ = ["Closed", "close_loop", "fit_surrogate", "planned"]
+__all__ = ["PAIRS", "Closed", "close_loop", "fit_surrogate", "planned"]
 
 Array = NDArray[np.float64]
 
+PAIRS = 20
+"""Simulated pairs of a named effect, unless told otherwise."""
 # Fewest pours of the base and of each effect from which a surrogate is any use.
 _LEAST_BASE, _LEAST_EACH = 300, 40
 # Shares of a budget: the base model has more directions than any one effect.
@@ -77,7 +80,7 @@ def close_loop(
     seed: int = 0,
     thresholds: Thresholds | None = None,
     surrogate: Surrogate | None = None,
-    pairs: int = 0,
+    pairs: int = PAIRS,
     rounds: int = 0,
     say: Callable[[str], None] = print,
 ) -> Closed:
@@ -93,7 +96,8 @@ def close_loop(
         thresholds: of the verdict.
         surrogate: of the same archive, where it has been fitted for another task.
         pairs: simulated pairs that calibrate the interval of a named effect's strength, each as
-            many pours as were measured to fit; 19 are the fewest from which 95 % can be read.
+            many pours as were measured to fit; 19 are the fewest from which 95 % can be read, and
+            0 leaves the interval of the model's own pours.
         rounds: of further pours where the fits are, once the residual test has rejected; each
             takes up to `refine.ROUND` pours, and everything is asked again afterwards.
         say: is told each step.
@@ -120,7 +124,10 @@ def close_loop(
     for sentence in drifts(task) if store.missing else []:
         say(sentence)
     store.fill(threads=threads, say=say)
-    surrogate = surrogate or fit_surrogate(store, seed=seed, say=say)
+    if surrogate is None:
+        surrogate = fit_surrogate(store, seed=seed, say=say)
+    else:
+        surrogate = replace(surrogate, anchor=None)
     analysis = Analysis(task, store.plan, Forward(folder / "pours", workers), rules, seed, say)
     counts = [len(condition.recordings) for condition in analysis.fitted]
     middle = np.full(len(task.prior.names), 0.5)

@@ -42,6 +42,7 @@ def reproduce(out: Path, data: Path) -> bool:
             folder / name,
             archive=folder / "archive",
             budget=_BUDGET,
+            pairs=0,
             surrogate=surrogate,
         )
         stands &= closed.standing.stands

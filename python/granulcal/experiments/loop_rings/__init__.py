@@ -38,6 +38,7 @@ def reproduce(out: Path, data: Path) -> bool:
             folder / group,
             archive=folder / "archive",
             budget=_BUDGET,
+            pairs=0,
             surrogate=surrogate,
         )
         # Every group has the same pours.

@@ -40,7 +40,7 @@ def conditioned(surrogate: Surrogate, rows: Rows) -> Surrogate:
     """Returns the surrogate that knows further pours; those with a statistic missing are left out.
 
     Args:
-        surrogate: without an anchor, which further pours would belie.
+        surrogate: of an archive; an anchor is gone, for it held the gap that these pours close.
         rows: in unit coordinates, all statistics of the archive.
     """
     rows = rows.taken(np.all(np.isfinite(rows.x[:, surrogate.columns]), axis=1))
@@ -76,6 +76,7 @@ def conditioned(surrogate: Surrogate, rows: Rows) -> Surrogate:
         noise=np.concatenate([surrogate.noise, noise]),
         rows=np.concatenate([surrogate.rows, u]),
         is_donor=np.concatenate([surrogate.is_donor, donors]),
+        anchor=None,
         raw_range=np.stack([np.fmin(low, rows.x.min(axis=0)), np.fmax(high, rows.x.max(axis=0))]),
     )
 
