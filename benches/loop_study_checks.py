@@ -1,7 +1,8 @@
 """What `close-loop` asks before a word of the fits stands, for a set of `loop_study.py`.
 
 Pours of the base model and of the verdict's at their fits, that hold the surrogate where it is
-wrong; whether those pours leave anything of the set; what is left of the word then. Not asked are
+wrong; a step of the verdict's model by its own pours; whether pours leave anything of the set; what
+is left of the word then. Not asked are
 random draws of the prior, whose pours and new surrogate cost as much as the set and all else, and
 other definitions, of which the study has none.
 """
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from granulcal.loop import ConditionPours, Surrogate, Thresholds, Trace
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.check.checks import recentred
+from granulcal.loop.check.placed import placed
 from granulcal.loop.check.settle import settle
 from granulcal.loop.check.standing import stand
 from granulcal.loop.pours.archive import ArchivePlan
@@ -79,6 +81,8 @@ class Checks:
         of_base = own = recentred(*known, held.base, sets, simulated)
         if held.best is not held.base:
             own = recentred(*known, held.best, sets, simulated)
+        there = placed(*known, own, sets, simulated)
+        held, own = there.trace, there.own
         standing = stand(
             held.verdict,
             self.rules,

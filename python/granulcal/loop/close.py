@@ -28,6 +28,7 @@ from granulcal.loop.check.checks import (
     trivial,
 )
 from granulcal.loop.check.coverage import FEWEST_PAIRS
+from granulcal.loop.check.placed import placed
 from granulcal.loop.check.prior_rounds import ROUNDS, drawn, prior_rounds
 from granulcal.loop.check.settle import settle
 from granulcal.loop.check.standing import stand
@@ -154,9 +155,7 @@ def close_loop(
     seen = prior_rounds(analysis, surrogate, found, observed, measured)
     settled = settle(analysis, seen.surrogate, seen.trace, observed)
     found, surrogate = settled.trace, settled.surrogate
-    hidden = task.of(SEALED)
-    of_hidden = {c.name: both(analysis.forward, task, c, found, settled.seed) for c in hidden}
-    simulated = settled.simulated | of_hidden
+    hidden, simulated = task.of(SEALED), settled.simulated
     best, draws = seen.best, seen.draws
     if found.best.effects != seen.trace.best.effects and rules.look:
         # The winner is another: no random draw of it has been poured.
@@ -164,10 +163,13 @@ def close_loop(
     of_base = own = recentred(analysis, surrogate, found, found.base, measured, simulated)
     if found.best is not found.base:
         own = recentred(analysis, surrogate, found, found.best, measured, simulated)
+    there = placed(analysis, surrogate, found, own, measured, simulated)
+    found, simulated, own = there.trace, there.simulated, there.own
     if own is not None:
-        say(f"they leave of the measured pours what has p = {own.residual_test.p:.3g}")
+        say(f"its pours leave of the measured ones what has p = {own.residual_test.p:.3g}")
     if of_base is not None and own is not of_base:
         say(f"pours of the base model leave what has p = {of_base.residual_test.p:.3g}")
+    simulated |= {c.name: both(analysis.forward, task, c, found, settled.seed) for c in hidden}
     elsewhere = moved(analysis, surrogate)
     for other in elsewhere:
         say(f"defined as {other.definition}: {other.verdict.kind}, p = {other.verdict.p:.3g}")
@@ -210,7 +212,8 @@ def close_loop(
         pours=plan.pours
         + _needed(task, pairs if wide is not None else 0, draws)
         + rounded
-        + settled.before,
+        + settled.before
+        + there.pours,
         registration=registration,
         measured=measured,
         simulated=simulated,

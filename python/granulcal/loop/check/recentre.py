@@ -38,7 +38,7 @@ from granulcal.loop.test.residual_test import ResidualTest, residual_test
 from granulcal.loop.test.score import Scores
 from granulcal.loop.test.thresholds import Thresholds
 
-__all__ = ["Recentred", "recentre"]
+__all__ = ["Recentred", "misfit", "recentre"]
 
 Array = NDArray[np.float64]
 
@@ -90,13 +90,9 @@ def recentre(
         rules: level of the intervals, numbers of replicates.
         seed: of the replicates.
     """
-    seen, poured = StackedMeans.of(surrogate, measured), StackedMeans.of(surrogate, fresh)
-    counts = seen.counts * poured.counts / (seen.counts + poured.counts)
-    local = _without_error(LinearisedSurrogate.at(surrogate, seen.conditions, counts, fit.v))
-    root = np.asarray(np.linalg.cholesky(local.covariance(fit.v, fit.psi)), dtype=np.float64)
+    local, root, gap = _gap(surrogate, fit, measured, fresh)
     slopes = local.slopes(fit.v, fit.psi, fit.active)[1]
     white = np.linalg.solve(root, slopes)
-    gap = (seen.means - poured.means).ravel()
     pull = np.concatenate([np.ones(len(fit.v)), np.full(len(fit.active), 1e-9)])
     at = np.concatenate([fit.v, fit.psi[list(fit.active)]])
     normal = white.T @ white + np.diag(pull)
@@ -127,6 +123,31 @@ def recentre(
         intervals=np.array(intervals).reshape(len(fit.active), 2),
         step=float(np.sqrt(step @ normal @ step)),
     )
+
+
+def misfit(
+    surrogate: Surrogate,
+    fit: Fit,
+    measured: Sequence[ConditionPours],
+    fresh: Sequence[ConditionPours],
+) -> float:
+    """Returns r^T S^-1 r of measured and fresh pours, S at a fit."""
+    _, root, gap = _gap(surrogate, fit, measured, fresh)
+    return float(np.sum(np.linalg.solve(root, gap) ** 2))
+
+
+def _gap(
+    surrogate: Surrogate,
+    fit: Fit,
+    measured: Sequence[ConditionPours],
+    fresh: Sequence[ConditionPours],
+) -> tuple[LinearisedSurrogate, Array, Array]:
+    """The surrogate without its error, the root of S, and r."""
+    seen, poured = StackedMeans.of(surrogate, measured), StackedMeans.of(surrogate, fresh)
+    counts = seen.counts * poured.counts / (seen.counts + poured.counts)
+    local = _without_error(LinearisedSurrogate.at(surrogate, seen.conditions, counts, fit.v))
+    root = np.asarray(np.linalg.cholesky(local.covariance(fit.v, fit.psi)), dtype=np.float64)
+    return local, root, (seen.means - poured.means).ravel()
 
 
 def _without_error(local: LinearisedSurrogate) -> LinearisedSurrogate:

@@ -4,7 +4,7 @@
 |---|---|---|
 | base | its own pours leave something: p <= `detect`, for a name p <= `name` | RESIDUAL, NONE |
 | surrogate | it is right at the fit, p > `confirm`, after `settle.py` at the latest | UNCONFIRMED |
-| own pours | they leave nothing of the data: p > `adequate`, for NONE > `name` | UNCONFIRMED |
+| own pours | they leave nothing: p > `adequate`, for NONE > `name` | RESIDUAL; NONE: UNCONFIRMED |
 | prior | no random draw of the model is nearer to the data than its fit | UNCONFIRMED |
 | definitions | the same verdict with every threshold and definition moved | OVERTURNED |
 | sealed rows | the named effect beats what needs no physics (`trivial.py`) | said beside the name |
@@ -169,7 +169,13 @@ def stand(
     if pours is not None and pours.residual_test.p <= least:
         left = pours.residual_test.p
         why = f"its own pours at its fit leave something of the data (p = {left:.3g})"
-        verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
+        if verdict is word and word.kind in NAMING and of_base is not None:
+            # Of the base model they have left something, or there were no name.
+            of_none = of_base.residual_test.p
+            why = f"{_said(before)}, but {why}, as the base model's do (p = {of_none:.3g})"
+            verdict = Verdict("RESIDUAL", (), (), before.p, why)
+        else:
+            verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
     if not confirmed > rules.confirm:
         why = (
             "no fresh pour of its model is usable"

@@ -24,6 +24,7 @@ __all__ = [
     "model_faults",
     "model_scene",
     "placebo_of",
+    "pours_of",
     "seeds_of_replicates",
 ]
 
@@ -70,15 +71,20 @@ def model_faults(task: Task, one: Explanation) -> dict[str, float]:
     return faults_of(task, dict(zip(one.effects, one.best_strengths.tolist(), strict=True)))
 
 
+def pours_of(
+    forward: Forward, task: Task, condition: Condition, one: Explanation, seed: int
+) -> Array:
+    """Returns pours of a model at its best fit under a condition."""
+    scene, faults = model_scene(task, condition, one), model_faults(task, one)
+    return forward.limit(scene, seeds_of_replicates(seed), faults, task.coarse)
+
+
 def both(forward: Forward, task: Task, condition: Condition, found: Trace, seed: int) -> ModelPours:
     """Returns pours of the base and of the augmented model under a condition."""
-    seeds = seeds_of_replicates(seed)
-    before = forward.limit(model_scene(task, condition, found.base), seeds, None, task.coarse)
+    before = pours_of(forward, task, condition, found.base, seed)
     if found.best is found.base:
         return ModelPours(before, before)
-    after = model_scene(task, condition, found.best)
-    faults = model_faults(task, found.best)
-    return ModelPours(before, forward.limit(after, seeds, faults, task.coarse))
+    return ModelPours(before, pours_of(forward, task, condition, found.best, seed))
 
 
 def placebo_of(
