@@ -148,6 +148,13 @@ def test_what_its_own_pours_leave_takes_a_name_away() -> None:
     assert stand(NONE, RULES, confirmed=0.5, own=own(0.005)).verdict.kind == "UNCONFIRMED"
     unexplained = Verdict("UNEXPLAINED", (), (), 0.001, "")
     assert stand(unexplained, RULES, confirmed=0.5, own=own(0.001)).verdict is unexplained
+    # The base model's pours have left something: no name, but a residual.
+    found = stand(EFFECT, RULES, confirmed=0.5, own=own(0.015), of_base=own(0.002))
+    assert found.verdict.kind == "RESIDUAL" and not found.verdict.named and found.stands
+    assert "as the base model's do (p = 0.002)" in found.verdict.reason
+    # Where the surrogate is wrong, or another fit is nearer, that is not known either.
+    found = stand(EFFECT, RULES, confirmed=0.001, own=own(0.015), of_base=own(0.002))
+    assert found.verdict.kind == "UNCONFIRMED"
 
 
 def test_a_random_draw_that_is_nearer_than_the_fit_takes_the_word_away() -> None:
