@@ -23,10 +23,11 @@ _restore: dict[str, Callable[[], None]] = {}
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Keeps numpy and torch to one thread meanwhile; also a decorator of functions.
+    """Keeps numpy, SciPy and torch to one thread meanwhile; also a decorator of functions.
 
     The number holds for the whole process. It is set by whoever comes first and put back by whoever
-    leaves last, so that calls may nest and may come from several threads.
+    leaves last, so that calls may nest and may come from several threads. What imports SciPy or
+    torch inside enters once more afterwards.
     """
     global _inside
     with _lock:
@@ -43,9 +44,12 @@ def one_thread() -> Iterator[None]:
 
 
 def _limit() -> None:
-    """Limits what is loaded and not limited yet: torch may come while others are inside."""
-    if "numpy" not in _restore:
-        _restore["numpy"] = _pools().limit(limits=1, user_api="blas").restore_original_limits
+    """Limits what is loaded and not limited yet: others may come while some are inside."""
+    # SciPy brings a library of linear algebra of its own.
+    for name in ("numpy", "scipy.linalg"):
+        if name in sys.modules and name not in _restore:
+            limited = _pools(name).limit(limits=1, user_api="blas")
+            _restore[name] = limited.restore_original_limits
     torch = sys.modules.get("torch")
     if torch is not None and "torch" not in _restore:
         threads: int = torch.get_num_threads()
@@ -54,5 +58,5 @@ def _limit() -> None:
 
 
 @cache
-def _pools() -> ThreadpoolController:
+def _pools(_: str) -> ThreadpoolController:
     return ThreadpoolController()

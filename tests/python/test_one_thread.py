@@ -1,5 +1,9 @@
 """Linear algebra on one thread: the same bits everywhere, and the caller's number put back."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
@@ -55,3 +59,30 @@ def test_an_emulator_has_the_same_bits_on_any_number_of_threads():
     one, two = (model.likelihood.leading.coefficients for model in models)
     np.testing.assert_array_equal(one, two)
     np.testing.assert_array_equal(*(model.at_truth for model in models))
+
+
+def test_libraries_that_come_inside_are_held_as_well():
+    # In a process of its own: SciPy's linear algebra is loaded by the first inverse.
+    code = """
+import sys
+import numpy as np
+from threadpoolctl import threadpool_info
+from granulcal.loop.surrogate.inverse import inverse_of
+from granulcal.one_thread import one_thread
+
+def threads():
+    return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+
+assert "scipy.linalg" not in sys.modules
+with one_thread():
+    inverse_of(np.eye(3))
+    assert "scipy.linalg" in sys.modules and len(threads()) >= 2, threads()
+    assert set(threads()) == {1}, threads()
+before = threads()
+with one_thread():
+    assert set(threads()) == {1}, threads()
+assert threads() == before
+"""
+    # As many threads as SciPy takes by itself, on any machine.
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "3"}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment)

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.one_thread import one_thread
+
 __all__ = ["inverse_of"]
 
 Array = NDArray[np.float64]
@@ -17,8 +19,10 @@ def inverse_of(precision: Array) -> Array:
     from scipy.linalg import get_lapack_funcs
 
     potrf, potri = get_lapack_funcs(("potrf", "potri"), (precision,))
-    factor, failed = potrf(precision, lower=1, clean=0)
-    lower, failed_too = potri(factor, lower=1)
+    # Once more: SciPy may have come just now.
+    with one_thread():
+        factor, failed = potrf(precision, lower=1, clean=0)
+        lower, failed_too = potri(factor, lower=1)
     if failed or failed_too:
         raise np.linalg.LinAlgError("the precision matrix is not positive definite")
     below = np.tril(lower, -1)
