@@ -31,7 +31,7 @@ _SENTENCES = {
 }
 # Share of an effect that the parameters must not mimic for its interval to hold what it says.
 _QUOTABLE = 0.5
-# Rightly named effects of the self study whose 95 % interval without pairs held the truth, of how many
+# Rightly named effects of the self study whose interval without pairs held the truth, of how many
 # (docs/results/loop-self.md).
 _HELD = (53, 62)
 # Statistics that the picture of residuals shows, the largest ones.
