@@ -2,9 +2,8 @@
 
 Pours of the base model and of the verdict's at their fits, that hold the surrogate where it is
 wrong; a step of the verdict's model by its own pours; whether pours leave anything of the set; what
-is left of the word then. Not asked are
-random draws of the prior, whose pours and new surrogate cost as much as the set and all else, and
-other definitions, of which the study has none.
+is left of the word then. Not asked are random draws of the prior, whose pours cost more than all
+else, and other definitions, of which the study has none.
 """
 
 from pathlib import Path
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 
 from granulcal.loop import ConditionPours, Surrogate, Thresholds, Trace
 from granulcal.loop.analysis import Analysis
-from granulcal.loop.check.checks import recentred
 from granulcal.loop.check.placed import placed
 from granulcal.loop.check.settle import settle
 from granulcal.loop.check.standing import stand
@@ -76,13 +74,8 @@ class Checks:
         """
         analysis = Analysis(self.task, self.plan, self.forward, self.rules, seed, lambda _: None)
         settled = settle(analysis, surrogate, found, observed)
-        held, simulated = settled.trace, settled.simulated
-        known = analysis, settled.surrogate, held
-        of_base = own = recentred(*known, held.base, sets, simulated)
-        if held.best is not held.base:
-            own = recentred(*known, held.best, sets, simulated)
-        there = placed(*known, own, sets, simulated)
-        held, own = there.trace, there.own
+        there = placed(analysis, settled.surrogate, settled.trace, sets, settled.simulated)
+        held, of_base, own = there.trace, there.of_base, there.own
         standing = stand(
             held.verdict,
             self.rules,

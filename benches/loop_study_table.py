@@ -1,7 +1,7 @@
 """The table of `loop_study.py`: rates with 95 % Wilson intervals beside the targets."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -11,13 +11,13 @@ from scipy.stats import binomtest
 
 from granulcal.loop.check.coverage import needed_stretch
 from granulcal.loop.test.refit import interval
+from granulcal.loop.test.verdict import NAMING
 
 __all__ = ["table"]
 
 Row = dict[str, Any]
 
-_NAMED = ("EFFECT", "SET", "EFFECTS")
-_ALARMS = (*_NAMED, "RESIDUAL", "UNEXPLAINED")
+_ALARMS = (*NAMING, "RESIDUAL", "UNEXPLAINED")
 _LEVEL = 0.95
 # For a truth that no stretch holds: the interval is nearly the whole prior.
 _LARGEST = 12.0
@@ -55,17 +55,16 @@ def _finals(of: dict[str, list[Row]]) -> None:
         kind: [{**r, **dict.fromkeys(own), **r["final"]} for r in rows] for kind, rows in of.items()
     }
     spoken = [*final["null"], *final["single"], *final["pair"], *final["hidden"]]
-    null = [r["verdict"] for r in final["null"]]
-    _rate("null: alarm", [v in _ALARMS for v in null], "<= 5 % (<= 8 %)")
-    _rate("null: named", [v in _NAMED for v in null])
+    alarms = [r["verdict"] in _ALARMS for r in final["null"]]
+    _rate("null: alarm", alarms, "<= 5 % (<= 8 %)")
+    _rate("null: named", [_is_named(r) for r in final["null"]])
     _rate("no word (UNCONFIRMED), of all", [r["verdict"] == "UNCONFIRMED" for r in spoken])
-    for low, high, target in _BANDS:
-        chosen = [r for r in final["single"] if low <= r["delta"] < high]
-        band = f"delta {low:g} to {high:g}" if np.isfinite(high) else f"delta from {low:g}"
-        _rate(f"single: alarm, {band}", [r["verdict"] in _ALARMS for r in chosen], target)
-        _rate(f"single: named, {band}", [_is_named(r) for r in chosen])
-        right = [r["best"][0] == r["effects"][0] for r in chosen if _is_named(r)]
-        _rate("  of these the first is right", right, ">= 90 %" if low >= 1 else "")
+    _bands(
+        final["single"],
+        ("single: alarm", "single: named"),
+        lambda r: r["verdict"] in _ALARMS,
+        lambda r: r["best"][0],
+    )
     _naming(final)
     named = [r for r in final["single"] if _is_named(r) and r["best"] == r["effects"] and r["own"]]
     held = [_is_in(r, r["own"]["intervals"][0]) for r in named]
@@ -102,13 +101,22 @@ def _nulls(rows: list[Row]) -> None:
 
 
 def _singles(rows: list[Row]) -> None:
+    _bands(rows, ("detected", "named"), lambda r: r["p"] <= 0.05, lambda r: r["first"])
+
+
+def _bands(
+    rows: list[Row],
+    words: tuple[str, str],
+    is_found: Callable[[Row], bool],
+    first: Callable[[Row], str],
+) -> None:
+    """Rates of what is found and named, and whether its first name is right, by the misfit."""
     for low, high, target in _BANDS:
         chosen = [r for r in rows if low <= r["delta"] < high]
         band = f"delta {low:g} to {high:g}" if np.isfinite(high) else f"delta from {low:g}"
-        _rate(f"detected, {band}", [r["p"] <= 0.05 for r in chosen], target)
-        named = [r for r in chosen if _is_named(r)]
-        _rate(f"named, {band}", [_is_named(r) for r in chosen])
-        right = [r["first"] == r["effects"][0] for r in named]
+        _rate(f"{words[0]}, {band}", [is_found(r) for r in chosen], target)
+        _rate(f"{words[1]}, {band}", [_is_named(r) for r in chosen])
+        right = [first(r) == r["effects"][0] for r in chosen if _is_named(r)]
         _rate("  of these the first is right", right, ">= 90 %" if low >= 1 else "")
 
 
@@ -182,7 +190,7 @@ def _effect(name: str, rows: list[Row]) -> None:
 
 
 def _is_named(row: Row) -> bool:
-    return row["verdict"] in _NAMED
+    return row["verdict"] in NAMING
 
 
 def _covers(row: Row) -> bool:

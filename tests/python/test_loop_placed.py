@@ -11,7 +11,6 @@ from granulcal.loop import ConditionPours, Design, Effect, Surrogate, Thresholds
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.check import placed as module
 from granulcal.loop.check.placed import Placed, placed
-from granulcal.loop.check.recentre import recentre
 from granulcal.loop.pours.replicates import ModelPours
 from granulcal.loop.test.trace import Explanation, Trace
 
@@ -74,9 +73,7 @@ def place(
     observed = [ConditionPours.of(name, [float(name)], rows) for name, rows in seen.items()]
     found = trace(surrogate, observed, RULES, seed=number)
     simulated = {f"{c:g}": ModelPours(of(found.base, c, 0), of(found.best, c, 0)) for c in PLACES}
-    fresh = [ConditionPours.of(n, [float(n)], two.augmented) for n, two in simulated.items()]
-    own = recentre(surrogate, found.fit_of(found.best), observed, fresh, RULES, seed=number)
-    return found, placed(analysis, surrogate, found, own, seen, simulated)
+    return found, placed(analysis, surrogate, found, seen, simulated)
 
 
 def test_a_step_takes_the_model_to_where_its_pours_are_those_measured(

@@ -1,6 +1,6 @@
 """What one analysis has fixed before it sees a residual, and what runs its pours."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
@@ -42,3 +42,7 @@ class Analysis:
     def pours(self, condition: Condition, rows: ArrayLike) -> ConditionPours:
         """Returns rows of statistics (n, s) as pours of a condition."""
         return ConditionPours.of(condition.name, self.plan.unit(condition.at), rows)
+
+    def observed(self, rows: Mapping[str, ArrayLike]) -> list[ConditionPours]:
+        """Returns rows of every condition to fit, by its name, as pours of these conditions."""
+        return [self.pours(condition, rows[condition.name]) for condition in self.fitted]

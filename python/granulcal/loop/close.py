@@ -24,7 +24,6 @@ from granulcal.loop.check.checks import (
     corrected,
     moved,
     nearer,
-    recentred,
     trivial,
 )
 from granulcal.loop.check.coverage import FEWEST_PAIRS
@@ -136,7 +135,7 @@ def close_loop(
     say(_power_table(sights))
 
     measured = {c.name: c.statistics(task.scene) for c in analysis.fitted}
-    observed = [analysis.pours(c, measured[c.name]) for c in analysis.fitted]
+    observed = analysis.observed(measured)
     found = trace(surrogate, observed, rules, seed=seed)
     say(f"the fits say {found.verdict.kind}: {found.verdict.reason}")
 
@@ -155,21 +154,19 @@ def close_loop(
     seen = prior_rounds(analysis, surrogate, found, observed, measured)
     settled = settle(analysis, seen.surrogate, seen.trace, observed)
     found, surrogate = settled.trace, settled.surrogate
-    hidden, simulated = task.of(SEALED), settled.simulated
+    hidden = task.of(SEALED)
     best, draws = seen.best, seen.draws
     if found.best.effects != seen.trace.best.effects and rules.look:
         # The winner is another: no random draw of it has been poured.
         best, draws = drawn(analysis, surrogate, found, measured), draws + rules.look
-    of_base = own = recentred(analysis, surrogate, found, found.base, measured, simulated)
-    if found.best is not found.base:
-        own = recentred(analysis, surrogate, found, found.best, measured, simulated)
-    there = placed(analysis, surrogate, found, own, measured, simulated)
-    found, simulated, own = there.trace, there.simulated, there.own
+    there = placed(analysis, surrogate, found, measured, settled.simulated)
+    found, of_base, own = there.trace, there.of_base, there.own
     if own is not None:
         say(f"its pours leave of the measured ones what has p = {own.residual_test.p:.3g}")
     if of_base is not None and own is not of_base:
         say(f"pours of the base model leave what has p = {of_base.residual_test.p:.3g}")
-    simulated |= {c.name: both(analysis.forward, task, c, found, settled.seed) for c in hidden}
+    of_hidden = {c.name: both(analysis.forward, task, c, found, settled.seed) for c in hidden}
+    simulated = there.simulated | of_hidden
     elsewhere = moved(analysis, surrogate)
     for other in elsewhere:
         say(f"defined as {other.definition}: {other.verdict.kind}, p = {other.verdict.p:.3g}")

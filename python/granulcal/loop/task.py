@@ -258,17 +258,13 @@ class Task:
         material = {path: value for path, value in drawn if path.startswith("material.")}
         for effect in self.library:
             numbers = effect.at(self.scene).numbers(1.0)
-            try:
-                self.scene.with_(numbers)
-            except ValueError:
-                continue  # What the scene is poured with decides.
-            try:
-                self.scene.with_({**material, **numbers})
-            except ValueError as error:
+            refusal = self.scene.refusal({**material, **numbers})
+            # What is refused without them, too, is not theirs.
+            if refusal is not None and self.scene.refusal(numbers) is None:
                 raise ObservationError(
                     f"{effect.name} can be no candidate with numbers that every fit has free: "
-                    f"{error}; leave it out of effects, or the number out of law and prior"
-                ) from error
+                    f"{refusal}; leave it out of effects, or the number out of law and prior"
+                ) from refusal
 
     def of(self, use: str) -> tuple[Condition, ...]:
         """Returns the conditions of one use."""

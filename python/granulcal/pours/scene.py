@@ -188,6 +188,14 @@ class Scene:
             native = native.with_name(_word("name", wanted.pop("name")))
         return Scene(native.with_values([(path, _number(path, v)) for path, v in wanted.items()]))
 
+    def refusal(self, changes: Mapping[str, float]) -> ValueError | None:
+        """Returns why `with_` refuses these values; None if it takes them."""
+        try:
+            self.with_(changes)
+        except ValueError as error:
+            return error
+        return None
+
     def with_material(self, material: Material) -> "Scene":
         """Returns a copy whose grains have this material."""
         return self.with_(material.values())

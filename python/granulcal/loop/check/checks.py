@@ -45,9 +45,7 @@ def recentred(
     }
     if min(map(len, pours.values())) < FEWEST:
         return None
-    seen, fresh = (
-        [analysis.pours(c, of[c.name]) for c in analysis.fitted] for of in (measured, pours)
-    )
+    seen, fresh = analysis.observed(measured), analysis.observed(pours)
     fit = found.fit_of(one)
     return recentre(surrogate, fit, seen, fresh, analysis.rules, seed=analysis.seed)
 

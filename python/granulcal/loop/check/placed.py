@@ -8,7 +8,6 @@ Errors at sealed conditions, predictions and parameters are those of the model t
 base model stays at its fit, on which the correction without physics stands.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.analysis import Analysis
+from granulcal.loop.check.checks import recentred
 from granulcal.loop.check.recentre import Recentred, misfit, recentre
 from granulcal.loop.effects.design import LARGEST_Z, cube_from_normal
 from granulcal.loop.pours.replicates import FEWEST, ModelPours, pours_of
@@ -36,12 +36,14 @@ class Placed(NamedTuple):
     Attributes:
         trace: whose verdict's model is where its pours put it.
         simulated: pours of both models under the conditions to fit, by name.
-        own: what the pours of the verdict's model say where it is.
+        of_base: what the base model's pours say of the data; None where too few are usable.
+        own: the same of the verdict's model, where it is.
         pours: that were made for it.
     """
 
     trace: Trace
     simulated: dict[str, ModelPours]
+    of_base: Recentred | None
     own: Recentred | None
     pours: int
 
@@ -50,9 +52,8 @@ def placed(
     analysis: Analysis,
     surrogate: Surrogate,
     found: Trace,
-    own: Recentred | None,
-    measured: Mapping[str, Array],
-    simulated: Mapping[str, ModelPours],
+    measured: dict[str, Array],
+    simulated: dict[str, ModelPours],
 ) -> Placed:
     """Returns the verdict's model at its fit or a step from it, whichever is nearer to the data.
 
@@ -60,28 +61,28 @@ def placed(
         analysis: task and pours.
         surrogate: whose slopes and noise are used.
         found: what the fits say.
-        own: the step of the verdict's model; None where too few of its pours are usable.
         measured: statistics under each condition to fit, by name.
         simulated: pours of both models at their fits, the same way.
     """
     best = found.best
+    of_base = own = recentred(analysis, surrogate, found, found.base, measured, simulated)
+    if best is not found.base:
+        own = recentred(analysis, surrogate, found, best, measured, simulated)
     if own is None or best is found.base:
-        return Placed(found, dict(simulated), own, 0)
+        return Placed(found, simulated, of_base, own, 0)
     v = np.clip(own.v, -LARGEST_Z, LARGEST_Z)
     moved = replace(best, theta=cube_from_normal(v), best_strengths=own.strengths)
     seed = analysis.seed + _SEED
     fresh = {
         c.name: pours_of(analysis.forward, analysis.task, c, moved, seed) for c in analysis.fitted
     }
-    same = Placed(found, dict(simulated), own, sum(map(len, fresh.values())))
+    same = Placed(found, simulated, of_base, own, sum(map(len, fresh.values())))
     if min(map(len, fresh.values())) < FEWEST:
         return same
 
     fit = found.fit_of(best)
-    seen, poured, known = (
-        [analysis.pours(c, of[c.name]) for c in analysis.fitted]
-        for of in (measured, fresh, {name: two.augmented for name, two in simulated.items()})
-    )
+    seen, poured = analysis.observed(measured), analysis.observed(fresh)
+    known = analysis.observed({name: two.augmented for name, two in simulated.items()})
     before = misfit(surrogate, fit, seen, known)
     after = misfit(surrogate, fit, seen, poured)
     analysis.say(f"the step of its own pours takes its misfit from {before:.3g} to {after:.3g}")
@@ -94,4 +95,5 @@ def placed(
     again = recentre(
         surrogate, replace(fit, v=v, psi=psi), seen, poured, analysis.rules, seed=analysis.seed
     )
-    return Placed(replace(found, explanations=explanations), there, again, same.pours)
+    moved_trace = replace(found, explanations=explanations)
+    return same._replace(trace=moved_trace, simulated=there, own=again)

@@ -60,9 +60,5 @@ def law_numbers(asked: bool | Sequence[str], scene: Scene) -> tuple[Parameter, .
 
 def _refusal(number: Parameter, scene: Scene) -> ValueError | None:
     """Returns why a scene does not take the number: grains that are not round do not know all."""
-    try:
-        for value in number.bounds:
-            scene.with_({number.path: value})
-    except ValueError as error:
-        return error
-    return None
+    refusals = (scene.refusal({number.path: value}) for value in number.bounds)
+    return next((one for one in refusals if one is not None), None)
