@@ -3,6 +3,8 @@
     python benches/blind/make.py out/sets --sealed out/sealed --sets 42
     python benches/blind/make.py out/liggghts --sealed out/answers --sets 30 --nulls 30 \
         --engine epsd2 --young 1e7
+    python benches/blind/make.py out/pairs --sealed out/answers --sets 38 --nulls 14 \
+        --pairs 12 --outside 12 --no-singles
 
 A set is a folder with `loop.toml`, scene, prior and depth images. Nothing in it says what the truth
 has. Sets that are there are not made again, so it goes on where it was stopped.
@@ -14,7 +16,7 @@ import os
 import secrets
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -38,37 +40,78 @@ OUTSIDE = ("clumps", "charge", "slot", "count", "vibration")
 """Effects that are hard to name: one of each, at the medium strength, in a round."""
 TRIES = 4
 """Pours that are tried where grains stay in the funnel."""
+FOREIGN = ("clumps", "charge", "slot")
+"""Of these what no effect of the loop's library is."""
+TOUCHING = ("adhesion", "cohesion", "polydispersity")
+"""At most one of these in a pair: they take all spheres as equal, and the pair style is one."""
 MOST = 1000
 """Names that are dealt out: more than any plan has sets."""
+
+Truth = tuple[tuple[str, int], ...]
+"""Effects by name, each with its level of strength, in the order in which they are applied."""
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A set to be made: its place in the plan, its name, its effect and how strong it is."""
+    """A set to be made: its place in the plan, its name, its effects and how strong they are."""
 
     index: int
     name: str
-    effect: str | None
-    level: int
+    truth: Truth
 
 
-def plan(seed: int, count: int, nulls: int = NULLS) -> list[Planned]:
-    """Returns the first sets: nulls, every effect at three strengths, some odd ones; and again."""
-    known = [name for name in effects.load() if name not in OUTSIDE]
-    rounds: list[tuple[str | None, int]] = [(None, 0)] * nulls
-    rounds += [(name, level) for name in known for level in range(3)]
-    rounds += [(name, 1) for name in OUTSIDE]
+@dataclass(frozen=True, kw_only=True)
+class Round:
+    """What a round of sets has, in this order.
+
+    Attributes:
+        nulls: sets without effect.
+        singles: whether every effect is there at three strengths, and the odd ones.
+        pairs: sets with two effects of the library, each medium or strong.
+        outside: sets with an effect that the library lacks, of all strengths in turn.
+    """
+
+    nulls: int = NULLS
+    singles: bool = True
+    pairs: int = 0
+    outside: int = 0
+
+    def truths(self, random: np.random.Generator) -> list[Truth]:
+        """Returns what the sets have; pairs are drawn."""
+        known = [name for name in effects.load() if name not in OUTSIDE]
+        found: list[Truth] = [()] * self.nulls
+        if self.singles:
+            found += [((name, level),) for name in known for level in range(3)]
+            found += [((name, 1),) for name in OUTSIDE]
+        found += [_pair(known, random) for _ in range(self.pairs)]
+        foreign = [((name, level),) for level in (1, 2, 0) for name in FOREIGN]
+        return found + [foreign[i % len(foreign)] for i in range(self.outside)]
+
+
+def _pair(known: Sequence[str], random: np.random.Generator) -> Truth:
+    """Two effects; drag first, for it changes the weight that others are stated by."""
+    while True:
+        names = [str(name) for name in random.choice(known, size=2, replace=False)]
+        if sum(name in TOUCHING for name in names) < 2:
+            names.sort(key=lambda name: (name != "air_drag", name in TOUCHING))
+            return tuple((name, int(random.integers(1, 3))) for name in names)
+
+
+def plan(seed: int, count: int, of: Round | None = None) -> list[Planned]:
+    """Returns the first sets of one round after the other."""
     order = np.random.default_rng([seed, 0]).permutation(MOST)
-    what = (rounds[i % len(rounds)] for i in range(count))
-    return [Planned(i, f"set-{order[i]:03d}", *pair) for i, pair in enumerate(what)]
+    random = np.random.default_rng([seed, 2])
+    what: list[Truth] = []
+    while len(what) < count:
+        what += (of or Round()).truths(random)
+    return [Planned(i, f"set-{order[i]:03d}", truth) for i, truth in enumerate(what[:count])]
 
 
 def make(planned: Planned, pour: Engine, seed: int, pours: int, sets: Path, sealed: Path) -> None:
     """Makes one set of an engine's pours and seals its answer."""
     bench, random = Bench.load(), np.random.default_rng([seed, 1, planned.index])
     theta = gc.Prior.load(PRIOR).sample(1, seed=int(random.integers(2**31)))[0]
-    effect = None if planned.effect is None else effects.load()[planned.effect]
-    strength = None if effect is None else effect.strengths[planned.level]
+    known = effects.load()
     of_effect = int(random.integers(2**31))
     draft = sets / f".{planned.name}.part"
     shutil.rmtree(draft, ignore_errors=True)
@@ -76,10 +119,15 @@ def make(planned: Planned, pour: Engine, seed: int, pours: int, sets: Path, seal
     answer = {
         "set": planned.name,
         "salt": secrets.token_hex(16),
-        "effect": planned.effect,
-        "strength": strength,
-        "unit": None if effect is None else effect.unit,
-        "level": planned.level,
+        "effects": [
+            {
+                "name": name,
+                "strength": known[name].strengths[level],
+                "unit": known[name].unit,
+                "level": level,
+            }
+            for name, level in planned.truth
+        ],
         "theta": dict(zip(PARAMETERS, map(float, theta), strict=True)),
         "seed": [seed, planned.index],
         "conditions": [],
@@ -91,10 +139,12 @@ def make(planned: Planned, pour: Engine, seed: int, pours: int, sets: Path, seal
             for number in range(pours):
                 seeds = random.integers(2**31, size=TRIES + 1).tolist()
                 setups = (bench.setup(theta, height, start) for start in seeds[:-1])
-                if effect is not None:
+                for name, level in planned.truth:
                     # The same table, the same diameters: what is drawn belongs to the set.
-                    with_effect = partial(_apply, effect, strength, of_effect)
-                    setups = map(with_effect, setups)
+                    effect = known[name]
+                    setups = map(
+                        partial(_apply, effect, effect.strengths[level], of_effect), setups
+                    )
                 image = f"{round(100 * height):02d}cm/pour-{number}.png"
                 made.append(_recorded(bench, map(pour, setups), draft, image, seeds[-1]))
             answer["conditions"].append({"height": height, "use": use, "pours": made})
@@ -165,6 +215,16 @@ def main() -> None:
     parser.add_argument("--sealed", type=Path, required=True, help="folder of the answers")
     parser.add_argument("--sets", type=int, default=42)
     parser.add_argument("--nulls", type=int, default=NULLS, help="of a round: sets without effect")
+    parser.add_argument(
+        "--singles",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="every effect at three strengths, and odd ones, in a round",
+    )
+    parser.add_argument("--pairs", type=int, default=0, help="of a round: sets with two effects")
+    parser.add_argument(
+        "--outside", type=int, default=0, help="of a round: an effect that the library lacks"
+    )
     parser.add_argument("--first", type=int, default=0, help="sets of the plan to pass over")
     parser.add_argument("--pours", type=int, default=3, help="pours at each height")
     add_part(parser)
@@ -176,7 +236,13 @@ def main() -> None:
     for folder in (options.out, options.sealed):
         folder.mkdir(parents=True, exist_ok=True)
     seed = seed_of(options.sealed, options.seed)
-    for planned in plan(seed, options.sets, options.nulls)[options.first :]:
+    of = Round(
+        nulls=options.nulls,
+        singles=options.singles,
+        pairs=options.pairs,
+        outside=options.outside,
+    )
+    for planned in plan(seed, options.sets, of)[options.first :]:
         part, parts = options.part
         if planned.index % parts != part or planned.name in seals(options.out):
             continue
