@@ -44,8 +44,9 @@ Array = NDArray[np.float64]
 
 HEIGHTS = (0.02, 0.12)
 FIT, SEALED = (0.04, 0.08, 0.12), (0.02, 0.06, 0.10)
-# Pours of a set at each height; fresh ones of the truth, for its misfit; at sealed heights.
-POURS, FRESH, MANY = 3, 2, 3
+# Pours of a set at each height; fresh ones of the truth, for its misfit (of two, sets of no misfit
+# had counted among those of more than one); at sealed heights.
+POURS, FRESH, MANY = 3, 8, 3
 STRENGTHS, OUTSIDE_STRENGTHS, OF_PAIRS = (0.3, 0.6, 0.9), (0.5, 1.0), 0.7
 PAIRS = 4
 RULES = Thresholds()
@@ -324,9 +325,10 @@ def run(options: argparse.Namespace) -> None:
         options.archive, kept, asked, options.threads, options.pairs, is_checked=options.checks
     )
     truths = Truth.all(options.nulls, options.rounds)
+    part, parts = options.part
     with path.open("a", encoding="utf-8") as file:
         for index, truth in enumerate(truths, start=options.first):
-            if index in done:
+            if index in done or index % parts != part:
                 continue
             row = study.row(index, truth)
             file.write(json.dumps(row or {"index": index, "kind": "jammed"}) + "\n")
@@ -351,6 +353,14 @@ def main() -> None:
     runner.add_argument("--pairs", type=int, default=0, help="simulated pairs of a named effect")
     runner.add_argument("--checks", action="store_true", help="what a word has to stand")
     runner.add_argument("--threads", type=int, default=2)
+    runner.add_argument(
+        "--part",
+        type=int,
+        nargs=2,
+        default=(0, 1),
+        metavar=("K", "N"),
+        help="of N runs side by side, each with its own OUT, this is the one number K, from 0",
+    )
     commands.add_parser("table").add_argument("paths", type=Path, nargs="+")
     options = parser.parse_args()
     run(options) if options.command == "run" else table(options.paths)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
+from granulcal.loop import Thresholds
 from granulcal.loop.check.coverage import needed_stretch
 from granulcal.loop.test.refit import interval
 from granulcal.loop.test.verdict import NAMING
@@ -90,6 +91,9 @@ def _naming(of: dict[str, list[Row]]) -> None:
     _rate("pairs, named: no false member", alone, ">= 95 %")
     both = [set(r["named"]) == set(r["effects"]) for r in of["pair"]]
     _rate("pairs: both found", both, ">= 60 %")
+    # Where one effect by itself leaves nothing there is no second to be found.
+    apart = [b for r, b in zip(of["pair"], both, strict=True) if not _by_one(r)]
+    _rate("  of those that no single effect explains", apart)
 
 
 def _nulls(rows: list[Row]) -> None:
@@ -187,6 +191,11 @@ def _effect(name: str, rows: list[Row]) -> None:
     covered = f"{sum(map(_covers, rows))}" if "strength" in rows[0] else "-"
     cells = [name, len(rows), found, len(named), right, f"{delta:.2f}", covered]
     print("| " + " | ".join(map(str, cells)) + " |")
+
+
+def _by_one(row: Row) -> bool:
+    """Whether a single effect leaves nothing of the set."""
+    return any(len(effects) == 1 and p > Thresholds().adequate for effects, _, p in row["models"])
 
 
 def _is_named(row: Row) -> bool:

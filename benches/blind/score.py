@@ -92,29 +92,52 @@ class Verdict:
 
 
 @dataclass(frozen=True)
+class Truth:
+    """An effect of a set's truth, its strength in the truth's unit, and what it may be called."""
+
+    effect: str
+    strength: float
+    family: Family
+
+
+@dataclass(frozen=True)
 class Judged:
     """A set with its truth and the loop's verdict."""
 
     name: str
-    effect: str | None
-    truth: float | None
-    family: Family
+    truth: tuple[Truth, ...]
     verdict: Verdict
+
+    @property
+    def right(self) -> set[str]:
+        """The names of the loop that are right."""
+        return {name for one in self.truth for name in one.family.names}
 
     @property
     def is_null(self) -> bool:
         """Whether the truth has no effect."""
-        return self.effect is None
+        return not self.truth
 
     @property
     def is_outside(self) -> bool:
         """Whether the library lacks the truth's effect."""
-        return not self.is_null and not self.family.names
+        return not self.is_null and not self.right
 
     @property
     def is_single(self) -> bool:
-        """Whether the truth has one effect of the library."""
-        return not self.is_null and bool(self.family.names)
+        """Whether the truth has one effect, of the library."""
+        return len(self.truth) == 1 and bool(self.right)
+
+    @property
+    def is_pair(self) -> bool:
+        """Whether the truth has two effects, of the library."""
+        return len(self.truth) == 2
+
+    @property
+    def finds_both(self) -> bool:
+        """Whether each effect of the truth has a name."""
+        named = set(self.verdict.named)
+        return all(named & set(one.family.names) for one in self.truth)
 
     @property
     def delta(self) -> float:
@@ -139,12 +162,12 @@ class Judged:
     @property
     def is_first_right(self) -> bool:
         """Whether the effect named first is right."""
-        return self.is_named and self.verdict.named[0] in self.family.names
+        return self.is_named and self.verdict.named[0] in self.right
 
     @property
     def holds_truth(self) -> bool:
         """Whether an effect that is named is right."""
-        return any(name in self.family.names for name in self.verdict.named)
+        return not self.right.isdisjoint(self.verdict.named)
 
     @property
     def is_false(self) -> bool:
@@ -152,19 +175,22 @@ class Judged:
         if not self.is_named:
             return False
         if self.verdict.verdict == "EFFECTS":
-            return not all(name in self.family.names for name in self.verdict.named)
+            return not self.right.issuperset(self.verdict.named)
         return not self.holds_truth
 
     @property
     def covers(self) -> bool | None:
         """Whether the interval of the strength holds the truth; None where that means nothing."""
+        if not self.is_single:
+            return None
+        (one,) = self.truth
         for name in self.verdict.named:
-            if self.truth is not None and name in self.family.strength:
-                offset, factor = self.family.strength[name]
+            if name in one.family.strength:
+                offset, factor = one.family.strength[name]
                 if name not in self.verdict.strength:
                     return None
                 low, _, high = self.verdict.strength[name]
-                return low <= offset + factor * self.truth <= high
+                return low <= offset + factor * one.strength <= high
         return None
 
 
@@ -198,12 +224,18 @@ def judge(
         if not file.exists():
             missing.append(name)
             continue
-        effect = answer["effect"]
-        if effect is not None and effect not in known:
-            raise BadVerdictError(f"{name}: no family of the effect {effect!r}")
-        family = Family((), {}) if effect is None else known[effect]
-        judged.append(Judged(name, effect, answer["strength"], family, Verdict.read(file)))
+        judged.append(Judged(name, _truth(answer, known), Verdict.read(file)))
     return judged, missing
+
+
+def _truth(answer: dict, known: dict[str, Family]) -> tuple[Truth, ...]:
+    """The effects of an answer."""
+    unknown = [one["name"] for one in answer["effects"] if one["name"] not in known]
+    if unknown:
+        raise BadVerdictError(f"{answer['set']}: no family of the effect {unknown[0]!r}")
+    return tuple(
+        Truth(one["name"], float(one["strength"]), known[one["name"]]) for one in answer["effects"]
+    )
 
 
 def wilson(hits: int, total: int) -> tuple[float, float]:
@@ -242,6 +274,8 @@ def table(sets: Sequence[Judged]) -> list[tuple[str, str, str, str]]:
     nulls = [s for s in sets if s.is_null]
     singles = [s for s in sets if s.is_single]
     outside = [s for s in sets if s.is_outside]
+    pairs = [s for s in sets if s.is_pair]
+    of_pairs = [s for s in pairs if s.is_named]
     strong = [s for s in singles if s.delta >= STRONG]
     middle = [s for s in singles if MIDDLE <= s.delta < STRONG]
     weak = [s for s in singles if s.delta < MIDDLE]
@@ -271,6 +305,10 @@ def table(sets: Sequence[Judged]) -> list[tuple[str, str, str, str]]:
         ("mean number of names", "<= 1.5", "<= 2", size),
         ("false naming among library verdicts that name", "<= 5 %", "<= 10 %",
          share([s.is_false for s in library])),
+        ("pairs: detected", "-", "-", share([s.is_detected for s in pairs])),
+        ("pairs, named: no false member", ">= 95 %", ">= 85 %",
+         share([s.right.issuperset(s.verdict.named) for s in of_pairs])),
+        ("pairs: both found", ">= 60 %", ">= 40 %", share([s.finds_both for s in pairs])),
         ("out of library, delta >= 1: UNEXPLAINED or not named", ">= 70 %", ">= 50 %", share(far)),
         ("removed misfit at sealed heights, right effect", ">= 90 %", ">= 70 %", removed(right)),
         ("removed misfit at sealed heights, UNEXPLAINED", ">= 70 %", ">= 50 %",
@@ -300,8 +338,9 @@ def main() -> None:
     if options.each:
         print("\n| set | truth | strength | delta | verdict | named |\n|---|---|---|---|---|---|")
         for s in judged:
-            strength = "-" if s.truth is None else f"{s.truth:g}"
-            cells = [s.name, s.effect or "none", strength, f"{s.delta:.2f}", s.verdict.verdict]
+            effects = ", ".join(one.effect for one in s.truth) or "none"
+            strength = ", ".join(f"{one.strength:g}" for one in s.truth) or "-"
+            cells = [s.name, effects, strength, f"{s.delta:.2f}", s.verdict.verdict]
             print(f"| {' | '.join([*cells, ', '.join(s.verdict.named) or '-'])} |")
 
 

@@ -20,9 +20,9 @@ def place(tmp_path):
     sealed.mkdir()
 
     def put(name, effect, verdict, named=(), *, truth=1.0, **more):
-        answer = {"set": name, "salt": "0", "effect": effect}
-        answer["strength"] = None if effect is None else truth
-        answers.seal(answer, sealed, sets)
+        effects = () if effect is None else effect if isinstance(effect, tuple) else (effect,)
+        of = [{"name": one, "strength": truth} for one in effects]
+        answers.seal({"set": name, "salt": "0", "effects": of}, sealed, sets)
         report = sets / name / "report"
         report.mkdir(parents=True)
         table = {
@@ -73,6 +73,9 @@ def test_every_line_counts_the_sets_it_is_about(place):
         "mean number of names": "1.3",
         # The spurious name of the null and the wrong one; the odd set is no library verdict.
         "false naming among library verdicts that name": "2/4",
+        "pairs: detected": "no such set",
+        "pairs, named: no false member": "no such set",
+        "pairs: both found": "no such set",
         "out of library, delta >= 1: UNEXPLAINED or not named": "1/2",
         "removed misfit at sealed heights, right effect": "90 %",
         "removed misfit at sealed heights, UNEXPLAINED": "50 %",
@@ -100,6 +103,21 @@ def test_one_right_name_of_two_that_act_together_is_false(place):
     assert found["removed misfit at sealed heights, right effect"] == "no such set"
 
 
+def test_a_pair_is_told_by_its_members(place):
+    both = ("tilt", "adhesion")
+    # Either name of a family will do; another name beside them is a false member.
+    place.put("found", both, "EFFECTS", ["cohesion.capillary", "tilt.y"])
+    place.put("half", both, "EFFECT", ["tilt.x"])
+    place.put("false", both, "EFFECTS", ["tilt.x", "height"])
+    place.put("quiet", both, "RESIDUAL")
+    found, _ = measured(place)
+    assert "4/4" in found["pairs: detected"]
+    assert "2/3" in found["pairs, named: no false member"]
+    assert "1/4" in found["pairs: both found"]
+    # Rows of single effects are not of pairs.
+    assert found["truth inside what is named"] == "no such set"
+
+
 def test_removed_misfit_has_an_interval_of_sets(place):
     for number, after in enumerate((0.0, 4.0)):
         place.put(f"s{number}", "tilt", "EFFECT", ["tilt.x"], before=4.0, after=after)
@@ -121,7 +139,7 @@ def test_a_changed_answer_is_refused(place):
     file = place.sealed / "a.json"
     sealed = answers.seals(place.sets)["a"]
     assert sealed == hashlib.sha256(file.read_bytes()).hexdigest()
-    file.write_text(file.read_text().replace("null", '"tilt"'))
+    file.write_text(file.read_text().replace("[]", "[1]"))
     with pytest.raises(answers.BrokenSealError, match=f"a: its answer has the hash .* {sealed}"):
         answers.unseal(place.sealed, place.sets)
     file.unlink()

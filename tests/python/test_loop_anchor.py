@@ -167,6 +167,22 @@ def test_an_effect_is_found_by_the_surrogate_that_is_held(
     assert abs(np.mean(errors)) < 0.05
 
 
+def test_the_verdicts_model_has_its_turn_where_the_base_stays_wrong(
+    linear: Linear, right: Surrogate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held: list[bool] = []
+
+    def hold(surrogate: Surrogate, fit: Any, _: Any) -> Surrogate:
+        held.append(bool(fit.active))
+        return surrogate
+
+    monkeypatch.setattr(module, "confirm", lambda *_: 0.0)
+    monkeypatch.setattr(module, "anchored", hold)
+    found, after = settled(linear, right, 0.6, 1, monkeypatch)
+    assert found.verdict.named == ("first",) and after.anchors == ANCHORS
+    assert held == [False] + [True] * (ANCHORS - 1)
+
+
 def test_an_anchor_is_right_at_its_fit_for_other_pours(linear: Linear, wrong: Surrogate) -> None:
     found = trace(wrong, linear.observe(0.0, 1), RULES)
     u = float(cube_from_normal(found.base_fit.v)[0])

@@ -4,7 +4,8 @@ r"""Pours of the models at their fits, again and again until the surrogate is ri
         pour the base model and the verdict's at their fits, with fresh seeds
         p <- are these pours where the surrogate says?                        (confirm.py)
         stop if p > `confirm`, or after `ANCHORS` anchors
-        hold the surrogate at the fit by these pours                          (anchor.py)
+        hold the surrogate at a fit by these pours                            (anchor.py):
+            the base model's, if this is the first round and it is wrong there; else the verdict's
         ask everything again
 
 A surrogate is worst where it stands at the edge of its archive, and there fits are led astray. Each
@@ -81,8 +82,9 @@ def settle(
         if number == ANCHORS or not of_base or not right <= rules.confirm:
             return Settled(found, surrogate, simulated, right, number, own, before)
         # What is wrong without effects is wrong with them: all models start from the base's mean.
-        base = found.base_fit
-        if fit is base or confirm(surrogate, base, of_base) <= rules.confirm:
+        # Where holding it there has not mended the verdict's model, that one's turn comes.
+        base, is_first = found.base_fit, number == 0
+        if fit is base or (is_first and confirm(surrogate, base, of_base) <= rules.confirm):
             surrogate = anchored(surrogate, base, of_base)
         else:
             surrogate = anchored(surrogate, fit, of_best)
