@@ -46,6 +46,7 @@ VIEWS = {
     "scoop": View(within=0.06),
     # Cut in half.
     "crater": View(behind=-1e-3),
+    "ring": View(within=0.15, behind=-1e-3),
 }
 
 

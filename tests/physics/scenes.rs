@@ -20,6 +20,7 @@ pub fn block(counts: [usize; 3], spacing: f64, base: f64, material: Material) ->
         material,
         grains: Grains::balls(counts.iter().product(), 2.0 * RADIUS, 1300.0),
         start: Start::Grid { counts, spacing, jitter: 0.0, base },
+        bed: None,
         intruder: None,
         ground: Ground::default(),
         funnel: None,

@@ -10,7 +10,7 @@ from granulcal import _native
 DOCS = Path(__file__).parents[2] / "docs"
 NAMES = [
     *["funnel", "drop", "drum", "column", "hopper", "hopper_round", "bowl", "trail", "scoop"],
-    "crater",
+    *["crater", "ring"],
 ]
 
 

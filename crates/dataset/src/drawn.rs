@@ -1,6 +1,6 @@
 //! Grains that a camera looks at: spheres, or convex bodies of one shape.
 
-use granulcal_dem::{ConvexGrains, Pour};
+use granulcal_dem::{BedAtRest, ConvexGrains, Pour};
 use granulcal_features::{
     Camera, ConvexShape, DepthImage, FeatureError, render_convex, render_grid,
 };
@@ -15,17 +15,24 @@ pub struct Drawn<'a> {
     pub radii: &'a [f64],
     /// Shape and orientations, if they are not round.
     pub convex: Option<&'a ConvexGrains>,
+    /// The bed before they fell on it, if there was one: a map of heights shows what has become of it since.
+    pub bed: Option<&'a BedAtRest>,
 }
 
 impl<'a> Drawn<'a> {
     /// The grains of a pour.
     pub fn of(pour: &'a Pour) -> Self {
-        Self { positions: &pour.positions, radii: &pour.radii, convex: pour.convex.as_ref() }
+        Self {
+            positions: &pour.positions,
+            radii: &pour.radii,
+            convex: pour.convex.as_ref(),
+            bed: pour.bed.as_ref(),
+        }
     }
 
     /// Round grains.
     pub fn spheres(positions: &'a [Vector3<f64>], radii: &'a [f64]) -> Self {
-        Self { positions, radii, convex: None }
+        Self { positions, radii, convex: None, bed: None }
     }
 
     /// Every `step`-th pixel of their depth image.

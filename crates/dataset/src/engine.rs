@@ -116,6 +116,7 @@ pub fn foreign_pour(
         grains_in_funnel,
         simulated_s: f64::NAN,
         convex: None,
+        bed: None,
         state_hash: hash.digest128(),
     })
 }

@@ -136,7 +136,8 @@ impl<'a> Recorder<'a> {
         let failed = |source| DatasetError::Mcap { path: self.path.to_owned(), source };
         let (positions, radii) = (simulation.positions(), simulation.radii());
         let convex = simulation.convex();
-        let drawn = Drawn { positions: &positions, radii: &radii, convex: convex.as_ref() };
+        let drawn =
+            Drawn { positions: &positions, radii: &radii, convex: convex.as_ref(), bed: None };
         let view = capture(&scene.camera, &drawn, seed);
         let further: Vec<_> = scene
             .views

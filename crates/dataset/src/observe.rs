@@ -212,7 +212,14 @@ fn views(
         Projection::Orthographic => {
             let resolution = camera.field_width / camera.pixels as f64;
             // A checked scene has no convex grains under this camera.
-            height_map(grains.positions, grains.radii, camera.pixels, resolution, (0.0, 0.0))
+            let heights = |places: &[Vector3<f64>], radii: &[f64]| {
+                height_map(places, radii, camera.pixels, resolution, (0.0, 0.0))
+            };
+            heights(grains.positions, grains.radii)
+                .and_then(|map| match grains.bed {
+                    Some(bed) => map.less(&heights(&bed.positions, &bed.radii)?),
+                    None => Ok(map),
+                })
                 .and_then(|map| map.downsample(camera.downsample))
                 .and_then(|clean| {
                     let mut map = noise.apply_to_height_map(&clean, seed)?;
@@ -246,7 +253,7 @@ fn is_too_few(error: &FeatureError) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use granulcal_dem::{Health, Status};
+    use granulcal_dem::{BedAtRest, Health, Status};
     use granulcal_features::{DepthSensor, NoiseField, StereoSensor};
     use granulcal_scene::Scene;
 
@@ -269,8 +276,40 @@ mod tests {
             grains_in_funnel: 0,
             simulated_s: 1.0,
             convex: None,
+            bed: None,
             state_hash: 0,
         }
+    }
+
+    #[test]
+    fn a_map_of_a_bed_shows_what_has_become_of_it() {
+        let mut camera = Scene::drop(0.1).camera;
+        (camera.projection, camera.downsample) = (Projection::Orthographic, 4);
+        let mut pour = carpet(0.0);
+        let before = BedAtRest { positions: pour.positions.clone(), radii: pour.radii.clone() };
+        pour.bed = Some(before);
+        let heights = |pour: &Pour| match capture(&camera, &Drawn::of(pour), 1).unwrap() {
+            View::Heights(map) => map,
+            View::Depth(..) => panic!("a depth image"),
+        };
+        // Nothing has happened: no grain is in view.
+        assert!(heights(&pour).z.iter().all(|&z| z == 0.0));
+        assert!(observe(&camera, &pour, 1).unwrap().statistics.is_err());
+        // The grain at (0, 0) lies on its neighbour at (0.01, 0): a hole and a hill of its height.
+        let (hole, hill) = (40, 41);
+        pour.positions[hole] = pour.positions[hill] + Vector3::new(0.0, 0.0, 4e-3);
+        let map = heights(&pour);
+        let at = |place: Vector3<f64>| {
+            let pixel = |c: f64| (c / map.resolution_x + 0.5 * map.width as f64) as usize;
+            map.at(pixel(place.x), pixel(place.y))
+        };
+        let (low, high) = (at(before_of(&pour)[hole]), at(before_of(&pour)[hill]));
+        // A pixel is within 0.9 mm of the middle of a grain of 2 mm radius.
+        assert!((low + 4e-3).abs() < 5e-4 && (high - 4e-3).abs() < 5e-4, "{low} {high}");
+    }
+
+    fn before_of(pour: &Pour) -> &[Vector3<f64>] {
+        &pour.bed.as_ref().unwrap().positions
     }
 
     #[test]

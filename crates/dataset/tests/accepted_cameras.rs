@@ -59,7 +59,7 @@ fn every_accepted_camera_delivers() {
         }
         for camera in cameras {
             let positions = [Vector3::new(0.0, 0.0, 2e-3)];
-            let drawn = Drawn { positions: &positions, radii: &[2e-3], convex: None };
+            let drawn = Drawn { positions: &positions, radii: &[2e-3], convex: None, bed: None };
             let delivered = capture(&camera, &drawn, 3);
             if is_accepted(&camera) {
                 assert!(delivered.is_ok(), "{camera:?}: {delivered:?}");

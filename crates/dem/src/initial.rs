@@ -8,7 +8,7 @@ use crate::particles::Particles;
 use crate::period::Period;
 
 /// The grains where they start, as large and as heavy as the scene says: the spheres of `clumps` if they are not round.
-/// An intruder is the last.
+/// A bed's come after them, an intruder is the last.
 pub(crate) fn particles(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Particles {
     let radius = scene.grains.radius();
     let (mut spheres, inverse): (Vec<Row>, f64) = if let Some(clumps) = clumps {
@@ -24,12 +24,21 @@ pub(crate) fn particles(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Pa
             *inverse = (radius / own).powi(3);
         }
     }
+    if let Some(bed) = &scene.bed {
+        let places = bed.positions(&scene.grains, seed);
+        inverse_mass.resize(spheres.len() + places.len(), 1.0);
+        spheres.extend(places.iter().map(|at| Row::new(at, radius)));
+    }
     if let Some(intruder) = &scene.intruder {
         spheres.push(Row::new(&intruder.centre(), intruder.radius()));
         inverse_mass.push(1.0 / intruder.relative_mass(&scene.grains));
     }
     let mut particles =
         Particles::new(spheres, inverse_mass, scene.periodic.as_ref().map(Period::of));
+    if scene.bed.is_some() {
+        // The ball is to be let go, `simulation/bed.rs`.
+        (0..scene.grains.count).for_each(|grain| particles.take_out(grain));
+    }
     if scene.intruder.is_some() {
         // It is to enter, `simulation/intruder.rs`.
         particles.take_out(particles.count() - 1);

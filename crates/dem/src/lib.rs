@@ -81,7 +81,7 @@ pub use granulcal_scene::{
 pub use health::{Health, MAX_ENERGY_CREATED};
 pub use impact::ImpactWork;
 pub use law::{LAW, arithmetic};
-pub use pour::{ConvexGrains, Pour, Status};
+pub use pour::{BedAtRest, ConvexGrains, Pour, Status};
 pub use problem::{ContactProblem, DelassusBlock, FrozenContact, Partner, Side};
 pub use simulation::Simulation;
 pub use solver::frozen::{FrozenSolution, FrozenSolve};

@@ -99,6 +99,16 @@ impl Particles {
         self.set_motion(grain, velocity, &Vector3::zeros());
     }
 
+    /// Moves a grain that is held out `[m]`.
+    pub fn raise(&mut self, grain: usize, way: &Vector3<f64>) {
+        self.spheres[grain].add(way);
+    }
+
+    /// Mass of a grain over that of a typical one `[-]`.
+    pub fn mass(&self, grain: usize) -> f64 {
+        1.0 / self.inverse_mass[grain]
+    }
+
     /// Share of the grains' mass that has left `[-]`.
     pub fn outflow_fraction(&self) -> f64 {
         let mass = |grain: usize| 1.0 / self.inverse_mass[grain];

@@ -73,8 +73,19 @@ pub struct Pour {
     pub simulated_s: f64,
     /// Shape and orientations of the grains, if they are convex bodies; `radii` are then half of the scene's diameter.
     pub convex: Option<ConvexGrains>,
+    /// The scene's bed as it was when the ball was let go, if it has one and the pour got so far.
+    pub bed: Option<BedAtRest>,
     /// [`crate::Simulation::state_hash`] at the end: equal hashes are equal pours, to the last bit.
     pub state_hash: u128,
+}
+
+/// A bed before anything has fallen on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BedAtRest {
+    /// Centres of its grains `[m]`.
+    pub positions: Vec<Vector3<f64>>,
+    /// Their radii `[m]`.
+    pub radii: Vec<f64>,
 }
 
 /// Grains that are convex bodies of one shape: an intersection of half spaces, and of a cylinder about the y axis if it

@@ -1,6 +1,7 @@
 //! A pour in time: what it is of and what can be asked of it. The substep is in `simulation/substep.rs`, when it ends
 //! in `simulation/end.rs`, its state as bytes in `simulation/state.rs`.
 
+mod bed;
 mod end;
 mod frozen;
 mod intruder;
@@ -23,6 +24,7 @@ use crate::error::DemError;
 use crate::health::{Health, HealthWatch};
 use crate::impact::{ImpactWork, Impacts};
 use crate::initial;
+use crate::lanes::Row;
 use crate::parallel::Threads;
 use crate::particles::Particles;
 use crate::pour::{ConvexGrains, Pour, Status};
@@ -47,6 +49,8 @@ pub struct Simulation {
     clumps: Option<Clumps>,
     /// convex bodies of one shape, which have a substep of their own; `particles` follow them.
     bodies: Option<Bodies>,
+    /// The scene's bed as it was when the ball was let go, once it has been: centres and radii.
+    bed_at_rest: Option<Vec<Row>>,
     origin: Arc<Origin>,
     substep: usize,
     /// Whether the grains hardly moved at the last examination.
@@ -91,6 +95,7 @@ impl Simulation {
             on_layer: ContactSet::default(),
             clumps,
             bodies: Bodies::of(scene, seed),
+            bed_at_rest: None,
             origin: Arc::new(Origin { scene: scene.clone(), seed }),
             substep: 0,
             is_quiet: false,
@@ -275,6 +280,7 @@ impl Simulation {
             radii: self.radii(),
             radii_out: self.radii_out(),
             convex: self.convex(),
+            bed: self.bed_before(),
         }
     }
 }

@@ -193,6 +193,7 @@ fn scene() -> impl Strategy<Value = Scene> {
                 material,
                 grains: Grains::balls(count, 2.0 * radius, 1300.0),
                 start: scaled_start(start, radius),
+                bed: None,
                 // With neither of those two, as the scene's check asks.
                 intruder: intruder.filter(|_| period.is_none() && outflow.is_none()).map(
                     |(size, density, position, velocity, enters)| Intruder {

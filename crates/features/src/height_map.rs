@@ -66,6 +66,17 @@ impl HeightMap {
             .collect()
     }
 
+    /// These heights less those of another map of the same ground; NaN where either has no data.
+    ///
+    /// # Errors
+    /// `LengthMismatch` for a map of another size.
+    pub fn less(&self, other: &Self) -> Result<Self, FeatureError> {
+        self.require_valid()?;
+        require_length("the other map's heights", other.z.len(), self.z.len())?;
+        let z = self.z.iter().zip(&other.z).map(|(mine, theirs)| mine - theirs).collect();
+        Self::new(self.width, self.height, self.resolution_x, self.resolution_y, z)
+    }
+
     /// Keeps the middle pixel of every n × n block, as [`crate::DepthImage::downsample`] does.
     ///
     /// # Errors

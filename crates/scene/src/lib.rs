@@ -12,6 +12,7 @@
 //! # Ok::<(), granulcal_scene::SceneError>(())
 //! ```
 
+mod bed;
 mod camera;
 mod check;
 mod distribution;
@@ -39,6 +40,7 @@ mod uniforms;
 mod view;
 mod walls;
 
+pub use bed::Bed;
 pub use camera::{CameraSpec, MAX_BLUR, MAX_DEPTH_NOISE, MAX_SENSOR_PIXELS, Mask, Projection};
 pub use distribution::Distribution;
 pub use effects::*;

@@ -6,7 +6,8 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::camera::{CameraSpec, Projection};
+use crate::bed::Bed;
+use crate::camera::{CameraSpec, Mask, Projection};
 use crate::check::{finite, positive};
 use crate::effects::{Effect, Effects};
 use crate::end::{EndRule, RolledAway};
@@ -48,6 +49,9 @@ pub struct Scene {
     pub grains: Grains,
     /// Where the grains are when the pour begins.
     pub start: Start,
+    /// A bed of grains that the pour falls on, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bed: Option<Bed>,
     /// A ball of another size, if one falls among the grains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intruder: Option<Intruder>,
@@ -94,6 +98,7 @@ impl Scene {
             material: Material::default(),
             grains: Grains::balls(2000, 4e-3, 1300.0),
             start: Start::Grid { counts: [10, 10, 20], spacing: 8e-3, jitter: 1e-4, base: -4e-3 },
+            bed: None,
             intruder: None,
             ground: Ground::default(),
             funnel: Some(Funnel { height, ..Funnel::default() }),
@@ -170,10 +175,11 @@ impl Scene {
         }
     }
 
-    /// When the last wall has come to rest, the last effect that ends has and the intruder has entered, or the horizon
-    /// if one never does `[s]`.
+    /// When the last wall has come to rest, the last effect that ends has, the bed has settled and the intruder has
+    /// entered, or the horizon if one never does `[s]`.
     pub fn moves_until(&self) -> f64 {
         let entry = self.intruder.as_ref().map_or(0.0, |intruder| intruder.enters);
+        let entry = self.bed.map_or(entry, |bed| bed.settle.max(entry));
         let walls = self.walls.iter().map(|wall| &wall.motion);
         let motions = walls.chain(self.funnel.iter().map(|funnel| &funnel.motion));
         let last = motions.map(Motion::end).fold(self.effects.acts_until().max(entry), f64::max);
@@ -263,6 +269,7 @@ impl Scene {
             ("outflow", self.outflow.is_some()),
             ("periodic", self.periodic.is_some()),
             ("intruder", self.intruder.is_some()),
+            ("bed", self.bed.is_some()),
         ];
         exclude("end.rolled_away = \"leave\"", &others)
     }
@@ -297,6 +304,30 @@ impl Scene {
         exclude("intruder", &others)
     }
 
+    /// What a bed cannot be with. It is seen by what has become of it, which a map of heights tells.
+    fn check_bed(&self) -> Result<(), SceneError> {
+        let Some(bed) = &self.bed else { return Ok(()) };
+        bed.check(&self.grains)?;
+        let others = [
+            ("a start that is no ball", !Bed::suits(&self.start)),
+            (
+                "a camera that is not orthographic",
+                self.camera.projection != Projection::Orthographic,
+            ),
+            ("camera.mask = \"colour\"", self.camera.mask != Mask::Height),
+            ("grains.shape", self.grains.shape.is_some()),
+            ("effects.clump", self.effects.clump.is_on()),
+            (self.effects.polydispersity.path(), self.effects.polydispersity.is_on()),
+            ("funnel", self.funnel.is_some()),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+            ("intruder", self.intruder.is_some()),
+            ("observe", self.observe.is_some()),
+            ("views", !self.views.is_empty()),
+        ];
+        exclude("bed", &others)
+    }
+
     /// Checks every number of the scene.
     ///
     /// # Errors
@@ -317,6 +348,7 @@ impl Scene {
         self.check_shape()?;
         self.check_bodies()?;
         self.check_intruder()?;
+        self.check_bed()?;
         self.start.check(&self.held_grains())?;
         self.effects.check_method(self.settings().method)?;
         if let Some(funnel) = &self.funnel {

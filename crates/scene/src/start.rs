@@ -31,7 +31,8 @@ pub enum Start {
         /// Height of the lowest layer above the funnel's rim, or above the ground without a funnel `[m]`.
         base: f64,
     },
-    /// A ball cut out of a face-centred cubic lattice, its lowest point at `height` above the ground.
+    /// A ball cut out of a face-centred cubic lattice, its lowest point at `height` above the ground, or above the
+    /// scene's bed at rest.
     Ball {
         /// Height of the lowest grain's lowest point `[m]`.
         height: f64,
@@ -69,7 +70,7 @@ impl Start {
         match self {
             &Self::Grid { counts, spacing, jitter, base } => {
                 finite("start.base", base)?;
-                jitter_fits(jitter, spacing - grains.diameter)?;
+                jitter_fits("start.jitter", jitter, spacing - grains.diameter)?;
                 positive("start.spacing", spacing)?;
                 let capacity =
                     counts.iter().fold(1, |all: usize, &count| all.saturating_mul(count));
@@ -85,6 +86,7 @@ impl Start {
                     return Err(SceneError::range("start.solid_fraction", solid_fraction, allowed));
                 }
                 jitter_fits(
+                    "start.jitter",
                     jitter,
                     lattice_spacing(grains.diameter, solid_fraction) - grains.diameter,
                 )?;
@@ -97,14 +99,8 @@ impl Start {
                 positive("start (distance of from and to)", length)?;
                 positive("start.radius", radius)?;
                 positive("start.spacing", spacing)?;
-                jitter_fits(jitter, spacing - grains.diameter)?;
-                let places = std::f64::consts::PI * radius * radius * length / spacing.powi(3);
-                if places > MOST_PLACES {
-                    let name = "start (places of the lattice in the cylinder)";
-                    let allowed =
-                        "at most 1e8: a smaller cylinder, or a wider spacing, holds as many grains";
-                    return Err(SceneError::range(name, places, allowed));
-                }
+                jitter_fits("start.jitter", jitter, spacing - grains.diameter)?;
+                check_places("start", radius, length, spacing)?;
                 let capacity = cylinder(grains, from, to, radius, spacing, jitter).len();
                 if grains.count > capacity {
                     let count = grains.count;
@@ -135,7 +131,7 @@ impl Start {
         pose: Option<&Isometry3<f64>>,
         seed: u64,
     ) -> Vec<Vector3<f64>> {
-        let mut random = Pcg64::seed_from_u64(seed);
+        let mut random = random(seed);
         let (mut positions, jitter) = match self {
             &Self::Grid { counts, spacing, jitter, base } => {
                 let floor = funnel.map_or(0.0, Funnel::rim_height);
@@ -162,22 +158,48 @@ impl Start {
                 return positions.iter().map(|&position| Vector3::from(position)).collect();
             }
         };
-        for position in &mut positions {
-            for axis in 0..3 {
-                position[axis] += jitter * (2.0 * half_open(random.next_u64()) - 1.0);
-            }
-        }
+        displace(&mut positions, jitter, &mut random);
         positions
     }
 }
 
+/// The random numbers of a seed.
+pub(crate) fn random(seed: u64) -> Pcg64 {
+    Pcg64::seed_from_u64(seed)
+}
+
+/// Moves every point by at most `jitter` `[m]` along each axis.
+pub(crate) fn displace(points: &mut [Vector3<f64>], jitter: f64, random: &mut Pcg64) {
+    for point in points {
+        for axis in 0..3 {
+            point[axis] += jitter * (2.0 * half_open(random.next_u64()) - 1.0);
+        }
+    }
+}
+
 /// Two neighbours may move towards each other by `jitter` along every axis, so twice its length must fit the gap.
-fn jitter_fits(jitter: f64, gap: f64) -> Result<(), SceneError> {
-    non_negative("start.jitter", jitter)?;
+pub(crate) fn jitter_fits(name: &str, jitter: f64, gap: f64) -> Result<(), SceneError> {
+    non_negative(name, jitter)?;
     if 2.0 * jitter * 3f64.sqrt() <= gap + 1e-12 {
         return Ok(());
     }
-    Err(SceneError::range("start.jitter", jitter, "small enough that no two grains overlap"))
+    Err(SceneError::range(name, jitter, "small enough that no two grains overlap"))
+}
+
+/// Refuses a lattice in a cylinder of more places than anybody fills.
+pub(crate) fn check_places(
+    of: &str,
+    radius: f64,
+    length: f64,
+    spacing: f64,
+) -> Result<(), SceneError> {
+    let places = std::f64::consts::PI * radius * radius * length / spacing.powi(3);
+    if places <= MOST_PLACES {
+        return Ok(());
+    }
+    let name = format!("{of} (places of the lattice in the cylinder)");
+    let allowed = "at most 1e8: a smaller cylinder, or a wider spacing, holds as many grains";
+    Err(SceneError::range(&name, places, allowed))
 }
 
 fn lattice_spacing(diameter: f64, solid_fraction: f64) -> f64 {
@@ -196,7 +218,7 @@ fn grid(count: usize, counts: [usize; 3], spacing: f64, bottom: f64) -> Vec<Vect
 }
 
 /// The points of a cubic lattice along the axis of a cylinder at which a grain that may move by `jitter` fits into it.
-fn cylinder(
+pub(crate) fn cylinder(
     grains: &Grains,
     from: [f64; 3],
     to: [f64; 3],

@@ -69,10 +69,11 @@ class Setup:
         """Returns the pour of a scene with a seed.
 
         Raises:
-            ValueError: the scene has moving or meshed walls, a period, an outflow or an intruder.
+            ValueError: the scene has moving or meshed walls, a period, an outflow, an intruder
+                or a bed.
         """
         table = tomllib.loads(scene.to_toml())
-        for key in ("periodic", "outflow", "intruder"):
+        for key in ("periodic", "outflow", "intruder", "bed"):
             if key in table:
                 raise ValueError(
                     f"{scene.name}: `{key}` has no counterpart in other engines' files"

@@ -26,6 +26,7 @@ pub fn scene(positions: &[Vector3<f64>], material: Material, walls: Vec<Wall>) -
         material,
         grains: Grains::balls(positions.len(), DIAMETER, 2500.0),
         start: Start::Positions { positions: positions.iter().map(|&p| p.into()).collect() },
+        bed: None,
         intruder: None,
         ground: Ground::default(),
         funnel: None,

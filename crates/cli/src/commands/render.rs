@@ -89,7 +89,7 @@ fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
             None => return Ok(Outcome::Stopped),
         }
     };
-    let drawn = Drawn { positions: &positions, radii: &radii, convex: convex.as_ref() };
+    let drawn = Drawn { positions: &positions, radii: &radii, convex: convex.as_ref(), bed: None };
     let view = match further {
         Some(further) => capture_from(further, &drawn)?,
         None => capture(&scene.camera, &drawn, args.seed)?,

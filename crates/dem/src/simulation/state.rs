@@ -19,6 +19,7 @@ use crate::effect::Bridges;
 use crate::error::DemError;
 use crate::health::HealthWatch;
 use crate::impact::Impacts;
+use crate::lanes::Row;
 use crate::particles::Particles;
 use crate::pour::Status;
 
@@ -68,7 +69,16 @@ impl Simulation {
         let strange = |what| DemError::CheckpointState { what };
         let (state, rest): (State<'_>, _) =
             postcard::take_from_bytes(state).map_err(|_| strange("bytes that are no state"))?;
-        if let Some(bodies) = &mut self.bodies {
+        let mut bed_at_rest = None;
+        if self.origin.scene.bed.is_some() {
+            let (bed, rest): (Option<Vec<Row>>, _) =
+                postcard::take_from_bytes(rest).map_err(|_| strange("bytes that are no bed"))?;
+            let of_bed = self.particles.count() - self.origin.scene.grains.count;
+            if !rest.is_empty() || bed.as_ref().is_some_and(|bed: &Vec<Row>| bed.len() != of_bed) {
+                return Err(strange("a bed that is not the scene's"));
+            }
+            bed_at_rest = bed;
+        } else if let Some(bodies) = &mut self.bodies {
             let (state, rest): (BodiesState, _) =
                 postcard::take_from_bytes(rest).map_err(|_| strange("bytes that are no bodies"))?;
             if !rest.is_empty() {
@@ -101,6 +111,7 @@ impl Simulation {
         particles.period = self.particles.period;
         (self.particles, self.contacts, self.watch) = (particles, contacts, watch);
         (self.bridges, self.on_layer) = (bridges, on_layer);
+        self.bed_at_rest = bed_at_rest;
         self.impacts = Impacts::default();
         Ok(self)
     }
@@ -130,7 +141,10 @@ impl Simulation {
             watch: Cow::Borrowed(&self.watch),
         };
         let mut bytes = postcard::to_stdvec(&state).expect("a state in memory");
-        // Behind the rest, so that a state of spheres has the bytes that it had before there were bodies.
+        // Behind the rest, so that a state of spheres has the bytes that it had before there were bodies and beds.
+        if self.origin.scene.bed.is_some() {
+            bytes.extend(postcard::to_stdvec(&self.bed_at_rest).expect("a state in memory"));
+        }
         if let Some(state) = self.bodies.as_ref().map(Bodies::state) {
             bytes.extend(postcard::to_stdvec(&state).expect("a state in memory"));
         }

@@ -46,6 +46,7 @@ impl Simulation {
             self.count_substep();
             return;
         }
+        self.let_ball_go();
         self.let_intruder_in();
         self.follow();
         self.act_forces();

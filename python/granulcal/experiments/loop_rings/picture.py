@@ -1,96 +1,56 @@
-"""Measured rings beside pours of the base model and of the most probable effect, and profiles."""
+"""Measured rings beside pours of the verdict's model at its fit, and all their profiles."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from granulcal.loop.closed import Closed
-from granulcal.loop.task import FIT
-from granulcal.measured.recording import Recording
-from granulcal.pours.formation_image import height_grid
-from granulcal.pours.simulate import simulate
+from granulcal.experiments.loop_rings.seen import Seen
+from granulcal.experiments.loop_rings.shape import profile
 
 __all__ = ["picture"]
 
-Array = NDArray[np.float64]
-
-# Side of the square that is shown, and width of a ring of the profiles [m].
-_FIELD, _RING = 0.36, 6e-3
-_PIXELS = 120
-_SEED = 7
+# What is shown each way from the middle, and the range of the colours [m], [mm].
+_HALF, _COLOURS = 0.18, 12
 
 
-def picture(path: Path, closed: dict[str, Closed]) -> None:
-    """Draws a column for each group."""
+def picture(path: Path, seen: dict[str, Seen]) -> None:
+    """Draws a column for each group: a map, a pour, the profiles."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    shape = (4, len(closed))
     figure, axes = plt.subplots(
-        *shape, figsize=(3.1 * shape[1], 11), squeeze=False, layout="constrained"
+        3, len(seen), figsize=(3.3 * len(seen), 9), squeeze=False, layout="constrained"
     )
     image = None
-    for (group, one), column in zip(closed.items(), axes.T, strict=True):
-        fitted = one.task.of(FIT)[0]
-        first = fitted.recordings[0]
-        heights, radius = _measured(first, fitted.reading)
-        rows = [(f"{group}: {first.stem}", heights)]
-        column[3].plot(*_profile(radius, heights), "k", label="measured")
-        models = [("rigid plane", one.trace.base)]
-        if one.trace.explanations:
-            best = one.trace.explanations[0]
-            models.append((f"with {' + '.join(best.effects)}", best))
-        for name, model in models:
-            pour = simulate(one.scene(fitted, model), seed=_SEED)
-            points = pour.points() - np.array([*pour.points()[:, :2].mean(axis=0), 0.0])
-            rows.append((name, height_grid(points, field=_FIELD, pixels=_PIXELS)))
-            column[3].plot(*_profile(*_radii(rows[-1][1])), label=name)
-        for axis, (name, shown) in zip(column[:3], rows, strict=False):
+    for (group, one), column in zip(seen.items(), axes.T, strict=True):
+        first = next(iter(one.maps))
+        shown = ((f"{group}: {first}", one.maps[first]), ("ball on a loose bed", one.pours[0]))
+        for axis, (title, (heights, spacing)) in zip(column[:2], shown, strict=True):
+            side = 0.5 * spacing * np.array(heights.shape[::-1])
             image = axis.imshow(
-                1e3 * np.nan_to_num(shown), origin="lower", vmin=-15, vmax=15, cmap="RdBu_r"
+                1e3 * np.nan_to_num(heights),
+                origin="lower",
+                extent=(-side[0], side[0], -side[1], side[1]),
+                vmin=-_COLOURS,
+                vmax=_COLOURS,
+                cmap="RdBu_r",
             )
-            axis.set_title(name, fontsize=9)
-        for axis in column[:3]:
+            axis.set(title=title, xlim=(-_HALF, _HALF), ylim=(-_HALF, _HALF))
+            axis.title.set_fontsize(9)
             axis.set_axis_off()
-        column[3].axhline(0, color="0.7", lw=0.8)
-        column[3].set(xlabel="radius [mm]", ylabel="mean height [mm]", xlim=(0, 180))
-        column[3].legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.25))
+        for pour in one.pours:
+            column[2].plot(*(1e3 * np.array(profile(*pour))), color="C0", lw=0.7, alpha=0.6)
+        for name, measured in one.maps.items():
+            style = "k--" if name in one.sealed else "k"
+            column[2].plot(*(1e3 * np.array(profile(*measured))), style, lw=1)
+        column[2].axhline(0, color="0.7", lw=0.8)
+        column[2].set(xlabel="radius [mm]", ylabel="mean height [mm]", xlim=(0, 150))
+        for style, label in (("k", "fitted"), ("k--", "sealed"), ("C0", "pours at the fit")):
+            column[2].plot([], [], style, label=label)
+        column[2].legend(fontsize=7)
     assert image is not None
-    figure.colorbar(image, ax=axes[:3], label="height above the bed [mm]", shrink=0.6)
+    figure.colorbar(image, ax=axes[:2], label="after less before [mm]", shrink=0.6)
     figure.savefig(path, dpi=62)
     plt.close(figure)
-
-
-def _measured(path: Path, reading: dict[str, Any]) -> tuple[Array, Array]:
-    """Returns heights over the bed [m] in the square about the ring, NaN outside, and radii."""
-    level = Recording.open(path).level(**reading)
-    width = level.resolution[0]
-    # The middle of the rim, which is what stands above the bed.
-    middle = [int(np.median(where)) for where in np.nonzero(level.mask)]
-    half = int(0.5 * _FIELD / width)
-    padded = np.pad(level.heights, half, constant_values=np.nan)
-    grid = padded[tuple(slice(at, at + 2 * half + 1) for at in middle)]
-    along = width * np.arange(-half, half + 1)
-    return grid, np.hypot(along[:, None], along[None])
-
-
-def _radii(grid: Array) -> tuple[Array, Array]:
-    side = _FIELD / len(grid)
-    along = side * (np.arange(len(grid)) - 0.5 * (len(grid) - 1))
-    return np.hypot(along[:, None], along[None]), np.nan_to_num(grid)
-
-
-def _profile(radius: Array, heights: Array) -> tuple[Array, Array]:
-    """Mean height in rings: radii [mm], heights [mm]."""
-    edges = np.arange(0.0, 0.18 + _RING, _RING)
-    rings = np.digitize(radius.ravel(), edges) - 1
-    flat = heights.ravel()
-    means = [
-        float(np.nanmean(flat[rings == i])) if np.isfinite(flat[rings == i]).any() else np.nan
-        for i in range(len(edges) - 1)
-    ]
-    return 1e3 * (edges[:-1] + 0.5 * _RING), 1e3 * np.array(means)
