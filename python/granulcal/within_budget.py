@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from granulcal.measured.recording import Recording
+from granulcal.pours.cluster import Cluster, cluster_asked, spread_over
 from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.scene import Scene
 from granulcal.pours.statistics import NAMES
@@ -33,6 +34,7 @@ def calibrate_within(
     progress: "Callable[[Round], None] | None" = None,
     poured: Callable[[int], None] | None = None,
     engine: "Engine | None" = None,
+    ray: "str | Cluster | None" = None,
 ) -> "SequentialFit":
     """Returns the posterior of recordings of one material from `budget` pours.
 
@@ -49,6 +51,8 @@ def calibrate_within(
         progress: called after each round.
         poured: called with the number of kept pours after each.
         engine: another simulator in place of ours; docs/engines.md says what it must do.
+        ray: address of a Ray cluster that makes the pours, as `ray.init` takes it, or `local`;
+            None for this machine's threads.
     """
     from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
 
@@ -69,7 +73,8 @@ def calibrate_within(
         progress=poured,
         engine=engine,
     )
-    found = infer_within_budget(
-        pours, prior, observed, budget=budget, seed=seed, x_names=NAMES, progress=progress
-    )
+    with spread_over(cluster_asked(ray)):
+        found = infer_within_budget(
+            pours, prior, observed, budget=budget, seed=seed, x_names=NAMES, progress=progress
+        )
     return replace(found, left_out=pours.left_out(len(found.x)))

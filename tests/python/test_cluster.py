@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal.pours.cluster import spread_over
+from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.part_store import PartStore
 
 pytest.importorskip("ray")
@@ -24,16 +26,8 @@ scene = gc.Scene.drop(0.01, count=25)
 prior = gc.Prior.default()
 ROWS, OUT = {ROWS}, sys.argv[1]
 """
-THREE_NODES = (
-    COMMON
-    + """
-import os, pathlib, signal, ray
-from ray.cluster_utils import Cluster
-cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
-nodes = [cluster.add_node(num_cpus=1) for _ in range(2)]
-ray.init(address=cluster.address, log_to_driver=False, logging_level="ERROR")
-assert ray.cluster_resources()["CPU"] == 3
-done = []
+KILL = """
+import os, pathlib, signal
 
 def is_ours(pid):
     while pid > 1:
@@ -42,20 +36,32 @@ def is_ours(pid):
         pid = int(pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
     return False
 
-def kill_a_worker():
+def kill_a_worker(named):
     for place in pathlib.Path("/proc").glob("[0-9]*"):
         try:
             words, pid = (place / "cmdline").read_text(), int(place.name)
-            if words.startswith("ray::_make_part") and is_ours(pid):
+            if words.startswith(named) and is_ours(pid):
                 os.kill(pid, signal.SIGKILL)
-                done.append("worker")
-                return
+                return True
         except OSError:
             pass
+    return False
+"""
+THREE_NODES = (
+    COMMON
+    + KILL
+    + """
+import ray
+from ray.cluster_utils import Cluster
+cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+nodes = [cluster.add_node(num_cpus=1) for _ in range(2)]
+ray.init(address=cluster.address, log_to_driver=False, logging_level="ERROR")
+assert ray.cluster_resources()["CPU"] == 3
+done = []
 
 def watch(total, resumed, made, *left_out):
-    if made and not done:
-        kill_a_worker()
+    if made and not done and kill_a_worker("ray::_make_part"):
+        done.append("worker")
     if done and made >= 16 * (len(done) + 1) and nodes:
         cluster.remove_node(nodes.pop(), allow_graceful=False)
         done.append("node")
@@ -64,6 +70,33 @@ gc.generate(scene, prior, ROWS, seed=5, out=OUT, ray=cluster.address, progress=w
 print(*done)
 ray.shutdown()
 cluster.shutdown()
+"""
+)
+AT_ONCE = (
+    COMMON
+    + KILL
+    + """
+import numpy as np
+from pathlib import Path
+from granulcal.loop.pours.forward import Forward
+from granulcal.pours.cluster import Cluster, spread_over
+from granulcal.pours.kept_pours import KeptPours
+theta, folder, killed = prior.sample(60, seed=3), Path(OUT), []
+scene = scene.with_({"grains.count": 150})
+folder.mkdir()
+
+def watch(kept):
+    if not killed and kill_a_worker("ray::_one"):
+        killed.append(kept)
+
+with spread_over(Cluster("local")):
+    spread = KeptPours(scene, prior, folder / "spread.json", progress=watch)(theta, 0)
+    loop = Forward(folder / "spread", 2).pours(scene, range(8))
+here = KeptPours(scene, prior, folder / "here.json")(theta, 0)
+assert np.array_equal(spread, here, equal_nan=True)
+assert np.array_equal(loop, Forward(folder / "here", 2).pours(scene, range(8)))
+import ray
+print(len(killed), ray.is_initialized())
 """
 )
 ONE_NODE = (
@@ -132,6 +165,25 @@ def test_the_driver_is_killed_and_started_again(whole: gc.Dataset, tmp_path: Pat
     third = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert third.returncode == 0 and third.stdout == f"0 {ROWS}\n", third.stderr[-3000:]
     assert same(gc.Dataset.load(out), whole)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="workers are found in /proc")
+def test_pours_one_by_one_are_those_of_threads_whoever_is_killed(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", AT_ONCE, str(tmp_path / "pours")]
+    told = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert told.returncode == 0, told.stderr[-3000:]
+    assert "1 False" in told.stdout.splitlines(), told.stdout[-2000:]
+
+
+def test_pours_of_another_engine_are_not_spread(tmp_path: Path) -> None:
+    engine = gc.engines.CallableEngine(lambda scene, seed: np.zeros((1, 3)), name="none")
+    scene, prior = gc.Scene.drop(0.01, count=5), gc.Prior.default()
+    pours = KeptPours(scene, prior, tmp_path / "pours.json", engine=engine)
+    with (
+        spread_over(gc.Cluster("local")),
+        pytest.raises(ValueError, match="granulcal alone, not with the engine none"),
+    ):
+        pours(prior.sample(2, seed=1), 0)
 
 
 def test_an_engine_does_not_go_with_a_cluster(tmp_path: Path) -> None:

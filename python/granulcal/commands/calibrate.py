@@ -5,6 +5,7 @@ import json
 import sys
 from typing import Any
 
+from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.counts import pour_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
@@ -40,6 +41,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--seed", type=int, default=0, help="seed of the run (default: 0)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
+    add_cluster(parser)
     add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.set_defaults(run=_run)
@@ -82,6 +84,7 @@ def _run(options: argparse.Namespace) -> int:
             progress=lambda each: print(each, file=sys.stderr, flush=True),
             poured=poured,
             engine=engine,
+            ray=cluster_of(options),
         )
     posterior = found.posterior
     document = {

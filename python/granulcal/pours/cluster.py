@@ -14,21 +14,36 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from granulcal import _native
 from granulcal.pours.part_store import PartStore
 
-__all__ = ["Cluster", "cluster_in_use", "gather", "spread_over"]
+if TYPE_CHECKING:
+    from granulcal.engines import Engine
 
-# Tasks for each core, so that none waits for the driver.
-_AHEAD = 2
+__all__ = [
+    "AHEAD",
+    "PATIENCE_S",
+    "RETRIES",
+    "Cluster",
+    "cluster_asked",
+    "cluster_in_use",
+    "connected",
+    "gather",
+    "refuse_engine",
+    "spread_over",
+]
+
+AHEAD = 2
+"""Tasks for each core, so that none waits for the driver."""
 # Tasks that take this many medians are made a second time on a core that has nothing to do.
 _STRAGGLES = 3.0
 _LEAST_STRAGGLE_S = 20.0
-_PATIENCE_S = 0.5
-# Workers that are killed under the same part so often are not killed by chance.
-_RETRIES = 20
+PATIENCE_S = 0.5
+"""How long the driver waits for a task before it looks around [s]."""
+RETRIES = 20
+"""Workers that are killed under the same part so often are not killed by chance."""
 
 
 @dataclass(frozen=True)
@@ -46,22 +61,63 @@ class Cluster:
 
 
 _in_use: Cluster | None = None
+_disconnect: contextlib.ExitStack | None = None
 
 
 @contextlib.contextmanager
 def spread_over(cluster: Cluster | None) -> Iterator[None]:
-    """Lets `generate` use a cluster where it is given none; None for this machine's threads."""
+    """Lets all batches of pours use a cluster; None for this machine's threads."""
     global _in_use
     before, _in_use = _in_use, cluster
-    try:
+    with contextlib.ExitStack() as stack:
+        stack.callback(_leave, before)
         yield
-    finally:
-        _in_use = before
+
+
+def _leave(before: Cluster | None) -> None:
+    """Ends the job's use of its cluster, and the connection that `connected` has made for it."""
+    global _in_use, _disconnect
+    _in_use = before
+    if before is None and _disconnect is not None:
+        _disconnect.close()
+        _disconnect = None
 
 
 def cluster_in_use() -> Cluster | None:
     """Returns the cluster of the job that runs, None for this machine's threads."""
     return _in_use
+
+
+def cluster_asked(ray: "str | Cluster | None") -> Cluster | None:
+    """Returns the cluster of an argument `ray`: an address, a cluster, or None for the job's."""
+    return Cluster(ray) if isinstance(ray, str) else ray or cluster_in_use()
+
+
+def refuse_engine(engine: "Engine | None") -> None:
+    """Refuses another engine where a cluster pours.
+
+    Raises:
+        ValueError: there is one.
+    """
+    if engine is not None:
+        raise ValueError(f"a cluster pours with granulcal alone, not with the engine {engine.name}")
+
+
+def connected() -> Any:
+    """Returns ray, connected to the job's cluster until the job ends.
+
+    Raises:
+        ModuleNotFoundError: ray is not installed.
+        ConnectionError: there is no cluster at the address.
+    """
+    global _disconnect
+    import ray
+
+    cluster = cluster_in_use()
+    if cluster is not None and not ray.is_initialized():
+        _disconnect = contextlib.ExitStack()
+        _disconnect.enter_context(_connected(ray, cluster.address))
+    return ray
 
 
 def gather(
@@ -176,7 +232,7 @@ class _Gathering:
         report: Callable[..., object] | None,
     ) -> None:
         self.ray, self.batch, self.order, self.store, self.report = ray, batch, order, store, report
-        self.remote = ray.remote(num_cpus=1, max_retries=_RETRIES)(_make_part)
+        self.remote = ray.remote(num_cpus=1, max_retries=RETRIES)(_make_part)
         self.waiting = deque(batch.missing())
         self.tasks: dict[Any, _Task] = {}
         self.took: list[float] = []
@@ -186,7 +242,7 @@ class _Gathering:
         try:
             while self.batch.missing():
                 self._submit()
-                done, _ = self.ray.wait(list(self.tasks), timeout=_PATIENCE_S)
+                done, _ = self.ray.wait(list(self.tasks), timeout=PATIENCE_S)
                 for reference in done:
                     self._take(reference)
                 if self.report is not None:
@@ -197,7 +253,7 @@ class _Gathering:
 
     def _submit(self) -> None:
         cores = max(1, int(self.ray.cluster_resources().get("CPU", 1)))
-        while self.waiting and len(self.tasks) < _AHEAD * cores:
+        while self.waiting and len(self.tasks) < AHEAD * cores:
             self._start(self.waiting.popleft(), is_second=False)
         if self.waiting or not self.took or len(self.tasks) >= cores:
             return

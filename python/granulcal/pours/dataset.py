@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from granulcal import _native
 from granulcal.engines.in_use import engine_in_use
 from granulcal.errors import OtherLawWarning, UnverifiedDataWarning
-from granulcal.pours.cluster import Cluster, cluster_in_use, gather
+from granulcal.pours.cluster import Cluster, cluster_asked, gather, refuse_engine
 from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import check_whole, require_scene
@@ -230,9 +230,9 @@ def generate(
     folder = Path(tempfile.mkdtemp(prefix="granulcal-") if out is None else out)
     line = ProgressLine() if progress is True else None
     report = line if line is not None else (progress if callable(progress) else None)
-    cluster = Cluster(ray) if isinstance(ray, str) else ray or cluster_in_use()
-    if cluster is not None and engine is not None:
-        raise ValueError(f"a cluster pours with granulcal alone, not with the engine {engine.name}")
+    cluster = cluster_asked(ray)
+    if cluster is not None:
+        refuse_engine(engine)
     try:
         if cluster is not None:
             counts = gather(

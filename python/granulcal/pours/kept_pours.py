@@ -5,13 +5,14 @@ something else: a budget of pours is paid for once. Groups of pours that nobody 
 made again where a file is damaged, are those of `store.py`.
 """
 
+import contextlib
 import hashlib
 import json
 import math
 import os
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,8 @@ from granulcal import _native
 from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, Text, Whole, read_json
 from granulcal.engines.in_use import law_of_pours
 from granulcal.files import write_beside
+from granulcal.pours.at_once import at_once
+from granulcal.pours.cluster import cluster_in_use, refuse_engine
 from granulcal.pours.forward import scene_at
 from granulcal.pours.left_out import LeftOut
 from granulcal.pours.one_run import OneRun
@@ -105,23 +108,23 @@ class KeptPours:
     def __call__(self, theta: Array, first: int) -> Array:
         """Returns the statistics of pours at `theta` (b, p), NaN where there are none, (b, s)."""
         missing = [i for i in range(len(theta)) if not self._is_kept(first + i, theta[i])]
-        with ThreadPoolExecutor(self.threads) as workers:
-            jobs = {workers.submit(self._pour, theta[i], first + i): i for i in missing}
-            written = time.monotonic()
-            try:
-                for job in as_completed(jobs):
-                    self.rows[str(first + jobs[job])] = job.result()
+        asked = [(theta[i], _FIRST_SEED + 100_000 * self.seed + first + i) for i in missing]
+        if missing and cluster_in_use() is not None:
+            refuse_engine(self.engine)
+        work = partial(_poured, self.scene, self.prior, self.look, self.engine)
+        written = time.monotonic()
+        try:
+            with contextlib.closing(at_once(work, asked, self.threads)) as rows:
+                for place, row in rows:
+                    self.rows[str(first + missing[place])] = row
                     if time.monotonic() - written > _KEEP_EVERY_S:
                         self._write()
                         written = time.monotonic()
                     if self.progress is not None:
                         self.progress(len(self.rows))
-            except BaseException:
-                workers.shutdown(wait=False, cancel_futures=True)
-                raise
-            finally:
-                if missing:
-                    self._write()
+        finally:
+            if missing:
+                self._write()
         kept = [self.rows[str(first + i)]["x"] for i in range(len(theta))]
         return np.array([[np.nan] * len(self.x_names) if x is None else x for x in kept], float)
 
@@ -134,27 +137,6 @@ class KeptPours:
     def _is_kept(self, index: int, theta: Array) -> bool:
         row = self.rows.get(str(index))
         return row is not None and np.allclose(row["theta"], theta, rtol=1e-12, atol=0)
-
-    def _pour(self, theta: Array, index: int) -> dict:
-        scene = scene_at(self.scene, self.prior, theta)
-        seed = _FIRST_SEED + 100_000 * self.seed + index
-        if self.engine is not None:
-            left = self.engine(scene, seed)
-            if not isinstance(left, tuple):
-                x = np.asarray(statistics(left)).tolist()
-                return {"theta": theta.tolist(), "status": "at_rest", "x": x}
-            pour = Pour(scene.native.pour_of(*left, seed), scene, seed)
-        else:
-            pour = simulate(scene, seed=seed)
-        status, x = pour.status, None
-        if status not in UNUSABLE:
-            try:
-                x = np.asarray(self.look(pour), float).tolist()
-            except ValueError:
-                status = NO_GRAINS
-        row = {"theta": theta.tolist(), "status": status, "x": x}
-        # Nobody knows the time of another engine.
-        return {**row, "cpu_s": pour.cpu_seconds} if math.isfinite(pour.cpu_seconds) else row
 
     def _read(self) -> dict[str, dict]:
         document = read_json(self.path, _SCHEMA)
@@ -177,6 +159,35 @@ class KeptPours:
         write_beside(
             self.path, json.dumps({**document, "hash": _hash(self.rows), "pours": self.rows})
         )
+
+
+def _poured(
+    base: Scene,
+    prior: Prior,
+    look: Callable[[Pour], ArrayLike],
+    engine: "Engine | None",
+    asked: tuple[Array, int],
+) -> dict:
+    """The row of one pour, by its parameters and seed."""
+    theta, seed = asked
+    scene = scene_at(base, prior, theta)
+    if engine is not None:
+        left = engine(scene, seed)
+        if not isinstance(left, tuple):
+            x = np.asarray(statistics(left)).tolist()
+            return {"theta": theta.tolist(), "status": "at_rest", "x": x}
+        pour = Pour(scene.native.pour_of(*left, seed), scene, seed)
+    else:
+        pour = simulate(scene, seed=seed)
+    status, x = pour.status, None
+    if status not in UNUSABLE:
+        try:
+            x = np.asarray(look(pour), float).tolist()
+        except ValueError:
+            status = NO_GRAINS
+    row = {"theta": theta.tolist(), "status": status, "x": x}
+    # Nobody knows the time of another engine.
+    return {**row, "cpu_s": pour.cpu_seconds} if math.isfinite(pour.cpu_seconds) else row
 
 
 def _hash(rows: dict[str, dict]) -> str:

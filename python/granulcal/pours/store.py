@@ -4,7 +4,6 @@ A file is whole or absent. One that is damaged is as good as absent: its pours c
 """
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TypeVar
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from granulcal.arrays import read_arrays
 from granulcal.files import beside
+from granulcal.pours.at_once import at_once
 from granulcal.progress import steps
 
 __all__ = ["PourStore"]
@@ -51,13 +51,16 @@ class PourStore:
             np.savez_compressed(temporary, **arrays)  # pyright: ignore[reportArgumentType]
 
     def make(self, pour: Callable[[Of], Row], of: Iterable[Of]) -> list[Row]:
-        """Returns `pour` of each, several at once, in their order."""
+        """Returns `pour` of each, several at once, in their order.
+
+        On a cluster, if the job has one: `pour` has to be one that can be pickled.
+        """
         each = list(of)
-        with ThreadPoolExecutor(self.threads) as pool:
-            rows = pool.map(pour, each)
-            # One pour is a step of whoever asks for it.
-            counted = steps("pours", each) if len(each) > 1 else each
-            return [next(rows) for _ in counted]
+        rows = at_once(pour, each, self.threads)
+        # One pour is a step of whoever asks for it.
+        counted = steps("pours", each) if len(each) > 1 else each
+        made = dict(next(rows) for _ in counted)
+        return [made[place] for place in range(len(each))]
 
     def _path(self, name: str) -> Path:
         return self.folder / f"{name}.npz"

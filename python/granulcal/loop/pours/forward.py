@@ -5,6 +5,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import ceil
 from pathlib import Path
 
@@ -60,7 +61,7 @@ class Forward:
             # Of before there was a checksum; what is damaged is made again.
             with contextlib.suppress(ValueError):
                 return read_array(older)
-        made = self.store.make(lambda seed: _row(scene, seed, faults), seeds)
+        made = self.store.make(partial(_row, scene, faults), seeds)
         rows = [row for row in made if row is not None]
         self.ran += len(seeds)
         found = np.array(rows).reshape(len(rows), len(names))
@@ -110,7 +111,7 @@ class Coarse:
         return ceil((1 - self.held) ** 2 + self.held**2)
 
 
-def _row(scene: Scene, seed: int, faults: Mapping[str, float] | None) -> Array | None:
+def _row(scene: Scene, faults: Mapping[str, float] | None, seed: int) -> Array | None:
     pour = simulate(scene, seed=seed)
     if pour.status in UNUSABLE:
         return None

@@ -1,0 +1,100 @@
+"""Several pours at once: on this machine's threads, or on the cluster that the job has.
+
+A task of a cluster is one pour here, where `generate` has parts of 16: these batches are small,
+and their rows are wanted one by one.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from typing import Any, TypeVar
+
+from granulcal import _native
+from granulcal.engines.in_use import engine_in_use
+from granulcal.pours.cluster import (
+    AHEAD,
+    PATIENCE_S,
+    RETRIES,
+    cluster_in_use,
+    connected,
+    refuse_engine,
+)
+
+__all__ = ["at_once"]
+
+Of = TypeVar("Of")
+Row = TypeVar("Row")
+
+
+def at_once(
+    work: Callable[[Of], Row], each: Sequence[Of], threads: int
+) -> Iterator[tuple[int, Row]]:
+    """Yields the place of each in `each` and what `work` makes of it, as they are done.
+
+    Args:
+        work: makes one; a function that can be pickled where the job has a cluster.
+        each: what is asked of it.
+        threads: at once, on this machine.
+
+    Raises:
+        ValueError: a worker of the cluster has another granulcal, or the job another engine.
+    """
+    if cluster_in_use() is None or not each:
+        yield from _on_threads(work, each, threads)
+    else:
+        yield from _on_cluster(work, each)
+
+
+def _on_threads(
+    work: Callable[[Of], Row], each: Sequence[Of], threads: int
+) -> Iterator[tuple[int, Row]]:
+    with ThreadPoolExecutor(threads) as workers:
+        jobs = {workers.submit(work, one): place for place, one in enumerate(each)}
+        try:
+            for job in as_completed(jobs):
+                yield jobs[job], job.result()
+        except BaseException:
+            workers.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _on_cluster(work: Callable[[Of], Row], each: Sequence[Of]) -> Iterator[tuple[int, Row]]:
+    refuse_engine(engine_in_use())
+    ray = connected()
+    remote = ray.remote(num_cpus=1, max_retries=RETRIES)(_one)
+    waiting, tasks = deque(range(len(each))), {}
+    shared = ray.put(work)
+    try:
+        while waiting or tasks:
+            cores = max(1, int(ray.cluster_resources().get("CPU", 1)))
+            while waiting and len(tasks) < AHEAD * cores:
+                place = waiting.popleft()
+                tasks[remote.remote(shared, each[place], _law())] = place
+            done, _ = ray.wait(list(tasks), timeout=PATIENCE_S)
+            for reference in done:
+                place = tasks.pop(reference)
+                try:
+                    row = ray.get(reference)
+                except ray.exceptions.RayTaskError as error:
+                    # What granulcal said on the worker, not the worker's trace of it.
+                    raise error.cause if isinstance(error.cause, Exception) else error from None
+                except ray.exceptions.RayError:
+                    # Killed more often than Ray starts it again, or gone with its node.
+                    waiting.append(place)
+                    continue
+                yield place, row
+    finally:
+        for reference in tasks:
+            ray.cancel(reference, force=True)
+
+
+def _one(work: Callable[[Any], Any], one: Any, law: tuple[str, int]) -> Any:
+    """Makes one on a worker, which has to have the driver's granulcal."""
+    if _law() != law:
+        own, asked = (f"{version} (law {number})" for version, number in (_law(), law))
+        raise ValueError(f"a worker of the cluster has granulcal {own}, the driver {asked}")
+    return work(one)
+
+
+def _law() -> tuple[str, int]:
+    return _native.__version__, _native.LAW
