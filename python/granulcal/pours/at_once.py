@@ -5,7 +5,7 @@ and their rows are wanted one by one.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any, TypeVar
 
@@ -28,7 +28,7 @@ Row = TypeVar("Row")
 
 def at_once(
     work: Callable[[Of], Row], each: Sequence[Of], threads: int
-) -> Iterator[tuple[int, Row]]:
+) -> Generator[tuple[int, Row], None, None]:
     """Yields the place of each in `each` and what `work` makes of it, as they are done.
 
     Args:
@@ -47,7 +47,7 @@ def at_once(
 
 def _on_threads(
     work: Callable[[Of], Row], each: Sequence[Of], threads: int
-) -> Iterator[tuple[int, Row]]:
+) -> Generator[tuple[int, Row], None, None]:
     with ThreadPoolExecutor(threads) as workers:
         jobs = {workers.submit(work, one): place for place, one in enumerate(each)}
         try:
@@ -58,7 +58,9 @@ def _on_threads(
             raise
 
 
-def _on_cluster(work: Callable[[Of], Row], each: Sequence[Of]) -> Iterator[tuple[int, Row]]:
+def _on_cluster(
+    work: Callable[[Of], Row], each: Sequence[Of]
+) -> Generator[tuple[int, Row], None, None]:
     refuse_engine(engine_in_use())
     ray = connected()
     remote = ray.remote(num_cpus=1, max_retries=RETRIES)(_one)

@@ -132,4 +132,14 @@ mod tests {
             assert_eq!(second.run(), whole);
         }
     }
+    #[test]
+    fn its_bits_are_those_of_any_number_of_threads() {
+        let scene = scene(5e-3, 0.5);
+        let run = |threads| {
+            let mut simulation = Simulation::new(&scene, 1).unwrap().with_threads(threads).unwrap();
+            simulation.advance(0.4);
+            simulation.state_hash()
+        };
+        assert_eq!(run(1), run(3));
+    }
 }
