@@ -41,7 +41,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--seed", type=int, default=0, help="seed of the run (default: 0)")
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
     parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
-    add_cluster(parser)
+    add_cluster(parser, store=False)
     add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.set_defaults(run=_run)

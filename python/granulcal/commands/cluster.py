@@ -7,13 +7,16 @@ from granulcal.pours.cluster import Cluster
 __all__ = ["add_cluster", "cluster_of"]
 
 
-def add_cluster(parser: argparse.ArgumentParser) -> None:
-    """Adds the options."""
+def add_cluster(parser: argparse.ArgumentParser, *, store: bool = True) -> None:
+    """Adds the options; without `store` for a command that pours no batch that has parts."""
     parser.add_argument(
         "--ray",
         metavar="ADDRESS",
         help="pour on a Ray cluster: auto, local, HOST:PORT or ray://HOST:PORT; docs/cluster.md",
     )
+    if not store:
+        parser.set_defaults(ray_store=None)
+        return
     parser.add_argument(
         "--ray-store",
         metavar="URL",
