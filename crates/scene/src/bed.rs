@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::check::{non_negative, positive};
 use crate::error::SceneError;
 use crate::grains::Grains;
-use crate::start::{self, Start};
+use crate::start;
 
 /// A bed of the pour's grains, of which it has as many as fit: a cubic lattice in an upright cylinder on the ground,
 /// that falls and comes to rest before the ball is there.
@@ -60,11 +60,6 @@ impl Bed {
     fn lattice(&self, grains: &Grains) -> Vec<Vector3<f64>> {
         let top = [0.0, 0.0, self.height];
         start::cylinder(grains, [0.0; 3], top, self.radius, self.spacing, self.jitter)
-    }
-
-    /// What starts can fall on it.
-    pub(crate) fn suits(start: &Start) -> bool {
-        matches!(start, Start::Ball { .. })
     }
 }
 

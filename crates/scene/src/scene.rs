@@ -309,7 +309,7 @@ impl Scene {
         let Some(bed) = &self.bed else { return Ok(()) };
         bed.check(&self.grains)?;
         let others = [
-            ("a start that is no ball", !Bed::suits(&self.start)),
+            ("a start that is no ball", !matches!(self.start, Start::Ball { .. })),
             (
                 "a camera that is not orthographic",
                 self.camera.projection != Projection::Orthographic,

@@ -15,9 +15,11 @@ from granulcal.pours.cluster import (
     AHEAD,
     PATIENCE_S,
     RETRIES,
+    LostResultError,
     cluster_in_use,
     connected,
     refuse_engine,
+    result_of,
 )
 
 __all__ = ["at_once"]
@@ -76,12 +78,8 @@ def _on_cluster(
             for reference in done:
                 place = tasks.pop(reference)
                 try:
-                    row = ray.get(reference)
-                except ray.exceptions.RayTaskError as error:
-                    # What granulcal said on the worker, not the worker's trace of it.
-                    raise error.cause if isinstance(error.cause, Exception) else error from None
-                except ray.exceptions.RayError:
-                    # Killed more often than Ray starts it again, or gone with its node.
+                    row = result_of(ray, reference)
+                except LostResultError:
                     waiting.append(place)
                     continue
                 yield place, row

@@ -27,11 +27,13 @@ __all__ = [
     "PATIENCE_S",
     "RETRIES",
     "Cluster",
+    "LostResultError",
     "cluster_asked",
     "cluster_in_use",
     "connected",
     "gather",
     "refuse_engine",
+    "result_of",
     "spread_over",
 ]
 
@@ -44,6 +46,10 @@ PATIENCE_S = 0.5
 """How long the driver waits for a task before it looks around [s]."""
 RETRIES = 20
 """Workers that are killed under the same part so often are not killed by chance."""
+
+
+class LostResultError(Exception):
+    """A task has to be asked for again."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +67,7 @@ class Cluster:
 
 
 _in_use: Cluster | None = None
-_disconnect: contextlib.ExitStack | None = None
+_is_connection_ours = False
 
 
 @contextlib.contextmanager
@@ -69,18 +75,12 @@ def spread_over(cluster: Cluster | None) -> Iterator[None]:
     """Lets all batches of pours use a cluster; None for this machine's threads."""
     global _in_use
     before, _in_use = _in_use, cluster
-    with contextlib.ExitStack() as stack:
-        stack.callback(_leave, before)
+    try:
         yield
-
-
-def _leave(before: Cluster | None) -> None:
-    """Ends the job's use of its cluster, and the connection that `connected` has made for it."""
-    global _in_use, _disconnect
-    _in_use = before
-    if before is None and _disconnect is not None:
-        _disconnect.close()
-        _disconnect = None
+    finally:
+        _in_use = before
+        if before is None:
+            _disconnect()
 
 
 def cluster_in_use() -> Cluster | None:
@@ -104,20 +104,50 @@ def refuse_engine(engine: "Engine | None") -> None:
 
 
 def connected() -> Any:
-    """Returns ray, connected to the job's cluster until the job ends.
+    """Returns ray, connected to the job's cluster until the job ends, unless it is connected.
 
     Raises:
         ModuleNotFoundError: ray is not installed.
         ConnectionError: there is no cluster at the address.
     """
-    global _disconnect
+    global _is_connection_ours
     import ray
 
     cluster = cluster_in_use()
-    if cluster is not None and not ray.is_initialized():
-        _disconnect = contextlib.ExitStack()
-        _disconnect.enter_context(_connected(ray, cluster.address))
+    if cluster is None or ray.is_initialized():
+        return ray
+    quiet = {"log_to_driver": False, "logging_level": "ERROR", "include_dashboard": False}
+    if cluster.address != "local":
+        del quiet["include_dashboard"]
+    ray.init(address=cluster.address, **quiet)
+    _is_connection_ours = True
     return ray
+
+
+def _disconnect() -> None:
+    """Ends the connection that `connected` has made."""
+    global _is_connection_ours
+    if _is_connection_ours:
+        import ray
+
+        ray.shutdown()
+        _is_connection_ours = False
+
+
+def result_of(ray: Any, reference: Any) -> Any:
+    """Returns what a task has made.
+
+    Raises:
+        Exception: what granulcal said on the worker, not the worker's trace of it.
+        LostResultError: it is lost: its workers were killed more often than Ray starts them again,
+            or it went with its node.
+    """
+    try:
+        return ray.get(reference)
+    except ray.exceptions.RayTaskError as error:
+        raise error.cause if isinstance(error.cause, Exception) else error from None
+    except (ray.exceptions.RayError, OSError) as error:
+        raise LostResultError(str(error)) from error
 
 
 def gather(
@@ -157,28 +187,13 @@ def gather(
             for chunk in sorted(store.chunks() & set(batch.missing())):
                 batch.put(chunk, store.read(chunk))
         if batch.missing():
-            with _connected(ray, cluster.address):
+            with spread_over(cluster):
+                connected()
                 order = (scene.to_toml(), prior_toml, rows, seed, batch.chunk_size, batch.chunks)
                 _Gathering(ray, batch, order, store, report).run()
         return batch.counts()
     finally:
         batch.close()
-
-
-@contextlib.contextmanager
-def _connected(ray: Any, address: str) -> Iterator[None]:
-    """Connects to a cluster unless the process is connected already."""
-    if ray.is_initialized():
-        yield
-        return
-    quiet = {"log_to_driver": False, "logging_level": "ERROR", "include_dashboard": False}
-    if address != "local":
-        del quiet["include_dashboard"]
-    ray.init(address=address, **quiet)
-    try:
-        yield
-    finally:
-        ray.shutdown()
 
 
 def _make_part(
@@ -273,12 +288,8 @@ class _Gathering:
     def _take(self, reference: Any) -> None:
         task = self.tasks.pop(reference)
         try:
-            part = self.ray.get(reference)
-        except self.ray.exceptions.RayTaskError as error:
-            # What granulcal said on the worker, not the worker's trace of it.
-            raise error.cause if isinstance(error.cause, Exception) else error from None
-        except (self.ray.exceptions.RayError, OSError):
-            # Killed more often than Ray starts it again, or its result went with its node.
+            part = result_of(self.ray, reference)
+        except LostResultError:
             if task.chunk in self.batch.missing():
                 self.waiting.append(task.chunk)
             return

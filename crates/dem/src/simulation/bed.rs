@@ -8,21 +8,16 @@ use crate::lanes::Row;
 use crate::pour::BedAtRest;
 
 impl Simulation {
-    /// Whether the ball is still to be let go.
-    fn is_ball_held(&self) -> bool {
-        self.origin.scene.bed.is_some() && self.bed_at_rest.is_none()
-    }
-
     /// Lets the ball go when the bed has had its time: at the scene's height above the bed as it is then, at rest. The
     /// energy that it brings does not count as created.
     pub(super) fn let_ball_go(&mut self) {
-        let Some(bed) = self.origin.scene.bed.filter(|_| self.is_ball_held()) else { return };
-        if self.time() < bed.settle {
+        let Some(bed) = &self.origin.scene.bed else { return };
+        if self.bed_at_rest.is_some() || self.time() < bed.settle {
             return;
         }
-        let ball: Vec<usize> = (0..self.origin.scene.grains.count).collect();
+        let ball = 0..self.origin.scene.grains.count;
         let width =
-            ball.iter().map(|&i| self.particles.position(i).xy().norm()).fold(0.0, f64::max);
+            ball.clone().map(|i| self.particles.position(i).xy().norm()).fold(0.0, f64::max);
         let (positions, radii) = (self.positions(), self.radii());
         let below = positions.iter().zip(&radii).filter(|(place, _)| place.xy().norm() <= width);
         let surface = below.map(|(place, radius)| place.z + radius).fold(0.0, f64::max);
