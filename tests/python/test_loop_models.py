@@ -121,6 +121,19 @@ def test_the_correction_moves_the_base_model_by_its_residual(
         models.predict("corrected", {"start.base": 0.08}, forward)
 
 
+def test_groups_that_are_poured_beforehand_are_the_same_and_not_made_twice(
+    models: Models, tmp_path: Path
+) -> None:
+    asked = [(models.scene.with_({"start.base": base}), [1, 2]) for base in (0.02, 0.03, 0.04)]
+    ahead, after = Forward(tmp_path / "ahead", 2), Forward(tmp_path / "after", 1)
+    ahead.pours(*asked[1])
+    ahead.fill("pours", asked)
+    assert ahead.ran == 6
+    for one in asked:
+        assert np.array_equal(ahead.pours(*one), after.pours(*one))
+    assert ahead.ran == after.ran == 6
+
+
 def test_a_named_effect_that_shifts_a_condition_shifts_it(models: Models, tmp_path: Path) -> None:
     forward = Forward(tmp_path, 1)
     maker = models.makers["named"][0]

@@ -258,8 +258,8 @@ def test_columns_in_the_centrifuge_hold_each_their_own_liquid_and_have_no_end(
         if not entry.is_free:
             assert scene.with_(entry.at(scene).numbers(1.0)).get(entry.path) == entry.full
     draws = ROUNDS * Thresholds().look
-    _, _, budget = loop_centrifuge.poured(tmp_path)
-    assert planned(asked, budget, 0, rounds=1, draws=draws).pours < budget
+    [kind] = loop_centrifuge.poured(tmp_path)
+    assert planned(asked, kind.count, 0, rounds=1, draws=draws).pours < kind.count
 
 
 def test_draws_around_a_fit_have_its_spread_and_stay_in_the_prior() -> None:
@@ -294,7 +294,7 @@ def test_the_budgets_of_the_measured_studies_afford_their_libraries(tmp_path: Pa
     draws = ROUNDS * Thresholds().look
     rings = [loop_rings.task(tmp_path, group) for group in loop_rings.GROUPS]
     drums = [loop_drum.task(tmp_path, fitted) for fitted in ((15, 45), (15,), (45,))]
-    budget = [study.poured(tmp_path)[2] for study in (loop_rings, loop_drum, loop_column)]
+    budget = [study.poured(tmp_path)[0].count for study in (loop_rings, loop_drum, loop_column)]
     for tasks, pours in ((rings, budget[0]), (drums, budget[1])):
         plans = [planned(asked, pours, 0, draws=draws) for asked in tasks]
         assert all(plan.pours < pours for plan in plans)

@@ -15,7 +15,7 @@ import pytest
 import granulcal as gc
 from granulcal.cli import _guarded, _parser, _subparsers, main
 from granulcal.commands.counts import pour_count
-from granulcal.pours.pour_time import in_the_middle
+from granulcal.pours.pour_time import PourKind, in_the_middle
 
 ALL = """
 scene simulate generate render features infer fit-sensor pick-colour inspect merge completions
@@ -213,6 +213,33 @@ def test_a_dry_run_of_a_report_counts_its_pours(
     assert not (tmp_path / "r.html").exists()
 
 
+def test_a_study_of_several_kinds_of_pours_says_how_long_each_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    scene = gc.Scene.funnel(0.05, count=30, preset="fast")
+    low = gc.Prior(
+        [gc.Parameter(path="material.restitution", distribution="uniform", low=0.1, high=0.2)]
+    )
+    other = scene.with_({"grains.count": 20.0})
+    kinds = [PourKind("one", scene, low, 5), PourKind("two", other, low, 7)]
+    kinds.append(PourKind("one more", scene, low, 10))
+    module = importlib.import_module("granulcal.experiments.predictions")
+    monkeypatch.setattr(module, "poured", lambda data: kinds)
+    words = ["reproduce", "predictions", "--data", str(tmp_path), "--out", str(tmp_path / "out")]
+    assert main([*words, "--dry-run"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].startswith("about ") and ": 22 pours at most, " in said[0]
+    assert [line.partition(":")[0].strip() for line in said[1:]] == [
+        "5 pours of one",
+        "7 pours of two",
+        "10 pours of one more",
+    ]
+    assert main([*words, "--dry-run", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["missing"] == 22 and told["seconds"] > 0 and told["extrapolated"] is False
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_study_says_how_long_its_archive_takes_and_others_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
@@ -228,9 +255,9 @@ def test_a_study_says_how_long_its_archive_takes_and_others_are_refused(
     # The archive's pours come from the scene of the study: no measurement is read for them.
     for study in ("kinect_mounds", "loop_column", "loop_drum", "loop_rings"):
         module = importlib.import_module(f"granulcal.experiments.{study}")
-        scene, prior, pours = module.poured(tmp_path)
-        assert in_the_middle(scene, prior).get("grains.count") > 0
-        assert pours >= 500
+        [kind] = module.poured(tmp_path)
+        assert in_the_middle(kind.scene, kind.prior).get("grains.count") > 0
+        assert kind.count >= 500
 
 
 @pytest.mark.parametrize(

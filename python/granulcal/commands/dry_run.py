@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING
 from granulcal.progress import duration
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from granulcal.engines import Engine
-    from granulcal.pours.pour_time import PourTime
+    from granulcal.pours.pour_time import PourKind, PourTime
     from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
 
-__all__ = ["add_dry_run", "cost", "say_how_long", "say_seconds"]
+__all__ = ["add_dry_run", "cost", "say_how_long", "say_how_long_of", "say_seconds"]
 
 _TRIED = 3
 # Draws of their own: a run that follows is not begun by them.
@@ -75,6 +77,33 @@ def say_how_long(
     told = {"missing": pours, "threads": threads, "pour_cpu_s": each.seconds}
     told["extrapolated"] = each.cut is not None
     return say_seconds(options, pours * each.seconds / threads, text, **told)
+
+
+def say_how_long_of(
+    options: argparse.Namespace, kinds: "Sequence[PourKind]", text: str, **told: object
+) -> int:
+    """Pours draws of every kind and says how long all of them would take; returns 0.
+
+    Args:
+        options: may have `threads` and, for JSON, `json`.
+        kinds: what would be poured.
+        text: follows the number of pours.
+        **told: more for JSON.
+    """
+    threads = getattr(options, "threads", None) or os.cpu_count() or 1
+    # Kinds of one scene are tried once.
+    first = {kind.scene.to_toml(): kind for kind in reversed(kinds)}
+    costs = {toml: cost(kind.scene, kind.prior, share=len(first)) for toml, kind in first.items()}
+    each = [costs[kind.scene.to_toml()] for kind in kinds]
+    seconds = sum(k.count * one.seconds for k, one in zip(kinds, each, strict=True)) / threads
+    missing = sum(kind.count for kind in kinds)
+    told |= {"missing": missing, "threads": threads}
+    told["extrapolated"] = any(one.cut is not None for one in each)
+    say_seconds(options, seconds, f"{missing} pours{text}, {threads} at once", **told)
+    if not getattr(options, "json", False):
+        for kind, one in zip(kinds, each, strict=True):
+            print(f"  {kind.count} pours of {kind.name}: {one}")
+    return 0
 
 
 def say_seconds(options: argparse.Namespace, seconds: float, text: str, **told: object) -> int:

@@ -4,14 +4,14 @@ import argparse
 import contextlib
 import importlib
 import json
-import os
 import pkgutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.cluster import add_cluster, cluster_of
-from granulcal.commands.dry_run import add_dry_run, cost, say_how_long, say_seconds
+from granulcal.commands.dry_run import add_dry_run, say_how_long_of
 from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.paths import READS, writes
 from granulcal.pours.cluster import spread_over
@@ -19,7 +19,6 @@ from granulcal.progress import shown
 from granulcal.words import did_you_mean
 
 if TYPE_CHECKING:
-    from granulcal.experiments.paper.common.poured_set import PouredSet
     from granulcal.experiments.paper.common.sizes import Size
 
 __all__ = ["add"]
@@ -152,33 +151,21 @@ def _say_how_long(options: argparse.Namespace, module: Any, data: Path | None) -
             f"--dry-run is of studies with a training set or an archive of pours; {options.study} "
             "pours a few scenes or none"
         )
-    scene, prior, pours = module.poured(data)
     options.tells = options.json is True
-    return say_how_long(options, scene, prior, pours)
+    return say_how_long_of(options, module.poured(data), " at most")
 
 
 def _say_how_long_of_paper(options: argparse.Namespace, size: "Size") -> int:
     """Says what the pours of the experiments take, from three pours of each kind of grain."""
     from granulcal.experiments.paper import missing_sets
+    from granulcal.pours.pour_time import PourKind
     from granulcal.prior import Prior
 
-    sets, threads = missing_sets(options.out, options.experiment, size=size), options.threads
-    threads = threads or os.cpu_count() or 1
-    counts: dict[str, int] = {}
-    first: dict[str, PouredSet] = {}
-    for each in sets:
-        text = each.scene.to_toml()
-        first.setdefault(text, each)
-        counts[text] = counts.get(text, 0) + each.count
-    costs = {
-        text: cost(each.scene, Prior.default(), share=len(first)) for text, each in first.items()
-    }
-    seconds = sum(count * costs[text].seconds for text, count in counts.items()) / threads
-    missing = sum(counts.values())
-    told = f"{missing} pours in {len(sets)} sets, {threads} at once, training apart"
+    sets = missing_sets(options.out, options.experiment, size=size)
+    kinds: dict[str, PourKind] = {}
+    for one in sets:
+        of = kinds.get(one.scene.to_toml(), PourKind(one.name, one.scene, Prior.default(), 0))
+        kinds[one.scene.to_toml()] = replace(of, count=of.count + one.count)
     options.tells = options.json is True
-    cut = any(each.cut is not None for each in costs.values())
-    say_seconds(options, seconds, told, missing=missing, threads=threads, extrapolated=cut)
-    for text, count in counts.items():
-        print(f"  {count} pours as of {first[text].name}: {costs[text]}")
-    return DONE
+    text = f" in {len(sets)} sets, training apart"
+    return say_how_long_of(options, list(kinds.values()), text)

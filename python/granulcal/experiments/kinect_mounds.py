@@ -24,7 +24,7 @@ from granulcal.measured.recording import Recording
 from granulcal.pours.compare import Scale, nearest_row, standardised_distance
 from granulcal.pours.dataset import Dataset, generate
 from granulcal.pours.forward import pours_at, scene_at
-from granulcal.pours.pour_time import in_the_middle, pour_time
+from granulcal.pours.pour_time import PourKind, in_the_middle, pour_time
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour
 from granulcal.pours.statistics import diagnostic_statistics
@@ -191,9 +191,9 @@ def reproduce(
     return results
 
 
-def poured(data: Path | None) -> tuple[Scene, Prior, int]:
-    """Returns scene, prior and number of the training's pours, for `--dry-run`."""
-    return _scene(), _prior(), _POURS
+def poured(data: Path | None) -> list[PourKind]:
+    """Returns what is poured, for `--dry-run`."""
+    return [PourKind("the training set", _scene(), _prior(), _POURS)]
 
 
 def demo(out_dir: Path, data_dir: Path) -> Calibrated:

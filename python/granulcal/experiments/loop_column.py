@@ -12,6 +12,7 @@ from granulcal.loop.effects.library import by_name
 from granulcal.loop.effects.nuisances import declared_nuisances
 from granulcal.loop.pours.refine import ROUND
 from granulcal.loop.task import FIT, SEALED, Condition, Task
+from granulcal.pours.pour_time import PourKind
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 
@@ -110,10 +111,10 @@ def _files(data: Path, tests: list[str]) -> tuple[Path, ...]:
     return tuple(data / _RUNOUT / f"{test}.txt" for test in tests)
 
 
-def poured(data: Path) -> tuple[Scene, Prior, int]:
-    """Returns scene, prior and number of the pours, for `--dry-run`."""
+def poured(data: Path) -> list[PourKind]:
+    """Returns what is poured, for `--dry-run`."""
     asked = task(data)
-    return asked.at_first(), asked.prior, _BUDGET
+    return [PourKind("the archive", asked.at_first(), asked.prior, _BUDGET)]
 
 
 def reproduce(out: Path, data: Path) -> bool:

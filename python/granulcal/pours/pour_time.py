@@ -17,7 +17,7 @@ from granulcal.prior import Prior
 if TYPE_CHECKING:
     from granulcal.engines import Engine
 
-__all__ = ["PATIENCE_S", "PourTime", "in_the_middle", "pour_time"]
+__all__ = ["PATIENCE_S", "PourKind", "PourTime", "in_the_middle", "pour_time"]
 
 PATIENCE_S = 45.0
 _SEED = 6_000_011
@@ -48,6 +48,23 @@ class PourTime:
             )
         pours = "1 pour" if self.poured == 1 else f"{self.poured} pours"
         return f"{self.seconds:.2f} s of a core each (mean of {pours})"
+
+
+@dataclass(frozen=True)
+class PourKind:
+    """Pours of one kind that a study makes.
+
+    Attributes:
+        name: what they are for.
+        scene: what is poured.
+        prior: what is drawn.
+        count: how many, at most.
+    """
+
+    name: str
+    scene: Scene
+    prior: Prior
+    count: int
 
 
 def pour_time(

@@ -11,8 +11,7 @@ from granulcal.experiments.loop_drum.task import task
 from granulcal.files import write_beside
 from granulcal.loop.close import close_loop
 from granulcal.loop.report.folder import write_report
-from granulcal.pours.scene import Scene
-from granulcal.prior import Prior
+from granulcal.pours.pour_time import PourKind
 
 __all__ = ["reproduce", "task"]
 
@@ -22,10 +21,10 @@ _BUDGET = 1150
 _ASKED = {"both": (15, 45), "fit-15": (15,), "fit-45": (45,)}
 
 
-def poured(data: Path) -> tuple[Scene, Prior, int]:
-    """Returns scene, prior and number of the pours, for `--dry-run`."""
+def poured(data: Path) -> list[PourKind]:
+    """Returns what is poured, for `--dry-run`."""
     asked = task(data)
-    return asked.at_first(), asked.prior, _BUDGET
+    return [PourKind("the archive", asked.at_first(), asked.prior, _BUDGET)]
 
 
 def reproduce(out: Path, data: Path) -> bool:

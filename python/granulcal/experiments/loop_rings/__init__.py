@@ -8,18 +8,17 @@ from granulcal.experiments.loop_rings.task import GROUPS, task
 from granulcal.files import write_beside
 from granulcal.loop.close import Closed, close_loop
 from granulcal.loop.report.folder import write_report
-from granulcal.pours.scene import Scene
-from granulcal.prior import Prior
+from granulcal.pours.pour_time import PourKind
 
 __all__ = ["GROUPS", "reproduce", "task"]
 
 _BUDGET = 545
 
 
-def poured(data: Path) -> tuple[Scene, Prior, int]:
-    """Returns scene, prior and number of the pours, for `--dry-run`."""
+def poured(data: Path) -> list[PourKind]:
+    """Returns what is poured, for `--dry-run`."""
     asked = task(data, next(iter(GROUPS)))
-    return asked.at_first(), asked.prior, _BUDGET
+    return [PourKind("the archive", asked.at_first(), asked.prior, _BUDGET)]
 
 
 def reproduce(out: Path, data: Path) -> bool:

@@ -25,12 +25,17 @@ from granulcal.experiments.predictions.columns import (
     column_rows,
     column_rows_without_physics,
 )
-from granulcal.experiments.predictions.drum import drum_rows, drum_rows_without_loop
-from granulcal.experiments.predictions.fitted_columns import fitted_rows
+from granulcal.experiments.predictions.drum import (
+    drum_rows,
+    drum_rows_without_loop,
+    poured_of_drum,
+)
+from granulcal.experiments.predictions.fitted_columns import fitted_rows, poured_of_columns
 from granulcal.files import write_beside
 from granulcal.loop.report.models import Models
+from granulcal.pours.pour_time import PourKind
 
-__all__ = ["reproduce", "write_csv"]
+__all__ = ["poured", "reproduce", "write_csv"]
 
 
 def reproduce(out: Path, data: Path) -> None:
@@ -53,6 +58,11 @@ def reproduce(out: Path, data: Path) -> None:
     write_csv(folder / "columns.csv", header, fronts)
     draw(folder / "columns.png", read_fronts(data), fronts)
     print(folder)
+
+
+def poured(data: Path) -> list[PourKind]:
+    """Returns what is poured where no loop has been closed, for `--dry-run`."""
+    return [*poured_of_drum(data), *poured_of_columns(data)]
 
 
 def write_csv(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:

@@ -33,7 +33,6 @@ from granulcal.bayessim.emulator.ridge import Ridge
 from granulcal.experiments.predictions.between_tests import Told
 from granulcal.experiments.predictions.column_pours import UNKNOWN, ColumnPours
 from granulcal.experiments.predictions.column_tests import Fronts, Test, times_of
-from granulcal.progress import steps
 
 __all__ = [
     "APPARATUS",
@@ -135,8 +134,7 @@ class ColumnFit:
 
     def unknown(self, of: int) -> dict[str, float]:
         """Returns the values of `UNKNOWN` of an apparatus, by the fit to all days."""
-        values = UNKNOWN.from_unconstrained(self._all.u[of][None])[0].tolist()
-        return dict(zip(UNKNOWN.names, values, strict=True))
+        return dict(zip(UNKNOWN.names, self._values(of).tolist(), strict=True))
 
     def clocks(self, of: int) -> dict[str, float]:
         """Returns what each day's clock is late by [s]."""
@@ -154,6 +152,11 @@ class ColumnFit:
         middle = self._told(number, self._without[day])
         return self._within(test, middle, self._days != day)
 
+    def fill(self, tests: Sequence[Test], seeds: Sequence[int]) -> None:
+        """Pours what `tell` will be asked for, several at once."""
+        asked = [(test, self._values(apparatus(test)), seeds) for test in tests]
+        self._columns.fill("columns that were not measured: pours", asked)
+
     def tell(self, test: Test, seeds: Sequence[int]) -> Told:
         """Returns the front of a test that was not measured, from pours of its own.
 
@@ -161,12 +164,14 @@ class ColumnFit:
             ValueError: fewer than two of its pours are usable.
         """
         of = apparatus(test)
-        unknown = UNKNOWN.from_unconstrained(self._all.u[of][None])[0]
-        rows = self._columns.fronts(test, unknown, seeds)
+        rows = self._columns.fronts(test, self._values(of), seeds)
         if len(rows) < 2:
             raise ValueError(f"{len(rows)} of {len(seeds)} pours are usable, two are needed")
         middle = _seen(_late(times_of(test), rows.mean(axis=0), self._all.clock(of)))
         return self._within(test, middle, np.full(len(self._days), True))
+
+    def _values(self, of: int) -> Array:
+        return UNKNOWN.from_unconstrained(self._all.u[of][None])[0]
 
     def _emulate(self, tests: list[Test], name: str) -> dict[str, Emulated]:
         """Emulators of one pour at each point, by the code of the test."""
@@ -175,8 +180,10 @@ class ColumnFit:
         asked = [(test, number) for test in tests for number in range(POINTS)]
         fronts: dict[str, list[Array]] = {test.code: [] for test in tests}
         kept: dict[str, list[int]] = {test.code: [] for test in tests}
-        for test, number in steps(f"{name}: pours", asked):
-            for front in self._columns.fronts(test, values[number], [number]):
+        columns = self._columns
+        columns.fill(f"{name}: pours", [(test, values[i], [i]) for test, i in asked])
+        for test, number in asked:
+            for front in columns.fronts(test, values[number], [number]):
                 fronts[test.code].append(front)
                 kept[test.code].append(number)
         return {

@@ -17,6 +17,7 @@ Every time of a pour, its substep too, is in units of the test's free fall, $1 /
 pour at 28 g is as fine and as long as one at 1 g.
 """
 
+import os
 from collections.abc import Sequence
 from math import sqrt
 from pathlib import Path
@@ -106,11 +107,15 @@ class ColumnPours:
 
     def __init__(self, pours: Path, model: str) -> None:
         """Begins or goes on with a folder."""
-        self._forward, self._model = Forward(pours, 1), model
+        self._forward, self._model = Forward(pours, os.cpu_count() or 1), model
 
     def scene(self, test: Test) -> Scene:
         """Returns the test's scene, of which only `UNKNOWN` is not stated."""
         return column_scene(test, self._model)
+
+    def fill(self, what: str, asked: Sequence[tuple[Test, Array, Sequence[int]]]) -> None:
+        """Pours what `fronts` will be asked for, several at once; `what` names the steps."""
+        self._forward.fill(what, [self._asked(*one) for one in asked])
 
     def fronts(self, test: Test, unknown: Array, seeds: Sequence[int]) -> Array:
         """Returns the fronts at the test's times and at the end [mm], shape (n, T + 1).
@@ -120,8 +125,11 @@ class ColumnPours:
             unknown: values of `UNKNOWN`, shape (6,).
             seeds: of pours; those that are not usable have no row.
         """
-        scene = self.scene(test).with_(dict(zip(UNKNOWN.names, unknown.tolist(), strict=True)))
-        rows = 1e3 * self._forward.pours(scene, [_SEED + seed for seed in seeds])
+        rows = 1e3 * self._forward.pours(*self._asked(test, unknown, seeds))
         # A body that has fallen apart is no front: the end is the farthest that was one.
         rows[:, -1] = np.fmax(rows[:, -1], np.nanmax(rows[:, :-1], axis=1))
         return np.asarray(rows, dtype=np.float64)
+
+    def _asked(self, test: Test, unknown: Array, seeds: Sequence[int]) -> tuple[Scene, list[int]]:
+        scene = self.scene(test).with_(dict(zip(UNKNOWN.names, unknown.tolist(), strict=True)))
+        return scene, [_SEED + seed for seed in seeds]

@@ -6,17 +6,26 @@ from pathlib import Path
 
 import numpy as np
 
-from granulcal.experiments.loop_drum.task import at_speed
+from granulcal.experiments.loop_drum.task import SPEEDS as PICTURED
+from granulcal.experiments.loop_drum.task import at_speed, task
 from granulcal.experiments.predictions.between_speeds import (
     MODELS as WITHOUT_PHYSICS,
 )
 from granulcal.experiments.predictions.between_speeds import between_speeds, read_pictures
-from granulcal.experiments.predictions.drum_base import DrumBase
-from granulcal.experiments.predictions.drum_fit import DrumFit
+from granulcal.experiments.predictions.drum_base import SETTINGS, DrumBase
+from granulcal.experiments.predictions.drum_fit import (
+    KEPT,
+    POINTS,
+    ROUNDS,
+    UNKNOWN,
+    DrumFit,
+    true_size,
+)
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.models import Models, Prediction
+from granulcal.pours.pour_time import PourKind
 
-__all__ = ["SPEEDS", "drum_rows", "drum_rows_without_loop"]
+__all__ = ["SPEEDS", "drum_rows", "drum_rows_without_loop", "poured_of_drum"]
 
 SPEEDS = {10: (2.0, 2.6), 20: (1.3, 1.7), 30: (1.1, 1.4), 60: (0.9, 1.2)}
 """Rounds a minute, and when the mean begins and ends [s]: once the surface stands."""
@@ -68,6 +77,7 @@ def drum_rows_without_loop(
             )
         is_slope = np.array([x is None for x in places])
         settings = DrumFit(base, speeds, values, is_slope, say=say).settings
+        base.fill("drum: pours", [(one, *at) for one in settings for at in SPEEDS.items()])
     profiles: list[tuple[object, ...]] = []
     slopes: list[tuple[object, ...]] = []
     for rpm, window in SPEEDS.items():
@@ -81,6 +91,19 @@ def drum_rows_without_loop(
             profiles += more
             slopes.append(slope)
     return profiles, slopes
+
+
+def poured_of_drum(data: Path) -> list[PourKind]:
+    """Returns what `drum_rows_without_loop` pours, at most but for pours that are not usable."""
+    pictured, told = len(PICTURED), len(SPEEDS)
+    scene = task(data).scene
+    larger = POINTS * pictured + len(SETTINGS) * (pictured + told)
+    true = ROUNDS * pictured + KEPT * told
+    sizes = {"1.7 mm": (scene, larger), "1.2 mm": (scene.with_(true_size(scene)), true)}
+    return [
+        PourKind(f"the drum, {size}", scene.with_(at_speed(15, *PICTURED[15])), UNKNOWN, count)
+        for size, (scene, count) in sizes.items()
+    ]
 
 
 def _rows(

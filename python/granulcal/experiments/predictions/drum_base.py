@@ -14,6 +14,7 @@ pictures and not fitted to them, each told at a speed from its own surfaces at t
 and from the pours of the other.
 """
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from granulcal.experiments.loop_drum.task import at_speed, task
 from granulcal.experiments.predictions.between_speeds import between_speeds, in_drum
 from granulcal.experiments.predictions.interval import HALF_90
 from granulcal.loop.pours.forward import Forward
+from granulcal.pours.scene import Scene
 
 __all__ = ["SETTINGS", "DrumBase"]
 
@@ -61,7 +63,19 @@ class DrumBase:
     def __init__(self, data: Path, pours: Path) -> None:
         """Begins; nothing is poured yet."""
         self.scene = task(data).scene
-        self._forward = Forward(pours, 1)
+        self._forward = Forward(pours, os.cpu_count() or 1)
+
+    def fill(
+        self, what: str, asked: Sequence[tuple[Mapping[str, float], float, tuple[float, float]]]
+    ) -> None:
+        """Pours what `at` will be asked for, several at once.
+
+        Args:
+            what: names the steps of the progress.
+            asked: setting, speed, and when the mean begins and ends [s].
+        """
+        scenes = [self._scene(setting, rpm, *window) for setting, rpm, window in asked]
+        self._forward.fill(what, [(scene, [_SEED]) for scene in scenes])
 
     def at(self, setting: Mapping[str, float], rpm: float, begin: float, end: float) -> Array:
         """Returns the statistics of a setting at a speed, examined from begin to end [s].
@@ -71,7 +85,7 @@ class DrumBase:
         Raises:
             ValueError: none of `_TRIES` pours is usable.
         """
-        scene = self.scene.with_({**setting, **at_speed(rpm, begin, end)})
+        scene = self._scene(setting, rpm, begin, end)
         for seed in range(_SEED, _SEED + _TRIES):
             for row in self._forward.pours(scene, [seed]):
                 return np.asarray(row, dtype=np.float64)
@@ -79,6 +93,7 @@ class DrumBase:
 
     def pictured(self, setting: Mapping[str, float], speeds: Array) -> Array:
         """Returns a setting's statistics at the pictures' speeds, shape (2, s)."""
+        self.fill("drum: pours", [(setting, n, PICTURED[int(n)]) for n in speeds.tolist()])
         return np.array([self.at(setting, n, *PICTURED[int(n)]) for n in speeds.tolist()])
 
     def held(
@@ -97,6 +112,10 @@ class DrumBase:
             speeds: of the pictures, shape (2,).
             places: as in `tell`.
         """
+        self.fill(
+            "stated drums: pours",
+            [(one, n, window) for one in SETTINGS for n, window in {**PICTURED, **windows}.items()],
+        )
         is_slope = np.array([x is None for x in places])
         gaps: dict[str, list[Array]] = {"line": [], "corrected": []}
         inside: dict[str, list[NDArray[np.bool_]]] = {"line": [], "corrected": []}
@@ -154,3 +173,6 @@ class DrumBase:
             "corrected": (corrected, np.min(low, axis=0), np.max(high, axis=0)),
         }
         return {model: in_drum(rows, places) for model, rows in told.items()}
+
+    def _scene(self, setting: Mapping[str, float], rpm: float, begin: float, end: float) -> Scene:
+        return self.scene.with_({**setting, **at_speed(rpm, begin, end)})

@@ -31,8 +31,8 @@ from granulcal.experiments.loop_drum.task import RESOLUTION
 from granulcal.experiments.loop_drum.task import SPEEDS as PICTURED
 from granulcal.experiments.predictions.between_speeds import HEIGHT, SLOPE
 from granulcal.experiments.predictions.drum_base import DrumBase
+from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
-from granulcal.progress import steps
 
 __all__ = ["KEPT", "POINTS", "ROUNDS", "UNKNOWN", "DrumFit", "true_size"]
 
@@ -62,10 +62,10 @@ _COUNT = 4.0
 _SUBSTEP = 1.0 / 5000.0
 
 
-def true_size(drum: DrumBase) -> dict[str, float]:
-    """Returns the numbers of the scene with grains of the true diameter."""
-    ratio = RESOLUTION.diameter / drum.scene.get("grains.diameter")
-    scaled = {path: drum.scene.get(path) * ratio**p for path, p in RESOLUTION.scales.items()}
+def true_size(scene: Scene) -> dict[str, float]:
+    """Returns the numbers of the drum's scene with grains of the true diameter."""
+    ratio = RESOLUTION.diameter / scene.get("grains.diameter")
+    scaled = {path: scene.get(path) * ratio**p for path, p in RESOLUTION.scales.items()}
     return {"grains.diameter": RESOLUTION.diameter, "substep": _SUBSTEP, **scaled}
 
 
@@ -93,7 +93,7 @@ class DrumFit:
         self._speeds, self._values, self._is_slope = speeds, values, is_slope
         self._count = np.where(is_slope, 1.0, np.sqrt(_COUNT / max(1, (~is_slope).sum())))
         self._emulate(drum)
-        size, shift = true_size(drum), np.zeros_like(values)
+        size, shift = true_size(drum.scene), np.zeros_like(values)
         tried: list[tuple[float, dict[str, float]]] = []
         for number in range(ROUNDS):
             u = self._best(shift)
@@ -115,9 +115,12 @@ class DrumFit:
         """Coefficients (2, d, s) and errors (2, s) of the larger grains' emulators."""
         points = np.asarray(qmc.Sobol(len(UNKNOWN.names), rng=_DESIGN_SEED).random(POINTS))
         coefficients, errors = [], []
-        for rpm in self._speeds.tolist():
-            window, kept, rows = PICTURED[int(rpm)], [], []
-            for u in steps(f"drum of 1.7 mm, {rpm:.0f} rpm: pours", list(points)):
+        windows = {rpm: PICTURED[int(rpm)] for rpm in self._speeds.tolist()}
+        asked = [(_named(u), *one) for one in windows.items() for u in points]
+        drum.fill("drum of 1.7 mm: pours", asked)
+        for rpm, window in windows.items():
+            kept, rows = [], []
+            for u in points:
                 try:
                     rows.append(drum.at(_named(u), rpm, *window))
                 except ValueError:

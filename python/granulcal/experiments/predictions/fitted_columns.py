@@ -25,16 +25,22 @@ from granulcal.experiments.predictions.column_fit import (
     apparatus,
     with_own_clock,
 )
-from granulcal.experiments.predictions.column_pours import LIQUIDS, ColumnPours
+from granulcal.experiments.predictions.column_pours import (
+    LIQUIDS,
+    UNKNOWN,
+    ColumnPours,
+    column_scene,
+)
 from granulcal.experiments.predictions.column_tests import Fronts, Test, all_tests, read_fronts
 from granulcal.experiments.predictions.columns import rows_of
+from granulcal.pours.pour_time import PourKind
 
-__all__ = ["fitted_rows", "half_and_half"]
+__all__ = ["FURTHER_SEEDS", "fitted_rows", "half_and_half", "poured_of_columns"]
 
 Array = NDArray[np.float64]
 
-# Of a test that was not measured.
-_POURS = 4
+FURTHER_SEEDS = range(POINTS, POINTS + 4)
+"""Pours of a test that was not measured."""
 
 
 def fitted_rows(data: Path, pours: Path, *, say: Callable[[str], None]) -> list[tuple[object, ...]]:
@@ -61,6 +67,16 @@ def fitted_rows(data: Path, pours: Path, *, say: Callable[[str], None]) -> list[
     ]
 
 
+def poured_of_columns(data: Path) -> list[PourKind]:
+    """Returns what `fitted_rows` pours, at most."""
+    measured, tests = read_fronts(data).tests, all_tests(data)
+    count = POINTS * len(measured) + len(FURTHER_SEEDS) * (len(tests) - len(measured))
+    return [
+        PourKind(f"columns, {model}", column_scene(measured[0], model), UNKNOWN, count)
+        for model in LIQUIDS
+    ]
+
+
 def half_and_half(one: Told, other: Told) -> Told:
     """Returns what two rows say together: the mixture of both normals at equal weights."""
     middle = 0.5 * (one.middle + other.middle)
@@ -78,11 +94,11 @@ def _fitted(
     """Returns what a model says of every test of which two pours are usable."""
     fit = ColumnFit(fronts, ColumnPours(pours, model), model)
     told = {test.code: fit.tell_measured(i) for i, test in enumerate(fronts.tests)}
-    for test in tests:
-        if test.code in told:
-            continue
+    others, seeds = [test for test in tests if test.code not in told], FURTHER_SEEDS
+    fit.fill(others, seeds)
+    for test in others:
         try:
-            told[test.code] = fit.tell(test, range(POINTS, POINTS + _POURS))
+            told[test.code] = fit.tell(test, seeds)
         except ValueError as error:
             say(f"columns, {model} of {test.code}: no prediction: {error}")
     _say_fit(model, fit, say)

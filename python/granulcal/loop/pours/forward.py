@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from granulcal.arrays import read_array
 from granulcal.engines.in_use import law_of_pours, version_of_pours
 from granulcal.loop.pours.measures import Measures
+from granulcal.pours.at_once import at_once
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
 from granulcal.pours.status import UNUSABLE
 from granulcal.pours.store import PourStore
+from granulcal.progress import steps
 
 __all__ = ["Coarse", "Forward"]
 
@@ -49,10 +51,31 @@ class Forward:
 
         `faults` are those of the image, by kind.
         """
-        names = Measures.of(scene).names
-        of = [version_of_pours(), law_of_pours(), names, scene.to_toml(), list(seeds)]
-        text = json.dumps([*of, dict(faults)] if faults else of)
-        key = hashlib.sha256(text.encode()).hexdigest()[:16]
+        key = _key(scene, seeds, faults)
+        kept = self._kept(key)
+        if kept is not None:
+            return kept
+        found = self._whole(scene, self.store.make(partial(_row, scene, faults), seeds))
+        self.ran += len(seeds)
+        self.store.keep(key, {"found": found})
+        return found
+
+    def fill(self, what: str, asked: Sequence[tuple[Scene, Sequence[int]]]) -> None:
+        """Makes and keeps what `pours` would be asked for one after the other, several at once.
+
+        Args:
+            what: names the steps of the progress.
+            asked: scenes and the seeds of each.
+        """
+        missing = [one for one in asked if self._kept(_key(*one)) is None]
+        made = at_once(_rows, missing, self.store.threads)
+        for _ in steps(what, missing):
+            place, rows = next(made)
+            scene, seeds = missing[place]
+            self.ran += len(seeds)
+            self.store.keep(_key(scene, seeds), {"found": self._whole(scene, rows)})
+
+    def _kept(self, key: str) -> Array | None:
         kept = self.store.read(key)
         if kept is not None and "found" in kept:
             return kept["found"]
@@ -61,12 +84,12 @@ class Forward:
             # Of before there was a checksum; what is damaged is made again.
             with contextlib.suppress(ValueError):
                 return read_array(older)
-        made = self.store.make(partial(_row, scene, faults), seeds)
+        return None
+
+    @staticmethod
+    def _whole(scene: Scene, made: Sequence[Array | None]) -> Array:
         rows = [row for row in made if row is not None]
-        self.ran += len(seeds)
-        found = np.array(rows).reshape(len(rows), len(names))
-        self.store.keep(key, {"found": found})
-        return found
+        return np.array(rows).reshape(len(rows), len(Measures.of(scene).names))
 
     def limit(
         self,
@@ -109,6 +132,19 @@ class Coarse:
     def repeats(self) -> int:
         """Pours at each size whose mean, taken to the limit, scatters no more than one pour."""
         return ceil((1 - self.held) ** 2 + self.held**2)
+
+
+def _key(scene: Scene, seeds: Sequence[int], faults: Mapping[str, float] | None = None) -> str:
+    """The name of a group among the kept ones."""
+    names = Measures.of(scene).names
+    of = [version_of_pours(), law_of_pours(), names, scene.to_toml(), list(seeds)]
+    text = json.dumps([*of, dict(faults)] if faults else of)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _rows(asked: tuple[Scene, Sequence[int]]) -> list[Array | None]:
+    scene, seeds = asked
+    return [_row(scene, None, seed) for seed in seeds]
 
 
 def _row(scene: Scene, faults: Mapping[str, float] | None, seed: int) -> Array | None:
