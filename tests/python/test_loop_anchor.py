@@ -116,7 +116,7 @@ def settled(
         return ModelPours(base, base if found.best is found.base else of(found.best))
 
     monkeypatch.setattr(module, "both", both)
-    conditions = [SimpleNamespace(name=f"{c:g}", at=c) for c in PLACES]
+    conditions = [SimpleNamespace(name=f"{c:g}", at=c, session="") for c in PLACES]
     task: Any = SimpleNamespace(of=lambda _: conditions)
     plan: Any = SimpleNamespace(unit=lambda at: np.array([at]))
     forward: Any = None

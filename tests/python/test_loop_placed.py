@@ -64,7 +64,7 @@ def place(
     monkeypatch.setattr(
         module, "pours_of", lambda _, __, condition, one, ___: of(one, condition.at, 1, away)
     )
-    conditions = [SimpleNamespace(name=f"{c:g}", at=c) for c in PLACES]
+    conditions = [SimpleNamespace(name=f"{c:g}", at=c, session="") for c in PLACES]
     task: Any = SimpleNamespace(of=lambda _: conditions)
     plan: Any = SimpleNamespace(unit=lambda at: np.array([at]))
     forward: Any = None

@@ -41,7 +41,8 @@ class Analysis:
 
     def pours(self, condition: Condition, rows: ArrayLike) -> ConditionPours:
         """Returns rows of statistics (n, s) as pours of a condition."""
-        return ConditionPours.of(condition.name, self.plan.unit(condition.at), rows)
+        at = self.plan.unit(condition.at)
+        return ConditionPours.of(condition.name, at, rows, condition.session)
 
     def observed(self, rows: Mapping[str, ArrayLike]) -> list[ConditionPours]:
         """Returns rows of every condition to fit, by its name, as pours of these conditions."""

@@ -27,6 +27,7 @@ from granulcal.loop.check.checks import (
     trivial,
 )
 from granulcal.loop.check.coverage import FEWEST_PAIRS
+from granulcal.loop.check.own_errors import as_recorded
 from granulcal.loop.check.placed import placed
 from granulcal.loop.check.prior_rounds import ROUNDS, drawn, prior_rounds
 from granulcal.loop.check.settle import settle
@@ -49,6 +50,7 @@ from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.time_needed import time_needed
 from granulcal.loop.preregistration import register
 from granulcal.loop.report.models_of import models_of
+from granulcal.loop.surrogate.condition_pours import session_numbers
 from granulcal.loop.surrogate.conditioned import conditioned
 from granulcal.loop.surrogate.store_surrogate import fit_surrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
@@ -131,7 +133,9 @@ def close_loop(
     analysis = Analysis(task, store.plan, Forward(folder / "pours", workers), rules, seed, say)
     counts = [len(condition.recordings) for condition in analysis.fitted]
     middle = np.full(len(task.prior.names), 0.5)
-    sights = power(surrogate, middle, [analysis.plan.unit(c.at) for c in analysis.fitted], counts)
+    units = [analysis.plan.unit(c.at) for c in analysis.fitted]
+    sessions = session_numbers([c.session for c in analysis.fitted])
+    sights = power(surrogate, middle, units, counts, sessions)
     say(_power_table(sights))
 
     measured = {c.name: c.statistics(task.scene) for c in analysis.fitted}
@@ -174,10 +178,11 @@ def close_loop(
     if wide is not None:
         held = f"{wide.held} of {wide.pairs} simulated pairs held by the plain interval"
         say(f"{held}; stretched by {wide.stretch:.3g}")
-    fit = error_of(task, analysis.fitted, measured, simulated, surrogate, seed)
+    recorded = as_recorded(analysis, surrogate, found, measured, simulated)
+    fit = error_of(task, analysis.fitted, measured, recorded, surrogate, seed)
     # Opened here, once, after everything that could be chosen has been.
     measured |= {c.name: c.statistics(task.scene) for c in hidden}
-    sealed = error_of(task, hidden, measured, simulated, surrogate, seed) if hidden else None
+    sealed = error_of(task, hidden, measured, recorded, surrogate, seed) if hidden else None
     standing = stand(
         found.verdict,
         rules,
@@ -188,7 +193,7 @@ def close_loop(
         draws=draws,
         nearer=nearer(analysis, surrogate, found, best, measured, simulated),
         moved=elsewhere,
-        trivial=trivial(analysis, surrogate, measured, simulated),
+        trivial=trivial(analysis, surrogate, measured, recorded),
     )
     say(f"verdict {standing.verdict.kind}: {standing.verdict.reason}")
 
@@ -213,8 +218,8 @@ def close_loop(
         + there.pours,
         registration=registration,
         measured=measured,
-        simulated=simulated,
-        corrections=corrected(analysis, surrogate, found, measured, simulated),
+        simulated=recorded,
+        corrections=corrected(analysis, surrogate, found, measured, recorded),
         calibrated=wide,
     )
     said = {"kind": standing.verdict.kind, "named": list(standing.verdict.named)}

@@ -32,6 +32,8 @@ class Condition:
         reading: arguments with which the recordings are read.
         averaged: each recording is a mean over time of what a pour shows, at least as steady as the
             simulated mean of one pour; it is taken to be as noisy as that.
+        session: when it was recorded: what each condition has of its own, such as a clock, is the
+            same in all of one session; empty for one of its own.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Condition:
     known: dict[str, float] = field(default_factory=dict)
     reading: dict[str, Any] = field(default_factory=dict)
     averaged: bool = False
+    session: str = ""
 
     def under(self, definition: Definition) -> "Condition":
         """Returns the condition by a definition."""
@@ -95,6 +98,7 @@ def condition_of(file: Path, table: dict[str, Any]) -> Condition:
         known,
         reading=dict(table.get("reading", {})),
         averaged=table.get("averaged", False),
+        session=table.get("session", ""),
     )
 
 

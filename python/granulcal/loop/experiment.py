@@ -88,6 +88,8 @@ def next_experiment(
             np.concatenate([local.conditions, at[None]]),
             np.append(local.counts, float(pours)),
             v,
+            # In a session of its own.
+            np.append(local.sessions, local.sessions.max() + 1),
         )
         gains, told = _gains(both, v, names, strengths, rivals)
         worst = min(gains, key=lambda pair: gains[pair] - already[pair]) if gains else ()

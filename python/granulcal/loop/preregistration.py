@@ -45,6 +45,7 @@ def register(
                 {"name": c.name, "at": c.at, "use": c.use, "recordings": _digests(c.recordings)}
                 | ({"reading": c.reading} if c.reading else {})
                 | ({"averaged": True} if c.averaged else {})
+                | ({"session": c.session} if c.session else {})
                 for c in task.conditions
             ],
             "library": [described(effect) for effect in task.library],

@@ -33,6 +33,10 @@ archive has a value of its own, and every fit has them free.
 `averaged = true` of a condition: each recording is a mean over a time in which the grains forgot
 themselves many times (a drum's picture), so that one is enough.
 
+`session = "monday"` of conditions: what each condition has of its own (a nuisance with `shared =
+false`: a clock, a camera's tilt) is the same under all conditions of one session. What the fitted
+ones tell of it is known under the sealed ones as well; see `own_errors.py`.
+
 `between = false`: the archive has pours at the conditions alone and not between them. Numbers of a
 condition may then depend on each other (two walls that turn together). With
 `sealed_in_archive = false` as well it has none at sealed conditions: no fit needs them there, and
@@ -82,7 +86,7 @@ _AT = Mapping(Number())
 _READING = Mapping(OneOf((Text(), Flag(), ListOf(Number()), Number())))
 _CONDITION = Table(
     {"name": Text(), "at": _AT, "use": Text((FIT, SEALED)), "recordings": ListOf(Text(), least=1)},
-    {"camera": Text(), "known": _AT, "reading": _READING, "averaged": Flag()},
+    {"camera": Text(), "known": _AT, "reading": _READING, "averaged": Flag(), "session": Text()},
 )
 _TOLERANCE = Table({"sd": Number(0)}, {"shared": Flag()})
 _SCHEMA = Table(
@@ -167,6 +171,7 @@ class Task:
         if repeated:
             raise ObservationError(f"conditions need names of their own, twice: {repeated}")
         require_different(self.conditions)
+        self._refuse_idle_sessions()
         pours = sum(len(c.recordings) for c in self.of(FIT))
         # One odd pour of one or two passes for an effect; a mean over time cannot be odd.
         is_steady = pours > 0 and all(c.averaged for c in self.of(FIT))
@@ -234,6 +239,16 @@ class Task:
     def under(self, definition: Definition, use: str) -> tuple[Condition, ...]:
         """Returns the conditions of one use, by a definition."""
         return tuple(c.under(definition) for c in self.stated if c.use == use)
+
+    def _refuse_idle_sessions(self) -> None:
+        """Refuses sessions where nothing is each condition's own: they would say nothing."""
+        named = [c.name for c in self.conditions if c.session]
+        own = [e.name for e in self.library if e.nuisance_sd is not None and not e.is_shared]
+        if named and not own:
+            raise ObservationError(
+                f"the session of {named[0]} says nothing: no nuisance of the task is each "
+                "condition's own; declare one with shared = false, or leave session out"
+            )
 
     def _refuse_fitted(self) -> None:
         """Refuses candidates whose number every fit has free.

@@ -38,7 +38,7 @@ from granulcal.loop.test.residual_test import ResidualTest, residual_test
 from granulcal.loop.test.score import Scores
 from granulcal.loop.test.thresholds import Thresholds
 
-__all__ = ["Recentred", "misfit", "recentre"]
+__all__ = ["Recentred", "gap_of", "misfit", "recentre"]
 
 Array = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def recentre(
         rules: level of the intervals, numbers of replicates.
         seed: of the replicates.
     """
-    local, root, gap = _gap(surrogate, fit, measured, fresh)
+    local, root, gap = gap_of(surrogate, fit, measured, fresh)
     slopes = local.slopes(fit.v, fit.psi, fit.active)[1]
     white = np.linalg.solve(root, slopes)
     pull = np.concatenate([np.ones(len(fit.v)), np.full(len(fit.active), 1e-9)])
@@ -132,20 +132,22 @@ def misfit(
     fresh: Sequence[ConditionPours],
 ) -> float:
     """Returns r^T S^-1 r of measured and fresh pours, S at a fit."""
-    _, root, gap = _gap(surrogate, fit, measured, fresh)
+    _, root, gap = gap_of(surrogate, fit, measured, fresh)
     return float(np.sum(np.linalg.solve(root, gap) ** 2))
 
 
-def _gap(
+def gap_of(
     surrogate: Surrogate,
     fit: Fit,
     measured: Sequence[ConditionPours],
     fresh: Sequence[ConditionPours],
 ) -> tuple[LinearisedSurrogate, Array, Array]:
-    """The surrogate without its error, the root of S, and r."""
+    """Returns the surrogate without its error, the root of S, and r."""
     seen, poured = StackedMeans.of(surrogate, measured), StackedMeans.of(surrogate, fresh)
     counts = seen.counts * poured.counts / (seen.counts + poured.counts)
-    local = _without_error(LinearisedSurrogate.at(surrogate, seen.conditions, counts, fit.v))
+    local = _without_error(
+        LinearisedSurrogate.at(surrogate, seen.conditions, counts, fit.v, seen.sessions)
+    )
     root = np.asarray(np.linalg.cholesky(local.covariance(fit.v, fit.psi)), dtype=np.float64)
     return local, root, (seen.means - poured.means).ravel()
 

@@ -76,7 +76,8 @@ def fit_base(
     """Returns the best fit without effects, and the surrogate around it."""
     places = [*_starts(surrogate, stack, seed), *(start.v for start in starts)]
     best: tuple[LinearisedSurrogate, Fit] | None = None
-    local = LinearisedSurrogate.at(surrogate, stack.conditions, stack.counts, places[0])
+    at, counts, sessions = stack.conditions, stack.counts, stack.sessions
+    local = LinearisedSurrogate.at(surrogate, at, counts, places[0], sessions)
     for start in places:
         fit = improve(local, stack.means.ravel(), start, local.none(), ())
         if best is None or fit.log_density > best[1].log_density:
@@ -84,7 +85,7 @@ def fit_base(
     assert best is not None
     fit = best[1]
     # What is local is taken at the fit, and the fit once more with it.
-    local = LinearisedSurrogate.at(surrogate, stack.conditions, stack.counts, fit.v)
+    local = LinearisedSurrogate.at(surrogate, at, counts, fit.v, sessions)
     return local, improve(local, stack.means.ravel(), fit.v, local.none(), ())
 
 

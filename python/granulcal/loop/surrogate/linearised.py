@@ -41,7 +41,8 @@ class LinearisedSurrogate:
         error_roots: of the mean's uncertainty: without effects, then for each effect the part that
             psi multiplies and the part that psi^2 does, shape (1 + 2 K, H, m, d).
         shift_roots: of the shifts of theta that effects are in part, shape (K, H m, r).
-        nuisance: covariance of the declared nuisances, shape (H m, H m).
+        own_errors: what a standard deviation of each declared nuisance does, shape (N, H, m).
+        sessions: number of the session of each condition, shape (H,).
     """
 
     surrogate: Surrogate
@@ -51,13 +52,19 @@ class LinearisedSurrogate:
     correlations: Array
     error_roots: Array
     shift_roots: Array
-    nuisance: Array
+    own_errors: Array
+    sessions: NDArray[np.int64]
 
     @classmethod
     def at(
-        cls, surrogate: Surrogate, conditions: Array, counts: Array, v: Array
+        cls,
+        surrogate: Surrogate,
+        conditions: Array,
+        counts: Array,
+        v: Array,
+        sessions: NDArray[np.int64] | None = None,
     ) -> "LinearisedSurrogate":
-        """Returns what holds around `v` (p,)."""
+        """Returns what holds around `v` (p,); None: a session for each condition."""
         theta = cube_from_normal(v)
         count, size = len(conditions), surrogate.size
         rows = np.tile(theta, (count, 1))
@@ -72,20 +79,13 @@ class LinearisedSurrogate:
         correlations = np.stack(
             [factor * surrogate.correlation_near(theta, c, NEAR) for c in conditions]
         )
-        nuisance = np.zeros((count * size, count * size))
-        for k in surrogate.design.nuisances:
+        nuisances = surrogate.design.nuisances
+        own_errors = np.empty((len(nuisances), count, size))
+        for i, k in enumerate(nuisances):
             effect = surrogate.design.effects[k]
             linear = surrogate.effect_features(rows, conditions, k)[0]
-            along = linear @ surrogate.coefficients.T
-            along = (effect.nuisance_sd or 0.0) * (
-                along + surrogate.effect_move(rows, conditions, k)
-            )
-            if effect.is_shared:
-                nuisance += np.outer(along.ravel(), along.ravel())
-            else:
-                for h in range(count):
-                    part = slice(h * size, (h + 1) * size)
-                    nuisance[part, part] += np.outer(along[h], along[h])
+            along = linear @ surrogate.coefficients.T + surrogate.effect_move(rows, conditions, k)
+            own_errors[i] = (effect.nuisance_sd or 0.0) * along
         return cls(
             surrogate,
             conditions,
@@ -103,8 +103,20 @@ class LinearisedSurrogate:
                     for k in range(len(effects))
                 ]
             ),
-            nuisance,
+            own_errors,
+            np.arange(count) if sessions is None else sessions,
         )
+
+    @cached_property
+    def nuisance(self) -> Array:
+        """Covariance of the declared nuisances, shape (H m, H m)."""
+        design = self.surrogate.design
+        each = np.repeat(self.sessions, self.surrogate.size)
+        total = np.zeros((self.size, self.size))
+        for k, along in zip(design.nuisances, self.own_errors, strict=True):
+            same = True if design.effects[k].is_shared else each[:, None] == each
+            total += same * np.outer(along, along)
+        return total
 
     @property
     def size(self) -> int:

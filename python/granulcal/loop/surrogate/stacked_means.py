@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.errors import ObservationError
-from granulcal.loop.surrogate.condition_pours import ConditionPours
+from granulcal.loop.surrogate.condition_pours import ConditionPours, session_numbers
 from granulcal.loop.surrogate.surrogate import Surrogate
 
 __all__ = ["StackedMeans"]
@@ -24,12 +24,14 @@ class StackedMeans:
         conditions: shape (H, q).
         means: standardised, transformed, shape (H, m).
         counts: pours of each, shape (H,).
+        sessions: number of the session of each, shape (H,).
     """
 
     labels: tuple[str, ...]
     conditions: Array
     means: Array
     counts: Array
+    sessions: NDArray[np.int64]
 
     @classmethod
     def of(cls, surrogate: Surrogate, observations: Sequence[ConditionPours]) -> "StackedMeans":
@@ -60,4 +62,5 @@ class StackedMeans:
             ),
             means=np.array([surrogate.standardise(o.pours).mean(axis=0) for o in observations]),
             counts=np.array([len(one.pours) for one in observations], dtype=np.float64),
+            sessions=session_numbers([one.session for one in observations]),
         )

@@ -260,6 +260,14 @@ class Surrogate:
             raise ObservationError(f"statistic {bad} of an observed pour is not finite")
         return np.column_stack([t(used[:, j]) for j, t in enumerate(self.transforms)]) @ self.axes
 
+    def moved(self, x: Array, by: Array) -> Array:
+        """Returns statistics `x` (n, s) in the archive's units moved `by` (m,) on the axes of y."""
+        rows = np.array(x, dtype=np.float64)
+        z = by @ self.from_axes
+        for j, (column, transform) in enumerate(zip(self.columns, self.transforms, strict=True)):
+            rows[:, column] = transform.inverse(transform(rows[:, column]) + z[j])
+        return rows
+
     @property
     def from_axes(self) -> Array:
         """C^1/2: y times it is z, shape (m, m)."""

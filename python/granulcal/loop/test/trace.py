@@ -278,15 +278,27 @@ def _residuals(local: LinearisedSurrogate, fit: Fit) -> Array:
 
 
 def power(
-    surrogate: Surrogate, theta: ArrayLike, conditions: ArrayLike, counts: ArrayLike
+    surrogate: Surrogate,
+    theta: ArrayLike,
+    conditions: ArrayLike,
+    counts: ArrayLike,
+    sessions: NDArray[np.int64] | None = None,
 ) -> Power:
-    """Returns what `counts` (H,) pours under `conditions` (H, q) could see at `theta` (p,)."""
+    """Returns what pours could see.
+
+    Args:
+        surrogate: of the archive.
+        theta: where, shape (p,).
+        conditions: unit coordinates, shape (H, q).
+        counts: pours of each, shape (H,).
+        sessions: number of the session of each, shape (H,); None: each has its own.
+    """
     v = normal_from_cube(np.asarray(theta, dtype=np.float64))
     each = np.asarray(counts, dtype=np.float64)
     # Repeats of one condition have no inputs: (H, 0) is what no -1 can stand for.
     where = np.asarray(conditions, dtype=np.float64)
     where = where.reshape(len(each), len(surrogate.design.conditions))
-    local = LinearisedSurrogate.at(surrogate, where, each, v)
+    local = LinearisedSurrogate.at(surrogate, where, each, v, sessions)
     return Power.of(surrogate, Scores.of(local, fit_at(local, v), surrogate.design.candidates))
 
 
