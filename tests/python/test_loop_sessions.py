@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.errors import ObservationError
 from granulcal.loop.analysis import Analysis
-from granulcal.loop.check.own_errors import as_recorded
+from granulcal.loop.check.own_errors import as_recorded, in_told_sessions
 from granulcal.loop.condition import Condition
 from granulcal.loop.effects.design import Design, Effect
 from granulcal.loop.effects.library import by_name
@@ -141,7 +141,9 @@ def test_a_sealed_condition_is_read_by_the_clock_of_its_day(
 
     analysis = SimpleNamespace(
         fitted=conditions[:2],
-        task=SimpleNamespace(conditions=conditions),
+        task=SimpleNamespace(
+            conditions=conditions, of=lambda use: [c for c in conditions if c.use == use]
+        ),
         plan=SimpleNamespace(unit=lambda at: np.array([at["c"]])),
         observed=observed,
     )
@@ -159,9 +161,11 @@ def test_a_sealed_condition_is_read_by_the_clock_of_its_day(
 
     for name in ("low", "middle", "high"):
         assert square(read, name) < 0.05 * square(simulated, name)
+    assert [c.name for c in in_told_sessions(asked.task)] == ["low", "middle", "high"]
     # Neither in sessions of their own nor with too few pours is anything told.
+    unnamed = tuple(replace(c, session="") for c in conditions)
     nameless: Any = SimpleNamespace(
-        **{**vars(analysis), "fitted": tuple(replace(c, session="") for c in conditions[:2])}
+        **{**vars(analysis), "task": SimpleNamespace(conditions=unnamed, of=lambda _: unnamed[:2])}
     )
     assert as_recorded(nameless, surrogate, found, measured, simulated) is simulated
     few = simulated | {"low": ModelPours(plain["low"][:1], plain["low"][:1])}

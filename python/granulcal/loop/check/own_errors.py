@@ -15,7 +15,7 @@ Reference:
     Rasmussen and Williams, Gaussian processes for machine learning, 2006, equation 2.23.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +27,18 @@ from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.surrogate.condition_pours import session_numbers
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
+from granulcal.loop.task import FIT, Condition, Task
 from granulcal.loop.test.trace import Trace
 
-__all__ = ["as_recorded"]
+__all__ = ["as_recorded", "in_told_sessions"]
 
 Array = NDArray[np.float64]
+
+
+def in_told_sessions(task: Task) -> list[Condition]:
+    """Returns the conditions of sessions of which one is fitted."""
+    sessions = {c.session for c in task.of(FIT)} - {""}
+    return [c for c in task.conditions if c.session in sessions]
 
 
 def as_recorded(
@@ -50,7 +57,7 @@ def as_recorded(
         measured: statistics under each condition to fit, by name.
         simulated: pours of both models under every condition, by name.
     """
-    told = {c.session for c in analysis.fitted} - {""}
+    told = in_told_sessions(analysis.task)
     if not told or min(len(rows) for c in analysis.fitted for rows in simulated[c.name]) < FEWEST:
         return simulated
     models = [found.base] if found.best is found.base else [found.base, found.best]
@@ -68,14 +75,13 @@ def _moved(
     fit: Fit,
     measured: Mapping[str, Array],
     simulated: dict[str, Array],
-    told: set[str],
+    told: Sequence[Condition],
 ) -> dict[str, Array]:
-    """One model's pours, moved under the conditions of the sessions that are told."""
+    """One model's pours, moved under the conditions that are `told`."""
     seen, poured = analysis.observed(measured), analysis.observed(simulated)
     _, root, gap = gap_of(surrogate, fit, seen, poured)
     weights = np.linalg.solve(root.T, np.linalg.solve(root, gap))
-    asked = [c for c in analysis.task.conditions if c.session in told]
-    everywhere = [*analysis.fitted, *asked]
+    everywhere = [*analysis.fitted, *told]
     local = LinearisedSurrogate.at(
         surrogate,
         np.array([analysis.plan.unit(c.at) for c in everywhere]).reshape(len(everywhere), -1),
@@ -83,8 +89,8 @@ def _moved(
         fit.v,
         session_numbers([c.session for c in everywhere]),
     )
-    shifts = (local.nuisance[len(gap) :, : len(gap)] @ weights).reshape(len(asked), -1)
+    shifts = (local.nuisance[len(gap) :, : len(gap)] @ weights).reshape(len(told), -1)
     moved = {
-        c.name: surrogate.moved(simulated[c.name], y) for c, y in zip(asked, shifts, strict=True)
+        c.name: surrogate.moved(simulated[c.name], y) for c, y in zip(told, shifts, strict=True)
     }
     return simulated | moved

@@ -9,6 +9,7 @@ import numpy as np
 
 from granulcal.engines.in_use import version_of_pours
 from granulcal.files import write_beside
+from granulcal.loop.check.own_errors import in_told_sessions
 from granulcal.loop.closed import Closed
 from granulcal.loop.effects.image_faults import Frame
 from granulcal.loop.pours.measures import Measures, formation_of
@@ -54,6 +55,7 @@ def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
         totals=[("fit", closed.fit)] + ([("sealed", closed.sealed)] if closed.sealed else []),
         placebo=closed.placebo.verdict,
         errors=_errors(closed),
+        told=[c.name for c in in_told_sessions(closed.task)],
         corrections=closed.corrections,
         standing=closed.standing,
         sealed_model=closed.sealed.total_after.square if closed.sealed else None,
