@@ -185,3 +185,31 @@ def test_a_session_that_says_nothing_is_refused() -> None:
     assert task({"tilt.x": {"sd": 0.005, "shared": False}}).conditions[0].session == "monday"
     with pytest.raises(ObservationError, match="session of all says nothing: .*shared = false"):
         task({"tilt.x": {"sd": 0.005, "shared": True}})
+
+
+def test_a_task_file_states_sessions(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(Scene.drop(0.02, count=40).to_toml())
+    one = Parameter(path="material.restitution", distribution="uniform", low=0.2, high=0.6)
+    (tmp_path / "prior.toml").write_text(Prior([one]).to_toml())
+    for name in "abcd":
+        (tmp_path / name).touch()
+    (tmp_path / "loop.toml").write_text("""
+scene = "scene.toml"
+prior = "prior.toml"
+effects = ["drag"]
+nuisances = { "tilt.x" = { sd = 0.005, shared = false } }
+[[conditions]]
+name = "low"
+at = { "start.base" = 0.03 }
+use = "fit"
+recordings = ["a", "b", "c"]
+session = "monday"
+[[conditions]]
+name = "high"
+at = { "start.base" = 0.05 }
+use = "sealed"
+recordings = ["d"]
+""")
+    task = Task.load(tmp_path / "loop.toml")
+    assert [c.session for c in task.conditions] == ["monday", ""]
+    assert [c.name for c in in_told_sessions(task)] == ["low"]

@@ -34,6 +34,10 @@ TASK is a TOML file: a scene, a prior of the material, and recordings under at l
     use = "fit"
     recordings = ["04cm/pour-0.png", "04cm/pour-1.png"]
 
+What may be wrong with the measurement is declared, and is never a finding: before the conditions
+nuisances = { "tilt.x" = 0.005, "height" = { sd = 0.001, shared = false } }, and in conditions that
+share what each has of its own session = "monday" (docs/theory/loop.md, "Own errors").
+
 Written to the folder -o: preregistration.json (before any data is seen), verdict.json,
 report.html, and the tables conditions, candidates and residuals.parquet. The archive of pours may
 serve many tasks of one scene; all of it is resumed after an interruption. Verdicts: NONE, RESIDUAL
