@@ -6,6 +6,7 @@
 //! | `body` | place, turn, momentum; what an impulse does |
 //! | `around` | shape, walls and material in a substep; how far bodies search for each other |
 //! | `collide` | points of contact |
+//! | `boxes` | the normal between two boxes |
 //! | `manifold` | where two bodies are nearest, by parry |
 //! | `contact` | the law at a point |
 //! | `impact` | impacts, each at its time |
@@ -14,6 +15,7 @@
 
 mod around;
 mod body;
+mod boxes;
 mod collide;
 mod contact;
 #[cfg(test)]
