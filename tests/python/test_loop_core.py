@@ -257,7 +257,7 @@ def test_false_alarms_and_coverage(toy: Linear, surrogate: Surrogate) -> None:
         ((0.7, 0.0, 0.0), 0.0, "EFFECT", ("seen",)),
         ((0.0, 0.0, -0.7), 0.0, "EFFECT", ("signed",)),
         ((0.0, 0.0, 0.0), 1.5, "UNEXPLAINED", ()),
-        ((0.9, 0.0, 0.9), 0.0, "EFFECTS", ("seen", "signed")),
+        ((0.9, 0.0, 0.9), 0.0, "EFFECTS", ("signed", "seen")),
     ],
 )
 def test_verdicts(

@@ -54,6 +54,12 @@ def test_a_pair_that_is_best_is_named_whole() -> None:
     assert word((model(9.0, 0, 2), 0.5), (model(8.0, 1), 0.5)).kind == "EFFECTS"
 
 
+def test_of_a_pair_the_one_that_explains_more_alone_comes_first() -> None:
+    alone = (model(2.0, 0), 0.001), (model(5.0, 2), 0.001)
+    assert word((model(12.0, 0, 2), 0.5), *alone).named == ("count", "drag")
+    assert word((model(12.0, 0, 2), 0.5)).named == ("drag", "count")
+
+
 def test_what_leaves_something_is_no_explanation() -> None:
     assert word((model(30.0, 0), 0.01), (model(5.0, 1), 0.5)).named == ("tilt",)
     assert word((model(30.0, 0), 0.01)).kind == "UNEXPLAINED"

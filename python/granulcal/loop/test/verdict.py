@@ -6,7 +6,7 @@
 | RESIDUAL | something is left (p <= `detect`), too unsure for a name: none is within `rivals` |
 | EFFECT | every adequate model within `rivals` of the best is of one family |
 | SET | several families are |
-| EFFECTS | the best adequate model needs two effects |
+| EFFECTS | the best adequate model needs two effects: first the one that is more probable alone |
 | UNEXPLAINED | p <= `name`, and no model of one or two effects leaves nothing |
 """
 
@@ -32,7 +32,8 @@ class Verdict:
 
     Attributes:
         kind: one of `KINDS`.
-        named: effects of the finding; for SET all that are not distinguished; else none.
+        named: effects of the finding, the most probable first; for SET all that are not
+            distinguished; else none.
         families: of `named`, each once.
         p: of the residual test before any effect was fitted.
         reason: one sentence with the numbers that decided.
@@ -84,8 +85,11 @@ def decide(
         )
         return Verdict("RESIDUAL", (), (), p, why)
     if len(best.effects) == 2:
-        names = tuple(design.effects[k].name for k in best.effects)
-        kin = _families(design, best.effects, merged)
+        alone = {m.effects[0]: m.log_probability for m, _ in models if len(m.effects) == 1}
+        # The one that explains more by itself comes first.
+        members = tuple(sorted(best.effects, key=lambda k: -alone.get(k, float("-inf"))))
+        names = tuple(design.effects[k].name for k in members)
+        kin = _families(design, members, merged)
         if len(kin) == 1:
             return Verdict("EFFECT", names, kin, p, _gain(gain))
         return Verdict("EFFECTS", names, kin, p, _gain(gain))
