@@ -7,7 +7,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::{DatasetError, Form};
 
@@ -93,12 +93,18 @@ pub fn is_writing() -> bool {
     WRITING.load(Ordering::SeqCst) > 0
 }
 
-/// Removes what this process has half written; for whoever ends it at once.
+/// Removes what this process has half written; for whoever ends it at once: whoever begins another file waits for ever.
 pub fn remove_temporaries() {
-    let mut paths = TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut paths = temporaries();
     for path in paths.drain(..) {
         let _ = fs::remove_file(path);
     }
+    std::mem::forget(paths);
+}
+
+/// The list is held while a file of it comes or goes, so that none is missed.
+fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
+    TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Refuses to replace what stands at `place`, unless it is nothing, empty, or one of this form that granulcal
@@ -157,9 +163,11 @@ impl PendingFile {
     pub(crate) fn create(target: &Path, form: Form) -> Result<Self, DatasetError> {
         let place = place_of(target)?;
         require_replaceable(&place, form, target)?;
+        let mut all = temporaries();
         let (temporary, file) =
             create_beside(&place).map_err(DatasetError::io("create", target))?;
-        TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner).push(temporary.clone());
+        all.push(temporary.clone());
+        drop(all);
         Ok(Self {
             writer: Some(BufWriter::new(file)),
             temporary,
@@ -254,9 +262,8 @@ impl Drop for PendingFile {
             // What is buffered is not wanted any more.
             drop(writer.into_parts().0);
         }
-        let mut all = TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = temporaries();
         all.retain(|path| *path != self.temporary);
-        drop(all);
         if !self.is_committed {
             // There is no one to tell if it fails.
             let _ = fs::remove_file(&self.temporary);
