@@ -33,6 +33,9 @@ def front(test: Test, u: Array) -> Array:
 class Closed(ColumnPours):
     """Pours whose fronts are known."""
 
+    def fill(self, what: str, asked: object) -> None:
+        """Nothing is poured beforehand."""
+
     def fronts(self, test: Test, unknown: Array, seeds: Sequence[int]) -> Array:
         u = UNKNOWN.to_unconstrained(unknown[None])[0]
         return np.array([front(test, u) for _ in seeds])

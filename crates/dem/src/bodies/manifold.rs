@@ -3,8 +3,8 @@
 //! The normal comes from the nearest points of the bodies' cores, which are the bodies scaled by 1 - [`SHRUNK`] about
 //! their centres: bodies that rest on each other overlap by a little, and the way out of an overlap takes parry's EPA
 //! several times as long as the way between what is apart takes GJK. Points of contact are those of the whole bodies.
-//! Cores that meet leave it to parry. Of boxes the separating axes are tried here (`boxes.rs`), as parry does, at a
-//! fifth of the time.
+//! Cores that meet leave it to parry. Of boxes the separating axes are tried here (`boxes.rs`), as parry does, in
+//! less time.
 
 use nalgebra::UnitQuaternion;
 use parry3d_f64::math::{Pose, Rotation, Vector};
