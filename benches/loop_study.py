@@ -10,7 +10,8 @@ effect at three strengths, four pairs, and six effects that the library lacks at
 Sealed heights are 2, 6 and 10 cm. `--small` has 120 grains, pixels of 1.6 mm without noise, and an
 archive of half the size: minutes on an idle core where the whole study takes an hour. The pours of
 a set are kept in OUT.pours, so that the loop can be run on them again. `--first` numbers the sets
-from there: their materials and seeds are others. `--checks` asks what `close-loop` asks before a
+from there: their materials and seeds are others. `--only pair` passes over all other sets, which
+keep their numbers. `--checks` asks what `close-loop` asks before a
 word stands (loop_study_checks.py): 30 to 60 further pours a set.
 """
 
@@ -49,6 +50,7 @@ FIT, SEALED = (0.04, 0.08, 0.12), (0.02, 0.06, 0.10)
 POURS, FRESH, MANY = 3, 8, 3
 STRENGTHS, OUTSIDE_STRENGTHS, OF_PAIRS = (0.3, 0.6, 0.9), (0.5, 1.0), 0.7
 PAIRS = 4
+KINDS = ("null", "single", "pair", "hidden")
 RULES = Thresholds()
 BLIND = Path(__file__).parent / "blind"
 
@@ -328,7 +330,7 @@ def run(options: argparse.Namespace) -> None:
     part, parts = options.part
     with path.open("a", encoding="utf-8") as file:
         for index, truth in enumerate(truths, start=options.first):
-            if index in done or index % parts != part:
+            if index in done or index % parts != part or truth.kind not in options.only:
                 continue
             row = study.row(index, truth)
             file.write(json.dumps(row or {"index": index, "kind": "jammed"}) + "\n")
@@ -352,6 +354,7 @@ def main() -> None:
     runner.add_argument("--small", action="store_true")
     runner.add_argument("--pairs", type=int, default=0, help="simulated pairs of a named effect")
     runner.add_argument("--checks", action="store_true", help="what a word has to stand")
+    runner.add_argument("--only", nargs="+", choices=KINDS, default=KINDS, metavar="KIND")
     runner.add_argument("--threads", type=int, default=2)
     runner.add_argument(
         "--part",

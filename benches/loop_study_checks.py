@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from granulcal.loop import ConditionPours, Surrogate, Thresholds, Trace
 from granulcal.loop.analysis import Analysis
-from granulcal.loop.check.placed import placed
-from granulcal.loop.check.settle import settle
+from granulcal.loop.check.look_again import look_again
 from granulcal.loop.check.standing import stand
 from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.forward import Forward
@@ -73,8 +72,8 @@ class Checks:
             seed: of the fresh pours.
         """
         analysis = Analysis(self.task, self.plan, self.forward, self.rules, seed, lambda _: None)
-        settled = settle(analysis, surrogate, found, observed)
-        there = placed(analysis, settled.surrogate, settled.trace, sets, settled.simulated)
+        looked = look_again(analysis, surrogate, found, observed, sets)
+        settled, there = looked.settled, looked.placed
         held, of_base, own = there.trace, there.of_base, there.own
         standing = stand(
             held.verdict,
@@ -91,6 +90,7 @@ class Checks:
             "fits": held.verdict.kind,
             "best": held.best.effects,
             "anchors": settled.anchors,
+            "looked": looked.rounds,
             "confirmed": settled.confirmed,
             "own": None if own is None else own.to_dict(),
             "base_p": None if of_base is None else of_base.residual_test.p,

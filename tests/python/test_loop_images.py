@@ -1,6 +1,7 @@
 """Effects of the image: closed forms of the operators, and what an archive makes of them."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -178,13 +179,60 @@ def test_one_pour_serves_all_effects_of_the_image(tmp_path: Path) -> None:
         assert len(same) == 1
         gap = first.x[row, column] - first.x[same[0], column]
         assert gap == pytest.approx(1e-3 * first.psi[row, 0], rel=1e-6)
-    # A further effect needs no further pour.
+    # A further effect needs no further pour, and is read together with the first one.
     both = Archive(folder, plan(tmp_path, "camera.offset", "grains.lost"))
     assert both.plan.pours == 24
     both.fill(threads=1, say=lambda _: None, progress=False)
     second = both.pours()
     assert np.array_equal(second.x[: len(first.x)], first.x)
     assert (second.psi[len(first.x) :, 1] > 0).all() and len(second.x) > len(first.x)
+
+
+def test_some_pours_of_an_effect_are_read_under_those_of_the_image(tmp_path: Path) -> None:
+    names = "tilt.x", "count", "camera.offset", "camera.scale"
+    asked = replace(plan(tmp_path, *names), base=32, each=20)
+    archive = Archive(tmp_path / "archive", asked)
+    assert (asked.pours, asked.images, asked.images_each) == (72, 8, 4)
+    # 24 plain ones, 16 of each effect; 8 + 2 x 4 with their images.
+    assert archive.missing == 72
+    archive.fill(threads=1, say=lambda _: None, progress=False)
+    assert {p.name for p in archive.folder.glob("images*")} == {
+        "images",
+        "images-tilt.x",
+        "images-count",
+    }
+    order = [effect.name for effect in asked.library]
+    tilt, count, offset, scale = (order.index(name) for name in names)
+    rows = archive.pours()
+    on = rows.psi != 0
+    for k in (tilt, count):
+        both = on[:, k] & on[:, offset]
+        assert 0 < both.sum() <= 4 and on[both].sum() == 2 * both.sum()
+        assert np.unique(rows.theta[both], axis=0).shape == (both.sum(), len(asked.prior.names))
+    # A count is a whole number of grains.
+    (effect,) = (one.at(asked.scene) for one in by_name(["count"]))
+    grains = [effect.value(psi) for psi in rows.psi[on[:, count] & on[:, offset], count]]
+    assert all(n == round(n) for n in grains)
+    assert not (on[:, scale] & on[:, offset]).any()
+
+
+def test_two_effects_of_the_image_are_read_together(tmp_path: Path) -> None:
+    asked = replace(plan(tmp_path, "camera.offset", "grains.lost"), base=96)
+    archive = Archive(tmp_path / "archive", asked)
+    archive.fill(threads=1, say=lambda _: None, progress=False)
+    rows = archive.pours()
+    both = (rows.psi != 0).all(axis=1)
+    assert 0 < both.sum() < 24
+    order = [effect.name for effect in asked.library]
+    highest, lone = rows.names.index("max_z"), rows.names.index("isolated_grains")
+    k = order.index("camera.offset")
+    for row in np.nonzero(both)[0]:
+        same = (rows.theta == rows.theta[row]).all(axis=1)
+        plain = rows.x[same & ~rows.psi.any(axis=1)]
+        # Lost grains leave the highest point, and the offset leaves the lone ones.
+        gap = rows.x[row, highest] - plain[0, highest]
+        assert gap == pytest.approx(1e-3 * rows.psi[row, k], rel=1e-6)
+        assert rows.x[row, lone] <= plain[0, lone]
 
 
 def test_the_forward_run_has_the_fault(tmp_path: Path, pour: gc.Pour) -> None:

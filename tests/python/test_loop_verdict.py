@@ -68,3 +68,14 @@ def test_what_leaves_something_is_no_explanation() -> None:
 @pytest.mark.parametrize(("p", "kind"), [(0.06, "NONE"), (0.04, "RESIDUAL")])
 def test_what_is_not_rejected_has_no_name(p: float, kind: str) -> None:
     assert word((model(30.0, 0), 0.5), p=p).kind == kind
+
+
+def test_a_second_effect_is_told_from_none_as_a_first_one_is() -> None:
+    left = (model(20.0, 2), 0.005), (model(4.0, 0), 0.001)
+    # What the first one leaves is no evidence of a second one that explains nothing.
+    found = word((model(22.9, 0, 2), 0.5), *left)
+    assert (found.kind, found.named) == ("EFFECT", ("count",)) and "20.0 nat" in found.reason
+    assert word((model(23.1, 0, 2), 0.5), *left).named == ("count", "drag")
+    # A rival of the member that leaves nothing is named beside it.
+    found = word((model(22.0, 0, 2), 0.5), *left, (model(18.0, 1), 0.5))
+    assert (found.kind, found.named) == ("SET", ("count", "tilt"))

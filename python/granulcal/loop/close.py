@@ -2,9 +2,9 @@
 
 The steps are those of docs/theory/loop.md: register what is fixed; fill the archive; say what could
 be seen; fit and test; refit the library; decide; pour draws of the prior; pour the base and the
-augmented model until the surrogate is right there; move every definition; open the sealed
-conditions once, beside rows that need no physics; say the verdict; run the placebo; write the
-report.
+augmented model until the surrogate is right there and they do not contradict it; move every
+definition; open the sealed conditions once, beside rows that need no physics; say the verdict; run
+the placebo; write the report.
 """
 
 import json
@@ -27,10 +27,9 @@ from granulcal.loop.check.checks import (
     trivial,
 )
 from granulcal.loop.check.coverage import FEWEST_PAIRS
+from granulcal.loop.check.look_again import look_again
 from granulcal.loop.check.own_errors import as_recorded
-from granulcal.loop.check.placed import placed
 from granulcal.loop.check.prior_rounds import ROUNDS, drawn, prior_rounds
-from granulcal.loop.check.settle import settle
 from granulcal.loop.check.standing import stand
 from granulcal.loop.check.steady import drifts
 from granulcal.loop.closed import Closed
@@ -156,14 +155,14 @@ def close_loop(
         found = trace(surrogate, observed, rules, seed=seed)
         say(f"after pours where the fits are, {found.verdict.kind}: {found.verdict.reason}")
     seen = prior_rounds(analysis, surrogate, found, observed, measured)
-    settled = settle(analysis, seen.surrogate, seen.trace, observed)
+    looked = look_again(analysis, seen.surrogate, seen.trace, observed, measured)
+    settled, there = looked.settled, looked.placed
     found, surrogate = settled.trace, settled.surrogate
     hidden = task.of(SEALED)
     best, draws = seen.best, seen.draws
     if found.best.effects != seen.trace.best.effects and rules.look:
         # The winner is another: no random draw of it has been poured.
         best, draws = drawn(analysis, surrogate, found, measured), draws + rules.look
-    there = placed(analysis, surrogate, found, measured, settled.simulated)
     found, of_base, own = there.trace, there.of_base, there.own
     if own is not None:
         say(f"its pours leave of the measured ones what has p = {own.residual_test.p:.3g}")
@@ -188,6 +187,7 @@ def close_loop(
         rules,
         confirmed=settled.confirmed,
         anchors=settled.anchors,
+        looked=looked.rounds,
         own=own,
         of_base=of_base,
         draws=draws,
@@ -215,7 +215,8 @@ def close_loop(
         + _needed(task, pairs if wide is not None else 0, draws)
         + rounded
         + settled.before
-        + there.pours,
+        + there.pours
+        + looked.pours,
         registration=registration,
         measured=measured,
         simulated=recorded,

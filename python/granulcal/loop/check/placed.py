@@ -39,6 +39,7 @@ class Placed(NamedTuple):
         of_base: what the base model's pours say of the data; None where too few are usable.
         own: the same of the verdict's model, where it is.
         pours: that were made for it.
+        seed: of the pours of a step.
     """
 
     trace: Trace
@@ -46,6 +47,7 @@ class Placed(NamedTuple):
     of_base: Recentred | None
     own: Recentred | None
     pours: int
+    seed: int
 
 
 def placed(
@@ -64,19 +66,18 @@ def placed(
         measured: statistics under each condition to fit, by name.
         simulated: pours of both models at their fits, the same way.
     """
-    best = found.best
+    best, seed = found.best, analysis.seed + _SEED
     of_base = own = recentred(analysis, surrogate, found, found.base, measured, simulated)
     if best is not found.base:
         own = recentred(analysis, surrogate, found, best, measured, simulated)
     if own is None or best is found.base:
-        return Placed(found, simulated, of_base, own, 0)
+        return Placed(found, simulated, of_base, own, 0, seed)
     v = np.clip(own.v, -LARGEST_Z, LARGEST_Z)
     moved = replace(best, theta=cube_from_normal(v), best_strengths=own.strengths)
-    seed = analysis.seed + _SEED
     fresh = {
         c.name: pours_of(analysis.forward, analysis.task, c, moved, seed) for c in analysis.fitted
     }
-    same = Placed(found, simulated, of_base, own, sum(map(len, fresh.values())))
+    same = Placed(found, simulated, of_base, own, sum(map(len, fresh.values())), seed)
     if min(map(len, fresh.values())) < FEWEST:
         return same
 

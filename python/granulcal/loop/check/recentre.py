@@ -160,6 +160,7 @@ def _without_error(local: LinearisedSurrogate) -> LinearisedSurrogate:
         local,
         surrogate=surrogate,
         error_roots=np.zeros_like(local.error_roots),
+        crossed_roots=np.zeros_like(local.crossed_roots),
         shift_roots=np.zeros_like(local.shift_roots),
     )
 

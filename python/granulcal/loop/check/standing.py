@@ -64,6 +64,7 @@ class Standing:
         own: what the model's own pours at its fit say of the data; None where too few are usable.
         of_base: the same of the base model.
         anchors: rounds of fresh pours that the surrogate was held by.
+        looked: rounds of pours that contradicted the fits, from which the surrogate has learnt.
         draws: random draws of the model that were poured.
         nearer: D^2 of the best draw less that of the fit, with 95 %; None where neither was poured.
         moved: verdicts under the other definitions.
@@ -80,6 +81,7 @@ class Standing:
     own: Recentred | None = None
     of_base: Recentred | None = None
     anchors: int = 0
+    looked: int = 0
 
     @property
     def stands(self) -> bool:
@@ -100,6 +102,7 @@ class Standing:
             "verdict_before_checks": self.before.kind,
             "confirmed_p": None if self.confirmed != self.confirmed else self.confirmed,
             "anchors": self.anchors,
+            "looked_again": self.looked,
             "own_pours": None if self.own is None else self.own.to_dict(),
             "base_pours_p": None if self.of_base is None else self.of_base.residual_test.p,
             "random_draws": self.draws,
@@ -131,6 +134,7 @@ def stand(
     *,
     confirmed: float,
     anchors: int = 0,
+    looked: int = 0,
     own: Recentred | None = None,
     of_base: Recentred | None = None,
     draws: int = 0,
@@ -145,6 +149,7 @@ def stand(
         rules: what was fixed beforehand.
         confirmed: p of fresh pours of the verdict's model; NaN counts as failed.
         anchors: rounds of fresh pours that the surrogate was held by.
+        looked: rounds of pours that contradicted the fits.
         own: what the last of these pours say of the data.
         of_base: what fresh pours of the base model say of them.
         draws: random draws that were poured.
@@ -194,6 +199,7 @@ def stand(
         own=own,
         of_base=of_base,
         anchors=anchors,
+        looked=looked,
     )
     if verdict.kind in NAMING and found.unbeaten:
         rows = " nor ".join(found.unbeaten)

@@ -4,8 +4,9 @@
       archive.json        scene, prior, conditions, library; written first, refused if another
       base/               pours of the plain model, conditions and parameters from their priors
       effect-NAME/        the same with one effect at a strength from its prior
-      images/             further pours of the plain model, whose images are read again under each
-                          effect of the image; npz, see `image_rows.py`
+      images/             further pours of the plain model, whose images are read again under the
+                          effects of the image; npz, see `image_rows.py`
+      images-NAME/        the same of pours with one effect
       base-at-0/, ...     instead of base/ where pours are at the conditions alone, a part for each
 
 Each other part is a data set of `generate`: it is stopped and continued anywhere and has the same
@@ -115,13 +116,13 @@ class Archive:
                 threads=threads,
                 progress=progress,
             )
-        if self.plan.images:
-            self._image_rows().fill(threads=threads or os.cpu_count() or 1, say=say)
+        for images in self._image_rows():
+            images.fill(threads=threads or os.cpu_count() or 1, say=say)
 
     @property
     def missing(self) -> int:
         """Pours that are planned and not there yet; those with images count as missing."""
-        count = self.plan.images
+        count = sum(images.count for images in self._image_rows())
         for part in parts_of(self.plan):
             folder = self.folder / part.name
             there = len(Dataset.load(folder)) if folder.exists() else 0
@@ -172,9 +173,12 @@ class Archive:
         rows = Rows(cube(plan.prior, theta), plan.unit_condition(condition), psi, x[usable])
         return rows, left_out
 
-    def _image_rows(self) -> ImageRows:
+    def _image_rows(self) -> tuple[ImageRows, ...]:
+        """Pours that are read under effects of the image; none where no effect is one."""
         plan = self.plan
-        return ImageRows(
+        if not plan.images:
+            return ()
+        of_base = ImageRows(
             folder=self.folder / "images",
             scene=plan.scene,
             prior=plan.prior,
@@ -184,23 +188,30 @@ class Archive:
             count=plan.images,
             seed=plan.seed,
         )
+        of_effects = (
+            replace(
+                of_base,
+                folder=self.folder / f"images-{effect.name}",
+                count=plan.images_each,
+                poured=effect,
+            )
+            for effect in plan.library
+            if plan.is_crossed(effect)
+        )
+        return (of_base, *of_effects)
 
     def _rows_of_images(self) -> list[Rows]:
-        """Rows of `images/`: plain ones, then those under each effect."""
-        if not self.plan.images:
-            return []
-        found = self._image_rows().rows()
-        if found is None:
-            raise TrainingDataError(
-                f"{self.folder / 'images'} is not whole: fill the archive first"
-            )
+        """Rows of `images/`, plain ones first, then those of `images-NAME/`."""
         names = [effect.name for effect in self.plan.library]
         rows = []
-        for name, read in found.items():
-            psi = np.zeros((len(read), len(names)))
-            if name:
-                psi[:, names.index(name)] = read.psi[:, 0]
-            rows.append(Rows(read.theta, read.condition, psi, read.x))
+        for images in self._image_rows():
+            found = images.rows()
+            if found is None:
+                raise TrainingDataError(f"{images.folder} is not whole: fill the archive first")
+            for effects, read in found:
+                psi = np.zeros((len(read), len(names)))
+                psi[:, [names.index(name) for name in effects]] = read.psi
+                rows.append(Rows(read.theta, read.condition, psi, read.x))
         return rows
 
 

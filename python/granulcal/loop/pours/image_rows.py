@@ -1,12 +1,17 @@
-"""Base pours whose image is read again under every effect of the image: one pour serves them all.
+"""Pours whose image is read again under the effects of the image: one pour serves them all.
 
-They are pours of the plain model as well and count among them. In the archive's folder `images/`:
-chunks of pours, each with its parameters, its statistics, and the strength and statistics under
-each effect. A chunk is whole or absent, and is made again where an effect has been added.
+Base pours are read plainly, under each effect of the image, and under each two of them. They are
+pours of the plain model as well and count among them: the archive's folder `images/`. Pours with an
+effect that is poured, which count among that effect's, are read under it and each effect of the
+image: `images-NAME/`. So the surrogate sees what two effects do together.
+
+Chunks of pours hold for each its parameters, and strengths and statistics of each reading. A chunk
+is whole or absent, and is made again where an effect has been added.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from zlib import crc32
 
@@ -33,11 +38,13 @@ _STREAM = 5
 # Share of the pours that each effect reads again: copies of a pour share its noise, and a surrogate
 # that took many for pours of their own would be too sure of itself.
 _SHARE = 0.5
+# The same of each two effects.
+_TWO_SHARE = 0.2
 
 
 @dataclass(frozen=True)
 class ImageRows:
-    """Pours read under effects of the image.
+    """Pours of one model, read under effects of the image.
 
     Attributes:
         folder: of the chunks.
@@ -48,6 +55,7 @@ class ImageRows:
         effects: of the image.
         count: pours.
         seed: of all of them.
+        poured: effect that the pours have; None for the base model's.
     """
 
     folder: Path
@@ -58,34 +66,52 @@ class ImageRows:
     effects: tuple[LibraryEffect, ...]
     count: int
     seed: int
+    poured: LibraryEffect | None = None
+
+    @property
+    def readings(self) -> tuple[tuple[LibraryEffect, ...], ...]:
+        """Effects of the image in each reading; () is none."""
+        alone = tuple((effect,) for effect in self.effects)
+        if self.poured is not None:
+            # Read plainly as well it would be copied once more, and tell nothing of two effects.
+            return alone
+        return ((), *alone, *combinations(self.effects, 2))
 
     def fill(self, *, threads: int, say: Callable[[str], None] = print) -> None:
         """Pours what is missing."""
         missing = [i for i in range(self._chunks) if self._read(i) is None]
         if missing:
-            say(f"images: {len(missing) * _CHUNK} pours, read under {len(self.effects)} effects")
+            of = f" of {self.poured.name}" if self.poured else ""
+            say(
+                f"images{of}: {len(missing) * _CHUNK} pours, read under {len(self.effects)} effects"
+            )
         store = PourStore(self.folder, threads)
         for chunk in missing:
-            of = range(chunk * _CHUNK, min((chunk + 1) * _CHUNK, self.count))
-            rows = store.make(self._row, of)
+            of_chunk = range(chunk * _CHUNK, min((chunk + 1) * _CHUNK, self.count))
+            rows = store.make(self._row, of_chunk)
             store.keep(_name(chunk), {k: np.array([row[k] for row in rows]) for k in rows[0]})
 
-    def rows(self) -> dict[str, Rows] | None:
-        """Returns the usable pours, with the strength of one effect as the only psi.
+    def rows(self) -> Iterator[tuple[tuple[str, ...], Rows]] | None:
+        """Returns the usable readings and the effects of each; None if pours are missing.
 
-        Plain ones under the name "", those under an effect under its name; None if pours are
-        missing.
+        Columns of psi are the strengths of these effects, the poured one's first.
         """
-        parts: dict[str, list[Rows]] = {"": []}
-        for chunk in range(self._chunks):
-            found = self._read(chunk)
-            if found is None:
-                return None
-            for name in ("", *(effect.name for effect in self.effects)):
-                x, psi = found[f"x/{name}"], found[f"psi/{name}"][:, None]
+        chunks = [self._read(chunk) for chunk in range(self._chunks)]
+        whole = [chunk for chunk in chunks if chunk is not None]
+        return self._readings(whole) if len(whole) == len(chunks) else None
+
+    def _readings(self, chunks: list[dict[str, Array]]) -> Iterator[tuple[tuple[str, ...], Rows]]:
+        first = () if self.poured is None else (self.poured.name,)
+        for reading in self.readings if chunks else ():
+            key = _key(reading)
+            parts = []
+            for found in chunks:
+                x, psi = found[f"x/{key}"], found[f"psi/{key}"]
+                if self.poured is not None:
+                    psi = np.column_stack([found["poured"], psi])
                 rows = Rows(found["theta"], found["condition"], psi, x)
-                parts.setdefault(name, []).append(rows.taken(np.all(np.isfinite(x), axis=1)))
-        return {name: Rows.joined(chunks) for name, chunks in parts.items()}
+                parts.append(rows.taken(np.all(np.isfinite(x), axis=1)))
+            yield (*first, *(effect.name for effect in reading)), Rows.joined(parts)
 
     @property
     def _chunks(self) -> int:
@@ -96,7 +122,7 @@ class ImageRows:
         if found is None or "theta" not in found:
             return None
         wanted = min((chunk + 1) * _CHUNK, self.count) - chunk * _CHUNK
-        is_whole = all(f"x/{effect.name}" in found for effect in self.effects)
+        is_whole = all(f"x/{_key(reading)}" in found for reading in self.readings)
         return (
             {k: v[:wanted] for k, v in found.items()}
             if is_whole and len(found["theta"]) >= wanted
@@ -104,8 +130,10 @@ class ImageRows:
         )
 
     def _row(self, row: int) -> dict[str, Array]:
-        """One pour: NaN for what it does not show, and under effects that leave it out."""
-        generator = np.random.default_rng([self.seed, _STREAM, row])
+        """One pour: NaN for what it does not show, and for readings that leave it out."""
+        poured = None if self.poured is None else self.poured.at(self.scene)
+        own = () if poured is None else (crc32(poured.name.encode()),)
+        generator = np.random.default_rng([self.seed, _STREAM, row, *own])
         theta = generator.random(len(self.prior.names))
         unit = generator.random(len(self.conditions))
         values = dict(
@@ -118,7 +146,16 @@ class ImageRows:
         if self.places:
             at = self.places[row % len(self.places)]
             unit = np.array([(at[p] - low) / (high - low) for p, low, high in self.conditions])
-        scene = self.scene.with_({**self.prior.fixed, **values, **at})
+        numbers = {**self.prior.fixed, **values, **at}
+        found = {"theta": theta, "condition": unit}
+        if poured is not None:
+            psi = float(generator.uniform(-1.0 if poured.is_two_sided else 0.0, 1.0))
+            numbers |= poured.numbers(psi)
+            if poured.whole:
+                # A whole number may lie half a grain beyond full strength.
+                psi = float(np.clip(poured.strength(np.array(poured.value(psi))), -1.0, 1.0))
+            found["poured"] = np.array(psi)
+        scene = self.scene.with_(numbers)
         pour = simulate(scene, seed=int(generator.integers(2**62)))
         measures = Measures.of(scene)
         nothing = np.full(len(measures.names), np.nan)
@@ -131,14 +168,24 @@ class ImageRows:
                 # Too few grains in view.
                 return nothing
 
-        found = {"theta": theta, "condition": unit, "psi/": np.array(0.0), "x/": measure({})}
-        for effect in self.effects:
-            own = np.random.default_rng([self.seed, _STREAM, row, crc32(effect.name.encode())])
-            psi = own.uniform(-1.0 if effect.is_two_sided else 0.0, 1.0)
-            is_read = own.random() < _SHARE
-            found[f"psi/{effect.name}"] = np.array(psi)
-            found[f"x/{effect.name}"] = measure(effect.faults(psi)) if is_read else nothing
+        for reading in self.readings:
+            key = _key(reading)
+            # The seeds of what one effect alone is read with are those of before there were two.
+            of = np.random.default_rng([self.seed, _STREAM, row, *own, crc32(key.encode())])
+            lows = [-1.0 if effect.is_two_sided else 0.0 for effect in reading]
+            psi_ = np.array([of.uniform(low, 1.0) for low in lows])
+            share = (1.0, _SHARE, _TWO_SHARE)[len(reading)]
+            is_read = not reading or of.random() < share
+            faults: dict[str, float] = {}
+            for effect, strength in zip(reading, psi_.tolist(), strict=True):
+                faults |= effect.faults(strength)
+            found[f"psi/{key}"] = psi_
+            found[f"x/{key}"] = measure(faults) if is_read else nothing
         return found
+
+
+def _key(reading: tuple[LibraryEffect, ...]) -> str:
+    return "+".join(effect.name for effect in reading)
 
 
 def _name(chunk: int) -> str:

@@ -93,11 +93,12 @@ def _of_effect(
     plan: ArchivePlan, effect: LibraryEffect, common: list[Parameter], seed: int
 ) -> list[Part]:
     own, name = effect.at(plan.scene), f"effect-{effect.name}"
+    each = plan.each - (plan.images_each if plan.is_crossed(effect) else 0)
     if own.held is not None or not own.whole:
         scene = plan.scene.with_(dict(own.also)) if own.also else plan.scene
         prior = Prior(common if own.held is not None else [*common, own.parameter()])
-        return [Part(name, scene, prior, plan.each, seed, effect.name)]
-    share = -(-plan.each // len(_WHOLE_STRENGTHS))
+        return [Part(name, scene, prior, each, seed, effect.name)]
+    share = -(-each // len(_WHOLE_STRENGTHS))
     return [
         Part(
             f"{name}-{number}",

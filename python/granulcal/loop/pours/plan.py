@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 # Most base pours whose images are kept at hand for faults of the image, and their
 # largest share of the base.
 _IMAGES, _IMAGES_SHARE = 400, 0.25
+# Share of an effect's pours whose images are kept at hand, to be read under the image's as well.
+_CROSSED_SHARE = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,6 +93,16 @@ class ArchivePlan:
         if not any(effect.image for effect in self.library):
             return 0
         return min(_IMAGES, int(_IMAGES_SHARE * self.base))
+
+    def is_crossed(self, effect: LibraryEffect) -> bool:
+        """Whether some pours of an effect are read under those of the image as well."""
+        is_candidate = effect.nuisance_sd is None and effect.held is None
+        return self.images > 0 and is_candidate and not effect.is_free
+
+    @property
+    def images_each(self) -> int:
+        """How many pours of such an effect are."""
+        return int(_CROSSED_SHARE * self.each) if self.images else 0
 
     def unit(self, at: dict[str, float]) -> Array:
         """Returns the inputs of a condition that states the numbers `at` in [0, 1], shape (q,)."""

@@ -1,5 +1,7 @@
 """Features of the surrogate, and the axes of uncorrelated noise that it stands on."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,6 +9,8 @@ from granulcal.bayessim.emulator.basis import Basis, polynomial
 from granulcal.errors import TrainingDataError
 
 __all__ = [
+    "crossed_columns",
+    "crossed_effects",
     "held_residuals",
     "lack_of_fit",
     "mean_columns",
@@ -28,6 +32,8 @@ _LARGEST_SHARE = 0.9
 _LACK_ROWS, _NEIGHBOURS = 2000, 4
 # Prior standard deviations of constant, slopes and curvatures of an effect, before its own width.
 _CONSTANT, _SLOPE, _CURVATURE = 1.0, 0.5, 0.25
+# Fewest rows that say what two effects do together.
+_CROSSED_ROWS = 4
 
 
 def held_residuals(noise: Array) -> Array:
@@ -84,9 +90,23 @@ def usable_statistics(x: Array, labels: tuple[str, ...]) -> tuple[NDArray[np.int
 
 
 def mean_columns(
-    basis: Basis, u: Array, psi: Array, bent: NDArray[np.bool_]
+    basis: Basis,
+    u: Array,
+    psi: Array,
+    bent: NDArray[np.bool_],
+    crossed: Sequence[tuple[int, int]] = (),
+    inputs: int = 0,
 ) -> tuple[Array, list[slice]]:
-    """Returns the features of the mean, shape (n, f), and where each block of them stands."""
+    """Returns the features of the mean, shape (n, f), and where each block of them stands.
+
+    Args:
+        basis: of f_0.
+        u: coordinates (theta, c), shape (n, p + q).
+        psi: strengths, shape (n, K).
+        bent: effects that have a square, shape (K,).
+        crossed: two effects each that have a product.
+        inputs: q.
+    """
     first, second = _effect_columns(u)
     main = basis(u)
     waves = 2 * len(basis.frequencies)
@@ -96,9 +116,25 @@ def mean_columns(
         strength = psi[:, k : k + 1]
         parts += [strength * first, bent[k] * strength**2 * second]
         widths += [first.shape[1], second.shape[1]]
+    both = crossed_columns(u[:, u.shape[1] - inputs :])
+    for k, other in crossed:
+        parts.append(psi[:, k : k + 1] * psi[:, other : other + 1] * both)
+        widths.append(both.shape[1])
     stops = np.cumsum(widths)
     blocks = [slice(int(b - w), int(b)) for b, w in zip(stops, widths, strict=True)]
     return np.concatenate(parts, axis=1), blocks
+
+
+def crossed_columns(condition: Array) -> Array:
+    """Returns prior-scaled monomials of what two effects do together, shape (n, 1 + q)."""
+    return np.column_stack([np.full(len(condition), _CONSTANT), _SLOPE * (2 * condition - 1)])
+
+
+def crossed_effects(psi: Array) -> tuple[tuple[int, int], ...]:
+    """Returns which two effects at least `_CROSSED_ROWS` rows of psi (n, K) have both, in order."""
+    both = (psi != 0).astype(np.float64)
+    many = np.triu(both.T @ both, 1)
+    return tuple((int(k), int(other)) for k, other in np.argwhere(many >= _CROSSED_ROWS))
 
 
 def _effect_columns(u: Array) -> tuple[Array, Array]:

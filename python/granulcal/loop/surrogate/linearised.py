@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.effects.design import cube_from_normal
+from granulcal.loop.surrogate.columns import crossed_columns
 from granulcal.loop.surrogate.surrogate import Surrogate
 
 __all__ = ["LinearisedSurrogate"]
@@ -40,6 +41,8 @@ class LinearisedSurrogate:
         correlations: R_h times the Hotelling factor, shape (H, m, m).
         error_roots: of the mean's uncertainty: without effects, then for each effect the part that
             psi multiplies and the part that psi^2 does, shape (1 + 2 K, H, m, d).
+        crossed_roots: of the part that the product of two strengths multiplies, for each two that
+            have one, shape (X, H, m, d).
         shift_roots: of the shifts of theta that effects are in part, shape (K, H m, r).
         own_errors: what a standard deviation of each declared nuisance does, shape (N, H, m).
         sessions: number of the session of each condition, shape (H,).
@@ -51,6 +54,7 @@ class LinearisedSurrogate:
     v: Array
     correlations: Array
     error_roots: Array
+    crossed_roots: Array
     shift_roots: Array
     own_errors: Array
     sessions: NDArray[np.int64]
@@ -95,6 +99,7 @@ class LinearisedSurrogate:
             np.ascontiguousarray(
                 roots.reshape(size, count, 1 + 2 * len(effects), -1).transpose(2, 1, 0, 3)
             ),
+            _crossed_roots(surrogate, conditions),
             np.array(
                 [
                     surrogate.shift.root(np.column_stack([rows, conditions]), k).reshape(
@@ -205,6 +210,9 @@ class LinearisedSurrogate:
         for k in np.nonzero(psi)[0]:
             linear, square = self.error_roots[1 + 2 * k], self.error_roots[2 + 2 * k]
             root = root + psi[k] * linear + psi[k] ** 2 * square
+        crossed = self.surrogate.crossed
+        for k, other in self.surrogate.crossed_of(psi[None]):
+            root = root + psi[k] * psi[other] * self.crossed_roots[crossed.index((k, other))]
         return root
 
     @cached_property
@@ -242,3 +250,14 @@ class LinearisedSurrogate:
         count = len(self.conditions)
         theta = np.tile(cube_from_normal(v), (count, 1))
         return self.surrogate.scale(theta, self.conditions, np.tile(psi, (count, 1)))
+
+
+def _crossed_roots(surrogate: Surrogate, conditions: Array) -> Array:
+    """Roots of the uncertainty of what two effects do together, shape (X, H, m, d)."""
+    along = crossed_columns(conditions)
+    shape = len(surrogate.crossed), len(conditions), *surrogate.roots.shape[::2]
+    roots: Array = np.empty(shape)
+    for i, (k, other) in enumerate(surrogate.crossed):
+        part = surrogate.roots[:, surrogate.crossed_slice(k, other)]
+        roots[i] = np.einsum("hf,mfd->hmd", along, part)
+    return roots

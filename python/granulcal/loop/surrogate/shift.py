@@ -103,7 +103,21 @@ class Shift:
 
     def move(self, u: Array, k: int) -> Array:
         """Returns J a_k at rows of (theta, c), shape (n, m)."""
-        return self._moves(u) @ self.shifts[k].ravel()
+        psi = np.zeros((len(u), len(self.shifts)))
+        psi[:, k] = 1.0
+        return self.along(u, psi)
+
+    def along(self, u: Array, psi: Array) -> Array:
+        r"""Returns $J \sum_k \psi_k a_k$ at rows of (theta, c), a slope of f_0, shape (n, m)."""
+        numbers = (psi @ self.shifts.reshape(len(self.shifts), -1)).reshape(
+            len(u), self.parameters, -1
+        )
+        by = (numbers @ _terms(u)[:, :, None])[:, :, 0]
+        up, down = u.copy(), u.copy()
+        up[:, : self.parameters] += _STEP * by
+        down[:, : self.parameters] -= _STEP * by
+        change = (self.basis(up) - self.basis(down)) / (2 * _STEP)
+        return change @ self.coefficients.T
 
     def root(self, u: Array, k: int) -> Array:
         """Returns the root of the covariance of `move`, shape (n, m, r)."""
@@ -118,8 +132,12 @@ class Shift:
             down[:, i] -= _STEP
             change = (self.basis(up) - self.basis(down)) / (2 * _STEP)
             slopes[:, :, i] = change @ self.coefficients.T
-        terms = np.concatenate([np.ones((len(u), 1)), 2 * u - 1], axis=1)
-        return (slopes[:, :, :, None] * terms[:, None, None, :]).reshape(*slopes.shape[:2], -1)
+        return (slopes[:, :, :, None] * _terms(u)[:, None, None, :]).reshape(*slopes.shape[:2], -1)
+
+
+def _terms(u: Array) -> Array:
+    """What a_k is linear in, shape (n, 1 + p + q)."""
+    return np.concatenate([np.ones((len(u), 1)), 2 * u - 1], axis=1)
 
 
 def _ridge(

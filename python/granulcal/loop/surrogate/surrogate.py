@@ -6,12 +6,14 @@ surrogate's errors on different axes are independent, and an axis that many stat
 as well known as it deserves. On the axes
 
 $$ m(\theta, c, \psi) = f_0(\theta, c)
-   + \sum_k \psi_k (J a_k + \tilde g_k)(\theta, c) + \psi_k^2 h_k(\theta, c), \qquad
+   + \sum_k \psi_k (J a_k + \tilde g_k)(\theta, c) + \psi_k^2 h_k(\theta, c)
+   + \sum_{k < l} \psi_k \psi_l q_{kl}(c), \qquad
    y = m + s(\theta, c, \psi) \epsilon, \quad \epsilon \sim (0, R) $$
 
 $f_0$ is a quadratic and random features of a Matern kernel; $J a_k$ the part of an effect that is a
 shift of theta (`shift.py`), $\tilde g_k$ a quadratic and $h_k$ a linear function, each with a prior
-width learnt for every statistic and effect (`blocks.py`). log s is a
+width learnt for every statistic and effect (`blocks.py`). $q_{kl}$, linear in c, is what two
+effects do together, learnt of those that the archive has poured or read together. log s is a
 function of the same coordinates and of the strengths. What the archive leaves unknown about m is
 the posterior of the coefficients, the same for all pours of a condition and correlated between
 conditions; nothing about it averages away with more measured pours. What the features cannot follow
@@ -29,6 +31,7 @@ Reference:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,6 +44,8 @@ from granulcal.loop.surrogate.anchor import Anchor
 from granulcal.loop.surrogate.blocks import fit_blocks
 from granulcal.loop.surrogate.columns import (
     _effect_columns,
+    crossed_columns,
+    crossed_effects,
     held_residuals,
     lack_of_fit,
     mean_columns,
@@ -95,6 +100,7 @@ class Surrogate:
         is_donor: rows whose residuals make replicates and no covariance, shape (n,).
         dof: rows less coefficients that they decided, mean over statistics.
         excluded: rows that were not finite.
+        crossed: two effects each that have a q_kl.
         anchor: what true pours at a fit have shown; None before any.
     """
 
@@ -121,6 +127,7 @@ class Surrogate:
     is_donor: NDArray[np.bool_]
     dof: float
     excluded: int
+    crossed: tuple[tuple[int, int], ...] = ()
     anchor: Anchor | None = None
 
     @classmethod
@@ -190,7 +197,9 @@ class Surrogate:
             moved[on] += psi_[on, k, None] * shift.move(u[on], k)
         z = z - moved
         bent = np.array([effect.held is None for effect in design.effects], dtype=bool)
-        design_matrix, blocks = mean_columns(basis, u, psi_, bent)
+        crossed = crossed_effects(psi_)
+        inputs = condition_.shape[1]
+        design_matrix, blocks = mean_columns(basis, u, psi_, bent, crossed, inputs)
         scale_matrix = scale_columns(scale_basis, u, psi_, bent)
         coefficients = np.empty((size, design_matrix.shape[1]))
         roots = np.empty((size, design_matrix.shape[1], design_matrix.shape[1]))
@@ -236,6 +245,7 @@ class Surrogate:
             is_donor=is_donor,
             dof=dof,
             excluded=int((~kept).sum()),
+            crossed=crossed,
         )
 
     @property
@@ -293,7 +303,8 @@ class Surrogate:
 
     def features(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns the features at rows of (theta, condition, psi), shape (n, d)."""
-        return mean_columns(self.basis, np.column_stack([theta, condition]), psi, self._bent)[0]
+        u, inputs = np.column_stack([theta, condition]), condition.shape[1]
+        return mean_columns(self.basis, u, psi, self._bent, self.crossed, inputs)[0]
 
     @property
     def _bent(self) -> NDArray[np.bool_]:
@@ -334,8 +345,26 @@ class Surrogate:
             bend = strength**2 if self._bent[k] else 0.0 * strength
             columns = np.concatenate([strength * first, bend * second], axis=1)
             total += columns @ self.coefficients[:, start : start + step].T
-            total += strength * self.shift.move(u, int(k))
+        total += self.shift.along(u, psi)
+        for k, other in self.crossed_of(psi):
+            strength = psi[:, k : k + 1] * psi[:, other : other + 1]
+            total += strength * (crossed_columns(condition) @ self._of_crossed(k, other).T)
         return total
+
+    def crossed_of(self, psi: Array) -> list[tuple[int, int]]:
+        """Returns which two effects of rows of psi (n, K) have a q_kl."""
+        active = np.nonzero(psi.any(axis=0))[0].tolist()
+        return [pair for pair in combinations(active, 2) if pair in self.crossed]
+
+    def crossed_slice(self, k: int, other: int) -> slice:
+        """Returns the columns of q_kl among the features."""
+        width = 1 + len(self.design.conditions)
+        start = self.coefficients.shape[1] - width * len(self.crossed)
+        start += width * self.crossed.index((k, other))
+        return slice(start, start + width)
+
+    def _of_crossed(self, k: int, other: int) -> Array:
+        return self.coefficients[:, self.crossed_slice(k, other)]
 
     def scale(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns s at rows of (theta, condition, psi), shape (n, m)."""

@@ -17,7 +17,7 @@ class Thresholds:
             without effects among them [nat].
         null_share, single_share: prior probability of no effect, and of one effect; the rest is
             that of two.
-        pairs: largest number of pairs of effects that are fitted.
+        pairs: largest number of pairs of effects that are fitted, the more probable singles first.
         replicates: of the residual test before any effect is fitted.
         replicates_after: of the residual test after each fit.
         refits: replicates that are refitted in full to scale the linear ones.
@@ -32,7 +32,7 @@ class Thresholds:
     rivals: float = 3.0
     null_share: float = 0.5
     single_share: float = 0.4
-    pairs: int = 4
+    pairs: int = 200
     replicates: int = 2000
     replicates_after: int = 600
     refits: int = 32

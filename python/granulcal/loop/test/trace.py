@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,6 @@ Array = NDArray[np.float64]
 
 # Models whose log probability is this far below the best need no test of what they leave [nat].
 _HOPELESS = 12.0
-# Forward steps start from so many singles.
-_PARENTS = 2
 # Effects named beside a residual.
 _NEAREST = 3
 
@@ -322,7 +321,7 @@ def _models(
     singles = [
         fit_single(local, target, base, k, rules, starts) for k in steps("effects", candidates)
     ]
-    singles.sort(key=lambda model: -model.log_probability)
+    singles.sort(key=_by, reverse=True)
     best = singles[0].log_probability
     tested = [
         (m, _after(local, m, rules, seed) if m.log_probability > best - _HOPELESS else np.nan)
@@ -331,17 +330,21 @@ def _models(
     adequate = [m for m, p in tested if p > rules.adequate]
     if adequate and adequate[0].log_probability > best - rules.rivals:
         return tested
-    pairs: dict[tuple[int, int], Model] = {}
-    for parent in singles[:_PARENTS]:
-        rest = tuple(k for k in candidates if k not in parent.effects)
-        scores = Scores.of(local, parent.fit, rest)
-        squares = scores.squares((scores.whiten @ parent.fit.residual)[:, None])[:, 0]
-        for i in np.argsort(-squares)[: max(1, rules.pairs // _PARENTS)]:
-            k = rest[int(i)]
-            pair = (min(parent.effects[0], k), max(parent.effects[0], k))
-            if pair not in pairs:
-                pairs[pair] = fit_pair(local, target, base, parent.fit, pair, rules)
-    return tested + [(m, _after(local, m, rules, seed)) for m in pairs.values()]
+    alone = {model.effects[0]: model for model in singles}
+    # Two effects may hide each other so well that neither explains much alone: all are fitted, each
+    # pair from its more probable member.
+    two = [(min(k, other), max(k, other)) for k, other in combinations(alone, 2)]
+    pairs = [
+        fit_pair(local, target, base, max(alone[k], alone[other], key=_by).fit, (k, other), rules)
+        for k, other in steps("pairs", two[: rules.pairs])
+    ]
+    best = max(model.log_probability for model in [*singles, *pairs])
+    near = sorted((m for m in pairs if m.log_probability > best - _HOPELESS), key=_by)
+    return tested + [(m, _after(local, m, rules, seed)) for m in reversed(near)]
+
+
+def _by(model: Model) -> float:
+    return model.log_probability
 
 
 def _after(local: LinearisedSurrogate, model: Model, rules: Thresholds, seed: int) -> float:

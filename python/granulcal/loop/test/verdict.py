@@ -8,9 +8,14 @@
 | SET | several families are |
 | EFFECTS | the best adequate model needs two effects: first the one that is more probable alone |
 | UNEXPLAINED | p <= `name`, and no model of one or two effects leaves nothing |
+
+A second effect has to be told from none as a first one has: a pair that is not `rivals` nat more
+probable than its better member alone gives way to that one. What the member leaves is then asked of
+its own pours (`standing.py`).
 """
 
 from dataclasses import dataclass
+from math import inf
 
 from granulcal.loop.effects.design import Design
 from granulcal.loop.test.refit import Model
@@ -76,7 +81,7 @@ def decide(
         best = max(after for _, after in models)
         why = f"no one or two effects of the library explain it (best p after a fit {best:.3g})"
         return Verdict("UNEXPLAINED", (), (), p, why)
-    best = max(adequate, key=lambda model: model.log_probability)
+    best = max(adequate, key=_by)
     gain = best.log_probability - none.log_probability
     if gain <= thresholds.rivals:  # No effect is a rival like any other.
         why = (
@@ -84,10 +89,14 @@ def decide(
             f"{gain:.1f} nat of log probability, {thresholds.rivals:g} asked"
         )
         return Verdict("RESIDUAL", (), (), p, why)
+    alone = {m.effects[0]: m for m, _ in models if len(m.effects) == 1}
+    lead = max((alone[k] for k in best.effects if k in alone), key=_by, default=best)
+    if best.log_probability - lead.log_probability <= thresholds.rivals:
+        best = lead
+        gain = best.log_probability - none.log_probability
     if len(best.effects) == 2:
-        alone = {m.effects[0]: m.log_probability for m, _ in models if len(m.effects) == 1}
         # The one that explains more by itself comes first.
-        members = tuple(sorted(best.effects, key=lambda k: -alone.get(k, float("-inf"))))
+        members = tuple(sorted(best.effects, key=lambda k: -_by(alone[k]) if k in alone else inf))
         names = tuple(design.effects[k].name for k in members)
         kin = _families(design, members, merged)
         if len(kin) == 1:
@@ -95,16 +104,20 @@ def decide(
         return Verdict("EFFECTS", names, kin, p, _gain(gain))
     near = [
         model
-        for model in adequate
-        if len(model.effects) == 1
+        for model in alone.values()
+        if any(model is one for one in (best, *adequate))
         and model.log_probability > best.log_probability - thresholds.rivals
     ]
-    near.sort(key=lambda model: -model.log_probability)
+    near.sort(key=_by, reverse=True)
     effects = tuple(model.effects[0] for model in near)
     kin = _families(design, effects, merged)
     names = tuple(design.effects[k].name for k in effects)
     kind = "EFFECT" if len(kin) == 1 else "SET"
     return Verdict(kind, names, kin, p, _gain(gain))
+
+
+def _by(model: Model) -> float:
+    return model.log_probability
 
 
 def _gain(gain: float) -> str:
