@@ -60,6 +60,7 @@ def _finals(of: dict[str, list[Row]]) -> None:
     _rate("null: alarm", alarms, "<= 5 % (<= 8 %)")
     _rate("null: named", [_is_named(r) for r in final["null"]])
     _rate("no word (UNCONFIRMED), of all", [r["verdict"] == "UNCONFIRMED" for r in spoken])
+    _rate("looked again, of all", [r.get("looked", 0) > 0 for r in spoken])
     _bands(
         final["single"],
         ("single: alarm", "single: named"),

@@ -10,10 +10,13 @@ r"""What the models' own pours teach the surrogate, where they contradict what t
 
 A surrogate that is unsure of a model takes it for adequate where the model's own pours are not: one
 effect hides a second one so. It can be unsure of the base model as well, and sees nothing where
-that model's pours leave something; and where no model is adequate by it, the most probable one may
-be so by its pours. What the pours say at these fits the surrogate knows from then on, and other
-models are held against it. The pours of the next round are fresh: no word rests on pours that the
-surrogate has seen.
+that model's pours leave something. What the pours say at these fits the surrogate knows from then
+on, and other models are held against it; where none is adequate by that, the most probable one is
+poured next. The pours of the next round are fresh: no word rests on pours that the surrogate has
+seen.
+
+Where no model is adequate by the archive alone, that stands: whoever looks on until something fits
+names an effect of the library for one that it lacks (docs/results/loop-self.md).
 
 Reference:
     Jones, Schonlau and Welch, Efficient global optimization of expensive black-box functions, J.
@@ -88,7 +91,8 @@ def look_again(
         settled = settle(fresh, surrogate, found, observed)
         there = placed(fresh, settled.surrogate, settled.trace, measured, settled.simulated)
         why = _contradiction(settled.trace, there, analysis.rules)
-        more = _poured(analysis, settled, there) if why and number < ROUNDS else []
+        stands = number == ROUNDS or (number == 0 and settled.trace.verdict.kind == "UNEXPLAINED")
+        more = _poured(analysis, settled, there) if why and not stands else []
         if not more:
             return Looked(settled, there, number, before)
         number += 1
