@@ -65,7 +65,7 @@ def _finals(of: dict[str, list[Row]]) -> None:
         final["single"],
         ("single: alarm", "single: named"),
         lambda r: r["verdict"] in _ALARMS,
-        lambda r: r["best"][0],
+        lambda r: r["named"][0],
     )
     _naming(final)
     named = [r for r in final["single"] if _is_named(r) and r["best"] == r["effects"] and r["own"]]
