@@ -196,6 +196,7 @@ def test_some_pours_of_an_effect_are_read_under_those_of_the_image(tmp_path: Pat
     # 24 plain ones, 16 of each effect; 8 + 2 x 4 with their images.
     assert archive.missing == 72
     archive.fill(threads=1, say=lambda _: None, progress=False)
+    assert archive.missing == 0
     assert {p.name for p in archive.folder.glob("images*")} == {
         "images",
         "images-tilt.x",

@@ -121,8 +121,8 @@ class Archive:
 
     @property
     def missing(self) -> int:
-        """Pours that are planned and not there yet; those with images count as missing."""
-        count = sum(images.count for images in self._image_rows())
+        """Pours that are planned and not there yet."""
+        count = sum(images.missing for images in self._image_rows())
         for part in parts_of(self.plan):
             folder = self.folder / part.name
             there = len(Dataset.load(folder)) if folder.exists() else 0

@@ -77,14 +77,18 @@ class ImageRows:
             return alone
         return ((), *alone, *combinations(self.effects, 2))
 
+    @property
+    def missing(self) -> int:
+        """Pours that are not there yet, in whole chunks."""
+        chunks = (min(_CHUNK, self.count - _CHUNK * i) for i in self._missing)
+        return sum(chunks)
+
     def fill(self, *, threads: int, say: Callable[[str], None] = print) -> None:
         """Pours what is missing."""
-        missing = [i for i in range(self._chunks) if self._read(i) is None]
+        missing = self._missing
         if missing:
             of = f" of {self.poured.name}" if self.poured else ""
-            say(
-                f"images{of}: {len(missing) * _CHUNK} pours, read under {len(self.effects)} effects"
-            )
+            say(f"images{of}: {self.missing} pours, read under {len(self.effects)} effects")
         store = PourStore(self.folder, threads)
         for chunk in missing:
             of_chunk = range(chunk * _CHUNK, min((chunk + 1) * _CHUNK, self.count))
@@ -116,6 +120,10 @@ class ImageRows:
     @property
     def _chunks(self) -> int:
         return -(-self.count // _CHUNK)
+
+    @property
+    def _missing(self) -> list[int]:
+        return [i for i in range(self._chunks) if self._read(i) is None]
 
     def _read(self, chunk: int) -> dict[str, Array] | None:
         found = PourStore(self.folder).read(_name(chunk))
