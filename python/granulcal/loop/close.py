@@ -91,7 +91,8 @@ def close_loop(
         task: scene, prior, recordings.
         out: folder of the report; one that was cut off goes on.
         archive: folder of the pours, shared between analyses of one scene; `out`/archive if None.
-        budget: pours, all told; those of a surrogate that is found wrong at its fits come on top.
+        budget: pours, all told; those of a surrogate that is found wrong at its fits, and that
+            contradict what these say, come on top.
         threads: pours at once; one for each core if None.
         seed: of everything.
         thresholds: of the verdict.
