@@ -110,7 +110,9 @@ class ImageRows:
             key = _key(reading)
             parts = []
             for found in chunks:
-                x, psi = found[f"x/{key}"], found[f"psi/{key}"]
+                x = found[f"x/{key}"]
+                # Before there were readings of two effects, strengths were numbers.
+                psi = found[f"psi/{key}"].reshape(len(x), -1)[:, : len(reading)]
                 if self.poured is not None:
                     psi = np.column_stack([found["poured"], psi])
                 rows = Rows(found["theta"], found["condition"], psi, x)
