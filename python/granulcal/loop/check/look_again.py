@@ -130,12 +130,12 @@ def _best(found: Trace) -> Explanation:
 
 def _poured(analysis: Analysis, settled: Settled, there: Placed) -> list[Rows]:
     """Pours of the base model and of the best one at their fits, and where that was placed."""
-    held, seed = settled.trace, settled.seed
-    models = [(held.base, seed), (_best(held), seed)]
+    held, best = settled.trace, _best(settled.trace)
+    models = [(held.base, settled.seed)]
+    if best is not held.base:
+        models.append((best, settled.seed))
     if there.trace is not held:
         models.append((there.trace.best, there.seed))
-    if models[1][0] is held.base:
-        del models[1]
     return [rows for one, of in models for rows in _rows(analysis, one, of)]
 
 

@@ -80,19 +80,18 @@ class ImageRows:
     @property
     def missing(self) -> int:
         """Pours that are not there yet, in whole chunks."""
-        chunks = (min(_CHUNK, self.count - _CHUNK * i) for i in self._missing)
-        return sum(chunks)
+        return sum(len(self._of(chunk)) for chunk in self._missing)
 
     def fill(self, *, threads: int, say: Callable[[str], None] = print) -> None:
         """Pours what is missing."""
         missing = self._missing
         if missing:
             of = f" of {self.poured.name}" if self.poured else ""
-            say(f"images{of}: {self.missing} pours, read under {len(self.effects)} effects")
+            count = sum(len(self._of(chunk)) for chunk in missing)
+            say(f"images{of}: {count} pours, read under {len(self.effects)} effects")
         store = PourStore(self.folder, threads)
         for chunk in missing:
-            of_chunk = range(chunk * _CHUNK, min((chunk + 1) * _CHUNK, self.count))
-            rows = store.make(self._row, of_chunk)
+            rows = store.make(self._row, self._of(chunk))
             store.keep(_name(chunk), {k: np.array([row[k] for row in rows]) for k in rows[0]})
 
     def rows(self) -> Iterator[tuple[tuple[str, ...], Rows]] | None:
@@ -123,6 +122,10 @@ class ImageRows:
     def _chunks(self) -> int:
         return -(-self.count // _CHUNK)
 
+    def _of(self, chunk: int) -> range:
+        """The pours of a chunk, by number."""
+        return range(chunk * _CHUNK, min((chunk + 1) * _CHUNK, self.count))
+
     @property
     def _missing(self) -> list[int]:
         return [i for i in range(self._chunks) if self._read(i) is None]
@@ -131,7 +134,7 @@ class ImageRows:
         found = PourStore(self.folder).read(_name(chunk))
         if found is None or "theta" not in found:
             return None
-        wanted = min((chunk + 1) * _CHUNK, self.count) - chunk * _CHUNK
+        wanted = len(self._of(chunk))
         is_whole = all(f"x/{_key(reading)}" in found for reading in self.readings)
         return (
             {k: v[:wanted] for k, v in found.items()}

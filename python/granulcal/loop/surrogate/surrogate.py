@@ -348,7 +348,8 @@ class Surrogate:
         total += self.shift.along(u, psi)
         for k, other in self.crossed_of(psi):
             strength = psi[:, k : k + 1] * psi[:, other : other + 1]
-            total += strength * (crossed_columns(condition) @ self._of_crossed(k, other).T)
+            learnt = self.coefficients[:, self.crossed_slice(k, other)]
+            total += strength * (crossed_columns(condition) @ learnt.T)
         return total
 
     def crossed_of(self, psi: Array) -> list[tuple[int, int]]:
@@ -362,9 +363,6 @@ class Surrogate:
         start = self.coefficients.shape[1] - width * len(self.crossed)
         start += width * self.crossed.index((k, other))
         return slice(start, start + width)
-
-    def _of_crossed(self, k: int, other: int) -> Array:
-        return self.coefficients[:, self.crossed_slice(k, other)]
 
     def scale(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns s at rows of (theta, condition, psi), shape (n, m)."""

@@ -30,7 +30,7 @@ from granulcal.loop.surrogate.baseline import Fit, Start, improve
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.test.thresholds import Thresholds
 
-__all__ = ["Model", "fit_none", "fit_pair", "fit_single", "interval"]
+__all__ = ["Model", "by_probability", "fit_none", "fit_pair", "fit_single", "interval"]
 
 Array = NDArray[np.float64]
 
@@ -63,6 +63,11 @@ class Model:
     intervals: Array
     at_end: bool
     curve: Array
+
+
+def by_probability(model: Model) -> float:
+    """Returns what models are ordered by."""
+    return model.log_probability
 
 
 def fit_none(fit: Fit, thresholds: Thresholds) -> Model:

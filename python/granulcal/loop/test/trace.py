@@ -14,7 +14,7 @@ from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
-from granulcal.loop.test.refit import Model, fit_none, fit_pair, fit_single
+from granulcal.loop.test.refit import Model, by_probability, fit_none, fit_pair, fit_single
 from granulcal.loop.test.residual_test import ResidualTest, residual_test
 from granulcal.loop.test.score import Scores, families
 from granulcal.loop.test.thresholds import Thresholds
@@ -321,7 +321,7 @@ def _models(
     singles = [
         fit_single(local, target, base, k, rules, starts) for k in steps("effects", candidates)
     ]
-    singles.sort(key=_by, reverse=True)
+    singles.sort(key=by_probability, reverse=True)
     best = singles[0].log_probability
     tested = [
         (m, _after(local, m, rules, seed) if m.log_probability > best - _HOPELESS else np.nan)
@@ -335,16 +335,19 @@ def _models(
     # pair from its more probable member.
     two = [(min(k, other), max(k, other)) for k, other in combinations(alone, 2)]
     pairs = [
-        fit_pair(local, target, base, max(alone[k], alone[other], key=_by).fit, (k, other), rules)
+        fit_pair(
+            local,
+            target,
+            base,
+            max(alone[k], alone[other], key=by_probability).fit,
+            (k, other),
+            rules,
+        )
         for k, other in steps("pairs", two[: rules.pairs])
     ]
     best = max(model.log_probability for model in [*singles, *pairs])
-    near = sorted((m for m in pairs if m.log_probability > best - _HOPELESS), key=_by)
+    near = sorted((m for m in pairs if m.log_probability > best - _HOPELESS), key=by_probability)
     return tested + [(m, _after(local, m, rules, seed)) for m in reversed(near)]
-
-
-def _by(model: Model) -> float:
-    return model.log_probability
 
 
 def _after(local: LinearisedSurrogate, model: Model, rules: Thresholds, seed: int) -> float:

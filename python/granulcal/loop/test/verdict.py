@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from math import inf
 
 from granulcal.loop.effects.design import Design
-from granulcal.loop.test.refit import Model
+from granulcal.loop.test.refit import Model, by_probability
 from granulcal.loop.test.residual_test import ResidualTest
 from granulcal.loop.test.thresholds import Thresholds
 
@@ -81,7 +81,7 @@ def decide(
         best = max(after for _, after in models)
         why = f"no one or two effects of the library explain it (best p after a fit {best:.3g})"
         return Verdict("UNEXPLAINED", (), (), p, why)
-    best = max(adequate, key=_by)
+    best = max(adequate, key=by_probability)
     gain = best.log_probability - none.log_probability
     if gain <= thresholds.rivals:  # No effect is a rival like any other.
         why = (
@@ -90,13 +90,15 @@ def decide(
         )
         return Verdict("RESIDUAL", (), (), p, why)
     alone = {m.effects[0]: m for m, _ in models if len(m.effects) == 1}
-    lead = max((alone[k] for k in best.effects if k in alone), key=_by, default=best)
+    lead = max((alone[k] for k in best.effects if k in alone), key=by_probability, default=best)
     if best.log_probability - lead.log_probability <= thresholds.rivals:
         best = lead
         gain = best.log_probability - none.log_probability
     if len(best.effects) == 2:
         # The one that explains more by itself comes first.
-        members = tuple(sorted(best.effects, key=lambda k: -_by(alone[k]) if k in alone else inf))
+        members = tuple(
+            sorted(best.effects, key=lambda k: -by_probability(alone[k]) if k in alone else inf)
+        )
         names = tuple(design.effects[k].name for k in members)
         kin = _families(design, members, merged)
         if len(kin) == 1:
@@ -108,16 +110,12 @@ def decide(
         if any(model is one for one in (best, *adequate))
         and model.log_probability > best.log_probability - thresholds.rivals
     ]
-    near.sort(key=_by, reverse=True)
+    near.sort(key=by_probability, reverse=True)
     effects = tuple(model.effects[0] for model in near)
     kin = _families(design, effects, merged)
     names = tuple(design.effects[k].name for k in effects)
     kind = "EFFECT" if len(kin) == 1 else "SET"
     return Verdict(kind, names, kin, p, _gain(gain))
-
-
-def _by(model: Model) -> float:
-    return model.log_probability
 
 
 def _gain(gain: float) -> str:
