@@ -40,6 +40,7 @@ __all__ = [
     "demo",
     "maps_in",
     "measured_maps",
+    "picture",
     "reproduce",
     "shape_of_map",
     "shape_of_pour",
@@ -182,7 +183,7 @@ def reproduce(
         clouds.append((recording.formation(**_SEGMENTATION).points, calibrated.pours[0].points()))
         print(_row(results[-1]), flush=True)
     write_beside(out_dir / "results.md", _table(results, model.prior.names))
-    _picture(out_dir / "formations.png", [path.stem for path in maps], clouds)
+    picture(out_dir / "formations.png", [path.stem for path in maps], clouds)
     print(f"table and picture in {out_dir}")
     if json_path is not None:
         rows = [result.to_dict(model.prior.names) for result in results]
@@ -368,7 +369,7 @@ def _table(results: list[MapResult], names: Sequence[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _picture(path: Path, names: Sequence[str], clouds: Sequence) -> None:
+def picture(path: Path, names: Sequence[str], clouds: Sequence) -> None:
     """Draws every map above the pour at its posterior's mode, one scale for all."""
     import matplotlib
 
