@@ -2,15 +2,17 @@
 
 import struct
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
-from granulcal.experiments import loop_centrifuge, loop_column, loop_drum, loop_rings
+from granulcal.experiments import loop_centrifuge, loop_column, loop_drum, loop_mounds, loop_rings
 from granulcal.loop.check.prior_rounds import ROUNDS
-from granulcal.loop.close import _candidates, planned
+from granulcal.loop.close import Closed, _candidates, planned
 from granulcal.loop.effects.design import Design, Effect, normal_from_cube
 from granulcal.loop.effects.library import LibraryEffect, by_name
 from granulcal.loop.pours.archive import Archive, ArchivePlan
@@ -290,12 +292,46 @@ def test_the_rings_effects_fit_their_scene_and_no_map_is_fitted_and_sealed(tmp_p
             assert scene.with_({path: value}).get(path) == value
 
 
+def test_every_mound_is_in_one_group_and_every_other_one_is_sealed(tmp_path: Path) -> None:
+    used = [n for fitted, sealed in loop_mounds.GROUPS.values() for n in (*fitted, *sealed)]
+    # Every third map is not in the folder.
+    assert sorted(used) == [n for n in range(1, 24) if n % 3]
+    for fitted, sealed in loop_mounds.GROUPS.values():
+        assert len(fitted) == len(sealed) and sorted((*fitted, *sealed))[::2] == list(fitted)
+    scene = loop_mounds.task(tmp_path, "late").at_first()
+    for effect in (entry.at(scene) for entry in loop_mounds.EFFECTS):
+        for path, value in effect.numbers(1.0).items():
+            assert scene.with_({path: value}).get(path) == value
+    bed = next(entry for entry in loop_mounds.EFFECTS if entry.name == "ground.rolling")
+    assert bed.at(scene).numbers(-1.0) == {"effects.ground.rolling_friction": 10.0}
+
+
+def test_clods_of_maps_are_held_against_the_range_of_pours(tmp_path: Path, monkeypatch) -> None:
+    shapes = {"a": (5.0, 2e-3, 0.4), "b": (9.0, 1e-3, 0.5)}
+    monkeypatch.setattr(loop_mounds, "shape_of_pour", lambda pour: np.array(pour))
+    monkeypatch.setattr(loop_mounds, "shape_of_map", lambda name, _: np.array(shapes[name]))
+    monkeypatch.setattr(loop_mounds.Recording, "open", lambda path: path.stem)
+    maps = {use: [Condition(n, {}, use, (tmp_path / n,))] for n, use in (("a", FIT), ("b", SEALED))}
+    closed = SimpleNamespace(task=SimpleNamespace(of=maps.get, scene=None))
+    pours = [(4.0, 1.5e-3, 0.45), (6.0, 2.5e-3, 0.55)]
+    lines = loop_mounds._clods(cast(Closed, closed), cast(list[gc.Pour], pours))
+    assert lines[2:] == [
+        "| pours at the fit | 4 to 6 | 1.5 to 2.5 | 0.45 to 0.55 |",
+        "| a | **5** | **2** | 0.4 |",
+        "| b (sealed) | 9 | 1 | **0.5** |",
+        "| within the range | 1 of 2 | 1 of 2 | 1 of 2 |",
+        "",
+    ]
+
+
 def test_the_budgets_of_the_measured_studies_afford_their_libraries(tmp_path: Path) -> None:
     draws = ROUNDS * Thresholds().look
     rings = [loop_rings.task(tmp_path, group) for group in loop_rings.GROUPS]
     drums = [loop_drum.task(tmp_path, fitted) for fitted in ((15, 45), (15,), (45,))]
     budget = [study.poured(tmp_path)[0].count for study in (loop_rings, loop_drum, loop_column)]
-    for tasks, pours in ((rings, budget[0]), (drums, budget[1])):
+    mounds = [loop_mounds.task(tmp_path, group) for group in loop_mounds.GROUPS]
+    of_mounds = loop_mounds.poured(tmp_path)[0].count
+    for tasks, pours in ((rings, budget[0]), (drums, budget[1]), (mounds, of_mounds)):
         plans = [planned(asked, pours, 0, draws=draws) for asked in tasks]
         assert all(plan.pours < pours for plan in plans)
     rounds = loop_column._ROUNDS

@@ -253,7 +253,7 @@ def test_a_study_says_how_long_its_archive_takes_and_others_are_refused(
     assert main(["reproduce", "sensor", *words]) == 2
     assert "--dry-run is of studies" in capsys.readouterr().err
     # The archive's pours come from the scene of the study: no measurement is read for them.
-    for study in ("kinect_mounds", "loop_column", "loop_drum", "loop_rings"):
+    for study in ("kinect_mounds", "loop_column", "loop_drum", "loop_mounds", "loop_rings"):
         module = importlib.import_module(f"granulcal.experiments.{study}")
         [kind] = module.poured(tmp_path)
         assert in_the_middle(kind.scene, kind.prior).get("grains.count") > 0
