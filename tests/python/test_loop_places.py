@@ -10,7 +10,14 @@ import pytest
 
 import granulcal as gc
 from granulcal.errors import ObservationError, TrainingDataError
-from granulcal.experiments import loop_centrifuge, loop_column, loop_drum, loop_mounds, loop_rings
+from granulcal.experiments import (
+    _groups,
+    loop_centrifuge,
+    loop_column,
+    loop_drum,
+    loop_mounds,
+    loop_rings,
+)
 from granulcal.loop.check.prior_rounds import ROUNDS
 from granulcal.loop.close import Closed, _candidates, planned
 from granulcal.loop.effects.design import Design, Effect, normal_from_cube
@@ -322,6 +329,39 @@ def test_clods_of_maps_are_held_against_the_range_of_pours(tmp_path: Path, monke
         "| within the range | 1 of 2 | 1 of 2 | 1 of 2 |",
         "",
     ]
+
+
+def test_groups_share_one_archive_and_the_surrogate_of_the_one_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = []
+
+    def close(asked, out, *, archive, budget, pairs, surrogate):
+        given.append((asked, out, archive, budget, pairs, surrogate))
+        return SimpleNamespace(trace=SimpleNamespace(local=SimpleNamespace(surrogate=f"s{asked}")))
+
+    monkeypatch.setattr(_groups, "close_loop", close)
+    monkeypatch.setattr(_groups, "write_report", lambda closed, out, *, command, title: None)
+    asked = cast(dict[str, Task], {"early": 1, "late": 2})
+    found = _groups.close_groups(tmp_path, asked, budget=7, command="", title="")
+    archive = tmp_path / "archive"
+    assert list(found) == ["early", "late"]
+    assert given == [
+        (1, tmp_path / "early", archive, 7, 0, None),
+        (2, tmp_path / "late", archive, 7, 0, "s1"),
+    ]
+
+
+def test_a_groups_verdict_says_which_models_were_not_tested() -> None:
+    models = [SimpleNamespace(effects=("a", "b"), log_probability=3.14, p_after=0.5)]
+    models.append(SimpleNamespace(effects=("c",), log_probability=-1.0, p_after=float("nan")))
+    closed = SimpleNamespace(
+        verdict=SimpleNamespace(kind="EFFECTS", named=("a", "b"), reason="so"),
+        trace=SimpleNamespace(explanations=models, beyond=("beyond",)),
+    )
+    lines = _groups.verdict_lines("early", cast(Closed, closed))
+    assert lines[:3] == ["## early", "", "EFFECTS a, b: so"]
+    assert lines[6:] == ["| a + b | 3.1 | 0.5 |", "| c | -1.0 | not tested |", "", "- beyond", ""]
 
 
 def test_the_budgets_of_the_measured_studies_afford_their_libraries(tmp_path: Path) -> None:

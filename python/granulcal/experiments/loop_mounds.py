@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.experiments._groups import close_groups, verdict_lines
 from granulcal.experiments.kinect_mounds import SHAPE, picture, shape_of_map, shape_of_pour
 from granulcal.files import write_beside
-from granulcal.loop.close import Closed, close_loop
+from granulcal.loop.close import Closed
 from granulcal.loop.effects.definitions import Definition
 from granulcal.loop.effects.law import law_numbers
 from granulcal.loop.effects.library import LibraryEffect, by_name
-from granulcal.loop.report.folder import write_report
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.measured.recording import Recording
 from granulcal.pours.pour_time import PourKind
@@ -105,30 +105,18 @@ def reproduce(out: Path, data: Path) -> bool:
     Returns whether every verdict stands.
     """
     folder = out / "loop_mounds"
-    closed: dict[str, Closed] = {}
-    surrogate = None
-    for group in GROUPS:
-        closed[group] = close_loop(
-            task(data, group),
-            folder / group,
-            archive=folder / "archive",
-            budget=_BUDGET,
-            pairs=0,
-            surrogate=surrogate,
-        )
-        # Every group has the same pours.
-        surrogate = closed[group].trace.local.surrogate
-        write_report(
-            closed[group],
-            folder / group,
-            command=f"granulcal reproduce loop_mounds --out {out}",
-            title=f"Mounds on a hard bed: {group}",
-        )
+    closed = close_groups(
+        folder,
+        {group: task(data, group) for group in GROUPS},
+        budget=_BUDGET,
+        command=f"granulcal reproduce loop_mounds --out {out}",
+        title="Mounds on a hard bed",
+    )
     lines, names, clouds = [], [], []
     for group, one in closed.items():
         scene = one.scene(one.task.of(FIT)[0], one.trace.best)
         pours = [simulate(scene, seed=_SEED + i) for i in range(_POURS)]
-        lines += [*_verdict(group, one), *_clods(one, pours)]
+        lines += [*verdict_lines(group, one), *_clods(one, pours)]
         paths = [path for use in (FIT, SEALED) for c in one.task.of(use) for path in c.recordings]
         for path, pour in zip(paths, pours, strict=False):
             names.append(path.stem)
@@ -137,16 +125,6 @@ def reproduce(out: Path, data: Path) -> bool:
     write_beside(folder / "results.md", "\n".join(lines) + "\n")
     print(folder / "results.md")
     return all(one.standing.stands for one in closed.values())
-
-
-def _verdict(group: str, closed: Closed) -> list[str]:
-    verdict = closed.verdict
-    lines = [f"## {group}", "", f"{verdict.kind} {', '.join(verdict.named)}: {verdict.reason}", ""]
-    lines += ["| model | log probability over none [nat] | p of what it leaves |", "|---|---|---|"]
-    for one in closed.trace.explanations[:6]:
-        names = " + ".join(one.effects)
-        lines.append(f"| {names} | {one.log_probability:.1f} | {one.p_after:.3g} |")
-    return [*lines, "", *(f"- {text}" for text in closed.trace.beyond), ""]
 
 
 def _clods(closed: Closed, pours: Sequence[Pour]) -> list[str]:

@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
+from granulcal.experiments._groups import close_groups, verdict_lines
 from granulcal.experiments.loop_rings.picture import picture
 from granulcal.experiments.loop_rings.seen import look, table
 from granulcal.experiments.loop_rings.task import GROUPS, task
 from granulcal.files import write_beside
-from granulcal.loop.close import Closed, close_loop
-from granulcal.loop.report.folder import write_report
 from granulcal.pours.pour_time import PourKind
 
 __all__ = ["GROUPS", "reproduce", "task"]
@@ -27,41 +26,20 @@ def reproduce(out: Path, data: Path) -> bool:
     Returns whether every verdict stands.
     """
     folder = out / "loop_rings"
-    closed: dict[str, Closed] = {}
-    surrogate = None
-    for group in GROUPS:
-        closed[group] = close_loop(
-            task(data, group),
-            folder / group,
-            archive=folder / "archive",
-            budget=_BUDGET,
-            pairs=0,
-            surrogate=surrogate,
-        )
-        # Every group has the same pours.
-        surrogate = closed[group].trace.local.surrogate
-        write_report(
-            closed[group],
-            folder / group,
-            command=f"granulcal reproduce loop_rings --out {out}",
-            title=f"Rings on a loose bed: {group}",
-        )
+    closed = close_groups(
+        folder,
+        {group: task(data, group) for group in GROUPS},
+        budget=_BUDGET,
+        command=f"granulcal reproduce loop_rings --out {out}",
+        title="Rings on a loose bed",
+    )
     seen = {group: look(one) for group, one in closed.items()}
     picture(folder / "rings.png", seen)
     lines = [
-        line for group, one in closed.items() for line in (*_table(group, one), *table(seen[group]))
+        line
+        for group, one in closed.items()
+        for line in (*verdict_lines(group, one), *table(seen[group]))
     ]
     write_beside(folder / "results.md", "\n".join(lines) + "\n")
     print(folder / "results.md")
     return all(one.standing.stands for one in closed.values())
-
-
-def _table(group: str, closed: Closed) -> list[str]:
-    verdict = closed.verdict
-    lines = [f"## {group}", "", f"{verdict.kind} {', '.join(verdict.named)}: {verdict.reason}", ""]
-    lines += ["| model | log probability over none [nat] | p of what it leaves |", "|---|---|---|"]
-    for one in closed.trace.explanations[:6]:
-        names = " + ".join(one.effects)
-        lines.append(f"| {names} | {one.log_probability:.1f} | {one.p_after:.3g} |")
-    lines += ["", *(f"- {text}" for text in closed.trace.beyond), ""]
-    return lines
