@@ -87,7 +87,7 @@ def test_every_measured_mound_is_segmented():
     maps = kinect_mounds.measured_maps(_DATA)
     assert len(maps) >= 10
     for path in maps:
-        formation = Recording.open(path).formation(**kinect_mounds._SEGMENTATION)
+        formation = Recording.open(path).formation(**kinect_mounds.READING)
         statistics = formation.statistics()
         assert np.isfinite(statistics.paper16).all(), path.name
         # Beds are level to a fraction of a degree, mounds some 10 mm high and some 5 cm wide.
@@ -108,7 +108,7 @@ def test_volumes_agree_with_those_published_beside_the_maps():
     for path in kinect_mounds.measured_maps(_DATA):
         if path.stem == "compacted_23":
             continue  # its bed is not flat: the two fits differ by half a millimetre
-        heights = Recording.open(path).formation(**kinect_mounds._SEGMENTATION).points[:, 2]
+        heights = Recording.open(path).formation(**kinect_mounds.READING).points[:, 2]
         volume = pixel_cm2 * 100 * heights.sum()
         # Two fits of the ground: two tenths of a millimetre over the mound's area.
         tolerance = 0.05 * volume + 0.02 * pixel_cm2 * len(heights)

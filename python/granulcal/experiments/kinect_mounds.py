@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
 
 __all__ = [
+    "FOLDER",
+    "READING",
     "SHAPE",
     "MapResult",
     "demo",
@@ -44,20 +46,23 @@ __all__ = [
     "reproduce",
     "shape_of_map",
     "shape_of_pour",
+    "study_prior",
+    "study_scene",
 ]
 
 SHAPE = ("patches", "roughness", "shoulder")
 """Statistics that see clods, terraces and a steep edge."""
 
-_FOLDER = Path("granular-impact-kinect") / "data"
+FOLDER = Path("granular-impact-kinect") / "data"
+"""Of the maps, within the measured data."""
 _HERE = Path(__file__).parent
 _POURS = 800
 _DEMO_POURS = 120
 _DEMO_MAP = "compacted_8"
 _SEED = 1
 _FORWARD_SEEDS = 3
-# Kinect maps have dead pixels along their edges.
-_SEGMENTATION = {"border_px": 6, "height_threshold": 1e-3}
+READING = {"border_px": 6, "height_threshold": 1e-3}
+"""How a map is read: Kinect maps have dead pixels along their edges."""
 # A second set of forward pours, at the posterior's mean, has seeds of its own.
 _MEAN_SEEDS = range(9100, 9100 + _FORWARD_SEEDS)
 
@@ -133,7 +138,7 @@ def measured_maps(data_dir: Path) -> list[Path]:
     Raises:
         FileNotFoundError: there is none.
     """
-    return maps_in(data_dir / _FOLDER)
+    return maps_in(data_dir / FOLDER)
 
 
 def maps_in(folder: Path) -> list[Path]:
@@ -168,7 +173,7 @@ def reproduce(
     Raises:
         FileNotFoundError: there is no map.
     """
-    folder = maps_dir if data_dir is None or maps_dir is not None else data_dir / _FOLDER
+    folder = maps_dir if data_dir is None or maps_dir is not None else data_dir / FOLDER
     if folder is None:
         raise FileNotFoundError("neither a folder of maps nor the measured data were given")
     maps = maps_in(folder)
@@ -180,7 +185,7 @@ def reproduce(
         recording = Recording.open(path)
         calibrated = _calibrate_map(model, data, recording, out_dir / f"{path.stem}.html")
         results.append(_judge(path.stem, recording, calibrated, model, data))
-        clouds.append((recording.formation(**_SEGMENTATION).points, calibrated.pours[0].points()))
+        clouds.append((recording.formation(**READING).points, calibrated.pours[0].points()))
         print(_row(results[-1]), flush=True)
     write_beside(out_dir / "results.md", _table(results, model.prior.names))
     picture(out_dir / "formations.png", [path.stem for path in maps], clouds)
@@ -194,30 +199,32 @@ def reproduce(
 
 def poured(data: Path | None) -> list[PourKind]:
     """Returns what is poured, for `--dry-run`."""
-    return [PourKind("the training set", _scene(), _prior(), _POURS)]
+    return [PourKind("the training set", study_scene(), study_prior(), _POURS)]
 
 
 def demo(out_dir: Path, data_dir: Path) -> Calibrated:
     """Runs the line on one map with few pours; the report is `out_dir/report.html`."""
     data = _training_pours(out_dir, _DEMO_POURS)
     model = _trained(data)
-    path = data_dir / _FOLDER / f"{_DEMO_MAP}.npz"
+    path = data_dir / FOLDER / f"{_DEMO_MAP}.npz"
     calibrated = _calibrate_map(model, data, Recording.open(path), out_dir / "report.html")
     print(_row(_judge(path.stem, Recording.open(path), calibrated, model, data)))
     print(f"    report: {calibrated.report}")
     return calibrated
 
 
-def _scene() -> Scene:
+def study_scene() -> Scene:
+    """Returns the ball of sand above a hard bed."""
     return Scene.load(_HERE / "kinect_mounds.toml")
 
 
-def _prior() -> Prior:
+def study_prior() -> Prior:
+    """Returns what is unknown of it."""
     return Prior.load(_HERE / "kinect_mounds_prior.toml")
 
 
 def _training_pours(out_dir: Path, count: int) -> Dataset:
-    scene, prior = _scene(), _prior()
+    scene, prior = study_scene(), study_prior()
     each, threads = pour_time([in_the_middle(scene, prior)]).seconds, os.cpu_count() or 1
     print(
         f"{count} pours less those that are there: at {each:.1f} s each, {threads} at once, about "
@@ -256,7 +263,7 @@ def _calibrate_map(
         summary=_SUMMARY,
         notes=_NOTES,
         command="granulcal reproduce kinect_mounds",
-        segmentation=_SEGMENTATION,
+        segmentation=READING,
         diagnostics=SHAPE,
     )
 
@@ -298,7 +305,7 @@ def _judge(
 
 def shape_of_map(recording: Recording, scene: Scene) -> NDArray[np.float64]:
     """Returns `SHAPE` of a measured map, its pixels as wide as those of the scene's images."""
-    settings = {**_SEGMENTATION, "ground_resolution": scene.ground_resolution}
+    settings = {**READING, "ground_resolution": scene.ground_resolution}
     found = recording.formation(**settings).diagnostic_statistics(
         grain_diameter=scene.get("grains.diameter")
     )
@@ -370,7 +377,7 @@ def _table(results: list[MapResult], names: Sequence[str]) -> str:
 
 
 def picture(path: Path, names: Sequence[str], clouds: Sequence) -> None:
-    """Draws every map above the pour at its posterior's mode, one scale for all."""
+    """Draws every map above a pour that stands for it, one scale for all."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -13,7 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.experiments._groups import close_groups, verdict_lines
-from granulcal.experiments.kinect_mounds import SHAPE, picture, shape_of_map, shape_of_pour
+from granulcal.experiments.kinect_mounds import (
+    FOLDER,
+    READING,
+    SHAPE,
+    picture,
+    shape_of_map,
+    shape_of_pour,
+    study_prior,
+    study_scene,
+)
 from granulcal.files import write_beside
 from granulcal.loop.close import Closed
 from granulcal.loop.effects.definitions import Definition
@@ -22,16 +31,11 @@ from granulcal.loop.effects.library import LibraryEffect, by_name
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.measured.recording import Recording
 from granulcal.pours.pour_time import PourKind
-from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour, simulate
-from granulcal.prior import Parameter, Prior
+from granulcal.prior import Prior
 
 __all__ = ["DEFINITIONS", "EFFECTS", "GROUPS", "reproduce", "task"]
 
-_SCENE = Path(__file__).with_name("kinect_mounds.toml")
-_FOLDER = Path("granular-impact-kinect") / "data"
-# Kinect maps have dead pixels along their edges.
-_READING = {"border_px": 6, "height_threshold": 1e-3}
 _BUDGET = 1600
 # Free numbers of the contact law: two dimensions more are what the archive can bear.
 _LAW = ("touching_exponent", "torsional_friction")
@@ -69,28 +73,19 @@ Not polydispersity: the ball begins as a lattice in which unequal grains overlap
 
 def task(data: Path, group: str) -> Task:
     """Returns what is asked of a group of maps; the height of the fall is unknown and its own."""
-    scene = Scene.load(_SCENE)
-    prior = Prior(
-        [
-            Parameter(path="material.sliding_friction", distribution="uniform", low=0.05, high=1.0),
-            Parameter(
-                path="material.rolling_friction", distribution="log_uniform", low=1e-2, high=1.0
-            ),
-            Parameter(path="material.restitution", distribution="uniform", low=0.0, high=0.9),
-            Parameter(path="start.height", distribution="log_uniform", low=0.02, high=1.2),
-            Parameter(path="camera.blur", distribution="uniform", low=0.5, high=2.0),
-            *law_numbers(_LAW, scene),
-        ]
-    )
+    scene = study_scene()
+    # What `kinect_mounds` has of cohesion and the bed are candidates here.
+    known = (one for one in study_prior().parameters if not one.path.startswith("effects."))
+    prior = Prior([*known, *law_numbers(_LAW, scene)])
     conditions = tuple(
-        Condition(f"{group} mounds, {use}", {}, use, _maps(data, numbers), reading=_READING)
+        Condition(f"{group} mounds, {use}", {}, use, _maps(data, numbers), reading=READING)
         for use, numbers in zip((FIT, SEALED), GROUPS[group], strict=True)
     )
     return Task(scene, prior, conditions, EFFECTS, definitions=DEFINITIONS)
 
 
 def _maps(data: Path, numbers: Sequence[int]) -> tuple[Path, ...]:
-    return tuple(data / _FOLDER / f"compacted_{number}.npz" for number in numbers)
+    return tuple(data / FOLDER / f"compacted_{number}.npz" for number in numbers)
 
 
 def poured(data: Path) -> list[PourKind]:
@@ -120,7 +115,7 @@ def reproduce(out: Path, data: Path) -> bool:
         paths = [path for use in (FIT, SEALED) for c in one.task.of(use) for path in c.recordings]
         for path, pour in zip(paths, pours, strict=False):
             names.append(path.stem)
-            clouds.append((Recording.open(path).formation(**_READING).points, pour.points()))
+            clouds.append((Recording.open(path).formation(**READING).points, pour.points()))
     picture(folder / "mounds.png", names, clouds)
     write_beside(folder / "results.md", "\n".join(lines) + "\n")
     print(folder / "results.md")

@@ -9,6 +9,7 @@ below it, the crater, is left to be told (`shape.py`).
 
 from pathlib import Path
 
+from granulcal.experiments.kinect_mounds import FOLDER, READING
 from granulcal.loop.effects.library import LibraryEffect, by_name
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.pours.scene import Scene
@@ -17,9 +18,6 @@ from granulcal.prior import Parameter, Prior
 __all__ = ["EFFECTS", "GROUPS", "task"]
 
 _SCENE = Path(__file__).with_name("bed.toml")
-_FOLDER = Path("granular-impact-kinect") / "data"
-# Kinect maps have dead pixels along their edges.
-_READING = {"border_px": 6, "height_threshold": 1e-3}
 # Numbers of the maps: fitted as repeats, and sealed, a condition each.
 GROUPS = {
     "middle": ((13, 14, 16, 17), (11, 19)),
@@ -50,9 +48,9 @@ def task(data: Path, group: str) -> Task:
     )
     fitted, sealed = GROUPS[group]
     conditions = (
-        Condition(f"{group} rings", {}, FIT, _maps(data, fitted), reading=_READING),
+        Condition(f"{group} rings", {}, FIT, _maps(data, fitted), reading=READING),
         *(
-            Condition(f"ring {number}", {}, SEALED, _maps(data, (number,)), reading=_READING)
+            Condition(f"ring {number}", {}, SEALED, _maps(data, (number,)), reading=READING)
             for number in sealed
         ),
     )
@@ -60,4 +58,4 @@ def task(data: Path, group: str) -> Task:
 
 
 def _maps(data: Path, numbers: tuple[int, ...]) -> tuple[Path, ...]:
-    return tuple(data / _FOLDER / f"fluidized_{number}.npz" for number in numbers)
+    return tuple(data / FOLDER / f"fluidized_{number}.npz" for number in numbers)
