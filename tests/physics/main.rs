@@ -16,6 +16,7 @@ mod ground_impact;
 mod impact;
 mod incline;
 mod layer;
+mod liquid;
 mod meshes;
 mod moving_walls;
 mod packing;

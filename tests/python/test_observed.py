@@ -138,7 +138,7 @@ def test_a_camera_that_stops_makes_no_jump(scene: gc.Scene) -> None:
     # Each camera's own end: 90 and 83 mm.
     assert found.observed(scene)["front_radius[end]"] == pytest.approx(0.0865)
     assert found.observed(scene, camera=1)["front_radius[end]"] == pytest.approx(0.09)
-    assert found.fluid_radius()[:31] == pytest.approx(front[:31] + 0.01)
+    assert found.liquid_radius()[:31] == pytest.approx(front[:31] + 0.01)
     with pytest.raises(ValueError, match="camera must be 1 or 2, got 3"):
         found.observed(scene, camera=3)
 

@@ -7,6 +7,7 @@
 mod discharge;
 mod front;
 mod images;
+mod liquid;
 mod observation;
 mod radius;
 mod spill;
@@ -54,6 +55,9 @@ fn observations(scene: &Scene) -> Vec<Box<dyn Observation>> {
     }
     if let Some(spec) = &observe.front {
         all.push(Box::new(front::Front::new(spec)));
+    }
+    if let Some(spec) = &observe.liquid {
+        all.push(Box::new(liquid::Liquid::new(spec)));
     }
     if let Some(spec) = &observe.discharge {
         all.push(Box::new(discharge::Discharge::new(spec)));
@@ -138,7 +142,8 @@ impl Observer {
         self.next = ((time + half - self.begin) * self.rate).floor().max(0.0) as u64 + 1;
         let (positions, radii) = (simulation.positions(), simulation.radii());
         let radii_out = simulation.radii_out();
-        let frame = Frame { time: time - self.begin, positions, radii, radii_out };
+        let liquid = simulation.liquid_profile();
+        let frame = Frame { time: time - self.begin, positions, radii, radii_out, liquid };
         for observation in &mut self.observations {
             observation.see(&frame);
         }

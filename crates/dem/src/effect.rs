@@ -8,6 +8,7 @@ mod drag;
 mod elastic_layer;
 mod film;
 mod near;
+mod neighbours;
 mod pore_surface;
 mod restitution_speed;
 mod rolling_form;
@@ -18,8 +19,11 @@ use std::sync::Arc;
 
 pub(crate) use acts::{Acts, EffectContext};
 pub(crate) use bridges::Bridges;
+pub(crate) use drag::Drag;
 use granulcal_scene::Scene;
 use nalgebra::Vector3;
+pub(crate) use neighbours::neighbours;
+pub(crate) use pore_surface::PACKED;
 
 use crate::contact::ContactLaw;
 use crate::contact_set::ContactSet;

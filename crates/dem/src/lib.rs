@@ -47,6 +47,7 @@ mod impact;
 mod initial;
 mod lanes;
 mod law;
+mod liquid;
 mod neighbor;
 mod parallel;
 mod particles;
@@ -70,11 +71,11 @@ pub use frozen_search::FrozenSearch;
 pub use granulcal_scene::{
     Adhesion, BoxSide, CameraSpec, Capillary, Clump, Complementarity, DepthSensor, Effect, Effects,
     EndRule, Ends, Fluid, Funnel, FunnelPose, GRAVITY, GrainShape, Grains, Ground, GroundUnlike,
-    ImpactSettings, Intruder, Layer, Lubrication, Mask, Material, Mesh, MeshFile, Method, Motion,
-    NewtonSettings, NoiseField, Observe, ObserveDischarge, ObserveFront, ObserveImages,
-    ObserveRadius, ObserveSpill, ObserveSurface, Outflow, Outlet, Periodic, PeriodicAxis,
-    Polydispersity, Preset, Projection, ReferenceSettings, RestitutionSpeed, RolledAway,
-    RollingForm, Scene, SceneError, Shape, SolverSettings, Start, StereoSensor, Tilt,
+    ImpactSettings, Intruder, Layer, Liquid, Lubrication, Mask, Material, Mesh, MeshFile, Method,
+    Motion, NewtonSettings, NoiseField, Observe, ObserveDischarge, ObserveFront, ObserveImages,
+    ObserveLiquid, ObserveRadius, ObserveSpill, ObserveSurface, Outflow, Outlet, Periodic,
+    PeriodicAxis, Polydispersity, Preset, Projection, ReferenceSettings, RestitutionSpeed,
+    RolledAway, RollingForm, Scene, SceneError, Shape, SolverSettings, Start, StereoSensor, Tilt,
     TimeOfFlightSensor, Vibration, ViewSpec, Wall, WallMaterial, rolling_friction_from_length,
     rolling_friction_to_length,
 };

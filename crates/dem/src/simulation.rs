@@ -25,6 +25,7 @@ use crate::health::{Health, HealthWatch};
 use crate::impact::{ImpactWork, Impacts};
 use crate::initial;
 use crate::lanes::Row;
+use crate::liquid::Liquid;
 use crate::parallel::Threads;
 use crate::particles::Particles;
 use crate::pour::{ConvexGrains, Pour, Status};
@@ -45,6 +46,8 @@ pub struct Simulation {
     bridges: Bridges,
     /// Contacts with a soft layer.
     on_layer: ContactSet,
+    /// A liquid with a flow of its own, if there is one.
+    liquid: Option<Liquid>,
     /// The bodies that the grains are, if they are not round: several spheres each, or
     clumps: Option<Clumps>,
     /// convex bodies of one shape, which have a substep of their own; `particles` follow them.
@@ -93,6 +96,7 @@ impl Simulation {
             impacts: Impacts::default(),
             bridges: Bridges::default(),
             on_layer: ContactSet::default(),
+            liquid: Liquid::of(scene),
             clumps,
             bodies: Bodies::of(scene, seed),
             bed_at_rest: None,
@@ -208,6 +212,12 @@ impl Simulation {
     pub fn convex(&self) -> Option<ConvexGrains> {
         let bodies = self.bodies.as_ref()?;
         Some(ConvexGrains::new(&bodies.solid, bodies.orientations()))
+    }
+
+    /// Height of the surface of the scene's liquid, which flows about the z axis, in rings of this width `[m]`; None
+    /// without one, or before its begin.
+    pub fn liquid_profile(&self) -> Option<(f64, Vec<f64>)> {
+        self.liquid.as_ref()?.profile(&self.particles)
     }
 
     /// What the grains press on every wall with in the last substep: the ground first, then the funnel's cone

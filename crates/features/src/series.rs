@@ -4,9 +4,11 @@
 pub mod front;
 pub mod outline;
 pub mod percentile;
+pub mod sheet;
 pub mod silhouette;
 
 pub use front::front_radius;
 pub use outline::outline_radius;
 pub use percentile::mass_percentiles;
+pub use sheet::sheet_radius;
 pub use silhouette::Silhouette;

@@ -11,6 +11,7 @@ mod fluid;
 mod funnel_pose;
 mod ground;
 mod layer;
+mod liquid;
 mod lubrication;
 mod outlet;
 mod polydispersity;
@@ -83,6 +84,8 @@ effects! {
     rolling_form: rolling_form::RollingForm,
     /// A fluid at rest around the grains.
     fluid: fluid::Fluid,
+    /// A liquid with a flow of its own.
+    liquid: liquid::Liquid,
     /// A fluid film between surfaces.
     lubrication: lubrication::Lubrication,
     /// A table that is not level.

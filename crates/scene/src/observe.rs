@@ -28,6 +28,9 @@ pub struct Observe {
     /// The front of a spreading body from above.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub front: Option<ObserveFront>,
+    /// The front of the liquid of `effects.liquid`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub liquid: Option<ObserveLiquid>,
     /// The share that has run out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub discharge: Option<ObserveDischarge>,
@@ -76,6 +79,17 @@ pub struct ObserveFront {
     /// Whether the radius is taken at the end of the pour, too.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub end: bool,
+}
+
+/// The radius about the z axis up to which there is liquid, against time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObserveLiquid {
+    /// When the radius is taken, after `begin`, rising `[s]`.
+    pub times: Vec<f64>,
+    /// Height of the liquid's surface at its front `[m]`: what is thinner is not seen.
+    #[serde(default = "half_a_millimetre")]
+    pub depth: f64,
 }
 
 /// The share of the grains' mass that is below a height, against time.
@@ -129,6 +143,10 @@ fn half() -> f64 {
     0.5
 }
 
+const fn half_a_millimetre() -> f64 {
+    5e-4
+}
+
 const fn yes() -> bool {
     true
 }
@@ -175,6 +193,11 @@ impl Observe {
                 let allowed = "at least one time where observe.front.end is false";
                 return Err(SceneError::range("observe.front.times", 0.0, allowed));
             }
+        }
+        if let Some(liquid) = &self.liquid {
+            let allowed = "from 0 to end.horizon less observe.begin";
+            rising("observe.liquid.times", &liquid.times, (0.0, rest), allowed)?;
+            positive("observe.liquid.depth", liquid.depth)?;
         }
         if let Some(discharge) = &self.discharge {
             finite("observe.discharge.below", discharge.below)?;
@@ -255,12 +278,23 @@ mod tests {
             begin: 0.5,
             surface: None,
             front: Some(front),
+            liquid: Some(ObserveLiquid { times: vec![0.1], depth: 1e-3 }),
             discharge: Some(discharge),
             radius: Some(ObserveRadius { axis: [0.0; 2], percentiles: vec![10.0, 90.0] }),
             spill: Some(ObserveSpill { axis: [0.0; 2], radius: 0.05 }),
             images: Some(ObserveImages { times: vec![0.3, 0.4], below: Some(0.1) }),
         };
-        Scene { observe: Some(observe), ..Scene::drop(0.1) }
+        let mut scene = Scene { observe: Some(observe), ..Scene::drop(0.1) };
+        scene.effects.liquid.height = 0.02;
+        scene
+    }
+
+    #[test]
+    fn a_front_of_liquid_needs_a_liquid() {
+        let mut scene = scene();
+        scene.effects.liquid.height = 0.0;
+        let error = scene.check().unwrap_err().to_string();
+        assert!(error.starts_with("effects.liquid.height must be positive where"), "{error}");
     }
 
     #[test]

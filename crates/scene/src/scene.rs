@@ -304,6 +304,29 @@ impl Scene {
         exclude("intruder", &others)
     }
 
+    /// What a liquid that flows by itself cannot be with: it stands about the z axis on a level ground.
+    fn check_liquid(&self) -> Result<(), SceneError> {
+        let slopes = self.gravity[0] != 0.0 || self.gravity[1] != 0.0 || self.gravity[2] >= 0.0;
+        let others = [
+            ("effects.fluid", self.effects.fluid.is_on()),
+            ("gravity that is not along -z", slopes),
+            ("effects.tilt", self.effects.tilt.is_on()),
+            ("effects.vibration", self.effects.vibration.is_on()),
+            ("effects.clump", self.effects.clump.is_on()),
+            ("periodic", self.periodic.is_some()),
+            ("bed", self.bed.is_some()),
+        ];
+        if self.effects.liquid.is_on() {
+            return exclude("effects.liquid", &others);
+        }
+        if self.observe.as_ref().is_some_and(|observe| observe.liquid.is_some()) {
+            let allowed = "positive where observe.liquid asks for its front";
+            let got = self.effects.liquid.height;
+            return Err(SceneError::range("effects.liquid.height", got, allowed));
+        }
+        Ok(())
+    }
+
     /// What a bed cannot be with. It is seen by what has become of it, which a map of heights tells.
     fn check_bed(&self) -> Result<(), SceneError> {
         let Some(bed) = &self.bed else { return Ok(()) };
@@ -349,6 +372,7 @@ impl Scene {
         self.check_bodies()?;
         self.check_intruder()?;
         self.check_bed()?;
+        self.check_liquid()?;
         self.start.check(&self.held_grains())?;
         self.effects.check_method(self.settings().method)?;
         if let Some(funnel) = &self.funnel {

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 # Frame, then fluid radius and velocity, particle radius and velocity of each of two cameras.
 _COLUMNS = 9
 _PARTICLE_RADII = (3, 7)
-_FLUID_RADII = (1, 5)
+_LIQUID_RADII = (1, 5)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,7 +28,7 @@ class RunOut:
     """The fronts of a collapsing column.
 
     Files have a line of names and then nine columns: frame, and for each of two cameras the radius
-    of the fluid's front [m], its velocity, the radius of the particles' front [m] and its velocity;
+    of the liquid's front [m], its velocity, the radius of the particles' front [m] and its velocity;
     `nan` where it was not tracked. A radius is the average over the azimuths that a camera sees.
 
     The two cameras see other azimuths, and differ by up to some beads. So each is read by itself,
@@ -38,13 +38,13 @@ class RunOut:
     Attributes:
         time: since the release [s], shape (n,).
         particles: radius of the particles' front by camera [m], shape (n, 2).
-        fluid: radius of the fluid's front by camera [m], shape (n, 2).
+        liquid: radius of the liquid's front by camera [m], shape (n, 2).
         source: the file, for messages.
     """
 
     time: Array
     particles: Array
-    fluid: Array
+    liquid: Array
     source: str = "a run-out file"
 
     @classmethod
@@ -85,7 +85,7 @@ class RunOut:
         return cls(
             time=frames / fps,
             particles=table[:, _PARTICLE_RADII],
-            fluid=table[:, _FLUID_RADII],
+            liquid=table[:, _LIQUID_RADII],
             source=str(path),
         )
 
@@ -96,9 +96,9 @@ class RunOut:
         """
         return _mean(self.particles)
 
-    def fluid_radius(self) -> Array:
-        """Returns the fluid's front [m], as `front_radius` has that of the particles, (n,)."""
-        return _mean(self.fluid)
+    def liquid_radius(self) -> Array:
+        """Returns the liquid's front [m], as `front_radius` has that of the particles, (n,)."""
+        return _mean(self.liquid)
 
     def end_radius(self) -> float:
         """Returns the mean of what each camera saw last of the particles' front [m], or NaN."""
@@ -116,8 +116,8 @@ class RunOut:
     def observed(self, scene: Scene, *, camera: int | None = None) -> ObservedStatistics:
         """Returns the measured `front_radius[t]` of the scene's times; `front_radius[end]` is last.
 
-        The end is the mean of what each camera saw last. `fluid_radius[t]` and `fluid_radius[end]`
-        are those of the fluid.
+        The end is the mean of what each camera saw last. `liquid_radius[t]` and `liquid_radius[end]`
+        are those of the liquid.
 
         Args:
             scene: the scene whose statistics are asked for.
@@ -146,7 +146,7 @@ class RunOut:
             scene,
             {
                 "front_radius": reader(self.particles[:, chosen]),
-                "fluid_radius": reader(self.fluid[:, chosen]),
+                "liquid_radius": reader(self.liquid[:, chosen]),
             },
             "a run-out file",
         )

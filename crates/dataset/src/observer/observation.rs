@@ -62,6 +62,8 @@ pub(super) struct Frame {
     pub(super) radii: Vec<f64>,
     /// Of the grains that have left the scene.
     pub(super) radii_out: Vec<f64>,
+    /// Width of a ring, and height of the liquid's surface in each; none where there is no liquid.
+    pub(super) liquid: Option<(f64, Vec<f64>)>,
 }
 
 /// One kind of observation.

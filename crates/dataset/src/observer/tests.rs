@@ -30,6 +30,7 @@ fn scene() -> Scene {
             link: 0.0,
             end: true,
         }),
+        liquid: None,
         discharge: Some(ObserveDischarge {
             below: 0.027,
             times: vec![0.03, 0.1, 0.3],

@@ -35,8 +35,8 @@ use granulcal_scene::{Effect, Fluid, Grains, Scene};
 use nalgebra::Vector3;
 
 use super::acts::{Acts, EffectContext};
+use super::neighbours::neighbours;
 use super::pore_surface::{PACKED, PoreSurface};
-use crate::contact_set::ContactSet;
 use crate::particles::Particles;
 
 /// Reynolds number from which on the drag coefficient is constant.
@@ -46,7 +46,7 @@ const NEWTON_DRAG: f64 = 0.44;
 
 /// What a fluid does to grains of a density.
 #[derive(Clone, Copy, Debug)]
-struct Drag {
+pub(crate) struct Drag {
     fluid: Fluid,
     /// Mass of a grain with its added mass, over its volume `[kg/m^3]`.
     inertia: f64,
@@ -76,7 +76,7 @@ fn drag_of(scene: &Scene) -> Option<Drag> {
 
 impl Drag {
     /// `gravity`: its magnitude along the vertical `[m/s^2]`.
-    fn of(fluid: Fluid, grains: &Grains, gravity: f64) -> Self {
+    pub fn of(fluid: Fluid, grains: &Grains, gravity: f64) -> Self {
         let inertia = grains.density + fluid.added_mass * fluid.density;
         Self {
             fluid,
@@ -104,8 +104,8 @@ impl Drag {
         [linear, 10.0 / 3.0 * stokes]
     }
 
-    /// The rates of [`Drag::rates`] among neighbours.
-    fn crowded_rates(&self, radius: f64, speed: f64, crowd: f64) -> [f64; 2] {
+    /// The rates of [`Drag::rates`] among neighbours, `crowd` between 0 and 1.
+    pub fn crowded_rates(&self, radius: f64, speed: f64, crowd: f64) -> [f64; 2] {
         let crowd = crowd * self.fluid.crowding;
         if crowd == 0.0 {
             return self.rates(radius, speed);
@@ -165,56 +165,6 @@ impl Acts for Drag {
         }
         if is_alone { 0.0 } else { given.max(0.0) }
     }
-}
-
-/// Gap below which two grains are neighbours, in radii `[-]`: what every preset lists.
-const NEIGHBOUR: f64 = 0.25;
-/// Neighbours inside a random packing: `python examples/neighbours.py` counts 7.9 and, of smoother beads, 8.7 deep in a
-/// column.
-const NEIGHBOURS: f64 = 8.0;
-
-/// The neighbours of a grain.
-#[derive(Clone, Copy, Debug, Default)]
-struct Neighbours {
-    count: f64,
-    velocity: Vector3<f64>,
-}
-
-impl Neighbours {
-    fn add(&mut self, velocity: &Vector3<f64>) {
-        self.count += 1.0;
-        self.velocity += velocity;
-    }
-
-    /// How crowded the grain is, and the mean velocity of its neighbours.
-    fn crowd_and_mean(&self) -> (f64, Vector3<f64>) {
-        if self.count == 0.0 {
-            return (0.0, Vector3::zeros());
-        }
-        ((self.count / NEIGHBOURS).min(1.0), self.velocity / self.count)
-    }
-}
-
-/// The neighbours of every grain, with their velocities before they fell by `fall` `[m/s]` in this substep.
-fn neighbours(particles: &Particles, pairs: &ContactSet, fall: &Vector3<f64>) -> Vec<Neighbours> {
-    let mut around = vec![Neighbours::default(); particles.count()];
-    for (grain, near) in around.iter_mut().enumerate() {
-        // The ground is a neighbour that rests.
-        if particles.position(grain).z < (1.0 + NEIGHBOUR) * particles.radius(grain) {
-            near.add(&Vector3::zeros());
-        }
-    }
-    for (number, lane) in pairs.lanes() {
-        let batch = &pairs.batches[number];
-        let (i, j) = (batch.i[lane] as usize, batch.j[lane] as usize);
-        let touching = particles.radius(i) + particles.radius(j);
-        let apart = particles.nearest(particles.position(i) - particles.position(j)).norm();
-        if apart - touching < 0.5 * NEIGHBOUR * touching {
-            around[i].add(&(particles.velocity(j) - fall));
-            around[j].add(&(particles.velocity(i) - fall));
-        }
-    }
-    around
 }
 
 #[cfg(test)]

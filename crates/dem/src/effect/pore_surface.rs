@@ -12,7 +12,7 @@
 use crate::particles::Particles;
 
 /// Solid fraction of a random packing `[-]`.
-pub(super) const PACKED: f64 = 0.6;
+pub(crate) const PACKED: f64 = 0.6;
 /// Times that the heights are filtered with 1/4, 1/2, 1/4 along either axis: half a cell squared of variance each.
 const FILTERS: usize = 4;
 /// Cells along an axis, at most: grains that have been thrown far must not ask for a map of the room.

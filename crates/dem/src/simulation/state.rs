@@ -20,6 +20,7 @@ use crate::error::DemError;
 use crate::health::HealthWatch;
 use crate::impact::Impacts;
 use crate::lanes::Row;
+use crate::liquid::RadialFlow;
 use crate::particles::Particles;
 use crate::pour::Status;
 
@@ -85,6 +86,13 @@ impl Simulation {
                 return Err(strange("more bytes than a state has"));
             }
             bodies.take(state).map_err(strange)?;
+        } else if let Some(liquid) = &mut self.liquid {
+            let (state, rest): (Option<RadialFlow>, _) =
+                postcard::take_from_bytes(rest).map_err(|_| strange("bytes that are no liquid"))?;
+            if !rest.is_empty() {
+                return Err(strange("more bytes than a state has"));
+            }
+            liquid.take(state).map_err(strange)?;
         } else if !rest.is_empty() {
             return Err(strange("more bytes than a state has"));
         }
@@ -141,12 +149,16 @@ impl Simulation {
             watch: Cow::Borrowed(&self.watch),
         };
         let mut bytes = postcard::to_stdvec(&state).expect("a state in memory");
-        // Behind the rest, so that a state of spheres has the bytes that it had before there were bodies and beds.
+        // Behind the rest, so that a state of spheres has the bytes that it had before there were bodies, beds and
+        // liquids.
         if self.origin.scene.bed.is_some() {
             bytes.extend(postcard::to_stdvec(&self.bed_at_rest).expect("a state in memory"));
         }
         if let Some(state) = self.bodies.as_ref().map(Bodies::state) {
             bytes.extend(postcard::to_stdvec(&state).expect("a state in memory"));
+        }
+        if let Some(liquid) = &self.liquid {
+            bytes.extend(postcard::to_stdvec(liquid.state()).expect("a state in memory"));
         }
         bytes
     }

@@ -112,9 +112,9 @@ impl Simulation {
 
     /// Lets gravity act, and what acts with it.
     fn act_forces(&mut self) {
-        let dt = self.around.settings.dt;
+        let (dt, time) = (self.around.settings.dt, self.time());
         // The middle of the substep, where velocities are.
-        if let Some(gravity) = self.around.effects.gravity_at(self.time() + 0.5 * dt) {
+        if let Some(gravity) = self.around.effects.gravity_at(time + 0.5 * dt) {
             self.around.gravity = gravity;
             let added = gravity - self.around.effects.gravity;
             self.watch.see_work(self.particles.work_of(&added, dt));
@@ -123,6 +123,9 @@ impl Simulation {
         particles.accelerate(&around.gravity, dt, &around.threads);
         let context = around.for_effects([&self.contacts.pairs, &self.contacts.at_walls]);
         self.watch.see_work(around.effects.act_with_gravity(particles, &context));
+        if let Some(liquid) = &mut self.liquid {
+            self.watch.see_work(liquid.act(particles, &context, time));
+        }
         particles.freeze_removed();
     }
 

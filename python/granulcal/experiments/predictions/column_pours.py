@@ -5,9 +5,11 @@ r"""Columns of beads, dry or holding their liquid: what is known of a test, and 
 | `dry` | none |
 | `saturated` | fills the beads to their surface, drags them, is squeezed out between them |
 | `sheared` | the same, and resists surfaces that slide past each other |
+| `slipping` | flows by itself and drags them, through them and out ahead of them; films as `sheared` |
 
 A test states gravity, beads and liquid, and all of them are taken as stated: density and viscosity
-of `effects.fluid` and `effects.lubrication` are the test's own. What nobody measured is left:
+of `effects.fluid` (`effects.liquid` where it flows by itself) and `effects.lubrication` are the
+test's own, as are the height up to which it fills the column, and its surface tension. What nobody measured is left:
 friction of the beads and of the ground, restitution, and how fast the tube is lifted (`UNKNOWN`).
 Clay thins with shear, and its stated viscosity is that of the collapse as a whole, some hundreds a
 second. In the films between beads, with thousands a second, it is taken as what is left at any
@@ -30,7 +32,14 @@ from granulcal.loop.pours.forward import Forward
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 
-__all__ = ["LIQUIDS", "UNKNOWN", "ColumnPours", "column_scene", "known_liquid"]
+__all__ = [
+    "LIQUIDS",
+    "UNKNOWN",
+    "ColumnPours",
+    "column_scene",
+    "known_flow",
+    "known_liquid",
+]
 
 Array = NDArray[np.float64]
 
@@ -56,8 +65,15 @@ _SATURATED = {
     # Of the fluid between grains of a solid fraction of 0.6.
     "effects.fluid.added_mass": 0.4 / 0.6,
 }
+_SHEARED = {"effects.lubrication.shear": 1.0}
+_FLOWING = {
+    "effects.liquid.radius": 0.054,
+    # Of water on acrylic, some 70 degrees.
+    "effects.liquid.contact_angle": 1.2,
+}
 LIQUIDS: dict[str, dict[str, float] | None] = {
-    "sheared": {**_SATURATED, "effects.lubrication.shear": 1.0},
+    "slipping": {**_FLOWING, **_SHEARED},
+    "sheared": {**_SATURATED, **_SHEARED},
     "saturated": _SATURATED,
     "dry": None,
 }
@@ -81,7 +97,9 @@ def column_scene(test: Test, model: str) -> Scene:
         "walls.0.motion.end": numbers["end.horizon"],
     }
     if liquid is not None:
-        numbers |= {**known_liquid(test), **liquid}
+        numbers |= {**(known_flow(test) if model == "slipping" else known_liquid(test)), **liquid}
+        if model == "slipping":
+            numbers["effects.liquid.begin"] = numbers["walls.0.motion.begin"]
     return observing(base, times_of(test)).with_(numbers)
 
 
@@ -94,6 +112,19 @@ def known_liquid(test: Test) -> dict[str, float]:
         "effects.fluid.density": test.numbers["rho_f"],
         "effects.fluid.viscosity": test.numbers["mu_f"],
         "effects.lubrication.viscosity": film,
+    }
+
+
+def known_flow(test: Test) -> dict[str, float]:
+    """Returns what is known of a test's liquid where it flows by itself, by path."""
+    known = {
+        path.replace("effects.fluid", "effects.liquid"): value
+        for path, value in known_liquid(test).items()
+    }
+    return {
+        **known,
+        "effects.liquid.height": test.numbers["H_f0"],
+        "effects.liquid.tension": test.numbers["sigma_f"],
     }
 
 

@@ -40,9 +40,9 @@ KINDS = (
 """What an effect of the measurement may be, in the order in which they act."""
 
 _NAME = re.compile(r"(?P<of>[a-z_]+)\[(?P<at>[^\]]+)\]")
-_OVER_TIME = ("front_radius", "fluid_radius", "discharged")
+_OVER_TIME = ("front_radius", "liquid_radius", "discharged")
 _OVER_X = ("surface_z",)
-_LENGTHS = ("front_radius", "fluid_radius", "surface_z", "radius")
+_LENGTHS = ("front_radius", "liquid_radius", "surface_z", "radius")
 _SLOPE = "surface_slope"
 
 
