@@ -16,7 +16,10 @@
 //! 1573, doi:10.1098/rsta.2005.1596; slip of water and grains in a collapse: Meng et al., J. Fluid Mech. 943 (2022) A19,
 //! doi:10.1017/jfm.2022.400.
 
+mod drag;
 mod flow;
+mod rows;
+mod solids;
 
 use std::f64::consts::PI;
 
@@ -25,8 +28,10 @@ use nalgebra::Vector3;
 
 use crate::effect::{Drag, EffectContext, neighbours};
 use crate::particles::Particles;
+use drag::Dragged;
+use flow::Ground;
 pub(crate) use flow::RadialFlow;
-use flow::{Dragging, Ground};
+use solids::Solids;
 
 /// The liquid of a scene.
 #[derive(Clone, Debug)]
@@ -107,8 +112,7 @@ impl Liquid {
     /// What is wrong.
     pub fn take(&mut self, state: Option<RadialFlow>) -> Result<(), &'static str> {
         let is_like = state.as_ref().is_none_or(|flow| {
-            let circles = flow.thickness.len() + 1;
-            flow.ring == self.ring && flow.speed.len() == circles && flow.grains.is_at(circles)
+            flow.ring == self.ring && flow.speed.len() == flow.thickness.len() + 1
         });
         if !is_like {
             return Err("a liquid that is not the scene's");
@@ -120,7 +124,7 @@ impl Liquid {
     /// Height of the surface in each ring among these grains, and the rings' width `[m]`; none before its begin.
     pub fn profile(&self, particles: &Particles) -> Option<(f64, Vec<f64>)> {
         let flow = self.flow.as_ref()?;
-        let solids = solids(particles, self.ring);
+        let solids = Solids::of(particles, self.ring);
         let heights = (0..flow.thickness.len()).map(|ring| flow.height(ring, &solids));
         Some((self.ring, heights.collect()))
     }
@@ -137,7 +141,7 @@ impl Liquid {
             return 0.0;
         }
         let gravity = context.gravity.norm();
-        let solids = solids(particles, self.ring);
+        let solids = Solids::of(particles, self.ring);
         let count = (self.spec.radius / self.ring).round() as usize;
         let flow = self.flow.get_or_insert_with(|| {
             RadialFlow::at_rest(self.ring, count, self.spec.height, &solids)
@@ -147,172 +151,136 @@ impl Liquid {
             gravity,
             viscosity: self.spec.viscosity / self.spec.density,
             puddle: self.spec.puddle(gravity),
+            suction: (self.spec.suction(2.0 * context.radius, gravity), context.radius),
             gate,
         };
-        flow.advance(&solids, &ground, context.dt);
-        let heights: Vec<_> =
-            (0..flow.thickness.len()).map(|ring| flow.height(ring, &solids)).collect();
-        let mut masses: Vec<_> =
-            (0..flow.speed.len()).map(|circle| self.mass * flow.volume_at(circle)).collect();
-        // At the axis nothing flows.
-        masses[0] *= f64::INFINITY;
-        let pressure = flow.pressure.clone();
-        let sheet =
-            Sheet { ring: self.ring, heights: &heights, masses: &masses, pressure: &pressure };
+        let sheet = Sheet::of(flow, &solids);
+        let unit = (self.ring, 2.0 * PI * self.ring * self.ring * self.mass);
         let around = neighbours(particles, context.pairs, &(context.dt * context.gravity));
-        let (still, mut given) = (flow.speed.clone(), 0.0);
-        let mut felt = Felt::new(&still);
+        let (mut wet, mut dragged) = (Vec::new(), Vec::new());
+        let mut given = 0.0;
         for (grain, near) in around.iter().enumerate() {
-            let wet = sheet.wet(particles, grain);
-            if wet == 0.0 || particles.has_left(grain) {
+            let share = sheet.wet(particles, grain);
+            if share == 0.0 || particles.has_left(grain) {
                 continue;
             }
-            let before = particles.velocity(grain);
-            let (crowd, mean) = near.crowd_and_mean();
-            self.push(particles, grain, &sheet, wet, context);
-            let flow = self.flow.as_mut().expect("a liquid that has begun");
-            let drag = (&self.drag, wet / self.spec.permeability);
-            exchange(particles, grain, &sheet, flow, &mut felt, drag, (crowd, &mean), context);
-            // Along each axis, for what falls on something that holds it takes nothing from what goes along.
-            let after = particles.velocity(grain);
-            let gained = after.component_mul(&after) - before.component_mul(&before);
-            given += 0.5 * particles.mass(grain) * gained.map(|gain| gain.max(0.0)).sum();
+            let energy = Along::of(particles, grain);
+            let (drag, strength) = (&self.drag, share / self.spec.permeability);
+            let (_, mean) = near.crowd_and_mean();
+            let crowd = sheet.crowd(particles, grain);
+            let speed = sheet.speed(flow, particles, grain);
+            let rate = beside(particles, grain, (drag, strength), (crowd, &mean, speed), context);
+            wet.push((grain, share, energy));
+            dragged.push(dragged_one(particles, grain, rate, unit));
         }
-        let flow = self.flow.as_mut().expect("a liquid that has begun");
-        flow.grains = felt.dragging(flow, &still, self.mass, context.dt);
+        flow.advance(&solids, &ground, &mut dragged, context.dt);
+        for ((grain, share, energy), one) in wet.into_iter().zip(dragged) {
+            let (_, outwards) = from_axis(&particles.position(grain));
+            let gained = one.speed - particles.velocity(grain).dot(&outwards);
+            let along = flow.pressure_at(one.at) * outwards - context.gravity;
+            let push = gained * outwards + context.dt * share * self.ratio * along;
+            particles.bodies[grain].velocity.add(&push);
+            given += Along::of(particles, grain).gained_since(&energy, particles.mass(grain));
+        }
         given
     }
+}
 
-    /// Buoyancy, and the pressure below a surface that slopes.
-    fn push(
-        &self,
-        particles: &mut Particles,
-        grain: usize,
-        sheet: &Sheet<'_>,
-        wet: f64,
-        context: &EffectContext<'_>,
-    ) {
-        let (distance, outwards) = from_axis(&particles.position(grain));
-        let along = |(circle, weight): &(usize, f64)| weight * sheet.pressure[*circle];
-        let pressure: f64 = sheet.circles(distance).iter().map(along).sum();
-        let step = context.dt * wet * self.ratio;
-        let push = pressure * outwards - context.gravity;
-        particles.bodies[grain].velocity.add(&(step * push));
+/// A grain as the flow knows it; `unit` is the mass of liquid of its own unit of volume.
+fn dragged_one(
+    particles: &Particles,
+    grain: usize,
+    rate: f64,
+    (ring, unit): (f64, f64),
+) -> Dragged {
+    let (distance, outwards) = from_axis(&particles.position(grain));
+    Dragged {
+        at: distance / ring,
+        mass: particles.mass(grain) / unit,
+        rate,
+        speed: particles.velocity(grain).dot(&outwards),
     }
 }
 
-/// Drag between a grain and the liquid, at a share of the rate in a packing.
-fn exchange(
+/// Drags a grain up and around with its neighbours and takes its spin; returns the rate at which it is dragged outwards,
+/// where the liquid has the velocity `speed`.
+fn beside(
     particles: &mut Particles,
     grain: usize,
-    sheet: &Sheet<'_>,
-    flow: &mut RadialFlow,
-    felt: &mut Felt,
     (drag, share): (&Drag, f64),
-    (crowd, mean): (f64, &Vector3<f64>),
+    (crowd, mean, speed): (f64, &Vector3<f64>, f64),
     context: &EffectContext<'_>,
-) {
-    let (distance, outwards) = from_axis(&particles.position(grain));
-    let circles = sheet.circles(distance);
-    let speed: f64 = circles.iter().map(|(circle, weight)| weight * flow.speed[*circle]).sum();
+) -> f64 {
+    let (_, outwards) = from_axis(&particles.position(grain));
     let stream = mean + (speed - mean.dot(&outwards)) * outwards;
-    let velocity = particles.velocity(grain);
-    let slip = (velocity - context.dt * context.gravity - stream).norm();
+    let apart = particles.velocity(grain) - stream;
+    let slip = (apart - context.dt * context.gravity).norm();
     let [linear, angular] = drag.crowded_rates(particles.radius(grain), slip, crowd);
     let k = context.dt * share * linear;
-    let apart = velocity - stream;
-    let radial = apart.dot(&outwards);
-    let beside = apart - radial * outwards;
-    // What a unit of impulse changes of the liquid's velocity at the grain.
-    let mass = particles.mass(grain);
-    let yields = circles.iter().map(|(circle, weight)| weight * weight / sheet.masses[*circle]);
-    let k_r =
-        if circles.is_empty() { 0.0 } else { k / (1.0 + k * (1.0 + mass * yields.sum::<f64>())) };
     let body = &mut particles.bodies[grain];
-    body.velocity.add(&(-k / (1.0 + k) * beside - k_r * radial * outwards));
+    body.velocity.add(&(-k / (1.0 + k) * (apart - apart.dot(&outwards) * outwards)));
     body.spin.scale(1.0 / (1.0 + context.dt * share * angular));
-    let coefficient = share * linear * mass;
-    if let Some(rate) = felt.rates.get_mut((distance / sheet.ring) as usize) {
-        *rate += coefficient;
+    share * linear
+}
+
+/// Squares of a grain's velocity along each axis: what falls on something that holds it takes nothing from what goes along.
+struct Along(Vector3<f64>);
+
+impl Along {
+    fn of(particles: &Particles, grain: usize) -> Self {
+        let velocity = particles.velocity(grain);
+        Self(velocity.component_mul(&velocity))
     }
-    for (circle, weight) in circles {
-        felt.weights[circle] += weight * coefficient;
-        felt.sums[circle] += weight * coefficient * velocity.dot(&outwards);
-        flow.speed[circle] += weight * mass * k_r * radial / sheet.masses[circle];
+
+    /// Kinetic energy of what has become faster.
+    fn gained_since(&self, before: &Self, mass: f64) -> f64 {
+        0.5 * mass * (self.0 - before.0).map(|gain| gain.max(0.0)).sum()
     }
 }
 
-/// What is summed over the grains for the liquid: drag coefficients of rings, and with the velocities outwards of circles.
-struct Felt {
-    rates: Vec<f64>,
-    weights: Vec<f64>,
-    sums: Vec<f64>,
-}
-
-impl Felt {
-    fn new(speed: &[f64]) -> Self {
-        let none = vec![0.0; speed.len()];
-        Self { rates: none.clone(), weights: none.clone(), sums: none }
-    }
-
-    /// What the liquid remembers of it; `mass` is its density over a typical grain's mass.
-    fn dragging(&self, flow: &RadialFlow, before: &[f64], mass: f64, dt: f64) -> Dragging {
-        let changes = flow.speed.iter().zip(before).map(|(now, then)| (now - then) / dt);
-        let mean = |circle: usize| {
-            let weight = self.weights[circle];
-            if weight > 0.0 { self.sums[circle] / weight } else { flow.speed[circle] }
-        };
-        let rate = |ring: usize| {
-            let mass = mass * flow.volume_of(ring);
-            if mass > 0.0 { self.rates[ring] / mass } else { 0.0 }
-        };
-        Dragging {
-            acceleration: changes.collect(),
-            speed: (0..flow.speed.len()).map(mean).collect(),
-            rate: (0..flow.thickness.len()).map(rate).collect(),
-        }
-    }
-}
-
-/// The liquid as grains see it in a substep.
-struct Sheet<'a> {
+/// The surface of the liquid as grains see it.
+struct Sheet {
     ring: f64,
-    /// Surface in each ring `[m]`.
-    heights: &'a [f64],
-    /// Mass that has each circle's velocity, over that of a typical grain.
-    masses: &'a [f64],
-    /// What its pressure accelerates the liquid by at each circle `[m/s^2]`.
-    pressure: &'a [f64],
+    /// Height in each ring `[m]`.
+    heights: Vec<f64>,
+    /// How crowded each ring is below it, over a packing `[-]`.
+    crowds: Vec<f64>,
 }
 
-impl Sheet<'_> {
-    /// Height of the surface at a distance from the axis, linear between the middles of rings `[m]`.
-    fn height(&self, distance: f64) -> f64 {
-        let at = (distance.abs() / self.ring - 0.5).max(0.0);
+impl Sheet {
+    fn of(flow: &RadialFlow, solids: &Solids) -> Self {
+        let rings = 0..flow.thickness.len();
+        let heights: Vec<_> = rings.map(|ring| flow.height(ring, solids)).collect();
+        let crowds = heights.iter().enumerate().map(|(ring, &height)| solids.crowd(ring, height));
+        Self { ring: flow.ring, crowds: crowds.collect(), heights }
+    }
+
+    /// How crowded a grain is: the solids in its ring over those of a packing up to the surface, which a layer of grains on
+    /// the ground has and its neighbours do not tell.
+    fn crowd(&self, particles: &Particles, grain: usize) -> f64 {
+        self.between(&self.crowds, from_axis(&particles.position(grain)).0)
+    }
+
+    /// A value at a distance from the axis, linear between the middles of rings.
+    fn between(&self, values: &[f64], distance: f64) -> f64 {
+        let at = (distance / self.ring - 0.5).max(0.0);
         let ring = at as usize;
-        let of = |ring: usize| self.heights.get(ring).copied().unwrap_or(0.0);
+        let of = |ring: usize| values.get(ring).copied().unwrap_or(0.0);
         of(ring) + at.fract() * (of(ring + 1) - of(ring))
     }
 
     /// Share of a grain's volume that is below the surface `[-]`.
     fn wet(&self, particles: &Particles, grain: usize) -> f64 {
         let (place, radius) = (particles.position(grain), particles.radius(grain));
-        let depth = self.height(place.x.hypot(place.y)) - (place.z - radius);
+        let surface = self.between(&self.heights, place.x.hypot(place.y));
+        let depth = surface - (place.z - radius);
         let share = (depth / (2.0 * radius)).clamp(0.0, 1.0);
         share * share * (3.0 - 2.0 * share)
     }
 
-    /// The wet circles around a distance from the axis, each with the weight that its velocity has there.
-    fn circles(&self, distance: f64) -> Vec<(usize, f64)> {
-        let at = distance / self.ring;
-        let (circle, share) = (at as usize, at.fract());
-        let is_wet = |circle: usize| self.masses.get(circle).is_some_and(|&mass| mass > 0.0);
-        match (is_wet(circle), is_wet(circle + 1)) {
-            (true, true) => vec![(circle, 1.0 - share), (circle + 1, share)],
-            (true, false) => vec![(circle, 1.0)],
-            (false, true) => vec![(circle + 1, 1.0)],
-            (false, false) => Vec::new(),
-        }
+    /// Velocity of the liquid outwards at a grain `[m/s]`.
+    fn speed(&self, flow: &RadialFlow, particles: &Particles, grain: usize) -> f64 {
+        flow.speed_at(from_axis(&particles.position(grain)).0 / self.ring)
     }
 }
 
@@ -321,34 +289,6 @@ fn from_axis(place: &Vector3<f64>) -> (f64, Vector3<f64>) {
     let away = Vector3::new(place.x, place.y, 0.0);
     let distance = away.norm();
     (distance, if distance > 0.0 { away / distance } else { Vector3::zeros() })
-}
-
-/// Volume of the grains over the area of each ring `[m]`: a sphere's slices, as its shadow meets the rings.
-fn solids(particles: &Particles, ring: f64) -> Vec<f64> {
-    let mut volumes: Vec<f64> = Vec::new();
-    for grain in particles.present() {
-        let (place, radius) = (particles.position(grain), particles.radius(grain));
-        let distance = place.x.hypot(place.y);
-        let volume = 4.0 / 3.0 * PI * radius.powi(3);
-        // Share of a sphere that is nearer than a plane at a distance from the axis.
-        let nearer = |edge: f64| {
-            let x = ((edge - distance) / radius).clamp(-1.0, 1.0);
-            0.25 * (2.0 + 3.0 * x - x.powi(3))
-        };
-        let first = ((distance - radius) / ring).max(0.0) as usize;
-        let last = ((distance + radius) / ring) as usize;
-        if volumes.len() <= last {
-            volumes.resize(last + 1, 0.0);
-        }
-        for (at, sum) in volumes.iter_mut().enumerate().take(last + 1).skip(first) {
-            let [from, to] = [at, at + 1].map(|edge| edge as f64 * ring);
-            // Beyond the axis it is in the ring on the other side.
-            let beyond = nearer(-from) - nearer(-to);
-            *sum += volume * (nearer(to) - nearer(from) + beyond);
-        }
-    }
-    let area = |at: usize| PI * ring * ring * (2 * at + 1) as f64;
-    volumes.iter().enumerate().map(|(at, volume)| volume / area(at)).collect()
 }
 
 #[cfg(test)]

@@ -41,20 +41,6 @@ fn act(liquid: &mut Liquid, particles: &mut Particles, scene: &Scene) {
 }
 
 #[test]
-fn solids_are_where_the_grains_are_and_no_more_than_they() {
-    let particles =
-        grains(&[[0.0, 0.0, 0.1], [1e-3, 0.0, 0.2], [0.05, 0.02, 0.0], [-0.03, 0.0, 0.0]]);
-    let ring = 2e-3;
-    let found = solids(&particles, ring);
-    let area = |at: usize| PI * ring * ring * (2 * at + 1) as f64;
-    let total: f64 = found.iter().enumerate().map(|(at, s)| s * area(at)).sum();
-    let grain = 4.0 / 3.0 * PI * RADIUS.powi(3);
-    assert!((total / (4.0 * grain) - 1.0).abs() < 1e-12);
-    // The grain at 30 mm lies in the rings from 26 to 34 mm.
-    assert!(found[12] == 0.0 && found[13] > 0.0 && found[16] > 0.0 && found[17] == 0.0);
-}
-
-#[test]
 fn a_grain_under_water_has_buoyancy_and_one_above_has_none() {
     let scene = scene();
     let mut liquid = Liquid::of(&scene).unwrap();
@@ -66,38 +52,6 @@ fn a_grain_under_water_has_buoyancy_and_one_above_has_none() {
     assert!((up(0) / ratio - 1.0).abs() < 0.1, "{}", up(0));
     assert_eq!(up(1), 0.0);
     assert!((up(2) / ratio - 0.5).abs() < 0.1, "{}", up(2));
-}
-
-#[test]
-fn drag_gives_the_liquid_what_it_takes_from_the_grain() {
-    let mut scene = scene();
-    scene.effects.liquid.permeability = 0.05;
-    let mut liquid = Liquid::of(&scene).unwrap();
-    let mut particles = grains(&[[0.03, 0.04, 0.02]]);
-    act(&mut liquid, &mut particles, &scene);
-    let rest = liquid.state().clone().unwrap();
-    particles.set_motion(0, &Vector3::new(0.6, 0.8, 0.0), &Vector3::zeros());
-    let flow = liquid.flow.as_mut().unwrap();
-    flow.speed.iter_mut().for_each(|u| *u = 0.0);
-    let (drag, mean) = (liquid.drag, Vector3::zeros());
-    let heights = vec![0.05; rest.thickness.len()];
-    let masses: Vec<_> =
-        (0..flow.speed.len()).map(|circle| liquid.mass * flow.volume_at(circle)).collect();
-    let sheet = Sheet { ring: flow.ring, heights: &heights, masses: &masses, pressure: &heights };
-    let (none, walls) = (ContactSet::default(), Walls::of(&scene));
-    let (gravity, radius) = (Vector3::zeros(), RADIUS);
-    let context =
-        EffectContext { pairs: &none, at_walls: &none, walls: &walls, gravity, radius, dt: DT };
-    let [rate, _] = drag.crowded_rates(RADIUS, 1.0, 1.0);
-    let mut felt = Felt::new(&flow.speed);
-    exchange(&mut particles, 0, &sheet, flow, &mut felt, (&drag, 20.0), (1.0, &mean), &context);
-    let taken = 1.0 - particles.velocity(0).norm();
-    let gained: f64 = flow.speed.iter().zip(&masses).map(|(u, mass)| u * mass).sum();
-    assert!((taken - gained).abs() < 1e-12, "{taken} {gained}");
-    // Implicit in both: J = k / (1 + k (1 + w^2 / M)), half of either circle at 12.5 rings.
-    let k = DT * 20.0 * rate;
-    let yields: f64 = [12, 13].iter().map(|&circle: &usize| 0.25 / masses[circle]).sum();
-    assert!((taken / (k / (1.0 + k * (1.0 + yields))) - 1.0).abs() < 1e-9, "{taken}");
 }
 
 #[test]

@@ -72,6 +72,15 @@ impl Effect for Liquid {
 }
 
 impl Liquid {
+    /// Height by which menisci between packed grains of a `diameter` `[m]` draw the liquid up, `6 gamma (1 - eps) / (eps d
+    /// rho_f g)` with eps = 0.4 between them, which it wets `[m]`.
+    ///
+    /// Source: tension times the surface of the grains over the volume between them, Haines, J. Agricultural Science 20
+    /// (1930) 97, doi:10.1017/S002185960008864X.
+    pub fn suction(&self, diameter: f64, gravity: f64) -> f64 {
+        6.0 * self.tension * 0.6 / (0.4 * diameter * self.density * gravity)
+    }
+
     /// Thickness of a puddle that neither advances nor recedes, `e = 2 sqrt(gamma / (rho_f g)) sin(theta / 2)` `[m]`.
     ///
     /// Source: de Gennes, Brochard-Wyart and Quéré, Capillarity and Wetting Phenomena (2004), section 2.2.
