@@ -10,7 +10,7 @@ from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.folder import write_report
 from granulcal.loop.task import FIT, Task
 
-__all__ = ["DEFINITIONS", "NUISANCES", "TENSIONS", "close_fronts"]
+__all__ = ["DEFINITIONS", "NUISANCES", "OUTLINES", "TENSIONS", "close_fronts"]
 
 # Tension in N/m: as multiples of a bead's weight it would grow with gravity.
 TENSIONS = (
@@ -42,10 +42,13 @@ NUISANCES = {
 }
 # The outline, with longer and shorter links, and what each camera alone saw.
 _LINK = "observe.front.link"
-DEFINITIONS = (
+OUTLINES = (
     Definition("outline, links of 1.5", {_LINK: 1.5}),
     Definition("outline, links of 1.2", {_LINK: 1.2}),
     Definition("outline, links of 2", {_LINK: 2.0}),
+)
+DEFINITIONS = (
+    *OUTLINES,
     Definition("camera 1 alone", {_LINK: 1.5}, {"camera": 1}),
     Definition("camera 2 alone", {_LINK: 1.5}, {"camera": 2}),
 )
@@ -80,9 +83,7 @@ def _draw(path: Path, closed: Closed, forward: Forward) -> None:
     if best is trace.base and trace.explanations:
         # Nothing is adequate: the most probable model all the same.
         best = trace.explanations[0]
-    # front_radius[0.1] and so on; that at the end, if there is one, is last.
-    within = [name.partition("[")[2][:-1] for name in closed.task.scene.observed_names]
-    times = [float(time) for time in within if time != "end"]
+    fronts = _fronts(closed.task.scene.observed_names)
     conditions = closed.task.conditions
     lines = ceil(len(conditions) / _COLUMNS)
     figure, axes = plt.subplots(
@@ -103,14 +104,15 @@ def _draw(path: Path, closed: Closed, forward: Forward) -> None:
         drawn = [("base model", before, "C0")]
         if best is not trace.base:
             drawn.append((f"with {' + '.join(best.effects)}", after, "C1"))
-        for label, rows, colour in drawn:
-            fronts = 1e3 * rows[:, : len(times)]
-            low, high = fronts.min(axis=0), fronts.max(axis=0)
-            axis.fill_between(times, low, high, color=colour, alpha=0.25, lw=0)
-            axis.plot(times, fronts.mean(axis=0), color=colour, label=label)
-        for number, row in enumerate(1e3 * closed.measured[condition.name]):
-            label = "measured" if number == 0 else None
-            axis.plot(times, row[: len(times)], "k.-", lw=0.8, label=label)
+        for of, (times, columns, line) in fronts.items():
+            for label, rows, colour in drawn:
+                front = 1e3 * rows[:, columns]
+                low, high = front.min(axis=0), front.max(axis=0)
+                axis.fill_between(times, low, high, color=colour, alpha=0.25, lw=0)
+                axis.plot(times, front.mean(axis=0), line, color=colour, label=f"{label}{of}")
+            for number, row in enumerate(1e3 * closed.measured[condition.name]):
+                label = f"measured{of}" if number == 0 else None
+                axis.plot(times, row[columns], f"k.{line}", lw=0.8, label=label)
         axis.set_title(f"{condition.name} ({'fitted' if condition.use == FIT else condition.use})")
     for axis in axes[(len(conditions) - 1) // _COLUMNS]:
         axis.set_xlabel("time [s]")
@@ -119,3 +121,17 @@ def _draw(path: Path, closed: Closed, forward: Forward) -> None:
     axes.flat[0].legend(fontsize=8, loc="upper left")
     figure.savefig(path, dpi=80)
     plt.close(figure)
+
+
+def _fronts(names: list[str]) -> dict[str, tuple[list[float], list[int], str]]:
+    """Times, columns and line of each front among statistics; that at the end has no time."""
+    found: dict[str, tuple[list[float], list[int], str]] = {}
+    both = any(name.startswith("liquid_radius") for name in names)
+    kinds = (("front_radius", ", beads" if both else "", "-"), ("liquid_radius", ", liquid", "--"))
+    for kind, of, line in kinds:
+        # front_radius[0.1] and so on.
+        within = [(j, n[len(kind) + 1 : -1]) for j, n in enumerate(names) if n.startswith(kind)]
+        timed = [(float(at), j) for j, at in within if at != "end"]
+        if timed:
+            found[of] = ([at for at, _ in timed], [j for _, j in timed], line)
+    return found

@@ -5,12 +5,13 @@ r"""Columns of beads, dry or holding their liquid: what is known of a test, and 
 | `dry` | none |
 | `saturated` | fills the beads to their surface, drags them, is squeezed out between them |
 | `sheared` | the same, and resists surfaces that slide past each other |
-| `slipping` | flows by itself and drags them, through them and out ahead of them; films as `sheared` |
+| `slipping` | flows by itself, drags them and runs out ahead of them; films as `sheared` |
 
 A test states gravity, beads and liquid, and all of them are taken as stated: density and viscosity
 of `effects.fluid` (`effects.liquid` where it flows by itself) and `effects.lubrication` are the
-test's own, as are the height up to which it fills the column, and its surface tension. What nobody measured is left:
-friction of the beads and of the ground, restitution, and how fast the tube is lifted (`UNKNOWN`).
+test's own, as are the height up to which it fills the column, and its surface tension. What nobody
+measured is left: friction of the beads and of the ground, restitution, and how fast the tube is
+lifted (`UNKNOWN`).
 Clay thins with shear, and its stated viscosity is that of the collapse as a whole, some hundreds a
 second. In the films between beads, with thousands a second, it is taken as what is left at any
 rate, that of hard grains in water, $\mu_w (1 + 2.5 C_v)$ (Einstein 1906).
