@@ -18,6 +18,7 @@
 
 mod drag;
 mod flow;
+mod motion;
 mod rows;
 mod solids;
 

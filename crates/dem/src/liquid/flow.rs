@@ -20,18 +20,16 @@
 //! back with `g e^2 / 2` over a length of edge, e the thickness of a puddle at rest. Under a tube that is being lifted the
 //! liquid has the gap alone.
 
-use std::f64::consts::PI;
-
 use serde::{Deserialize, Serialize};
 
-use super::drag::{Dragged, Held, drag};
-use super::rows::Rows;
+use super::drag::Dragged;
+use super::motion::accelerate;
 use super::solids::Solids;
 
 /// Share of a ring that anything may cross in a step `[-]`.
 const COURANT: f64 = 0.4;
 /// A thinner sheet is dry ground `[m]`.
-const DRY: f64 = 1e-6;
+pub(super) const DRY: f64 = 1e-6;
 /// Steps in a call, at most: what is faster than that is no flow.
 const MOST_STEPS: usize = 64;
 /// Rings, at most: liquid that goes farther is gone.
@@ -64,7 +62,7 @@ impl Ground {
     }
 
     /// What is open above the ground at a circle `[m]`: all of it where no tube stands.
-    fn gap_at(&self, circle: usize) -> f64 {
+    pub fn gap_at(&self, circle: usize) -> f64 {
         self.gate.filter(|(at, _)| *at == circle).map_or(f64::INFINITY, |(_, gap)| gap)
     }
 }
@@ -95,7 +93,7 @@ impl RadialFlow {
     }
 
     /// Radius of a ring's middle, in rings.
-    fn middle(ring: usize) -> f64 {
+    pub fn middle(ring: usize) -> f64 {
         ring as f64 + 0.5
     }
 
@@ -140,7 +138,8 @@ impl RadialFlow {
             let dt = if step == 0 { left } else { left.min(longest) };
             let of = |(ring, &h): (usize, &f64)| ground.head(h, solids.top(ring));
             let heads: Vec<_> = heights.iter().enumerate().map(of).collect();
-            self.accelerate((&heights, &heads), ground, dragged, dt);
+            let fluxes = self.fluxes(&heights, ground);
+            accelerate(self, &fluxes, (&heights, &heads), ground, dragged, dt);
             self.move_on(&heights, ground, dt);
             left -= dt;
             if left <= 0.0 {
@@ -158,119 +157,6 @@ impl RadialFlow {
             circle as f64 * self.thickness[from] * open * u
         };
         self.speed.iter().enumerate().map(flux).collect()
-    }
-
-    /// Changes velocities: what they carry with them, the pressure, the edge, and, implicitly, the ground and the grains.
-    fn accelerate(
-        &mut self,
-        (heights, heads): (&[f64], &[f64]),
-        ground: &Ground,
-        dragged: &mut [Dragged],
-        dt: f64,
-    ) {
-        let old = self.speed.clone();
-        let circles = self.thickness.len();
-        let mut rows = Rows::new(circles);
-        // What flows at each circle, nothing where nothing does, and its acceleration without pressure, ground and grains.
-        let (mut mass, mut own) = (vec![0.0; circles], vec![0.0; circles]);
-        let mut opened = vec![1.0; circles];
-        let fluxes = self.fluxes(heights, ground);
-        for circle in 1..circles {
-            let (q_in, q_out) = (self.thickness[circle - 1], self.thickness[circle]);
-            let gap = ground.gap_at(circle);
-            self.speed[circle] = 0.0;
-            if gap <= 0.0 || (q_in < DRY && q_out < DRY) {
-                continue;
-            }
-            let share = Self::middle(circle - 1) * q_in + Self::middle(circle) * q_out;
-            // Below a tube that is what passes it.
-            let mean = share / (2.0 * circle as f64);
-            opened[circle] = (gap / mean).min(1.0);
-            let mean = mean * opened[circle];
-            // What comes in on either side brings the velocity that it has there.
-            let middle = |ring: usize| 0.5 * (fluxes[ring] + fluxes[ring + 1]);
-            let gained = middle(circle - 1).max(0.0) * (old[circle - 1] - old[circle])
-                - middle(circle).min(0.0) * (old[circle + 1] - old[circle]);
-            let carried = gained / (circle as f64 * mean * self.ring);
-            let slope = (heads[circle] - heads[circle - 1]) / self.ring;
-            let drives = carried - ground.gravity * slope;
-            // The edge to dry ground holds a sheet back, and never drives it.
-            let is_edge = q_in < DRY || q_out < DRY;
-            let outwards = if q_out < DRY { 1.0 } else { -1.0 };
-            let holds = ground.gravity * ground.puddle.powi(2) / (2.0 * mean * self.ring);
-            let holds = if is_edge { outwards * holds } else { 0.0 };
-            if is_edge && outwards * (old[circle] + dt * (drives - holds)) <= 0.0 {
-                continue;
-            }
-            mass[circle] = circle as f64 * mean;
-            own[circle] = carried - holds;
-            rows.acts[circle] = mass[circle] * (drives - holds);
-            let deep = 0.5 * (heights[circle - 1] + heights[circle]);
-            let taken = mass[circle] * friction(old[circle], mean, deep, ground.viscosity);
-            rows.add(circle, circle, mass[circle] + dt * taken);
-            rows.acts[circle] -= taken * old[circle];
-            self.speed[circle] = old[circle];
-        }
-        self.sink(&mut rows, heights, ground, (&mass, &old), dragged, dt);
-        drag(&mut rows, (&mass, &opened, &old), dragged, dt);
-        let gained = rows.solve(&mass);
-        for circle in (1..circles).filter(|&circle| mass[circle] > 0.0) {
-            self.speed[circle] = old[circle] + dt * gained[circle];
-        }
-        self.pressure = vec![0.0; circles + 1];
-        let mut pushed: Vec<_> = (0..circles).map(|circle| gained[circle] - own[circle]).collect();
-        for one in dragged {
-            for (circle, given) in one.follow(&mass, &self.speed, dt) {
-                pushed[circle] -= opened[circle] * given / mass[circle];
-            }
-        }
-        for circle in (1..circles).filter(|&circle| mass[circle] > 0.0) {
-            let deep = 0.5 * (heights[circle - 1] + heights[circle]);
-            let mean = mass[circle] / circle as f64;
-            let taken = friction(old[circle], mean, deep, ground.viscosity);
-            self.pressure[circle] = pushed[circle] + taken * self.speed[circle];
-        }
-    }
-
-    /// What spreads sinks: the energy of the motion down is q h^2 / 6 (div u)^2 over an area, and grains that it sinks
-    /// past hold it up.
-    fn sink(
-        &self,
-        rows: &mut Rows,
-        heights: &[f64],
-        ground: &Ground,
-        (mass, old): (&[f64], &[f64]),
-        dragged: &[Dragged],
-        dt: f64,
-    ) {
-        let circles = mass.len();
-        let held = Held::of(dragged, mass, old, dt);
-        for ring in 0..circles {
-            let of = |circle: usize| {
-                let open = (ground.gap_at(circle) / heights[ring.min(circle)].max(DRY)).min(1.0);
-                let is_flowing = mass.get(circle).is_some_and(|&mass| mass > 0.0);
-                if is_flowing {
-                    open * circle as f64 / (Self::middle(ring) * self.ring)
-                } else {
-                    0.0
-                }
-            };
-            let around = [(ring, -of(ring)), (ring + 1, of(ring + 1))];
-            let volume = Self::middle(ring) * self.thickness[ring];
-            let sinks = volume * heights[ring].powi(2) / 3.0;
-            let rate = if volume > 0.0 { held.rate[ring] / volume } else { 0.0 };
-            let slip = |&(circle, part): &(usize, f64)| {
-                if part == 0.0 { 0.0 } else { part * held.slip[circle] }
-            };
-            let past: f64 = around.iter().map(slip).sum();
-            for (circle, part) in around.into_iter().filter(|(_, part)| *part != 0.0) {
-                rows.acts[circle] -= sinks * rate * part * past;
-                for (other, its) in around.into_iter().filter(|(_, its)| *its != 0.0) {
-                    let follows = 1.0 + dt * rate * held.stays[other];
-                    rows.add(circle, other, sinks * part * its * follows);
-                }
-            }
-        }
     }
 
     /// Moves the liquid; no ring gives more than it has.
@@ -298,19 +184,6 @@ fn between(values: &[f64], at: f64) -> f64 {
     let of = |circle: usize| values.get(circle).copied().unwrap_or(0.0);
     let circle = at as usize;
     of(circle) + at.fract() * (of(circle + 1) - of(circle))
-}
-
-/// Rate at which the ground takes velocity from a sheet of mean thickness `q` up to `deep` `[1/s]`.
-fn friction(speed: f64, q: f64, deep: f64, viscosity: f64) -> f64 {
-    let (speed, q, deep) = (speed.abs(), q.max(DRY), deep.max(DRY));
-    // 24 / Re, without a division by a speed of zero.
-    let laminar = 3.0 * viscosity / (deep * deep);
-    if viscosity == 0.0 {
-        return 0.0;
-    }
-    let reynolds = q * speed / viscosity;
-    let blasius = 0.223 / 8.0 * reynolds.max(f64::MIN_POSITIVE).powf(-0.25) * speed / deep;
-    laminar.max(blasius)
 }
 
 #[cfg(test)]

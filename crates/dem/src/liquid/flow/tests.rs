@@ -1,3 +1,5 @@
+use std::f64::consts::PI;
+
 use super::*;
 
 const GRAVITY: f64 = 9.81;
