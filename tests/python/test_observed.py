@@ -123,7 +123,7 @@ def test_a_run_out_file_gives_the_fronts_of_the_scene(scene: gc.Scene, tmp_path:
 def run_out(particles: np.ndarray) -> RunOut:
     """Fronts of two cameras at 100 frames a second, the fluid 10 mm ahead."""
     time = 0.01 * np.arange(len(particles)).astype(np.float64)
-    return RunOut(time=time, particles=particles, fluid=particles + 0.01, source="run.txt")
+    return RunOut(time=time, particles=particles, liquid=particles + 0.01, source="run.txt")
 
 
 def test_a_camera_that_stops_makes_no_jump(scene: gc.Scene) -> None:
@@ -199,7 +199,7 @@ def test_a_drum_picture_gives_its_surface(scene: gc.Scene, tmp_path: Path) -> No
     with pytest.raises(ValueError, match="shows no grains"):
         DrumImage.open(path, width=width)
     with pytest.raises(ValueError, match="observes nothing"):
-        RunOut(time=np.zeros(1), particles=np.zeros((1, 2)), fluid=np.zeros((1, 2))).observed(
+        RunOut(time=np.zeros(1), particles=np.zeros((1, 2)), liquid=np.zeros((1, 2))).observed(
             gc.Scene.drop(0.02)
         )
 

@@ -18,6 +18,7 @@
 
 mod drag;
 mod flow;
+mod ground;
 mod motion;
 mod rows;
 mod solids;
@@ -30,8 +31,9 @@ use nalgebra::Vector3;
 use crate::effect::{Drag, EffectContext, neighbours};
 use crate::particles::Particles;
 use drag::Dragged;
-use flow::Ground;
 pub(crate) use flow::RadialFlow;
+use ground::Ground;
+use motion::advance;
 use solids::Solids;
 
 /// The liquid of a scene.
@@ -103,8 +105,8 @@ impl Liquid {
     }
 
     /// What changes as it flows.
-    pub fn state(&self) -> &Option<RadialFlow> {
-        &self.flow
+    pub fn state(&self) -> Option<&RadialFlow> {
+        self.flow.as_ref()
     }
 
     /// Goes on from a state.
@@ -174,7 +176,7 @@ impl Liquid {
             wet.push((grain, share, energy));
             dragged.push(dragged_one(particles, grain, rate, unit));
         }
-        flow.advance(&solids, &ground, &mut dragged, context.dt);
+        advance(flow, &solids, &ground, &mut dragged, context.dt);
         for ((grain, share, energy), one) in wet.into_iter().zip(dragged) {
             let (_, outwards) = from_axis(&particles.position(grain));
             let gained = one.speed - particles.velocity(grain).dot(&outwards);

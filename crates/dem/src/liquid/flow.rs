@@ -22,50 +22,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::drag::Dragged;
-use super::motion::accelerate;
+use super::ground::{DRY, Ground};
 use super::solids::Solids;
 
-/// Share of a ring that anything may cross in a step `[-]`.
-const COURANT: f64 = 0.4;
-/// A thinner sheet is dry ground `[m]`.
-pub(super) const DRY: f64 = 1e-6;
-/// Steps in a call, at most: what is faster than that is no flow.
-const MOST_STEPS: usize = 64;
 /// Rings, at most: liquid that goes farther is gone.
 const MOST_RINGS: usize = 2048;
-
-/// What the flow goes by, besides itself.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Ground {
-    /// Magnitude of gravity `[m/s^2]`.
-    pub gravity: f64,
-    /// Kinematic viscosity nu `[m^2/s]`.
-    pub viscosity: f64,
-    /// Thickness e of a puddle at rest `[m]`.
-    pub puddle: f64,
-    /// Height c that a surface between grains is drawn up by its menisci, and how far below the grains' surface they have
-    /// all of it `[m]`.
-    pub suction: (f64, f64),
-    /// The circle that a tube stands on, and the gap below it `[m]`.
-    pub gate: Option<(usize, f64)>,
-}
-
-impl Ground {
-    /// Head of the pressure: the surface's height, less what menisci between grains draw it down by `[m]`.
-    fn head(&self, height: f64, top: f64) -> f64 {
-        let (most, over) = self.suction;
-        if most == 0.0 {
-            return height;
-        }
-        height - most * ((top - height) / over).clamp(0.0, 1.0)
-    }
-
-    /// What is open above the ground at a circle `[m]`: all of it where no tube stands.
-    pub fn gap_at(&self, circle: usize) -> f64 {
-        self.gate.filter(|(at, _)| *at == circle).map_or(f64::INFINITY, |(_, gap)| gap)
-    }
-}
 
 /// Liquid in rings about the axis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -113,7 +74,7 @@ impl RadialFlow {
     }
 
     /// Keeps dry rings around the liquid.
-    fn make_room(&mut self) {
+    pub fn make_room(&mut self) {
         let wet = self.thickness.iter().rposition(|&q| q > 0.0).map_or(0, |ring| ring + 1);
         let wanted = (wet + 2).min(MOST_RINGS);
         if self.thickness.len() < wanted {
@@ -122,34 +83,8 @@ impl RadialFlow {
         }
     }
 
-    /// Flows for `dt` `[s]` over the ground and between `solids` and past the
-    /// grains that it drags.
-    pub fn advance(&mut self, solids: &Solids, ground: &Ground, dragged: &mut [Dragged], dt: f64) {
-        let mut left = dt;
-        for step in (0..MOST_STEPS).rev() {
-            self.make_room();
-            let heights: Vec<_> =
-                (0..self.thickness.len()).map(|ring| self.height(ring, solids)).collect();
-            let deepest = heights.iter().copied().fold(0.0, f64::max);
-            let fastest = self.speed.iter().map(|u| u.abs()).fold(0.0, f64::max);
-            let steeper = 1.0 + ground.suction.0 / ground.suction.1.max(f64::MIN_POSITIVE);
-            let fastest = fastest + (ground.gravity * deepest * steeper).sqrt();
-            let longest = COURANT * self.ring / fastest.max(f64::MIN_POSITIVE);
-            let dt = if step == 0 { left } else { left.min(longest) };
-            let of = |(ring, &h): (usize, &f64)| ground.head(h, solids.top(ring));
-            let heads: Vec<_> = heights.iter().enumerate().map(of).collect();
-            let fluxes = self.fluxes(&heights, ground);
-            accelerate(self, &fluxes, (&heights, &heads), ground, dragged, dt);
-            self.move_on(&heights, ground, dt);
-            left -= dt;
-            if left <= 0.0 {
-                return;
-            }
-        }
-    }
-
     /// Volume that crosses each circle, over its angle, in rings `[m^2/s]`: liquid of the ring that it comes from.
-    fn fluxes(&self, heights: &[f64], ground: &Ground) -> Vec<f64> {
+    pub fn fluxes(&self, heights: &[f64], ground: &Ground) -> Vec<f64> {
         let flux = |(circle, &u): (usize, &f64)| {
             let from = if u > 0.0 { circle.checked_sub(1) } else { Some(circle) };
             let Some(from) = from.filter(|&ring| ring < self.thickness.len()) else { return 0.0 };
@@ -160,7 +95,7 @@ impl RadialFlow {
     }
 
     /// Moves the liquid; no ring gives more than it has.
-    fn move_on(&mut self, heights: &[f64], ground: &Ground, dt: f64) {
+    pub fn move_on(&mut self, heights: &[f64], ground: &Ground, dt: f64) {
         let mut fluxes = self.fluxes(heights, ground);
         let over = |ring: usize| dt / (Self::middle(ring) * self.ring);
         for (ring, &q) in self.thickness.iter().enumerate() {
@@ -185,6 +120,3 @@ fn between(values: &[f64], at: f64) -> f64 {
     let circle = at as usize;
     of(circle) + at.fract() * (of(circle + 1) - of(circle))
 }
-
-#[cfg(test)]
-mod tests;

@@ -10,8 +10,15 @@
 //! with m the volume that has a circle's velocity, f the ground's friction and S the mass of what sinks as it spreads.
 
 use super::drag::{Dragged, Held, drag};
-use super::flow::{DRY, Ground, RadialFlow};
+use super::flow::RadialFlow;
+use super::ground::{DRY, Ground};
 use super::rows::Rows;
+use super::solids::Solids;
+
+/// Share of a ring that anything may cross in a step `[-]`.
+const COURANT: f64 = 0.4;
+/// Steps in a call, at most: what is faster than that is no flow.
+const MOST_STEPS: usize = 64;
 
 /// What flows at a circle; nothing where the mass is 0.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,20 +35,48 @@ struct Circle {
     taken: f64,
 }
 
-/// Changes the velocities of `flow` and of the grains that it drags within `dt`, and says what pressure did.
-pub(super) fn accelerate(
+/// Lets `flow` go on for `dt` `[s]` over the ground, between `solids` and past the grains that it drags.
+pub(super) fn advance(
     flow: &mut RadialFlow,
-    fluxes: &[f64],
+    solids: &Solids,
+    ground: &Ground,
+    dragged: &mut [Dragged],
+    dt: f64,
+) {
+    let mut left = dt;
+    for step in (0..MOST_STEPS).rev() {
+        flow.make_room();
+        let heights: Vec<_> =
+            (0..flow.thickness.len()).map(|ring| flow.height(ring, solids)).collect();
+        let of = |(ring, &h): (usize, &f64)| ground.head(h, solids.top(ring));
+        let heads: Vec<_> = heights.iter().enumerate().map(of).collect();
+        let deepest = heights.iter().copied().fold(0.0, f64::max);
+        let fastest = flow.speed.iter().map(|u| u.abs()).fold(0.0, f64::max);
+        let fastest = fastest + ground.wave(deepest);
+        let longest = COURANT * flow.ring / fastest.max(f64::MIN_POSITIVE);
+        let dt = if step == 0 { left } else { left.min(longest) };
+        accelerate(flow, (&heights, &heads), ground, dragged, dt);
+        flow.move_on(&heights, ground, dt);
+        left -= dt;
+        if left <= 0.0 {
+            return;
+        }
+    }
+}
+
+/// Changes the velocities of `flow` and of the grains that it drags within `dt`, and says what pressure did.
+fn accelerate(
+    flow: &mut RadialFlow,
     (heights, heads): (&[f64], &[f64]),
     ground: &Ground,
     dragged: &mut [Dragged],
     dt: f64,
 ) {
-    let old = flow.speed.clone();
+    let (fluxes, old) = (flow.fluxes(heights, ground), flow.speed.clone());
     let count = flow.thickness.len();
     let mut circles = vec![Circle::default(); count];
     for (at, circle) in circles.iter_mut().enumerate().skip(1) {
-        *circle = circle_at(flow, at, fluxes, (heights, heads), ground, dt).unwrap_or_default();
+        *circle = circle_at(flow, at, &fluxes, (heights, heads), ground, dt).unwrap_or_default();
     }
     let mass: Vec<_> = circles.iter().map(|circle| circle.mass).collect();
     let open: Vec<_> = circles.iter().map(|circle| circle.open).collect();
@@ -153,3 +188,6 @@ fn friction(speed: f64, q: f64, deep: f64, viscosity: f64) -> f64 {
     let blasius = 0.223 / 8.0 * reynolds.max(f64::MIN_POSITIVE).powf(-0.25) * speed / deep;
     laminar.max(blasius)
 }
+
+#[cfg(test)]
+mod tests;

@@ -158,7 +158,7 @@ impl Simulation {
             bytes.extend(postcard::to_stdvec(&state).expect("a state in memory"));
         }
         if let Some(liquid) = &self.liquid {
-            bytes.extend(postcard::to_stdvec(liquid.state()).expect("a state in memory"));
+            bytes.extend(postcard::to_stdvec(&liquid.state()).expect("a state in memory"));
         }
         bytes
     }

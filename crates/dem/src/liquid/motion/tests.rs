@@ -85,7 +85,7 @@ fn solids_lift_the_surface_and_liquid_at_rest_stays() {
     assert!((flow.height(3, &solids) - 0.03).abs() < 1e-15);
     let walled = Ground { gate: Some((40, 0.0)), ..ground(1e-6, 0.0) };
     let before = flow.clone();
-    flow.advance(&solids, &walled, &mut [], 0.05);
+    advance(&mut flow, &solids, &walled, &mut [], 0.05);
     let moved = flow.speed.iter().fold(0.0, |most: f64, u| most.max(u.abs()));
     assert!(moved < 1e-12, "{moved}");
     assert_eq!(flow.thickness.len(), before.thickness.len());
@@ -110,7 +110,7 @@ impl RadialFlow {
     fn advance_for(&mut self, seconds: f64, ground: &Ground) {
         let step = 5e-4;
         for _ in 0..(seconds / step).round() as usize {
-            self.advance(&Solids::default(), ground, &mut [], step);
+            advance(self, &Solids::default(), ground, &mut [], step);
         }
     }
 
