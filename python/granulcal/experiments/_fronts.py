@@ -1,5 +1,6 @@
 """What studies of fronts of columns share: own errors, tensions, the run, a picture."""
 
+from collections.abc import Sequence
 from math import ceil
 from pathlib import Path
 
@@ -123,7 +124,7 @@ def _draw(path: Path, closed: Closed, forward: Forward) -> None:
     plt.close(figure)
 
 
-def _fronts(names: list[str]) -> dict[str, tuple[list[float], list[int], str]]:
+def _fronts(names: Sequence[str]) -> dict[str, tuple[list[float], list[int], str]]:
     """Times, columns and line of each front among statistics; that at the end has no time."""
     found: dict[str, tuple[list[float], list[int], str]] = {}
     both = any(name.startswith("liquid_radius") for name in names)

@@ -28,8 +28,9 @@ class RunOut:
     """The fronts of a collapsing column.
 
     Files have a line of names and then nine columns: frame, and for each of two cameras the radius
-    of the liquid's front [m], its velocity, the radius of the particles' front [m] and its velocity;
-    `nan` where it was not tracked. A radius is the average over the azimuths that a camera sees.
+    of the liquid's front [m], its velocity, the radius of the particles' front [m] and its
+    velocity; `nan` where it was not tracked. A radius is the average over the azimuths that a
+    camera sees.
 
     The two cameras see other azimuths, and differ by up to some beads. So each is read by itself,
     and what counts is the mean over what both see: a mean over the cameras that still see the front
@@ -116,8 +117,8 @@ class RunOut:
     def observed(self, scene: Scene, *, camera: int | None = None) -> ObservedStatistics:
         """Returns the measured `front_radius[t]` of the scene's times; `front_radius[end]` is last.
 
-        The end is the mean of what each camera saw last. `liquid_radius[t]` and `liquid_radius[end]`
-        are those of the liquid.
+        The end is the mean of what each camera saw last. `liquid_radius[t]` are those of the
+        liquid.
 
         Args:
             scene: the scene whose statistics are asked for.
