@@ -20,7 +20,8 @@ LATE = {"20210101": 0.012, "20210102": -0.015, "20210103": 0.004, "20210104": 0.
 
 def one(day: str, gravity: float, viscosity: float, beads: float = 8e-3) -> Test:
     numbers = {"N": gravity, "G": 9.81 * gravity, "d_p": beads, "rho_p": 2632.0}
-    return Test(f"{day}_{viscosity}", {**numbers, "rho_f": 1100.0, "mu_f": viscosity})
+    liquid = {"rho_f": 1100.0, "mu_f": viscosity, "H_f0": 0.05, "sigma_f": 0.07}
+    return Test(f"{day}_{viscosity}", {**numbers, **liquid})
 
 
 def front(test: Test, u: Array) -> Array:
@@ -124,6 +125,11 @@ def test_a_pour_has_the_liquid_and_the_free_fall_of_its_test(tmp_path: Path) -> 
     without = ColumnPours(tmp_path / "pours", "saturated").scene(one("a", 1.0, 1e-3))
     assert without.get("effects.lubrication.shear") == 0.0
     assert not ColumnPours(tmp_path, "dry").scene(one("a", 1.0, 1e-3)).has("effects.fluid.density")
+    flows = ColumnPours(tmp_path / "pours", "slipping").scene(one("a", 25.0, 5e-2, 6e-3))
+    assert flows.get("effects.liquid.viscosity") == 5e-2
+    assert flows.get("effects.liquid.tension") == 0.07
+    assert flows.get("effects.liquid.begin") == flows.get("walls.0.motion.begin")
+    assert not flows.has("effects.fluid.density")
     assert fast.get("gravity.2") == -9.81 * 25
     for path in ("substep", "end.horizon", "observe.begin", "walls.0.motion.begin"):
         assert fast.get(path) == pytest.approx(slow.get(path) / 5.0), path

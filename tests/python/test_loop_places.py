@@ -15,6 +15,7 @@ from granulcal.experiments import (
     loop_centrifuge,
     loop_column,
     loop_drum,
+    loop_liquid,
     loop_mounds,
     loop_rings,
 )
@@ -268,6 +269,45 @@ def test_columns_in_the_centrifuge_hold_each_their_own_liquid_and_have_no_end(
             assert scene.with_(entry.at(scene).numbers(1.0)).get(entry.path) == entry.full
     draws = ROUNDS * Thresholds().look
     [kind] = loop_centrifuge.poured(tmp_path)
+    assert planned(asked, kind.count, 0, rounds=1, draws=draws).pours < kind.count
+
+
+def test_columns_of_all_gravities_are_one_in_units_of_free_fall(tmp_path: Path) -> None:
+    folder = tmp_path / "column-collapse-webb"
+    folder.mkdir()
+    codes = [
+        code
+        for group in (loop_liquid.FITTED, loop_liquid.SEALED_TESTS)
+        for _, c in group
+        for code in c
+    ]
+    names = "TestCode N G r_0 H_p0 H_f0 d_p rho_p phi_p IF C_v rho_f mu_f sigma_f"
+    lines = [names]
+    for code in codes:
+        gravity = 4.0 if code.endswith("005") else 1.0
+        fluid = code.partition("_08g_")[2][3]
+        numbers = f"{gravity} {9.81 * gravity} 0.054 0.05 0.05 0.008 2632 0.6"
+        lines.append(f"{code} {numbers} {fluid} 0.08 1100 0.02 0.06")
+    (folder / "Experimental_Conditions.txt").write_text("\n".join(lines))
+    asked = loop_liquid.task(tmp_path)
+    scene = asked.at_first()
+    assert scene.get("gravity.2") == -9.81 and scene.get("effects.lubrication.shear") == 0.0
+    conditions = {condition.name: condition for condition in asked.conditions}
+    slow, fast = conditions["73 % glycerol, 1 g"], conditions["78 % glycerol, 4.6 g"]
+    assert slow.reading == {"fps": 240.0} and fast.reading == {"fps": 120.0}
+    for path, ratio in (("viscosity", 2.0), ("tension", 4.0), ("density", 1.0)):
+        name = f"effects.liquid.{path}"
+        assert slow.at[name] == pytest.approx(ratio * fast.at[name])
+    kinds = [name.partition("[")[0] for name in scene.observed_names]
+    assert kinds == ["front_radius"] * 7 + ["liquid_radius"] * 7
+    # A column of stated numbers is seen to run out, and its liquid ahead of it.
+    pour = gc.simulate(scene, seed=1).observed()
+    assert pour["liquid_radius[0.15]"] > pour["front_radius[0.15]"] > 0.06
+    for entry in asked.library:
+        if not entry.is_free:
+            assert scene.with_(entry.at(scene).numbers(1.0)).get(entry.path) == entry.full
+    [kind] = loop_liquid.poured(tmp_path)
+    draws = ROUNDS * Thresholds().look
     assert planned(asked, kind.count, 0, rounds=1, draws=draws).pours < kind.count
 
 

@@ -24,7 +24,7 @@ from granulcal.pours.pour_time import PourKind
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
-__all__ = ["reproduce", "task"]
+__all__ = ["FITTED", "SEALED_TESTS", "reproduce", "task"]
 
 _FOLDER = Path("column-collapse-webb")
 _FPS = 240.0
@@ -67,14 +67,14 @@ DEFINITIONS = (
     Definition("a shallower front of the liquid", {**OUTLINES[0].at, _DEPTH: 5e-4}),
 )
 
-# Name and tests of each condition: one liquid, one gravity.
-_FITTED = (
+Tests = tuple[tuple[str, tuple[str, ...]], ...]
+FITTED: Tests = (
     ("water, 1 g", ("20210420_08g_010w_050_050_001", "20210816_08g_010w_050_050_001")),
     ("7 % glycerol, 1 g", ("20210824_08g_012g_050_050_001",)),
     ("46 % glycerol, 4.6 g", ("20210804_08g_050g_050_050_005",)),
     ("88 % glycerol, 4.6 g", ("20220411_08g_1500g_050_050_005",)),
 )
-_SEALED = (
+SEALED_TESTS: Tests = (
     ("73 % glycerol, 1 g", ("20220608_08g_310g_050_050_001",)),
     ("78 % glycerol, 4.6 g", ("20220411_08g_500g_050_050_005",)),
     ("85 % glycerol, 4.6 g", ("20220411_08g_1000g_050_050_005",)),
@@ -83,12 +83,13 @@ _SEALED = (
     ("10 % clay, 4.6 g", ("20211124_08g_010k_050_050_005", "20220413_08g_010k_050_050_005")),
     ("20 % clay, 4.6 g", ("20211126_08g_020k_050_050_005", "20220412_08g_020k_050_050_005")),
 )
+"""Name and tests of each condition: one liquid, one gravity."""
 
 
 def task(data: Path) -> Task:
     """Returns what is asked of the measured columns."""
     tests = {test.code: test for test in read_tests(data / _FOLDER / "Experimental_Conditions.txt")}
-    scene = _scene(tests[_FITTED[0][1][0]])
+    scene = _scene(tests[FITTED[0][1][0]])
     conditions = [
         Condition(
             name,
@@ -97,7 +98,7 @@ def task(data: Path) -> Task:
             tuple(data / _FOLDER / "runout" / f"{code}.txt" for code in codes),
             reading={"fps": _FPS / sqrt(tests[codes[0]].numbers["N"])},
         )
-        for use, group in ((FIT, _FITTED), (SEALED, _SEALED))
+        for use, group in ((FIT, FITTED), (SEALED, SEALED_TESTS))
         for name, codes in group
     ]
     effects = (_PERMEABILITY, _FILM, *TENSIONS, _TORSION, *by_name(_EFFECTS))
