@@ -6,11 +6,10 @@
 //! ```
 //!
 //! The liquid is a sheet about the z axis (`liquid/flow.rs`) with a surface h(r) and a velocity u outwards. A grain feels
-//! it with the share w of its volume that is below that surface: buoyancy, the pressure that accelerates
-//! the liquid there by a_p, and Di Felice's drag in a packing (`effect/drag.rs`, which is Ergun's within a third) over `permeability`.
-//! What the drag gives to a grain it takes from the liquid, radially; up and around the liquid goes with the grain's
-//! neighbours `<v>`, the ground among them. Drag is implicit in what either has after it, one grain after the other, so
-//! that no drag is too strong for the substep. Added mass is left out.
+//! it with the share w of its volume that is below that surface: buoyancy, the pressure that accelerates the liquid there
+//! by a_p, half of what it displaces as added mass, and Di Felice's drag in a packing (`effect/drag.rs`, which is Ergun's
+//! within a third) over `permeability`. What the drag gives to a grain it takes from the liquid, radially; up and around
+//! the liquid goes with the grain's neighbours `<v>`, the ground among them. Drag is implicit (`liquid/drag.rs`).
 //!
 //! Source: two phases, each with its momentum, averaged over the depth: Pitman and Le, Phil. Trans. R. Soc. A 363 (2005)
 //! 1573, doi:10.1098/rsta.2005.1596; slip of water and grains in a collapse: Meng et al., J. Fluid Mech. 943 (2022) A19,
@@ -35,6 +34,9 @@ pub(crate) use flow::RadialFlow;
 use ground::Ground;
 use motion::advance;
 use solids::Solids;
+
+/// Mass of liquid that goes with a grain past it, over what it displaces `[-]`.
+const ADDED: f64 = 0.5;
 
 /// The liquid of a scene.
 #[derive(Clone, Debug)]
@@ -174,7 +176,8 @@ impl Liquid {
             let speed = sheet.speed(flow, particles, grain);
             let rate = beside(particles, grain, (drag, strength), (crowd, &mean, speed), context);
             wet.push((grain, share, energy));
-            dragged.push(dragged_one(particles, grain, rate, unit));
+            let added = ADDED * share * self.ratio;
+            dragged.push(dragged_one(particles, grain, (rate, added), unit));
         }
         advance(flow, &solids, &ground, &mut dragged, context.dt);
         for ((grain, share, energy), one) in wet.into_iter().zip(dragged) {
@@ -193,7 +196,7 @@ impl Liquid {
 fn dragged_one(
     particles: &Particles,
     grain: usize,
-    rate: f64,
+    (rate, added): (f64, f64),
     (ring, unit): (f64, f64),
 ) -> Dragged {
     let (distance, outwards) = from_axis(&particles.position(grain));
@@ -201,6 +204,7 @@ fn dragged_one(
         at: distance / ring,
         mass: particles.mass(grain) / unit,
         rate,
+        added,
         speed: particles.velocity(grain).dot(&outwards),
     }
 }

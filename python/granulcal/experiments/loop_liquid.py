@@ -35,16 +35,7 @@ _TIMES = (0.15, 0.175, 0.2, 0.225, 0.25, 0.275, 0.3)
 _OUT, _AFTER = 0.03, 0.01
 _ROUNDS = 1
 _BUDGET = 1600 + _ROUNDS * ROUND
-_EFFECTS = ("restitution.tangential", "restitution.speed")
-_PERMEABILITY = LibraryEffect(
-    name="liquid.permeability",
-    path="effects.liquid.permeability",
-    off=1.0,
-    full=10.0,
-    is_two_sided=True,
-    is_ratio=True,
-    doc="the beads let the liquid through more or less easily than theory says; a ratio",
-)
+_EFFECTS = ("liquid.permeability", "restitution.tangential", "restitution.speed")
 _FILM = LibraryEffect(
     name="film.shear",
     path="effects.lubrication.shear",
@@ -101,7 +92,7 @@ def task(data: Path) -> Task:
         for use, group in ((FIT, FITTED), (SEALED, SEALED_TESTS))
         for name, codes in group
     ]
-    effects = (_PERMEABILITY, _FILM, *TENSIONS, _TORSION, *by_name(_EFFECTS))
+    effects = (_FILM, *TENSIONS, _TORSION, *by_name(_EFFECTS))
     library = (*effects, *declared_nuisances({**NUISANCES, **_ANGLE}, scene))
     return Task(
         scene,

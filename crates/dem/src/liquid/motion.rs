@@ -97,7 +97,7 @@ fn accelerate(
         }
     }
     for one in dragged {
-        for (at, given) in one.follow(&mass, &flow.speed, dt) {
+        for (at, given) in one.follow(&mass, [&old, &flow.speed], dt) {
             flow.pressure[at] -= open[at] * given / mass[at];
         }
     }

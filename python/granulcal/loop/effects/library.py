@@ -233,6 +233,15 @@ LIBRARY: tuple[LibraryEffect, ...] = (
         doc="a fluid film resists surfaces that come together or part",
     ),
     LibraryEffect(
+        name="liquid.permeability",
+        path="effects.liquid.permeability",
+        off=1.0,
+        full=10.0,
+        is_two_sided=True,
+        is_ratio=True,
+        doc="grains let the scene's liquid through more or less easily than theory says",
+    ),
+    LibraryEffect(
         name="ground.layer",
         path="effects.layer.thickness",
         full=2e-3,
