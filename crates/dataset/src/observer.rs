@@ -4,6 +4,7 @@
 //! without. The names, units and meanings of its statistics follow from the scene's `observe` alone, so that every pour
 //! of a data set has the same columns.
 
+mod clock;
 mod discharge;
 mod front;
 mod images;
@@ -54,10 +55,10 @@ fn observations(scene: &Scene) -> Vec<Box<dyn Observation>> {
         all.push(Box::new(surface::Surface::new(spec, scene)));
     }
     if let Some(spec) = &observe.front {
-        all.push(Box::new(front::Front::new(spec)));
+        all.push(Box::new(front::Front::new(spec, observe.clock.as_ref())));
     }
     if let Some(spec) = &observe.liquid {
-        all.push(Box::new(liquid::Liquid::new(spec)));
+        all.push(Box::new(liquid::Liquid::new(spec, observe.clock.as_ref())));
     }
     if let Some(spec) = &observe.discharge {
         all.push(Box::new(discharge::Discharge::new(spec)));

@@ -72,12 +72,12 @@ pub use granulcal_scene::{
     Adhesion, BoxSide, CameraSpec, Capillary, Clump, Complementarity, DepthSensor, Effect, Effects,
     EndRule, Ends, Fluid, Funnel, FunnelPose, GRAVITY, GrainShape, Grains, Ground, GroundUnlike,
     ImpactSettings, Intruder, Layer, Liquid, Lubrication, Mask, Material, Mesh, MeshFile, Method,
-    Motion, NewtonSettings, NoiseField, Observe, ObserveDischarge, ObserveFront, ObserveImages,
-    ObserveLiquid, ObserveRadius, ObserveSpill, ObserveSurface, Outflow, Outlet, Periodic,
-    PeriodicAxis, Polydispersity, Preset, Projection, ReferenceSettings, RestitutionSpeed,
-    RolledAway, RollingForm, Scene, SceneError, Shape, SolverSettings, Start, StereoSensor, Tilt,
-    TimeOfFlightSensor, Vibration, ViewSpec, Wall, WallMaterial, rolling_friction_from_length,
-    rolling_friction_to_length,
+    Motion, NewtonSettings, NoiseField, Observe, ObserveClock, ObserveDischarge, ObserveFront,
+    ObserveImages, ObserveLiquid, ObserveRadius, ObserveSpill, ObserveSurface, Outflow, Outlet,
+    Periodic, PeriodicAxis, Polydispersity, Preset, Projection, ReferenceSettings,
+    RestitutionSpeed, RolledAway, RollingForm, Scene, SceneError, Shape, SolverSettings, Start,
+    StereoSensor, Tilt, TimeOfFlightSensor, Vibration, ViewSpec, Wall, WallMaterial,
+    rolling_friction_from_length, rolling_friction_to_length,
 };
 pub use health::{Health, MAX_ENERGY_CREATED};
 pub use impact::ImpactWork;

@@ -56,8 +56,8 @@ pub use material::{
 pub use mesh::{Mesh, MeshFile};
 pub use motion::Motion;
 pub use observe::{
-    Observe, ObserveDischarge, ObserveFront, ObserveImages, ObserveLiquid, ObserveRadius,
-    ObserveSpill, ObserveSurface,
+    Observe, ObserveClock, ObserveDischarge, ObserveFront, ObserveImages, ObserveLiquid,
+    ObserveRadius, ObserveSpill, ObserveSurface,
 };
 pub use outflow::Outflow;
 pub use path::first_difference;

@@ -31,6 +31,9 @@ pub struct Observe {
     /// The front of the liquid of `effects.liquid`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub liquid: Option<ObserveLiquid>,
+    /// Where the clock of `front` and `liquid` begins, if it is not `begin`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock: Option<ObserveClock>,
     /// The share that has run out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub discharge: Option<ObserveDischarge>,
@@ -88,6 +91,17 @@ pub struct ObserveLiquid {
     /// When the radius is taken, after `begin`, rising `[s]`.
     pub times: Vec<f64>,
     /// Height of the liquid's surface at its front `[m]`: what is thinner is not seen.
+    #[serde(default = "half_a_millimetre")]
+    pub depth: f64,
+}
+
+/// A clock of `front` and `liquid` that begins when the front of the liquid of `effects.liquid` comes by.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObserveClock {
+    /// Radius about the z axis at which the liquid's front begins it `[m]`.
+    pub liquid_at: f64,
+    /// Height of the liquid's surface at that front `[m]`.
     #[serde(default = "half_a_millimetre")]
     pub depth: f64,
 }
@@ -157,6 +171,11 @@ const fn is_yes(value: &bool) -> bool {
 }
 
 impl Observe {
+    /// Whether it asks for the front of the scene's liquid.
+    pub(crate) fn asks_for_liquid(&self) -> bool {
+        self.liquid.is_some() || self.clock.is_some()
+    }
+
     pub(crate) fn check(&self, horizon: f64, diameter: f64) -> Result<(), SceneError> {
         positive("observe.rate", self.rate)?;
         non_negative("observe.begin", self.begin)?;
@@ -198,6 +217,10 @@ impl Observe {
             let allowed = "from 0 to end.horizon less observe.begin";
             rising("observe.liquid.times", &liquid.times, (0.0, rest), allowed)?;
             positive("observe.liquid.depth", liquid.depth)?;
+        }
+        if let Some(clock) = &self.clock {
+            positive("observe.clock.liquid_at", clock.liquid_at)?;
+            positive("observe.clock.depth", clock.depth)?;
         }
         if let Some(discharge) = &self.discharge {
             finite("observe.discharge.below", discharge.below)?;
@@ -279,6 +302,7 @@ mod tests {
             surface: None,
             front: Some(front),
             liquid: Some(ObserveLiquid { times: vec![0.1], depth: 1e-3 }),
+            clock: Some(ObserveClock { liquid_at: 0.1, depth: 1e-3 }),
             discharge: Some(discharge),
             radius: Some(ObserveRadius { axis: [0.0; 2], percentiles: vec![10.0, 90.0] }),
             spill: Some(ObserveSpill { axis: [0.0; 2], radius: 0.05 }),

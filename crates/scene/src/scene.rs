@@ -319,8 +319,8 @@ impl Scene {
         if self.effects.liquid.is_on() {
             return exclude("effects.liquid", &others);
         }
-        if self.observe.as_ref().is_some_and(|observe| observe.liquid.is_some()) {
-            let allowed = "positive where observe.liquid asks for its front";
+        if self.observe.as_ref().is_some_and(Observe::asks_for_liquid) {
+            let allowed = "positive where observe.liquid or observe.clock asks for its front";
             let got = self.effects.liquid.height;
             return Err(SceneError::range("effects.liquid.height", got, allowed));
         }

@@ -2,9 +2,10 @@
 
 use granulcal_dem::Pour;
 use granulcal_features::series::{front_radius, outline_radius};
-use granulcal_scene::ObserveFront;
+use granulcal_scene::{ObserveClock, ObserveFront};
 use nalgebra::Vector2;
 
+use super::clock::Clock;
 use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 
 /// `front_radius[t]` at the stated times, and `front_radius[end]` unless it is left out.
@@ -12,11 +13,16 @@ use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 pub(super) struct Front {
     spec: ObserveFront,
     series: Series,
+    clock: Clock,
 }
 
 impl Front {
-    pub(super) fn new(spec: &ObserveFront) -> Self {
-        Self { spec: spec.clone(), series: Series::new("front_radius", "m") }
+    pub(super) fn new(spec: &ObserveFront, clock: Option<&ObserveClock>) -> Self {
+        Self {
+            spec: spec.clone(),
+            series: Series::new("front_radius", "m"),
+            clock: Clock::new(clock),
+        }
     }
 }
 
@@ -49,11 +55,12 @@ impl Observation for Front {
         } else {
             front_radius(&frame.positions, &frame.radii, axis, level)
         };
+        self.clock.see(frame);
         self.series.push(frame.time, radius.unwrap_or(f64::NAN));
     }
 
     fn values(&self, pour: &Pour) -> Vec<f64> {
-        let at = |&time: &f64| self.series.at(time, holds(pour));
+        let at = |&time: &f64| self.series.at(self.clock.time(time), holds(pour));
         let end = self.series.values.last().copied().unwrap_or(f64::NAN);
         self.spec.times.iter().map(at).chain(self.spec.end.then_some(end)).collect()
     }

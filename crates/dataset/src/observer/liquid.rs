@@ -2,8 +2,9 @@
 
 use granulcal_dem::Pour;
 use granulcal_features::series::sheet_radius;
-use granulcal_scene::ObserveLiquid;
+use granulcal_scene::{ObserveClock, ObserveLiquid};
 
+use super::clock::Clock;
 use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 
 /// `liquid_radius[t]` at the stated times.
@@ -11,11 +12,16 @@ use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 pub(super) struct Liquid {
     spec: ObserveLiquid,
     series: Series,
+    clock: Clock,
 }
 
 impl Liquid {
-    pub(super) fn new(spec: &ObserveLiquid) -> Self {
-        Self { spec: spec.clone(), series: Series::new("liquid_radius", "m") }
+    pub(super) fn new(spec: &ObserveLiquid, clock: Option<&ObserveClock>) -> Self {
+        Self {
+            spec: spec.clone(),
+            series: Series::new("liquid_radius", "m"),
+            clock: Clock::new(clock),
+        }
     }
 }
 
@@ -35,11 +41,16 @@ impl Observation for Liquid {
     fn see(&mut self, frame: &Frame) {
         let of = |(ring, heights): &(f64, Vec<f64>)| sheet_radius(*ring, heights, self.spec.depth);
         let radius = frame.liquid.as_ref().and_then(of);
+        self.clock.see(frame);
         self.series.push(frame.time, radius.unwrap_or(f64::NAN));
     }
 
     fn values(&self, pour: &Pour) -> Vec<f64> {
-        self.spec.times.iter().map(|&time| self.series.at(time, holds(pour))).collect()
+        self.spec
+            .times
+            .iter()
+            .map(|&time| self.series.at(self.clock.time(time), holds(pour)))
+            .collect()
     }
 
     fn series(&self) -> &[Series] {

@@ -31,6 +31,7 @@ fn scene() -> Scene {
             end: true,
         }),
         liquid: None,
+        clock: None,
         discharge: Some(ObserveDischarge {
             below: 0.027,
             times: vec![0.03, 0.1, 0.3],
