@@ -133,7 +133,6 @@ def _scene(test: Test) -> Scene:
     scene = observing(column_scene(test, "slipping"), np.array(_TIMES), end=False)
     listed = ", ".join(repr(t) for t in _TIMES)
     liquid = f"\n[observe.liquid]\ntimes = [{listed}]\ndepth = {_THIN[_DEPTH]!r}\n"
-    liquid += f"\n[observe.clock]\nliquid_at = {_TUBE!r}\ndepth = {_THIN[_DEPTH]!r}\n"
     begin = scene.get("walls.0.motion.begin")
     horizon = begin + _TIMES[-1] + _AFTER
     return Scene.from_toml(scene.to_toml() + liquid).with_(
@@ -141,6 +140,7 @@ def _scene(test: Test) -> Scene:
             "observe.begin": begin,
             "end.horizon": horizon,
             "walls.0.motion.end": horizon,
+            "observe.clock.depth": _THIN[_DEPTH],
             # Looked for.
             _FILM.path: 0.0,
         }

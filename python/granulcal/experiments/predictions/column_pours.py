@@ -82,6 +82,8 @@ LIQUIDS: dict[str, dict[str, float] | None] = {
 # Times of the scene that go with free fall, and the one that is a rate.
 _TIMES = ("substep", "walls.0.motion.begin", "observe.begin", "end.horizon")
 _RATE = "observe.rate"
+# Outer radius of the tube [m].
+_TUBE = 0.062
 _SEED = 8_700_001
 _WATER = 1e-3
 
@@ -101,7 +103,11 @@ def column_scene(test: Test, model: str) -> Scene:
         numbers |= {**(known_flow(test) if model == "slipping" else known_liquid(test)), **liquid}
         if model == "slipping":
             numbers["effects.liquid.begin"] = numbers["walls.0.motion.begin"]
-    return observing(base, times_of(test)).with_(numbers)
+    scene = observing(base, times_of(test)).with_(numbers)
+    if model != "slipping":
+        return scene
+    # A film's first frame is where the liquid has come out from under the tube.
+    return Scene.from_toml(f"{scene.to_toml()}\n[observe.clock]\nliquid_at = {_TUBE!r}\n")
 
 
 def known_liquid(test: Test) -> dict[str, float]:
