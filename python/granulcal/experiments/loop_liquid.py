@@ -143,6 +143,7 @@ def _scene(test: Test) -> Scene:
             "observe.clock.depth": _THIN[_DEPTH],
             # Looked for.
             _FILM.path: 0.0,
+            "effects.liquid.permeability": 1.0,
         }
     )
 

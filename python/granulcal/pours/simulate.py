@@ -166,8 +166,8 @@ class Pour:
         """Returns times after the begin of the observation [s] and the samples of what is observed.
 
         Args:
-            name: `front_radius` [m], `discharged` [%], `surface_slope` [deg] or the height of the
-                surface at a stated x, `surface_z[0.01]` [m].
+            name: `front_radius` or `liquid_radius` [m], `discharged` [%], `surface_slope` [deg] or
+                the height of the surface at a stated x, `surface_z[0.01]` [m].
 
         Raises:
             KeyError: the scene does not observe it.

@@ -7,6 +7,8 @@ r"""Columns of beads, dry or holding their liquid: what is known of a test, and 
 | `sheared` | the same, and resists surfaces that slide past each other |
 | `slipping` | flows by itself, drags them and runs out ahead of them; films as `sheared` |
 
+`slipping` tells tests of other days no better than `sheared`, and has no row in the predictions.
+
 A test states gravity, beads and liquid, and all of them are taken as stated: density and viscosity
 of `effects.fluid` (`effects.liquid` where it flows by itself) and `effects.lubrication` are the
 test's own, as are the height up to which it fills the column, and its surface tension. What nobody
@@ -71,14 +73,16 @@ _FLOWING = {
     "effects.liquid.radius": 0.054,
     # Of water on acrylic, some 70 degrees.
     "effects.liquid.contact_angle": 1.2,
+    # Over theory's: what `reproduce loop_liquid` makes of it.
+    "effects.liquid.permeability": 0.2,
 }
 LIQUIDS: dict[str, dict[str, float] | None] = {
-    "slipping": {**_FLOWING, **_SHEARED},
     "sheared": {**_SATURATED, **_SHEARED},
     "saturated": _SATURATED,
     "dry": None,
 }
 """Models by name: numbers of the scene beside the liquid's own; None without a liquid."""
+_MODELS = {**LIQUIDS, "slipping": {**_FLOWING, **_SHEARED}}
 # Times of the scene that go with free fall, and the one that is a rate.
 _TIMES = ("substep", "walls.0.motion.begin", "observe.begin", "end.horizon")
 _RATE = "observe.rate"
@@ -89,8 +93,8 @@ _WATER = 1e-3
 
 
 def column_scene(test: Test, model: str) -> Scene:
-    """Returns a test's scene by one of `LIQUIDS`, of which only `UNKNOWN` is not stated."""
-    base, liquid = Scene.load(_SCENE), LIQUIDS[model]
+    """Returns a test's scene by a model, of which only `UNKNOWN` is not stated."""
+    base, liquid = Scene.load(_SCENE), _MODELS[model]
     unit = 1.0 / sqrt(test.numbers["N"])
     numbers = test.scene_numbers(base)
     numbers |= {path: unit * base.get(path) for path in _TIMES}
@@ -140,7 +144,7 @@ class ColumnPours:
 
     Args:
         pours: folder of the kept ones.
-        model: one of `LIQUIDS`.
+        model: one of `LIQUIDS`, or `slipping`.
     """
 
     def __init__(self, pours: Path, model: str) -> None:

@@ -35,7 +35,13 @@ from granulcal.experiments.predictions.column_tests import Fronts, Test, all_tes
 from granulcal.experiments.predictions.columns import rows_of
 from granulcal.pours.pour_time import PourKind
 
-__all__ = ["FURTHER_SEEDS", "fitted_rows", "half_and_half", "poured_of_columns"]
+__all__ = [
+    "FURTHER_SEEDS",
+    "fitted_rows",
+    "half_and_half",
+    "poured_of_columns",
+    "say_fitted",
+]
 
 Array = NDArray[np.float64]
 
@@ -65,6 +71,19 @@ def fitted_rows(data: Path, pours: Path, *, say: Callable[[str], None]) -> list[
         if test.code in told[model]
         for row in rows_of(model, test, told[model][test.code])
     ]
+
+
+def say_fitted(model: str, data: Path, pours: Path) -> None:
+    """Prints what `fitted_rows` says of a model, of one that has no rows, too.
+
+    Args:
+        model: of `column_pours.py`.
+        data: measured data.
+        pours: folder of the pours that are kept.
+    """
+    fronts = read_fronts(data)
+    told = _fitted(model, fronts, list(fronts.tests), pours, print)
+    _say_held(model, fronts, [told[test.code] for test in fronts.tests], print)
 
 
 def poured_of_columns(data: Path) -> list[PourKind]:
