@@ -11,6 +11,7 @@ clock of a pour begins when its liquid is there, and no test has a clock of its 
 misread of it.
 """
 
+from collections.abc import Mapping
 from math import sqrt
 from pathlib import Path
 
@@ -28,7 +29,7 @@ from granulcal.pours.pour_time import PourKind
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
-__all__ = ["FITTED", "SEALED_TESTS", "reproduce", "task"]
+__all__ = ["BUDGET", "FITTED", "OWN_ERRORS", "ROUNDS", "SEALED_TESTS", "reproduce", "task"]
 
 _FOLDER = Path("column-collapse-webb")
 _FPS = 240.0
@@ -39,8 +40,8 @@ _TUBE = 0.062
 # A pour ends that long after the tube's begin and the last time: the liquid may take its time, too
 # [s at 1 g].
 _AFTER = 0.1
-_ROUNDS = 1
-_BUDGET = 1600 + _ROUNDS * ROUND
+ROUNDS = 1
+BUDGET = 1600 + ROUNDS * ROUND
 _EFFECTS = ("liquid.permeability", "restitution.tangential", "restitution.speed")
 _FILM = LibraryEffect(
     name="film.shear",
@@ -54,12 +55,15 @@ _TORSION = LibraryEffect(
     full=0.3,
     doc="torsional friction between beads",
 )
-# Of the liquid on the plate, which nobody stated [rad].
-_ANGLE = {"effects.liquid.contact_angle": {"sd": 0.3, "shared": True}}
 _DEPTH, _CLOCK = "observe.liquid.depth", "observe.clock.liquid_at"
 _THIN = {_DEPTH: 1e-3, _CLOCK: _TUBE}
-# Two frames of a centrifuge's film, in place of a clock that is set by hand.
-_MISREAD = {"clock.offset": {"sd": 0.008, "shared": False}}
+_PRIOR = Prior(UNKNOWN.parameters)
+OWN_ERRORS: Mapping[str, Mapping[str, float | bool]] = {
+    # Two frames of a centrifuge's film, in place of a clock that is set by hand.
+    "clock.offset": {"sd": 0.008, "shared": False},
+    # Of the liquid on the plate, which nobody stated [rad].
+    "effects.liquid.contact_angle": {"sd": 0.3, "shared": True},
+}
 DEFINITIONS = (
     *(Definition(one.name, {**one.at, **_THIN}, one.reading) for one in OUTLINES),
     Definition("a deeper front of the liquid", {**OUTLINES[0].at, **_THIN, _DEPTH: 2e-3}),
@@ -87,8 +91,18 @@ SEALED_TESTS: Tests = (
 """Name and tests of each condition: one liquid, one gravity."""
 
 
-def task(data: Path) -> Task:
-    """Returns what is asked of the measured columns."""
+def task(
+    data: Path,
+    prior: Prior = _PRIOR,
+    own_errors: Mapping[str, Mapping[str, float | bool]] = OWN_ERRORS,
+) -> Task:
+    """Returns what is asked of the measured columns.
+
+    Args:
+        data: measured data.
+        prior: of what nobody measured.
+        own_errors: declared tolerances beside those of every study of fronts.
+    """
     tests = {test.code: test for test in read_tests(data / _FOLDER / "Experimental_Conditions.txt")}
     scene = _scene(tests[FITTED[0][1][0]])
     conditions = [
@@ -103,10 +117,10 @@ def task(data: Path) -> Task:
         for name, codes in group
     ]
     effects = (_FILM, *TENSIONS, _TORSION, *by_name(_EFFECTS))
-    library = (*effects, *declared_nuisances({**NUISANCES, **_MISREAD, **_ANGLE}, scene))
+    library = (*effects, *declared_nuisances({**NUISANCES, **own_errors}, scene))
     return Task(
         scene,
-        Prior(UNKNOWN.parameters),
+        prior,
         tuple(conditions),
         library,
         # Density, viscosity and tension of a liquid go together.
@@ -151,7 +165,7 @@ def _scene(test: Test) -> Scene:
 def poured(data: Path) -> list[PourKind]:
     """Returns what is poured, for `--dry-run`."""
     asked = task(data)
-    return [PourKind("the archive", asked.at_first(), asked.prior, _BUDGET)]
+    return [PourKind("the archive", asked.at_first(), asked.prior, BUDGET)]
 
 
 def reproduce(out: Path, data: Path) -> bool:
@@ -164,6 +178,6 @@ def reproduce(out: Path, data: Path) -> bool:
         out / "loop_liquid",
         command=f"granulcal reproduce loop_liquid --out {out}",
         title="Columns of beads and the liquid that flows through them, at every gravity",
-        budget=_BUDGET,
-        rounds=_ROUNDS,
+        budget=BUDGET,
+        rounds=ROUNDS,
     )
