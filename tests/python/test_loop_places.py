@@ -18,6 +18,7 @@ from granulcal.experiments import (
     loop_liquid,
     loop_mounds,
     loop_rings,
+    loop_tube,
 )
 from granulcal.loop.check.prior_rounds import ROUNDS
 from granulcal.loop.close import Closed, _candidates, planned
@@ -306,6 +307,14 @@ def test_columns_of_all_gravities_are_one_in_units_of_free_fall(tmp_path: Path) 
     for entry in asked.library:
         if not entry.is_free:
             assert scene.with_(entry.at(scene).numbers(1.0)).get(entry.path) == entry.full
+    # With a tube of each test's own its speed is an own error of a condition, and no unknown.
+    own = loop_tube.task(tmp_path)
+    assert set(asked.prior.names) - set(own.prior.names) == {"walls.0.motion.velocity.2"}
+    [speed] = [entry for entry in own.library if entry.path == "walls.0.motion.velocity.2"]
+    assert not speed.is_shared and speed.nuisance_sd == 0.5
+    assert [entry.name for entry in own.library if entry is not speed] == [
+        entry.name for entry in asked.library
+    ]
     [kind] = loop_liquid.poured(tmp_path)
     draws = ROUNDS * Thresholds().look
     assert planned(asked, kind.count, 0, rounds=1, draws=draws).pours < kind.count
