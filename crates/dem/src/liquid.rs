@@ -31,6 +31,7 @@ use crate::effect::{Drag, EffectContext, neighbours};
 use crate::particles::Particles;
 use drag::Dragged;
 pub(crate) use flow::RadialFlow;
+use flow::between;
 use ground::Ground;
 use motion::advance;
 use solids::Solids;
@@ -129,9 +130,7 @@ impl Liquid {
     /// Height of the surface in each ring among these grains, and the rings' width `[m]`; none before its begin.
     pub fn profile(&self, particles: &Particles) -> Option<(f64, Vec<f64>)> {
         let flow = self.flow.as_ref()?;
-        let solids = Solids::of(particles, self.ring);
-        let heights = (0..flow.thickness.len()).map(|ring| flow.height(ring, &solids));
-        Some((self.ring, heights.collect()))
+        Some((self.ring, flow.heights(&Solids::of(particles, self.ring))))
     }
 
     /// Flows for a substep that begins at `time`, once gravity has acted on the grains, and acts on them; returns the
@@ -256,8 +255,7 @@ struct Sheet {
 
 impl Sheet {
     fn of(flow: &RadialFlow, solids: &Solids) -> Self {
-        let rings = 0..flow.thickness.len();
-        let heights: Vec<_> = rings.map(|ring| flow.height(ring, solids)).collect();
+        let heights = flow.heights(solids);
         let crowds = heights.iter().enumerate().map(|(ring, &height)| solids.crowd(ring, height));
         Self { ring: flow.ring, crowds: crowds.collect(), heights }
     }
@@ -270,10 +268,7 @@ impl Sheet {
 
     /// A value at a distance from the axis, linear between the middles of rings.
     fn between(&self, values: &[f64], distance: f64) -> f64 {
-        let at = (distance / self.ring - 0.5).max(0.0);
-        let ring = at as usize;
-        let of = |ring: usize| values.get(ring).copied().unwrap_or(0.0);
-        of(ring) + at.fract() * (of(ring + 1) - of(ring))
+        between(values, (distance / self.ring - 0.5).max(0.0))
     }
 
     /// Share of a grain's volume that is below the surface `[-]`.

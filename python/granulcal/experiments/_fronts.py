@@ -11,7 +11,15 @@ from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.folder import write_report
 from granulcal.loop.task import FIT, Task
 
-__all__ = ["DEFINITIONS", "NUISANCES", "OUTLINES", "TENSIONS", "close_fronts"]
+__all__ = [
+    "DEFINITIONS",
+    "FILM",
+    "NUISANCES",
+    "OUTLINES",
+    "TENSIONS",
+    "TORSION",
+    "close_fronts",
+]
 
 # Tension in N/m: as multiples of a bead's weight it would grow with gravity.
 TENSIONS = (
@@ -33,6 +41,19 @@ TENSIONS = (
         also=(("effects.adhesion.walls", 0.0),),
         doc="adhesion of touching beads; surface energy",
     ),
+)
+# Nothing is free in theory: the share is 1.
+FILM = LibraryEffect(
+    name="film.shear",
+    path="effects.lubrication.shear",
+    doc="the film between beads resists surfaces that slide past each other; share of theory",
+)
+TORSION = LibraryEffect(
+    name="torsion",
+    path="material.torsional_friction",
+    off=0.02,
+    full=0.3,
+    doc="torsional friction between beads",
 )
 # Own errors: fronts of one condition are shifted by 25 to 50 ms from campaign to campaign, frames
 # are told at 240 a second, lengths are read off a wide lens.

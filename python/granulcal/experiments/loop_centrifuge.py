@@ -10,10 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from granulcal.experiments._fronts import DEFINITIONS, NUISANCES, TENSIONS, close_fronts
+from granulcal.experiments._fronts import (
+    DEFINITIONS,
+    FILM,
+    NUISANCES,
+    TENSIONS,
+    TORSION,
+    close_fronts,
+)
 from granulcal.experiments.predictions.column_pours import UNKNOWN, column_scene, known_liquid
 from granulcal.experiments.predictions.column_tests import Test, observing, read_tests
-from granulcal.loop.effects.library import LibraryEffect, by_name
+from granulcal.loop.effects.library import by_name
 from granulcal.loop.effects.nuisances import declared_nuisances
 from granulcal.loop.pours.refine import ROUND
 from granulcal.loop.task import FIT, SEALED, Condition, Task
@@ -31,19 +38,6 @@ _AFTER = 0.01
 _ROUNDS = 1
 _BUDGET = 1600 + _ROUNDS * ROUND
 _EFFECTS = ("restitution.tangential", "restitution.speed")
-# Nothing is free in theory: the share is 1.
-_FILM = LibraryEffect(
-    name="film.shear",
-    path="effects.lubrication.shear",
-    doc="the film between beads resists surfaces that slide past each other; share of theory",
-)
-_TORSION = LibraryEffect(
-    name="torsion",
-    path="material.torsional_friction",
-    off=0.02,
-    full=0.3,
-    doc="torsional friction between beads",
-)
 
 _END = "_050_050_005"
 # Name and tests of each condition: one liquid, one gravity.
@@ -74,7 +68,7 @@ def task(data: Path) -> Task:
         for use, group in ((FIT, _FITTED), (SEALED, _SEALED))
         for name, codes in group
     ]
-    effects = (_FILM, *TENSIONS, _TORSION, *by_name(_EFFECTS))
+    effects = (FILM, *TENSIONS, TORSION, *by_name(_EFFECTS))
     library = (*effects, *declared_nuisances(NUISANCES, scene))
     return Task(
         scene,

@@ -17,11 +17,18 @@ from pathlib import Path
 
 import numpy as np
 
-from granulcal.experiments._fronts import NUISANCES, OUTLINES, TENSIONS, close_fronts
+from granulcal.experiments._fronts import (
+    FILM,
+    NUISANCES,
+    OUTLINES,
+    TENSIONS,
+    TORSION,
+    close_fronts,
+)
 from granulcal.experiments.predictions.column_pours import UNKNOWN, column_scene, known_flow
 from granulcal.experiments.predictions.column_tests import Test, observing, read_tests
 from granulcal.loop.effects.definitions import Definition
-from granulcal.loop.effects.library import LibraryEffect, by_name
+from granulcal.loop.effects.library import by_name
 from granulcal.loop.effects.nuisances import declared_nuisances
 from granulcal.loop.pours.refine import ROUND
 from granulcal.loop.task import FIT, SEALED, Condition, Task
@@ -43,18 +50,6 @@ _AFTER = 0.1
 ROUNDS = 1
 BUDGET = 1600 + ROUNDS * ROUND
 _EFFECTS = ("liquid.permeability", "restitution.tangential", "restitution.speed")
-_FILM = LibraryEffect(
-    name="film.shear",
-    path="effects.lubrication.shear",
-    doc="the film between beads resists surfaces that slide past each other; share of theory",
-)
-_TORSION = LibraryEffect(
-    name="torsion",
-    path="material.torsional_friction",
-    off=0.02,
-    full=0.3,
-    doc="torsional friction between beads",
-)
 _DEPTH, _CLOCK = "observe.liquid.depth", "observe.clock.liquid_at"
 _THIN = {_DEPTH: 1e-3, _CLOCK: _TUBE}
 _PRIOR = Prior(UNKNOWN.parameters)
@@ -116,7 +111,7 @@ def task(
         for use, group in ((FIT, FITTED), (SEALED, SEALED_TESTS))
         for name, codes in group
     ]
-    effects = (_FILM, *TENSIONS, _TORSION, *by_name(_EFFECTS))
+    effects = (FILM, *TENSIONS, TORSION, *by_name(_EFFECTS))
     library = (*effects, *declared_nuisances({**NUISANCES, **own_errors}, scene))
     return Task(
         scene,
@@ -156,7 +151,7 @@ def _scene(test: Test) -> Scene:
             "walls.0.motion.end": horizon,
             "observe.clock.depth": _THIN[_DEPTH],
             # Looked for.
-            _FILM.path: 0.0,
+            FILM.path: 0.0,
             "effects.liquid.permeability": 1.0,
         }
     )

@@ -1,6 +1,5 @@
 //! Time zero of what is observed: the begin of the observation, or when the scene's liquid comes by.
 
-use granulcal_features::series::sheet_radius;
 use granulcal_scene::ObserveClock;
 
 use super::observation::Frame;
@@ -22,8 +21,7 @@ impl Clock {
     /// Takes a sample.
     pub(super) fn see(&mut self, frame: &Frame) {
         let (Some(spec), None) = (self.spec, self.zero) else { return };
-        let of = |(ring, heights): &(f64, Vec<f64>)| sheet_radius(*ring, heights, spec.depth);
-        let Some(radius) = frame.liquid.as_ref().and_then(of) else { return };
+        let Some(radius) = frame.liquid_front(spec.depth) else { return };
         if radius < spec.liquid_at {
             self.before = Some((frame.time, radius));
             return;

@@ -1,7 +1,6 @@
 //! The radius of the front of the scene's liquid, against time.
 
 use granulcal_dem::Pour;
-use granulcal_features::series::sheet_radius;
 use granulcal_scene::{ObserveClock, ObserveLiquid};
 
 use super::clock::Clock;
@@ -39,8 +38,7 @@ impl Observation for Liquid {
     }
 
     fn see(&mut self, frame: &Frame) {
-        let of = |(ring, heights): &(f64, Vec<f64>)| sheet_radius(*ring, heights, self.spec.depth);
-        let radius = frame.liquid.as_ref().and_then(of);
+        let radius = frame.liquid_front(self.spec.depth);
         self.clock.see(frame);
         self.series.push(frame.time, radius.unwrap_or(f64::NAN));
     }

@@ -3,6 +3,7 @@
 use std::fmt::Debug;
 
 use granulcal_dem::{Pour, Status};
+use granulcal_features::series::sheet_radius;
 use nalgebra::Vector3;
 
 /// A statistic of a scene, as the registry tells the others.
@@ -64,6 +65,14 @@ pub(super) struct Frame {
     pub(super) radii_out: Vec<f64>,
     /// Width of a ring, and height of the liquid's surface in each; none where there is no liquid.
     pub(super) liquid: Option<(f64, Vec<f64>)>,
+}
+
+impl Frame {
+    /// Radius up to which the liquid's surface is `depth` high `[m]`; none where there is no such liquid.
+    pub(super) fn liquid_front(&self, depth: f64) -> Option<f64> {
+        let (ring, heights) = self.liquid.as_ref()?;
+        sheet_radius(*ring, heights, depth)
+    }
 }
 
 /// One kind of observation.

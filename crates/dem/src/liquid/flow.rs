@@ -63,6 +63,11 @@ impl RadialFlow {
         self.thickness.get(ring).map_or(0.0, |&q| solids.surface(ring, q))
     }
 
+    /// Height of the surface in each ring `[m]`.
+    pub fn heights(&self, solids: &Solids) -> Vec<f64> {
+        (0..self.thickness.len()).map(|ring| self.height(ring, solids)).collect()
+    }
+
     /// Velocity outwards at a distance from the axis in rings, linear between circles `[m/s]`.
     pub fn speed_at(&self, at: f64) -> f64 {
         between(&self.speed, at)
@@ -114,8 +119,8 @@ impl RadialFlow {
     }
 }
 
-/// A value between two circles.
-fn between(values: &[f64], at: f64) -> f64 {
+/// A value between two circles, or two middles of rings; nothing beyond the last.
+pub(super) fn between(values: &[f64], at: f64) -> f64 {
     let of = |circle: usize| values.get(circle).copied().unwrap_or(0.0);
     let circle = at as usize;
     of(circle) + at.fract() * (of(circle + 1) - of(circle))

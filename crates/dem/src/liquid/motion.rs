@@ -46,8 +46,7 @@ pub(super) fn advance(
     let mut left = dt;
     for step in (0..MOST_STEPS).rev() {
         flow.make_room();
-        let heights: Vec<_> =
-            (0..flow.thickness.len()).map(|ring| flow.height(ring, solids)).collect();
+        let heights = flow.heights(solids);
         let of = |(ring, &h): (usize, &f64)| ground.head(h, solids.top(ring));
         let heads: Vec<_> = heights.iter().enumerate().map(of).collect();
         let deepest = heights.iter().copied().fold(0.0, f64::max);
