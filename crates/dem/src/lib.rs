@@ -33,6 +33,7 @@ mod assemble;
 mod blocks;
 mod bodies;
 mod body;
+mod bonds;
 mod checkpoint;
 mod clumps;
 mod contact;
@@ -69,12 +70,12 @@ pub use error::DemError;
 pub use frozen_search::FrozenSearch;
 /// What is asked, from the crate below; all of it is in [`granulcal_scene`].
 pub use granulcal_scene::{
-    Adhesion, BoxSide, CameraSpec, Capillary, Clump, Complementarity, DepthSensor, Effect, Effects,
-    EndRule, Ends, Fluid, Funnel, FunnelPose, GRAVITY, GrainShape, Grains, Ground, GroundUnlike,
-    ImpactSettings, Intruder, Layer, Liquid, Lubrication, Mask, Material, Mesh, MeshFile, Method,
-    Motion, NewtonSettings, NoiseField, Observe, ObserveClock, ObserveDischarge, ObserveFront,
-    ObserveImages, ObserveLiquid, ObserveRadius, ObserveSpill, ObserveSurface, Outflow, Outlet,
-    Periodic, PeriodicAxis, Polydispersity, Preset, Projection, ReferenceSettings,
+    Adhesion, Bed, Bonds, BoxSide, CameraSpec, Capillary, Clump, Complementarity, DepthSensor,
+    Effect, Effects, EndRule, Ends, Fluid, Funnel, FunnelPose, GRAVITY, GrainShape, Grains, Ground,
+    GroundUnlike, ImpactSettings, Intruder, Layer, Liquid, Lubrication, Mask, Material, Mesh,
+    MeshFile, Method, Motion, NewtonSettings, NoiseField, Observe, ObserveClock, ObserveDischarge,
+    ObserveFront, ObserveImages, ObserveLiquid, ObserveRadius, ObserveSpill, ObserveSurface,
+    Outflow, Outlet, Periodic, PeriodicAxis, Polydispersity, Preset, Projection, ReferenceSettings,
     RestitutionSpeed, RolledAway, RollingForm, Scene, SceneError, Shape, SolverSettings, Start,
     StereoSensor, Tilt, TimeOfFlightSensor, Vibration, ViewSpec, Wall, WallMaterial,
     rolling_friction_from_length, rolling_friction_to_length,

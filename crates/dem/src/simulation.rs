@@ -15,6 +15,7 @@ use granulcal_scene::{Scene, SolverSettings};
 use nalgebra::Vector3;
 
 use crate::bodies::Bodies;
+use crate::bonds::Bonds;
 use crate::clumps::Clumps;
 use crate::contact_context::ContactContext;
 use crate::contact_set::ContactSet;
@@ -48,6 +49,8 @@ pub struct Simulation {
     on_layer: ContactSet,
     /// A liquid with a flow of its own, if there is one.
     liquid: Option<Liquid>,
+    /// Bonds that join grains until they break, if there are any.
+    bonds: Option<Bonds>,
     /// The bodies that the grains are, if they are not round: several spheres each, or
     clumps: Option<Clumps>,
     /// convex bodies of one shape, which have a substep of their own; `particles` follow them.
@@ -97,6 +100,7 @@ impl Simulation {
             bridges: Bridges::default(),
             on_layer: ContactSet::default(),
             liquid: Liquid::of(scene),
+            bonds: Bonds::of(scene),
             clumps,
             bodies: Bodies::of(scene, seed),
             bed_at_rest: None,

@@ -4,6 +4,7 @@
 //! A number of an effect has a path like any other of a scene, for example `effects.capillary.bond`.
 
 mod adhesion;
+mod bonds;
 mod capillary;
 mod clump;
 mod effect;
@@ -70,6 +71,8 @@ effects! {
     capillary: capillary::Capillary,
     /// Dry adhesion of touching grains.
     adhesion: adhesion::Adhesion,
+    /// Bonds of grains that break.
+    bonds: bonds::Bonds,
     /// Grains that are not round.
     clump: clump::Clump,
     /// Grains of different size.

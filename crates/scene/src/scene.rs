@@ -327,6 +327,15 @@ impl Scene {
         Ok(())
     }
 
+    /// What bonds cannot be with: bodies of several spheres.
+    fn check_bonds(&self) -> Result<(), SceneError> {
+        let others = [
+            ("effects.clump", self.effects.clump.is_on()),
+            ("grains.shape", self.grains.shape.is_some()),
+        ];
+        if self.effects.bonds.is_on() { exclude("effects.bonds", &others) } else { Ok(()) }
+    }
+
     /// What a bed cannot be with. It is seen by what has become of it, which a map of heights tells.
     fn check_bed(&self) -> Result<(), SceneError> {
         let Some(bed) = &self.bed else { return Ok(()) };
@@ -373,6 +382,7 @@ impl Scene {
         self.check_intruder()?;
         self.check_bed()?;
         self.check_liquid()?;
+        self.check_bonds()?;
         self.start.check(&self.held_grains())?;
         self.effects.check_method(self.settings().method)?;
         if let Some(funnel) = &self.funnel {

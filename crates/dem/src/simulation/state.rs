@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Simulation;
 use crate::bodies::{Bodies, BodiesState};
+use crate::bonds::{Bond, Bonds};
 use crate::checkpoint::{self, CheckpointHeader};
 use crate::clumps::{ClumpState, Clumps};
 use crate::contact_set::ContactSet;
@@ -37,6 +38,19 @@ struct State<'a> {
     on_layer: Cow<'a, ContactSet>,
     clumps: Option<ClumpState>,
     watch: Cow<'a, HealthWatch>,
+}
+
+/// The bytes behind that: of what a scene has besides.
+struct Rest<'a>(&'a [u8]);
+
+impl<'a> Rest<'a> {
+    /// Reads one part; `or` says what the bytes are if they are none.
+    fn take<T: Deserialize<'a>>(&mut self, or: &'static str) -> Result<T, DemError> {
+        let strange = |_| DemError::CheckpointState { what: or };
+        let (part, rest) = postcard::take_from_bytes(self.0).map_err(strange)?;
+        self.0 = rest;
+        Ok(part)
+    }
 }
 
 impl Simulation {
@@ -70,30 +84,28 @@ impl Simulation {
         let strange = |what| DemError::CheckpointState { what };
         let (state, rest): (State<'_>, _) =
             postcard::take_from_bytes(state).map_err(|_| strange("bytes that are no state"))?;
+        let mut rest = Rest(rest);
         let mut bed_at_rest = None;
         if self.origin.scene.bed.is_some() {
-            let (bed, rest): (Option<Vec<Row>>, _) =
-                postcard::take_from_bytes(rest).map_err(|_| strange("bytes that are no bed"))?;
+            bed_at_rest = rest.take::<Option<Vec<Row>>>("bytes that are no bed")?;
             let of_bed = self.particles.count() - self.origin.scene.grains.count;
-            if !rest.is_empty() || bed.as_ref().is_some_and(|bed: &Vec<Row>| bed.len() != of_bed) {
+            if bed_at_rest.as_ref().is_some_and(|bed| bed.len() != of_bed) {
                 return Err(strange("a bed that is not the scene's"));
             }
-            bed_at_rest = bed;
-        } else if let Some(bodies) = &mut self.bodies {
-            let (state, rest): (BodiesState, _) =
-                postcard::take_from_bytes(rest).map_err(|_| strange("bytes that are no bodies"))?;
-            if !rest.is_empty() {
-                return Err(strange("more bytes than a state has"));
-            }
+        }
+        if let Some(bodies) = &mut self.bodies {
+            let state: BodiesState = rest.take("bytes that are no bodies")?;
             bodies.take(state).map_err(strange)?;
-        } else if let Some(liquid) = &mut self.liquid {
-            let (state, rest): (Option<RadialFlow>, _) =
-                postcard::take_from_bytes(rest).map_err(|_| strange("bytes that are no liquid"))?;
-            if !rest.is_empty() {
-                return Err(strange("more bytes than a state has"));
-            }
+        }
+        if let Some(liquid) = &mut self.liquid {
+            let state: Option<RadialFlow> = rest.take("bytes that are no liquid")?;
             liquid.take(state).map_err(strange)?;
-        } else if !rest.is_empty() {
+        }
+        if let Some(bonds) = &mut self.bonds {
+            let state: Option<Vec<Bond>> = rest.take("bytes that are no bonds")?;
+            bonds.take(state).map_err(strange)?;
+        }
+        if !rest.0.is_empty() {
             return Err(strange("more bytes than a state has"));
         }
         let State { substep, is_quiet, seemed_ended, ended, watch, .. } = state;
@@ -149,8 +161,8 @@ impl Simulation {
             watch: Cow::Borrowed(&self.watch),
         };
         let mut bytes = postcard::to_stdvec(&state).expect("a state in memory");
-        // Behind the rest, so that a state of spheres has the bytes that it had before there were bodies, beds and
-        // liquids.
+        // Behind the rest, so that a state of spheres has the bytes that it had before there were bodies, beds, liquids
+        // and bonds.
         if self.origin.scene.bed.is_some() {
             bytes.extend(postcard::to_stdvec(&self.bed_at_rest).expect("a state in memory"));
         }
@@ -159,6 +171,9 @@ impl Simulation {
         }
         if let Some(liquid) = &self.liquid {
             bytes.extend(postcard::to_stdvec(&liquid.state()).expect("a state in memory"));
+        }
+        if let Some(state) = self.bonds.as_ref().map(Bonds::state) {
+            bytes.extend(postcard::to_stdvec(&state).expect("a state in memory"));
         }
         bytes
     }

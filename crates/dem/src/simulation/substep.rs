@@ -48,6 +48,7 @@ impl Simulation {
         }
         self.let_ball_go();
         self.let_intruder_in();
+        self.join();
         self.follow();
         self.act_forces();
         let seen = self.assemble();
@@ -59,6 +60,7 @@ impl Simulation {
         }
         self.solve();
         self.move_on();
+        self.follow_bonds();
         self.watch.see_penetration(seen.penetration);
         self.count_substep();
     }
@@ -135,13 +137,18 @@ impl Simulation {
         self.contacts.assemble(&self.particles, &self.around, self.watch.lost_mut(), found)
     }
 
-    /// Resolves the impacts, each at its time; those of bodies that turn are a matter of the contact solve.
+    /// Resolves the impacts, each at its time, and lets bonds hold what they part; those of bodies that turn are a matter
+    /// of the contact solve.
     fn resolve_impacts(&mut self) {
         let (particles, contacts, around) = (&mut self.particles, &mut self.contacts, &self.around);
         if self.clumps.is_some() {
             self.impacts.candidates.clear();
         }
-        if self.impacts.resolve(particles, contacts, around) > 0 {
+        let hit = self.impacts.resolve(particles, contacts, around);
+        if let Some(bonds) = &self.bonds {
+            bonds.hold(particles, around.settings.dt);
+        }
+        if hit > 0 {
             contacts.assemble_again(particles, around);
             particles.rewind();
         }
@@ -158,6 +165,21 @@ impl Simulation {
         let around = &self.around;
         let context = around.for_effects([&self.contacts.pairs, &self.contacts.at_walls]);
         around.effects.act_across_gaps(&mut self.particles, &context, &mut self.bridges);
+    }
+
+    /// Joins the grains of the start, where bonds do: those of a ball above a bed when it is let go.
+    fn join(&mut self) {
+        let is_there = self.origin.scene.bed.is_none() || self.bed_at_rest.is_some();
+        if let Some(bonds) = self.bonds.as_mut().filter(|_| is_there) {
+            bonds.join(&self.particles, self.substep as f64 * self.around.settings.dt);
+        }
+    }
+
+    /// Breaks the bonds of grains that have moved too far apart.
+    fn follow_bonds(&mut self) {
+        if let Some(bonds) = &mut self.bonds {
+            bonds.follow(&self.particles, self.around.settings.dt);
+        }
     }
 
     /// Lists the contacts with a soft layer, if there is one.

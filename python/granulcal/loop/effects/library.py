@@ -242,6 +242,12 @@ LIBRARY: tuple[LibraryEffect, ...] = (
         doc="grains let the scene's liquid through more or less easily than theory says",
     ),
     LibraryEffect(
+        name="bonds",
+        path="effects.bonds.bond",
+        full=50.0,
+        doc="bonds of the start's grains that break for good; strength over a grain's weight",
+    ),
+    LibraryEffect(
         name="ground.layer",
         path="effects.layer.thickness",
         full=2e-3,
