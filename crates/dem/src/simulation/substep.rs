@@ -137,7 +137,7 @@ impl Simulation {
         self.contacts.assemble(&self.particles, &self.around, self.watch.lost_mut(), found)
     }
 
-    /// Resolves the impacts, each at its time, and lets bonds hold what they part; those of bodies that turn are a matter
+    /// Resolves the impacts, each at its time, and lets bonds pull; those of bodies that turn are a matter
     /// of the contact solve.
     fn resolve_impacts(&mut self) {
         let (particles, contacts, around) = (&mut self.particles, &mut self.contacts, &self.around);
@@ -146,7 +146,7 @@ impl Simulation {
         }
         let hit = self.impacts.resolve(particles, contacts, around);
         if let Some(bonds) = &self.bonds {
-            bonds.hold(particles, around.settings.dt);
+            bonds.pull(particles, around.settings.dt);
         }
         if hit > 0 {
             contacts.assemble_again(particles, around);
@@ -170,8 +170,9 @@ impl Simulation {
     /// Joins the grains of the start, where bonds do: those of a ball above a bed when it is let go.
     fn join(&mut self) {
         let is_there = self.origin.scene.bed.is_none() || self.bed_at_rest.is_some();
+        let time = self.time();
         if let Some(bonds) = self.bonds.as_mut().filter(|_| is_there) {
-            bonds.join(&self.particles, self.substep as f64 * self.around.settings.dt);
+            self.watch.see_work(bonds.join(&self.particles, time));
         }
     }
 
@@ -243,7 +244,8 @@ impl Simulation {
             self.watch.see_contacts(self.contacts.count());
         }
         let grains = (self.clumps.as_ref(), self.bodies.as_ref());
-        self.watch.see_energy(energy(&self.particles, grains, &self.around));
+        let held = self.bonds.as_ref().map_or(0.0, |bonds| bonds.energy(&self.particles));
+        self.watch.see_energy(held + energy(&self.particles, grains, &self.around));
         self.ended = self.end_reached().map(|status| {
             let slack = if self.bodies.is_some() { CORNER_SLACK } else { 1.0 };
             let trusted = self.watch.is_healthy(slack * self.around.settings.max_penetration);

@@ -1,8 +1,8 @@
 //! Bonds that break: what glues grains to their neighbours at the begin, and not again once it has broken.
 //!
-//! A pair is held by up to F against parting and sliding until its surfaces have parted, or slid past each other, by
-//! `range` from where they were nearest: the contact bond of a bonded-particle model (Potyondy and Cundall, Int. J. Rock
-//! Mechanics and Mining Sciences 41 (2004) 1329, doi:10.1016/j.ijrmms.2004.09.011), rigid and plastic.
+//! A pair is held by a steady pull F until its surfaces have parted, or slid past each other, by `range` from where they
+//! were nearest: the contact bond of a bonded-particle model (Potyondy and Cundall, Int. J. Rock Mechanics and Mining
+//! Sciences 41 (2004) 1329, doi:10.1016/j.ijrmms.2004.09.011) for rigid grains, which have no stiffness to part it by.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,11 +10,11 @@ use super::effect::Effect;
 use crate::check::{non_negative, positive};
 use crate::error::SceneError;
 
-/// Breakable bonds between the grains of the start; prior of `bond`: log-uniform over 1 to 50.
+/// Breakable bonds between the grains of the start; prior of `bond`: log-uniform over 0.3 to 10.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Bonds {
-    /// Strength F of a bond between two typical grains over the weight of one `[-]`; 0: no bonds.
+    /// Pull F of a bond between two typical grains over the weight of one `[-]`; 0: no bonds.
     pub bond: f64,
     /// How far surfaces part, or slide, before their bond breaks, in radii of a typical grain `[-]`.
     pub range: f64,

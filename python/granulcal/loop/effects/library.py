@@ -244,8 +244,8 @@ LIBRARY: tuple[LibraryEffect, ...] = (
     LibraryEffect(
         name="bonds",
         path="effects.bonds.bond",
-        full=50.0,
-        doc="bonds of the start's grains that break for good; strength over a grain's weight",
+        full=10.0,
+        doc="bonds of the start's grains that break for good; pull over a grain's weight",
     ),
     LibraryEffect(
         name="ground.layer",
