@@ -16,6 +16,7 @@ use granulcal_scene::{Effect, Scene};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use crate::effect::inverse_inertia;
 use crate::neighbor::PairSearch;
 use crate::parallel::Threads;
 use crate::particles::Particles;
@@ -25,7 +26,7 @@ use crate::path::{Path, Reach};
 #[derive(Clone, Debug)]
 pub(crate) struct Bonds {
     spec: granulcal_scene::Bonds,
-    /// F over the mass of a typical grain `[m/s^2]`, and that grain's radius `[m]`.
+    /// F over the mass of a typical grain with what of a fluid goes with it `[m/s^2]`, and that grain's radius `[m]`.
     pull: f64,
     radius: f64,
     /// Grains from this number on are never joined: those of a bed, and an intruder.
@@ -64,7 +65,7 @@ impl Bonds {
         let weight = Vector3::from(scene.gravity).norm();
         spec.is_on().then(|| Self {
             spec,
-            pull: spec.bond * weight,
+            pull: spec.bond * weight * inverse_inertia(scene),
             radius: scene.grains.radius(),
             count: scene.grains.count,
             joined: None,

@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 pub(crate) use acts::{Acts, EffectContext};
 pub(crate) use bridges::Bridges;
-pub(crate) use drag::Drag;
+pub(crate) use drag::{Drag, inverse_inertia};
 use granulcal_scene::Scene;
 use nalgebra::Vector3;
 pub(crate) use neighbours::neighbours;

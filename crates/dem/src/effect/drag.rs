@@ -65,7 +65,7 @@ pub(super) fn of(scene: &Scene) -> Option<Arc<dyn Acts>> {
 }
 
 /// Mass of a grain over its mass with what of the fluid moves with it `[-]`; 1 without a fluid.
-pub(super) fn inverse_inertia(scene: &Scene) -> f64 {
+pub(crate) fn inverse_inertia(scene: &Scene) -> f64 {
     drag_of(scene).map_or(1.0, |drag| drag.inverse_inertia)
 }
 
