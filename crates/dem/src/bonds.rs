@@ -130,12 +130,15 @@ impl Bonds {
         let range = self.spec.range * self.radius;
         let rate = self.pull * apart.share * apart.inverse_mass;
         let (left, whole) = (bond.nearest + range - apart.gap, rate * dt);
+        if left <= 0.0 {
+            return 0.0;
+        }
         if (opening - whole) * dt <= left {
             return whole;
         }
         // Velocities live half a substep before, and places now.
         let speed = opening - 0.5 * whole;
-        let energy = speed * speed - 2.0 * rate * left.max(0.0);
+        let energy = speed * speed - 2.0 * rate * left;
         (opening - energy.max(0.0).sqrt()).min(whole)
     }
 
