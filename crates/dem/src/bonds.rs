@@ -95,8 +95,7 @@ impl Bonds {
         if self.joined.is_some() || time < self.spec.begin {
             return 0.0;
         }
-        let still = |i| Path { from: particles.position(i), velocity: Vector3::zeros() };
-        let paths: Vec<_> = (0..particles.count()).map(still).collect();
+        let paths = Path::all_of(particles);
         let far = self.spec.gap * self.radius;
         let (reach, mut found) = (Reach { interval: 0.0, near: far, far }, Vec::new());
         let alone = Threads::default();

@@ -137,8 +137,8 @@ impl Simulation {
         self.contacts.assemble(&self.particles, &self.around, self.watch.lost_mut(), found)
     }
 
-    /// Resolves the impacts, each at its time, and lets bonds pull; those of bodies that turn are a matter
-    /// of the contact solve.
+    /// Resolves the impacts, each at its time, and lets bonds pull; those of bodies that turn are a matter of the
+    /// contact solve.
     fn resolve_impacts(&mut self) {
         let (particles, contacts, around) = (&mut self.particles, &mut self.contacts, &self.around);
         if self.clumps.is_some() {
