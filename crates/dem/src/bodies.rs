@@ -3,25 +3,35 @@
 //! | file | what |
 //! |---|---|
 //! | `grain_shape` | what a scene states; corners, faces, volume and inertia of it |
+//! | `pose` | where a body is and how it is turned |
 //! | `body` | place, turn, momentum; what an impulse does |
 //! | `around` | shape, walls and material in a substep; how far bodies search for each other |
+//! | `pairs` | which bodies may meet in a substep |
 //! | `collide` | points of contact |
-//! | `boxes` | the normal between two boxes |
-//! | `manifold` | where two bodies are nearest, by parry |
+//! | `foresee` | points of contact that show only where bodies will be |
+//! | `boxes` | where two boxes meet, eight pairs at a time |
+//! | `manifold` | where two other bodies meet, by parry |
 //! | `contact` | the law at a point |
 //! | `impact` | impacts, each at its time |
 //! | `rims` | points of contact at the rims of walls |
-//! | `sweeps` | sweeps over all points, eight at a time |
+//! | `lever` | what a point's arm does where the inertia is 1 |
+//! | `batch` | eight points, and one round of the law for them |
+//! | `sweeps` | sweeps over all points |
 
 mod around;
+mod batch;
 mod body;
 mod boxes;
 mod collide;
 mod contact;
 #[cfg(test)]
 mod exams;
+mod foresee;
 mod impact;
+mod lever;
 mod manifold;
+mod pairs;
+mod pose;
 mod rims;
 mod sweeps;
 
@@ -38,8 +48,9 @@ use contact::{Point, WALL, rank};
 use granulcal_scene::Material;
 use granulcal_scene::Scene;
 use granulcal_scene::Solid;
+use pairs::Neighbours;
+use sweeps::Batches;
 pub(crate) use sweeps::Sweeps;
-use sweeps::{Batches, Settled};
 
 /// Keeps the orientations of a seed apart from its places.
 const STREAM: u64 = 0xbb67_ae85_84ca_a73b;
@@ -87,11 +98,20 @@ pub(crate) struct Bodies {
     // Only their memory goes from substep to substep.
     points: Vec<Point>,
     batches: Batches,
+    neighbours: Neighbours,
 }
 
 impl Bodies {
     fn new(solid: Arc<Solid>, all: Vec<RigidBody>) -> Self {
-        Self { solid, all, known: Vec::new(), points: Vec::new(), batches: Batches::default() }
+        let batches = Batches::of(&solid);
+        Self {
+            solid,
+            all,
+            known: Vec::new(),
+            points: Vec::new(),
+            batches,
+            neighbours: Neighbours::default(),
+        }
     }
 
     /// The bodies of a scene, turned at random, if its grains have a shape.
@@ -113,7 +133,7 @@ impl Bodies {
     /// Place, velocity and angular velocity of all `[m]`, `[m/s]`, `[rad/s]`.
     pub fn motions(&self) -> impl Iterator<Item = [Vector3<f64>; 3]> + '_ {
         let of = |body| Moving::of(body, &self.solid);
-        self.all.iter().map(of).map(|m| [m.centre, m.velocity, m.omega])
+        self.all.iter().map(of).map(|m| [m.pose.centre, m.velocity, m.omega])
     }
 
     /// Sets a body in motion; returns the kinetic energy that this adds, over the mass `[m^2/s^2]`.
@@ -165,35 +185,38 @@ impl Bodies {
             body.velocity += dt * gravity;
         }
         let around = Around { solid: &solid, walls, material, dt };
-        let mut contacts = collide::contacts(&around, &moving, std::mem::take(&mut self.points));
+        let (points, neighbours) = (std::mem::take(&mut self.points), &mut self.neighbours);
+        let mut contacts = collide::contacts(&around, &moving, neighbours, points);
         let mut step = Step::default();
         let depths = contacts.points.iter().map(|point| -point.gap);
         step.deepest = depths.fold(0.0, f64::max);
-        for round in 0..ROUNDS {
-            contacts.points.iter_mut().for_each(|point| point.assemble(&moving));
+        for round in 1..=ROUNDS {
             let (impacts, work) = impact::resolve(&mut contacts.points, &mut moving, dt);
             step.impacts += impacts;
             step.work_of_walls += work;
-            if round + 1 == ROUNDS || !contacts.foresee(&around, &moving) {
+            let known = contacts.points.len();
+            if round == ROUNDS || !contacts.foresee(&around, &moving, &mut self.neighbours, known) {
                 break;
             }
+            contacts.merge(known);
         }
         self.recall(&mut contacts.points);
         contacts.points.iter().for_each(|point| point.give(&mut moving, &point.impulse));
-        for round in 0..ROUNDS {
-            for point in &mut contacts.points {
-                point.assemble(&moving);
-                point.aim(&moving, dt);
-            }
-            self.batches.fill(&contacts.points, &moving, &solid);
-            let Settled { sweeps, residual, unconverged } = self.batches.settle(sweeps);
-            step.sweeps += sweeps;
-            (step.residual, step.unconverged) = (residual, unconverged);
-            self.batches.put_back(&mut contacts.points, &mut moving);
-            if round + 1 == ROUNDS || !contacts.foresee(&around, &moving) {
+        let sorted = contacts.points.len();
+        let mut known = 0;
+        for round in 1..=ROUNDS {
+            contacts.points.iter_mut().for_each(|point| point.aim(&moving, dt));
+            let points = &mut contacts.points;
+            let settled = self.batches.solve(points, known, &mut moving, &solid, sweeps);
+            step.sweeps += settled.sweeps;
+            (step.residual, step.unconverged) = (settled.residual, settled.unconverged);
+            known = contacts.points.len();
+            if round == ROUNDS || !contacts.foresee(&around, &moving, &mut self.neighbours, sorted)
+            {
                 break;
             }
         }
+        contacts.merge(sorted);
         let points = contacts.points;
         step.points = points.len();
         let work = |point: &Point| point.impulse.dot(&point.wall_velocity);

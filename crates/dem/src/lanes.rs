@@ -37,24 +37,24 @@ pub(crate) fn may_use(bits: u32) -> bool {
 
 /// Compiles a function three times, for AVX-512, AVX2 and the target's baseline, and calls the widest
 /// that this machine has. The body must be inlined for the wider registers to reach it; `$width` names
-/// the [`Width`] that it is compiled for.
+/// the [`Width`] that it is compiled for. It may have one more type, of a trait.
 macro_rules! widest {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident<$width:ident>($($arg:ident: $kind:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident<$width:ident $(, $more:ident: $bound:path)?>($($arg:ident: $kind:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
         $(#[$doc])*
         #[allow(unsafe_code)] // calls of functions that need the vector width just tested for
-        $vis fn $name($($arg: $kind),*) $(-> $out)? {
+        $vis fn $name$(<$more: $bound>)?($($arg: $kind),*) $(-> $out)? {
             #[inline(always)]
-            fn with<$width: $crate::lanes::Width>($($arg: $kind),*) $(-> $out)? $body
+            fn with<$width: $crate::lanes::Width $(, $more: $bound)?>($($arg: $kind),*) $(-> $out)? $body
 
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-                fn avx512($($arg: $kind),*) $(-> $out)? {
-                    with::<$crate::lanes::Avx512>($($arg),*)
+                fn avx512$(<$more: $bound>)?($($arg: $kind),*) $(-> $out)? {
+                    with::<$crate::lanes::Avx512 $(, $more)?>($($arg),*)
                 }
                 #[target_feature(enable = "avx2,fma")]
-                fn avx2($($arg: $kind),*) $(-> $out)? {
-                    with::<$crate::lanes::Avx2>($($arg),*)
+                fn avx2$(<$more: $bound>)?($($arg: $kind),*) $(-> $out)? {
+                    with::<$crate::lanes::Avx2 $(, $more)?>($($arg),*)
                 }
                 if $crate::lanes::may_use(512)
                     && is_x86_feature_detected!("avx512vl")
@@ -62,17 +62,17 @@ macro_rules! widest {
                     && is_x86_feature_detected!("avx512bw")
                 {
                     // SAFETY: the features were detected on this machine.
-                    return unsafe { avx512($($arg),*) };
+                    return unsafe { avx512$(::<$more>)?($($arg),*) };
                 }
                 if $crate::lanes::may_use(256)
                     && is_x86_feature_detected!("avx2")
                     && is_x86_feature_detected!("fma")
                 {
                     // SAFETY: the feature was detected on this machine.
-                    return unsafe { avx2($($arg),*) };
+                    return unsafe { avx2$(::<$more>)?($($arg),*) };
                 }
             }
-            with::<$crate::lanes::Portable>($($arg),*)
+            with::<$crate::lanes::Portable $(, $more)?>($($arg),*)
         }
     };
 }

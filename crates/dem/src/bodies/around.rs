@@ -1,6 +1,6 @@
 //! What bodies are of, what is around them in a substep, and how far they search for each other.
 
-use super::body::Moving;
+use super::pairs::Motion;
 use crate::wall::Walls;
 use granulcal_scene::{Material, Solid};
 
@@ -22,14 +22,11 @@ impl Around<'_> {
     }
 
     /// How far the points of a body go in a substep relative to those of another, and a little more `[m]`.
-    pub fn range(&self, a: &Moving, b: Option<&Moving>) -> f64 {
-        let way = b.map_or_else(
-            || a.way(self.solid.reach, self.dt),
-            |b| {
-                let (apart, turning) = (a.velocity - b.velocity, a.omega.norm() + b.omega.norm());
-                self.dt * (apart.norm() + turning * self.solid.reach)
-            },
+    pub fn range(&self, a: &Motion, b: Option<&Motion>) -> f64 {
+        let fastest = b.map_or_else(
+            || a.fastest(),
+            |b| (a.velocity - b.velocity).norm() + a.turning + b.turning,
         );
-        self.least() + way
+        self.least() + self.dt * fastest
     }
 }

@@ -10,6 +10,7 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::pose::Pose;
 use granulcal_scene::Solid;
 
 /// Place and motion.
@@ -51,8 +52,8 @@ impl RigidBody {
 /// A body as the contact solve sees it: velocities, and what an impulse does to them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moving {
-    pub centre: Vector3<f64>,
-    pub turned: UnitQuaternion<f64>,
+    /// At the begin of the substep.
+    pub pose: Pose,
     pub velocity: Vector3<f64>,
     /// `[rad/s]`
     pub omega: Vector3<f64>,
@@ -68,11 +69,10 @@ pub(super) struct Moving {
 
 impl Moving {
     pub fn of(body: &RigidBody, solid: &Solid) -> Self {
-        let turned = body.turned();
-        let inverse_inertia = inverse_inertia(&turned, solid);
+        let pose = Pose::new(body.centre.into(), body.turned());
+        let inverse_inertia = pose.inverse_inertia(&solid.inertia);
         Self {
-            centre: body.centre.into(),
-            turned,
+            pose,
             velocity: body.velocity.into(),
             omega: inverse_inertia * Vector3::from(body.momentum),
             inverse_inertia,
@@ -82,15 +82,15 @@ impl Moving {
         }
     }
 
-    /// Where it is at the end of a substep if nothing more meets it; its velocities and its inertia are those of now.
-    pub fn foreseen(&self, dt: f64) -> Self {
-        let turned = UnitQuaternion::new(dt * self.omega + self.twist) * self.turned;
-        Self { centre: self.centre + dt * self.velocity + self.shift, turned, ..*self }
+    /// Where it is at the end of a substep if nothing more meets it.
+    pub fn foreseen(&self, dt: f64) -> Pose {
+        let (goes, turns) = self.way(dt);
+        Pose::new(self.pose.centre + goes, UnitQuaternion::new(turns) * self.pose.turned)
     }
 
-    /// How far the points of one with this reach go within `dt`, at most `[m]`.
-    pub fn way(&self, reach: f64, dt: f64) -> f64 {
-        dt * (self.velocity.norm() + self.omega.norm() * reach)
+    /// How far it goes within `dt` `[m]`, and turns `[rad]`.
+    pub fn way(&self, dt: f64) -> (Vector3<f64>, Vector3<f64>) {
+        (dt * self.velocity + self.shift, dt * self.omega + self.twist)
     }
 
     /// Velocity of its point at `arm` from the centre `[m/s]`.
@@ -104,10 +104,10 @@ impl Moving {
         self.shift + self.twist.cross(arm)
     }
 
-    /// Was hit at `time` `[s]`: until then it went and turned as `before`.
-    pub fn was_hit(&mut self, time: f64, before: &Self) {
-        self.shift += time * (before.velocity - self.velocity);
-        self.twist += time * (before.omega - self.omega);
+    /// Was hit at `time` `[s]`: until then it had this velocity and this angular velocity.
+    pub fn was_hit(&mut self, time: f64, [velocity, omega]: &[Vector3<f64>; 2]) {
+        self.shift += time * (velocity - self.velocity);
+        self.twist += time * (omega - self.omega);
         self.hit = time;
     }
 
@@ -124,23 +124,18 @@ impl Moving {
         Matrix3::identity() - cross * self.inverse_inertia * cross
     }
 
-    /// `F = R I^(-1/2)`: the inverse inertia in the scene's axes is `F F^T`.
-    pub fn frame(&self, solid: &Solid) -> Matrix3<f64> {
-        let roots = Matrix3::from_diagonal(&solid.inertia.map(|moment| 1.0 / moment.sqrt()));
-        self.turned.to_rotation_matrix().matrix() * roots
-    }
-
     /// The body a substep later.
     pub fn moved(&self, solid: &Solid, dt: f64) -> RigidBody {
-        let local = self.turned.inverse() * self.omega;
-        let momentum = self.turned * local.component_mul(&solid.inertia);
-        let half = UnitQuaternion::new(0.5 * (dt * self.omega + self.twist)) * self.turned;
-        let omega = inverse_inertia(&half, solid) * momentum;
-        let turned = UnitQuaternion::new(dt * omega + self.twist) * self.turned;
+        let Pose { turned, axes, .. } = self.pose;
+        let momentum = axes * self.pose.seen(&self.omega).component_mul(&solid.inertia);
+        let (goes, turns) = self.way(dt);
+        let half = Pose::new(self.pose.centre, UnitQuaternion::new(0.5 * turns) * turned);
+        let omega = half.inverse_inertia(&solid.inertia) * momentum;
+        let turned = UnitQuaternion::new(dt * omega + self.twist) * turned;
         // Products of unit quaternions stay of unit length to rounding only.
         let turned = UnitQuaternion::new_normalize(turned.into_inner());
         RigidBody {
-            centre: (self.centre + dt * self.velocity + self.shift).into(),
+            centre: (self.pose.centre + goes).into(),
             velocity: self.velocity.into(),
             turned: turned.coords.into(),
             momentum: momentum.into(),
@@ -148,15 +143,9 @@ impl Moving {
     }
 }
 
-fn inverse_inertia(turned: &UnitQuaternion<f64>, solid: &Solid) -> Matrix3<f64> {
-    let rotation = turned.to_rotation_matrix();
-    let inverse = Matrix3::from_diagonal(&solid.inertia.map(|moment| 1.0 / moment));
-    rotation.matrix() * inverse * rotation.matrix().transpose()
-}
-
 /// `matrix * vector`, which must be inlined in the innermost loop.
 #[inline(always)]
-pub(super) fn product(m: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+fn product(m: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
     Vector3::new(
         m.m11 * v.x + m.m12 * v.y + m.m13 * v.z,
         m.m21 * v.x + m.m22 * v.y + m.m23 * v.z,

@@ -1,169 +1,419 @@
-//! The normal between two boxes of one size: the direction along which they are farthest apart, or least deep.
+//! Where two boxes of one size meet: the direction along which they are farthest apart, or least deep, eight pairs at a
+//! time; and across it the corners of what their faces share.
 //!
-//! With the half extents h, the offset t of the second box and its axes R_j in those of the first, the gap along a unit
-//! direction d is
+//! With the half extents h, the offset t from the first centre to the second and the axes A_k and B_j, the gap along a
+//! unit direction d is
 //!
 //! ```text
-//! g(d) = |t . d| - sum_k h_k |d_k| - sum_j h_j |R_j . d|
+//! g(d) = |t . d| - sum_k h_k |A_k . d| - sum_j h_j |B_j . d|
 //! ```
 //!
 //! and the largest of all is along an axis of either box, or across an edge of each (Gottschalk, Lin and Manocha, 1996).
 //! Boxes that are apart along several of a box's axes are so along a line between them: parry's rule, which is followed
-//! here to the choice among equals.
+//! here to the choice among equals. Every width of registers gives the same bits.
 
-use parry3d_f64::math::{Pose, Vector};
+use nalgebra::Vector3;
 
-const AXES: [Vector; 3] = [Vector::X, Vector::Y, Vector::Z];
+use super::collide::{Asked, Meeting, Spot};
+use super::pose::Pose;
+use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, widest};
 
-/// The outward normals of both boxes in their own axes, if they are no more than `range` apart along them.
-pub(super) fn across(pose: &Pose, half: Vector, range: f64) -> Option<[Vector; 2]> {
-    let axes = AXES.map(|axis| pose.rotation * axis);
-    let boxes = Boxes { half, offset: pose.translation, axes };
-    let turned = axes.map(|axis| half.dot(axis.abs()));
-    let of_one = boxes.by_faces(&AXES, |i| {
-        half[i] + axes.iter().zip(half.to_array()).map(|(axis, h)| h * axis[i].abs()).sum::<f64>()
-    });
-    if of_one.0 > range {
-        return None;
+/// Gives, for each pair that may be nearer than its range, its number and where it meets.
+pub(super) fn meet(
+    half: &Vector3<f64>,
+    poses: &[Pose],
+    asked: &[Asked],
+    mut found: impl FnMut(usize, &Meeting),
+) {
+    let rows: Vec<_> = poses.iter().map(rows).collect();
+    let mut meeting = Meeting::default();
+    for (first, some) in (0..).step_by(LANES).zip(asked.chunks(LANES)) {
+        // Lanes that are not in use repeat the first.
+        let of = |lane: usize| some[if lane < some.len() { lane } else { 0 }];
+        let i = std::array::from_fn(|lane| of(lane).i as u32);
+        let j = std::array::from_fn(|lane| of(lane).j as u32);
+        let gaps = gaps(&rows, &i, &j, half);
+        for (lane, asked) in some.iter().enumerate() {
+            let boxes = Boxes::new(half, &poses[asked.i], &poses[asked.j]);
+            if let Some(normal) = boxes.across(&gaps, lane, asked.range) {
+                meeting.normal = normal;
+                boxes.share(&normal, &mut meeting.spots);
+                found(first + lane, &meeting);
+            }
+        }
     }
-    let of_other = boxes.by_faces(&axes, |j| half[j] + turned[j]);
-    if of_other.0 > range {
-        return None;
-    }
-    let of_edges = boxes.by_edges();
-    if of_edges.0 > range {
-        return None;
-    }
-    let normal = if of_other.0 > of_one.0 && of_other.0 > of_edges.0 {
-        of_other.1
-    } else if of_edges.0 > of_one.0 {
-        of_edges.1
-    } else {
-        of_one.1
-    };
-    Some([normal, pose.rotation.inverse() * -normal])
 }
 
-/// Two boxes in the axes of the first.
-struct Boxes {
-    half: Vector,
-    offset: Vector,
-    /// R_j
-    axes: [Vector; 3],
+/// A pose as registers take it: each axis with a coordinate of the centre.
+fn rows(pose: &Pose) -> [Row; 3] {
+    std::array::from_fn(|k| Row::new(&pose.axes.column(k).into_owned(), pose.centre[k]))
 }
 
-impl Boxes {
-    /// The gap along a unit direction.
-    fn gap(&self, along: Vector) -> f64 {
-        let [x, y, z] = self.axes.map(|axis| axis.dot(along).abs());
-        let reach = self.half.dot(along.abs()) + self.half.dot(Vector::new(x, y, z));
-        self.offset.dot(along).abs() - reach
+/// The gaps of eight pairs along the axes of either box, and the largest across an edge of each.
+struct Gaps {
+    faces: [[Lanes; 3]; 2],
+    edges: Lanes,
+    /// Of which: 3 j + k across A_k and B_j.
+    of_edges: Lanes,
+}
+
+widest! {
+    fn gaps<W>(rows: &[[Row; 3]], i: &[u32; LANES], j: &[u32; LANES], half: &Vector3<f64>) -> Gaps {
+        let h = [Reg::<W>::splat(half.x), Reg::splat(half.y), Reg::splat(half.z)];
+        let (a, b) = (gather::<W>(rows, i), gather::<W>(rows, j));
+        let offset = b.centre - a.centre;
+        let mut gaps = Gaps {
+            faces: [[Lanes::ZERO; 3]; 2],
+            edges: Lanes::ZERO,
+            of_edges: Lanes::ZERO,
+        };
+        let zero = Reg::splat(0.0);
+        let t = [offset.dot(a.axes[0]), offset.dot(a.axes[1]), offset.dot(a.axes[2])];
+        // r[k][j] = A_k . B_j, and its size.
+        let (mut r, mut size) = ([[zero; 3]; 3], [[zero; 3]; 3]);
+        for k in 0..3 {
+            for j in 0..3 {
+                r[k][j] = a.axes[k].dot(b.axes[j]);
+                size[k][j] = abs(r[k][j]);
+            }
+        }
+        for k in 0..3 {
+            let of_b = h[0].times_plus(size[k][0], h[1].times_plus(size[k][1], h[2] * size[k][2]));
+            (abs(t[k]) - (h[k] + of_b)).store(&mut gaps.faces[0][k]);
+        }
+        for j in 0..3 {
+            let of_a = h[0].times_plus(size[0][j], h[1].times_plus(size[1][j], h[2] * size[2][j]));
+            (abs(offset.dot(b.axes[j])) - (h[j] + of_a)).store(&mut gaps.faces[1][j]);
+        }
+        // Along A_k x B_j, of the length sqrt(1 - r_kj^2), neither A_k nor B_j is reached.
+        let (mut best, mut of_best) = (Reg::splat(f64::MIN), zero);
+        for j in 0..3 {
+            let [j1, j2] = [(j + 1) % 3, (j + 2) % 3];
+            for k in 0..3 {
+                let [k1, k2] = [(k + 1) % 3, (k + 2) % 3];
+                let square = r[k1][j].times_plus(r[k1][j], r[k2][j] * r[k2][j]);
+                let apart = abs((t[k2] * r[k1][j]).minus(t[k1], r[k2][j]));
+                let of_a = h[k1].times_plus(size[k2][j], h[k2] * size[k1][j]);
+                let of_b = h[j1].times_plus(size[k][j2], h[j2] * size[k][j1]);
+                // Edges that are parallel have no direction across both.
+                let gap = Reg::splat(PARALLEL).if_less(
+                    square,
+                    (apart - of_a - of_b).over(square.sqrt()),
+                    Reg::splat(f64::MIN),
+                );
+                of_best = best.if_less(gap, Reg::splat((3 * j + k) as f64), of_best);
+                best = best.if_less(gap, gap, best);
+            }
+        }
+        best.store(&mut gaps.edges);
+        of_best.store(&mut gaps.of_edges);
+        gaps
+    }
+}
+
+/// The square of the sine between two edges that are parallel, at most.
+const PARALLEL: f64 = f64::EPSILON * f64::EPSILON;
+
+/// Eight poses in registers.
+struct Eight<W: Width> {
+    axes: [Reg3<W>; 3],
+    centre: Reg3<W>,
+}
+
+#[inline(always)]
+fn gather<W: Width>(rows: &[[Row; 3]], index: &[u32; LANES]) -> Eight<W> {
+    let column = |k: usize| W::columns(each(index, |body| W::load_row(&rows[body as usize][k])));
+    let ([ax, ay, az, x], [bx, by, bz, y], [cx, cy, cz, z]) = (column(0), column(1), column(2));
+    let vector = |x, y, z| Reg3 { x: Reg(x), y: Reg(y), z: Reg(z) };
+    Eight {
+        axes: [vector(ax, ay, az), vector(bx, by, bz), vector(cx, cy, cz)],
+        centre: vector(x, y, z),
+    }
+}
+
+#[inline(always)]
+fn abs<W: Width>(value: Reg<W>) -> Reg<W> {
+    value.max(Reg::splat(0.0) - value)
+}
+
+/// Two boxes of one size.
+struct Boxes<'a> {
+    half: &'a Vector3<f64>,
+    a: &'a Pose,
+    b: &'a Pose,
+    /// From the centre of the first to the second's.
+    offset: Vector3<f64>,
+}
+
+impl<'a> Boxes<'a> {
+    fn new(half: &'a Vector3<f64>, a: &'a Pose, b: &'a Pose) -> Self {
+        Self { half, a, b, offset: b.centre - a.centre }
     }
 
-    /// `along`, or its opposite, from the first box to the second.
-    fn towards(&self, along: Vector) -> Vector {
-        if self.offset.dot(along) < 0.0 { -along } else { along }
+    /// The direction of the largest gap, from the first box to the second, if that is no more than `range`.
+    fn across(&self, gaps: &Gaps, lane: usize, range: f64) -> Option<Vector3<f64>> {
+        let edges = gaps.edges.0[lane];
+        let faces = |side: usize| gaps.faces[side].each_ref().map(|lanes| lanes.0[lane]);
+        let largest = |gaps: [f64; 3]| gaps.into_iter().fold(edges, f64::max);
+        if largest(faces(0)).max(largest(faces(1))) > range {
+            return None;
+        }
+        let (of_a, of_b) = (self.by_faces(self.a, faces(0)), self.by_faces(self.b, faces(1)));
+        if of_a.0 > range || of_b.0 > range {
+            return None;
+        }
+        Some(if of_b.0 > of_a.0 && of_b.0 > edges {
+            of_b.1
+        } else if edges > of_a.0 {
+            let number = gaps.of_edges.0[lane] as usize;
+            let along = self.a.axes.column(number % 3).cross(&self.b.axes.column(number / 3));
+            self.towards(along.normalize())
+        } else {
+            of_a.1
+        })
     }
 
     /// The largest gap along the axes of a box, and its direction; across a corner or an edge if there are gaps along
-    /// more than one. `reach` is how far both boxes reach along an axis.
-    fn by_faces(&self, axes: &[Vector; 3], reach: impl Fn(usize) -> f64) -> (f64, Vector) {
-        let mut best = (f64::MIN, Vector::ZERO);
-        let (mut sum, mut positive) = (Vector::ZERO, 0);
-        for (number, &axis) in axes.iter().enumerate() {
-            let gap = self.offset.dot(axis).abs() - reach(number);
-            if gap > best.0 {
-                best = (gap, axis);
-            }
-            if gap >= 0.0 {
-                sum += self.towards(axis) * gap.max(f64::EPSILON);
-                positive += 1;
-            }
-        }
+    /// more than one.
+    fn by_faces(&self, of: &Pose, gaps: [f64; 3]) -> (f64, Vector3<f64>) {
+        let along = |k: usize| self.towards(of.axes.column(k).into_owned());
+        let positive = gaps.iter().filter(|gap| **gap >= 0.0).count();
         if positive < 2 {
-            return (best.0, self.towards(best.1));
+            let best = (1..3).fold(0, |best, k| if gaps[k] > gaps[best] { k } else { best });
+            return (gaps[best], along(best));
         }
+        let part = |k: usize| if gaps[k] >= 0.0 { gaps[k].max(f64::EPSILON) } else { 0.0 };
+        let sum = part(0) * along(0) + part(1) * along(1) + part(2) * along(2);
         let along = sum.normalize();
-        (self.gap(along), along)
+        (self.gap(&along), along)
     }
 
-    /// The largest gap across an edge of each, and its direction. Along e_i x R_j, of the length s = sqrt(1 - R_ij^2),
-    /// neither e_i nor R_j is reached.
-    fn by_edges(&self) -> (f64, Vector) {
-        let (h, t) = (self.half.to_array(), self.offset.to_array());
-        let r = self.axes.map(|axis| axis.to_array());
-        let (mut best, mut of_best) = (f64::MIN, (0, 0));
-        for j in 0..3 {
-            let [j1, j2] = [(j + 1) % 3, (j + 2) % 3];
-            for i in 0..3 {
-                let [i1, i2] = [(i + 1) % 3, (i + 2) % 3];
-                let square = r[j][i1] * r[j][i1] + r[j][i2] * r[j][i2];
-                // Edges that are parallel have no direction across both.
-                if square <= f64::EPSILON * f64::EPSILON {
-                    continue;
-                }
-                let apart = (t[i2] * r[j][i1] - t[i1] * r[j][i2]).abs();
-                let of_one = h[i1] * r[j][i2].abs() + h[i2] * r[j][i1].abs();
-                let of_other = h[j1] * r[j2][i].abs() + h[j2] * r[j1][i].abs();
-                let gap = (apart - of_one - of_other) / square.sqrt();
-                if gap > best {
-                    (best, of_best) = (gap, (i, j));
-                }
+    /// The gap along a unit direction.
+    fn gap(&self, along: &Vector3<f64>) -> f64 {
+        let reach = |pose: &Pose| pose.seen(along).abs().dot(self.half);
+        self.offset.dot(along).abs() - reach(self.a) - reach(self.b)
+    }
+
+    /// `along`, or its opposite, from the first box to the second.
+    fn towards(&self, along: Vector3<f64>) -> Vector3<f64> {
+        if self.offset.dot(&along) < 0.0 { -along } else { along }
+    }
+
+    /// The corners of what the faces that look at each other share, seen along the normal.
+    fn share(&self, normal: &Vector3<f64>, spots: &mut Vec<Spot>) {
+        spots.clear();
+        let near = Face::towards(self.a, normal);
+        let far = Face::towards(self.b, &-normal);
+        // The second face over the first: its places in the first's plane along the normal, and its gap there.
+        let local = self.a.seen(normal);
+        let ahead = near.side * local[near.axis];
+        let over = |v: Vector3<f64>, above: f64| {
+            let gap = (near.side * v[near.axis] - above) / ahead;
+            let place = v - gap * local;
+            [place[near.across[0]], place[near.across[1]], gap]
+        };
+        let height = self.half[far.axis];
+        let in_first = |v: Vector3<f64>| self.a.seen(&v);
+        let out = far.side * height * self.b.axes.column(far.axis);
+        let middle = over(in_first(self.offset + out), self.half[near.axis]);
+        let edge = |k: usize| over(in_first(self.half[k] * self.b.axes.column(k)), 0.0);
+        let [p, q] = far.across.map(edge);
+        let corner = |s: f64, t: f64| -> [f64; 3] {
+            std::array::from_fn(|c| middle[c] + s * p[c] + t * q[c])
+        };
+        let corners = [corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)];
+        let shared = Polygon::of(corners).within(near.across.map(|k| self.half[k]));
+        for &[s, t, gap] in shared.corners() {
+            let mut mark = Vector3::zeros();
+            mark[near.axis] = near.side * self.half[near.axis];
+            (mark[near.across[0]], mark[near.across[1]]) = (s, t);
+            let on_a = self.a.axes * mark;
+            let on_b = on_a + gap * normal - self.offset;
+            spots.push(Spot { mark, on_a, on_b, gap });
+        }
+    }
+}
+
+/// A face of a box.
+struct Face {
+    axis: usize,
+    /// 1 or -1.
+    side: f64,
+    /// The axes along it.
+    across: [usize; 2],
+}
+
+impl Face {
+    /// That which looks most along a direction.
+    fn towards(pose: &Pose, direction: &Vector3<f64>) -> Self {
+        let local = pose.seen(direction);
+        let axis = local.iamax();
+        Self { axis, side: local[axis].signum(), across: [(axis + 1) % 3, (axis + 2) % 3] }
+    }
+}
+
+/// A convex polygon in a plane, of eight corners at most; with each a number that is linear in its place.
+struct Polygon {
+    corners: [[f64; 3]; 8],
+    count: usize,
+}
+
+impl Polygon {
+    fn of([a, b, c, d]: [[f64; 3]; 4]) -> Self {
+        let none = [0.0; 3];
+        Self { corners: [a, b, c, d, none, none, none, none], count: 4 }
+    }
+
+    fn corners(&self) -> &[[f64; 3]] {
+        &self.corners[..self.count]
+    }
+
+    /// What is within the rectangle of these half edges about the origin: one side after the other cuts off what is
+    /// beyond it (Sutherland and Hodgman, 1974).
+    fn within(mut self, half: [f64; 2]) -> Self {
+        for (axis, half) in half.into_iter().enumerate() {
+            for side in [1.0, -1.0] {
+                self.cut(|corner| half - side * corner[axis]);
             }
         }
-        let (i, j) = of_best;
-        let along = AXES[i].cross(self.axes[j]);
-        (best, self.towards(along.normalize_or_zero()))
+        self
+    }
+
+    /// Cuts off what is less than 0.
+    fn cut(&mut self, inside: impl Fn(&[f64; 3]) -> f64) {
+        if self.corners().iter().all(|corner| inside(corner) >= 0.0) {
+            return;
+        }
+        let (from, count) = (self.corners, self.count);
+        self.count = 0;
+        for number in 0..count {
+            let (a, b) = (from[number], from[(number + 1) % count]);
+            let (in_a, in_b) = (inside(&a), inside(&b));
+            if in_a >= 0.0 {
+                self.add(a);
+            }
+            if (in_a >= 0.0) != (in_b >= 0.0) {
+                let share = in_a / (in_a - in_b);
+                self.add(std::array::from_fn(|c| a[c] + share * (b[c] - a[c])));
+            }
+        }
+    }
+
+    /// A corner more; a side can add one only, but for rounding, which can add none that says anything new.
+    fn add(&mut self, corner: [f64; 3]) {
+        if self.count < self.corners.len() {
+            self.corners[self.count] = corner;
+            self.count += 1;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use parry3d_f64::math::Rotation;
+    use nalgebra::{Quaternion, UnitQuaternion};
+    use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector as ParryVector};
     use parry3d_f64::query::{
         ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher as _,
     };
     use parry3d_f64::shape::Cuboid;
     use proptest::prelude::*;
 
+    const RANGE: f64 = 0.05;
+
+    /// What parry says: the outward normal, and where the first box is touched, with the gap there.
+    fn theirs(half: Vector3<f64>, a: &Pose, b: &Pose) -> (Vector3<f64>, Vec<(Vector3<f64>, f64)>) {
+        let vector = |v: Vector3<f64>| ParryVector::new(v.x, v.y, v.z);
+        let of = |v: ParryVector| Vector3::new(v.x, v.y, v.z);
+        let turned = a.turned.inverse() * b.turned;
+        let pose = ParryPose::from_parts(
+            vector(a.seen(&(b.centre - a.centre))),
+            Rotation::from_xyzw(turned.i, turned.j, turned.k, turned.w),
+        );
+        let cuboid = Cuboid::new(vector(half));
+        let mut found = ContactManifold::<(), ()>::new();
+        DefaultQueryDispatcher
+            .contact_manifold_convex_convex(&pose, &cuboid, &cuboid, None, None, RANGE, &mut found)
+            .unwrap();
+        let points = found.points.iter().map(|point| (of(point.local_p1), point.dist));
+        (a.axes * of(found.local_n1), points.collect())
+    }
+
+    fn pose(centre: [f64; 3], q: [f64; 4]) -> Pose {
+        let turned = UnitQuaternion::new_normalize(Quaternion::new(q[3] + 1.5, q[0], q[1], q[2]));
+        Pose::new(centre.into(), turned)
+    }
+
     proptest! {
-        /// The same normal as parry's, or one along which the boxes are as far apart.
+        /// The normal is parry's, or one along which the boxes are as far apart; across parry's normal the points are
+        /// its own, each once.
         #[test]
-        fn the_normal_is_parry_s(
+        fn boxes_meet_where_parry_says(
             half in prop::array::uniform3(0.3..1.0_f64),
-            offset in prop::array::uniform3(-2.0..2.0_f64),
-            q in prop::array::uniform4(-1.0..1.0_f64),
+            offset in prop::array::uniform3(-1.6..1.6_f64),
+            one in prop::array::uniform4(-1.0..1.0_f64),
+            other in prop::array::uniform4(-1.0..1.0_f64),
             is_aligned in any::<bool>(),
         ) {
-            let rotation = if is_aligned {
-                Rotation::IDENTITY
-            } else {
-                Rotation::from_xyzw(q[0], q[1], q[2], q[3] + 1.5).normalize()
-            };
-            let half = Vector::new(half[0], half[1], half[2]);
-            let pose = Pose::from_parts(Vector::new(offset[0], offset[1], offset[2]), rotation);
-            let cuboid = Cuboid::new(half);
-            let range = 0.05;
-            let mut theirs = ContactManifold::<(), ()>::new();
-            DefaultQueryDispatcher
-                .contact_manifold_convex_convex(
-                    &pose, &cuboid, &cuboid, None, None, range, &mut theirs,
-                )
-                .unwrap();
-            let Some([normal, against]) = across(&pose, half, range) else {
-                prop_assert!(theirs.points.is_empty());
+            let half = Vector3::from(half);
+            let poses = [pose([0.3, -0.2, 0.1], one), pose(offset, if is_aligned { one } else { other })];
+            let [a, b] = &poses;
+            let (their_normal, their_points) = theirs(half, a, b);
+            let mut ours = None;
+            meet(&half, &poses, &[Asked { i: 0, j: 1, range: RANGE }], |_, found| {
+                ours = Some(found.clone());
+            });
+            let Some(ours) = ours else {
+                prop_assert!(their_points.is_empty());
                 return Ok(());
             };
-            prop_assert!((normal.length() - 1.0).abs() < 1e-12);
-            prop_assert!((pose.rotation * against + normal).length() < 1e-12);
-            if theirs.points.is_empty() {
+            prop_assert!((ours.normal.norm() - 1.0).abs() < 1e-12);
+            let boxes = Boxes::new(&half, a, b);
+            prop_assert!(boxes.offset.dot(&ours.normal) >= 0.0);
+            for spot in &ours.spots {
+                let apart = a.centre + spot.on_a + spot.gap * ours.normal - b.centre - spot.on_b;
+                prop_assert!(apart.norm() < 1e-12);
+                prop_assert!((a.axes * spot.mark - spot.on_a).norm() < 1e-12);
+            }
+            if their_points.is_empty() {
                 return Ok(());
             }
-            let axes = AXES.map(|axis| rotation * axis);
-            let boxes = Boxes { half, offset: pose.translation, axes };
-            prop_assert!((boxes.gap(normal) - boxes.gap(theirs.local_n1)).abs() < 1e-12);
-            prop_assert!(boxes.offset.dot(normal) >= 0.0);
+            prop_assert!((boxes.gap(&ours.normal) - boxes.gap(&their_normal)).abs() < 1e-12);
+            if (ours.normal - their_normal).norm() > 1e-9 || is_aligned {
+                return Ok(());
+            }
+            let is_there = |mark: Vector3<f64>, gap: f64| {
+                move |(place, of): (Vector3<f64>, f64)| {
+                    (place - mark).norm() < 1e-6 && (of - gap).abs() < 1e-6
+                }
+            };
+            for &(place, gap) in &their_points {
+                let mut spots = ours.spots.iter().map(|spot| (spot.mark, spot.gap));
+                prop_assert!(spots.any(is_there(place, gap)), "ours lacks {place} {gap}");
+            }
+            for spot in &ours.spots {
+                let mut points = their_points.iter().copied();
+                prop_assert!(points.any(is_there(spot.mark, spot.gap)), "theirs lacks {spot:?}");
+            }
+        }
+
+        /// Eight at a time or one by one, and beside whatever others.
+        #[test]
+        fn a_pair_meets_alike_in_any_lane(
+            centres in prop::collection::vec(prop::array::uniform3(-1.5..1.5_f64), 12),
+            turns in prop::collection::vec(prop::array::uniform4(-1.0..1.0_f64), 12),
+        ) {
+            let half = Vector3::new(0.4, 0.5, 0.7);
+            let poses: Vec<_> = centres.into_iter().zip(turns).map(|(c, q)| pose(c, q)).collect();
+            let pairs = (0..12).flat_map(|i| (i + 1..12).map(move |j| (i, j)));
+            let asked: Vec<_> = pairs.map(|(i, j)| Asked { i, j, range: RANGE }).collect();
+            let mut together = Vec::new();
+            meet(&half, &poses, &asked, |number, found| together.push((number, found.clone())));
+            let mut alone = Vec::new();
+            for (number, one) in asked.iter().enumerate() {
+                meet(&half, &poses, &[*one], |_, found| alone.push((number, found.clone())));
+            }
+            prop_assert_eq!(format!("{together:?}"), format!("{alone:?}"));
         }
     }
 }

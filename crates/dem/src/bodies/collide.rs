@@ -5,223 +5,170 @@ use nalgebra::Vector3;
 
 use super::around::Around;
 use super::body::Moving;
+use super::boxes;
 use super::contact::{Point, WALL};
+use super::foresee::Way;
 use super::manifold::manifold;
+use super::pairs::{Motion, Neighbours, motions};
+use super::pose::Pose;
 use super::rims::at_rims;
 use granulcal_scene::Solid;
 
-/// What goes farther than this within a substep is examined where it will be, too, in the least margin `[-]`.
-const FORESEEN: f64 = 0.5;
-/// Gaps of points that bodies turn past are corrected by no less than this, in their reach `[-]`.
-const CORRECTED: f64 = 2e-3;
-
-/// Pairs are sought so much farther than a body goes, for the impacts that make it faster, in its reach `[-]`.
-const SLACK: f64 = 0.1;
-
-/// Cells along an axis at most.
-const MOST_CELLS: u64 = 1 << 21;
-
-/// Velocity of a body, and how fast it turns its farthest points `[m/s]`.
-type Motion = (Vector3<f64>, f64);
+/// Two bodies whose balls may meet in a substep.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pair {
+    pub i: usize,
+    pub j: usize,
+    /// They are at least so far from each other at the begin of the substep; minus infinity where nothing is known `[m]`.
+    pub clear: f64,
+}
 
 /// What may meet in a substep, and where.
 pub(super) struct Contacts {
-    /// Pairs whose balls may meet, in rising order.
-    pairs: Vec<(usize, usize)>,
+    /// Pairs whose balls may meet.
+    pub pairs: Vec<Pair>,
     /// How each body was taken to move when they were found.
-    motions: Vec<Motion>,
+    pub motions: Vec<Motion>,
+    /// How far each body is from all walls at least, as of pairs `[m]`.
+    pub clear_of_walls: Vec<f64>,
+    /// The ways of the bodies of which the ends have been looked at; none at first.
+    pub examined: Vec<Way>,
     /// In the order of their rank, which depends on the places alone.
     pub points: Vec<Point>,
 }
 
 /// Every point of contact that the next substep may close, as far as it can be seen where the bodies are.
 /// `points` is a list of before, whose memory is used again.
-pub(super) fn contacts(around: &Around<'_>, bodies: &[Moving], mut points: Vec<Point>) -> Contacts {
+pub(super) fn contacts(
+    around: &Around<'_>,
+    bodies: &[Moving],
+    neighbours: &mut Neighbours,
+    mut points: Vec<Point>,
+) -> Contacts {
     points.clear();
-    for (i, body) in bodies.iter().enumerate() {
+    let poses: Vec<_> = bodies.iter().map(|body| body.pose).collect();
+    let motions = motions(around, bodies);
+    let mut clear_of_walls = Vec::with_capacity(bodies.len());
+    for (i, pose) in poses.iter().enumerate() {
         let first = points.len();
-        let range = around.range(body, None);
-        at_walls(around, body, i, range, &mut points);
-        at_rims(around, body, i, range, &mut points);
+        let range = around.range(&motions[i], None);
+        let is_near = at_walls(around, pose, i, range, &mut points)
+            | at_rims(around, pose, i, range, &mut points);
+        clear_of_walls.push(if is_near { f64::NEG_INFINITY } else { range });
         points[first..].sort_by_key(Point::rank);
     }
-    let pairs = near_pairs(around, bodies);
-    for &(i, j) in &pairs {
-        let range = around.range(&bodies[i], Some(&bodies[j]));
-        if are_apart(around.solid, &bodies[i], &bodies[j], range) {
-            continue;
+    let mut pairs = neighbours.near(around, bodies, &motions);
+    let mut near = Vec::new();
+    for (number, pair) in pairs.iter_mut().enumerate() {
+        let Pair { i, j, .. } = *pair;
+        let range = around.range(&motions[i], Some(&motions[j]));
+        pair.clear = clearance(around.solid, &poses[i], &poses[j]);
+        if pair.clear <= range {
+            pair.clear = range;
+            near.push((Asked { i, j, range }, number));
         }
-        touches(around, bodies, (i, j), range, |point| points.push(point));
     }
-    Contacts { pairs, motions: motions(around, bodies), points }
+    near.sort_unstable_by_key(|(asked, _)| (asked.i, asked.j));
+    let (asked, numbers): (Vec<_>, Vec<_>) = near.into_iter().unzip();
+    meet(around, &poses, &asked, |number, meeting| {
+        pairs[numbers[number]].clear = f64::NEG_INFINITY;
+        meeting.points(around, &asked[number], |point| points.push(point));
+    });
+    Contacts { pairs, motions, clear_of_walls, examined: Vec::new(), points }
 }
 
-impl Contacts {
-    /// Adds the points at which bodies would lie in something at the end of the substep: a corner that swings in from
-    /// elsewhere is none of those that are nearest at its begin. Returns whether there are any.
-    pub fn foresee(&mut self, around: &Around<'_>, bodies: &[Moving]) -> bool {
-        let known = self.points.len();
-        let mut new = Vec::new();
-        self.seek_farther(around, bodies);
-        let later: Vec<_> = bodies.iter().map(|body| body.foreseen(around.dt)).collect();
-        let is_far = |range: f64| range > (1.0 + FORESEEN) * around.least();
-        for (i, body) in later.iter().enumerate() {
-            if is_far(around.range(&bodies[i], None)) {
-                at_walls(around, body, i, 0.0, &mut new);
-                at_rims(around, body, i, 0.0, &mut new);
-            }
-        }
-        for &(i, j) in &self.pairs {
-            if is_far(around.range(&bodies[i], Some(&bodies[j])))
-                && !are_apart(around.solid, &later[i], &later[j], 0.0)
-            {
-                touches(around, &later, (i, j), 0.0, |point| new.push(point));
-            }
-        }
-        let (least, mut is_news) = (CORRECTED * around.solid.reach, false);
-        for point in new {
-            let point = point.foreseen(bodies, around.dt);
-            let of_before = &self.points[..known];
-            let first = of_before.partition_point(|known| known.rank() < point.rank());
-            let same = (first..known)
-                .take_while(|&number| of_before[number].rank() == point.rank())
-                .find(|&number| of_before[number].is_like(&point, around.solid.reach));
-            match same {
-                // Its bodies turn so far that it gets there sooner than its velocity says.
-                Some(number) if point.gap < self.points[number].gap - least => {
-                    self.points[number].gap = point.gap;
-                }
-                Some(_) => continue,
-                None => self.points.push(point),
-            }
-            is_news = true;
-        }
-        // Those of a manifold stay together.
-        if self.points.len() > known {
-            self.points.sort_by_key(Point::rank);
-        }
-        is_news
-    }
+/// Two bodies, and how near they are to be for their points to be of interest `[m]`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asked {
+    pub i: usize,
+    pub j: usize,
+    pub range: f64,
+}
 
-    /// Finds the pairs anew if impacts have changed a body's motion so much that it may meet others.
-    fn seek_farther(&mut self, around: &Around<'_>, bodies: &[Moving]) {
-        let now = motions(around, bodies);
-        let slack = SLACK * around.solid.reach / around.dt;
-        let is_other = |(now, then): (&Motion, &Motion)| {
-            (now.0 - then.0).norm() + (now.1 - then.1).max(0.0) > slack
-        };
-        if now.iter().zip(&self.motions).any(is_other) {
-            self.pairs = near_pairs(around, bodies);
-            self.motions = now;
+/// Where two bodies are near each other.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Meeting {
+    /// Unit, from the first to the second.
+    pub normal: Vector3<f64>,
+    pub spots: Vec<Spot>,
+}
+
+/// Two places that face each other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spot {
+    /// On the first body, in its own axes `[m]`.
+    pub mark: Vector3<f64>,
+    /// The same from its centre, in the scene's axes `[m]`.
+    pub on_a: Vector3<f64>,
+    /// On the second body, from its centre `[m]`.
+    pub on_b: Vector3<f64>,
+    /// `[m]`
+    pub gap: f64,
+}
+
+impl Meeting {
+    /// Gives the points of contact: half way between the two places of those that are near enough.
+    pub fn points(&self, around: &Around<'_>, asked: &Asked, mut found: impl FnMut(Point)) {
+        for spot in self.spots.iter().filter(|spot| spot.gap <= asked.range) {
+            let aside = 0.5 * spot.gap * self.normal;
+            let mut point = Point::new(asked.i, asked.j, 0, -self.normal, spot.gap);
+            (point.arm_i, point.arm_j) = (spot.on_a + aside, spot.on_b - aside);
+            point.mark = spot.mark;
+            (point.friction, point.restitution) =
+                (around.material.sliding_friction, around.material.restitution);
+            found(point);
         }
     }
 }
 
-fn motions(around: &Around<'_>, bodies: &[Moving]) -> Vec<Motion> {
-    bodies.iter().map(|body| (body.velocity, body.omega.norm() * around.solid.reach)).collect()
-}
-
-/// Pairs whose balls may meet, each once, in rising order. Cells are as wide as no two balls that may meet are apart, and
-/// are sorted: a row of them along z is one range.
-fn near_pairs(around: &Around<'_>, bodies: &[Moving]) -> Vec<(usize, usize)> {
-    let reach = around.solid.reach;
-    let farthest = bodies.iter().map(|body| body.way(reach, around.dt)).fold(0.0, f64::max);
-    let slack = 2.0 * SLACK * reach;
-    let width = 2.0 * reach + around.least() + 2.0 * farthest + slack;
-    let low = bodies.iter().fold(Vector3::repeat(f64::MAX), |low, body| low.inf(&body.centre));
-    // Far beyond any scene all are of one cell, whose neighbours still have numbers.
-    let cell_of = |body: &Moving| {
-        let [x, y, z] = <[f64; 3]>::from((body.centre - low) / width)
-            .map(|c| (c as u64).min(MOST_CELLS - 3) + 1);
-        cell(x, y, z)
-    };
-    let mut cells: Vec<_> = bodies.iter().map(cell_of).zip(0_u32..).collect();
-    cells.sort_unstable();
-    let mut pairs = Vec::new();
-    for (at, &(of_i, i)) in cells.iter().enumerate() {
-        let body = &bodies[i as usize];
-        let mut look = |slots: &[(u64, u32)], last: u64| {
-            for &(_, j) in slots.iter().take_while(|slot| slot.0 <= last) {
-                let other = &bodies[j as usize];
-                let square = (other.centre - body.centre).norm_squared();
-                if square > width * width {
-                    continue;
-                }
-                let range = 2.0 * reach + around.range(body, Some(other)) + slack;
-                if square < range * range {
-                    pairs.push(u64::from(i.min(j)) << 32 | u64::from(i.max(j)));
-                }
-            }
-        };
-        // What comes after it in the order: its own row, and those ahead.
-        look(&cells[at + 1..], of_i + 1);
-        let (along_y, along_x) = (cell(0, 1, 0), cell(1, 0, 0));
-        for row in
-            [of_i + along_y, of_i + along_x - along_y, of_i + along_x, of_i + along_x + along_y]
-        {
-            let first = cells.partition_point(|slot| slot.0 < row - 1);
-            look(&cells[first..], row + 1);
+/// Gives, for each pair that may be as near as asked, its number and where it meets.
+pub(super) fn meet(
+    around: &Around<'_>,
+    poses: &[Pose],
+    asked: &[Asked],
+    mut found: impl FnMut(usize, &Meeting),
+) {
+    if around.solid.is_box() {
+        return boxes::meet(&around.solid.half_extents, poses, asked, found);
+    }
+    let mut meeting = Meeting::default();
+    for (number, &Asked { i, j, range }) in asked.iter().enumerate() {
+        if manifold(around.solid, [&poses[i], &poses[j]], range, &mut meeting) {
+            found(number, &meeting);
         }
     }
-    pairs.sort_unstable();
-    pairs.into_iter().map(|pair| ((pair >> 32) as usize, (pair & 0xffff_ffff) as usize)).collect()
 }
 
-/// The number of a cell: in the order of x, then y, then z.
-fn cell(x: u64, y: u64, z: u64) -> u64 {
-    (x * MOST_CELLS + y) * MOST_CELLS + z
-}
-
-/// Whether the boxes or cylinders around two bodies, along their own axes, are more than `range` apart along the line
-/// between their centres.
-fn are_apart(solid: &Solid, a: &Moving, b: &Moving, range: f64) -> bool {
+/// How far the boxes or cylinders around two bodies, along their own axes, are apart along the line between their
+/// centres: no more than the bodies are `[m]`.
+pub(super) fn clearance(solid: &Solid, a: &Pose, b: &Pose) -> f64 {
     let offset = b.centre - a.centre;
-    let extent = |body: &Moving| {
-        let local = body.turned.inverse_transform_vector(&offset);
+    let extent = |body: &Pose| {
+        let local = body.seen(&offset);
         match solid.round {
             Some((radius, half)) => radius * local.x.hypot(local.z) + half * local.y.abs(),
             None => local.abs().dot(&solid.half_extents),
         }
     };
-    offset.norm_squared() - extent(a) - extent(b) > range * offset.norm()
+    let square = offset.norm_squared();
+    (square - extent(a) - extent(b)) / square.sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Gives the points at which two bodies are nearer than `range`.
-fn touches(
+/// Adds the points of body `i` at all surfaces that are nearer than `range`; returns whether any may be so near.
+pub(super) fn at_walls(
     around: &Around<'_>,
-    bodies: &[Moving],
-    (i, j): (usize, usize),
+    body: &Pose,
+    i: usize,
     range: f64,
-    mut found: impl FnMut(Point),
-) {
-    let (solid, a, b) = (around.solid, &bodies[i], &bodies[j]);
-    let Some(manifold) = manifold(solid, a, b, range) else { return };
-    let of = |v: parry3d_f64::math::Vector| Vector3::new(v.x, v.y, v.z);
-    let normal = -(a.turned * of(manifold.local_n1));
-    for contact in &manifold.points {
-        let gap = contact.dist * solid.reach;
-        if gap > range {
-            continue;
-        }
-        let mark = of(contact.local_p1) * solid.reach;
-        let on_i = a.turned * mark;
-        let on_j = b.turned * (of(contact.local_p2) * solid.reach);
-        let middle = 0.5 * (a.centre + on_i + b.centre + on_j);
-        let mut point = Point::new(i, j, 0, normal, gap);
-        (point.arm_i, point.arm_j, point.mark) = (middle - a.centre, middle - b.centre, mark);
-        (point.friction, point.restitution) =
-            (around.material.sliding_friction, around.material.restitution);
-        found(point);
-    }
-}
-
-fn at_walls(around: &Around<'_>, body: &Moving, i: usize, range: f64, found: &mut Vec<Point>) {
+    found: &mut Vec<Point>,
+) -> bool {
     let (solid, walls) = (around.solid, around.walls);
-    let back = body.turned.inverse();
+    let mut is_near = false;
     walls.reached(&body.centre, solid.reach + range, |surface| {
+        is_near = true;
         let wall = walls.wall(surface);
         let mut touch = |mark: Vector3<f64>| {
-            let arm = body.turned * mark;
+            let arm = body.axes * mark;
             let near = walls.nearest(surface, &(body.centre + arm), 0.0);
             // Beyond the end of a shell or a disc it is its rim that touches.
             let is_at_rim = near.side == 0 && near.distance > 0.0 && !wall.has_facets();
@@ -245,11 +192,12 @@ fn at_walls(around: &Around<'_>, body: &Moving, i: usize, range: f64, found: &mu
             found.push(point);
         };
         let seen = walls.nearest(surface, &body.centre, 0.0);
-        let towards = back * -seen.normal;
+        let towards = body.seen(&-seen.normal);
         solid.extremes(&towards, &mut touch);
         // A triangle that is not the nearest of its mesh to the centre does not tell on which side that is.
         if solid.round.is_some() && seen.distance.is_infinite() {
             solid.extremes(&-towards, &mut touch);
         }
     });
+    is_near
 }

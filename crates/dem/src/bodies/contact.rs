@@ -10,9 +10,10 @@
 //! Unlike a ball's, the block W couples the normal to the tangent, so that the two lines are repeated until they stand:
 //! by the sweeps over all points, and in an impact over those of its manifold.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
-use super::body::{Moving, product};
+use super::body::Moving;
+use super::pose::Pose;
 use crate::law::{CORRECTION, CORRECTION_SPEED, SLOP};
 
 /// Points of a manifold are one within this distance in the bodies' reach and this cosine of their normals `[-]`.
@@ -49,12 +50,18 @@ pub(super) struct Point {
     pub restitution: f64,
     /// Where it is on body i, in its own axes `[m]`: by this it is known again.
     pub mark: Vector3<f64>,
-    pub block: Matrix3<f64>,
     pub bias: f64,
     /// On body i `[m/s]`.
     pub impulse: Vector3<f64>,
-    /// Reciprocals of the normal element and of the largest tangential eigenvalue of the block.
-    pub compliance: [f64; 2],
+}
+
+/// What the law needs of a point's block W.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block {
+    /// W n.
+    pushed: Vector3<f64>,
+    /// Reciprocals of the normal element and of the largest tangential eigenvalue.
+    compliance: [f64; 2],
 }
 
 impl Point {
@@ -72,10 +79,8 @@ impl Point {
             friction: 0.0,
             restitution: 0.0,
             mark: Vector3::zeros(),
-            block: Matrix3::zeros(),
             bias: 0.0,
             impulse: Vector3::zeros(),
-            compliance: [0.0; 2],
         }
     }
 
@@ -91,14 +96,12 @@ impl Point {
 
     /// This point, found where its bodies will be at the end of the substep, as it is now: with the gap from which their
     /// velocities lead to the one that is foreseen.
-    pub fn foreseen(mut self, bodies: &[Moving], dt: f64) -> Self {
-        let turned_back = |body: &Moving, arm: &Vector3<f64>| {
-            let later = body.foreseen(dt);
-            body.turned * (later.turned.inverse() * arm)
-        };
-        self.arm_i = turned_back(&bodies[self.i], &self.arm_i);
+    pub fn foreseen(mut self, bodies: &[Moving], later: &[Pose], dt: f64) -> Self {
+        let turned_back =
+            |body: usize, arm: &Vector3<f64>| bodies[body].pose.axes * later[body].seen(arm);
+        self.arm_i = turned_back(self.i, &self.arm_i);
         if self.j != WALL {
-            self.arm_j = turned_back(&bodies[self.j], &self.arm_j);
+            self.arm_j = turned_back(self.j, &self.arm_j);
         }
         self.gap -= dt * self.normal.dot(&self.velocity(bodies));
         self.gap -= self.gap_of_last_motion(bodies) - self.gap;
@@ -111,23 +114,20 @@ impl Point {
             && self.normal.dot(&other.normal) > SAME_NORMAL
     }
 
-    /// Makes the block, once.
-    pub fn assemble(&mut self, bodies: &[Moving]) {
-        if self.compliance[0] > 0.0 {
-            return;
-        }
-        self.block = bodies[self.i].response(&self.arm_i);
+    /// What the law needs of its block.
+    pub fn block(&self, bodies: &[Moving]) -> Block {
+        let mut block = bodies[self.i].response(&self.arm_i);
         if self.j != WALL {
-            self.block += bodies[self.j].response(&self.arm_j);
+            block += bodies[self.j].response(&self.arm_j);
         }
         let n = self.normal;
         let other = if n.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
         let s = n.cross(&other).normalize();
         let t = n.cross(&s);
-        let (a, b, c) =
-            (s.dot(&(self.block * s)), s.dot(&(self.block * t)), t.dot(&(self.block * t)));
+        let (a, b, c) = (s.dot(&(block * s)), s.dot(&(block * t)), t.dot(&(block * t)));
         let largest = 0.5 * (a + c) + (0.25 * (a - c) * (a - c) + b * b).sqrt();
-        self.compliance = [1.0 / n.dot(&(self.block * n)), 1.0 / largest];
+        let pushed = block * n;
+        Block { pushed, compliance: [1.0 / n.dot(&pushed), 1.0 / largest] }
     }
 
     /// Sets the bias, from where the last motions of its bodies begin.
@@ -144,6 +144,9 @@ impl Point {
     /// The gap that the last motions of its bodies would have begun with at the begin of the substep `[m]`: bodies that
     /// an impact has turned back in it come from elsewhere.
     pub fn gap_of_last_motion(&self, bodies: &[Moving]) -> f64 {
+        if self.last_hit(bodies) == 0.0 {
+            return self.gap;
+        }
         let mut aside = bodies[self.i].shift_at(&self.arm_i);
         if self.j != WALL {
             aside -= bodies[self.j].shift_at(&self.arm_j);
@@ -178,12 +181,12 @@ impl Point {
 
     /// One round of the two lines, without bias; returns the change of the impulse `[m/s]`.
     #[inline(always)]
-    pub fn solve(&mut self, bodies: &mut [Moving]) -> f64 {
+    pub fn solve(&mut self, block: &Block, bodies: &mut [Moving]) -> f64 {
         let (n, old, u) = (self.normal, self.impulse, self.velocity(bodies));
         let was = n.dot(&old);
-        let normal = (was - n.dot(&u) * self.compliance[0]).max(0.0);
-        let u = u + product(&self.block, &n) * (normal - was);
-        let wanted = old - was * n - self.compliance[1] * (u - n.dot(&u) * n);
+        let normal = (was - n.dot(&u) * block.compliance[0]).max(0.0);
+        let u = u + block.pushed * (normal - was);
+        let wanted = old - was * n - block.compliance[1] * (u - n.dot(&u) * n);
         let (limit, length) = (self.friction * normal, wanted.norm());
         let tangent = if length > limit { wanted * (limit / length) } else { wanted };
         self.impulse = normal * n + tangent;

@@ -59,7 +59,7 @@ impl Exam {
     fn body(&self, number: usize) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
         let body = &self.bodies.all[number];
         let moving = Moving::of(body, &self.bodies.solid);
-        (moving.centre, moving.velocity, moving.omega)
+        (moving.pose.centre, moving.velocity, moving.omega)
     }
 
     fn energy(&self) -> f64 {

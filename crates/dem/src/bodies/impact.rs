@@ -93,26 +93,30 @@ fn first_touch(group: &[Point], bodies: &[Moving], dt: f64) -> Option<f64> {
 /// Lets a manifold's bodies bounce; returns what a moving wall has put in.
 fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64 {
     let touched = [Some(group[0].i), (group[0].j != WALL).then_some(group[0].j)];
-    let before = touched.map(|body| body.map(|body| bodies[body]));
+    let motion = |body: usize| [bodies[body].velocity, bodies[body].omega];
+    let before = touched.map(|body| body.map(motion));
     let meets = |point: &Point, bodies: &[Moving]| {
         point.gap_of_last_motion(bodies) <= -dt * point.normal.dot(&point.velocity(bodies))
     };
-    let touching: Vec<usize> = (0..group.len()).filter(|&k| meets(&group[k], bodies)).collect();
+    let touching: Vec<_> = (0..group.len())
+        .filter(|&k| meets(&group[k], bodies))
+        .map(|k| (k, group[k].block(bodies)))
+        .collect();
     for point in group.iter_mut() {
         point.impulse = Vector3::zeros();
     }
     for _ in 0..SWEEPS {
         let (mut changed, mut largest) = (0.0_f64, 0.0_f64);
-        for &k in &touching {
-            changed = changed.max(group[k].solve(bodies));
-            largest = largest.max(group[k].impulse.norm());
+        for (k, block) in &touching {
+            changed = changed.max(group[*k].solve(block, bodies));
+            largest = largest.max(group[*k].impulse.norm());
         }
         if changed <= STANDS * largest {
             break;
         }
     }
     let mut work = 0.0;
-    for &k in &touching {
+    for &(k, _) in &touching {
         let again = group[k].restitution * group[k].impulse;
         group[k].give(bodies, &again);
         work += (group[k].impulse + again).dot(&group[k].wall_velocity);

@@ -6,16 +6,16 @@
 //! Cores that meet leave it to parry. Of boxes the separating axes are tried here (`boxes.rs`), as parry does, in
 //! less time.
 
-use nalgebra::UnitQuaternion;
-use parry3d_f64::math::{Pose, Rotation, Vector};
+use nalgebra::{UnitQuaternion, Vector3};
+use parry3d_f64::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d_f64::query::gjk::{CsoPoint, VoronoiSimplex};
 use parry3d_f64::query::{
     ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher as _, TrackedContact,
 };
 use parry3d_f64::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, SupportMap};
 
-use super::body::Moving;
-use super::boxes::across;
+use super::collide::{Meeting, Spot};
+use super::pose::Pose;
 use granulcal_scene::{Solid, parry};
 
 /// What a body's core lacks of it `[-]`: overlaps up to twice this share of a body's thickness are found by the cores.
@@ -26,19 +26,35 @@ const NEAR: f64 = 1e-5;
 const STEPS: usize = 100;
 
 /// Points at which two bodies are near each other, in units of their reach and in the first body's axes.
-pub(super) type Manifold = ContactManifold<(), ()>;
+type Manifold = ContactManifold<(), ()>;
 
-/// The points at which `b` is nearer to `a` than `range`, or a little more. What a manifold remembers of the substep
-/// before would make the next depend on more than the state: it is made anew.
-pub(super) fn manifold(solid: &Solid, a: &Moving, b: &Moving, range: f64) -> Option<Manifold> {
-    let back = a.turned.inverse();
-    let offset = parry(&(back * (b.centre - a.centre) / solid.reach));
-    let pose = Pose::from_parts(offset, rotation(&(back * b.turned)));
+/// The points at which the second body is nearer to the first than `range`, or a little more; returns whether it may be
+/// so near.
+pub(super) fn manifold(
+    solid: &Solid,
+    [a, b]: [&Pose; 2],
+    range: f64,
+    meeting: &mut Meeting,
+) -> bool {
+    let Some(found) = found(solid, [a, b], range) else { return false };
+    let of = |v: Vector| Vector3::new(v.x, v.y, v.z);
+    meeting.normal = a.axes * of(found.local_n1);
+    let spot = |contact: &TrackedContact<()>| {
+        let mark = solid.reach * of(contact.local_p1);
+        let on_b = b.axes * (solid.reach * of(contact.local_p2));
+        Spot { mark, on_a: a.axes * mark, on_b, gap: solid.reach * contact.dist }
+    };
+    meeting.spots.clear();
+    meeting.spots.extend(found.points.iter().map(spot));
+    true
+}
+
+/// What a manifold remembers of the substep before would make the next depend on more than the state: it is made anew.
+fn found(solid: &Solid, [a, b]: [&Pose; 2], range: f64) -> Option<Manifold> {
+    let offset = parry(&(a.seen(&(b.centre - a.centre)) / solid.reach));
+    let turned = a.turned.inverse() * b.turned;
+    let pose = ParryPose::from_parts(offset, rotation(&turned));
     let (shape, range) = (solid.unit.as_ref(), range / solid.reach);
-    if let Some(cuboid) = shape.as_cuboid() {
-        let [normal, against] = across(&pose, cuboid.half_extents, range)?;
-        return Some(between_faces(&pose, cuboid, [normal, against], [Vector::ZERO; 2]));
-    }
     if let Some((whole, _)) = shape.as_polygonal_feature_map() {
         match by_cores(&pose, whole, range) {
             Cores::Near(found) => return Some(found),
@@ -60,7 +76,7 @@ enum Cores {
     Meet,
 }
 
-fn by_cores(pose: &Pose, whole: &dyn PolygonalFeatureMap, range: f64) -> Cores {
+fn by_cores(pose: &ParryPose, whole: &dyn PolygonalFeatureMap, range: f64) -> Cores {
     let (on_1, on_2, normal) = match nearest(pose, &Core(whole), range + 2.0 * SHRUNK) {
         Nearest::Points(on_1, on_2, normal) => (on_1, on_2, normal),
         Nearest::Farther => return Cores::Apart,
@@ -80,7 +96,7 @@ fn by_cores(pose: &Pose, whole: &dyn PolygonalFeatureMap, range: f64) -> Cores {
 /// The points at which the features of two bodies meet that face each other: outward normals of both, and what each is
 /// to be near, in its own axes.
 fn between_faces(
-    pose: &Pose,
+    pose: &ParryPose,
     whole: &dyn PolygonalFeatureMap,
     normals: [Vector; 2],
     near: [Vector; 2],
@@ -109,7 +125,7 @@ enum Nearest {
 /// GJK on two bodies of one shape, with parry's simplex: parry's own loop goes on to 5e-8 of the distance, which takes
 /// curved bodies some 25 steps. The distance between the simplex and the origin is too long, by no more than it is longer
 /// than the way to the plane across it that no body crosses.
-fn nearest(pose: &Pose, body: &Core<'_>, farthest: f64) -> Nearest {
+fn nearest(pose: &ParryPose, body: &Core<'_>, farthest: f64) -> Nearest {
     let start = pose.translation.try_normalize().unwrap_or(Vector::X);
     let mut simplex = VoronoiSimplex::new();
     simplex.reset(CsoPoint::from_shapes(pose, body, body, start));
@@ -153,7 +169,6 @@ fn rotation(turned: &UnitQuaternion<f64>) -> Rotation {
 mod tests {
     use super::*;
     use granulcal_scene::GrainShape;
-    use nalgebra::Vector3;
     use proptest::prelude::*;
 
     fn turned(q: [f64; 4]) -> UnitQuaternion<f64> {
@@ -181,12 +196,12 @@ mod tests {
             let solid = Solid::new(&shape, 2.0).unwrap();
             let shape = solid.unit.as_ref();
             let whole = shape.as_polygonal_feature_map().unwrap().0;
-            let mut pose = Pose::from_parts(
+            let mut pose = ParryPose::from_parts(
                 parry(&(towards.normalize() * 2.1)),
                 rotation(&(turned(one).inverse() * turned(other))),
             );
-            let parted = |pose: &Pose| {
-                let at_origin = Pose::IDENTITY;
+            let parted = |pose: &ParryPose| {
+                let at_origin = ParryPose::IDENTITY;
                 parry3d_f64::query::contact(&at_origin, shape, pose, shape, 3.0).unwrap().unwrap()
             };
             // Pushed together along their line until they overlap by the depth.

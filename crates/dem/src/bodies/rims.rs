@@ -8,8 +8,8 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::Vector3;
 
 use super::around::Around;
-use super::body::Moving;
 use super::contact::{Point, WALL};
+use super::pose::Pose;
 use crate::wall::{Rim, Wall, any_normal};
 use granulcal_scene::Solid;
 
@@ -20,21 +20,22 @@ const NARROWINGS: usize = 24;
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// Adds the points of body `i` at all rims that are nearer than `range` `[m]`: one in each part of the circle, so that a
-/// face that lies on a rim has two or more.
+/// face that lies on a rim has two or more. Returns whether any may be so near.
 pub(super) fn at_rims(
     around: &Around<'_>,
-    body: &Moving,
+    body: &Pose,
     i: usize,
     range: f64,
     found: &mut Vec<Point>,
-) {
+) -> bool {
+    let mut is_near = false;
     for (count, (wall, rim)) in around.walls.rims().enumerate() {
         let first = found.len();
         let touch = |gap: f64, mark: Vector3<f64>, face: Vector3<f64>| {
             // After the surfaces, so that its points have a name of their own.
             let surface = around.walls.surfaces() + count;
-            let mut point = Point::new(i, WALL, surface, -(body.turned * face), gap);
-            (point.arm_i, point.mark) = (body.turned * mark, mark);
+            let mut point = Point::new(i, WALL, surface, -(body.axes * face), gap);
+            (point.arm_i, point.mark) = (body.axes * mark, mark);
             point.wall_velocity = wall.motion_at(&(body.centre + point.arm_i)).0;
             (point.friction, point.restitution) =
                 (wall.material.sliding_friction, wall.material.restitution);
@@ -43,27 +44,29 @@ pub(super) fn at_rims(
                 found.push(point);
             }
         };
-        nearest(around.solid, body, (wall, rim), range, touch);
+        is_near |= nearest(around.solid, body, (wall, rim), range, touch);
     }
+    is_near
 }
 
 /// Gives where a body is nearer to a rim than `range`: how far it is `[m]`, where on the body that is `[m]`, and the
-/// outward normal of its face there; both in its own axes.
+/// outward normal of its face there; both in its own axes. Returns whether the ball around it is so near.
 fn nearest(
     solid: &Solid,
-    body: &Moving,
+    body: &Pose,
     (wall, rim): (&Wall, &Rim),
     range: f64,
     mut found: impl FnMut(f64, Vector3<f64>, Vector3<f64>),
-) {
+) -> bool {
     let reach = solid.reach + range;
     let centre = wall.seen_at_begin(&body.centre);
     let offset = centre - rim.centre;
     let along = offset.dot(&rim.axis);
     let across = offset - along * rim.axis;
     let from_axis = across.norm();
-    if along.hypot(from_axis - rim.radius) > reach {
-        return;
+    let aside = from_axis - rim.radius;
+    if along * along + aside * aside > reach * reach {
+        return false;
     }
     // The first direction is towards the body; on the axis any is.
     let is_aside = from_axis > 1e-9 * rim.radius;
@@ -88,6 +91,7 @@ fn nearest(
         let corner = |quarter: i32| f64::from(quarter) * FRAC_PI_2;
         (0..4).for_each(|quarter| part(corner(quarter), corner(quarter + 1)));
     }
+    true
 }
 
 /// Where a function is least between two places: the first least of some samples, then golden section about it.

@@ -148,6 +148,11 @@ impl Solid {
         })
     }
 
+    /// Whether it is a box, of [`Self::half_extents`].
+    pub fn is_box(&self) -> bool {
+        self.unit.as_cuboid().is_some()
+    }
+
     /// The points of the body that may touch a surface whose normal, towards the body, is `-direction`: of a polyhedron
     /// its corners, of a cylinder the ends of the generator that is farthest, and three more points of that end's rim.
     pub fn extremes(&self, direction: &Vector3<f64>, mut found: impl FnMut(Vector3<f64>)) {

@@ -1,0 +1,186 @@
+//! What the end of a substep tells: what is nearest at its begin is not all that meets in it.
+
+use nalgebra::Vector3;
+
+use super::around::Around;
+use super::body::Moving;
+use super::collide::{Asked, Contacts, Pair, at_walls, clearance, meet};
+use super::contact::{Point, WALL};
+use super::pairs::{Motion, Neighbours, SLACK, motions};
+use super::pose::Pose;
+use super::rims::at_rims;
+
+/// What goes farther than this within a substep is examined where it will be, too, in the least margin `[-]`.
+const FORESEEN: f64 = 0.5;
+/// Gaps of points that bodies turn past are corrected by no less than this, in their reach `[-]`.
+const CORRECTED: f64 = 2e-3;
+/// Ways that lead no farther from each other than this, in the bodies' reach, lead into the same `[-]`.
+const SAME_WAY: f64 = 2e-4;
+
+impl Contacts {
+    /// Adds the points at which bodies would lie in something at the end of the substep, behind the others: a corner that
+    /// swings in from elsewhere is none of those that are nearest at its begin. Those before `sorted` are in the order of
+    /// their rank. Returns whether there are any.
+    pub fn foresee(
+        &mut self,
+        around: &Around<'_>,
+        bodies: &[Moving],
+        neighbours: &mut Neighbours,
+        sorted: usize,
+    ) -> bool {
+        let known = self.points.len();
+        self.seek_farther(around, bodies, neighbours);
+        let ways: Vec<_> = bodies.iter().map(|body| Way::of(around, body)).collect();
+        let is_other = self.examine(around, &ways);
+        let least = FORESEEN * around.least();
+        let mut later = Later::new(around, bodies);
+        let mut new = Vec::new();
+        for (i, way) in ways.iter().enumerate() {
+            if is_other[i] && way.length() > least.max(self.clear_of_walls[i]) {
+                let pose = later.pose(i);
+                at_walls(around, pose, i, 0.0, &mut new);
+                at_rims(around, pose, i, 0.0, &mut new);
+            }
+        }
+        let mut asked = Vec::new();
+        for &Pair { i, j, clear } in &self.pairs {
+            if (is_other[i] || is_other[j]) && ways[i].beside(&ways[j]) > least.max(clear) {
+                let (a, b) = (*later.pose(i), *later.pose(j));
+                if clearance(around.solid, &a, &b) <= 0.0 {
+                    asked.push(Asked { i, j, range: 0.0 });
+                }
+            }
+        }
+        meet(around, &later.poses, &asked, |number, meeting| {
+            meeting.points(around, &asked[number], |point| new.push(point));
+        });
+        let (least, mut is_news) = (CORRECTED * around.solid.reach, false);
+        for point in new {
+            let point = point.foreseen(bodies, &later.poses, around.dt);
+            let first = self.points[..sorted].partition_point(|of| of.rank() < point.rank());
+            let of_manifold = |number: &usize| self.points[*number].rank() == point.rank();
+            let same = (first..sorted)
+                .take_while(of_manifold)
+                .chain((sorted..known).filter(of_manifold))
+                .find(|&number| self.points[number].is_like(&point, around.solid.reach));
+            match same {
+                // Its bodies turn so far that it gets there sooner than its velocity says.
+                Some(number) if point.gap < self.points[number].gap - least => {
+                    self.points[number].gap = point.gap;
+                }
+                Some(_) => continue,
+                None => self.points.push(point),
+            }
+            is_news = true;
+        }
+        is_news
+    }
+
+    /// Puts the points from `sorted` on among those before, in the order of their rank: behind those that rank no higher.
+    pub fn merge(&mut self, sorted: usize) {
+        let mut new = self.points.split_off(sorted);
+        new.sort_by_key(Point::rank);
+        let (mut left, mut at) = (sorted, sorted + new.len());
+        self.points.resize(at, Point::new(0, WALL, 0, Vector3::zeros(), 0.0));
+        for point in new.into_iter().rev() {
+            while left > 0 && self.points[left - 1].rank() > point.rank() {
+                (left, at) = (left - 1, at - 1);
+                self.points[at] = self.points[left];
+            }
+            at -= 1;
+            self.points[at] = point;
+        }
+    }
+
+    /// Adds the pairs of bodies whose motion impacts have changed so much that they may meet others.
+    fn seek_farther(
+        &mut self,
+        around: &Around<'_>,
+        bodies: &[Moving],
+        neighbours: &mut Neighbours,
+    ) {
+        let now = motions(around, bodies);
+        let slack = SLACK * around.solid.reach / around.dt;
+        let is_other = |(now, then): (&Motion, &Motion)| {
+            (now.velocity - then.velocity).norm() + (now.turning - then.turning).max(0.0) > slack
+        };
+        let other: Vec<_> = now.iter().zip(&self.motions).map(is_other).collect();
+        if other.contains(&true) {
+            neighbours.more(around, bodies, &now, |body| other[body], &mut self.pairs);
+            self.motions = now;
+        }
+    }
+
+    /// Which bodies go another way than that of which the end has been looked at last; it is taken as looked at.
+    fn examine(&mut self, around: &Around<'_>, ways: &[Way]) -> Vec<bool> {
+        if self.examined.is_empty() {
+            self.examined = ways.to_vec();
+            return vec![true; ways.len()];
+        }
+        let least = SAME_WAY * around.solid.reach;
+        let is_other = |(then, now): (&mut Way, &Way)| {
+            let is_other = now.differs(then, around.solid.reach) > least;
+            if is_other {
+                *then = *now;
+            }
+            is_other
+        };
+        self.examined.iter_mut().zip(ways).map(is_other).collect()
+    }
+}
+
+/// Where a body is at the end of a substep, seen from its begin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Way {
+    /// `[m]`
+    goes: Vector3<f64>,
+    /// `[rad]`
+    turns: Vector3<f64>,
+    /// How far it turns its farthest points, at most `[m]`.
+    swings: f64,
+}
+
+impl Way {
+    fn of(around: &Around<'_>, body: &Moving) -> Self {
+        let (goes, turns) = body.way(around.dt);
+        Self { goes, turns, swings: around.solid.reach * turns.norm() }
+    }
+
+    /// How far its points go, at most `[m]`.
+    fn length(&self) -> f64 {
+        self.goes.norm() + self.swings
+    }
+
+    /// How far its points go beside those of another, at most `[m]`.
+    fn beside(&self, other: &Self) -> f64 {
+        (self.goes - other.goes).norm() + self.swings + other.swings
+    }
+
+    /// How far from each other two ways of a body of this reach lead, at most `[m]`.
+    fn differs(&self, other: &Self, reach: f64) -> f64 {
+        (self.goes - other.goes).norm() + reach * (self.turns - other.turns).norm()
+    }
+}
+
+/// Where bodies will be at the end of the substep, each found when it is asked for.
+struct Later<'a> {
+    around: &'a Around<'a>,
+    bodies: &'a [Moving],
+    /// Of those not asked for yet where they are now.
+    poses: Vec<Pose>,
+    is_known: Vec<bool>,
+}
+
+impl<'a> Later<'a> {
+    fn new(around: &'a Around<'a>, bodies: &'a [Moving]) -> Self {
+        let poses = bodies.iter().map(|body| body.pose).collect();
+        Self { around, bodies, poses, is_known: vec![false; bodies.len()] }
+    }
+
+    fn pose(&mut self, body: usize) -> &Pose {
+        if !std::mem::replace(&mut self.is_known[body], true) {
+            self.poses[body] = self.bodies[body].foreseen(self.around.dt);
+        }
+        &self.poses[body]
+    }
+}

@@ -1,0 +1,174 @@
+//! Which bodies may meet in a substep: pairs of balls, found by cells.
+
+use nalgebra::Vector3;
+
+use super::around::Around;
+use super::body::Moving;
+use super::collide::Pair;
+
+/// Pairs are sought so much farther than a body goes, for the impacts that make it faster, in its reach `[-]`.
+pub(super) const SLACK: f64 = 0.1;
+
+/// They are known for so much farther, and found anew when bodies may have gone as far, in their reach `[-]`.
+const SKIN: f64 = 0.5;
+
+/// Cells along an axis at most.
+const MOST_CELLS: u64 = 1 << 21;
+
+/// How a body moves.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Motion {
+    /// `[m/s]`
+    pub velocity: Vector3<f64>,
+    /// How fast it turns its farthest points `[m/s]`.
+    pub turning: f64,
+}
+
+impl Motion {
+    /// How fast its points move at most `[m/s]`.
+    pub fn fastest(&self) -> f64 {
+        self.velocity.norm() + self.turning
+    }
+}
+
+/// How every body moves.
+pub(super) fn motions(around: &Around<'_>, bodies: &[Moving]) -> Vec<Motion> {
+    let of = |body: &Moving| Motion {
+        velocity: body.velocity,
+        turning: body.omega.norm() * around.solid.reach,
+    };
+    bodies.iter().map(of).collect()
+}
+
+/// Pairs of bodies that may come near each other for as long as none has gone far.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Neighbours {
+    /// Where the bodies were when they were sought `[m]`.
+    centres: Vec<Vector3<f64>>,
+    /// All whose centres were nearer than this are known `[m]`.
+    within: f64,
+    pairs: Vec<(u32, u32)>,
+    /// Which of them were given in this substep.
+    is_given: Vec<bool>,
+}
+
+impl Neighbours {
+    /// Pairs whose balls may meet, each once: which depends on the places and motions alone, their order does not.
+    pub fn near(
+        &mut self,
+        around: &Around<'_>,
+        bodies: &[Moving],
+        motions: &[Motion],
+    ) -> Vec<Pair> {
+        let mut pairs = Vec::with_capacity(self.pairs.len());
+        self.is_given.fill(false);
+        self.more(around, bodies, motions, |_| true, &mut pairs);
+        pairs
+    }
+
+    /// Adds those that were not given yet of the bodies in question.
+    pub fn more(
+        &mut self,
+        around: &Around<'_>,
+        bodies: &[Moving],
+        motions: &[Motion],
+        is_asked: impl Fn(usize) -> bool,
+        given: &mut Vec<Pair>,
+    ) {
+        let reach = around.solid.reach;
+        let balls: Vec<_> = bodies.iter().zip(motions).map(Ball::of).collect();
+        let fastest = balls.iter().map(|ball| ball.fastest).fold(0.0, f64::max);
+        let base = 2.0 * (1.0 + SLACK) * reach + around.least();
+        let is_new = self.seek(&balls, base + 2.0 * around.dt * fastest, SKIN * reach);
+        if is_new {
+            given.clear();
+        }
+        for (&(i, j), is_given) in self.pairs.iter().zip(&mut self.is_given) {
+            let (i, j) = (i as usize, j as usize);
+            if *is_given || !(is_new || is_asked(i) || is_asked(j)) {
+                continue;
+            }
+            let (a, b) = (&balls[i], &balls[j]);
+            let square = (b.centre - a.centre).norm_squared();
+            // No pair is faster than both of its bodies.
+            let most = base + around.dt * (a.fastest + b.fastest);
+            if square >= most * most {
+                continue;
+            }
+            let range = base - around.least() + around.range(&motions[i], Some(&motions[j]));
+            if square < range * range {
+                *is_given = true;
+                given.push(Pair { i, j, clear: square.sqrt() - 2.0 * reach });
+            }
+        }
+    }
+
+    /// Finds the pairs anew unless all that are nearer than `width` are known; returns whether it has.
+    fn seek(&mut self, balls: &[Ball], width: f64, skin: f64) -> bool {
+        let gone = |(ball, centre): (&Ball, &Vector3<f64>)| (ball.centre - centre).norm_squared();
+        let farthest = balls.iter().zip(&self.centres).map(gone).fold(0.0, f64::max).sqrt();
+        if self.centres.len() == balls.len() && width + 2.0 * farthest <= self.within {
+            return false;
+        }
+        self.within = width + skin;
+        self.centres.clear();
+        self.centres.extend(balls.iter().map(|ball| ball.centre));
+        self.pairs.clear();
+        pairs_within(&self.centres, self.within, |i, j| self.pairs.push((i, j)));
+        self.is_given.clear();
+        self.is_given.resize(self.pairs.len(), false);
+        true
+    }
+}
+
+/// A body as the search sees it.
+#[derive(Clone, Copy, Debug)]
+struct Ball {
+    centre: Vector3<f64>,
+    /// How fast its points move at most `[m/s]`.
+    fastest: f64,
+}
+
+impl Ball {
+    fn of((body, motion): (&Moving, &Motion)) -> Self {
+        Self { centre: body.pose.centre, fastest: motion.fastest() }
+    }
+}
+
+/// Gives each pair of places, the lower number first, that are no farther than `width` from each other. Cells are as wide,
+/// and are sorted: a row of them along z is one range.
+fn pairs_within(centres: &[Vector3<f64>], width: f64, mut found: impl FnMut(u32, u32)) {
+    let low = centres.iter().fold(Vector3::repeat(f64::MAX), |low, centre| low.inf(centre));
+    // Far beyond any scene all are of one cell, whose neighbours still have numbers.
+    let cell_of = |centre: &Vector3<f64>| {
+        let [x, y, z] =
+            <[f64; 3]>::from((centre - low) / width).map(|c| (c as u64).min(MOST_CELLS - 3) + 1);
+        cell(x, y, z)
+    };
+    let mut cells: Vec<_> = centres.iter().map(cell_of).zip(0_u32..).collect();
+    cells.sort_unstable();
+    let sorted: Vec<_> = cells.iter().map(|&(_, i)| centres[i as usize]).collect();
+    for (at, &(of_i, i)) in cells.iter().enumerate() {
+        let mut look = |from: usize, last: u64| {
+            let ahead = cells[from..].iter().zip(&sorted[from..]);
+            for (&(_, j), centre) in ahead.take_while(|(slot, _)| slot.0 <= last) {
+                if (centre - sorted[at]).norm_squared() <= width * width {
+                    found(i.min(j), i.max(j));
+                }
+            }
+        };
+        // What comes after it in the order: its own row, and those ahead.
+        look(at + 1, of_i + 1);
+        let (along_y, along_x) = (cell(0, 1, 0), cell(1, 0, 0));
+        for row in
+            [of_i + along_y, of_i + along_x - along_y, of_i + along_x, of_i + along_x + along_y]
+        {
+            look(cells.partition_point(|slot| slot.0 < row - 1), row + 1);
+        }
+    }
+}
+
+/// The number of a cell: in the order of x, then y, then z.
+fn cell(x: u64, y: u64, z: u64) -> u64 {
+    (x * MOST_CELLS + y) * MOST_CELLS + z
+}
