@@ -6,10 +6,13 @@
 //! | `pose` | where a body is and how it is turned |
 //! | `body` | place, turn, momentum; what an impulse does |
 //! | `around` | shape, walls and material in a substep; how far bodies search for each other |
+//! | `motion` | how far a body goes in a substep |
 //! | `pairs` | which bodies may meet in a substep |
 //! | `collide` | points of contact |
 //! | `foresee` | points of contact that show only where bodies will be |
+//! | `meeting` | what is asked of two bodies and answered |
 //! | `boxes` | where two boxes meet, eight pairs at a time |
+//! | `polygon` | what two faces share |
 //! | `manifold` | where two other bodies meet, by parry |
 //! | `contact` | the law at a point |
 //! | `impact` | impacts, each at its time |
@@ -30,7 +33,10 @@ mod foresee;
 mod impact;
 mod lever;
 mod manifold;
+mod meeting;
+mod motion;
 mod pairs;
+mod polygon;
 mod pose;
 mod rims;
 mod sweeps;

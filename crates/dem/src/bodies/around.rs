@@ -1,6 +1,6 @@
 //! What bodies are of, what is around them in a substep, and how far they search for each other.
 
-use super::pairs::Motion;
+use super::motion::Motion;
 use crate::wall::Walls;
 use granulcal_scene::{Material, Solid};
 

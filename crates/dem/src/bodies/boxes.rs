@@ -14,7 +14,8 @@
 
 use nalgebra::Vector3;
 
-use super::collide::{Asked, Meeting, Spot};
+use super::meeting::{Asked, Meeting, Spot};
+use super::polygon::Polygon;
 use super::pose::Pose;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, widest};
 
@@ -249,62 +250,6 @@ impl Face {
         let local = pose.seen(direction);
         let axis = local.iamax();
         Self { axis, side: local[axis].signum(), across: [(axis + 1) % 3, (axis + 2) % 3] }
-    }
-}
-
-/// A convex polygon in a plane, of eight corners at most; with each a number that is linear in its place.
-struct Polygon {
-    corners: [[f64; 3]; 8],
-    count: usize,
-}
-
-impl Polygon {
-    fn of([a, b, c, d]: [[f64; 3]; 4]) -> Self {
-        let none = [0.0; 3];
-        Self { corners: [a, b, c, d, none, none, none, none], count: 4 }
-    }
-
-    fn corners(&self) -> &[[f64; 3]] {
-        &self.corners[..self.count]
-    }
-
-    /// What is within the rectangle of these half edges about the origin: one side after the other cuts off what is
-    /// beyond it (Sutherland and Hodgman, 1974).
-    fn within(mut self, half: [f64; 2]) -> Self {
-        for (axis, half) in half.into_iter().enumerate() {
-            for side in [1.0, -1.0] {
-                self.cut(|corner| half - side * corner[axis]);
-            }
-        }
-        self
-    }
-
-    /// Cuts off what is less than 0.
-    fn cut(&mut self, inside: impl Fn(&[f64; 3]) -> f64) {
-        if self.corners().iter().all(|corner| inside(corner) >= 0.0) {
-            return;
-        }
-        let (from, count) = (self.corners, self.count);
-        self.count = 0;
-        for number in 0..count {
-            let (a, b) = (from[number], from[(number + 1) % count]);
-            let (in_a, in_b) = (inside(&a), inside(&b));
-            if in_a >= 0.0 {
-                self.add(a);
-            }
-            if (in_a >= 0.0) != (in_b >= 0.0) {
-                let share = in_a / (in_a - in_b);
-                self.add(std::array::from_fn(|c| a[c] + share * (b[c] - a[c])));
-            }
-        }
-    }
-
-    /// A corner more; a side can add one only, but for rounding, which can add none that says anything new.
-    fn add(&mut self, corner: [f64; 3]) {
-        if self.count < self.corners.len() {
-            self.corners[self.count] = corner;
-            self.count += 1;
-        }
     }
 }
 

@@ -7,21 +7,13 @@ use super::around::Around;
 use super::body::Moving;
 use super::boxes;
 use super::contact::{Point, WALL};
-use super::foresee::Way;
 use super::manifold::manifold;
-use super::pairs::{Motion, Neighbours, motions};
+use super::meeting::{Asked, Meeting};
+use super::motion::{Motion, Way};
+use super::pairs::{Neighbours, Pair};
 use super::pose::Pose;
 use super::rims::at_rims;
 use granulcal_scene::Solid;
-
-/// Two bodies whose balls may meet in a substep.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Pair {
-    pub i: usize,
-    pub j: usize,
-    /// They are at least so far from each other at the begin of the substep; minus infinity where nothing is known `[m]`.
-    pub clear: f64,
-}
 
 /// What may meet in a substep, and where.
 pub(super) struct Contacts {
@@ -47,7 +39,7 @@ pub(super) fn contacts(
 ) -> Contacts {
     points.clear();
     let poses: Vec<_> = bodies.iter().map(|body| body.pose).collect();
-    let motions = motions(around, bodies);
+    let motions: Vec<_> = bodies.iter().map(|body| Motion::of(body, around.solid.reach)).collect();
     let mut clear_of_walls = Vec::with_capacity(bodies.len());
     for (i, pose) in poses.iter().enumerate() {
         let first = points.len();
@@ -75,50 +67,6 @@ pub(super) fn contacts(
         meeting.points(around, &asked[number], |point| points.push(point));
     });
     Contacts { pairs, motions, clear_of_walls, examined: Vec::new(), points }
-}
-
-/// Two bodies, and how near they are to be for their points to be of interest `[m]`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
-    pub i: usize,
-    pub j: usize,
-    pub range: f64,
-}
-
-/// Where two bodies are near each other.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Meeting {
-    /// Unit, from the first to the second.
-    pub normal: Vector3<f64>,
-    pub spots: Vec<Spot>,
-}
-
-/// Two places that face each other.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Spot {
-    /// On the first body, in its own axes `[m]`.
-    pub mark: Vector3<f64>,
-    /// The same from its centre, in the scene's axes `[m]`.
-    pub on_a: Vector3<f64>,
-    /// On the second body, from its centre `[m]`.
-    pub on_b: Vector3<f64>,
-    /// `[m]`
-    pub gap: f64,
-}
-
-impl Meeting {
-    /// Gives the points of contact: half way between the two places of those that are near enough.
-    pub fn points(&self, around: &Around<'_>, asked: &Asked, mut found: impl FnMut(Point)) {
-        for spot in self.spots.iter().filter(|spot| spot.gap <= asked.range) {
-            let aside = 0.5 * spot.gap * self.normal;
-            let mut point = Point::new(asked.i, asked.j, 0, -self.normal, spot.gap);
-            (point.arm_i, point.arm_j) = (spot.on_a + aside, spot.on_b - aside);
-            point.mark = spot.mark;
-            (point.friction, point.restitution) =
-                (around.material.sliding_friction, around.material.restitution);
-            found(point);
-        }
-    }
 }
 
 /// Gives, for each pair that may be as near as asked, its number and where it meets.

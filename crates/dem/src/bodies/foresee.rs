@@ -4,9 +4,11 @@ use nalgebra::Vector3;
 
 use super::around::Around;
 use super::body::Moving;
-use super::collide::{Asked, Contacts, Pair, at_walls, clearance, meet};
+use super::collide::{Contacts, at_walls, clearance, meet};
 use super::contact::{Point, WALL};
-use super::pairs::{Motion, Neighbours, SLACK, motions};
+use super::meeting::Asked;
+use super::motion::{Motion, Way};
+use super::pairs::{Neighbours, Pair, SLACK};
 use super::pose::Pose;
 use super::rims::at_rims;
 
@@ -30,7 +32,8 @@ impl Contacts {
     ) -> bool {
         let known = self.points.len();
         self.seek_farther(around, bodies, neighbours);
-        let ways: Vec<_> = bodies.iter().map(|body| Way::of(around, body)).collect();
+        let (reach, dt) = (around.solid.reach, around.dt);
+        let ways: Vec<_> = bodies.iter().map(|body| Way::of(body, reach, dt)).collect();
         let is_other = self.examine(around, &ways);
         let least = FORESEEN * around.least();
         let mut later = Later::new(around, bodies);
@@ -99,8 +102,9 @@ impl Contacts {
         bodies: &[Moving],
         neighbours: &mut Neighbours,
     ) {
-        let now = motions(around, bodies);
-        let slack = SLACK * around.solid.reach / around.dt;
+        let reach = around.solid.reach;
+        let now: Vec<_> = bodies.iter().map(|body| Motion::of(body, reach)).collect();
+        let slack = SLACK * reach / around.dt;
         let is_other = |(now, then): (&Motion, &Motion)| {
             (now.velocity - then.velocity).norm() + (now.turning - then.turning).max(0.0) > slack
         };
@@ -126,39 +130,6 @@ impl Contacts {
             is_other
         };
         self.examined.iter_mut().zip(ways).map(is_other).collect()
-    }
-}
-
-/// Where a body is at the end of a substep, seen from its begin.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Way {
-    /// `[m]`
-    goes: Vector3<f64>,
-    /// `[rad]`
-    turns: Vector3<f64>,
-    /// How far it turns its farthest points, at most `[m]`.
-    swings: f64,
-}
-
-impl Way {
-    fn of(around: &Around<'_>, body: &Moving) -> Self {
-        let (goes, turns) = body.way(around.dt);
-        Self { goes, turns, swings: around.solid.reach * turns.norm() }
-    }
-
-    /// How far its points go, at most `[m]`.
-    fn length(&self) -> f64 {
-        self.goes.norm() + self.swings
-    }
-
-    /// How far its points go beside those of another, at most `[m]`.
-    fn beside(&self, other: &Self) -> f64 {
-        (self.goes - other.goes).norm() + self.swings + other.swings
-    }
-
-    /// How far from each other two ways of a body of this reach lead, at most `[m]`.
-    fn differs(&self, other: &Self, reach: f64) -> f64 {
-        (self.goes - other.goes).norm() + reach * (self.turns - other.turns).norm()
     }
 }
 

@@ -14,7 +14,7 @@ use parry3d_f64::query::{
 };
 use parry3d_f64::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, SupportMap};
 
-use super::collide::{Meeting, Spot};
+use super::meeting::{Meeting, Spot};
 use super::pose::Pose;
 use granulcal_scene::{Solid, parry};
 

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::around::Around;
 use super::body::Moving;
-use super::collide::Pair;
+use super::motion::Motion;
 
 /// Pairs are sought so much farther than a body goes, for the impacts that make it faster, in its reach `[-]`.
 pub(super) const SLACK: f64 = 0.1;
@@ -15,29 +15,13 @@ const SKIN: f64 = 0.5;
 /// Cells along an axis at most.
 const MOST_CELLS: u64 = 1 << 21;
 
-/// How a body moves.
+/// Two bodies whose balls may meet in a substep.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Motion {
-    /// `[m/s]`
-    pub velocity: Vector3<f64>,
-    /// How fast it turns its farthest points `[m/s]`.
-    pub turning: f64,
-}
-
-impl Motion {
-    /// How fast its points move at most `[m/s]`.
-    pub fn fastest(&self) -> f64 {
-        self.velocity.norm() + self.turning
-    }
-}
-
-/// How every body moves.
-pub(super) fn motions(around: &Around<'_>, bodies: &[Moving]) -> Vec<Motion> {
-    let of = |body: &Moving| Motion {
-        velocity: body.velocity,
-        turning: body.omega.norm() * around.solid.reach,
-    };
-    bodies.iter().map(of).collect()
+pub(super) struct Pair {
+    pub i: usize,
+    pub j: usize,
+    /// They are at least so far from each other at the begin of the substep; minus infinity where nothing is known `[m]`.
+    pub clear: f64,
 }
 
 /// Pairs of bodies that may come near each other for as long as none has gone far.

@@ -172,7 +172,9 @@ impl<L: Lever> BatchesOf<L> {
                 next[colour] += 1;
             }
         }
-        batches.iter_mut().for_each(|batch| batch.clear_rest(resting as u32));
+        for batch in batches.iter_mut() {
+            batch.clear_rest(resting as u32);
+        }
         assemble(batches);
     }
 
