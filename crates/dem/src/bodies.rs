@@ -197,7 +197,8 @@ impl Bodies {
         let depths = contacts.points.iter().map(|point| -point.gap);
         step.deepest = depths.fold(0.0, f64::max);
         for round in 1..=ROUNDS {
-            let (impacts, work) = impact::resolve(&mut contacts.points, &mut moving, dt);
+            let (impacts, work) =
+                impact::resolve(&mut contacts.points, &mut moving, solid.reach, dt);
             step.impacts += impacts;
             step.work_of_walls += work;
             let known = contacts.points.len();

@@ -17,6 +17,7 @@ use nalgebra::Vector3;
 
 use super::body::Moving;
 use super::contact::{Point, WALL};
+use super::motion::Motion;
 use crate::law::IMPACT_SPEED;
 
 /// Sweeps over the points of a manifold at most, and the change over the impulse at which they stand.
@@ -24,18 +25,32 @@ const SWEEPS: usize = 300;
 const STANDS: f64 = 1e-11;
 /// Impacts of a substep at most, over its manifolds: a cube between two others may be hit often.
 const ROUNDS: usize = 8;
+/// Points are no farther from a body's centre than this in its reach: half a gap aside of it `[-]`.
+const FARTHEST: f64 = 2.0;
 
 /// Resolves what meets within the substep faster than an impact must; returns the number of impacts, and what moving
 /// walls have put in over the mass `[m^2/s^2]`.
-pub(super) fn resolve(points: &mut [Point], bodies: &mut [Moving], dt: f64) -> (usize, f64) {
+pub(super) fn resolve(
+    points: &mut [Point],
+    bodies: &mut [Moving],
+    reach: f64,
+    dt: f64,
+) -> (usize, f64) {
     let manifolds = manifolds(points);
     let (mut count, mut work) = (0, 0.0);
     // The round in which each body was hit last: what is not due stays so until a body of it is.
     let mut hit_in = vec![0; bodies.len()];
+    let fastest = |body: usize| Motion::of(&bodies[body], FARTHEST * reach).fastest();
+    let fastest: Vec<_> = (0..bodies.len()).map(fastest).collect();
     for round in 1..=ROUNDS {
         let may_be_due = |range: &Range<usize>| {
             let Point { i, j, .. } = points[range.start];
-            round == 1 || hit_in[i] + 1 == round || (j != WALL && hit_in[j] + 1 == round)
+            if round == 1 {
+                // Two that are slow do not close fast, wherever they touch.
+                j == WALL || fastest[i] + fastest[j] > IMPACT_SPEED
+            } else {
+                hit_in[i] + 1 == round || (j != WALL && hit_in[j] + 1 == round)
+            }
         };
         let mut due: Vec<(f64, usize)> = manifolds
             .iter()

@@ -29,19 +29,23 @@ impl Polygon {
 
     /// Cuts off what is less than 0.
     fn cut(&mut self, inside: impl Fn(&[f64; 3]) -> f64) {
-        if self.corners().iter().all(|corner| inside(corner) >= 0.0) {
+        let (from, count) = (self.corners, self.count);
+        let mut depths = [0.0; 8];
+        for (depth, corner) in depths.iter_mut().zip(self.corners()) {
+            *depth = inside(corner);
+        }
+        if depths[..count].iter().all(|depth| *depth >= 0.0) {
             return;
         }
-        let (from, count) = (self.corners, self.count);
         self.count = 0;
         for number in 0..count {
-            let (a, b) = (from[number], from[(number + 1) % count]);
-            let (in_a, in_b) = (inside(&a), inside(&b));
+            let next = if number + 1 < count { number + 1 } else { 0 };
+            let (in_a, in_b) = (depths[number], depths[next]);
             if in_a >= 0.0 {
-                self.add(a);
+                self.add(from[number]);
             }
             if (in_a >= 0.0) != (in_b >= 0.0) {
-                let share = in_a / (in_a - in_b);
+                let (a, b, share) = (from[number], from[next], in_a / (in_a - in_b));
                 self.add(std::array::from_fn(|c| a[c] + share * (b[c] - a[c])));
             }
         }

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
-use granulcal_scene::{Ends, Funnel, Shape, Start, Wall};
+use granulcal_scene::{Ends, Funnel, GrainShape, Shape, Start, Wall};
 
 use super::*;
 use crate::contact_set::ContactSet;
@@ -79,7 +79,20 @@ fn a_whole_pour_has_the_same_bits_on_any_registers() {
     let mut scene = scene();
     scene.grains.count = 200;
     let preset = |preset| Scene { preset, ..scene.clone() };
-    for scene in [preset(Preset::Default), preset(Preset::Paper)] {
+    let shaped = |shape| {
+        let mut scene = scene.clone();
+        (scene.grains.shape, scene.end.horizon) = (Some(shape), 0.3);
+        scene.start = Start::Grid { counts: [5, 5, 8], spacing: 8e-3, jitter: 1e-4, base: 5e-3 };
+        scene
+    };
+    let scenes = [
+        preset(Preset::Default),
+        preset(Preset::Paper),
+        shaped(GrainShape::Box { aspect: [1.0; 3] }),
+        shaped(GrainShape::Box { aspect: [0.8, 1.0, 1.4] }),
+        shaped(GrainShape::Cylinder { aspect: 1.2 }),
+    ];
+    for scene in scenes {
         let mut hashes = Vec::new();
         for bits in [128, 256, 512] {
             WIDEST.store(bits, Ordering::Relaxed);
