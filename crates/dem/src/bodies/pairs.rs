@@ -50,7 +50,7 @@ impl Neighbours {
         pairs
     }
 
-    /// Adds those that were not given yet of the bodies in question.
+    /// Adds those that were not given yet in this substep of the bodies in question.
     pub fn more(
         &mut self,
         around: &Around<'_>,
@@ -63,13 +63,12 @@ impl Neighbours {
         let balls: Vec<_> = bodies.iter().zip(motions).map(Ball::of).collect();
         let fastest = balls.iter().map(|ball| ball.fastest).fold(0.0, f64::max);
         let base = 2.0 * (1.0 + SLACK) * reach + around.least();
-        let is_new = self.seek(&balls, base + 2.0 * around.dt * fastest, SKIN * reach);
-        if is_new {
-            given.clear();
+        if self.seek(&balls, base + 2.0 * around.dt * fastest, SKIN * reach) {
+            self.mark(given);
         }
         for (&(i, j), is_given) in self.pairs.iter().zip(&mut self.is_given) {
             let (i, j) = (i as usize, j as usize);
-            if *is_given || !(is_new || is_asked(i) || is_asked(j)) {
+            if *is_given || !(is_asked(i) || is_asked(j)) {
                 continue;
             }
             let (a, b) = (&balls[i], &balls[j]);
@@ -87,6 +86,14 @@ impl Neighbours {
         }
     }
 
+    /// Notes which pairs were given: what is given in a substep does not depend on when they were found.
+    fn mark(&mut self, given: &[Pair]) {
+        let mut given: Vec<_> = given.iter().map(|pair| (pair.i as u32, pair.j as u32)).collect();
+        given.sort_unstable();
+        let is_given = self.pairs.iter().map(|pair| given.binary_search(pair).is_ok());
+        self.is_given = is_given.collect();
+    }
+
     /// Finds the pairs anew unless all that are nearer than `width` are known; returns whether it has.
     fn seek(&mut self, balls: &[Ball], width: f64, skin: f64) -> bool {
         let gone = |(ball, centre): (&Ball, &Vector3<f64>)| (ball.centre - centre).norm_squared();
@@ -99,8 +106,6 @@ impl Neighbours {
         self.centres.extend(balls.iter().map(|ball| ball.centre));
         self.pairs.clear();
         pairs_within(&self.centres, self.within, |i, j| self.pairs.push((i, j)));
-        self.is_given.clear();
-        self.is_given.resize(self.pairs.len(), false);
         true
     }
 }
