@@ -5,7 +5,7 @@ use super::lever::Lever;
 use crate::body::SharedBodies;
 use crate::lanes::{LANES, Lanes, Lanes3, Reg, Reg3, Width, widest};
 use crate::law::project_ball;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Eight points.
 #[derive(Clone, Debug)]
@@ -13,8 +13,6 @@ pub(super) struct Batch<L> {
     i: [u32; LANES],
     /// The resting body at a wall that rests, one of its own at a wall that moves.
     j: [u32; LANES],
-    /// Where each point is in the list.
-    number: [u32; LANES],
     used: u32,
     normal: Lanes3,
     /// W n.
@@ -35,7 +33,6 @@ impl<L: Lever> Batch<L> {
         Self {
             i: [resting; LANES],
             j: [resting; LANES],
-            number: [0; LANES],
             used: 0,
             normal: Lanes3::ZERO,
             pushed: Lanes3::ZERO,
@@ -61,10 +58,10 @@ impl<L: Lever> Batch<L> {
 
     /// Appends a point; `j` is its second body among those of the sweeps, `frames` are F of all bodies. Returns its lane.
     #[inline(always)]
-    pub fn add(&mut self, number: usize, j: u32, point: &Point, frames: &[Matrix3<f64>]) -> u32 {
+    pub fn add(&mut self, j: u32, point: &Point, frames: &[Matrix3<f64>]) -> u32 {
         let lane = self.used as usize;
         self.used += 1;
-        (self.i[lane], self.j[lane], self.number[lane]) = (point.i as u32, j, number as u32);
+        (self.i[lane], self.j[lane]) = (point.i as u32, j);
         self.normal.set(lane, point.normal.into());
         self.lever_i.set(lane, &point.arm_i, &frames[point.i]);
         if point.j == WALL {
@@ -87,11 +84,11 @@ impl<L: Lever> Batch<L> {
 
     /// Leaves nothing in the lanes that are not in use.
     pub fn clear_rest(&mut self, resting: u32) {
-        let none = Matrix3::zeros();
+        let (no_arm, no_frame) = (Vector3::zeros(), Matrix3::zeros());
         for lane in self.used as usize..LANES {
             (self.i[lane], self.j[lane]) = (resting, resting);
-            self.lever_i.set(lane, &none.column(0).into_owned(), &none);
-            self.lever_j.set(lane, &none.column(0).into_owned(), &none);
+            self.lever_i.set(lane, &no_arm, &no_frame);
+            self.lever_j.set(lane, &no_arm, &no_frame);
             self.moves_j.0[lane] = 0.0;
             self.bias.0[lane] = 0.0;
             self.friction.0[lane] = 0.0;
@@ -100,11 +97,9 @@ impl<L: Lever> Batch<L> {
         }
     }
 
-    /// Hands the impulses back.
-    pub fn put_back(&self, points: &mut [Point]) {
-        for lane in 0..self.used as usize {
-            points[self.number[lane] as usize].impulse = self.impulse.get(lane).into();
-        }
+    /// The impulse of a point.
+    pub fn impulse(&self, lane: usize) -> Vector3<f64> {
+        self.impulse.get(lane).into()
     }
 
     /// Makes what is needed of the blocks `W = (1 + B_i B_i^T) + (1 + B_j B_j^T)`.
@@ -135,7 +130,7 @@ impl<L: Lever> Batch<L> {
     #[allow(unsafe_code)]
     fn solve<W: Width>(&mut self, bodies: &SharedBodies<'_>, sums: &mut Sums<W>) {
         let zero = Reg::<W>::splat(0.0);
-        // SAFETY: the indices are of bodies that `Batches::fill` has made, and nobody else has them.
+        // SAFETY: the indices are of bodies that `BatchesOf` has taken over, and nobody else has them.
         let ([mut v_i, mut s_i], [mut v_j, mut s_j]) =
             unsafe { (bodies.gather::<W>(&self.i), bodies.gather::<W>(&self.j)) };
         let n = Reg3::load(&self.normal);

@@ -62,7 +62,8 @@ impl Neighbours {
         let reach = around.solid.reach;
         let balls: Vec<_> = bodies.iter().zip(motions).map(Ball::of).collect();
         let fastest = balls.iter().map(|ball| ball.fastest).fold(0.0, f64::max);
-        let base = 2.0 * (1.0 + SLACK) * reach + around.least();
+        let apart = 2.0 * (1.0 + SLACK) * reach;
+        let base = apart + around.least();
         if self.seek(&balls, base + 2.0 * around.dt * fastest, SKIN * reach) {
             self.mark(given);
         }
@@ -78,7 +79,7 @@ impl Neighbours {
             if square >= most * most {
                 continue;
             }
-            let range = base - around.least() + around.range(&motions[i], Some(&motions[j]));
+            let range = apart + around.range(&motions[i], Some(&motions[j]));
             if square < range * range {
                 *is_given = true;
                 given.push(Pair { i, j, clear: square.sqrt() - 2.0 * reach });

@@ -148,7 +148,7 @@ impl<L: Lever> BatchesOf<L> {
 
     /// Puts points into batches of their own.
     fn add(&mut self, points: &[Point], resting: usize) {
-        let (first, known) = (self.used, self.places.len());
+        let first = self.used;
         let (colours, mut next) = colour(points, &mut self.masks);
         self.used += next[COLOURS + 1];
         if self.all.len() < self.used {
@@ -156,7 +156,7 @@ impl<L: Lever> BatchesOf<L> {
         }
         let batches = &mut self.all[first..self.used];
         batches.iter_mut().for_each(Batch::clear);
-        for ((number, point), colour) in points.iter().enumerate().zip(colours) {
+        for (point, colour) in points.iter().zip(colours) {
             let j = if point.j != WALL {
                 point.j
             } else if point.wall_velocity == Vector3::zeros() {
@@ -166,7 +166,7 @@ impl<L: Lever> BatchesOf<L> {
                 self.bodies.len() - 1
             };
             let batch = &mut batches[next[colour]];
-            let lane = batch.add(known + number, j as u32, point, &self.frames);
+            let lane = batch.add(j as u32, point, &self.frames);
             self.places.push(((first + next[colour]) as u32, lane));
             if batch.is_full() || colour == COLOURS {
                 next[colour] += 1;
@@ -201,7 +201,9 @@ impl<L: Lever> BatchesOf<L> {
 
     /// Hands impulses and velocities back.
     fn put_back(&self, points: &mut [Point], moving: &mut [Moving]) {
-        self.all[..self.used].iter().for_each(|batch| batch.put_back(points));
+        for (&(batch, lane), point) in self.places.iter().zip(points) {
+            point.impulse = self.all[batch as usize].impulse(lane as usize);
+        }
         for ((body, solved), frame) in moving.iter_mut().zip(&self.bodies).zip(&self.frames) {
             body.velocity = solved.velocity.vector();
             body.omega = frame * solved.spin.vector();
