@@ -50,7 +50,7 @@ use crate::turns::turns;
 use crate::wall::Walls;
 use around::Around;
 use body::{Moving, RigidBody};
-use contact::{Point, WALL, rank};
+use contact::{Name, Point};
 use granulcal_scene::Material;
 use granulcal_scene::Scene;
 use granulcal_scene::Solid;
@@ -68,8 +68,8 @@ const KNOWN: f64 = 0.15;
 /// add points.
 const ROUNDS: usize = 3;
 
-/// The bodies and the wall's surface of a point's manifold, where the point was on its body, and its impulse.
-type Mark = ((usize, usize, usize), [f64; 3], [f64; 3]);
+/// A point's manifold, where the point was on its body, and its impulse.
+type Mark = (Name, [f64; 3], [f64; 3]);
 
 /// What of the bodies changes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -167,8 +167,10 @@ impl Bodies {
     /// What is wrong.
     pub fn take(&mut self, state: BodiesState) -> Result<(), &'static str> {
         let count = self.all.len();
-        let is_there = |((i, j, _), ..): &Mark| *i < count && (*j < count || *j == WALL);
-        let is_sorted = state.known.is_sorted_by_key(|mark| rank(mark.0));
+        let is_there = |&((is_of_two, i, j), ..): &Mark| {
+            (i as usize) < count && (!is_of_two || (j as usize) < count)
+        };
+        let is_sorted = state.known.is_sorted_by_key(|mark| mark.0);
         if state.all.len() != count || !is_sorted || !state.known.iter().all(is_there) {
             return Err("another number of bodies");
         }
@@ -207,14 +209,12 @@ impl Bodies {
             }
             contacts.merge(known);
         }
-        self.recall(&mut contacts.points);
-        contacts.points.iter().for_each(|point| point.give(&mut moving, &point.impulse));
+        self.recall(&mut contacts.points, &mut moving);
         let sorted = contacts.points.len();
         let mut known = 0;
         for round in 1..=ROUNDS {
-            contacts.points.iter_mut().for_each(|point| point.aim(&moving, dt));
             let points = &mut contacts.points;
-            let settled = self.batches.solve(points, known, &mut moving, &solid, sweeps);
+            let settled = self.batches.solve(points, known, &mut moving, &around, sweeps);
             step.sweeps += settled.sweeps;
             (step.residual, step.unconverged) = (settled.residual, settled.unconverged);
             known = contacts.points.len();
@@ -223,25 +223,25 @@ impl Bodies {
                 break;
             }
         }
-        contacts.merge(sorted);
         let points = contacts.points;
         step.points = points.len();
-        let work = |point: &Point| point.impulse.dot(&point.wall_velocity);
-        step.work_of_walls += points.iter().map(work).sum::<f64>();
-        self.remember(&points);
+        let at_walls = points[..sorted].iter().take_while(|point| point.j().is_none());
+        let work = at_walls.chain(&points[sorted..]).map(Point::work_of_wall);
+        step.work_of_walls += work.sum::<f64>();
+        self.remember(&points, sorted);
         self.points = points;
         self.all = moving.iter().map(|body| body.moved(&solid, dt)).collect();
         step
     }
 
-    /// Warm start: a point that is where one was begins with its impulse.
-    fn recall(&mut self, points: &mut [Point]) {
+    /// Warm start: a point that is where one was begins with its impulse, which its bodies get.
+    fn recall(&self, points: &mut [Point], bodies: &mut [Moving]) {
         let near = KNOWN * self.solid.reach;
-        debug_assert!(points.is_sorted_by_key(Point::rank));
+        debug_assert!(points.is_sorted_by_key(Point::name));
         let (mut is_free, mut first) = (vec![true; self.known.len()], 0);
         for point in points {
             // Both are in one order.
-            while self.known.get(first).is_some_and(|mark| rank(mark.0) < point.rank()) {
+            while self.known.get(first).is_some_and(|mark| mark.0 < point.name()) {
                 first += 1;
             }
             let of_manifold = (first..self.known.len())
@@ -262,15 +262,20 @@ impl Bodies {
                 let (limit, length) = (point.friction * normal, across.norm());
                 let scale = if length > limit { limit / length } else { 1.0 };
                 point.impulse = normal * point.normal + scale * across;
+                point.give(bodies, &point.impulse);
             }
         }
     }
 
-    fn remember(&mut self, points: &[Point]) {
+    /// Keeps the impulses of the points, those before `sorted` in the order of their names, in this order.
+    fn remember(&mut self, points: &[Point], sorted: usize) {
         self.known.clear();
         let acting = points.iter().filter(|point| point.impulse != Vector3::zeros());
         let mark = |point: &Point| (point.name(), point.mark.into(), point.impulse.into());
         self.known.extend(acting.map(mark));
+        if sorted < points.len() {
+            self.known.sort_by_key(|mark| mark.0);
+        }
     }
 
     /// Kinetic and potential energy over the mass of a body `[m^2/s^2]`.

@@ -13,7 +13,7 @@ use crate::law::{LAW, arithmetic};
 /// What a checkpoint begins with.
 const MAGIC: &[u8] = b"granulcal checkpoint\n";
 /// The format of header and state. Between two versions that are released a change of either is a new format.
-pub(crate) const FORMAT: u32 = 7;
+pub(crate) const FORMAT: u32 = 8;
 /// The version of granulcal that writes and reads.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 

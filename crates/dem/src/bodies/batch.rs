@@ -1,6 +1,6 @@
 //! Eight points of contact that share no body, and one round of the law for them.
 
-use super::contact::{Point, WALL};
+use super::contact::{Other, Point};
 use super::lever::Lever;
 use crate::body::SharedBodies;
 use crate::lanes::{LANES, Lanes, Lanes3, Reg, Reg3, Width, widest};
@@ -56,30 +56,34 @@ impl<L: Lever> Batch<L> {
         self.used as usize == LANES
     }
 
-    /// Appends a point; `j` is its second body among those of the sweeps, `frames` are F of all bodies. Returns its lane.
+    /// Appends a point with its bias; `j` is its second body among those of the sweeps, `frames` are F of all bodies.
+    /// Returns its lane.
     #[inline(always)]
-    pub fn add(&mut self, j: u32, point: &Point, frames: &[Matrix3<f64>]) -> u32 {
+    pub fn add(&mut self, j: u32, point: &Point, bias: f64, frames: &[Matrix3<f64>]) -> u32 {
         let lane = self.used as usize;
         self.used += 1;
-        (self.i[lane], self.j[lane]) = (point.i as u32, j);
+        (self.i[lane], self.j[lane]) = (point.i() as u32, j);
         self.normal.set(lane, point.normal.into());
-        self.lever_i.set(lane, &point.arm_i, &frames[point.i]);
-        if point.j == WALL {
-            self.lever_j.set(lane, &point.arm_j, &Matrix3::zeros());
-            self.moves_j.0[lane] = 0.0;
-        } else {
-            self.lever_j.set(lane, &point.arm_j, &frames[point.j]);
-            self.moves_j.0[lane] = 1.0;
+        self.lever_i.set(lane, &point.arm, &frames[point.i()]);
+        match &point.other {
+            Other::Wall { .. } => {
+                self.lever_j.set(lane, &Vector3::zeros(), &Matrix3::zeros());
+                self.moves_j.0[lane] = 0.0;
+            }
+            Other::Body { j, arm } => {
+                self.lever_j.set(lane, arm, &frames[*j as usize]);
+                self.moves_j.0[lane] = 1.0;
+            }
         }
-        self.bias.0[lane] = point.bias;
+        self.bias.0[lane] = bias;
         self.friction.0[lane] = point.friction;
         self.impulse.set(lane, point.impulse.into());
         lane as u32
     }
 
-    /// Takes the bias of a point over.
-    pub fn aim(&mut self, lane: usize, point: &Point) {
-        self.bias.0[lane] = point.bias;
+    /// Gives a point another bias.
+    pub fn aim(&mut self, lane: usize, bias: f64) {
+        self.bias.0[lane] = bias;
     }
 
     /// Leaves nothing in the lanes that are not in use.

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use super::around::Around;
 use super::body::Moving;
 use super::boxes;
-use super::contact::{Point, WALL};
+use super::contact::{Other, Point};
 use super::manifold::manifold;
 use super::meeting::{Asked, Meeting};
 use super::motion::{Motion, Way};
@@ -25,7 +25,7 @@ pub(super) struct Contacts {
     pub clear_of_walls: Vec<f64>,
     /// The ways of the bodies of which the ends have been looked at; none at first.
     pub examined: Vec<Way>,
-    /// In the order of their rank, which depends on the places alone.
+    /// In the order of their names, which depends on the places alone.
     pub points: Vec<Point>,
 }
 
@@ -47,7 +47,7 @@ pub(super) fn contacts(
         let is_near = at_walls(around, pose, i, range, &mut points)
             | at_rims(around, pose, i, range, &mut points);
         clear_of_walls.push(if is_near { f64::NEG_INFINITY } else { range });
-        points[first..].sort_by_key(Point::rank);
+        points[first..].sort_by_key(Point::name);
     }
     let mut pairs = neighbours.near(around, bodies, &motions);
     let mut near = Vec::new();
@@ -132,9 +132,10 @@ pub(super) fn at_walls(
             } else {
                 (near.distance, near.normal)
             };
-            let mut point = Point::new(i, WALL, surface, normal, gap);
-            (point.arm_i, point.mark) = (arm, mark);
-            point.wall_velocity = wall.motion_at(&(body.centre + arm)).0;
+            let velocity = wall.motion_at(&(body.centre + arm)).0;
+            let other = Other::Wall { surface: surface as u32, velocity };
+            let mut point = Point::new(i, other, normal, gap);
+            (point.arm, point.mark) = (arm, mark);
             (point.friction, point.restitution) =
                 (wall.material.sliding_friction, wall.material.restitution);
             found.push(point);

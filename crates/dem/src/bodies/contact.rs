@@ -19,38 +19,35 @@ use crate::law::{CORRECTION, CORRECTION_SPEED, SLOP};
 /// Points of a manifold are one within this distance in the bodies' reach and this cosine of their normals `[-]`.
 const SAME_PLACE: f64 = 0.1;
 const SAME_NORMAL: f64 = 0.99;
-/// No body: a wall.
-pub(super) const WALL: usize = usize::MAX;
 
-/// What points are in the order of.
-pub(super) type Rank = (bool, (usize, usize, usize));
+/// What the points of a manifold have in common: whether they are between bodies, body i, and body j or the wall's
+/// surface. In the order of these: those at walls first.
+pub(super) type Name = (bool, u32, u32);
 
-/// The rank of the points of a manifold.
-pub(super) fn rank(name: (usize, usize, usize)) -> Rank {
-    (name.1 != WALL, name)
+/// What body i touches.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Other {
+    /// A surface of the walls, which moves there with this velocity `[m/s]`.
+    Wall { surface: u32, velocity: Vector3<f64> },
+    /// Body j, there at this arm from its centre `[m]`.
+    Body { j: u32, arm: Vector3<f64> },
 }
 
 /// A point of contact.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
-    pub i: usize,
-    /// [`WALL`] for a wall.
-    pub j: usize,
-    /// The wall's surface, 0 between bodies; with the bodies it names the manifold.
-    pub surface: usize,
-    /// From j to i.
+    i: u32,
+    pub other: Other,
+    /// From what is touched to i.
     pub normal: Vector3<f64>,
-    pub arm_i: Vector3<f64>,
-    pub arm_j: Vector3<f64>,
-    /// Velocity of the wall there `[m/s]`.
-    pub wall_velocity: Vector3<f64>,
+    /// From the centre of i `[m]`.
+    pub arm: Vector3<f64>,
     /// `[m]`
     pub gap: f64,
     pub friction: f64,
     pub restitution: f64,
     /// Where it is on body i, in its own axes `[m]`: by this it is known again.
     pub mark: Vector3<f64>,
-    pub bias: f64,
     /// On body i `[m/s]`.
     pub impulse: Vector3<f64>,
 }
@@ -65,33 +62,48 @@ pub(super) struct Block {
 }
 
 impl Point {
-    /// A point without its numbers for the solve.
-    pub fn new(i: usize, j: usize, surface: usize, normal: Vector3<f64>, gap: f64) -> Self {
+    /// A point at the centre of i, without friction and restitution.
+    pub fn new(i: usize, other: Other, normal: Vector3<f64>, gap: f64) -> Self {
         Self {
-            i,
-            j,
-            surface,
+            i: i as u32,
+            other,
             normal,
-            arm_i: Vector3::zeros(),
-            arm_j: Vector3::zeros(),
-            wall_velocity: Vector3::zeros(),
+            arm: Vector3::zeros(),
             gap,
             friction: 0.0,
             restitution: 0.0,
             mark: Vector3::zeros(),
-            bias: 0.0,
             impulse: Vector3::zeros(),
         }
     }
 
-    /// The bodies and the surface: they name its manifold.
-    pub fn name(&self) -> (usize, usize, usize) {
-        (self.i, self.j, self.surface)
+    /// Body i.
+    pub fn i(&self) -> usize {
+        self.i as usize
     }
 
-    /// The order of the points: those at walls first, those of a manifold together.
-    pub fn rank(&self) -> Rank {
-        rank(self.name())
+    /// Body j; none at a wall.
+    pub fn j(&self) -> Option<usize> {
+        match self.other {
+            Other::Wall { .. } => None,
+            Other::Body { j, .. } => Some(j as usize),
+        }
+    }
+
+    /// The manifold that it belongs to.
+    pub fn name(&self) -> Name {
+        match self.other {
+            Other::Wall { surface, .. } => (false, self.i, surface),
+            Other::Body { j, .. } => (true, self.i, j),
+        }
+    }
+
+    /// What a moving wall has put in by its impulse, over the mass `[m^2/s^2]`.
+    pub fn work_of_wall(&self) -> f64 {
+        match self.other {
+            Other::Wall { velocity, .. } => self.impulse.dot(&velocity),
+            Other::Body { .. } => 0.0,
+        }
     }
 
     /// This point, found where its bodies will be at the end of the substep, as it is now: with the gap from which their
@@ -99,9 +111,9 @@ impl Point {
     pub fn foreseen(mut self, bodies: &[Moving], later: &[Pose], dt: f64) -> Self {
         let turned_back =
             |body: usize, arm: &Vector3<f64>| bodies[body].pose.axes * later[body].seen(arm);
-        self.arm_i = turned_back(self.i, &self.arm_i);
-        if self.j != WALL {
-            self.arm_j = turned_back(self.j, &self.arm_j);
+        self.arm = turned_back(self.i(), &self.arm);
+        if let Other::Body { j, arm } = &mut self.other {
+            *arm = turned_back(*j as usize, arm);
         }
         self.gap -= dt * self.normal.dot(&self.velocity(bodies));
         self.gap -= self.gap_of_last_motion(bodies) - self.gap;
@@ -116,9 +128,9 @@ impl Point {
 
     /// What the law needs of its block.
     pub fn block(&self, bodies: &[Moving]) -> Block {
-        let mut block = bodies[self.i].response(&self.arm_i);
-        if self.j != WALL {
-            block += bodies[self.j].response(&self.arm_j);
+        let mut block = bodies[self.i()].response(&self.arm);
+        if let Other::Body { j, arm } = &self.other {
+            block += bodies[*j as usize].response(arm);
         }
         let n = self.normal;
         let other = if n.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
@@ -130,15 +142,15 @@ impl Point {
         Block { pushed, compliance: [1.0 / n.dot(&pushed), 1.0 / largest] }
     }
 
-    /// Sets the bias, from where the last motions of its bodies begin.
-    pub fn aim(&mut self, bodies: &[Moving], dt: f64) {
+    /// The bias, from where the last motions of its bodies begin `[m/s]`.
+    pub fn bias(&self, bodies: &[Moving], dt: f64) -> f64 {
         let aside = self.gap_of_last_motion(bodies) - self.gap;
-        self.bias = if self.gap < 0.0 {
+        if self.gap < 0.0 {
             let push = (CORRECTION * (self.gap + SLOP) / dt).clamp(-CORRECTION_SPEED, 0.0);
             push + aside / dt
         } else {
             (self.gap + aside) / dt
-        };
+        }
     }
 
     /// The gap that the last motions of its bodies would have begun with at the begin of the substep `[m]`: bodies that
@@ -147,35 +159,34 @@ impl Point {
         if self.last_hit(bodies) == 0.0 {
             return self.gap;
         }
-        let mut aside = bodies[self.i].shift_at(&self.arm_i);
-        if self.j != WALL {
-            aside -= bodies[self.j].shift_at(&self.arm_j);
+        let mut aside = bodies[self.i()].shift_at(&self.arm);
+        if let Other::Body { j, arm } = &self.other {
+            aside -= bodies[*j as usize].shift_at(arm);
         }
         self.gap + self.normal.dot(&aside)
     }
 
     /// When the later of the last impacts of its bodies was, 0 if there was none `[s]`.
     pub fn last_hit(&self, bodies: &[Moving]) -> f64 {
-        let of_j = if self.j == WALL { 0.0 } else { bodies[self.j].hit };
-        bodies[self.i].hit.max(of_j)
+        bodies[self.i()].hit.max(self.j().map_or(0.0, |j| bodies[j].hit))
     }
 
-    /// Velocity of i relative to j there `[m/s]`.
+    /// Velocity of i relative to what it touches there `[m/s]`.
     #[inline(always)]
     pub fn velocity(&self, bodies: &[Moving]) -> Vector3<f64> {
-        let of_i = bodies[self.i].velocity_at(&self.arm_i);
-        match self.j {
-            WALL => of_i - self.wall_velocity,
-            j => of_i - bodies[j].velocity_at(&self.arm_j),
+        let of_i = bodies[self.i()].velocity_at(&self.arm);
+        match &self.other {
+            Other::Wall { velocity, .. } => of_i - velocity,
+            Other::Body { j, arm } => of_i - bodies[*j as usize].velocity_at(arm),
         }
     }
 
     /// Gives both bodies an impulse.
     #[inline(always)]
     pub fn give(&self, bodies: &mut [Moving], impulse: &Vector3<f64>) {
-        bodies[self.i].push(&self.arm_i, impulse);
-        if self.j != WALL {
-            bodies[self.j].push(&self.arm_j, &-impulse);
+        bodies[self.i()].push(&self.arm, impulse);
+        if let Other::Body { j, arm } = &self.other {
+            bodies[*j as usize].push(arm, &-impulse);
         }
     }
 

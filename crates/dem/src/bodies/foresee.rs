@@ -1,11 +1,9 @@
 //! What the end of a substep tells: what is nearest at its begin is not all that meets in it.
 
-use nalgebra::Vector3;
-
 use super::around::Around;
 use super::body::Moving;
 use super::collide::{Contacts, at_walls, clearance, meet};
-use super::contact::{Point, WALL};
+use super::contact::Point;
 use super::meeting::Asked;
 use super::motion::{Motion, Way};
 use super::pairs::{Neighbours, Pair, SLACK};
@@ -22,7 +20,7 @@ const SAME_WAY: f64 = 2e-4;
 impl Contacts {
     /// Adds the points at which bodies would lie in something at the end of the substep, behind the others: a corner that
     /// swings in from elsewhere is none of those that are nearest at its begin. Those before `sorted` are in the order of
-    /// their rank. Returns whether there are any.
+    /// their names. Returns whether there are any.
     pub fn foresee(
         &mut self,
         around: &Around<'_>,
@@ -60,8 +58,8 @@ impl Contacts {
         let (least, mut is_news) = (CORRECTED * around.solid.reach, false);
         for point in new {
             let point = point.foreseen(bodies, &later.poses, around.dt);
-            let first = self.points[..sorted].partition_point(|of| of.rank() < point.rank());
-            let of_manifold = |number: &usize| self.points[*number].rank() == point.rank();
+            let first = self.points[..sorted].partition_point(|of| of.name() < point.name());
+            let of_manifold = |number: &usize| self.points[*number].name() == point.name();
             let same = (first..sorted)
                 .take_while(of_manifold)
                 .chain((sorted..known).filter(of_manifold))
@@ -79,14 +77,14 @@ impl Contacts {
         is_news
     }
 
-    /// Puts the points from `sorted` on among those before, in the order of their rank: behind those that rank no higher.
+    /// Puts the points from `sorted` on among those before, in the order of their names: behind those of the same.
     pub fn merge(&mut self, sorted: usize) {
         let mut new = self.points.split_off(sorted);
-        new.sort_by_key(Point::rank);
+        new.sort_by_key(Point::name);
         let (mut left, mut at) = (sorted, sorted + new.len());
-        self.points.resize(at, Point::new(0, WALL, 0, Vector3::zeros(), 0.0));
+        self.points.extend_from_slice(&new);
         for point in new.into_iter().rev() {
-            while left > 0 && self.points[left - 1].rank() > point.rank() {
+            while left > 0 && self.points[left - 1].name() > point.name() {
                 (left, at) = (left - 1, at - 1);
                 self.points[at] = self.points[left];
             }

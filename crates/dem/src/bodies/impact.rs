@@ -16,7 +16,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use super::body::Moving;
-use super::contact::{Point, WALL};
+use super::contact::Point;
 use super::motion::Motion;
 use crate::law::IMPACT_SPEED;
 
@@ -44,12 +44,12 @@ pub(super) fn resolve(
     let fastest: Vec<_> = (0..bodies.len()).map(fastest).collect();
     for round in 1..=ROUNDS {
         let may_be_due = |range: &Range<usize>| {
-            let Point { i, j, .. } = points[range.start];
+            let (i, j) = (points[range.start].i(), points[range.start].j());
             if round == 1 {
                 // Two that are slow do not close fast, wherever they touch.
-                j == WALL || fastest[i] + fastest[j] > IMPACT_SPEED
+                j.is_none_or(|j| fastest[i] + fastest[j] > IMPACT_SPEED)
             } else {
-                hit_in[i] + 1 == round || (j != WALL && hit_in[j] + 1 == round)
+                hit_in[i] + 1 == round || j.is_some_and(|j| hit_in[j] + 1 == round)
             }
         };
         let mut due: Vec<(f64, usize)> = manifolds
@@ -70,9 +70,9 @@ pub(super) fn resolve(
             if let Some(time) = first_touch(group, bodies, dt) {
                 work += bounce(group, bodies, time, dt);
                 count += 1;
-                hit_in[group[0].i] = round;
-                if group[0].j != WALL {
-                    hit_in[group[0].j] = round;
+                hit_in[group[0].i()] = round;
+                if let Some(j) = group[0].j() {
+                    hit_in[j] = round;
                 }
             }
         }
@@ -82,11 +82,10 @@ pub(super) fn resolve(
 
 /// Consecutive points of one pair, or of one body and one surface.
 fn manifolds(points: &[Point]) -> Vec<Range<usize>> {
-    let name = |p: &Point| (p.i, p.j, p.surface);
     let mut all: Vec<Range<usize>> = Vec::new();
     for (number, point) in points.iter().enumerate() {
         match all.last_mut() {
-            Some(last) if name(&points[last.start]) == name(point) => last.end = number + 1,
+            Some(last) if points[last.start].name() == point.name() => last.end = number + 1,
             _ => all.push(number..number + 1),
         }
     }
@@ -107,7 +106,7 @@ fn first_touch(group: &[Point], bodies: &[Moving], dt: f64) -> Option<f64> {
 
 /// Lets a manifold's bodies bounce; returns what a moving wall has put in.
 fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64 {
-    let touched = [Some(group[0].i), (group[0].j != WALL).then_some(group[0].j)];
+    let touched = [Some(group[0].i()), group[0].j()];
     let motion = |body: usize| [bodies[body].velocity, bodies[body].omega];
     let before = touched.map(|body| body.map(motion));
     let meets = |point: &Point, bodies: &[Moving]| {
@@ -134,7 +133,8 @@ fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64
     for &(k, _) in &touching {
         let again = group[k].restitution * group[k].impulse;
         group[k].give(bodies, &again);
-        work += (group[k].impulse + again).dot(&group[k].wall_velocity);
+        group[k].impulse += again;
+        work += group[k].work_of_wall();
     }
     for (body, before) in touched.into_iter().zip(before) {
         if let (Some(body), Some(before)) = (body, before) {

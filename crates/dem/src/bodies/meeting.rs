@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::around::Around;
-use super::contact::Point;
+use super::contact::{Other, Point};
 
 /// Two bodies, and how near they are to be for their points to be of interest `[m]`.
 #[derive(Clone, Copy, Debug)]
@@ -39,9 +39,9 @@ impl Meeting {
     pub fn points(&self, around: &Around<'_>, asked: &Asked, mut found: impl FnMut(Point)) {
         for spot in self.spots.iter().filter(|spot| spot.gap <= asked.range) {
             let aside = 0.5 * spot.gap * self.normal;
-            let mut point = Point::new(asked.i, asked.j, 0, -self.normal, spot.gap);
-            (point.arm_i, point.arm_j) = (spot.on_a + aside, spot.on_b - aside);
-            point.mark = spot.mark;
+            let other = Other::Body { j: asked.j as u32, arm: spot.on_b - aside };
+            let mut point = Point::new(asked.i, other, -self.normal, spot.gap);
+            (point.arm, point.mark) = (spot.on_a + aside, spot.mark);
             (point.friction, point.restitution) =
                 (around.material.sliding_friction, around.material.restitution);
             found(point);

@@ -13,9 +13,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::around::Around;
 use super::batch::{Batch, assemble, sweep};
 use super::body::Moving;
-use super::contact::{Point, WALL};
+use super::contact::{Other, Point};
 use super::lever::{Arm, Lever, Rows, is_round};
 use crate::body::{Body, SharedBodies};
 use crate::lanes::{LANES, Row};
@@ -63,20 +64,20 @@ impl Batches {
         }
     }
 
-    /// Solves points that know their bias and impulse, and gives the bodies the velocities that they come to. If those
-    /// before `known` were solved last, and their bodies have not been touched since, they are taken up again as they
-    /// were but for their bias.
+    /// Solves points that know their impulse, with the bias of each, and gives the bodies the velocities that they come
+    /// to. If those before `known` were solved last, and their bodies have not been touched since, they are taken up
+    /// again as they were but for their bias.
     pub fn solve(
         &mut self,
         points: &mut [Point],
         known: usize,
         moving: &mut [Moving],
-        solid: &Solid,
+        around: &Around<'_>,
         rule: Sweeps,
     ) -> Settled {
         match self {
-            Self::Round(batches) => batches.solve(points, known, moving, solid, rule),
-            Self::Other(batches) => batches.solve(points, known, moving, solid, rule),
+            Self::Round(batches) => batches.solve(points, known, moving, around, rule),
+            Self::Other(batches) => batches.solve(points, known, moving, around, rule),
         }
     }
 }
@@ -116,16 +117,16 @@ impl<L: Lever> BatchesOf<L> {
         points: &mut [Point],
         known: usize,
         moving: &mut [Moving],
-        solid: &Solid,
+        around: &Around<'_>,
         rule: Sweeps,
     ) -> Settled {
         if known == 0 {
-            self.begin(moving, solid);
+            self.begin(moving, around.solid);
         }
         for (&(batch, lane), point) in self.places.iter().zip(points.iter()) {
-            self.all[batch as usize].aim(lane as usize, point);
+            self.all[batch as usize].aim(lane as usize, point.bias(moving, around.dt));
         }
-        self.add(&points[known..], moving.len());
+        self.add(&points[known..], moving, around.dt);
         let settled = self.settle(rule);
         self.put_back(points, moving);
         settled
@@ -147,8 +148,8 @@ impl<L: Lever> BatchesOf<L> {
     }
 
     /// Puts points into batches of their own.
-    fn add(&mut self, points: &[Point], resting: usize) {
-        let first = self.used;
+    fn add(&mut self, points: &[Point], moving: &[Moving], dt: f64) {
+        let (first, resting) = (self.used, moving.len());
         let (colours, mut next) = colour(points, &mut self.masks);
         self.used += next[COLOURS + 1];
         if self.all.len() < self.used {
@@ -157,16 +158,16 @@ impl<L: Lever> BatchesOf<L> {
         let batches = &mut self.all[first..self.used];
         batches.iter_mut().for_each(Batch::clear);
         for (point, colour) in points.iter().zip(colours) {
-            let j = if point.j != WALL {
-                point.j
-            } else if point.wall_velocity == Vector3::zeros() {
-                resting
-            } else {
-                self.bodies.push(body(point.wall_velocity, Vector3::zeros()));
-                self.bodies.len() - 1
+            let j = match point.other {
+                Other::Body { j, .. } => j,
+                Other::Wall { velocity, .. } if velocity == Vector3::zeros() => resting as u32,
+                Other::Wall { velocity, .. } => {
+                    self.bodies.push(body(velocity, Vector3::zeros()));
+                    (self.bodies.len() - 1) as u32
+                }
             };
             let batch = &mut batches[next[colour]];
-            let lane = batch.add(j as u32, point, &self.frames);
+            let lane = batch.add(j, point, point.bias(moving, dt), &self.frames);
             self.places.push(((first + next[colour]) as u32, lane));
             if batch.is_full() || colour == COLOURS {
                 next[colour] += 1;
@@ -220,7 +221,7 @@ fn body(velocity: Vector3<f64>, spin: Vector3<f64>) -> Body {
 fn colour(points: &[Point], masks: &mut [u64]) -> (Vec<usize>, [usize; COLOURS + 2]) {
     let mut counts = [0; COLOURS + 1];
     let mut of = |point: &Point| {
-        let both = [Some(point.i), (point.j != WALL).then_some(point.j)];
+        let both = [Some(point.i()), point.j()];
         let taken = both.iter().flatten().fold(0, |mask, &body| mask | masks[body]);
         let colour = (taken.trailing_ones() as usize).min(COLOURS);
         for &body in both.iter().flatten() {
