@@ -15,7 +15,7 @@ use facets::Facets;
 use granulcal_scene::{BoxSide, Material, Motion, Scene, Shape, WallMaterial};
 pub(crate) use rim::Rim;
 pub(crate) use surface::{Nearest, any_normal};
-use surface::{Surface, surfaces};
+use surface::{Surface, is_same_circle, surfaces};
 
 /// A wall with its resolved material, and where it is if it moves.
 #[derive(Clone, Debug)]
@@ -173,6 +173,23 @@ impl Walls {
     /// The walls' rims, each with its wall, where the walls are stated.
     pub fn rims(&self) -> impl Iterator<Item = (&Wall, &Rim)> {
         self.rims.iter().map(|(owner, rim)| (&self.all[*owner], rim))
+    }
+
+    /// Whether the way from one place to another, at the begin of a substep, changes the side of a surface round an end
+    /// at which nothing goes on. Of triangles it is not told.
+    pub fn leads_round(&self, surface: usize, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
+        let owner = self.owner(surface);
+        let wall = &self.all[owner];
+        let Some(of_wall) = wall.surfaces.get(surface - self.first[owner] as usize) else {
+            return false;
+        };
+        let [from, to] = [from, to].map(|x| wall.seen(x, 0.0).0);
+        // Walls that rest share their rims, one that moves has its own.
+        let is_of_it = |of: usize| of == owner || !(self.all[of].is_moving() || wall.is_moving());
+        of_wall.leads_round(&from, &to).is_some_and(|end| {
+            let mut rims = self.rims.iter().filter(|(of, _)| is_of_it(*of)).map(|(_, rim)| rim);
+            rims.any(|rim| rim.is_free() && is_same_circle(&(rim.centre, rim.radius), &end))
+        })
     }
 
     /// Whether any may move.

@@ -123,10 +123,12 @@ pub(super) fn at_walls(
             if near.distance > range || is_at_rim {
                 return;
             }
-            // A corner that has come through a shell is on the other side of it than the centre.
+            // A corner that has come through a shell, and not round its end, is on the other side of it than the centre.
             let from_wall = near.distance * near.normal - arm;
-            let is_through =
-                near.side != 0 && near.distance > 0.0 && from_wall.dot(&near.normal) < 0.0;
+            let is_through = near.side != 0
+                && near.distance > 0.0
+                && from_wall.dot(&near.normal) < 0.0
+                && !walls.leads_round(surface, &body.centre, &(body.centre + arm));
             let (gap, normal) = if is_through {
                 (-near.distance, -near.normal)
             } else {

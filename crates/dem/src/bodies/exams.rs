@@ -249,6 +249,38 @@ fn a_cube_lies_on_the_end_of_a_pipe() {
     }
 }
 
+/// A cube that leans over the rim of a bowl from outside, a corner inside and its centre outside, is not in the wall.
+#[test]
+fn a_cube_over_a_rim_is_not_in_the_wall() {
+    let (height, radius, lean) = (0.01, 0.2, 20.0_f64.to_radians());
+    let shape =
+        Shape::Cylinder { from: [0.0; 3], to: [0.0, 0.0, height], radius, closed: Ends::None };
+    let deepest = |from_rim: [f64; 2]| {
+        let mut exam = Exam::new(cube(), 0.5, 0.0);
+        let wall = Wall::fixed(shape.clone(), WallMaterial::default());
+        exam.walls = Walls::of(&Scene { walls: vec![wall], ..Scene::drop(0.1) });
+        exam.gravity = Vector3::zeros();
+        // From its corner inside to its centre.
+        let turned = UnitQuaternion::from_axis_angle(&-Vector3::y_axis(), lean);
+        let to_centre = turned * (0.5 * SIZE * Vector3::new(1.0, 0.0, 1.0));
+        let corner = Vector3::new(radius + from_rim[0], 0.0, height + from_rim[1]);
+        exam.put((corner + to_centre).into(), turned);
+        assert!(exam.body(0).0.x > radius);
+        exam.step().deepest
+    };
+    // Its lower face passes over the rim, then the rim is in that face. Far below it two other corners are in the wall.
+    assert_eq!(deepest([-0.15 * SIZE, -0.05 * SIZE]), 0.0);
+    let into_face = deepest([-0.15 * SIZE, -0.08 * SIZE]);
+    assert!(
+        (into_face - (0.08 * lean.cos() - 0.15 * lean.sin()) * SIZE).abs() < 1e-5,
+        "{into_face}"
+    );
+    let into_wall = deepest([(lean.sin() - 0.01) * SIZE, -1.5 * SIZE]);
+    // They are at the ends of an edge, which is nearer to the round wall in its middle.
+    let wanted = 0.01 * SIZE - 0.125 * SIZE * SIZE / radius;
+    assert!((into_wall - wanted).abs() < 1e-7, "{into_wall}");
+}
+
 /// Cubes that are thrown into a corner of each other, spinning: what an impact turns must not be turned through others.
 #[test]
 fn spinning_cubes_do_not_enter_each_other() {

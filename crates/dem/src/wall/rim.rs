@@ -55,6 +55,11 @@ impl Rim {
         }
     }
 
+    /// Whether a surface ends there and no other begins.
+    pub fn is_free(&self) -> bool {
+        self.into.len() == 1
+    }
+
     /// Its point at an angle about the axis, and the unit direction away from the axis there.
     pub fn at(&self, [first, second]: &[Vector3<f64>; 2], angle: f64) -> [Vector3<f64>; 2] {
         let outward = angle.cos() * first + angle.sin() * second;

@@ -64,6 +64,25 @@ impl Surface {
         }
     }
 
+    /// The circle at the end of the surface round which the way from one place to another leads, if both are on different
+    /// sides of it and of what would go on beyond its end: its centre and radius `[m]`.
+    pub fn leads_round(
+        &self,
+        from: &Vector3<f64>,
+        to: &Vector3<f64>,
+    ) -> Option<(Vector3<f64>, f64)> {
+        match self {
+            Self::Plane { .. } => None,
+            Self::Frustum(shell) => shell.leads_round(from, to),
+            Self::Disc { centre, normal, radius } => {
+                let [begin, end] = [from, to].map(|x| (x - centre).dot(normal));
+                let crossing = from + (to - from) * (begin / (begin - end));
+                let is_beyond = (crossing - centre).norm() > *radius;
+                (begin * end < 0.0 && is_beyond).then_some((*centre, *radius))
+            }
+        }
+    }
+
     /// Whether the surface may be nearer than `range` `[m]`; false only when it surely is not.
     pub fn may_reach(&self, centre: &Vector3<f64>, range: f64) -> bool {
         match self {
@@ -77,6 +96,9 @@ impl Surface {
         }
     }
 }
+
+/// How often the way between two places is halved to find where it crosses a shell.
+const HALVINGS: usize = 40;
 
 impl Frustum {
     fn new(from: Vector3<f64>, to: Vector3<f64>, radius_from: f64, radius_to: f64) -> Self {
@@ -110,20 +132,45 @@ impl Frustum {
         if is_joined { Nearest { distance: f64::INFINITY, ..near } } else { near }
     }
 
-    /// The nearest point whoever owns it, and where along the generator it would be.
-    fn nearest_of_all(&self, centre: &Vector3<f64>) -> (Nearest, f64) {
+    /// A place from the begin of the generator, along the axis and away from it `[m]`; and the unit direction away from
+    /// the axis there.
+    fn seen(&self, centre: &Vector3<f64>) -> (Vector2, Vector3<f64>) {
         let offset = centre - self.from;
         let along = offset.dot(&self.axis);
         let outward = offset - along * self.axis;
         let radius = outward.norm();
         // On the axis every direction is as near as any other: take one at right angles to it.
         let outward = if radius > 0.0 { outward / radius } else { any_normal(&self.axis) };
+        (Vector2::new(along, radius - self.radius_from), outward)
+    }
 
-        let in_plane = Vector2::new(along, radius - self.radius_from);
+    fn leads_round(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
+        let is_outside = |x: &Vector3<f64>| self.generator.perp(&self.seen(x).0) > 0.0;
+        let begin = is_outside(from);
+        if is_outside(to) == begin {
+            return None;
+        }
+        let (mut before, mut after) = (*from, *to);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (before + after);
+            *(if is_outside(&middle) == begin { &mut before } else { &mut after }) = middle;
+        }
+        let share = self.seen(&after).0.dot(&self.generator) / self.generator.norm_squared();
+        let [at_begin, at_end] = self.ends();
+        match share {
+            share if share < 0.0 => Some(at_begin),
+            share if share > 1.0 => Some(at_end),
+            _ => None,
+        }
+    }
+
+    /// The nearest point whoever owns it, and where along the generator it would be.
+    fn nearest_of_all(&self, centre: &Vector3<f64>) -> (Nearest, f64) {
+        let (in_plane, outward) = self.seen(centre);
         let share = in_plane.dot(&self.generator) / self.generator.norm_squared();
         let gap = in_plane - share.clamp(0.0, 1.0) * self.generator;
         let distance = gap.norm();
-        let cross = self.generator.x * in_plane.y - self.generator.y * in_plane.x;
+        let cross = self.generator.perp(&in_plane);
         let beyond_the_ends = share <= 0.0 || share >= 1.0;
         let side = if beyond_the_ends || cross == 0.0 { 0 } else { cross.signum() as i8 };
         // A centre on the shell itself is pushed inwards.
@@ -332,6 +379,33 @@ mod tests {
         assert_eq!((side(-0.039, 0.05), side(-0.041, 0.05)), (-1, 1));
         // Beyond the ends a grain may go round the rim.
         assert_eq!((side(0.07, 0.2), side(0.01, -0.1)), (0, 0));
+    }
+
+    #[test]
+    fn a_way_leads_through_a_shell_or_round_its_end() {
+        let cone = one(&Shape::Cone {
+            from: [0.0; 3],
+            to: [0.0, 0.0, 0.1],
+            radius_from: 0.02,
+            radius_to: 0.06,
+            closed: Ends::None,
+        });
+        let round = |surface: &Surface, from: [f64; 2], to: [f64; 2]| {
+            let [from, to] = [from, to].map(|[x, z]| Vector3::new(x, 0.0, z));
+            surface.leads_round(&from, &to)
+        };
+        // Through it, then above and below it, then without a crossing.
+        assert_eq!(round(&cone, [0.03, 0.05], [0.045, 0.05]), None);
+        let above = round(&cone, [0.064, 0.104], [0.054, 0.098]).expect("above");
+        assert!((above.0 - Vector3::new(0.0, 0.0, 0.1)).norm() < 1e-15 && above.1 == 0.06);
+        let below = round(&cone, [0.016, -0.006], [0.024, 0.002]).expect("below");
+        assert!(below.0.norm() < 1e-15 && below.1 == 0.02);
+        assert_eq!(round(&cone, [0.07, 0.104], [0.064, 0.098]), None);
+        let shape = Shape::Disc { centre: [0.0; 3], normal: [0.0, 0.0, 1.0], radius: 0.02 };
+        let disc = one(&shape);
+        assert_eq!(round(&disc, [0.0, 0.01], [0.01, -0.01]), None);
+        assert_eq!(round(&disc, [0.03, 0.01], [0.03, 0.02]), None);
+        assert_eq!(round(&disc, [0.03, 0.01], [0.0195, -0.001]), Some((Vector3::zeros(), 0.02)));
     }
 
     #[test]
