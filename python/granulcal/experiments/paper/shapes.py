@@ -31,13 +31,13 @@ from granulcal.prior import Parameter, Prior
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
 
-__all__ = ["EXPERIMENT", "shaped"]
+__all__ = ["EXPERIMENT", "OF_MODEL", "OF_TRUTH", "SHAPES", "Found", "Shape", "by_spheres", "shaped"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class _Shape:
+class Shape:
     """A shape of grains: its name, TOML's inline table, the paper's number, its seeds' first."""
 
     name: str
@@ -50,14 +50,14 @@ class _Shape:
         return shaped(three.VARIANTS[0].scene(size), self.table)
 
 
-_SHAPES = (
-    _Shape(
+SHAPES = (
+    Shape(
         "cubes",
         '{ kind = "box", aspect = [1.0, 1.0, 1.0] }',
         Published(mean=1.8301, sd=1.9275, count=50),
         611,
     ),
-    _Shape(
+    Shape(
         "cylinders",
         '{ kind = "cylinder", aspect = 1.0 }',
         Published(mean=4.0139, sd=1.0574, count=50),
@@ -67,13 +67,13 @@ _SHAPES = (
 """What takes less time first."""
 _EXAMPLES, _PICTURE_SEED = 5, 601
 _SLIDING, _RESTITUTION = "material.sliding_friction", "material.restitution"
-_OF_TRUTH = Prior(
+OF_TRUTH = Prior(
     [
         Parameter(path=_SLIDING, distribution="uniform", low=0.01, high=1.0),
         Parameter(path=_RESTITUTION, distribution="fixed", value=0.5),
     ]
 )
-_OF_MODEL = Prior(
+OF_MODEL = Prior(
     [
         Parameter(path=_SLIDING, distribution="uniform", low=0.0, high=1.0),
         Parameter(path=_RESTITUTION, distribution="uniform", low=0.0, high=1.0),
@@ -88,7 +88,7 @@ def shaped(scene: Scene, shape: str) -> Scene:
 
 
 @dataclass
-class _Found:
+class Found:
     """What has been found of a shape so far.
 
     Attributes:
@@ -117,7 +117,7 @@ def sets(size: Size) -> list[PouredSet]:
     variant = three.VARIANTS[0]
     spheres = variant.scene(size)
     found = three.sets(size, variant)
-    for shape in _SHAPES:
+    for shape in SHAPES:
         name, scene = shape.name, shape.scene(size)
         found += [
             PouredSet(f"{name}-tests", size.tests, scene),
@@ -134,29 +134,37 @@ def run(workshop: Workshop) -> Outcome:
     training, _ = three.training_and_tests(workshop, three.VARIANTS[0])
     sd = training.x.std(axis=0, ddof=1)
     round_model = workshop.model(three.VARIANTS[0].name, training)
-    found: dict[str, _Found] = {}
-    for shape in _SHAPES:
-        found[shape.name] = _by_spheres(workshop, shape, round_model, sd)
+    found: dict[str, Found] = {}
+    for shape in SHAPES:
+        found[shape.name] = by_spheres(workshop, shape, round_model, sd)
         workshop.so_far(_outcome(workshop.size, found))
-    for shape in _SHAPES:
+    for shape in SHAPES:
         _add_floor(workshop, shape, found[shape.name], sd)
         workshop.so_far(_outcome(workshop.size, found))
-    for shape in _SHAPES:
+    for shape in SHAPES:
         _add_itself(workshop, shape, found[shape.name], sd)
         workshop.so_far(_outcome(workshop.size, found))
     return _outcome(workshop.size, found)
 
 
-def _by_spheres(workshop: Workshop, shape: _Shape, model: "BayesSim", sd: Array) -> _Found:
+def by_spheres(workshop: Workshop, shape: Shape, model: "BayesSim", sd: Array) -> Found:
+    """Pours the tests of a shape, infers them with a model of spheres, and pours spheres there.
+
+    Args:
+        workshop: where the pours are kept.
+        shape: of the tests.
+        model: of spheres.
+        sd: of its training set's statistics, shape (s,).
+    """
     variant = three.VARIANTS[0]
     spheres = variant.scene(workshop.size)
     scene, name = shape.scene(workshop.size), shape.name
-    tests = workshop.tests(f"{name}-tests", scene, _OF_TRUTH, workshop.size.tests, shape.seed)
+    tests = workshop.tests(f"{name}-tests", scene, OF_TRUTH, workshop.size.tests, shape.seed)
     estimates, x = _again(workshop, f"{name}-by-spheres", model.posterior, tests,
                           spheres, variant.prior, shape.seed + 2)  # fmt: skip
     file = _picture(workshop, name, scene, tests, spheres, variant.prior, estimates)
     caption = f"{name} (top), and spheres at the parameters inferred from them (bottom)."
-    return _Found(
+    return Found(
         tests=tests,
         unexplained=float(np.mean([not model.misfit(x).is_inside for x in tests.x])),
         by_spheres=_distances(x, tests.x, sd),
@@ -164,30 +172,30 @@ def _by_spheres(workshop: Workshop, shape: _Shape, model: "BayesSim", sd: Array)
     )
 
 
-def _add_floor(workshop: Workshop, shape: _Shape, found: _Found, sd: Array) -> None:
+def _add_floor(workshop: Workshop, shape: Shape, found: Found, sd: Array) -> None:
     tests, scene = found.tests, shape.scene(workshop.size)
     theta = np.column_stack([tests.theta[:, 0], np.full(len(tests), 0.5)])
     name, seed = f"{shape.name}-floor", shape.seed + 4
-    found.floor = _distances(workshop.poured(name, scene, _OF_MODEL, theta, seed=seed), tests.x, sd)
+    found.floor = _distances(workshop.poured(name, scene, OF_MODEL, theta, seed=seed), tests.x, sd)
 
 
-def _add_itself(workshop: Workshop, shape: _Shape, found: _Found, sd: Array) -> None:
+def _add_itself(workshop: Workshop, shape: Shape, found: Found, sd: Array) -> None:
     tests, name, scene = found.tests, shape.name, shape.scene(workshop.size)
     right = workshop.pairs(
-        f"{name}-training", scene, _OF_MODEL, workshop.size.shapes, shape.seed + 1
+        f"{name}-training", scene, OF_MODEL, workshop.size.shapes, shape.seed + 1
     )
     model = workshop.model(name, right)
     estimates, x = _again(workshop, f"{name}-by-{name}", model.posterior, tests,
-                          scene, _OF_MODEL, shape.seed + 3)  # fmt: skip
+                          scene, OF_MODEL, shape.seed + 3)  # fmt: skip
     found.by_itself = _distances(x, tests.x, sd)
     found.errors = estimates[:, 0] - tests.theta[:, 0]
     found.unusable = right.unusable
 
 
-def _outcome(size: Size, found: dict[str, _Found]) -> Outcome:
+def _outcome(size: Size, found: dict[str, Found]) -> Outcome:
     """What has been found so far."""
     rows, cells, missing = [], [], []
-    for shape in _SHAPES:
+    for shape in SHAPES:
         name, each = shape.name, found.get(shape.name)
         if each is None:
             missing.append(f"{name} by spheres")
@@ -266,7 +274,7 @@ def _picture(
     top, bottom, titles = [], [], []
     for truth, theta in list(zip(tests.theta, estimates, strict=True))[:_EXAMPLES]:
         for row, at in (
-            (top, scene_at(scene, _OF_TRUTH, truth)),
+            (top, scene_at(scene, OF_TRUTH, truth)),
             (bottom, scene_at(spheres, prior, theta)),
         ):
             points = simulate(at, seed=_PICTURE_SEED).points()
