@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use super::around::Around;
 use super::body::Moving;
 use super::boxes;
-use super::contact::{Other, Point};
+use super::contact::Point;
 use super::manifold::manifold;
 use super::meeting::{Asked, Meeting};
 use super::motion::{Motion, Way};
@@ -134,13 +134,7 @@ pub(super) fn at_walls(
             } else {
                 (near.distance, near.normal)
             };
-            let velocity = wall.motion_at(&(body.centre + arm)).0;
-            let other = Other::Wall { surface: surface as u32, velocity };
-            let mut point = Point::new(i, other, normal, gap);
-            (point.arm, point.mark) = (arm, mark);
-            (point.friction, point.restitution) =
-                (wall.material.sliding_friction, wall.material.restitution);
-            found.push(point);
+            found.push(Point::at_wall(i, surface, wall, body, mark, normal, gap));
         };
         let seen = walls.nearest(surface, &body.centre, 0.0);
         let towards = body.seen(&-seen.normal);

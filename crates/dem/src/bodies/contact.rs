@@ -15,6 +15,7 @@ use nalgebra::Vector3;
 use super::body::Moving;
 use super::pose::Pose;
 use crate::law::{CORRECTION, CORRECTION_SPEED, SLOP};
+use crate::wall::Wall;
 
 /// Points of a manifold are one within this distance in the bodies' reach and this cosine of their normals `[-]`.
 const SAME_PLACE: f64 = 0.1;
@@ -75,6 +76,23 @@ impl Point {
             mark: Vector3::zeros(),
             impulse: Vector3::zeros(),
         }
+    }
+
+    /// A point of body i, there at `mark` in its own axes, at a wall's surface.
+    pub fn at_wall(
+        i: usize,
+        surface: usize,
+        wall: &Wall,
+        body: &Pose,
+        mark: Vector3<f64>,
+        normal: Vector3<f64>,
+        gap: f64,
+    ) -> Self {
+        let arm = body.axes * mark;
+        let velocity = wall.motion_at(&(body.centre + arm)).0;
+        let (friction, restitution) = (wall.material.sliding_friction, wall.material.restitution);
+        let other = Other::Wall { surface: surface as u32, velocity };
+        Self { arm, friction, restitution, mark, ..Self::new(i, other, normal, gap) }
     }
 
     /// Body i.

@@ -8,7 +8,7 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::Vector3;
 
 use super::around::Around;
-use super::contact::{Other, Point};
+use super::contact::Point;
 use super::pose::Pose;
 use crate::wall::{Rim, Wall, any_normal};
 use granulcal_scene::Solid;
@@ -33,14 +33,9 @@ pub(super) fn at_rims(
         let first = found.len();
         let touch = |gap: f64, mark: Vector3<f64>, face: Vector3<f64>| {
             // After the surfaces, so that its points have a name of their own.
-            let surface = (around.walls.surfaces() + count) as u32;
-            let arm = body.axes * mark;
-            let velocity = wall.motion_at(&(body.centre + arm)).0;
-            let other = Other::Wall { surface, velocity };
-            let mut point = Point::new(i, other, -(body.axes * face), gap);
-            (point.arm, point.mark) = (arm, mark);
-            (point.friction, point.restitution) =
-                (wall.material.sliding_friction, wall.material.restitution);
+            let surface = around.walls.surfaces() + count;
+            let normal = -(body.axes * face);
+            let point = Point::at_wall(i, surface, wall, body, mark, normal, gap);
             // The least of two parts may be where they meet.
             if !found[first..].iter().any(|other| other.is_like(&point, around.solid.reach)) {
                 found.push(point);

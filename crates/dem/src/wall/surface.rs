@@ -294,6 +294,17 @@ mod tests {
         assert_eq!(surfaces(&tube([0.0, 0.0, 0.1], Ends::From)).len(), 2);
     }
 
+    /// A cone that opens upwards from the origin, at half the height 0.04 wide.
+    fn cone() -> Surface {
+        one(&Shape::Cone {
+            from: [0.0; 3],
+            to: [0.0, 0.0, 0.1],
+            radius_from: 0.02,
+            radius_to: 0.06,
+            closed: Ends::None,
+        })
+    }
+
     /// A frustum from [`FROM`] to `to`.
     fn frustum(to: [f64; 3], radius_from: f64, radius_to: f64) -> Surface {
         one(&Shape::Cone { from: FROM, to, radius_from, radius_to, closed: Ends::None })
@@ -366,13 +377,7 @@ mod tests {
 
     #[test]
     fn side_changes_when_the_shell_is_crossed() {
-        let cone = one(&Shape::Cone {
-            from: [0.0; 3],
-            to: [0.0, 0.0, 0.1],
-            radius_from: 0.02,
-            radius_to: 0.06,
-            closed: Ends::None,
-        });
+        let cone = cone();
         let side = |x: f64, z: f64| cone.nearest(&Vector3::new(x, 0.0, z)).side;
         // At half the height the shell is at 0.04.
         assert_eq!((side(0.039, 0.05), side(0.041, 0.05)), (-1, 1));
@@ -383,13 +388,7 @@ mod tests {
 
     #[test]
     fn a_way_leads_through_a_shell_or_round_its_end() {
-        let cone = one(&Shape::Cone {
-            from: [0.0; 3],
-            to: [0.0, 0.0, 0.1],
-            radius_from: 0.02,
-            radius_to: 0.06,
-            closed: Ends::None,
-        });
+        let cone = cone();
         let round = |surface: &Surface, from: [f64; 2], to: [f64; 2]| {
             let [from, to] = [from, to].map(|[x, z]| Vector3::new(x, 0.0, z));
             surface.leads_round(&from, &to)
