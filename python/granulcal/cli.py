@@ -159,6 +159,9 @@ def _show(message: Warning | str, *_: object) -> None:
 
 def console() -> int:
     """Runs the command line of the process; threads that still pour do not hold up its end."""
+    for number in _asks_to_end():
+        # Before a command and after it nothing is under way, so that a signal may end it at once.
+        signal.signal(number, lambda *_: os._exit(INTERRUPTED))
     code = main()
     if code == INTERRUPTED:
         sys.stdout.flush()
@@ -171,6 +174,14 @@ def _subparsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentP
         if isinstance(action, argparse._SubParsersAction):
             return dict(action.choices)
     return {}
+
+
+def _asks_to_end() -> list[signal.Signals]:
+    """The signals that ask this process to end; those that its parent ignores (`nohup`) do not."""
+    if not Path("/dev/fd").exists():
+        return []
+    numbers = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU]
+    return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
 
 
 @contextlib.contextmanager
@@ -188,17 +199,12 @@ def _interruptible(*, raises: bool = True) -> Iterator[None]:
     os.set_blocking(write, False)
     before = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
     listener = _native.listen_for_signals(f"/dev/fd/{read}")
-    handlers = {}
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU):
-        # Of a process in the background of a shell that is `nohup` some are ignored, and stay so.
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            handlers[number] = signal.signal(
-                number, signal.default_int_handler if raises else lambda *_: None
-            )
+    handler = signal.default_int_handler if raises else lambda *_: None
+    before_it = {number: signal.signal(number, handler) for number in _asks_to_end()}
     try:
         yield
     finally:
-        for number, handler in handlers.items():
+        for number, handler in before_it.items():
             signal.signal(number, handler)
         signal.set_wakeup_fd(before)
         listener.close()

@@ -238,3 +238,22 @@ def test_after_a_command_signals_do_what_they_did_before(number: signal.Signals)
     # SIGINT raises a KeyboardInterrupt, of which Python dies by the signal; SIGTERM ends at once.
     assert done.returncode == -number, done.stderr
     assert number == signal.SIGTERM or done.stderr.endswith("KeyboardInterrupt\n"), done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_before_or_after_a_command_ends_the_process_with_the_same_code(
+    number: signal.Signals,
+) -> None:
+    for begin, end in (("ask()", ""), ("", "ask()")):
+        code = (
+            "import os, signal, sys\nfrom granulcal import cli\n"
+            "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+            f"def ask(): os.kill(os.getpid(), {int(number)})\n"
+            "real = cli.main\n"
+            f"def main():\n    {begin or 'pass'}\n    code = real(['features', '--list'])\n"
+            f"    {end or 'pass'}\n    return code\n"
+            "cli.main = main\nsys.exit(cli.console())\n"
+        )
+        words = [sys.executable, "-c", code]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=50)
+        assert (done.returncode, done.stderr) == (130, ""), (begin, end)
