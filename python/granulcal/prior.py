@@ -13,7 +13,7 @@ from granulcal.bayessim.arrays import as_matrix
 from granulcal.documents import LARGEST_DOCUMENT, read_bytes
 from granulcal.errors import PriorError
 from granulcal.parameter import Parameter
-from granulcal.words import did_you_mean
+from granulcal.words import not_there
 
 __all__ = ["Parameter", "Prior"]
 
@@ -117,9 +117,8 @@ class Prior:
         """
         if str(name) == "default":
             return cls.default()
-        near = did_you_mean(str(name), ["default"])
-        if near and not Path(name).exists():
-            raise FileNotFoundError(f"{str(name)!r} is no file and no built-in prior{near}")
+        if not Path(name).exists():
+            raise FileNotFoundError(not_there(str(name), "prior", ["default"]))
         return cls.load(name)
 
     @classmethod

@@ -82,7 +82,7 @@ fn pace(missing: u64, made: u64, elapsed: Duration) -> String {
 }
 
 /// A time in seconds, minutes or hours, as the commands in Python tell it.
-fn in_words(time: Duration) -> String {
+pub fn in_words(time: Duration) -> String {
     let seconds = time.as_secs_f64().round();
     if seconds >= 5400.0 {
         return format!("{:.1} h", seconds / 3600.0);

@@ -73,22 +73,25 @@ pub fn named(name: &Path) -> anyhow::Result<Scene> {
         Some("funnel") => Scene::funnel(FUNNEL_HEIGHT),
         Some("drop") => Scene::drop(DROP_HEIGHT),
         _ => {
-            refuse_misspelt(name, "scene", &["funnel", "drop"])?;
+            refuse_absent(name, "scene", &["funnel", "drop"])?;
             load_scene(name)?
         }
     })
 }
 
-/// Refuses a word that is no file, and nearly one of those that are built in.
-fn refuse_misspelt(name: &Path, what: &str, built_in: &[&str]) -> Result<(), BadArgument> {
+/// Refuses what is no file, and says what is built in.
+fn refuse_absent(name: &Path, what: &str, built_in: &[&str]) -> Result<(), BadArgument> {
+    if name.exists() {
+        return Ok(());
+    }
     let word = name.to_string_lossy();
     let near = |known: &&&str| strsim::normalized_damerau_levenshtein(&word, known) >= NEAR;
-    match built_in.iter().find(near) {
-        Some(meant) if !name.exists() => Err(BadArgument(format!(
-            "{word:?} is no file and no built-in {what}; did you mean {meant}?"
-        ))),
-        _ => Ok(()),
-    }
+    let meant = match built_in.iter().find(near) {
+        Some(meant) => format!("; did you mean {meant}?"),
+        None => String::new(),
+    };
+    let known = built_in.join(", ");
+    Err(BadArgument(format!("{word:?} is no file and no built-in {what} ({known}){meant}")))
 }
 
 /// The prior that an argument names.
@@ -99,7 +102,7 @@ pub fn prior(path: &Path) -> anyhow::Result<Prior> {
     if path.to_str() == Some("default") {
         return Ok(Prior::default());
     }
-    refuse_misspelt(path, "prior", &["default"])?;
+    refuse_absent(path, "prior", &["default"])?;
     load_prior(path).with_context(|| format!("reading {}", path.display()))
 }
 

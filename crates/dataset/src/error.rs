@@ -204,7 +204,7 @@ pub enum DatasetError {
         stated: String,
     },
     /// Two things that must be the same differ.
-    #[error("{}: {what} is {found}, but {given} is given; use another folder or the same {what}", path.display())]
+    #[error("{}: {what} is {found}, but {given} is given; use another folder, or {what} of before", path.display())]
     Differs {
         /// The folder or file.
         path: PathBuf,

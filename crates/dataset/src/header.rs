@@ -150,7 +150,7 @@ fn law_text(law: Option<u32>) -> String {
 }
 
 fn describe(prior: &Prior) -> String {
-    let of = |p: &granulcal_scene::Parameter| format!("{} {:?}", p.path, p.distribution);
+    let of = |p: &granulcal_scene::Parameter| format!("{} {}", p.path, p.distribution);
     prior.parameters().iter().map(of).collect::<Vec<_>>().join("; ")
 }
 

@@ -4,6 +4,8 @@
 //! whatever the distribution. Exponentials and logarithms come from `libm`, which gives the same bits
 //! on every machine.
 
+use std::fmt;
+
 use granulcal_numbers::normal_cdf;
 
 use crate::normal::truncated_normal_quantile;
@@ -94,9 +96,41 @@ impl Distribution {
     }
 }
 
+impl fmt::Display for Distribution {
+    /// For people: the word used in TOML and its numbers.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())?;
+        match *self {
+            Self::Uniform { low, high } | Self::LogUniform { low, high } => {
+                write!(f, " from {low} to {high}")
+            }
+            Self::Normal { mean, sd, low, high } => {
+                write!(f, " {mean} ± {sd}")?;
+                low.map_or(Ok(()), |low| write!(f, " from {low}"))?;
+                high.map_or(Ok(()), |high| write!(f, " to {high}"))
+            }
+            Self::Fixed { value } => write!(f, " at {value}"),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_distribution_says_its_word_and_its_numbers() {
+        for (distribution, words) in [
+            (Distribution::LogUniform { low: 0.001, high: 1.0 }, "log_uniform from 0.001 to 1"),
+            (
+                Distribution::Normal { mean: 0.5, sd: 0.1, low: Some(0.0), high: None },
+                "normal 0.5 ± 0.1 from 0",
+            ),
+            (Distribution::Fixed { value: 0.3 }, "fixed at 0.3"),
+        ] {
+            assert_eq!(distribution.to_string(), words);
+        }
+    }
 
     /// Mean of a standard normal cut to its upper half, sqrt(2 / pi).
     const HALF_NORMAL_MEAN: f64 = 0.797_884_560_802_865_4;

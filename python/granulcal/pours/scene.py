@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
-from granulcal.words import did_you_mean
+from granulcal.words import not_there
 
 __all__ = ["Material", "Scene"]
 
@@ -148,9 +148,8 @@ class Scene:
         """
         if str(name) in _BUILT_IN:
             return cls.built_in(str(name))
-        near = did_you_mean(str(name), _BUILT_IN)
-        if near and not Path(name).exists():
-            raise FileNotFoundError(f"{str(name)!r} is no file and no built-in scene{near}")
+        if not Path(name).exists():
+            raise FileNotFoundError(not_there(str(name), "scene", _BUILT_IN))
         return cls.load(name)
 
     @classmethod

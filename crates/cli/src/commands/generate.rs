@@ -15,7 +15,7 @@ use crate::args::paths::{Reads, Writes, writes};
 use crate::context::{Context, print_json, print_line};
 use crate::interrupt::keeps_going;
 use crate::outcome::Outcome;
-use crate::progress::RowProgress;
+use crate::progress::{RowProgress, in_words};
 use crate::run::{Run, Setting};
 use crate::scene;
 
@@ -167,8 +167,8 @@ fn dry_run(
             None => format!("mean of {tried} pours"),
         };
         print_line(&format!(
-            "about {:.1} min: {missing} rows are missing, {pour_s:.2} s of a core each ({from}), {} at once",
-            seconds / 60.0,
+            "about {}: {missing} rows are missing, {pour_s:.2} s of a core each ({from}), {} at once",
+            in_words(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)),
             options.threads
         ))?;
     }

@@ -113,7 +113,7 @@ fn scene_facts(scene: &Scene) -> Value {
 
 fn prior_facts(prior: &Prior) -> Value {
     let describe = |p: &granulcal_dataset::Parameter| {
-        (p.path.clone(), Value::from(format!("{:?}", p.distribution)))
+        (p.path.clone(), Value::from(p.distribution.to_string()))
     };
     prior.parameters().iter().map(describe).collect::<Map<_, _>>().into()
 }

@@ -105,10 +105,10 @@ class TrainingPairs:
         keep = is_healthy & is_finite
         _check_inside(theta[keep], prior)
         if keep.sum() < fewest:
-            dropped = ", ".join(f"{count} {reason}" for reason, count in excluded.items())
+            dropped = [f"{count} {reason}" for reason, count in excluded.items() if count]
             raise TrainingDataError(
                 f"at least {fewest} usable pairs are needed, got {int(keep.sum())} "
-                f"of {len(theta)} (excluded: {dropped})"
+                f"of {len(theta)} (excluded: {', '.join(dropped) or 'none'})"
             )
         return cls(
             prior=prior,

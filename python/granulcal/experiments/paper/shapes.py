@@ -130,7 +130,7 @@ def sets(size: Size) -> list[PouredSet]:
 
 
 def run(workshop: Workshop) -> Outcome:
-    """Infers both shapes with spheres, then pours each test again, then infers with themselves."""
+    """Infers each shape with spheres, pours each test again, then infers with the shape itself."""
     training, _ = three.training_and_tests(workshop, three.VARIANTS[0])
     sd = training.x.std(axis=0, ddof=1)
     round_model = workshop.model(three.VARIANTS[0].name, training)
@@ -138,10 +138,8 @@ def run(workshop: Workshop) -> Outcome:
     for shape in SHAPES:
         found[shape.name] = by_spheres(workshop, shape, round_model, sd)
         workshop.so_far(_outcome(workshop.size, found))
-    for shape in SHAPES:
         _add_floor(workshop, shape, found[shape.name], sd)
         workshop.so_far(_outcome(workshop.size, found))
-    for shape in SHAPES:
         _add_itself(workshop, shape, found[shape.name], sd)
         workshop.so_far(_outcome(workshop.size, found))
     return _outcome(workshop.size, found)
