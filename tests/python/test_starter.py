@@ -107,3 +107,17 @@ def test_a_built_in_scene_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
     assert main(["scene", "drop", "--set", "grains.count=60"]) == 0
     scene = gc.Scene.from_toml(capfd.readouterr().out)
     assert scene == gc.Scene.built_in("drop").with_({"grains.count": 60})
+
+
+def test_what_is_not_there_says_what_would_be(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["sample", "nowhere"]) == 2
+    assert "`granulcal init nowhere` writes it" in capfd.readouterr().err
+    for words, said in (
+        (["simulate", "heap"], '"heap" is no file and no built-in scene (funnel, drop)'),
+        (["simulate", "funel"], "(funnel, drop); did you mean funnel?"),
+        (["generate", "funnel", "flat", "-n", "1", "-o", "x"], "no built-in prior (default)"),
+        (["calibrate", "heap", "default", "x.png", "-o", "x"], "no built-in scene (funnel, drop)"),
+        (["calibrate", "funnel", "flat", "x.png", "-o", "x"], "no built-in prior (default)"),
+    ):
+        assert main(words) == 2
+        assert said in capfd.readouterr().err, words

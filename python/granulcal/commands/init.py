@@ -119,7 +119,10 @@ def _sample(options: argparse.Namespace) -> int:
     from granulcal.starter.folder import CONDITIONS
     from granulcal.starter.samples import HIDDEN, write_samples
 
-    scene = Scene.load(options.folder / "scene.toml")
+    file = options.folder / "scene.toml"
+    if not file.exists():
+        raise FileNotFoundError(f"{file} is not there; `granulcal init {options.folder}` writes it")
+    scene = Scene.load(file)
     path = "funnel.height" if scene.has("funnel.height") else "start.height"
     material = scene.with_material(HIDDEN).with_(dict(options.set)).material
     more = {} if options.seed is None else {"seed": options.seed}
