@@ -7,7 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["common_field", "formation_figure", "height_grid", "neighbour_distances"]
+__all__ = [
+    "common_field",
+    "formation_figure",
+    "height_grid",
+    "neighbour_distances",
+    "point_spacing",
+]
 
 Array = NDArray[np.float64]
 
@@ -29,21 +35,25 @@ def common_field(clouds: Sequence[Array]) -> float:
     return 2.4 * max(reach, default=0.1)
 
 
-def height_grid(points: Array, *, field: float, pixels: int = _PIXELS) -> Array:
+def height_grid(
+    points: Array, *, field: float, pixels: int = _PIXELS, patch: float | None = None
+) -> Array:
     """Returns the highest point of each cell of a square grid [m], NaN where none is.
 
     Each point fills a patch as wide as the distance between neighbouring points, so clouds of
-    different resolution look alike.
+    different resolution look alike, unless its width is given: of clouds of one camera, in some of
+    which grains lie alone.
 
     Args:
         points: points [m], shape (n, 3), centred.
         field: side of the square [m].
         pixels: cells along a side.
+        patch: width of a point [m].
     """
     grid = np.full((pixels, pixels), -np.inf)
     if len(points):
         cell = field / pixels
-        width = int(np.ceil(_spacing(points) / cell)) + 1
+        width = int(np.ceil((patch or point_spacing(points)) / cell)) + 1
         corner = np.floor((points[:, :2] + field / 2) / cell - (width - 1) / 2).astype(int)
         for right in range(width):
             for up in range(width):
@@ -90,8 +100,12 @@ def formation_figure(clouds: dict[str, Array]) -> bytes:
     return buffer.getvalue()
 
 
-def _spacing(points: Array) -> float:
-    """Median distance between neighbouring points in the horizontal plane [m]."""
+def point_spacing(points: Array) -> float:
+    """Returns the median distance between neighbouring points in the horizontal plane [m].
+
+    Args:
+        points: points [m], shape (n, 3), at least one.
+    """
     return float(np.median(neighbour_distances(points)))
 
 

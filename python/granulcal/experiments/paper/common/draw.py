@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.pours.formation_image import height_grid
+from granulcal.pours.formation_image import height_grid, point_spacing
 
 __all__ = ["ACCENT", "SECOND", "bars", "formations", "new_figure", "posterior_image", "save"]
 
@@ -50,7 +50,13 @@ def formations(
     columns = max(len(row) for row in rows)
     figure = new_figure(1.55 * columns + 0.9, 1.75 * len(rows))
     axes = figure.subplots(len(rows), columns, squeeze=False)
-    grids = [[_MM * height_grid(p, field=field, pixels=_GRID) for p in row] for row in rows]
+    # They are of one camera: a grain that lies alone is no wider than one in a heap.
+    patch = min((point_spacing(p) for p in flat if len(p)), default=None)
+
+    def grid(points: Array) -> Array:
+        return _MM * height_grid(points, field=field, pixels=_GRID, patch=patch)
+
+    grids = [[grid(points) for points in row] for row in rows]
     seen = [g for row in grids for g in row if np.isfinite(g).any()]
     tallest = max((float(np.nanmax(g)) for g in seen), default=1.0)
     image = None
