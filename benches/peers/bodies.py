@@ -133,8 +133,8 @@ def our_heap() -> dict[str, float | str]:
     pour = gc.simulate(gc.Scene.from_toml(drop.to_toml().replace("[grains]", shape)), seed=1)
     steps = pour.health["substeps"]
     return {
-        # Of the body's radius, which is that of its corners.
-        "deep": pour.health["worst_penetration"] * np.sqrt(0.75),
+        # In grains' radii, which are half of a cube's size.
+        "deep": 0.5 * pour.health["worst_penetration"],
         "cost": 1e6 * pour.cpu_seconds / (HEAP * steps),
     }
 
