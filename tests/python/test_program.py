@@ -288,8 +288,11 @@ def test_a_file_that_is_not_there_is_named_without_the_number_of_the_error(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "mine.toml"
-    assert main(["film", str(path), "-o", str(tmp_path / "x.gif")]) == 2
+    assert main(["train", str(path), "-o", str(tmp_path / "model")]) == 2
     assert capfd.readouterr().err == f"granulcal: {path}: cannot read: No such file or directory\n"
+    assert main(["film", str(path), "-o", str(tmp_path / "x.gif")]) == 2
+    told = f"{str(path)!r} is no file and no built-in scene (funnel, drop)"
+    assert capfd.readouterr().err == f"granulcal: {told}\n"
 
 
 @pytest.mark.parametrize(
