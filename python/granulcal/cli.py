@@ -200,11 +200,11 @@ def _interruptible(*, raises: bool = True) -> Iterator[None]:
     before = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
     listener = _native.listen_for_signals(f"/dev/fd/{read}")
     handler = signal.default_int_handler if raises else lambda *_: None
-    before_it = {number: signal.signal(number, handler) for number in _asks_to_end()}
+    replaced = {number: signal.signal(number, handler) for number in _asks_to_end()}
     try:
         yield
     finally:
-        for number, handler in before_it.items():
+        for number, handler in replaced.items():
             signal.signal(number, handler)
         signal.set_wakeup_fd(before)
         listener.close()

@@ -51,7 +51,8 @@ def formations(
     figure = new_figure(1.55 * columns + 0.9, 1.75 * len(rows))
     axes = figure.subplots(len(rows), columns, squeeze=False)
     # They are of one camera: a grain that lies alone is no wider than one in a heap.
-    patch = min((point_spacing(p) for p in flat if len(p)), default=None)
+    spacings = [point_spacing(p) for p in flat if len(p) > 1]
+    patch = min(spacings, default=None)
 
     def grid(points: Array) -> Array:
         return _MM * height_grid(points, field=field, pixels=_GRID, patch=patch)
