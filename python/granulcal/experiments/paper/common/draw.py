@@ -46,7 +46,7 @@ def formations(
     """
     flat = [points for row in rows for points in row]
     reach = [float(np.quantile(np.abs(p[:, :2]), 0.95)) for p in flat if len(p)]
-    field = 2.3 * max(reach, default=0.1)
+    field = 2.3 * (max(reach, default=0.0) or 0.1)
     columns = max(len(row) for row in rows)
     figure = new_figure(1.55 * columns + 0.9, 1.75 * len(rows))
     axes = figure.subplots(len(rows), columns, squeeze=False)
