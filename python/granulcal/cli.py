@@ -192,7 +192,8 @@ def _interruptible(*, raises: bool = True) -> Iterator[None]:
 
     Each raises a KeyboardInterrupt, too, unless what runs ends by itself when it is asked to.
     """
-    if threading.current_thread() is not threading.main_thread() or not Path("/dev/fd").exists():
+    numbers = _asks_to_end()
+    if threading.current_thread() is not threading.main_thread() or not numbers:
         yield
         return
     read, write = os.pipe()
@@ -200,7 +201,7 @@ def _interruptible(*, raises: bool = True) -> Iterator[None]:
     before = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
     listener = _native.listen_for_signals(f"/dev/fd/{read}")
     handler = signal.default_int_handler if raises else lambda *_: None
-    replaced = {number: signal.signal(number, handler) for number in _asks_to_end()}
+    replaced = {number: signal.signal(number, handler) for number in numbers}
     try:
         yield
     finally:

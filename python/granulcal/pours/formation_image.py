@@ -23,16 +23,18 @@ _MM = 1e3
 _SPACING_SAMPLE = 400
 
 
-def common_field(clouds: Sequence[Array]) -> float:
+def common_field(clouds: Sequence[Array], *, share: float = 0.97, sides: float = 2.4) -> float:
     """Returns the side of the square about the origin that shows the formations [m].
 
     It leaves out the few grains that rolled far away.
 
     Args:
         clouds: points [m], each of shape (n, 3), centred.
+        share: of each formation's coordinates that are in it.
+        sides: side over the farthest of these; grains that all lie at the origin have a side, too.
     """
-    reach = [float(np.quantile(np.abs(points[:, :2]), 0.97)) for points in clouds if len(points)]
-    return 2.4 * max(reach, default=0.1)
+    reach = [float(np.quantile(np.abs(points[:, :2]), share)) for points in clouds if len(points)]
+    return sides * (max(reach, default=0.0) or 0.1)
 
 
 def height_grid(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.pours.formation_image import height_grid, point_spacing
+from granulcal.pours.formation_image import common_field, height_grid, point_spacing
 
 __all__ = ["ACCENT", "SECOND", "bars", "formations", "new_figure", "posterior_image", "save"]
 
@@ -45,8 +45,7 @@ def formations(
         titles: of the columns, or of every formation, row by row.
     """
     flat = [points for row in rows for points in row]
-    reach = [float(np.quantile(np.abs(p[:, :2]), 0.95)) for p in flat if len(p)]
-    field = 2.3 * (max(reach, default=0.0) or 0.1)
+    field = common_field(flat, share=0.95, sides=2.3)
     columns = max(len(row) for row in rows)
     figure = new_figure(1.55 * columns + 0.9, 1.75 * len(rows))
     axes = figure.subplots(len(rows), columns, squeeze=False)
