@@ -13,7 +13,8 @@
 //! | `meeting` | what is asked of two bodies and answered |
 //! | `boxes` | where two boxes meet, eight pairs at a time |
 //! | `polygon` | what two faces share |
-//! | `manifold` | where two other bodies meet, by parry |
+//! | `cylinders` | the nearest points of two cylinders |
+//! | `manifold` | where two bodies that are no boxes meet, by parry |
 //! | `contact` | the law at a point |
 //! | `impact` | impacts, each at its time |
 //! | `rims` | points of contact at the rims of walls |
@@ -27,6 +28,7 @@ mod body;
 mod boxes;
 mod collide;
 mod contact;
+mod cylinders;
 #[cfg(test)]
 mod exams;
 mod foresee;

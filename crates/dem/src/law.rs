@@ -21,10 +21,11 @@ pub const LAW: u32 = 2;
 /// their points were swept eight at a time, and to 3 when walls were foreseen and cores told how bodies lie; boxes came to
 /// 4 when their separating axes were tried by the crate itself. Boxes came to 5 and the others to 4 when what is foreseen
 /// was looked at where a way leads elsewhere, and boxes met eight pairs at a time; to 6 and 5 when a corner that has gone
-/// round the end of a shell was no longer taken for one that has come through it.
+/// round the end of a shell was no longer taken for one that has come through it. Cylinders came to 6 when their nearest
+/// points were those of their features.
 pub fn arithmetic(scene: &Scene) -> u32 {
     match scene.grains.shape {
-        Some(GrainShape::Box { .. }) => 6,
+        Some(GrainShape::Box { .. } | GrainShape::Cylinder { .. }) => 6,
         Some(_) => 5,
         None => 1,
     }
@@ -108,7 +109,9 @@ mod tests {
         };
         assert_eq!(arithmetic(&balls), 1);
         assert_eq!(of(GrainShape::Box { aspect: [1.0; 3] }), 6);
-        assert_eq!(of(GrainShape::Cylinder { aspect: 1.0 }), 5);
+        assert_eq!(of(GrainShape::Cylinder { aspect: 1.0 }), 6);
+        let superquadric = GrainShape::Superquadric { aspect: [1.0; 3], exponents: [2.0; 2] };
+        assert_eq!(of(superquadric), 5);
     }
 
     #[test]

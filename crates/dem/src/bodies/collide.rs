@@ -94,7 +94,9 @@ pub(super) fn clearance(solid: &Solid, a: &Pose, b: &Pose) -> f64 {
     let extent = |body: &Pose| {
         let local = body.seen(&offset);
         match solid.round {
-            Some((radius, half)) => radius * local.x.hypot(local.z) + half * local.y.abs(),
+            Some((radius, half)) => {
+                radius * (local.x * local.x + local.z * local.z).sqrt() + half * local.y.abs()
+            }
             None => local.abs().dot(&solid.half_extents),
         }
     };

@@ -13,6 +13,15 @@ pub(super) struct Asked {
     pub range: f64,
 }
 
+/// What is known of two bodies that are apart.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Nearest {
+    /// The nearest points of the first and the second, and the direction from one to the other.
+    Points([Vector3<f64>; 2], Vector3<f64>),
+    /// They are farther apart than was asked.
+    Farther,
+}
+
 /// Where two bodies are near each other.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Meeting {
