@@ -114,6 +114,23 @@ def test_what_a_part_has_found_is_kept_before_the_next_is_run(tmp_path):
     assert "Not run yet: the paper&#39;s solver." in page and "(in part)" in page
 
 
+def test_a_formation_for_a_picture_is_poured_once(tmp_path, monkeypatch):
+    scene = gc.Scene.drop(0.01, count=25)
+    shop = Workshop(tmp_path, "x", TINY, threads=1, quiet=True)
+    first, other = shop.formation(scene, 1), shop.formation(scene, 2)
+    assert first.shape[1] == 3 and len(first) > 0
+    np.testing.assert_array_equal(first, gc.simulate(scene, seed=1).points())
+    assert first.shape != other.shape or not np.array_equal(first, other)
+
+    def poured_again(*_, **__):
+        raise AssertionError("it is there")
+
+    monkeypatch.setattr("granulcal.experiments.paper.common.workshop.simulate", poured_again)
+    np.testing.assert_array_equal(shop.formation(scene, 1), first)
+    with pytest.raises(AssertionError, match="it is there"):
+        shop.formation(scene.with_({"material.restitution": 0.1}), 1)
+
+
 def test_tables_hold_every_row_of_what_has_run(ran):
     text = write_tables(ran[0], experiments()).read_text(encoding="utf-8")
     lines = text.splitlines()

@@ -25,7 +25,6 @@ from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.forward import scene_at
 from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
-from granulcal.pours.simulate import simulate
 from granulcal.prior import Parameter, Prior
 
 if TYPE_CHECKING:
@@ -270,12 +269,13 @@ def _picture(
 ) -> str:
     """Pours the first tests again, in both shapes, for their pictures."""
     top, bottom, titles = [], [], []
+    workshop.say(f"{name}: {_EXAMPLES} formations of each shape for the picture")
     for truth, theta in list(zip(tests.theta, estimates, strict=True))[:_EXAMPLES]:
         for row, at in (
             (top, scene_at(scene, OF_TRUTH, truth)),
             (bottom, scene_at(spheres, prior, theta)),
         ):
-            points = simulate(at, seed=_PICTURE_SEED).points()
+            points = workshop.formation(at, _PICTURE_SEED)
             centre = points[:, :2].mean(axis=0) if len(points) else np.zeros(2)
             row.append(points - [*centre, 0.0])
         titles.append(f"sliding friction {truth[0]:.2f}")

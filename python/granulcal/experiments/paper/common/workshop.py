@@ -5,12 +5,14 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from granulcal.engines.in_use import law_of_pours
 from granulcal.experiments.paper.common.outcome import Outcome
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.files import write_beside
@@ -18,7 +20,7 @@ from granulcal.pours.dataset import Dataset, generate
 from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
-from granulcal.pours.simulate import Pour
+from granulcal.pours.simulate import Pour, simulate
 from granulcal.prior import Prior
 from granulcal.progress import ProgressLine
 
@@ -194,6 +196,18 @@ class Workshop:
         self.cpu_s += sum(kept.rows[str(i)].get("cpu_s", 0.0) for i in range(total))
         self.seeds[name] = seed
         return x
+
+    def formation(self, scene: Scene, seed: int) -> Array:
+        """Returns the points of a pour's image, shape (n, 3) [m], for a picture: poured once."""
+        pour = f"{law_of_pours()} {seed}\n{scene.to_toml()}"
+        name = hashlib.sha256(pour.encode()).hexdigest()[:16]
+        path = self.folder / "pours" / "formations" / f"{name}.npy"
+        if path.exists():
+            return np.load(path)
+        buffer = BytesIO()
+        np.save(buffer, simulate(scene, seed=seed).points())
+        write_beside(path, buffer.getvalue())
+        return np.load(path)
 
     def model(self, name: str, pairs: Pairs, *, seed: int = 0, **config: Any) -> "BayesSim":
         """Returns the model of these pairs, trained once and kept below `models`."""
