@@ -13,6 +13,7 @@
 //! | `meeting` | what is asked of two bodies and answered |
 //! | `boxes` | where two boxes meet, eight pairs at a time |
 //! | `polygon` | what two faces share |
+//! | `corners` | which corner of a hull is farthest along a direction |
 //! | `cylinders` | the nearest points of two cylinders |
 //! | `manifold` | where two bodies that are no boxes meet, by parry |
 //! | `contact` | the law at a point |
@@ -28,6 +29,7 @@ mod body;
 mod boxes;
 mod collide;
 mod contact;
+mod corners;
 mod cylinders;
 #[cfg(test)]
 mod exams;
@@ -53,6 +55,7 @@ use crate::wall::Walls;
 use around::Around;
 use body::{Moving, RigidBody};
 use contact::{Name, Point};
+use corners::Corners;
 use granulcal_scene::Material;
 use granulcal_scene::Scene;
 use granulcal_scene::Solid;
@@ -100,6 +103,8 @@ pub(crate) struct Step {
 #[derive(Clone, Debug)]
 pub(crate) struct Bodies {
     pub solid: Arc<Solid>,
+    /// None of a cylinder.
+    corners: Option<Corners>,
     all: Vec<RigidBody>,
     /// Those with an impulse, in the order of their manifolds.
     known: Vec<Mark>,
@@ -113,6 +118,7 @@ impl Bodies {
     fn new(solid: Arc<Solid>, all: Vec<RigidBody>) -> Self {
         let batches = Batches::of(&solid);
         Self {
+            corners: Corners::of(&solid),
             solid,
             all,
             known: Vec::new(),
@@ -194,7 +200,8 @@ impl Bodies {
         for body in &mut moving {
             body.velocity += dt * gravity;
         }
-        let around = Around { solid: &solid, walls, material, dt };
+        let corners = self.corners.as_ref();
+        let around = Around { solid: &solid, corners, walls, material, dt };
         let (points, neighbours) = (std::mem::take(&mut self.points), &mut self.neighbours);
         let mut contacts = collide::contacts(&around, &moving, neighbours, points);
         let mut step = Step::default();

@@ -1,5 +1,6 @@
 //! What bodies are of, what is around them in a substep, and how far they search for each other.
 
+use super::corners::Corners;
 use super::motion::Motion;
 use crate::wall::Walls;
 use granulcal_scene::{Material, Solid};
@@ -10,6 +11,8 @@ const LEAST_MARGIN: f64 = 0.02;
 /// What the bodies are of, and what is around them in a substep.
 pub(super) struct Around<'a> {
     pub solid: &'a Solid,
+    /// Of a polyhedron.
+    pub corners: Option<&'a Corners>,
     pub walls: &'a Walls,
     pub material: &'a Material,
     pub dt: f64,

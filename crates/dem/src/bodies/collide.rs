@@ -81,7 +81,7 @@ pub(super) fn meet(
     }
     let mut meeting = Meeting::default();
     for (number, &Asked { i, j, range }) in asked.iter().enumerate() {
-        if manifold(around.solid, [&poses[i], &poses[j]], range, &mut meeting) {
+        if manifold(around, [&poses[i], &poses[j]], range, &mut meeting) {
             found(number, &meeting);
         }
     }

@@ -14,6 +14,8 @@ use parry3d_f64::query::{
 };
 use parry3d_f64::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, SupportMap};
 
+use super::around::Around;
+use super::corners::Corners;
 use super::cylinders::{self, Cylinder};
 use super::meeting::{Meeting, Nearest, Spot};
 use super::pose::Pose;
@@ -32,12 +34,13 @@ type Manifold = ContactManifold<(), ()>;
 /// The points at which the second body is nearer to the first than `range`, or a little more; returns whether it may be
 /// so near.
 pub(super) fn manifold(
-    solid: &Solid,
+    around: &Around<'_>,
     [a, b]: [&Pose; 2],
     range: f64,
     meeting: &mut Meeting,
 ) -> bool {
-    let Some(found) = found(solid, [a, b], range) else { return false };
+    let solid = around.solid;
+    let Some(found) = found(around, [a, b], range) else { return false };
     meeting.normal = a.axes * vector(found.local_n1);
     let spot = |contact: &TrackedContact<()>| {
         let mark = solid.reach * vector(contact.local_p1);
@@ -50,13 +53,15 @@ pub(super) fn manifold(
 }
 
 /// What a manifold remembers of the substep before would make the next depend on more than the state: it is made anew.
-fn found(solid: &Solid, [a, b]: [&Pose; 2], range: f64) -> Option<Manifold> {
+fn found(around: &Around<'_>, [a, b]: [&Pose; 2], range: f64) -> Option<Manifold> {
+    let solid = around.solid;
     let offset = parry(&(a.seen(&(b.centre - a.centre)) / solid.reach));
     let turned = a.turned.inverse() * b.turned;
     let pose = ParryPose::from_parts(offset, rotation(&turned));
     let (shape, range) = (solid.unit.as_ref(), range / solid.reach);
     if let Some((whole, _)) = shape.as_polygonal_feature_map() {
-        match by_cores(&pose, solid, whole, range) {
+        let core = Core { whole, corners: around.corners };
+        match by_cores(&pose, solid, &core, range) {
             Cores::Near(found) => return Some(found),
             Cores::Apart => return None,
             Cores::Meet => {}
@@ -76,12 +81,12 @@ enum Cores {
     Meet,
 }
 
-fn by_cores(pose: &ParryPose, solid: &Solid, whole: &dyn PolygonalFeatureMap, range: f64) -> Cores {
+fn by_cores(pose: &ParryPose, solid: &Solid, core: &Core<'_>, range: f64) -> Cores {
     let farthest = range + 2.0 * SHRUNK;
     let of_features = solid.round.and_then(|round| {
         cylinders::nearest(&round_cores(pose, round, solid.reach), farthest, NEAR)
     });
-    let nearest = of_features.or_else(|| by_gjk(pose, &Core(whole), farthest));
+    let nearest = of_features.or_else(|| by_gjk(pose, core, farthest));
     let (on_1, on_2, normal) = match nearest {
         Some(Nearest::Points([on_1, on_2], normal)) => (parry(&on_1), parry(&on_2), parry(&normal)),
         Some(Nearest::Farther) => return Cores::Apart,
@@ -91,7 +96,7 @@ fn by_cores(pose: &ParryPose, solid: &Solid, whole: &dyn PolygonalFeatureMap, ra
     let on_1 = on_1 / (1.0 - SHRUNK);
     let on_2 = pose.inverse_transform_point(on_2) / (1.0 - SHRUNK);
     let normals = [normal, pose.rotation.inverse() * -normal];
-    let mut found = between_faces(pose, whole, normals, [on_1, on_2]);
+    let mut found = between_faces(pose, core.whole, normals, [on_1, on_2]);
     let gap = (pose.transform_point(on_2) - on_1).dot(normal);
     let unknown = PackedFeatureId::UNKNOWN;
     found.points.push(TrackedContact::new(on_1, on_2, unknown, unknown, gap));
@@ -160,11 +165,19 @@ fn by_gjk(pose: &ParryPose, body: &Core<'_>, farthest: f64) -> Option<Nearest> {
 }
 
 /// A body without its rind.
-struct Core<'a>(&'a dyn PolygonalFeatureMap);
+struct Core<'a> {
+    whole: &'a dyn PolygonalFeatureMap,
+    /// Of a polyhedron.
+    corners: Option<&'a Corners>,
+}
 
 impl SupportMap for Core<'_> {
     fn local_support_point(&self, towards: Vector) -> Vector {
-        self.0.local_support_point(towards) * (1.0 - SHRUNK)
+        let farthest = match self.corners {
+            Some(corners) => parry(corners.farthest(&vector(towards))),
+            None => self.whole.local_support_point(towards),
+        };
+        farthest * (1.0 - SHRUNK)
     }
 }
 
@@ -197,7 +210,7 @@ mod tests {
         let whole = solid.unit.as_polygonal_feature_map().unwrap().0;
         let of_features =
             cylinders::nearest(&round_cores(&pose, round, solid.reach), FARTHEST, NEAR);
-        [of_features, by_gjk(&pose, &Core(whole), FARTHEST)]
+        [of_features, by_gjk(&pose, &Core { whole, corners: None }, FARTHEST)]
     }
 
     /// The shares are those of the numbers of a lattice (Weyl), not of chance.
@@ -264,6 +277,8 @@ mod tests {
             let solid = Solid::new(&shape, 2.0).unwrap();
             let shape = solid.unit.as_ref();
             let whole = shape.as_polygonal_feature_map().unwrap().0;
+            let corners = Corners::of(&solid);
+            let core = Core { whole, corners: corners.as_ref() };
             let mut pose = ParryPose::from_parts(
                 parry(&(towards.normalize() * 2.1)),
                 rotation(&(turned(one).inverse() * turned(other))),
@@ -277,7 +292,7 @@ mod tests {
             pose.translation -= apart.normal1 * (apart.dist + depth);
             let truth = parted(&pose);
             prop_assume!(truth.dist < -0.0005 && truth.dist > -0.02);
-            let Cores::Near(found) = by_cores(&pose, &solid, whole, 0.1) else {
+            let Cores::Near(found) = by_cores(&pose, &solid, &core, 0.1) else {
                 return Err(TestCaseError::fail("the cores meet, or are out of reach"));
             };
             let deepest = found.points.iter().map(|p| p.dist).fold(f64::MAX, f64::min);
