@@ -137,7 +137,12 @@ fn toml_facts(path: &Path) -> anyhow::Result<Value> {
         Ok(camera) => return Ok(with_kind("camera", serde_json::to_value(camera)?)),
         Err(error) => anyhow!(error),
     };
+    let is_task = std::fs::read_to_string(path).is_ok_and(|text| text.contains("[[conditions]]"));
     let path = path.display();
+    if is_task {
+        let what = format!("{path} is the task of a loop: `granulcal close-loop {path} -o FOLDER");
+        return Err(BadArgument(format!("{what} --dry-run` reads it")).into());
+    }
     Err(BadArgument(format!(
         "{path} is no scene, prior or camera\nas a scene: {scene:#}\nas a prior: {prior:#}\nas a camera: {camera:#}"
     ))

@@ -123,3 +123,12 @@ fn bad_recordings_are_named() {
     let render = tiny(&["render", "drop", "-o", "o.png", "--positions", "flat.npy"], &[]);
     place.refused(&render, &["flat.npy", "shape", "[2]", "(n, 3)"]);
 }
+
+#[test]
+fn inspect_says_what_reads_the_task_of_a_loop() {
+    let place = Place::new();
+    place.write("loop.toml", "scene = \"scene.toml\"\n[[conditions]]\nname = \"low\"\n");
+    place.refused(&["inspect", "loop.toml"], &["loop.toml", "close-loop", "--dry-run"]);
+    place.write("other.toml", "scene = \"scene.toml\"\n");
+    place.refused(&["inspect", "other.toml"], &["as a scene", "as a prior", "as a camera"]);
+}
