@@ -45,6 +45,7 @@ pub(super) fn nearest([one, other]: &[Cylinder; 2], farthest: f64, near: f64) ->
     let mut most = separation(pair, &along);
     for of_features in FEATURES {
         let [on_1, on_2] = of_features(pair, &along);
+        // Features that are not there have no points: not a number.
         let Some((towards, distance)) = Unit::try_new_and_get(on_2 - on_1, near) else {
             continue;
         };
@@ -143,49 +144,50 @@ fn sides([one, other]: [&Cylinder; 2], _: &Vector3<f64>) -> [Vector3<f64>; 2] {
 }
 
 /// The side of the first and the rim of the second's end that looks at it: seen along the first's axis the rim is an
-/// ellipse, whose point nearest to the axis x_i = k_i^2 y_i / (t + k_i^2), with sum (x_i / k_i)^2 = 1, has the root t
-/// to which Newton's steps rise (D. Eberly, Distance from a point to an ellipse, 2013).
+/// ellipse, and the nearest point of both is that nearest to the axis.
 fn side_and_rim([one, other]: [&Cylinder; 2], along: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let middle = other.end(&-along);
-    let cosine = one.axis.dot(&other.axis);
     let level = one.axis.cross(&other.axis);
     let sine = level.norm();
-    let (level, steep) = if sine < NOTHING {
-        let level = one.across(&along.map(|x| x + NOTHING)).normalize();
-        (level, other.axis.cross(&level))
+    let level = if sine < NOTHING {
+        one.across(&along.map(|x| x + NOTHING)).normalize()
     } else {
-        (level / sine, other.axis.cross(&(level / sine)))
+        level / sine
     };
-    // Half axes of the ellipse, and the first's axis from its middle.
-    let half = [other.radius, other.radius * cosine.abs()];
+    let steep = other.axis.cross(&level);
+    let half = [other.radius, other.radius * one.axis.dot(&other.axis).abs()];
     let to_axis = one.across(&(one.centre - middle));
-    let seen = one.across(&steep);
-    let at = [to_axis.dot(&level), seen.try_normalize(0.0).map_or(0.0, |seen| to_axis.dot(&seen))];
-    let square = half.map(|half| half * half);
-    let mut root = (half[1] * at[1].abs() - square[1]).max(half[0] * at[0].abs() - square[0]);
-    for _ in 0..STEPS {
-        let of = |i: usize| {
-            let share = half[i] * at[i] / (root + square[i]);
-            if at[i] == 0.0 || half[i] == 0.0 {
-                (0.0, 0.0)
-            } else {
-                (share * share, share * share / (root + square[i]))
-            }
-        };
-        let ((first, d_first), (second, d_second)) = (of(0), of(1));
-        let step = (first + second - 1.0) / (2.0 * (d_first + d_second)).max(f64::MIN_POSITIVE);
-        root += step;
-        if step.abs() < SETTLED * other.radius * other.radius {
-            break;
-        }
-    }
-    let share = |i: usize| half[i] * at[i] / (root + square[i]).max(f64::MIN_POSITIVE);
-    let around = share(0) * level + share(1) * steep;
-    let around = around.try_normalize(0.0).unwrap_or(level);
+    let seen = one.across(&steep).try_normalize(0.0).unwrap_or_default();
+    let [first, second] = nearest_of_ellipse(half, [to_axis.dot(&level), to_axis.dot(&seen)]);
+    let around = (first * level + second * steep).try_normalize(0.0).unwrap_or(level);
     let on_2 = middle + other.radius * around;
     let place = one.place((on_2 - one.centre).dot(&one.axis));
     let out = one.across(&(on_2 - place)).try_normalize(0.0).unwrap_or(level);
     [place + one.radius * out, on_2]
+}
+
+/// The point of an ellipse that is nearest to one outside of it, in its half axes k: x_i = k_i^2 y_i / (t + k_i^2), with
+/// sum (x_i / k_i)^2 = 1, has the root t to which Newton's steps rise (D. Eberly, Distance from a point to an ellipse,
+/// 2013).
+fn nearest_of_ellipse(half: [f64; 2], outside: [f64; 2]) -> [f64; 2] {
+    let square = half.map(|half| half * half);
+    let share = |i: usize, root: f64| {
+        if half[i] * outside[i] == 0.0 { 0.0 } else { half[i] * outside[i] / (root + square[i]) }
+    };
+    let least = |i: usize| half[i] * outside[i].abs() - square[i];
+    let mut root = least(0).max(least(1));
+    for _ in 0..STEPS {
+        let squares = [0, 1].map(|i| share(i, root).powi(2));
+        let slope =
+            |i: usize| if squares[i] == 0.0 { 0.0 } else { squares[i] / (root + square[i]) };
+        let step = (squares[0] + squares[1] - 1.0) / (2.0 * (slope(0) + slope(1)));
+        root += step;
+        // Where the point is the middle no step is a number.
+        if step.abs() < SETTLED * square[0] || !step.is_finite() {
+            break;
+        }
+    }
+    [share(0, root), share(1, root)]
 }
 
 fn rim_and_side([one, other]: [&Cylinder; 2], along: &Vector3<f64>) -> [Vector3<f64>; 2] {
