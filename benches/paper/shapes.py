@@ -33,7 +33,7 @@ def again(workshop: Workshop) -> None:
     for shape in SHAPES:
         other = replace(shape, name=f"{shape.name}-again", seed=shape.seed + OTHER_SEEDS)
         found = by_spheres(workshop, other, model, sd)
-        distance = found.by_spheres
+        distance = found.by_spheres[np.isfinite(found.by_spheres)]
         print(
             f"{shape.name} by spheres: L2 {distance.mean():.2f} ± {distance.std(ddof=1):.2f} "
             f"(n = {len(distance)}), no spheres explain {found.unexplained:.0%}",

@@ -93,7 +93,9 @@ class Found:
     Attributes:
         tests: formations of known sliding friction.
         unexplained: share of them that no spheres explain [-].
-        by_spheres: L2 of spheres at the parameters inferred by the model of spheres, shape (n,).
+        by_spheres: L2 of spheres at the parameters inferred by the model of spheres, shape (n,);
+            here and below NaN where a pour cannot be used.
+        errors_by_spheres: of the sliding friction by that model, shape (n,).
         figure: formations beside those of the spheres.
         floor: L2 of a second pour of each test, shape (n,); None: not poured yet.
         by_itself: L2 of grains of the shape at what the model of the shape infers, shape (n,).
@@ -104,6 +106,7 @@ class Found:
     tests: Pairs
     unexplained: float
     by_spheres: Array
+    errors_by_spheres: Array
     figure: Figure
     floor: Array | None = None
     by_itself: Array | None = None
@@ -165,6 +168,7 @@ def by_spheres(workshop: Workshop, shape: Shape, model: "BayesSim", sd: Array) -
         tests=tests,
         unexplained=float(np.mean([not model.misfit(x).is_inside for x in tests.x])),
         by_spheres=_distances(x, tests.x, sd),
+        errors_by_spheres=estimates[:, 0] - tests.theta[:, 0],
         figure=Figure(file=file, caption=caption),
     )
 
@@ -191,44 +195,59 @@ def _add_itself(workshop: Workshop, shape: Shape, found: Found, sd: Array) -> No
 
 def _outcome(size: Size, found: dict[str, Found]) -> Outcome:
     """What has been found so far."""
-    rows, cells, missing = [], [], []
+    rows, cells, beside, missing = [], [], [], []
     for shape in SHAPES:
         name, each = shape.name, found.get(shape.name)
         if each is None:
             missing.append(f"{name} by spheres")
             continue
-        rows.append(level_row(f"L2, {name} by spheres", each.by_spheres, size, shape.paper))
+        rows.append(
+            level_row(f"L2, {name} by spheres", _usable(each.by_spheres), size, shape.paper)
+        )
         if each.by_itself is None:
             missing.append(f"{name} by {name}")
         else:
-            rows.append(level_row(f"L2, {name} by {name}", each.by_itself, size))
+            rows.append(level_row(f"L2, {name} by {name}", _usable(each.by_itself), size))
         floor = f"L2 of two pours of one material, {name} (floor)"
         if each.floor is None:
             missing.append(floor)
         else:
-            rows.append(level_row(floor, each.floor, size))
-        error = "-"
-        if each.errors is not None:
-            error = f"{each.errors.mean():.3f} ± {each.errors.std(ddof=1):.3f}"
+            rows.append(level_row(floor, _usable(each.floor), size))
+        if each.floor is not None and each.by_itself is not None:
+            beside.append([name, *_beside(each.by_spheres, each.by_itself, each.floor)])
         unusable = "-" if each.unusable is None else str(each.unusable)
-        cells.append([name, f"{each.unexplained:.0%}", error, unusable, str(each.tests.unusable)])
+        errors = [_spread(each.errors_by_spheres), _spread(each.errors)]
+        counts = [unusable, str(each.tests.unusable)]
+        cells.append([name, f"{each.unexplained:.0%}", *errors, *counts])
+    of_models = Table(
+        title="The models of the two shapes",
+        columns=[
+            "shape",
+            "formations that no spheres explain (5 % by chance)",
+            "error of the sliding friction, spheres",
+            "the same, right shape",
+            "training pours not usable",
+            "test pours not usable",
+        ],
+        rows=cells,
+    )
+    of_all_three = Table(
+        title="The formations of which all three pours can be used",
+        columns=[
+            "shape",
+            "formations",
+            "L2 by spheres",
+            "by itself",
+            "of second pours",
+            "nearer by itself than by spheres, with its standard error",
+        ],
+        rows=beside,
+    )
     return Outcome(
         rows=rows,
         answer="; ".join(f"{row.quantity}: {row.ours}" for row in rows),
         missing=missing,
-        tables=[
-            Table(
-                title="The models of the two shapes",
-                columns=[
-                    "shape",
-                    "formations that no spheres explain (5 % by chance)",
-                    "error of the sliding friction, right shape",
-                    "training pours not usable",
-                    "test pours not usable",
-                ],
-                rows=cells,
-            )
-        ],
+        tables=[of_models, of_all_three] if beside else [of_models],
         figures=[each.figure for each in found.values()],
         notes=[
             "Distances are in standard deviations of the training set of spheres, as everywhere.",
@@ -237,6 +256,26 @@ def _outcome(size: Size, found: dict[str, Found]) -> Outcome:
             "The model of the right shape has two unknowns, sliding friction and restitution.",
         ],
     )
+
+
+def _beside(by_spheres: Array, by_itself: Array, floor: Array) -> list[str]:
+    """Three pours of each formation, where none is missing: their number and mean distances."""
+    all_three = np.column_stack([by_spheres, by_itself, floor])
+    all_three = all_three[np.isfinite(all_three).all(axis=1)]
+    if len(all_three) < 2:
+        return [str(len(all_three)), "-", "-", "-", "-"]
+    nearer = all_three[:, 0] - all_three[:, 1]
+    error = nearer.std(ddof=1) / np.sqrt(len(nearer))
+    means = [f"{mean:.2f}" for mean in all_three.mean(axis=0)]
+    return [str(len(nearer)), *means, f"{nearer.mean():.2f} ± {error:.2f}"]
+
+
+def _spread(errors: Array | None) -> str:
+    return "-" if errors is None else f"{errors.mean():.3f} ± {errors.std(ddof=1):.3f}"
+
+
+def _usable(distances: Array) -> Array:
+    return distances[np.isfinite(distances)]
 
 
 def _again(
@@ -254,8 +293,7 @@ def _again(
 
 
 def _distances(x: Array, against: Array, sd: Array) -> Array:
-    found = np.linalg.norm((x - against) / sd, axis=1)
-    return found[np.isfinite(found)]
+    return np.linalg.norm((x - against) / sd, axis=1)
 
 
 def _picture(
