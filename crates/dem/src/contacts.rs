@@ -181,7 +181,7 @@ impl Contacts {
         }
     }
 
-    /// SolveInfo that the walls have done on the grains in the lasting contacts of the substep, per typical mass
+    /// Work that the walls have done on the grains in the lasting contacts of the substep, per typical mass
     /// `[m^2/s^2]`: impulse times the velocity of the wall, moment times its turning.
     pub fn work_of_walls(&self, particles: &Particles) -> f64 {
         let work = |(number, lane): (usize, usize)| {

@@ -109,7 +109,7 @@ pub(crate) struct Impacts {
     pub candidates: Vec<Candidate>,
     queue: BinaryHeap<Event>,
     foreseen: Vec<Event>,
-    /// SolveInfo that walls have done in impacts since it was last asked for, per typical mass `[m^2/s^2]`.
+    /// Work that walls have done in impacts since it was last asked for, per typical mass `[m^2/s^2]`.
     pub work_of_walls: f64,
     /// Impacts of each grain in this substep.
     counts: Vec<u32>,

@@ -204,7 +204,7 @@ impl Particles {
             .sum()
     }
 
-    /// SolveInfo of an acceleration on all grains within `dt` `[s]`, per typical mass `[m^2/s^2]`.
+    /// Work of an acceleration on all grains within `dt` `[s]`, per typical mass `[m^2/s^2]`.
     pub fn work_of(&self, acceleration: &Vector3<f64>, dt: f64) -> f64 {
         let step = dt * acceleration;
         let work = |i| (self.velocity(i) + 0.5 * step).dot(&step) / self.inverse_mass[i];

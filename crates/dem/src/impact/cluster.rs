@@ -34,7 +34,7 @@ pub(super) struct Outcome {
     pub micro_steps: usize,
     /// Whether contacts still pressed when the impact had lasted its longest.
     pub is_cut: bool,
-    /// SolveInfo of moving walls per typical mass `[m^2/s^2]`.
+    /// Work of moving walls per typical mass `[m^2/s^2]`.
     pub work_of_walls: f64,
     /// Energy of the grains that were hit, after over before and the walls' work `[-]`.
     pub energy_ratio: f64,
@@ -309,7 +309,7 @@ impl Cluster {
     fn rub_with(&mut self, number: usize, friction: &Friction) {
         let link = &mut self.links[number];
         if link.tangential_restitution > 0.0 {
-            // SolveInfo of an impulse: itself times the mean of the velocities before and after.
+            // Work of an impulse: itself times the mean of the velocities before and after.
             let slip = self.members.slip(link).u;
             let after = slip + link.block.a_t * friction.t + link.block.kappa * friction.m;
             link.total.sliding_taken -= 0.5 * friction.t.dot(&(slip + after));
@@ -346,7 +346,7 @@ impl Cluster {
         }
     }
 
-    /// SolveInfo of walls that move, per typical mass `[m^2/s^2]`.
+    /// Work of walls that move, per typical mass `[m^2/s^2]`.
     fn work_of_walls(&self, fallen: &Vector3<f64>) -> f64 {
         let of = |link: &Link| {
             let Some((velocity, spin)) = self.members.wall_motion(link.ends[1]) else { return 0.0 };

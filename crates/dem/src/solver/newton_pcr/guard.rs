@@ -20,7 +20,7 @@ const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
 
 /// Sweeps, at most, after the projection.
 const MAX_SWEEPS: usize = 4;
-/// SolveInfo of the impulses beyond that of the biases that is let pass, over the square of the normal impulses.
+/// Work of the impulses beyond that of the biases that is let pass, over the square of the normal impulses.
 const EXCESS_WORK: f64 = 1e-3;
 
 /// The merit of the present iterate and what the guard has done so far.
