@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from granulcal.arrays import read_array
 from granulcal.engines.in_use import law_of_pours
 from granulcal.experiments.paper.common.outcome import Outcome
 from granulcal.experiments.paper.common.sizes import Size
@@ -203,11 +204,12 @@ class Workshop:
         name = hashlib.sha256(pour.encode()).hexdigest()[:16]
         path = self.folder / "pours" / "formations" / f"{name}.npy"
         if path.exists():
-            return np.load(path)
+            return read_array(path)
+        points = simulate(scene, seed=seed).points()
         buffer = BytesIO()
-        np.save(buffer, simulate(scene, seed=seed).points())
+        np.save(buffer, points)
         write_beside(path, buffer.getvalue())
-        return np.load(path)
+        return points
 
     def model(self, name: str, pairs: Pairs, *, seed: int = 0, **config: Any) -> "BayesSim":
         """Returns the model of these pairs, trained once and kept below `models`."""
