@@ -96,6 +96,7 @@ class Found:
         by_spheres: L2 of spheres at the parameters inferred by the model of spheres, shape (n,);
             here and below NaN where a pour cannot be used.
         errors_by_spheres: of the sliding friction by that model, shape (n,).
+        height: of the heaps of these spheres over that of the tests', mean over mean [-].
         figure: formations beside those of the spheres.
         floor: L2 of a second pour of each test, shape (n,); None: not poured yet.
         by_itself: L2 of grains of the shape at what the model of the shape infers, shape (n,).
@@ -107,6 +108,7 @@ class Found:
     unexplained: float
     by_spheres: Array
     errors_by_spheres: Array
+    height: float
     figure: Figure
     floor: Array | None = None
     by_itself: Array | None = None
@@ -169,6 +171,7 @@ def by_spheres(workshop: Workshop, shape: Shape, model: "BayesSim", sd: Array) -
         unexplained=float(np.mean([not model.misfit(x).is_inside for x in tests.x])),
         by_spheres=_distances(x, tests.x, sd),
         errors_by_spheres=estimates[:, 0] - tests.theta[:, 0],
+        height=_height(x, tests),
         figure=Figure(file=file, caption=caption),
     )
 
@@ -216,14 +219,14 @@ def _outcome(size: Size, found: dict[str, Found]) -> Outcome:
         if each.floor is not None and each.by_itself is not None:
             beside.append([name, *_beside(each.by_spheres, each.by_itself, each.floor)])
         unusable = "-" if each.unusable is None else str(each.unusable)
-        errors = [_spread(each.errors_by_spheres), _spread(each.errors)]
-        counts = [unusable, str(each.tests.unusable)]
-        cells.append([name, f"{each.unexplained:.0%}", *errors, *counts])
+        spheres = [f"{each.unexplained:.0%}", f"{each.height:.0%}", _spread(each.errors_by_spheres)]
+        cells.append([name, *spheres, _spread(each.errors), unusable, str(each.tests.unusable)])
     of_models = Table(
         title="The models of the two shapes",
         columns=[
             "shape",
             "formations that no spheres explain (5 % by chance)",
+            "height of the spheres' heaps against the shape's",
             "error of the sliding friction, spheres",
             "the same, right shape",
             "training pours not usable",
@@ -268,6 +271,13 @@ def _beside(by_spheres: Array, by_itself: Array, floor: Array) -> list[str]:
     error = nearer.std(ddof=1) / np.sqrt(len(nearer))
     means = [f"{mean:.2f}" for mean in all_three.mean(axis=0)]
     return [str(len(nearer)), *means, f"{nearer.mean():.2f} ± {error:.2f}"]
+
+
+def _height(x: Array, tests: Pairs) -> float:
+    """Mean height of pours over that of the tests, of those that can be used."""
+    heights = np.column_stack([each[:, tests.names.index("max_z")] for each in (x, tests.x)])
+    again, first = heights[np.isfinite(heights).all(axis=1)].mean(axis=0)
+    return float(again / first)
 
 
 def _spread(errors: Array | None) -> str:
