@@ -53,8 +53,11 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, DatasetError> {
     read(path)
 }
 
-/// The text of a file of at most [`LARGEST_TEXT`].
-pub(crate) fn read_text(path: &Path) -> Result<String, DatasetError> {
+/// The text of a plain file of at most 16 MiB.
+///
+/// # Errors
+/// As [`read_file`], and [`DatasetError::Content`] for what is not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, DatasetError> {
     String::from_utf8(read_at_most(path, LARGEST_TEXT)?)
         .map_err(|_| DatasetError::content(path, "the text", "other bytes", "UTF-8"))
 }

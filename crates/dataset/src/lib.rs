@@ -75,7 +75,7 @@ pub use dataset::Dataset;
 pub use drawn::Drawn;
 pub use engine::{Engine, Outcome, foreign_pour};
 pub use error::DatasetError;
-pub use files::{is_writing, read_file, remove_temporaries, write_file};
+pub use files::{is_writing, read_file, read_text, remove_temporaries, write_file};
 pub use form::Form;
 pub use generate::{
     GatheredBatch, GenerateOptions, Progress, Shard, Summary, generate, generate_with,

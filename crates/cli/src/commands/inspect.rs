@@ -9,7 +9,7 @@ use std::path::Path;
 use anyhow::anyhow;
 use granulcal_dataset::{
     CameraFile, Dataset, DatasetError, Folder, Npz, Prior, load_prior, load_scene, npy, png,
-    read_checkpoint_header,
+    read_checkpoint_header, read_text,
 };
 use granulcal_scene::Scene;
 use serde_json::{Map, Value, json};
@@ -137,7 +137,7 @@ fn toml_facts(path: &Path) -> anyhow::Result<Value> {
         Ok(camera) => return Ok(with_kind("camera", serde_json::to_value(camera)?)),
         Err(error) => anyhow!(error),
     };
-    let is_task = std::fs::read_to_string(path).is_ok_and(|text| text.contains("[[conditions]]"));
+    let is_task = read_text(path).is_ok_and(|text| text.contains("[[conditions]]"));
     let path = path.display();
     if is_task {
         let what = format!("{path} is the task of a loop: `granulcal close-loop {path} -o FOLDER");

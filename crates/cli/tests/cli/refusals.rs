@@ -131,4 +131,9 @@ fn inspect_says_what_reads_the_task_of_a_loop() {
     place.refused(&["inspect", "loop.toml"], &["loop.toml", "close-loop", "--dry-run"]);
     place.write("other.toml", "scene = \"scene.toml\"\n");
     place.refused(&["inspect", "other.toml"], &["as a scene", "as a prior", "as a camera"]);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("/dev/zero", place.at("endless.toml")).unwrap();
+        place.refused(&["inspect", "endless.toml"], &["endless.toml", "a device or pipe"]);
+    }
 }
