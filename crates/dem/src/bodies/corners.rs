@@ -11,7 +11,6 @@ use granulcal_scene::Solid;
 /// The corners of a polyhedron in units of its reach.
 #[derive(Clone, Debug)]
 pub(super) struct Corners {
-    all: Vec<Vector3<f64>>,
     /// The last is filled up with the first corner.
     batches: Vec<Lanes3>,
 }
@@ -28,11 +27,11 @@ impl Corners {
             }
             batch
         };
-        Some(Self { batches: all.chunks(LANES).map(batch).collect(), all })
+        Some(Self { batches: all.chunks(LANES).map(batch).collect() })
     }
 
     /// The corner that is farthest along a direction, the first of equals.
-    pub fn farthest(&self, along: &Vector3<f64>) -> &Vector3<f64> {
+    pub fn farthest(&self, along: &Vector3<f64>) -> Vector3<f64> {
         let mut number = Lanes::ZERO;
         let most = most(&self.batches, along, &mut number);
         let mut best = 0;
@@ -42,7 +41,8 @@ impl Corners {
                 best = lane;
             }
         }
-        self.all.get(number.0[best] as usize).unwrap_or(&self.all[0])
+        let number = number.0[best] as usize;
+        self.batches[number / LANES].get(number % LANES).into()
     }
 }
 
@@ -97,7 +97,7 @@ mod tests {
             if flat {
                 along.z = 0.0; // Corners come in pairs of equals.
             }
-            let corner = *Corners::of(&solid).unwrap().farthest(&along);
+            let corner = Corners::of(&solid).unwrap().farthest(&along);
             let parrys = solid.unit.as_support_map().unwrap().local_support_point(parry(&along));
             prop_assert_eq!(corner, Vector3::new(parrys.x, parrys.y, parrys.z));
         }

@@ -41,7 +41,7 @@ const FEATURES: [OfFeatures; 6] =
 /// where no pair of features answers.
 pub(super) fn nearest([one, other]: &[Cylinder; 2], farthest: f64, near: f64) -> Option<Nearest> {
     let pair = [one, other];
-    let mut along = (pair[1].centre - pair[0].centre).try_normalize(0.0)?;
+    let mut along = (other.centre - one.centre).try_normalize(0.0)?;
     let mut most = separation(pair, &along);
     for of_features in FEATURES {
         let [on_1, on_2] = of_features(pair, &along);

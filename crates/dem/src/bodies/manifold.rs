@@ -174,7 +174,7 @@ struct Core<'a> {
 impl SupportMap for Core<'_> {
     fn local_support_point(&self, towards: Vector) -> Vector {
         let farthest = match self.corners {
-            Some(corners) => parry(corners.farthest(&vector(towards))),
+            Some(corners) => parry(&corners.farthest(&vector(towards))),
             None => self.whole.local_support_point(towards),
         };
         farthest * (1.0 - SHRUNK)
