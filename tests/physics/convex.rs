@@ -1,14 +1,16 @@
 //! Grains that are convex bodies, through the same door as all others: scene, pour, checkpoint. What one body does has
 //! closed forms, in `crates/dem/src/bodies/exams.rs`.
 
-use granulcal::dem::{DemError, GrainShape, Pour, Scene, Simulation, Status};
+use granulcal::dem::{
+    DemError, GrainShape, Motion, Pour, Scene, Shape, Simulation, Start, Status, Wall, WallMaterial,
+};
 use nalgebra::Vector3;
 
 fn scene(shape: GrainShape, count: usize) -> Scene {
     let mut scene = Scene::drop(0.01);
     scene.grains.count = count;
     scene.grains.shape = Some(shape);
-    if let granulcal::dem::Start::Ball { solid_fraction, .. } = &mut scene.start {
+    if let Start::Ball { solid_fraction, .. } = &mut scene.start {
         *solid_fraction = 0.3;
     }
     scene
@@ -79,4 +81,23 @@ fn what_convex_grains_cannot_be_with_is_named() {
     let simulation = Simulation::new(&scene(cube(), 10), 1).unwrap();
     let error = simulation.contact_problem().unwrap_err().to_string();
     assert!(error.contains("grains.shape"), "{error}");
+}
+
+#[test]
+fn a_thin_wall_that_moves_takes_a_body_along() {
+    let (speed, end) = (2.0, 0.02);
+    for seed in 0..6 {
+        let mut scene = scene(cube(), 1);
+        scene.gravity = [0.0; 3];
+        scene.start = Start::Positions { positions: vec![[0.0, 0.0, 0.3]] };
+        (scene.end.horizon, scene.end.kinetic_energy) = (end, 1e-30);
+        let (centre, normal) = ([-0.02, 0.0, 0.3], [1.0, 0.0, 0.0]);
+        let shape = Shape::Disc { centre, normal, radius: 0.05 };
+        let motion = Motion::Lift { velocity: [speed, 0.0, 0.0], begin: 0.0, end };
+        scene.walls.push(Wall { motion, ..Wall::fixed(shape, WallMaterial::default()) });
+        let pour = Simulation::new(&scene, seed).unwrap().run();
+        assert!(pour.health.worst_penetration < 0.1, "{seed}: {:?}", pour.health);
+        // The wall comes 20 mm past where the cube was.
+        assert!(pour.positions[0].x > 0.02, "{seed}: {}", pour.positions[0].x);
+    }
 }

@@ -24,7 +24,7 @@ fn hanging() -> Scene {
             radius: 0.05,
         },
         material: WallMaterial::default(),
-        motion: Motion::Still,
+        motion: Motion::default(),
     });
     scene
 }

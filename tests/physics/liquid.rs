@@ -1,7 +1,8 @@
 //! A liquid with a flow of its own among grains: docs/theory/effects.md, "Liquid".
 
 use granulcal::dem::{
-    Ends, GRAVITY, Grains, Liquid, Motion, Scene, Shape, Simulation, Start, Wall, WallMaterial,
+    EndRule, Ends, GRAVITY, Grains, Liquid, Motion, Scene, Shape, Simulation, Start, Wall,
+    WallMaterial,
 };
 
 use crate::scenes::{RADIUS, bits, block, material, start};
@@ -124,4 +125,24 @@ fn what_it_cannot_be_with_is_named() {
     scene.effects.liquid.permeability = 0.0;
     let error = scene.check().unwrap_err().to_string();
     assert!(error.starts_with("effects.liquid.permeability must be"), "{error}");
+}
+
+#[test]
+fn a_pour_waits_for_its_liquid_and_goes_on_while_that_flows() {
+    let mut scene = column(0.5, water());
+    scene.walls.clear();
+    // At rest long before; the column spreads out and takes grains with it.
+    scene.start = Start::Ball { height: 1e-3, solid_fraction: 0.5, jitter: 1e-5, turned: false };
+    scene.material.rolling_friction = 0.5;
+    scene.effects.liquid.begin = 1.5;
+    scene.end = EndRule { horizon: 3.0, ..Scene::drop(0.1).end };
+    let dry = {
+        let mut dry = scene.clone();
+        dry.effects.liquid.height = 0.0;
+        dry
+    };
+    let ended = start(&dry).run().simulated_s;
+    assert!(ended < 1.2, "{ended}");
+    let wet = start(&scene).run().simulated_s;
+    assert!(wet > 1.6, "{wet}");
 }

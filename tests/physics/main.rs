@@ -29,6 +29,7 @@ mod robustness;
 mod rolling;
 mod rolling_dashpot;
 mod scenes;
+mod similarity;
 mod solvers;
 mod splash;
 mod stack;

@@ -136,5 +136,8 @@ fn a_period_too_short_for_the_grains_is_refused() {
     let mut scene = falling(0.0, 0.5);
     scene.periodic = Some(Periodic { axis: PeriodicAxis::Y, from: 0.0, to: 7.9 * RADIUS });
     let said = Simulation::new(&scene, 1).unwrap_err().to_string();
-    assert!(said.contains("periodic.to") && said.contains("4 grain diameters"), "{said}");
+    assert!(
+        said.contains("periodic.to") && said.contains("4 diameters of the widest grain"),
+        "{said}"
+    );
 }

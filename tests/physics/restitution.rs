@@ -28,6 +28,16 @@ fn realised(scene: &Scene, dt: f64) -> f64 {
 }
 
 #[test]
+fn a_bounce_that_gives_all_back_creates_no_energy() {
+    for height in [0.005, 0.02, 0.1] {
+        let mut simulation = start(&one_grain(RADIUS + height, material(0.5, 0.1, 1.0)));
+        simulation.advance(1.0);
+        let created = simulation.health().energy_created;
+        assert!(created < 1e-3, "{height}: {created}");
+    }
+}
+
+#[test]
 fn restitution_is_realised_at_any_speed_and_substep() {
     for substeps in [5, 10, 20, 40] {
         let dt = 1.0 / (60.0 * f64::from(substeps));

@@ -90,6 +90,8 @@ pub struct MisfitReference {
     squares: Vec<f64>,
     residuals: Matrix,
     own_noise: Matrix,
+    /// Whether the noise is in standard deviations where its pair is; models of before have it as it is.
+    is_unit: bool,
 }
 
 impl MisfitReference {
@@ -99,12 +101,18 @@ impl MisfitReference {
     /// [`ModelError::Content`] for arrays that are missing, of another shape, not finite, or of no pair.
     pub fn read(tensors: &Tensors<'_>, s: usize) -> Result<Self, ModelError> {
         let residuals = tensors.rows("misfit_residuals", None, Some(s))?;
-        let own_noise = tensors.rows("misfit_noise", None, Some(s))?;
-        let squares = tensors.take("misfit_squares", &[residuals.rows()])?;
+        let rows = residuals.rows();
+        let unit_noise = tensors.matrix_if_there("misfit_unit_noise", rows, s)?;
+        let is_unit = unit_noise.is_some();
+        let own_noise = match unit_noise {
+            Some(noise) => noise,
+            None => tensors.rows("misfit_noise", None, Some(s))?,
+        };
+        let squares = tensors.take("misfit_squares", &[rows])?;
         if squares.is_empty() || own_noise.rows() == 0 {
             return Err(tensors.unfit("misfit_squares", "of at least one pair", "none"));
         }
-        Ok(Self { squares, residuals, own_noise })
+        Ok(Self { squares, residuals, own_noise, is_unit })
     }
 
     /// The test of pours that are standardised without being moved into the training range.
@@ -142,6 +150,8 @@ impl MisfitReference {
         let here = fit.predict(u);
         let here = Prediction::of(&here);
         let shared = 1.0 - pooled.share / (fit.widening * fit.widening);
+        // The noise of pairs from the whole prior, as large as it is here.
+        let scale = |j: usize| if self.is_unit { here.noise[j].sqrt() } else { 1.0 };
         // All that is random is drawn first, so that threads may share the fits.
         let errors: Vec<Vec<f64>> = (0..REPLICATES)
             .map(|_| {
@@ -155,7 +165,8 @@ impl MisfitReference {
                 let unknown = |j: usize| here.unknown[j].sqrt() * dot(fit.root.row(j), &normal);
                 (0..size)
                     .map(|j| {
-                        (1.0 - shared).sqrt() * own[j] + shared.sqrt() * common[j] + unknown(j)
+                        let noise = (1.0 - shared).sqrt() * own[j] + shared.sqrt() * common[j];
+                        scale(j) * noise + unknown(j)
                     })
                     .collect()
             })

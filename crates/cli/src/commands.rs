@@ -63,7 +63,8 @@ Start here:
   granulcal-cli infer model pile.bag                  its material, by a model of `granulcal train`
 
 Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours unhealthy or without
-grains in view, some frames of a recording lost, or a recording outside the model, 130 stopped. Results go to stdout, progress and messages to stderr.")]
+grains in view, rows missing in what is merged, some frames of a recording lost, or a recording
+outside the model, 130 stopped. Results go to stdout, progress and messages to stderr.")]
 pub struct Cli {
     #[command(flatten)]
     pub global: Global,

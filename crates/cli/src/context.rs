@@ -45,14 +45,16 @@ pub fn note(line: &str) {
     let _ = writeln!(io::stderr(), "{}", readable(line));
 }
 
-/// Prints a line of results.
+/// Prints a line of results. A reader that has gone away had enough: how the command ended is not changed by it.
 ///
 /// # Errors
-/// What stdout says, a broken pipe above all.
+/// What stdout says otherwise, a disk that is full above all.
 pub fn print_line(line: &str) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
-    writeln!(out, "{}", plain(line))?;
-    Ok(out.flush()?)
+    match writeln!(out, "{}", plain(line)).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => Ok(other?),
+    }
 }
 
 /// Prints one JSON object.

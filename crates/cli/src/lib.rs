@@ -4,10 +4,10 @@
 //!
 //! | code | meaning |
 //! |---|---|
-//! | 0 | done; also when whoever read stdout closed it |
+//! | 0 | done; a reader of stdout that goes away changes no code |
 //! | 1 | failed: a disk that is full, a folder in use; the result is printed even if a file beside it failed |
 //! | 2 | bad arguments or bad input |
-//! | 3 | done, but some pours are unhealthy or show no grains, a recording is cut off or damaged, or outside the model |
+//! | 3 | done, but pours unhealthy or without grains in view, rows missing, a recording damaged or outside the model |
 //! | 130 | stopped by Ctrl-C or a termination signal; finished rows are kept |
 
 mod args;
@@ -28,7 +28,6 @@ use clap::FromArgMatches;
 
 use commands::Cli;
 use context::Context;
-use outcome::Outcome;
 pub use program::{Further, FurtherOption, Program};
 use run::{Run, Setting};
 
@@ -79,11 +78,8 @@ pub fn run_as(program: &Program, args: impl IntoIterator<Item = OsString>) -> u8
     match checked.and_then(|()| cli.command.run(&setting)) {
         Ok(outcome) => outcome.exit_code(),
         Err(error) => {
-            let code = outcome::exit_code_of(&error);
-            if code != Outcome::Done.exit_code() {
-                context::note(&format!("error: {error:#}"));
-            }
-            code
+            context::note(&format!("error: {error:#}"));
+            outcome::exit_code_of(&error)
         }
     }
 }

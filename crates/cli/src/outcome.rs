@@ -1,7 +1,5 @@
 //! How a command ended, and the exit codes.
 
-use std::io;
-
 use granulcal_bayessim::ModelError;
 use granulcal_dataset::DatasetError;
 use granulcal_dem::DemError;
@@ -15,7 +13,7 @@ pub enum Outcome {
     Done,
     /// As asked, but some pours cannot be used.
     SomeUnhealthy,
-    /// As asked, but the input is cut off or damaged and a part of it is lost.
+    /// As asked, but the input is cut off or damaged, or does not have all its rows, and a part of it is lost.
     SomeLost,
     /// As asked, but the model cannot explain what was recorded.
     OutsideModel,
@@ -60,7 +58,7 @@ impl std::fmt::Display for BadArgument {
 
 impl std::error::Error for BadArgument {}
 
-/// The exit code of an error: 0 for a reader that had enough, 2 for bad input, else 1.
+/// The exit code of an error: 2 for bad input, else 1.
 pub fn exit_code_of(error: &anyhow::Error) -> u8 {
     for cause in error.chain() {
         if let Some(cause) = cause.downcast_ref::<DatasetError>() {
@@ -73,10 +71,6 @@ pub fn exit_code_of(error: &anyhow::Error) -> u8 {
             || cause.is::<FeatureError>()
         {
             return 2;
-        }
-        if cause.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe)
-        {
-            return 0;
         }
     }
     1

@@ -55,7 +55,7 @@ impl RowProgress {
             .map(|(count, what)| format!("{count} {what}"))
             .collect();
         let told = if told.is_empty() { String::new() } else { format!(" ({})", told.join(", ")) };
-        let pace = pace(total - done, made, self.started.elapsed());
+        let pace = pace(total.saturating_sub(done), made, self.started.elapsed());
         self.bar.set_message(format!("{pace}{told}"));
         if self.lines && self.last_line.elapsed() >= PERIOD {
             self.last_line = Instant::now();

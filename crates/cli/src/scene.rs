@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use granulcal_dataset::{
     DatasetError, Observer, POLL_INTERVAL, Prior, Room, load_prior, load_scene, load_sensor,
-    record_pour, resume_checkpoint, write_checkpoint,
+    read_checkpoint_header, record_pour, resume_checkpoint, write_checkpoint,
 };
 use granulcal_dem::{Pour, Simulation};
 use granulcal_scene::Scene;
@@ -148,6 +148,31 @@ pub fn start(
     }
 }
 
+/// Refuses to begin a pour anew over a checkpoint that is further on with it.
+///
+/// One of another pour, or that nobody can go on from, is replaced as any output of a command is.
+fn require_no_further(
+    path: &Path,
+    scene: &Scene,
+    seed: u64,
+    simulation: &Simulation,
+) -> Result<(), DatasetError> {
+    let Ok(kept) = read_checkpoint_header(path) else { return Ok(()) };
+    let is_same = kept.seed == seed
+        && kept.scene.first_difference(scene).is_ok_and(|difference| difference.is_none());
+    if !is_same || kept.time() <= simulation.time() {
+        return Ok(());
+    }
+    let (shown, at, begun) = (path.display(), kept.time(), simulation.time());
+    Err(DatasetError::Output {
+        argument: "--checkpoint".to_owned(),
+        reason: format!(
+            "{shown} has this pour at {at:.3} s, and going on from {begun:.3} s would replace it; go on from it with \
+             --resume {shown}, or delete it"
+        ),
+    })
+}
+
 /// Simulates `scene` from where `simulation` is to its end, before the eyes of `observer`; `None` when the user stopped
 /// it.
 ///
@@ -179,6 +204,7 @@ pub fn pour(
         }
         Keep::Nothing => run(simulation, observer, &mut watch, &mut |_, _| Ok(()))?,
         Keep::Checkpoint { path, every } => {
+            require_no_further(path, scene, seed, &simulation)?;
             let mut last = None;
             let mut failed = None;
             let pour = run(simulation, observer, &mut watch, &mut |simulation, must| {

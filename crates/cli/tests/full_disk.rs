@@ -114,6 +114,9 @@ fn what_was_there_stays_on_a_full_disk_and_a_batch_goes_on_when_there_is_room() 
     let part = disk.0.join("batch/part-000000.parquet");
     let before = fs::read(&part).unwrap();
     disk.fill("full");
+    // Nothing is left to do.
+    let output = place.run(&batch("3"));
+    assert!(finished(output.status.code()), "{}", text(&output.stderr));
     assert!(is_refused(&place.run(&batch("6"))));
     assert_eq!(fs::read(&part).unwrap(), before);
     assert!(

@@ -2,10 +2,10 @@
 
 mod place;
 
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use place::{Place, text};
+use place::{Place, interrupt, text};
 
 /// A pour that is over in milliseconds.
 const TINY: [&str; 8] = [
@@ -23,7 +23,7 @@ const TINY: [&str; 8] = [
 fn what_has_no_room_is_refused_by_name() {
     let place = Place::new();
     let room = ["GRANULCAL_NO_LIMITS", "memory"];
-    place.refused(&["simulate", "drop", "--set", "grains.count=1e18"], &room);
+    place.refused(&["simulate", "drop", "--set", "grains.count=1e15"], &room);
     place.refused(&["render", "drop", "--set", "grains.count=1e11", "-o", "a.png"], &room);
     place.refused(&["generate", "drop", "default", "--set", "grains.count=1e11", "-o", "d"], &room);
     let disk = ["GRANULCAL_NO_LIMITS", "disk"];
@@ -51,6 +51,41 @@ fn more_threads_than_there_can_be_are_as_many_as_there_can_be() {
     assert!(matches!(output.status.code(), Some(0 | 3)), "{}", text(&output.stderr));
 }
 
+/// `ulimit -u` does not bind root, who takes another user's place where that can be done.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_batch_for_which_no_thread_is_started_ends_with_a_message() {
+    use std::fs;
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    use std::process::Command;
+
+    let place = Place::new();
+    fs::set_permissions(place.at(""), PermissionsExt::from_mode(0o777)).unwrap();
+    let is_root = fs::metadata("/proc/self").unwrap().uid() == 0;
+    let mut command = if is_root {
+        let mut command = Command::new("setpriv");
+        command.args(["--reuid=65534", "--clear-groups", "sh"]);
+        command
+    } else {
+        Command::new("sh")
+    };
+    let args = ["generate", "drop", "default", "-n", "3", "--threads", "2", "-o", "d"];
+    // The one shell calls it u, the other p.
+    let limited = "ulimit -u 1 2>/dev/null || ulimit -p 1 || exit 127; exec \"$0\" \"$@\"";
+    let output = command
+        .args(["-c", limited, env!("CARGO_BIN_EXE_granulcal-cli")])
+        .args([&args[..], &TINY].concat())
+        .current_dir(place.at(""))
+        .output();
+    let Some(output) = output.ok().filter(|o| !matches!(o.status.code(), Some(126 | 127))) else {
+        eprintln!("skipped: the program cannot be run as another user");
+        return;
+    };
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("no thread can be started") && !said.contains("panicked"), "{said}");
+}
+
 /// What goes on for much longer than the test, and does not look at the time: millions of grains are put in place.
 #[cfg(unix)]
 fn long(place: &Place) -> std::process::Child {
@@ -58,13 +93,6 @@ fn long(place: &Place) -> std::process::Child {
     let mut command = place.command(&count);
     command.env("GRANULCAL_NO_LIMITS", "1").stdout(Stdio::null()).stderr(Stdio::null());
     command.spawn().unwrap()
-}
-
-#[cfg(unix)]
-fn interrupt(child: &std::process::Child) {
-    assert!(
-        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success()
-    );
 }
 
 /// Waits for the end, which a command that minds no signal would not come to.
@@ -89,7 +117,7 @@ fn ctrl_c_ends_what_does_not_look_and_twice_at_once() {
         let mut child = long(&place);
         std::thread::sleep(Duration::from_millis(400));
         for _ in 0..times {
-            interrupt(&child);
+            assert!(interrupt(&child));
             std::thread::sleep(Duration::from_millis(20));
         }
         assert_eq!(ended(&mut child), Some(130));

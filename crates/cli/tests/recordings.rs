@@ -172,7 +172,8 @@ fn infer_evaluates_a_model_without_python() {
     let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../bayessim/tests/data");
     let model = models.join("pile").display().to_string();
     let place = Place::new();
-    copied(&place, BAG);
+    let bytes = copied(&place, BAG);
+    place.write("again.bag", bytes);
     // The model is of made-up statistics: no parameters explain a pile.
     let found = json(&place.expect(3, &["infer", &model, BAG, "--json", "--samples", "50"]));
     assert_eq!(found["inside_model"]["is_inside"], false);
@@ -187,7 +188,8 @@ fn infer_evaluates_a_model_without_python() {
     assert!(high.as_f64().unwrap() <= 1.0);
     let mode = friction["mode"].as_f64().unwrap();
     assert!((0.0..=1.0).contains(&mode));
-    let lines = place.expect(3, &["infer", &model, BAG, BAG]);
+    place.refused(&["infer", &model, BAG, BAG], &["given once", BAG]);
+    let lines = place.expect(3, &["infer", &model, BAG, "again.bag"]);
     assert!(lines.contains("OUTSIDE THE MODEL"), "{lines}");
     assert!(lines.contains("material.restitution") && lines.contains("90 % interval"), "{lines}");
     let other = models.join("auto").display().to_string();

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use granulcal_features::stats::DIAGNOSTIC_COUNT;
 use granulcal_features::{DIAGNOSTICS, PAPER16};
 
+use crate::gaps::Gaps;
 use crate::header::Header;
 use crate::manifest::{self, Manifest};
 use crate::row::Row;
@@ -22,6 +23,8 @@ pub struct Dataset {
     /// Files that do not say what their rows hash to, so that damage in them cannot be found: those of before there
     /// was a hash.
     pub unverified: Vec<PathBuf>,
+    /// The most rows that the data set was asked to have over all shards; `None` where that was not written down.
+    pub asked: Option<u64>,
 }
 
 impl Dataset {
@@ -32,18 +35,17 @@ impl Dataset {
     /// file and what is wrong with it; [`DatasetError::Differs`] for parts of different data sets.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
         if !path.is_dir() {
-            let Table { header, rows, is_verified } = table::read(path)?;
+            let Table { header, rows, is_verified, asked } = table::read(path)?;
             let unverified = if is_verified { Vec::new() } else { vec![path.to_owned()] };
-            let mut dataset = Self { header, rows, unverified };
+            let mut dataset = Self { header, rows, unverified, asked };
             dataset.sort(path)?;
             return Ok(dataset);
         }
-        let manifest = Manifest::of(path)?;
-        let header = manifest.header;
-        let mut dataset = Self { header, rows: Vec::new(), unverified: Vec::new() };
+        let Manifest { header, rows: asked, .. } = Manifest::of(path)?;
+        let mut dataset = Self { header, rows: Vec::new(), unverified: Vec::new(), asked };
         for chunk in manifest::parts(path)? {
             let part = manifest::part_path(path, chunk);
-            let Table { header, rows, is_verified } = table::read(&part)?;
+            let Table { header, rows, is_verified, .. } = table::read(&part)?;
             dataset.header.require_same(&part, &header)?;
             dataset.rows.extend(rows);
             if !is_verified {
@@ -68,7 +70,7 @@ impl Dataset {
     /// Writes the data set as one Parquet file.
     ///
     /// # Errors
-    /// [`DatasetError::Io`] or [`DatasetError::Parquet`].
+    /// [`DatasetError::Io`].
     pub fn write(&self, path: &Path) -> Result<(), DatasetError> {
         table::write(path, &self.header, &self.rows)
     }
@@ -125,14 +127,21 @@ impl Dataset {
         counts
     }
 
-    /// The first rows that are missing below the highest index, at most `limit` of them.
+    /// The first rows that are missing of those asked for, or below the highest index where that was not written down,
+    /// at most `limit` of them.
     pub fn gaps(&self, limit: usize) -> Vec<u64> {
-        let mut expected = 0;
-        let mut gaps = Vec::new();
-        for row in &self.rows {
-            gaps.extend((expected..row.row).take(limit - gaps.len().min(limit)));
-            expected = row.row + 1;
-        }
+        self.all_gaps(limit).first
+    }
+
+    /// How many rows are missing, counted as [`Dataset::gaps`] names them.
+    pub fn missing(&self) -> u64 {
+        self.all_gaps(0).count
+    }
+
+    fn all_gaps(&self, limit: usize) -> Gaps {
+        let mut gaps = Gaps::new(limit);
+        self.rows.iter().for_each(|row| gaps.pass(row.row));
+        gaps.end(self.asked);
         gaps
     }
 }

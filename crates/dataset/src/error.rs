@@ -215,6 +215,11 @@ pub enum DatasetError {
         /// What was given.
         given: String,
     },
+    /// The system starts no thread for the pours.
+    #[error(
+        "no thread can be started for the pours; does a limit of the shell (ulimit -u, -v) allow any?"
+    )]
+    NoThread(#[source] io::Error),
     /// Another process is writing into the folder.
     #[error("{}: another generate is writing into this folder", path.display())]
     Locked {
@@ -252,6 +257,7 @@ impl DatasetError {
             Self::TomlWrite { .. }
             | Self::Mcap { .. }
             | Self::Locked { .. }
+            | Self::NoThread(_)
             | Self::Engine { .. } => false,
             Self::Row { source, .. } => source.is_bad_input(),
             _ => true,

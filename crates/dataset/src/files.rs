@@ -11,6 +11,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::{DatasetError, Form};
 
+#[cfg(target_os = "linux")]
+mod leftovers;
+
 /// End of the name of a file that is being written.
 pub(crate) const TEMPORARY: &str = ".tmp";
 /// Most bytes of a file that is read as a whole: 4 GiB, which is a data set of four million rows.
@@ -235,7 +238,11 @@ pub(crate) fn create_beside(place: &Path) -> io::Result<(PathBuf, File)> {
         let hidden = format!(".{name}.{}-{attempt}{TEMPORARY}", std::process::id());
         let temporary = place.with_file_name(hidden);
         match OpenOptions::new().write(true).create_new(true).open(&temporary) {
-            Ok(file) => return Ok((temporary, file)),
+            Ok(file) => {
+                #[cfg(target_os = "linux")]
+                leftovers::remove(place, (&name, TEMPORARY), &file);
+                return Ok((temporary, file));
+            }
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             Err(error) => return Err(error),
         }

@@ -86,6 +86,8 @@ pub fn generate_with(
 ) -> Result<Summary, DatasetError> {
     check(options)?;
     let mut header = Header::new(scene, prior, options.seed)?;
+    // Before the first pour: a batch that ends at a draw cannot go on with another prior.
+    prior.check_draws(scene, options.seed, options.rows).map_err(DatasetError::Prior)?;
     if let Some(engine) = &engine {
         header.version = engine.version();
         header.law = Some(FOREIGN_LAW);
@@ -93,9 +95,9 @@ pub fn generate_with(
         header.arithmetic = FIRST_ARITHMETIC;
     }
     let threads = options.threads.min(most_threads());
-    Room::of_batch(scene, options.rows, threads, options.chunk).require(Some(out))?;
-    let folder = Folder::open(out, header, options)?;
-    let Remaining { missing, open, progress } = folder.remaining(options)?;
+    let room = |rows, chunk| Room::of_batch(scene, rows, threads, chunk);
+    let (folder, remaining) = Folder::begin(out, header, options, &room)?;
+    let Remaining { missing, open, progress } = remaining;
     let queue = Mutex::new(Queue::new(missing, options, folder.chunk));
     let batch = Batch { rows: options.rows, folder: &folder, engine, chunks: open, progress };
     batch.run(options, &queue, threads, watch)
@@ -148,16 +150,17 @@ impl Batch<'_> {
         threads: usize,
         watch: &mut dyn FnMut(&Progress) -> bool,
     ) -> Result<Summary, DatasetError> {
-        let left = self.progress.total - self.progress.resumed;
+        let left = self.progress.total.saturating_sub(self.progress.resumed);
         let stop = AtomicBool::new(!watch(&self.progress));
         // Rows are handed over: when the caller stops, at most one finished row of a worker is still to come.
         let (sender, finished) = sync_channel(0);
         let (header, engine) = (&self.folder.header, self.engine);
 
         let outcome = std::thread::scope(|scope| {
-            for _ in 0..threads.min(usize::try_from(left).unwrap_or(usize::MAX)) {
+            let mut outcome = Ok(());
+            for started in 0..threads.min(usize::try_from(left).unwrap_or(usize::MAX)) {
                 let (sender, stop) = (sender.clone(), &stop);
-                scope.spawn(move || {
+                let work = move || {
                     let keep_going = || !stop.load(Ordering::Relaxed);
                     while keep_going() {
                         // Nobody panics while the queue is locked.
@@ -172,10 +175,16 @@ impl Batch<'_> {
                             break;
                         }
                     }
-                });
+                };
+                if let Err(error) = std::thread::Builder::new().spawn_scoped(scope, work) {
+                    // The system has no more: those that were started make all of the rows.
+                    if started == 0 {
+                        outcome = Err(DatasetError::NoThread(error));
+                    }
+                    break;
+                }
             }
             drop(sender);
-            let mut outcome = Ok(());
             let mut flushed = Instant::now();
             loop {
                 let result = match finished.recv_timeout(PATIENCE) {

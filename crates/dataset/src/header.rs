@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use granulcal_dem::{LAW, arithmetic};
+use granulcal_dem::{arithmetic, law_of};
 use granulcal_scene::{Prior, Scene, SceneError};
 
 use crate::{DatasetError, ObservedStatistic, observed_statistics, scene_file};
@@ -48,7 +48,7 @@ impl Header {
             scene: scene.clone(),
             prior: prior.clone(),
             version: VERSION.to_owned(),
-            law: Some(LAW),
+            law: Some(law_of(scene)),
             arithmetic: arithmetic(scene),
             seed,
             scene_toml: scene.to_toml().map_err(DatasetError::refused)?,
@@ -63,10 +63,11 @@ impl Header {
 
     /// What a user of the rows must know of the law that they follow, unless it is today's or another simulator's.
     pub fn other_law(&self) -> Option<String> {
+        let today = law_of(&self.scene);
         match self.law {
-            Some(LAW | FOREIGN_LAW) => None,
+            Some(law) if law == today || law == FOREIGN_LAW => None,
             law => Some(format!(
-                "made by {}, which is not today's {LAW}: its pours are those of another simulator",
+                "made by {}, which is not today's {today}: its pours are those of another simulator",
                 law_text(law)
             )),
         }
@@ -156,6 +157,8 @@ fn describe(prior: &Prior) -> String {
 
 #[cfg(test)]
 mod tests {
+    use granulcal_dem::LAW;
+
     use super::*;
 
     #[test]

@@ -36,6 +36,7 @@ mod error;
 mod fault;
 mod files;
 mod form;
+mod gaps;
 mod generate;
 mod header;
 mod image_file;

@@ -25,6 +25,9 @@ struct Contents {
     arithmetic: u32,
     seed: u64,
     chunk: u64,
+    // Folders of before it was written have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rows: Option<u64>,
     scene: String,
     prior: String,
 }
@@ -34,11 +37,13 @@ fn first_arithmetic() -> u32 {
     FIRST_ARITHMETIC
 }
 
-/// The header of a folder and the rows in each of its parts.
+/// The header of a folder, the rows in each of its parts and of the whole data set.
 #[derive(Clone, Debug)]
 pub(crate) struct Manifest {
     pub(crate) header: Header,
     pub(crate) chunk: u64,
+    /// The most rows that the data set was asked to have over all shards; `None` where it was not written down.
+    pub(crate) rows: Option<u64>,
 }
 
 impl Manifest {
@@ -60,9 +65,9 @@ impl Manifest {
         if contents.chunk == 0 {
             return refuse("chunk", 0, "at least 1");
         }
-        let Contents { version, law, arithmetic, seed, chunk, scene, prior, .. } = contents;
+        let Contents { version, law, arithmetic, seed, chunk, rows, scene, prior, .. } = contents;
         let header = Header::parse(&path, &scene, &prior, version, (law, arithmetic), seed)?;
-        Ok(Some(Self { header, chunk }))
+        Ok(Some(Self { header, chunk, rows }))
     }
 
     /// Reads the manifest of a folder that must have one.
@@ -80,6 +85,7 @@ impl Manifest {
             arithmetic: self.header.arithmetic,
             seed: self.header.seed,
             chunk: self.chunk,
+            rows: self.rows,
             scene: self.header.scene_toml.clone(),
             prior: self.header.prior_toml.clone(),
         };
@@ -91,15 +97,20 @@ impl Manifest {
 
 /// The file of a chunk.
 pub(crate) fn part_path(folder: &Path, chunk: u64) -> PathBuf {
-    folder.join(format!("part-{chunk:06}.parquet"))
+    folder.join(part_name(chunk))
 }
 
-/// The chunks whose parts lie in a folder, in order.
+fn part_name(chunk: u64) -> String {
+    format!("part-{chunk:06}.parquet")
+}
+
+/// The chunks whose parts lie in a folder, in order. `part-1.parquet` is none: the part of chunk 1 has another name.
 pub(crate) fn parts(folder: &Path) -> Result<Vec<u64>, DatasetError> {
-    let mut chunks: Vec<u64> = names(folder)?
-        .iter()
-        .filter_map(|name| name.strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok())
-        .collect();
+    let chunk_of = |name: &String| {
+        let chunk = name.strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()?;
+        (part_name(chunk) == *name).then_some(chunk)
+    };
+    let mut chunks: Vec<u64> = names(folder)?.iter().filter_map(chunk_of).collect();
     chunks.sort_unstable();
     Ok(chunks)
 }

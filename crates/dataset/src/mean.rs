@@ -12,7 +12,23 @@ pub(crate) struct Mean {
     height: usize,
     state: State,
     frames: usize,
+    /// The image that was the least like the mean of those before it, if one was unlike it.
+    unlike: Option<Unlike>,
 }
+
+/// An image that is not of what the others are of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Unlike {
+    /// Its number among those added.
+    frame: usize,
+    /// Of the pixels with data those that are off by more than [`OFF`] `[-]`.
+    share: f64,
+}
+
+/// Pixels of one view differ by less than this in depth, but for a few at edges `[-]`.
+const OFF: f64 = 0.02;
+/// How few that is `[-]`.
+const FEW: f64 = 0.03;
 
 enum State {
     /// Up to one image, as it came: most recordings of one image never need the sums.
@@ -34,7 +50,7 @@ impl Mean {
     /// The mean of one image.
     pub(crate) fn new(frame: DepthFrame) -> Self {
         let DepthFrame { width, height, values } = frame;
-        Self { width, height, state: State::One(values), frames: 1 }
+        Self { width, height, state: State::One(values), frames: 1, unlike: None }
     }
 
     /// Images that were added.
@@ -70,6 +86,10 @@ impl Mean {
                 }
             };
         }
+        let share = self.share_off(&frame.values);
+        if share > self.unlike.map_or(FEW, |unlike| unlike.share) {
+            self.unlike = Some(Unlike { frame: self.frames, share });
+        }
         match (&mut self.state, &frame.values) {
             (State::Counts(sums), Values::Counts(counts)) => {
                 sums.add(counts.iter().map(|&count| u32::from(count)));
@@ -83,6 +103,42 @@ impl Mean {
         }
         self.frames += 1;
         Ok(())
+    }
+
+    /// Of the pixels with data in an image and before those that are off by more than [`OFF`] `[-]`.
+    fn share_off(&self, values: &Values) -> f64 {
+        let (mut both, mut off) = (0.0, 0.0);
+        let mut compare = |sum: f64, valid: u16, value: f64| {
+            if valid > 0 && value > 0.0 {
+                let mean = sum / f64::from(valid);
+                both += 1.0;
+                off += f64::from(u8::from((value - mean).abs() > OFF * mean));
+            }
+        };
+        match (&self.state, values) {
+            (State::Counts(sums), Values::Counts(counts)) => {
+                for ((&sum, &valid), &count) in sums.sums.iter().zip(&sums.valid).zip(counts) {
+                    compare(f64::from(sum), valid, f64::from(count));
+                }
+            }
+            (State::Metres(sums), Values::Metres(metres)) => {
+                for ((&sum, &valid), &value) in sums.sums.iter().zip(&sums.valid).zip(metres) {
+                    compare(sum, valid, valid_metres(value));
+                }
+            }
+            _ => {}
+        }
+        off / f64::max(both, 1.0)
+    }
+
+    /// That the images are not of one view, if one is unlike the mean of those before it.
+    pub(crate) fn doubt(&self) -> Option<String> {
+        let Unlike { frame, share } = self.unlike?;
+        Some(format!(
+            "frame {frame} of those averaged differs from those before it in {:.0} % of its pixels: frames are averaged as \
+             images of one formation at rest; give several pours as several recordings",
+            100.0 * share
+        ))
     }
 
     /// The mean `[m]`; counts are `unit` metres each.

@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use crate::DatasetError;
+use crate::gaps::Gaps;
 use crate::header::Header;
 use crate::manifest::{self, Manifest};
 use crate::row::Row;
@@ -20,7 +21,11 @@ pub struct Merged {
     pub header: Header,
     /// Rows in the file.
     pub rows: usize,
-    /// The first rows that are missing below the highest index, at most as many as were asked for.
+    /// The most rows that one of the inputs says the data set was asked to have; `None` if none says.
+    pub asked: Option<u64>,
+    /// How many of them are missing, or below the highest index where none says.
+    pub missing: u64,
+    /// The first that are missing, at most as many as were to be named.
     pub gaps: Vec<u64>,
     /// Files that do not say what their rows hash to: see [`crate::Dataset::unverified`].
     pub unverified: Vec<PathBuf>,
@@ -34,9 +39,12 @@ pub struct Merged {
 /// them, [`DatasetError::Argument`] for no input; else as [`crate::Dataset::open`] and [`crate::Dataset::write`]. The
 /// file is then as it was before.
 pub fn merge(inputs: &[PathBuf], out: &Path, named_gaps: usize) -> Result<Merged, DatasetError> {
-    let (header, mut waiting) = sources(inputs)?;
+    let Sources { header, asked, mut waiting } = sources(inputs)?;
     let mut file = GroupWriter::create(out, &header)?;
-    let mut merged = Merged { header, rows: 0, gaps: Vec::new(), unverified: Vec::new() };
+    let mut gaps = Gaps::new(named_gaps);
+    let (rows, missing) = (0, 0);
+    let mut merged =
+        Merged { header, rows, asked, missing, gaps: Vec::new(), unverified: Vec::new() };
     let mut open: Vec<OpenSource> = Vec::new();
     // The row that was written last, and where it stood.
     let mut last: Option<(u64, PathBuf)> = None;
@@ -55,16 +63,13 @@ pub fn merge(inputs: &[PathBuf], out: &Path, named_gaps: usize) -> Result<Merged
         let Some(least) = least else { break };
         let source = &mut open[least];
         let Some(row) = source.rows.pop_front() else { break };
-        let expected = match &last {
-            Some((last, first)) if row.row <= *last => {
-                let (first, second) = (first.clone(), source.input.clone());
-                return Err(DatasetError::DuplicateRow { row: row.row, first, second });
-            }
-            Some((last, _)) => last + 1,
-            None => 0,
-        };
-        let room = named_gaps - merged.gaps.len();
-        merged.gaps.extend((expected..row.row).take(room));
+        if let Some((last, first)) = &last
+            && row.row <= *last
+        {
+            let (first, second) = (first.clone(), source.input.clone());
+            return Err(DatasetError::DuplicateRow { row: row.row, first, second });
+        }
+        gaps.pass(row.row);
         last = Some((row.row, source.input.clone()));
         if source.rows.is_empty() {
             open.swap_remove(least);
@@ -72,8 +77,20 @@ pub fn merge(inputs: &[PathBuf], out: &Path, named_gaps: usize) -> Result<Merged
         merged.rows += 1;
         file.push(row)?;
     }
-    file.commit()?;
+    file.commit(asked)?;
+    gaps.end(asked);
+    (merged.missing, merged.gaps) = (gaps.count, gaps.first);
     Ok(merged)
+}
+
+/// What is to be merged.
+#[derive(Debug)]
+struct Sources {
+    header: Header,
+    /// The most rows that an input says were asked for.
+    asked: Option<u64>,
+    /// The files of all inputs, by their first rows.
+    waiting: VecDeque<Source>,
 }
 
 /// A file that is still to be opened.
@@ -94,13 +111,15 @@ struct OpenSource {
     rows: VecDeque<Row>,
 }
 
-/// The files of all inputs by their first rows, and what they are of.
-fn sources(inputs: &[PathBuf]) -> Result<(Header, VecDeque<Source>), DatasetError> {
+/// The files of all inputs, and what they are of.
+fn sources(inputs: &[PathBuf]) -> Result<Sources, DatasetError> {
     let mut found: Option<Header> = None;
+    let mut asked = None;
     let mut sources = Vec::new();
     for input in inputs {
         let of_input = if input.is_dir() {
-            let Manifest { header, chunk } = Manifest::of(input)?;
+            let Manifest { header, chunk, rows } = Manifest::of(input)?;
+            asked = asked.max(rows);
             sources.extend(manifest::parts(input)?.into_iter().map(|number| Source {
                 input: input.clone(),
                 file: manifest::part_path(input, number),
@@ -111,6 +130,7 @@ fn sources(inputs: &[PathBuf]) -> Result<(Header, VecDeque<Source>), DatasetErro
         } else {
             let mut table = table::read(input)?;
             table.rows.sort_by_key(|row| row.row);
+            asked = asked.max(table.asked);
             let header = table.header.clone();
             let first = table.rows.first().map_or(0, |row| row.row);
             let (input, file) = (input.clone(), input.clone());
@@ -129,7 +149,7 @@ fn sources(inputs: &[PathBuf]) -> Result<(Header, VecDeque<Source>), DatasetErro
         got: "0".to_owned(),
         allowed: "at least 1",
     })?;
-    Ok((header, sources.into()))
+    Ok(Sources { header, asked, waiting: sources.into() })
 }
 
 impl Source {

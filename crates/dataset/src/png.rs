@@ -47,7 +47,7 @@ pub fn read_colour(path: &Path) -> Result<ColourImage, DatasetError> {
 ///
 /// # Errors
 /// [`DatasetError::Io`], [`DatasetError::Png`], or [`DatasetError::Argument`] for a unit in which a
-/// depth does not fit 16 bits.
+/// depth does not fit 16 bits, or in which no depth is anything but 0.
 pub fn write_depth(path: &Path, image: &DepthImage, depth_unit: f64) -> Result<(), DatasetError> {
     let counts = counts(image, depth_unit)?;
     let (width, height) = (image.width as u32, image.height as u32);
@@ -64,15 +64,19 @@ pub fn write_depth(path: &Path, image: &DepthImage, depth_unit: f64) -> Result<(
 
 /// Depth in counts of `depth_unit`, rounded; no data is 0.
 pub(crate) fn counts(image: &DepthImage, depth_unit: f64) -> Result<Vec<u16>, DatasetError> {
-    let refuse = |got: f64, allowed| {
-        Err(DatasetError::Argument { what: "depth unit [m]", got: got.to_string(), allowed })
-    };
+    let refuse =
+        |got, allowed| Err(DatasetError::Argument { what: "depth unit [m]", got, allowed });
     if !(depth_unit > 0.0 && depth_unit.is_finite()) {
-        return refuse(depth_unit, "positive and finite");
+        return refuse(depth_unit.to_string(), "positive and finite");
     }
     let deepest = image.depth.iter().copied().filter(|d| d.is_finite()).fold(0.0, f32::max);
-    if (f64::from(deepest) / depth_unit).round() > f64::from(u16::MAX) {
-        return refuse(depth_unit, "large enough that 65535 counts reach the deepest pixel");
+    let most = (f64::from(deepest) / depth_unit).round();
+    let got = || format!("{depth_unit} with a farthest depth of {deepest} m");
+    if most > f64::from(u16::MAX) {
+        return refuse(got(), "large enough that 65535 counts reach the deepest pixel");
+    }
+    if deepest > 0.0 && most == 0.0 {
+        return refuse(got(), "at most twice the farthest depth (else every depth is 0)");
     }
     // Casts of floats saturate and turn NaN into 0, which is no data.
     Ok(image.depth.iter().map(|&d| (f64::from(d) / depth_unit).round() as u16).collect())
@@ -96,6 +100,17 @@ mod tests {
         assert_eq!(back.at(3, 3), 0.0);
         let error = write_depth(&path, &image, 1e-6).unwrap_err().to_string();
         assert!(error.contains("depth unit"), "{error}");
+        // Every depth would be no data.
+        for unit in [1.0, 0.6] {
+            let error = write_depth(&path, &image, unit).unwrap_err().to_string();
+            assert!(
+                error.contains(&format!("got {unit} with a farthest depth of 0.29 m")),
+                "{error}"
+            );
+        }
+        write_depth(&path, &image, 0.57).unwrap();
+        let empty = DepthImage::new(2, 1, vec![0.0, f32::NAN]).unwrap();
+        write_depth(&path, &empty, 1.0).unwrap();
     }
 
     #[test]

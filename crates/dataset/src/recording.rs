@@ -55,6 +55,8 @@ pub struct Recording {
     pub lost: Option<Lost>,
     /// What is damaged, a line each.
     pub damage: Vec<String>,
+    /// That its frames are not of one formation at rest, if they do not look so.
+    pub unlike: Option<String>,
     /// Metres per count of a depth image.
     pub depth_unit: Option<f64>,
     /// How it is segmented: from the camera's file, else the default.
@@ -169,6 +171,7 @@ impl Recording {
             whole_frames: 1,
             lost: None,
             damage: Vec::new(),
+            unlike: None,
             depth_unit: None,
             segmentation,
         }
@@ -208,6 +211,7 @@ impl Recording {
             whole_frames: mean.frames as u64,
             lost: (damaged > 0).then_some(Lost::Exactly(damaged)),
             damage: mean.damage,
+            unlike: mean.unlike,
             depth_unit: Some(unit),
             ..Self::of_one(path.to_owned(), source, camera.segmentation.clone())
         })
@@ -231,6 +235,7 @@ impl Recording {
             whole_frames: read.whole,
             lost: read.lost,
             damage: read.damage,
+            unlike: read.unlike,
             depth_unit: Some(read.unit),
             ..Self::of_one(input.path().to_owned(), source, segmentation)
         })

@@ -20,6 +20,8 @@ const SAMPLED_PIXEL: f64 = 256.0;
 const BASE: f64 = 64e6;
 /// Bytes of a row of a data set on disk, and of one in memory.
 const ROW: f64 = 1024.0;
+/// Bytes of a part of a data set on disk besides its rows: scene, prior and what the format says of its columns.
+const PART: f64 = 17e3;
 /// Bytes of a grain and of a pixel in one frame of a film.
 const FILM_GRAIN: f64 = 16.0;
 const FILM_PIXEL: f64 = 4.0;
@@ -54,13 +56,17 @@ impl Room {
         }
     }
 
-    /// Many pours, so many at once.
+    /// Many pours, so many at once, of which `rows` are still to be made, `chunk` in a part.
     pub fn of_batch(scene: &Scene, rows: u64, threads: usize, chunk: u64) -> Self {
         let pour = Self::of_pour(scene, None);
         let (rows, threads) = (rows as f64, threads as f64);
         // Each pour at once may be of another chunk.
         let in_memory = rows.min(threads * chunk as f64);
-        Self { memory: BASE + (pour.memory - BASE) * threads + ROW * in_memory, disk: ROW * rows }
+        let parts = (rows / chunk as f64).ceil();
+        Self {
+            memory: BASE + (pour.memory - BASE) * threads + ROW * in_memory,
+            disk: ROW * rows + PART * parts,
+        }
     }
 
     /// Refuses what needs more than there is; `folder` is where is written. The variable `GRANULCAL_NO_LIMITS=1`
@@ -140,6 +146,10 @@ mod tests {
         assert!(error.is_bad_input());
         let fast = Room::of_pour(&scene, Some(1e12)).require(Some(&folder)).unwrap_err();
         assert!(fast.to_string().contains("disk"), "{fast}");
+        // A file for each row: most of it is what every file says.
+        let (alone, together) =
+            (Room::of_batch(&scene, 1000, 1, 1), Room::of_batch(&scene, 1000, 1, 100));
+        assert!(alone.disk > 17e6 && together.disk < 1.3e6, "{alone:?} {together:?}");
         let long = Room::of_batch(&scene, u64::MAX, 2, 16).require(Some(&folder)).unwrap_err();
         assert!(long.to_string().contains("disk"), "{long}");
     }

@@ -59,6 +59,10 @@ pub(crate) fn fill(scene: &mut Scene, folder: &Path) -> Result<(), DatasetError>
         if let Motion::Trajectory { file, knots } = motion
             && let Some(name) = file.take()
         {
+            if !knots.is_empty() {
+                let (one, other) = ("motion.file", "motion.knots");
+                return Err(DatasetError::refused(SceneError::Exclude { one, other }));
+            }
             *knots = trajectory_file::read(&whole(&name))?;
         }
     }

@@ -37,6 +37,8 @@ const SEED_KEY: &str = "granulcal.seed";
 const HASH_KEY: &str = "granulcal.hash";
 /// Of a file of several row groups: the hash of each, as if it were a file of its own, separated by spaces.
 const HASHES_KEY: &str = "granulcal.hashes";
+/// Of the same: the rows that the data set was asked to have, where that is known.
+const ROWS_KEY: &str = "granulcal.rows";
 /// Rows of a group of such a file.
 const GROUP: usize = if cfg!(test) { 4 } else { 16_384 };
 /// Bytes that one byte of a packed column may become: a column of one value packs well.
@@ -45,10 +47,10 @@ const MOST_PACKED: i64 = 4096;
 /// Writes rows as one complete file, one row group.
 ///
 /// # Errors
-/// [`DatasetError::Io`] or [`DatasetError::Parquet`].
+/// [`DatasetError::Io`].
 pub(crate) fn write(path: &Path, header: &Header, rows: &[Row]) -> Result<(), DatasetError> {
     let bytes = encode(header, rows, &columns(&header.prior.names(), &header.observed()))
-        .map_err(|source| DatasetError::Parquet { path: path.to_owned(), source })?;
+        .map_err(unwritten(path))?;
     files::write_file(path, Form::Parquet, &bytes)
 }
 
@@ -59,6 +61,8 @@ pub(crate) struct Table {
     pub(crate) rows: Vec<Row>,
     /// Whether the file says what its rows hash to; files of before there was a hash do not.
     pub(crate) is_verified: bool,
+    /// The rows that the data set was asked to have, if the file says.
+    pub(crate) asked: Option<u64>,
 }
 
 /// Hash of the header and of every value, column by column.
@@ -165,6 +169,20 @@ fn write_group<W: io::Write + Send>(
     Ok(())
 }
 
+/// What a writer says: the disk's words, where it is the disk that refused.
+fn unwritten(path: &Path) -> impl FnOnce(ParquetError) -> DatasetError {
+    let path = path.to_owned();
+    move |error| {
+        let source = match error {
+            ParquetError::External(cause) => {
+                cause.downcast().map_or_else(io::Error::other, |cause| *cause)
+            }
+            other => io::Error::other(other),
+        };
+        DatasetError::Io { action: "write", path, source }
+    }
+}
+
 /// A file that takes rows as they come and keeps some thousand of them in memory: row group after row group.
 pub(crate) struct GroupWriter {
     file: SerializedFileWriter<PendingFile>,
@@ -180,8 +198,7 @@ impl GroupWriter {
     pub(crate) fn create(path: &Path, header: &Header) -> Result<Self, DatasetError> {
         let columns = columns(&header.prior.names(), &header.observed());
         let pending = PendingFile::create(path, Form::Parquet)?;
-        let file = writer(pending, header, None, &columns)
-            .map_err(|source| DatasetError::Parquet { path: path.to_owned(), source })?;
+        let file = writer(pending, header, None, &columns).map_err(unwritten(path))?;
         let (header, path) = (header.clone(), path.to_owned());
         Ok(Self { file, header, columns, rows: Vec::new(), hashes: Vec::new(), path })
     }
@@ -194,22 +211,22 @@ impl GroupWriter {
 
     fn end_group(&mut self) -> Result<(), DatasetError> {
         self.hashes.push(hash(&self.header, &self.rows, &self.columns));
-        write_group(&mut self.file, &self.rows, &self.columns)
-            .map_err(|source| DatasetError::Parquet { path: self.path.clone(), source })?;
+        write_group(&mut self.file, &self.rows, &self.columns).map_err(unwritten(&self.path))?;
         self.rows.clear();
         Ok(())
     }
 
-    /// Ends the file and brings it to its place.
-    pub(crate) fn commit(mut self) -> Result<(), DatasetError> {
+    /// Ends the file, which says how many rows were asked for if that is known, and brings it to its place.
+    pub(crate) fn commit(mut self, asked: Option<u64>) -> Result<(), DatasetError> {
         if !self.rows.is_empty() || self.hashes.is_empty() {
             self.end_group()?;
         }
         let hashes = self.hashes.join(" ");
-        self.file.append_key_value_metadata(KeyValue::new(HASHES_KEY.to_owned(), hashes));
-        let path = self.path;
-        let pending = self.file.into_inner();
-        pending.map_err(|source| DatasetError::Parquet { path, source })?.commit()
+        let asked = asked.map(|rows| (ROWS_KEY, rows.to_string()));
+        for (key, value) in [(HASHES_KEY, hashes)].into_iter().chain(asked) {
+            self.file.append_key_value_metadata(KeyValue::new(key.to_owned(), value));
+        }
+        self.file.into_inner().map_err(unwritten(&self.path))?.commit()
     }
 }
 
@@ -231,6 +248,9 @@ pub(crate) fn parse(path: &Path, bytes: Vec<u8>) -> Result<Table, DatasetError> 
         .map_err(parquet)?;
     check_ranges(path, &file, length)?;
     let header = read_header(path, &file)?;
+    let asked = metadata(&file, ROWS_KEY);
+    let asked = asked.map(|rows| rows.parse().map_err(|_| no_number(path, ROWS_KEY, &rows)));
+    let asked = asked.transpose()?;
     let observed = header.observed();
     let mut columns = columns(&header.prior.names(), &observed);
     // Files without the diagnostic statistics end before them; they stay NaN.
@@ -292,7 +312,7 @@ pub(crate) fn parse(path: &Path, bytes: Vec<u8>) -> Result<Table, DatasetError> 
             return Err(DatasetError::Damaged { path, what: "the rows", found, stated });
         }
     }
-    Ok(Table { header, rows, is_verified: stated.is_some() })
+    Ok(Table { header, rows, is_verified: stated.is_some(), asked })
 }
 
 /// The value of a key in the file's metadata.
@@ -366,14 +386,7 @@ fn read_header(
             DatasetError::content(path, what, "none", "given, as granulcal-cli generate writes it")
         })
     };
-    let wrong = |key: &str, found: &str| {
-        DatasetError::content(
-            path,
-            format!("metadata {key}"),
-            format!("{found:?}"),
-            "a whole number",
-        )
-    };
+    let wrong = |key, found: &str| no_number(path, key, found);
     let seed = value(SEED_KEY)?;
     let seed = seed.parse().map_err(|_| wrong(SEED_KEY, &seed))?;
     let law = metadata(file, LAW_KEY);
@@ -383,6 +396,12 @@ fn read_header(
     })?;
     let (scene, prior, version) = (value(SCENE_KEY)?, value(PRIOR_KEY)?, value(VERSION_KEY)?);
     Header::parse(path, &scene, &prior, version, (law, arithmetic), seed)
+}
+
+/// The error of a key that must have a number.
+fn no_number(path: &Path, key: &str, found: &str) -> DatasetError {
+    let (what, found) = (format!("metadata {key}"), format!("{found:?}"));
+    DatasetError::content(path, what, found, "a whole number")
 }
 
 /// Refuses columns that lie outside of the file: the reader takes their places for granted, and panics.

@@ -5,7 +5,7 @@
 use crate::contact::{Batch, Candidate};
 use crate::contact_set::ContactSet;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, vectors, widest};
-use crate::law;
+use crate::law::{self, Small};
 use crate::particles::Particles;
 use crate::period::Period;
 use crate::wall::{Nearest, Walls};
@@ -36,10 +36,11 @@ widest! {
     pub(crate) fn assemble_pairs<W>(
         batches: &mut [Batch],
         particles: &Particles,
-        dt: f64,
+        step: (f64, &Small),
         impact_speed: f64,
         candidates: &mut Vec<Candidate>,
     ) -> Seen {
+        let (dt, small) = step;
         let mut overlap = Reg::<W>::splat(0.0);
         for batch in batches {
             let sphere = |body: u32| W::load_row(&particles.spheres[body as usize]);
@@ -51,7 +52,7 @@ widest! {
             let v_j = vectors::<W>(each(&batch.j, velocity));
             let dv = v_i - v_j;
             let w_n = Reg3::load(&batch.normal).dot(dv);
-            finish(batch, law::bias_lanes(gap, dt) + passing(distance, dv, w_n, dt));
+            finish(batch, law::bias_lanes(gap, dt, small) + passing(distance, dv, w_n, dt));
             let closes = closing_bits(gap, w_n, dt, impact_speed);
             for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
                 candidates.push(Candidate { i: batch.i[lane], partner: batch.j[lane] });
@@ -70,11 +71,12 @@ widest! {
         set: &mut ContactSet,
         walls: &Walls,
         particles: &Particles,
-        dt: f64,
+        step: (f64, &Small),
         impact_speed: f64,
         lost: &mut [bool],
         candidates: &mut Vec<Candidate>,
     ) -> Seen {
+        let (dt, small) = step;
         let mut seen = Seen::default();
         for number in 0..set.batches.len() {
             let WallGeometry { gap, follows, passing } =
@@ -87,7 +89,7 @@ widest! {
             let velocity = |body: u32| W::load_row(&particles.bodies[body as usize].velocity);
             let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
             let w_n = w_n - Reg::load(&follows);
-            finish(batch, law::bias_lanes(gap, dt) + Reg::load(&passing));
+            finish(batch, law::bias_lanes(gap, dt, small) + Reg::load(&passing));
             let closes = closing_bits(gap, w_n, dt, impact_speed);
             for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
                 let partner = particles.count() as u32 + at.wall[lane];
@@ -101,7 +103,8 @@ widest! {
 widest! {
     /// Refreshes the batches of pairs in which a grain has had an impact, as they are when the later one of
     /// their last impacts happened.
-    pub(crate) fn refresh_pairs<W>(batches: &mut [Batch], particles: &Particles, dt: f64) {
+    pub(crate) fn refresh_pairs<W>(batches: &mut [Batch], particles: &Particles, step: (f64, &Small)) {
+        let (dt, small) = step;
         for batch in batches {
             let mut clocks = Lanes::ZERO;
             for lane in batch.lanes() {
@@ -123,7 +126,7 @@ widest! {
             let dv = vectors::<W>(each(&batch.i, velocity)) - vectors(each(&batch.j, velocity));
             let w_n = Reg3::load(&batch.normal).dot(dv);
             let gap = empty_lanes_open(batch, gap);
-            let bias = law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt);
+            let bias = law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt, small);
             finish(batch, bias + passing(distance, dv, w_n, dt));
         }
     }
@@ -131,7 +134,8 @@ widest! {
 
 widest! {
     /// The same for the contacts at walls.
-    pub(crate) fn refresh_walls<W>(set: &mut ContactSet, walls: &Walls, particles: &Particles, dt: f64) {
+    pub(crate) fn refresh_walls<W>(set: &mut ContactSet, walls: &Walls, particles: &Particles, step: (f64, &Small)) {
+        let (dt, small) = step;
         for number in 0..set.batches.len() {
             let mut clocks = Lanes::ZERO;
             for lane in set.batches[number].lanes() {
@@ -147,7 +151,7 @@ widest! {
             let velocity = |body: u32| W::load_row(&particles.bodies[body as usize].velocity);
             let w_n = Reg3::load(&batch.normal).dot(vectors::<W>(each(&batch.i, velocity)));
             let w_n = w_n - Reg::load(&follows);
-            let bias = law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt);
+            let bias = law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt, small);
             finish(batch, bias + Reg::load(&passing));
         }
     }

@@ -50,6 +50,8 @@ use std::sync::Arc;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::energy::{Energy, Falling};
+use crate::law::Small;
 use crate::turns::turns;
 use crate::wall::Walls;
 use around::Around;
@@ -103,6 +105,7 @@ pub(crate) struct Step {
 #[derive(Clone, Debug)]
 pub(crate) struct Bodies {
     pub solid: Arc<Solid>,
+    small: Small,
     /// None of a cylinder.
     corners: Option<Corners>,
     all: Vec<RigidBody>,
@@ -115,10 +118,11 @@ pub(crate) struct Bodies {
 }
 
 impl Bodies {
-    fn new(solid: Arc<Solid>, all: Vec<RigidBody>) -> Self {
+    fn new(solid: Arc<Solid>, small: Small, all: Vec<RigidBody>) -> Self {
         let batches = Batches::of(&solid);
         Self {
             corners: Corners::of(&solid),
+            small,
             solid,
             all,
             known: Vec::new(),
@@ -136,7 +140,8 @@ impl Bodies {
             let [i, j, k, w] = turn();
             RigidBody::still(centre, UnitQuaternion::new_normalize(Quaternion::new(w, i, j, k)))
         };
-        Some(Self::new(solid, scene.starting_positions(seed).into_iter().map(still).collect()))
+        let all = scene.starting_positions(seed).into_iter().map(still).collect();
+        Some(Self::new(solid, Small::of(scene), all))
     }
 
     /// Turns of all bodies, from their axes to the scene's.
@@ -201,7 +206,8 @@ impl Bodies {
             body.velocity += dt * gravity;
         }
         let corners = self.corners.as_ref();
-        let around = Around { solid: &solid, corners, walls, material, dt };
+        let small = self.small;
+        let around = Around { solid: &solid, corners, walls, material, dt, small: &small };
         let (points, neighbours) = (std::mem::take(&mut self.points), &mut self.neighbours);
         let mut contacts = collide::contacts(&around, &moving, neighbours, points);
         let mut step = Step::default();
@@ -209,7 +215,7 @@ impl Bodies {
         step.deepest = depths.fold(0.0, f64::max);
         for round in 1..=ROUNDS {
             let (impacts, work) =
-                impact::resolve(&mut contacts.points, &mut moving, solid.reach, dt);
+                impact::resolve(&mut contacts.points, &mut moving, (solid.reach, dt), &small);
             step.impacts += impacts;
             step.work_of_walls += work;
             let known = contacts.points.len();
@@ -287,10 +293,13 @@ impl Bodies {
         }
     }
 
-    /// Kinetic and potential energy over the mass of a body `[m^2/s^2]`.
-    pub fn energy(&self, gravity: &Vector3<f64>) -> f64 {
-        let of = |body: &RigidBody| {
-            body.kinetic_energy(&self.solid) - gravity.dot(&Vector3::from(body.centre))
+    /// Energy over the mass of a body.
+    pub fn energy(&self, falling: &Falling) -> Energy {
+        let half = falling.half();
+        let of = |body: &RigidBody| Energy {
+            kinetic: body.kinetic_energy(&self.solid)
+                + half.dot(&(Vector3::from(body.velocity) + 0.5 * half)),
+            potential: falling.potential(&body.centre.into()),
         };
         self.all.iter().map(of).sum()
     }

@@ -8,12 +8,12 @@ use toml::Value;
 use xxhash_rust::xxh3::xxh3_128;
 
 use crate::error::DemError;
-use crate::law::{LAW, arithmetic};
+use crate::law::{arithmetic, law_of};
 
 /// What a checkpoint begins with.
 const MAGIC: &[u8] = b"granulcal checkpoint\n";
 /// The format of header and state. Between two versions that are released a change of either is a new format.
-pub(crate) const FORMAT: u32 = 8;
+pub(crate) const FORMAT: u32 = 9;
 /// The version of granulcal that writes and reads.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -108,7 +108,7 @@ pub(crate) fn hash(bytes: &[u8]) -> u128 {
 pub(crate) fn seal(header: &CheckpointHeader, state: &[u8]) -> Vec<u8> {
     let written = Written {
         version: header.version.clone(),
-        law: LAW,
+        law: law_of(&header.scene),
         arithmetic: arithmetic(&header.scene),
         // Numbers of a scene that a simulation was made of can be written.
         scene: header.scene.to_toml().expect("a checked scene as TOML"),
@@ -143,10 +143,10 @@ pub(crate) fn open(bytes: &[u8]) -> Result<(CheckpointHeader, &[u8]), DemError> 
     if version != VERSION {
         return Err(DemError::CheckpointVersion { got: version, allowed: VERSION });
     }
-    if law != LAW {
-        return Err(DemError::CheckpointLaw { got: law, allowed: LAW });
-    }
     let scene = Scene::parse(&scene)?;
+    if law != law_of(&scene) {
+        return Err(DemError::CheckpointLaw { got: law, allowed: law_of(&scene) });
+    }
     let allowed = arithmetic(&scene);
     if got != allowed {
         return Err(DemError::CheckpointArithmetic { got, allowed });
@@ -188,6 +188,7 @@ fn little_endian(bytes: &[u8]) -> u128 {
 mod tests {
     use super::*;
     use crate::Simulation;
+    use crate::law::LAW;
 
     fn simulation() -> Simulation {
         let mut scene = Scene::drop(0.01);
@@ -206,9 +207,9 @@ mod tests {
     #[test]
     fn another_format_names_the_version_that_wrote_it() {
         let mut bytes = simulation().checkpoint();
-        bytes[MAGIC.len() + LENGTH] = 9;
+        bytes[MAGIC.len() + LENGTH] = 99;
         let error = simulation().resume(&sealed(bytes)).unwrap_err().to_string();
-        let expected = format!("must have format {FORMAT}, got 9, written by granulcal {VERSION}");
+        let expected = format!("must have format {FORMAT}, got 99, written by granulcal {VERSION}");
         assert!(error.contains(&expected), "{error}");
     }
 

@@ -18,9 +18,11 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::body::Body;
+use crate::energy::{Energy, Falling};
 use crate::lanes::Row;
 use crate::law::INVERSE_INERTIA;
 use crate::particles::Particles;
+use crate::turning::{inverse_inertia, turned_on};
 use crate::turns::turns;
 
 /// Keeps the orientations of a seed apart from its places.
@@ -92,9 +94,7 @@ impl Clumps {
 
     /// Inverse of the tensor of inertia in the scene's axes `[1/m^2]`.
     fn inverse_inertia(&self, turned: &UnitQuaternion<f64>) -> Matrix3<f64> {
-        let rotation = turned.to_rotation_matrix();
-        let inverse = self.shape.inertia.map(|moment| 1.0 / moment);
-        rotation.matrix() * Matrix3::from_diagonal(&inverse) * rotation.matrix().transpose()
+        inverse_inertia(turned.to_rotation_matrix().matrix(), &self.shape.inertia)
     }
 
     /// Takes what the spheres have got since they moved as one, and lets them move as one again.
@@ -134,11 +134,10 @@ impl Clumps {
         for number in 0..self.bodies.len() {
             let rigid = self.bodies[number];
             let turned = rigid.turned();
-            // The angular velocity of the middle of the way: second order, for a body that tumbles.
             let momentum = Vector3::from(rigid.momentum);
-            let half = UnitQuaternion::new(0.5 * dt * (self.inverse_inertia(&turned) * momentum));
-            let omega = self.inverse_inertia(&(half * turned)) * momentum;
-            let turned = UnitQuaternion::new(dt * omega) * turned;
+            let omega = self.inverse_inertia(&turned) * momentum;
+            let (moments, unhit) = (&self.shape.inertia, Vector3::zeros());
+            let turned = turned_on(&turned, moments, [&momentum, &omega], &unhit, dt);
             let centre = Vector3::from(rigid.centre) + dt * Vector3::from(rigid.velocity);
             let rigid = &mut self.bodies[number];
             rigid.centre = centre.into();
@@ -157,15 +156,22 @@ impl Clumps {
         }
     }
 
-    /// Kinetic and potential energy in `gravity`, per typical mass `[m^2/s^2]`.
-    pub fn energy(&self, gravity: &Vector3<f64>) -> f64 {
+    /// Energy per typical mass.
+    pub fn energy(&self, falling: &Falling) -> Energy {
         let of = |rigid: &Rigid| {
-            let momentum = Vector3::from(rigid.momentum);
-            let turning = momentum.dot(&(self.inverse_inertia(&rigid.turned()) * momentum));
-            let velocity = Vector3::from(rigid.velocity).norm_squared();
-            0.5 * (velocity + turning) - gravity.dot(&Vector3::from(rigid.centre))
+            let (velocity, half) = (Vector3::from(rigid.velocity), falling.half());
+            Energy {
+                kinetic: self.kinetic_energy(rigid) + half.dot(&(velocity + 0.5 * half)),
+                potential: falling.potential(&rigid.centre.into()),
+            }
         };
         self.bodies.iter().map(of).sum()
+    }
+
+    fn kinetic_energy(&self, rigid: &Rigid) -> f64 {
+        let momentum = Vector3::from(rigid.momentum);
+        let turning = momentum.dot(&(self.inverse_inertia(&rigid.turned()) * momentum));
+        0.5 * (Vector3::from(rigid.velocity).norm_squared() + turning)
     }
 
     /// Sets a clump in motion; returns the kinetic energy that this adds, per typical mass `[m^2/s^2]`.
@@ -176,14 +182,19 @@ impl Clumps {
         velocity: &Vector3<f64>,
         angular: &Vector3<f64>,
     ) -> f64 {
-        let before = self.energy(&Vector3::zeros());
+        let before = self.kinetic_energy(&self.bodies[clump]);
         let turned = self.bodies[clump].turned();
         let local = turned.inverse() * angular;
         let momentum = turned * local.component_mul(&self.shape.inertia);
         let rigid = &mut self.bodies[clump];
         (rigid.velocity, rigid.momentum) = ((*velocity).into(), momentum.into());
         self.move_on(particles, 0.0);
-        self.energy(&Vector3::zeros()) - before
+        self.kinetic_energy(&self.bodies[clump]) - before
+    }
+
+    /// Velocity of a clump's centre `[m/s]`.
+    pub fn velocity(&self, clump: usize) -> Vector3<f64> {
+        self.bodies[clump].velocity.into()
     }
 
     /// Number of clumps.

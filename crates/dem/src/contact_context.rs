@@ -6,7 +6,8 @@ use nalgebra::Vector3;
 use crate::contact::ContactLaw;
 use crate::contact_set::ContactSet;
 use crate::effect::{Acting, EffectContext};
-use crate::law::{DAMPED_IMPACT_SPEED, IMPACT_SPEED};
+use crate::energy::Falling;
+use crate::law::Small;
 use crate::parallel::Threads;
 use crate::particles::Particles;
 use crate::path::Reach;
@@ -24,6 +25,8 @@ pub(crate) struct ContactContext {
     pub material: Material,
     /// Approach below which an impact is left to the contact solve `[m/s]`.
     pub impact_speed: f64,
+    /// What is too small to matter, of these grains.
+    pub small: Small,
     /// Gravity in the present substep `[m/s^2]`.
     pub gravity: Vector3<f64>,
     pub effects: Acting,
@@ -42,12 +45,14 @@ impl ContactContext {
         let settings = scene.settings();
         let walls = Walls::of(scene);
         let (effects, radius) = (Acting::of(scene), scene.grains.radius());
+        let small = Small::of(scene);
         let is_damped = scene.material.rolling_dashpot > 0.0 || walls.any_damps_rolling();
         Self {
             has_moving_walls: walls.any_moving(),
             walls,
             material: scene.material,
-            impact_speed: if is_damped { DAMPED_IMPACT_SPEED } else { IMPACT_SPEED },
+            impact_speed: if is_damped { small.damped_impact_speed } else { small.impact_speed },
+            small,
             gravity: effects.gravity,
             members: scene.effects.clump.members(),
             settings,
@@ -71,6 +76,11 @@ impl ContactContext {
             placement.move_to(time, dt);
             placement.look_ahead(time, interval);
         }
+    }
+
+    /// What acts on all grains throughout.
+    pub fn falling(&self) -> Falling {
+        Falling { gravity: self.effects.gravity, dt: self.settings.dt }
     }
 
     /// What a list must hold to be complete until the next one.

@@ -136,26 +136,25 @@ impl Contacts {
         lost: &mut [bool],
         found: &mut Vec<Candidate>,
     ) -> Seen {
-        let (dt, speed) = (around.settings.dt, around.impact_speed);
+        let (step, speed) = ((around.settings.dt, &around.small), around.impact_speed);
         self.age += 1;
         let assemble = |batches: &mut [Batch], found: &mut Vec<Candidate>| {
-            assemble::assemble_pairs(batches, particles, dt, speed, found)
+            assemble::assemble_pairs(batches, particles, step, speed, found)
         };
         let batches = &mut self.pairs.batches;
         let pairs = around.threads.gather(batches, SHARE, found, assemble, Seen::max);
         let at_walls = &mut self.at_walls;
         let walls =
-            assemble::assemble_walls(at_walls, &around.walls, particles, dt, speed, lost, found);
+            assemble::assemble_walls(at_walls, &around.walls, particles, step, speed, lost, found);
         pairs.max(walls)
     }
 
     /// The same for the contacts of grains that have had an impact.
     pub fn assemble_again(&mut self, particles: &Particles, around: &ContactContext) {
-        let refresh = |batches: &mut [Batch]| {
-            assemble::refresh_pairs(batches, particles, around.settings.dt);
-        };
+        let step = (around.settings.dt, &around.small);
+        let refresh = |batches: &mut [Batch]| assemble::refresh_pairs(batches, particles, step);
         around.threads.shares(&mut self.pairs.batches, SHARE, refresh, |(), ()| ());
-        assemble::refresh_walls(&mut self.at_walls, &around.walls, particles, around.settings.dt);
+        assemble::refresh_walls(&mut self.at_walls, &around.walls, particles, step);
     }
 
     /// Puts the walls' motion into the bodies that stand for them, one for each contact at a wall.

@@ -35,8 +35,9 @@ type Plugged = Arc<dyn Acts>;
 /// Every effect that acts in a substep, in the order in which they do: what makes it of a scene in which it is on.
 const ALL: &[fn(&Scene) -> Option<Plugged>] = &[
     tilt::of,
-    drag::of,
     vibration::of,
+    // After what shakes the fluid with the grains: they float in it then as ever.
+    drag::of,
     attraction::of,
     film::of,
     restitution_speed::of,
@@ -49,20 +50,29 @@ const ALL: &[fn(&Scene) -> Option<Plugged>] = &[
 pub(crate) struct Acting {
     /// Gravity less buoyancy, in the frame of the table `[m/s^2]`.
     pub gravity: Vector3<f64>,
+    /// What gravity is without any effect `[m/s^2]`.
+    plain: Vector3<f64>,
     effects: Vec<Plugged>,
 }
 
 impl Acting {
     pub fn of(scene: &Scene) -> Self {
         let effects: Vec<_> = ALL.iter().filter_map(|of| of(scene)).collect();
+        let plain = Vector3::from(scene.gravity);
         let turned = |gravity, effect: &Plugged| effect.gravity(gravity);
-        Self { gravity: effects.iter().fold(Vector3::from(scene.gravity), turned), effects }
+        Self { gravity: effects.iter().fold(plain, turned), plain, effects }
     }
 
     /// Gravity with what is added to it at `time` `[m/s^2]`; None where nothing ever is.
     pub fn gravity_at(&self, time: f64) -> Option<Vector3<f64>> {
-        let added = self.effects.iter().filter_map(|effect| effect.added_gravity(time));
-        added.fold(None, |sum, each| Some(sum.unwrap_or(self.gravity) + each))
+        let mut is_added_to = false;
+        let gravity = self.effects.iter().fold(self.plain, |gravity, effect| {
+            let gravity = effect.gravity(gravity);
+            let Some(added) = effect.added_gravity(time) else { return gravity };
+            is_added_to = true;
+            gravity + added
+        });
+        is_added_to.then_some(gravity)
     }
 
     /// How far the longest force across a gap reaches `[m]`; 0 without one.
@@ -124,6 +134,8 @@ impl Acting {
 
 #[cfg(test)]
 mod tests {
+    use granulcal_scene::Vibration;
+
     use super::*;
 
     #[test]
@@ -131,6 +143,17 @@ mod tests {
         let acting = Acting::of(&Scene::drop(0.02));
         assert!(acting.effects.is_empty());
         assert_eq!((acting.reach(), acting.gravity_at(1.0)), (0.0, None));
+    }
+
+    #[test]
+    fn a_fluid_on_a_table_that_shakes_carries_as_much_as_on_one_that_rests() {
+        let mut scene = Scene::drop(0.02);
+        scene.effects.fluid.density = scene.grains.density;
+        scene.effects.vibration.acceleration = 2.0;
+        let Vibration { begin, frequency, .. } = scene.effects.vibration;
+        let acting = Acting::of(&scene);
+        let most = acting.gravity_at(begin + 0.25 / frequency).unwrap();
+        assert!(acting.gravity.norm() < 1e-12 && most.norm() < 1e-12, "{most}");
     }
 
     #[test]

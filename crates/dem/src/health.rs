@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::energy::Energy;
 use crate::solver::solve_info::SolveInfo;
 
 /// Numbers that tell whether a pour can be trusted.
@@ -13,8 +14,9 @@ pub struct Health {
     pub mean_residual: f64,
     /// Worst natural-map residual over rms normal impulse of the sampled substeps `[-]`.
     pub worst_residual: f64,
-    /// Largest rise of mechanical energy above its lowest value so far `[-]`, over the energy at the start, or over
-    /// what lifts every grain by its radius and sets it in motion as the end rule sees it, if that is more.
+    /// Largest rise of mechanical energy above its lowest value so far `[-]`, over what the start had above the lowest
+    /// potential energy so far, or over what lifts every grain by its radius and sets it in motion as the end rule sees
+    /// it, if that is more.
     pub energy_created: f64,
     /// Grains whose centre passed through a wall; must be 0.
     pub grains_lost: usize,
@@ -44,6 +46,7 @@ pub(crate) struct HealthWatch {
     contacts_sum: f64,
     contacts_samples: usize,
     start_energy: f64,
+    lowest_potential: f64,
     least_scale: f64,
     energy: f64,
     lowest_energy: f64,
@@ -56,7 +59,8 @@ pub(crate) struct HealthWatch {
 
 impl HealthWatch {
     /// For so many grains with this energy at the start; energy created is compared with `least_scale` at least.
-    pub fn new(grains: usize, energy: f64, least_scale: f64) -> Self {
+    pub fn new(grains: usize, start: &Energy, least_scale: f64) -> Self {
+        let energy = start.total();
         Self {
             worst_penetration: 0.0,
             residual_sum: 0.0,
@@ -65,6 +69,7 @@ impl HealthWatch {
             contacts_sum: 0.0,
             contacts_samples: 0,
             start_energy: energy,
+            lowest_potential: start.potential,
             least_scale,
             energy,
             lowest_energy: energy,
@@ -102,8 +107,10 @@ impl HealthWatch {
         self.contacts_sum += contacts as f64;
     }
 
-    pub fn see_energy(&mut self, energy: f64) {
+    pub fn see_energy(&mut self, now: &Energy) {
+        let energy = now.total();
         self.energy = energy;
+        self.lowest_potential = self.lowest_potential.min(now.potential);
         self.created = self.created.max(energy - self.lowest_energy);
         self.lowest_energy = self.lowest_energy.min(energy);
     }
@@ -149,7 +156,8 @@ impl HealthWatch {
     }
 
     fn energy_created(&self) -> f64 {
-        let scale = self.start_energy.max(self.least_scale);
+        // Above the lowest that they have been, wherever the scene's origin is.
+        let scale = (self.start_energy - self.lowest_potential).max(self.least_scale);
         if scale > 0.0 { self.created / scale } else { 0.0 }
     }
 }

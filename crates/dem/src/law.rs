@@ -2,16 +2,25 @@
 //!
 //! Pure functions without loops over contacts; docs/theory/contact.md derives them.
 
-use granulcal_scene::{GrainShape, Scene};
+use granulcal_scene::{Effect, GrainShape, Scene};
+use nalgebra::Vector3;
 
 use crate::lanes::{Reg, Reg3, Width};
+use crate::turning::nutates;
 
 /// Number of the law that pours follow: of contacts, impacts, starts and of how all of it is solved.
 ///
 /// It counts up whenever the physics of a pour changes, whatever the version of the package: data sets, checkpoints,
 /// models and kept pours state it, so that pours of two laws are never mixed. 1 had impacts one by one; 2 has them as
-/// springs in the limit of infinite stiffness.
+/// springs in the limit of infinite stiffness. Of grains below 4 mm it is another, [`law_of`].
 pub const LAW: u32 = 2;
+/// The number of the law of smaller grains, whose small lengths and speeds go with their size (`Small`).
+const LAW_OF_SMALL: u32 = 3;
+
+/// Number of the law that pours of a scene follow.
+pub fn law_of(scene: &Scene) -> u32 {
+    if scene.grains.radius() < LARGE { LAW_OF_SMALL } else { LAW }
+}
 
 /// Number of the arithmetic that the law is worked out in, of pours of a scene.
 ///
@@ -22,28 +31,89 @@ pub const LAW: u32 = 2;
 /// 4 when their separating axes were tried by the crate itself. Boxes came to 5 and the others to 4 when what is foreseen
 /// was looked at where a way leads elsewhere, and boxes met eight pairs at a time; to 6 and 5 when a corner that has gone
 /// round the end of a shell was no longer taken for one that has come through it. Cylinders came to 6 when their nearest
-/// points were those of their features.
+/// points were those of their features. Bodies and clumps that nutate came one farther when they turned in parts of a
+/// substep, and bodies where walls move when those were looked at where they go.
 pub fn arithmetic(scene: &Scene) -> u32 {
-    match scene.grains.shape {
+    let of_shape = match scene.grains.shape {
         Some(GrainShape::Box { .. } | GrainShape::Cylinder { .. }) => 6,
         Some(_) => 5,
         None => 1,
-    }
+    };
+    let solid = scene.grains.solid();
+    let nutates =
+        solid.as_ref().map_or(scene.effects.clump.is_on(), |solid| nutates(&solid.inertia));
+    let motions = scene.walls.iter().map(|wall| &wall.motion);
+    let mut motions = motions.chain(scene.funnel.iter().map(|funnel| &funnel.motion));
+    let meets_moving = solid.is_some() && motions.any(|motion| !motion.is_still());
+    of_shape + u32::from(nutates || meets_moving)
 }
 
 /// Share of a penetration that is corrected in one substep (Baumgarte).
-pub(crate) const CORRECTION: f64 = 0.2;
-/// Penetration that is left alone, so that resting contacts stay closed `[m]`.
-pub(crate) const SLOP: f64 = 1e-5;
-/// Fastest correction of a penetration `[m/s]`.
-pub(crate) const CORRECTION_SPEED: f64 = 0.5;
-/// Fastest way out `[m/s]` that is asked of a contact whose grains have parted in an impact and are pressed together
-/// again in the same substep.
-pub(crate) const PINNED_SPEED: f64 = 0.1;
-/// Approach below which an impact is inelastic `[m/s]`: a matter of the contact solve, not of `impact`.
-pub(crate) const IMPACT_SPEED: f64 = 0.05;
-/// The same where a dashpot acts on rolling, which brakes a grain however slowly it is met `[m/s]`.
-pub(crate) const DAMPED_IMPACT_SPEED: f64 = 0.01;
+const CORRECTION: f64 = 0.2;
+/// Grains from this radius on have the numbers of [`Small::OF_LARGE`]; those of smaller ones are in proportion `[m]`.
+const LARGE: f64 = 2e-3;
+
+/// Speeds that gravity gives in a substep, in which a contact at rest is no impact `[-]`.
+const FALLS: f64 = 2.5;
+
+/// Lengths and speeds that are too small to matter, of grains of a size.
+///
+/// A pour of grains s times as small, all lengths like them and times like their root, is the same pour: so lengths go
+/// with the radius and speeds with its root. They are no larger for grains above 4 mm, which loses nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Small {
+    /// Penetration that is left alone, so that resting contacts stay closed `[m]`.
+    pub slop: f64,
+    /// Fastest correction of a penetration `[m/s]`.
+    pub correction_speed: f64,
+    /// Fastest way out `[m/s]` that is asked of a contact whose grains have parted in an impact and are pressed together
+    /// again in the same substep.
+    pub pinned_speed: f64,
+    /// Approach below which an impact is inelastic `[m/s]`: a matter of the contact solve, not of `impact`.
+    pub impact_speed: f64,
+    /// The same where a dashpot acts on rolling, which brakes a grain however slowly it is met `[m/s]`.
+    pub damped_impact_speed: f64,
+    /// Factor on the speeds over those of large grains `[-]`.
+    pub slowness: f64,
+}
+
+impl Small {
+    pub const OF_LARGE: Self = Self {
+        slop: 1e-5,
+        correction_speed: 0.5,
+        pinned_speed: 0.1,
+        impact_speed: 0.05,
+        damped_impact_speed: 0.01,
+        slowness: 1.0,
+    };
+
+    /// Of a scene's grains.
+    pub fn of(scene: &Scene) -> Self {
+        let fall = Vector3::from(scene.gravity).norm() * scene.settings().dt;
+        Self::of_grains(scene.grains.radius(), fall)
+    }
+
+    /// Of grains of a radius `[m]` that gravity makes faster by `fall` in a substep `[m/s]`.
+    fn of_grains(radius: f64, fall: f64) -> Self {
+        let length = (radius / LARGE).min(1.0);
+        let (large, speed) = (Self::OF_LARGE, length.sqrt());
+        // What rests falls back by as much in a substep, and is no impact, however coarse that is.
+        let least = (FALLS * fall).min(large.impact_speed);
+        Self {
+            slop: length * large.slop,
+            correction_speed: speed * large.correction_speed,
+            pinned_speed: speed * large.pinned_speed,
+            impact_speed: least.max(speed * large.impact_speed),
+            damped_impact_speed: speed * large.damped_impact_speed,
+            slowness: speed,
+        }
+    }
+
+    /// The bias of a closed contact of this gap, which pushes its bodies apart slowly `[m/s]`.
+    pub fn push(&self, gap: f64, dt: f64) -> f64 {
+        (CORRECTION * (gap + self.slop) / dt).clamp(-self.correction_speed, 0.0)
+    }
+}
 
 /// Inverse moment of inertia of a sphere times its mass and squared radius, 5/2.
 pub(crate) const INVERSE_INERTIA: f64 = 2.5;
@@ -55,10 +125,10 @@ pub(crate) const TANGENTIAL_INERTIA: f64 = 3.5;
 ///
 /// Open contacts may close their gap but not cross it; closed ones are pushed apart slowly.
 #[inline(always)]
-pub(crate) fn bias_lanes<W: Width>(gap: Reg<W>, dt: f64) -> Reg<W> {
+pub(crate) fn bias_lanes<W: Width>(gap: Reg<W>, dt: f64, small: &Small) -> Reg<W> {
     let (zero, step) = (Reg::splat(0.0), Reg::splat(dt));
-    let push = Reg::splat(CORRECTION) * (gap + Reg::splat(SLOP)).over(step);
-    gap.if_less(zero, push.max(Reg::splat(-CORRECTION_SPEED)), gap.over(step))
+    let push = Reg::splat(CORRECTION) * (gap + Reg::splat(small.slop)).over(step);
+    gap.if_less(zero, push.max(Reg::splat(-small.correction_speed)), gap.over(step))
 }
 
 /// The bias of a contact of which a grain has had an impact: at the time `clock` of that impact there is this
@@ -70,9 +140,10 @@ pub(crate) fn bias_after_impact<W: Width>(
     w_n: Reg<W>,
     clock: Reg<W>,
     dt: f64,
+    small: &Small,
 ) -> Reg<W> {
-    let begin = (gap - clock * w_n).over(Reg::splat(dt)).max(Reg::splat(-PINNED_SPEED));
-    gap.if_less(Reg::splat(0.0), bias_lanes(gap, dt), begin)
+    let begin = (gap - clock * w_n).over(Reg::splat(dt)).max(Reg::splat(-small.pinned_speed));
+    gap.if_less(Reg::splat(0.0), bias_lanes(gap, dt, small), begin)
 }
 
 /// The nearest point of the ball of radius `limit` to `impulse`: stick inside, slip on the rim.
@@ -112,16 +183,28 @@ mod tests {
         assert_eq!(of(GrainShape::Cylinder { aspect: 1.0 }), 6);
         let superquadric = GrainShape::Superquadric { aspect: [1.0; 3], exponents: [2.0; 2] };
         assert_eq!(of(superquadric), 5);
+        assert_eq!(of(GrainShape::Box { aspect: [1.0, 1.0, 2.0] }), 7);
+        let mut clumps = balls.clone();
+        clumps.effects.clump.aspect = 1.5;
+        assert_eq!(arithmetic(&clumps), 2);
+        let mut sand = balls.clone();
+        assert_eq!((law_of(&sand), Small::of(&sand)), (LAW, Small::OF_LARGE));
+        sand.grains.diameter = 1e-3;
+        let small = Small::of(&sand);
+        assert_eq!((law_of(&sand), small.slowness, small.impact_speed), (LAW_OF_SMALL, 0.5, 0.025));
+        // At the substep of large grains nothing below 12 mm/s is an impact.
+        sand.grains.diameter = 1e-5;
+        assert!((Small::of(&sand).impact_speed - 2.5 * 9.81 / 2000.0).abs() < 1e-12);
     }
 
     #[test]
     fn bias_has_its_modes() {
-        let bias = |gap| first(bias_lanes(R::splat(gap), DT));
+        let bias = |gap| first(bias_lanes(R::splat(gap), DT, &Small::OF_LARGE));
         assert_eq!(bias(1e-3), 1e-3 / DT); // open: the gap may close
         assert_eq!(bias(0.0), 0.0);
-        assert_eq!(bias(-1e-2), -CORRECTION_SPEED); // deep: capped correction
+        assert_eq!(bias(-1e-2), -Small::OF_LARGE.correction_speed); // deep: capped correction
         assert!((bias(-2e-5) + CORRECTION * 1e-5 / DT).abs() < 1e-12);
-        assert_eq!(bias(-SLOP), 0.0); // at the slop nothing moves
+        assert_eq!(bias(-Small::OF_LARGE.slop), 0.0); // at the slop nothing moves
     }
 
     proptest! {

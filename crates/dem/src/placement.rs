@@ -115,6 +115,6 @@ mod tests {
 
     #[test]
     fn a_still_wall_has_no_placement() {
-        assert!(Placement::new(&Motion::Still).is_none());
+        assert!(Placement::new(&Motion::default()).is_none());
     }
 }

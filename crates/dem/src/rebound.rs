@@ -4,7 +4,6 @@ use nalgebra::Vector3;
 
 use crate::contact_context::ContactContext;
 use crate::contact_set::ContactSet;
-use crate::law::IMPACT_SPEED;
 use crate::particles::Particles;
 
 /// Gives the contacts of a set their restitution: what closes faster than an impact must and touches
@@ -17,7 +16,7 @@ pub(crate) fn rebound(set: &mut ContactSet, particles: &Particles, around: &Cont
             let (i, j) = (batch.i[lane] as usize, batch.j[lane] as usize);
             let apart = particles.velocity(i) - particles.velocity(j);
             let w_n = Vector3::from(batch.normal.get(lane)).dot(&apart);
-            if w_n >= -IMPACT_SPEED || w_n + batch.bias.0[lane] >= 0.0 {
+            if w_n >= -around.small.impact_speed || w_n + batch.bias.0[lane] >= 0.0 {
                 continue;
             }
             let restitution = if at_walls {

@@ -21,6 +21,7 @@ use crate::contact_context::ContactContext;
 use crate::contact_set::ContactSet;
 use crate::contacts::Contacts;
 use crate::effect::Bridges;
+use crate::energy::Energy;
 use crate::error::DemError;
 use crate::health::{Health, HealthWatch};
 use crate::impact::{ImpactWork, Impacts};
@@ -90,7 +91,7 @@ impl Simulation {
         Ok(Self {
             watch: HealthWatch::new(
                 particles.count(),
-                energy(&particles, (None, None), &around),
+                &energy(&particles, (None, None), &around),
                 least_scale,
             ),
             contacts: Contacts::default(),
@@ -196,6 +197,12 @@ impl Simulation {
                 return Err(DemError::range(name, got, "finite"));
             }
         }
+        let before = match &self.clumps {
+            Some(clumps) => clumps.velocity(grain),
+            None => self.particles.velocity(grain),
+        };
+        let mass = if self.clumps.is_some() { 1.0 } else { self.particles.mass(grain) };
+        let gained = mass * self.around.falling().half().dot(&(velocity - before));
         let work = if let Some(clumps) = &mut self.clumps {
             clumps.set_motion(&mut self.particles, grain, &velocity, &angular_velocity)
         } else if let Some(bodies) = &mut self.bodies {
@@ -206,7 +213,7 @@ impl Simulation {
             self.particles.set_motion(grain, &velocity, &angular_velocity);
             self.particles.kinetic_energy(grain) - before
         };
-        self.watch.see_work(work);
+        self.watch.see_work(work + gained);
         self.contacts.forget_list();
         (self.seemed_ended, self.ended) = (None, None);
         Ok(())
@@ -304,14 +311,14 @@ fn energy(
     particles: &Particles,
     (clumps, bodies): (Option<&Clumps>, Option<&Bodies>),
     around: &ContactContext,
-) -> f64 {
-    let gravity = &around.effects.gravity;
-    let energy = match (clumps, bodies) {
-        (Some(clumps), _) => clumps.energy(gravity),
-        (None, Some(bodies)) => bodies.energy(gravity),
-        (None, None) => particles.energy(gravity),
+) -> Energy {
+    let falling = around.falling();
+    let Energy { kinetic, potential } = match (clumps, bodies) {
+        (Some(clumps), _) => clumps.energy(&falling),
+        (None, Some(bodies)) => bodies.energy(&falling),
+        (None, None) => particles.energy(&falling),
     };
-    energy + around.effects.energy(particles)
+    Energy { kinetic, potential: potential + around.effects.energy(particles) }
 }
 
 #[cfg(test)]

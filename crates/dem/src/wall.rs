@@ -88,9 +88,9 @@ impl Wall {
         self.placement.is_some()
     }
 
-    /// A place in the scene seen from where the wall is stated.
-    pub fn seen_at_begin(&self, x: &Vector3<f64>) -> Vector3<f64> {
-        self.placement.as_ref().map_or(*x, |placement| placement.seen(x, 0.0))
+    /// A place in the scene at `now` `[s]` into the substep, seen from where the wall is stated.
+    pub fn stated_place(&self, x: &Vector3<f64>, now: f64) -> Vector3<f64> {
+        self.placement.as_ref().map_or(*x, |placement| placement.seen(x, now))
     }
 
     /// Directions of the scene, seen from where the wall is stated.
@@ -130,7 +130,7 @@ impl Walls {
             placement: Placement::new(motion),
         };
         let of = |wall: &granulcal_scene::Wall| resolve(&wall.shape, &wall.material, &wall.motion);
-        let mut all = vec![resolve(&ground, &scene.ground.material, &Motion::Still)];
+        let mut all = vec![resolve(&ground, &scene.ground.material, &Motion::default())];
         all[0].material = scene.effects.ground.of(all[0].material);
         if let Some(funnel) = &scene.funnel {
             let mut walls = scene.effects.funnel.walls(funnel).map(|wall| of(&wall));
@@ -175,15 +175,31 @@ impl Walls {
         self.rims.iter().map(|(owner, rim)| (&self.all[*owner], rim))
     }
 
-    /// Whether the way from one place to another, at the begin of a substep, changes the side of a surface round an end
+    /// How fast points of walls no farther from a place than `reach` go at most, as far as they move with the place
+    /// `[m/s]`.
+    pub fn fastest_near(&self, x: &Vector3<f64>, reach: f64) -> f64 {
+        let of = |wall: &Wall| {
+            let (velocity, omega) = wall.motion_at(x);
+            velocity.norm() + reach * omega.norm()
+        };
+        self.all.iter().map(of).fold(0.0, f64::max)
+    }
+
+    /// Whether the way from one place to another, at `now` `[s]` into a substep, changes the side of a surface round an end
     /// at which nothing goes on. Of triangles it is not told.
-    pub fn leads_round(&self, surface: usize, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
+    pub fn leads_round(
+        &self,
+        surface: usize,
+        from: &Vector3<f64>,
+        to: &Vector3<f64>,
+        now: f64,
+    ) -> bool {
         let owner = self.owner(surface);
         let wall = &self.all[owner];
         let Some(of_wall) = wall.surfaces.get(surface - self.first[owner] as usize) else {
             return false;
         };
-        let [from, to] = [from, to].map(|x| wall.seen(x, 0.0).0);
+        let [from, to] = [from, to].map(|x| wall.stated_place(x, now));
         // Walls that rest share their rims, one that moves has its own.
         let is_of_it = |of: usize| of == owner || !(self.all[of].is_moving() || wall.is_moving());
         of_wall.leads_round(&from, &to).is_some_and(|end| {

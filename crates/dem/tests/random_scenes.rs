@@ -87,7 +87,7 @@ fn funnel() -> impl Strategy<Value = Funnel> {
             cone_length,
             stem_length,
             material: WallMaterial::default(),
-            motion: Motion::Still,
+            motion: Motion::default(),
         },
     )
 }
@@ -151,7 +151,7 @@ fn motion() -> impl Strategy<Value = Motion> {
             end: Some(begin + length),
         },
     );
-    let still = || Just(Motion::Still);
+    let still = || Just(Motion::default());
     prop_oneof![still(), still(), still(), lift, spin, shake]
 }
 

@@ -60,8 +60,8 @@ impl Intrinsics {
     /// Checked intrinsics.
     ///
     /// # Errors
-    /// `OutOfRange` or `NonFinite` for an empty image, a focal length that is not positive, or a
-    /// principal point that is not finite.
+    /// `OutOfRange` or `NonFinite` for an empty image, a focal length that is not positive or twice the other, or a
+    /// principal point that is not finite, or farther from the image than that is wide.
     pub fn new(
         width: usize,
         height: usize,
@@ -75,6 +75,13 @@ impl Intrinsics {
         require_in("focal length fx [px]", fx, f64::MIN_POSITIVE, MAX_FOCAL_PX)?;
         require_in("focal length fy [px]", fy, f64::MIN_POSITIVE, MAX_FOCAL_PX)?;
         require_finite("principal point [px]", [cx, cy].into_iter())?;
+        // A part of an image may have it outside, but not far.
+        for (name, at, side) in
+            [("principal point cx [px]", cx, width), ("principal point cy [px]", cy, height)]
+        {
+            require_in(name, at, -(side as f64), 2.0 * side as f64)?;
+        }
+        require_in("focal lengths fy over fx", fy / fx, 0.5, 2.0)?;
         Ok(Self { width, height, fx, fy, cx, cy })
     }
 

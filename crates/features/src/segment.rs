@@ -9,6 +9,7 @@ mod edge;
 mod flying;
 mod formation;
 mod levelled;
+mod outlook;
 mod settings;
 mod shape;
 mod spacing;
@@ -18,6 +19,7 @@ use nalgebra::Vector3;
 pub use edge::EdgePixels;
 pub use formation::Formation;
 pub use levelled::Levelled;
+pub use outlook::OtherHeap;
 pub use settings::{Segmentation, Threshold};
 pub use shape::{Kind, Shape};
 

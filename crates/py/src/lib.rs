@@ -66,7 +66,7 @@ mod _native {
     #[pymodule_export]
     use crate::run_cli::{Listener, listen_for_signals, run_cli};
     #[pymodule_export]
-    use crate::scene::Scene;
+    use crate::scene::{Scene, law_of};
     #[pymodule_export]
     use crate::simulate::{simulate, try_pour};
     #[pymodule_export]

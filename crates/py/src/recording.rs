@@ -65,6 +65,11 @@ impl Recording {
     }
 
     #[getter]
+    fn unlike(&self) -> Option<String> {
+        self.inner.unlike.clone()
+    }
+
+    #[getter]
     fn damage(&self) -> Vec<String> {
         self.inner.damage.clone()
     }

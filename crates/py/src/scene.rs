@@ -49,6 +49,12 @@ impl Scene {
         Ok(Self { inner })
     }
 
+    /// Number of the law that its pours follow.
+    #[getter]
+    fn law(&self) -> u32 {
+        dem::law_of(&self.inner)
+    }
+
     /// Why what a recording shows cannot be of this scene whose parameters are of a prior, a sentence each; none if it
     /// can, or if that cannot be told.
     fn violations(
@@ -145,4 +151,13 @@ impl Scene {
     fn preset(&self) -> &'static str {
         self.inner.preset.name()
     }
+}
+
+/// Number of the law that pours of a scene follow today; that of grains of 4 mm and more without one that can be read.
+#[pyfunction]
+#[pyo3(signature = (scene_toml))]
+pub fn law_of(scene_toml: Option<&str>) -> u32 {
+    let scene =
+        scene_toml.and_then(|text| granulcal_dataset::scene_from_text(text, Path::new("")).ok());
+    scene.as_ref().map_or(dem::LAW, dem::law_of)
 }

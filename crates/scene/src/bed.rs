@@ -118,7 +118,7 @@ mod tests {
             (|s| s.bed.as_mut().unwrap().settle = -1.0, "bed.settle"),
             (|s| s.bed.as_mut().unwrap().jitter = 1e-3, "bed.jitter"),
             (|s| s.bed.as_mut().unwrap().height = 3e-3, "smaller of radius and height"),
-            (|s| s.bed.as_mut().unwrap().spacing = 4.0e-6, "bed.jitter"),
+            (|s| s.bed.as_mut().unwrap().spacing = 4.0e-6, "bed.spacing"),
             (|s| s.camera.projection = Projection::Pinhole, "a camera that is not orthographic"),
             (|s| s.camera.mask = Mask::Colour, "camera.mask"),
             (|s| s.start = Scene::funnel(0.1).start, "a start that is no ball"),

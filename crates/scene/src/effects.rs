@@ -143,9 +143,10 @@ impl Effects {
         }
     }
 
-    /// When the last of them has ended that ends by itself `[s]`.
+    /// When the last of them has ended that ends by itself, and the last has begun that begins later `[s]`.
     pub(crate) fn acts_until(&self) -> f64 {
-        self.vibration.end()
+        let liquid = if self.liquid.is_on() { self.liquid.begin } else { 0.0 };
+        self.vibration.end().max(liquid)
     }
 }
 

@@ -78,6 +78,14 @@ pub enum SceneError {
         /// Table of the other.
         other: &'static str,
     },
+    /// What says something of a thing that the scene lacks.
+    #[error("{one} needs {needs}, which the scene lacks")]
+    Needs {
+        /// Table of the one.
+        one: &'static str,
+        /// What is not there.
+        needs: &'static str,
+    },
     /// A number of round grains' impacts that grains of another shape do not read.
     #[error(
         "{name} must be {} with {body}, whose impacts do not read it, got {}",

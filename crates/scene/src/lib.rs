@@ -36,6 +36,7 @@ mod prior;
 mod scene;
 mod sensor;
 mod start;
+mod together;
 mod uniforms;
 mod view;
 mod walls;

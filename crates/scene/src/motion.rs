@@ -7,12 +7,11 @@ use crate::check::{finite, non_negative, positive};
 use crate::error::SceneError;
 
 /// The motion of a wall from its stated place. Times are simulated times `[s]`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub enum Motion {
-    /// It stays where it is.
-    #[default]
-    Still,
+    /// It stays where it is. Braces, for a variant without them takes any key.
+    Still {},
     /// It moves at a constant velocity, for example a tube that is lifted off a column.
     Lift {
         /// `[m/s]`
@@ -64,16 +63,22 @@ pub enum Motion {
     },
 }
 
+impl Default for Motion {
+    fn default() -> Self {
+        Self::Still {}
+    }
+}
+
 impl Motion {
     /// Whether it never moves.
     pub fn is_still(&self) -> bool {
-        *self == Self::Still
+        *self == Self::Still {}
     }
 
     /// When the last of its motion is over `[s]`; infinite for one that never ends.
     pub fn end(&self) -> f64 {
         match self {
-            Self::Still => 0.0,
+            Self::Still {} => 0.0,
             &Self::Lift { end, .. } => end,
             &Self::Spin { end, .. } | &Self::Shake { end, .. } => end.unwrap_or(f64::INFINITY),
             Self::Trajectory { knots, .. } => knots.last().map_or(0.0, |knot| knot[0]),
@@ -84,7 +89,7 @@ impl Motion {
     pub fn pose(&self, time: f64) -> Isometry3<f64> {
         let since = |begin: f64, end: f64| (time.min(end) - begin).max(0.0);
         match self {
-            Self::Still => Isometry3::identity(),
+            Self::Still {} => Isometry3::identity(),
             &Self::Lift { velocity, begin, end } => {
                 Translation3::from(since(begin, end) * Vector3::from(velocity)).into()
             }
@@ -107,7 +112,7 @@ impl Motion {
     /// The fastest that it moves without turning `[m/s]`.
     fn fastest(&self) -> f64 {
         match self {
-            Self::Still | Self::Spin { .. } => 0.0,
+            Self::Still {} | Self::Spin { .. } => 0.0,
             Self::Lift { velocity, .. } => Vector3::from(*velocity).norm(),
             Self::Shake { amplitude, frequency, .. } => {
                 std::f64::consts::TAU * frequency * Vector3::from(*amplitude).norm()
@@ -145,7 +150,7 @@ impl Motion {
             }
         };
         match self {
-            Self::Still => Ok(()),
+            Self::Still {} => Ok(()),
             &Self::Lift { velocity, begin, end } => {
                 all_finite("velocity", &velocity)?;
                 is_after(begin, Some(end))
@@ -241,7 +246,7 @@ mod tests {
         assert!(at(&shake, 0.01, [0.0; 3]).x.abs() < 1e-15);
         assert!((at(&shake, 0.005, [0.0; 3]).x - 0.01).abs() < 1e-15);
         assert!((at(&shake, 1.0, [0.0; 3]).x - 0.01).abs() < 1e-12);
-        assert_eq!((spin.end(), shake.end(), Motion::Still.end()), (f64::INFINITY, 0.105, 0.0));
+        assert_eq!((spin.end(), shake.end(), Motion::default().end()), (f64::INFINITY, 0.105, 0.0));
     }
 
     #[test]

@@ -176,10 +176,18 @@ fn insert(tree: &mut Table, path: &str, value: f64) -> Result<(), SceneError> {
     set_number(path, number, value)
 }
 
+/// From here on not every whole number is a number of double precision.
+const LARGEST_WHOLE: f64 = 9_007_199_254_740_992.0;
+
 /// Replaces a number by another; a whole number stays one.
 fn set_number(path: &str, place: &mut Value, value: f64) -> Result<(), SceneError> {
     *place = match place {
-        Value::Integer(_) if value.fract() == 0.0 => Value::Integer(value as i64),
+        Value::Integer(_) if value.fract() == 0.0 && value.abs() < LARGEST_WHOLE => {
+            Value::Integer(value as i64)
+        }
+        Value::Integer(_) if value.fract() == 0.0 => {
+            return Err(path_error(path, &format!("must be below 2^53, got {}", General(value))));
+        }
         Value::Integer(_) => {
             return Err(path_error(
                 path,

@@ -43,13 +43,13 @@ pub struct Periodic {
 }
 
 impl Periodic {
-    pub(crate) fn check(&self, diameter: f64) -> Result<(), SceneError> {
+    pub(crate) fn check(&self, widest: f64) -> Result<(), SceneError> {
         finite("periodic.from", self.from)?;
         finite("periodic.to", self.to)?;
-        if self.to - self.from >= FEWEST_DIAMETERS * diameter {
+        if self.to - self.from >= FEWEST_DIAMETERS * widest {
             return Ok(());
         }
-        let allowed = "at least 4 grain diameters above periodic.from";
+        let allowed = "at least 4 diameters of the widest grain above periodic.from";
         Err(SceneError::range("periodic.to", self.to, allowed))
     }
 }

@@ -26,6 +26,9 @@ use entry::{Entry, File};
 use parameter::refuse;
 pub use parameter::{Keys, Parameter};
 
+/// Rows of a batch whose draws are checked before its first pour, at most.
+const MOST_CHECKED: u64 = 1 << 20;
+
 /// Independent parameters, each named by its path in the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
@@ -114,6 +117,30 @@ impl Prior {
         Ok(())
     }
 
+    /// Checks the values that the first `rows` rows of a seed draw where [`Self::check`] cannot tell: from a normal that is
+    /// not cut off.
+    ///
+    /// # Errors
+    /// [`SceneError::PriorDoesNotFit`] names the first parameter and value that does not fit.
+    pub fn check_draws(&self, scene: &Scene, seed: u64, rows: u64) -> Result<(), SceneError> {
+        let unbounded: Vec<_> = (0..self.parameters.len())
+            .filter(|&number| self.parameters[number].distribution.is_unbounded())
+            .collect();
+        let rows = if unbounded.is_empty() { 0 } else { rows.min(MOST_CHECKED) };
+        for row in 0..rows {
+            let values = self.sample(seed, row);
+            for &number in &unbounded {
+                let (path, value) = (&self.parameters[number].path, values[number]);
+                scene.with(path, value).map_err(|source| SceneError::PriorDoesNotFit {
+                    parameter: path.clone(),
+                    value,
+                    source: Box::new(source),
+                })?;
+            }
+        }
+        Ok(())
+    }
+
     /// All parameters, fixed ones included.
     pub fn parameters(&self) -> &[Parameter] {
         &self.parameters
@@ -180,6 +207,25 @@ mod tests {
         distribution = "fixed"
         value = 0.4
     "#;
+
+    #[test]
+    fn a_normal_that_is_not_cut_off_is_checked_draw_by_draw() {
+        let text = |cut: &str| {
+            format!(
+                "[[parameter]]\npath = \"material.sliding_friction\"\ndistribution = \"normal\"\nmean = 0.3\nsd = 0.12{cut}\n"
+            )
+        };
+        let (scene, open) = (Scene::drop(0.1), Prior::from_toml(&text("")).unwrap());
+        open.check(&scene).unwrap();
+        open.check_draws(&scene, 0, 20).unwrap();
+        let error = open.check_draws(&scene, 0, 2000).unwrap_err();
+        assert!(
+            matches!(error, SceneError::PriorDoesNotFit { value, .. } if value < 0.0),
+            "{error}"
+        );
+        let cut = Prior::from_toml(&text("\nlow = 0.0")).unwrap();
+        cut.check_draws(&scene, 0, 2000).unwrap();
+    }
 
     #[test]
     fn survives_toml_and_fits_the_scene() {

@@ -7,12 +7,11 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::bed::Bed;
-use crate::camera::{CameraSpec, Mask, Projection};
+use crate::camera::CameraSpec;
 use crate::check::{finite, positive};
-use crate::effects::{Effect, Effects};
-use crate::end::{EndRule, RolledAway};
+use crate::effects::Effects;
+use crate::end::EndRule;
 use crate::error::SceneError;
-use crate::grain_shape::Solid;
 use crate::grains::Grains;
 use crate::gravity::standard_gravity;
 use crate::intruder::Intruder;
@@ -195,83 +194,15 @@ impl Scene {
         Grains { diameter, shape: None, ..self.grains }
     }
 
+    /// Diameter of the widest grain that the scene can have `[m]`.
+    fn widest_grain(&self) -> f64 {
+        self.effects.polydispersity.widest(self.held_grains().diameter)
+    }
+
     /// Centres of the grains at time zero `[m]`, one each.
     pub fn starting_positions(&self, seed: u64) -> Vec<Vector3<f64>> {
         let pose = self.funnel.as_ref().and_then(|funnel| self.effects.funnel.of(funnel));
         self.start.positions(&self.held_grains(), self.funnel.as_ref(), pose.as_ref(), seed)
-    }
-
-    /// What grains that are not round cannot be with.
-    fn check_clump(&self) -> Result<(), SceneError> {
-        let others = [
-            (self.effects.polydispersity.path(), self.effects.polydispersity.is_on()),
-            ("outflow", self.outflow.is_some()),
-            ("periodic", self.periodic.is_some()),
-        ];
-        if self.effects.clump.is_on() { exclude("effects.clump", &others) } else { Ok(()) }
-    }
-
-    /// What convex bodies cannot be with: they have walls, gravity and the plain law.
-    fn check_shape(&self) -> Result<(), SceneError> {
-        let Some(shape) = &self.grains.shape else { return Ok(()) };
-        shape.check()?;
-        Solid::new(shape, self.grains.diameter)?;
-        let Effects { ground, tilt, funnel, outlet, .. } = self.effects.clone();
-        let alone = Effects { ground, tilt, funnel, outlet, ..Effects::default() };
-        let looks = |observe: &Observe| {
-            observe.images.is_some() || observe.surface.is_some() || observe.front.is_some()
-        };
-        let others = [
-            ("effects but ground, tilt, funnel and outlet", self.effects != alone),
-            ("outflow", self.outflow.is_some()),
-            ("periodic", self.periodic.is_some()),
-            ("observe.images, surface or front", self.observe.as_ref().is_some_and(looks)),
-            ("an orthographic camera", self.camera.projection == Projection::Orthographic),
-            ("preset paper", self.preset == Preset::Paper),
-        ];
-        exclude("grains.shape", &others)
-    }
-
-    /// Refuses numbers of balls' impacts, the grains' or a wall's, where grains are not round.
-    fn check_bodies(&self) -> Result<(), SceneError> {
-        let body = match (self.effects.clump.is_on(), &self.grains.shape) {
-            (true, _) => self.effects.clump.path(),
-            (false, Some(_)) => "grains.shape",
-            (false, None) => return Ok(()),
-        };
-        let walls = self.walls.iter().enumerate();
-        let named = walls.map(|(index, wall)| (format!("walls.{index}.material"), wall.material));
-        let funnel = self.funnel.iter().map(|f| ("funnel.material".to_owned(), f.material));
-        let ground = std::iter::once(("ground.material".to_owned(), self.ground.material));
-        self.material.check_bodies("material", body)?;
-        ground
-            .chain(funnel)
-            .chain(named)
-            .try_for_each(|(name, wall)| wall.over(&self.material).check_bodies(&name, body))
-    }
-
-    /// What grains that leave once they have rolled away cannot be with: what might turn one back, what looks at where it
-    /// is, and bodies that do not roll as balls do.
-    fn check_rolled_away(&self) -> Result<(), SceneError> {
-        if self.end.rolled_away == RolledAway::Stay {
-            return Ok(());
-        }
-        let slopes = self.gravity[0] != 0.0 || self.gravity[1] != 0.0 || self.gravity[2] >= 0.0;
-        let others = [
-            ("walls", !self.walls.is_empty()),
-            ("gravity that is not along -z", slopes),
-            ("effects.tilt", self.effects.tilt.is_on()),
-            ("effects.vibration", self.effects.vibration.is_on()),
-            ("effects.clump", self.effects.clump.is_on()),
-            ("grains.shape", self.grains.shape.is_some()),
-            ("observe", self.observe.is_some()),
-            ("views", !self.views.is_empty()),
-            ("outflow", self.outflow.is_some()),
-            ("periodic", self.periodic.is_some()),
-            ("intruder", self.intruder.is_some()),
-            ("bed", self.bed.is_some()),
-        ];
-        exclude("end.rolled_away = \"leave\"", &others)
     }
 
     /// The preset's settings, at the substep that the scene states, if it does.
@@ -291,75 +222,6 @@ impl Scene {
         Err(SceneError::range("substep", substep, allowed))
     }
 
-    /// What an intruder cannot be with.
-    fn check_intruder(&self) -> Result<(), SceneError> {
-        let Some(intruder) = &self.intruder else { return Ok(()) };
-        intruder.check(&self.grains)?;
-        let others = [
-            ("grains.shape", self.grains.shape.is_some()),
-            ("effects.clump", self.effects.clump.is_on()),
-            ("outflow", self.outflow.is_some()),
-            ("periodic", self.periodic.is_some()),
-        ];
-        exclude("intruder", &others)
-    }
-
-    /// What a liquid that flows by itself cannot be with: it stands about the z axis on a level ground.
-    fn check_liquid(&self) -> Result<(), SceneError> {
-        let slopes = self.gravity[0] != 0.0 || self.gravity[1] != 0.0 || self.gravity[2] >= 0.0;
-        let others = [
-            ("effects.fluid", self.effects.fluid.is_on()),
-            ("gravity that is not along -z", slopes),
-            ("effects.tilt", self.effects.tilt.is_on()),
-            ("effects.vibration", self.effects.vibration.is_on()),
-            ("effects.clump", self.effects.clump.is_on()),
-            ("periodic", self.periodic.is_some()),
-            ("bed", self.bed.is_some()),
-        ];
-        if self.effects.liquid.is_on() {
-            return exclude("effects.liquid", &others);
-        }
-        if self.observe.as_ref().is_some_and(Observe::asks_for_liquid) {
-            let allowed = "positive where observe.liquid or observe.clock asks for its front";
-            let got = self.effects.liquid.height;
-            return Err(SceneError::range("effects.liquid.height", got, allowed));
-        }
-        Ok(())
-    }
-
-    /// What bonds cannot be with: bodies of several spheres.
-    fn check_bonds(&self) -> Result<(), SceneError> {
-        let others = [
-            ("effects.clump", self.effects.clump.is_on()),
-            ("grains.shape", self.grains.shape.is_some()),
-        ];
-        if self.effects.bonds.is_on() { exclude("effects.bonds", &others) } else { Ok(()) }
-    }
-
-    /// What a bed cannot be with. It is seen by what has become of it, which a map of heights tells.
-    fn check_bed(&self) -> Result<(), SceneError> {
-        let Some(bed) = &self.bed else { return Ok(()) };
-        bed.check(&self.grains)?;
-        let others = [
-            ("a start that is no ball", !matches!(self.start, Start::Ball { .. })),
-            (
-                "a camera that is not orthographic",
-                self.camera.projection != Projection::Orthographic,
-            ),
-            ("camera.mask = \"colour\"", self.camera.mask != Mask::Height),
-            ("grains.shape", self.grains.shape.is_some()),
-            ("effects.clump", self.effects.clump.is_on()),
-            (self.effects.polydispersity.path(), self.effects.polydispersity.is_on()),
-            ("funnel", self.funnel.is_some()),
-            ("outflow", self.outflow.is_some()),
-            ("periodic", self.periodic.is_some()),
-            ("intruder", self.intruder.is_some()),
-            ("observe", self.observe.is_some()),
-            ("views", !self.views.is_empty()),
-        ];
-        exclude("bed", &others)
-    }
-
     /// Checks every number of the scene.
     ///
     /// # Errors
@@ -370,19 +232,12 @@ impl Scene {
         positive("grains.density", self.grains.density)?;
         self.end.check()?;
         self.check_substep()?;
-        self.check_rolled_away()?;
         for (axis, value) in ["x", "y", "z"].iter().zip(self.gravity) {
             finite(&format!("gravity.{axis}"), value)?;
         }
         self.ground.check(&self.material)?;
         self.effects.check()?;
-        self.check_clump()?;
-        self.check_shape()?;
-        self.check_bodies()?;
-        self.check_intruder()?;
-        self.check_bed()?;
-        self.check_liquid()?;
-        self.check_bonds()?;
+        self.check_together()?;
         self.start.check(&self.held_grains())?;
         self.effects.check_method(self.settings().method)?;
         if let Some(funnel) = &self.funnel {
@@ -399,7 +254,7 @@ impl Scene {
             motion.check_jumps(&name, dt, diameter)?;
         }
         if let Some(periodic) = &self.periodic {
-            periodic.check(self.grains.diameter)?;
+            periodic.check(self.widest_grain())?;
         }
         if let Some(outflow) = &self.outflow {
             outflow.check()?;
@@ -409,14 +264,6 @@ impl Scene {
         }
         check_views(&self.views)?;
         self.camera.check()
-    }
-}
-
-/// Refuses the first of `others` that is there, beside `one`, which is.
-fn exclude(one: &'static str, others: &[(&'static str, bool)]) -> Result<(), SceneError> {
-    match others.iter().find(|(_, is_there)| *is_there) {
-        Some(&(other, _)) => Err(SceneError::Exclude { one, other }),
-        None => Ok(()),
     }
 }
 
@@ -438,50 +285,6 @@ mod tests {
         let error = Scene::from_toml(&text).unwrap_err();
         let source = std::error::Error::source(&error).unwrap().to_string();
         assert!(source.contains("diametre") && source.contains("diameter"), "{source}");
-    }
-
-    #[test]
-    fn what_only_balls_impacts_read_is_refused_by_name_of_other_grains() {
-        let shape = crate::GrainShape::Box { aspect: [1.0, 1.0, 2.0] };
-        for (body, clump, shape) in
-            [("effects.clump", 1.5, None), ("grains.shape", 1.0, Some(shape))]
-        {
-            let mut plain = Scene::drop(0.1);
-            plain.effects.clump.aspect = clump;
-            plain.grains.shape = shape;
-            plain.check().unwrap();
-            for (path, value) in [
-                ("material.tangential_restitution", 0.3),
-                ("material.softness", 0.01),
-                ("material.touching_exponent", 0.5),
-                ("material.impact_friction", 1.1),
-                ("material.rolling_dashpot", 0.7),
-                ("ground.material.softness", 0.0),
-            ] {
-                let said = plain.with(path, value).unwrap_err().to_string();
-                assert!(said.contains(path) && said.contains(body), "{said}");
-                Scene::drop(0.1).with(path, value).unwrap();
-            }
-        }
-    }
-
-    #[test]
-    fn grains_leave_only_where_nothing_turns_them_back() {
-        let mut scene = Scene::funnel(0.12);
-        assert!(!scene.to_toml().unwrap().contains("rolled_away"));
-        scene.end.rolled_away = RolledAway::Leave;
-        scene.check().unwrap();
-        assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
-        for (change, name) in [
-            ((|s: &mut Scene| s.gravity[0] = 0.1) as fn(&mut Scene), "gravity"),
-            (|s| s.outflow = Some(Outflow { below: -1.0, until: None }), "outflow"),
-            (|s| s.effects.tilt.x = 0.01, "effects.tilt"),
-        ] {
-            let mut scene = scene.clone();
-            change(&mut scene);
-            let text = scene.check().unwrap_err().to_string();
-            assert!(text.contains("rolled_away") && text.contains(name), "{text}");
-        }
     }
 
     #[test]

@@ -180,6 +180,12 @@ pub(crate) fn displace(points: &mut [Vector3<f64>], jitter: f64, random: &mut Pc
 /// Two neighbours may move towards each other by `jitter` along every axis, so twice its length must fit the gap.
 pub(crate) fn jitter_fits(name: &str, jitter: f64, gap: f64) -> Result<(), SceneError> {
     non_negative(name, jitter)?;
+    if gap < 0.0 {
+        let table = name.strip_suffix(".jitter").unwrap_or(name);
+        let (name, allowed) =
+            (format!("{table}.spacing less the grains' diameter"), "at least 0 m");
+        return Err(SceneError::range(name, gap, allowed));
+    }
     if 2.0 * jitter * 3f64.sqrt() <= gap + 1e-12 {
         return Ok(());
     }

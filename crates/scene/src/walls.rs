@@ -64,7 +64,7 @@ impl Default for Funnel {
             cone_length: 0.07,
             stem_length: 0.01,
             material: WallMaterial::default(),
-            motion: Motion::Still,
+            motion: Motion::default(),
         }
     }
 }
@@ -276,7 +276,7 @@ pub enum Shape {
 impl Wall {
     /// A wall that stays where it is.
     pub fn fixed(shape: Shape, material: WallMaterial) -> Self {
-        Self { shape, material, motion: Motion::Still }
+        Self { shape, material, motion: Motion::default() }
     }
 
     fn check_numbers(name: &str, field: &str, values: [f64; 3]) -> Result<(), SceneError> {

@@ -35,7 +35,7 @@ fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
         return Err(BadArgument("a recording, or --list, must be given".to_owned()).into());
     };
     let recording = Recording::open(path, &args.read.options())?;
-    for line in &recording.damage {
+    for line in recording.damage.iter().chain(&recording.unlike) {
         note(&format!("warning: {line}"));
     }
     let levelled = recording.level_with(&segmentation(args, &recording.segmentation)?)?;

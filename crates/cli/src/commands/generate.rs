@@ -126,6 +126,7 @@ fn dry_run(
     options: &GenerateOptions,
 ) -> anyhow::Result<Outcome> {
     prior.check(scene)?;
+    prior.check_draws(scene, options.seed, options.rows)?;
     let (begun, mut longest) = (Instant::now(), Duration::ZERO);
     let (mut cpu_s, mut tried, mut cut) = (0.0, 0, None);
     for row in 0..options.rows.min(TRIED) {
@@ -188,19 +189,28 @@ fn report(args: &GenerateArgs, summary: &Summary) -> anyhow::Result<Outcome> {
             "unhealthy": progress.unhealthy,
             "out_of_view": progress.out_of_view,
             "jammed": progress.jammed,
+            "at_horizon": progress.at_horizon,
             "stopped": stopped,
         }))?;
     } else {
         let folder = args.out.display();
         print_line(&format!(
             "{folder}: {complete} of {} rows complete, {} made now, {} unhealthy, {} without grains in view, \
-             {} jammed",
+             {} jammed, {} still moving at the horizon",
             progress.total,
             progress.made,
             progress.unhealthy,
             progress.out_of_view,
-            progress.jammed
+            progress.jammed,
+            progress.at_horizon
         ))?;
+    }
+    if 2 * progress.at_horizon > complete {
+        tracing::warn!(
+            "{} of {complete} pours were still moving at the horizon: where grains have not rolled out of view, a longer \
+             end.horizon lets them come to rest",
+            progress.at_horizon
+        );
     }
     if progress.unverified > 0 {
         tracing::warn!(

@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use clap::Args;
 use granulcal_bayessim::Model;
 use granulcal_dataset::{Form, Limits, Product, Recording, scene_from_text, write_file};
-use granulcal_dem::LAW;
+use granulcal_dem::{LAW, law_of};
 use granulcal_features::{Formation, PAPER16};
 use granulcal_scene::Scene;
 use serde_json::json;
@@ -86,12 +86,6 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
             "note: the model is of an earlier version without hashes: damage in it cannot be found",
         );
     }
-    if let Some(law) = model.law.other_than(LAW, model.scene_toml.is_some()) {
-        note(&format!(
-            "warning: the model was trained on pours of another law of the solver, {law}; today's is {LAW}: pours at its \
-             posterior are not those that it knows; train again"
-        ));
-    }
     if !model.x_names.iter().map(String::as_str).eq(PAPER16.iter().map(|s| s.name)) {
         let (names, found) = (PAPER16.map(|s| s.name).join(", "), model.x_names.join(", "));
         let refusal =
@@ -101,6 +95,13 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
     // The scene may name meshes that are not here; the camera does not need them.
     let trained =
         model.scene_toml.as_deref().and_then(|text| scene_from_text(text, Path::new("")).ok());
+    let today = trained.as_ref().map_or(LAW, law_of);
+    if let Some(law) = model.law.other_than(today, model.scene_toml.is_some()) {
+        note(&format!(
+            "warning: the model was trained on pours of another law of the solver, {law}; today's is {today}: pours at its \
+             posterior are not those that it knows; train again"
+        ));
+    }
     if let Some(name) = &args.scene {
         require_same(trained.as_ref(), &scene::named(name)?)?;
     }
@@ -109,7 +110,8 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
         None => None,
     };
     let ground_resolution = trained.map(|scene| scene.camera.ground_resolution());
-    let (mut is_whole, mut impossible) = (true, Vec::new());
+    require_different(&args.recordings)?;
+    let (mut is_whole, mut impossible, mut doubts) = (true, Vec::new(), Vec::new());
     let mut observed = Vec::with_capacity(args.recordings.len());
     for path in &args.recordings {
         let recording = Recording::open(path, &args.read.options())?;
@@ -120,18 +122,21 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
             note(&format!("warning: {}: {lost}", path.display()));
             is_whole = false;
         }
+        doubts
+            .extend(recording.unlike.iter().map(|unlike| format!("{}: {unlike}", path.display())));
         let mut segmentation = recording.segmentation.clone();
         segmentation.ground_resolution = ground_resolution.or(segmentation.ground_resolution);
         segmentation.border_px = args.border.unwrap_or(segmentation.border_px);
         let formation = recording.formation_with(&segmentation)?;
         if args.border.is_none() {
             // Before the limits: these pixels may be why the extent cannot be the scene's.
-            note_edge(path, &formation);
+            doubts.extend(pixels_at_edge(path, &formation));
         }
         if let Some(limits) = &limits {
             let name = path.display();
-            let found = limits.violations(&formation).into_iter();
-            impossible.extend(found.map(|reason| format!("{name}: {reason}")));
+            let of_it = |reason| format!("{name}: {reason}");
+            impossible.extend(limits.violations(&formation).into_iter().map(of_it));
+            doubts.extend(limits.doubts(&formation).into_iter().map(of_it));
         }
         let statistics = recording.statistics_of(&formation);
         observed.push(match statistics.with_context(|| format!("describing {}", path.display())) {
@@ -142,11 +147,15 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
         });
     }
     let paths: Vec<_> = args.recordings.iter().map(|path| path.display().to_string()).collect();
+    for doubt in &doubts {
+        note(&format!("warning: {doubt}"));
+    }
     let report = if impossible.is_empty() {
         Report::of(&model, &paths, &observed, args.seed)?
     } else {
         Report::impossible(&model, &paths, &observed, impossible)
     };
+    let report = report.with_doubts(doubts);
     let mut sides = SideFiles::default();
     if let Some(path) = &args.out {
         let mut document = report.document();
@@ -171,17 +180,29 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
     Ok(sides.finish(outcome))
 }
 
-/// Tells pixels at the edge of the image that are taken for grains, and what leaves them out.
-fn note_edge(path: &Path, formation: &Formation) {
-    if let Some(edge) = formation.edge() {
-        note(&format!(
-            "warning: {}: {} pixels at the edge of the image, apart from the formation, are taken for grains; \
-             --border {} leaves them out",
-            path.display(),
-            edge.count,
-            edge.frame * formation.downsample
-        ));
+/// Pixels at the edge of the image that are taken for grains, and what leaves them out.
+fn pixels_at_edge(path: &Path, formation: &Formation) -> Option<String> {
+    let edge = formation.edge()?;
+    let (path, width) = (path.display(), edge.frame * formation.downsample);
+    Some(format!(
+        "{path}: {} pixels at the edge of the image, apart from the formation, are taken for grains; --border {width} \
+         leaves them out",
+        edge.count
+    ))
+}
+
+/// Refuses a recording that is given twice: it would count as two pours.
+fn require_different(recordings: &[Reads]) -> anyhow::Result<()> {
+    let mut seen = std::collections::HashSet::new();
+    for path in recordings {
+        let there = std::fs::canonicalize(&**path).unwrap_or_else(|_| path.to_path_buf());
+        if !seen.insert(there) {
+            let refusal =
+                format!("each recording must be given once, got {} twice", path.display());
+            return Err(BadArgument(refusal).into());
+        }
     }
+    Ok(())
 }
 
 /// Refuses a model of another scene.

@@ -86,6 +86,8 @@ fn dataset_facts(path: &Path) -> anyhow::Result<Value> {
     Ok(json!({
         "kind": "data set",
         "rows": dataset.rows.len(),
+        "asked": dataset.asked,
+        "rows missing": dataset.missing(),
         "missing": dataset.gaps(NAMED_GAPS),
         "status": dataset.status_counts(),
         "files without a hash": dataset.unverified.len(),
@@ -188,7 +190,7 @@ fn checkpoint_facts(path: &Path) -> anyhow::Result<Value> {
     Ok(json!({
         "kind": "checkpoint",
         "version": header.version,
-        "law": granulcal_dem::LAW,
+        "law": granulcal_dem::law_of(&header.scene),
         "arithmetic": granulcal_dem::arithmetic(&header.scene),
         "seed": header.seed,
         "substeps": header.substep,

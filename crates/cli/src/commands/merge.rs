@@ -20,6 +20,10 @@ Joins folders and files of one data set (same scene, prior, seed and version) in
 Parquet file, in order of the rows. A row that stands in two of them is an error. Of
 folders only some parts are in memory at a time, so that a million rows need no more.
 
+The file is written, too, where rows are missing of those that `generate` was asked for: how
+many is told, and the exit code is 3. Folders of earlier versions do not say how many were
+asked for; there only what is missing before the last row is known.
+
 Example:
   granulcal-cli merge shard-0/ shard-1/ -o data.parquet")]
 pub struct MergeArgs {
@@ -43,18 +47,33 @@ impl Run for MergeArgs {
 
 fn run(args: &MergeArgs) -> anyhow::Result<Outcome> {
     let inputs: Vec<_> = args.inputs.iter().map(|input| input.to_path_buf()).collect();
-    let Merged { header, rows, gaps, unverified } = merge(&inputs, &args.out, NAMED_GAPS)?;
+    let merged = merge(&inputs, &args.out, NAMED_GAPS)?;
+    let Merged { header, rows, asked, missing, gaps, unverified } = merged;
     warn_of(&header, &unverified);
-    if !gaps.is_empty() {
+    if missing > 0 {
         tracing::warn!(
-            "rows are missing, the first are {gaps:?}; is a shard absent or unfinished?"
+            "{missing} rows are missing, the first are {gaps:?}; is a shard absent or unfinished?"
+        );
+    }
+    if asked.is_none() {
+        tracing::warn!(
+            "the rows asked for are not recorded: whether some are missing after the last is not known"
         );
     }
     let out = args.out.display();
     if args.json {
-        print_json(&json!({ "file": out.to_string(), "rows": rows, "complete": gaps.is_empty() }))?;
+        print_json(&json!({
+            "file": out.to_string(),
+            "rows": rows,
+            "asked": asked,
+            "missing": missing,
+            // Null where nobody knows.
+            "complete": (missing > 0 || asked.is_some()).then_some(missing == 0),
+        }))?;
+    } else if missing > 0 {
+        print_line(&format!("{out}: {rows} rows, {missing} missing"))?;
     } else {
         print_line(&format!("{out}: {rows} rows"))?;
     }
-    Ok(Outcome::Done)
+    Ok(Outcome::whole_if(missing == 0))
 }

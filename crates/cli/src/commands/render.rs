@@ -6,13 +6,14 @@ use clap::Args;
 use granulcal_dataset::{
     CameraFile, Drawn, Observer, Product, View, capture, capture_from, npy, png, write_height_map,
 };
+use granulcal_dem::Status;
 use granulcal_scene::{Projection, Scene, ViewSpec};
 use serde_json::{Value, json};
 
 use crate::args::SceneArgs;
 use crate::args::numbers::positive;
 use crate::args::paths::{Reads, Writes, writes};
-use crate::context::{Context, print_json, print_line};
+use crate::context::{Context, note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
 use crate::run::{Run, Setting};
 use crate::scene::{self, Keep};
@@ -85,7 +86,12 @@ fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
             &mut Observer::new(&scene),
             &mut SideFiles::default(),
         )? {
-            Some(pour) => (pour.positions, pour.radii, pour.convex),
+            Some(pour) => {
+                if matches!(pour.status, Status::Unhealthy | Status::Jammed) {
+                    note(&format!("warning: the pour that is drawn is {}", pour.status));
+                }
+                (pour.positions, pour.radii, pour.convex)
+            }
             None => return Ok(Outcome::Stopped),
         }
     };

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use granulcal_dataset::Dataset;
 
-use crate::place::{Place, json, text};
+use crate::place::{Place, interrupt, json, text};
 use crate::tiny;
 
 fn rows(path: &Path) -> Dataset {
@@ -72,11 +72,64 @@ fn an_interrupt_keeps_finished_rows_and_exits_with_130() {
         assert!(child.try_wait().unwrap().is_none());
         std::thread::sleep(Duration::from_millis(2));
     }
-    let pid = child.id().to_string();
-    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    assert!(interrupt(&child));
     assert_eq!(child.wait().unwrap().code(), Some(130));
     let finished = rows(&place.at("d")).rows.len();
     assert!((2..2000).contains(&finished), "{finished}");
+}
+
+/// As `nohup` starts a command, and a script one in its background.
+#[cfg(unix)]
+#[test]
+fn signals_that_the_parent_ignores_end_nothing() {
+    let place = Place::new();
+    let args = tiny(&["generate", "drop", "default", "-n", "200"], &["--chunk", "1", "-o", "d"]);
+    let mut child = Command::new("sh")
+        .args(["-c", "trap '' HUP INT; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_granulcal-cli")])
+        .args(&args)
+        .current_dir(place.at(""))
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    while !place.at("d/part-000001.parquet").exists() {
+        assert!(child.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    for signal in ["-HUP", "-INT", "-INT"] {
+        let pid = child.id().to_string();
+        assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(matches!(child.wait().unwrap().code(), Some(0 | 3)));
+    assert_eq!(rows(&place.at("d")).rows.len(), 200);
+}
+
+/// What a limit of the shell allows is as a disk that is full.
+#[cfg(unix)]
+#[test]
+fn a_file_that_cannot_be_written_is_no_damaged_input() {
+    let place = Place::new();
+    place.expect(0, &tiny(&["generate", "drop", "default", "-n", "2", "-o", "d"], &[]));
+    let output = Command::new("sh")
+        .args(["-c", "ulimit -f 1; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_granulcal-cli")])
+        .args(["merge", "d", "-o", "all.parquet"])
+        .current_dir(place.at(""))
+        .output()
+        .unwrap();
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("cannot write all.parquet") && !said.contains("damaged"), "{said}");
+    assert_eq!(place.listing(), [place.at("d")]);
+}
+
+#[test]
+fn a_reader_that_goes_away_hides_no_unusable_rows() {
+    let place = Place::new();
+    let unseen = ["--set", "camera.height_threshold=0.5", "-o", "d"];
+    let args = tiny(&["generate", "drop", "default", "-n", "2"], &unseen);
+    let mut child = place.command(&args).stdout(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    assert_eq!(child.wait().unwrap().code(), Some(3));
 }
 
 #[test]
@@ -91,7 +144,16 @@ fn shards_merge_to_the_whole() {
     for (out, shard) in [("whole", "0/1"), ("a", "0/2"), ("b", "1/2")] {
         place.expect(0, &args(out, shard));
     }
-    place.expect(0, &["merge", "a", "b", "-o", "all.parquet"]);
+    let merge = |code, words: &[&'static str]| {
+        let told = place.expect(code, &[&["merge", "-o", "all.parquet", "--json"], words].concat());
+        let told = json(&told);
+        (told["rows"].clone(), told["missing"].clone(), told["complete"].clone())
+    };
+    // The last row is of the other shard.
+    assert_eq!(merge(3, &["a"]), (4.into(), 3.into(), false.into()));
+    assert_eq!(merge(3, &["b"]), (3.into(), 4.into(), false.into()));
+    assert!(place.expect(0, &["inspect", "a"]).contains("rows missing: 3"));
+    assert_eq!(merge(0, &["a", "b"]), (7.into(), 0.into(), true.into()));
     assert_same_rows(&place.at("whole"), &place.at("all.parquet"));
     place.refused(&["merge", "a", "whole", "-o", "x.parquet"], &["row 0", "stands in"]);
     let facts = json(&place.expect(0, &["inspect", "all.parquet", "--json"]));
@@ -133,6 +195,7 @@ fn rows_of_before_laws_had_numbers_are_told_by_who_looks() {
         let said = text(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{said}");
         assert!(said.contains("before laws had numbers"), "{said}");
+        assert_eq!(said.contains("not recorded"), words[0] == "merge", "{said}");
     }
     place.expect(0, &tiny(&["generate", "drop", "default", "-n", "1", "-o", "d"], &[]));
     assert_eq!(text(&place.run(&["inspect", "d", "-q"]).stderr), "");

@@ -75,6 +75,29 @@ fn a_substep_is_frozen_and_what_cannot_be_is_named() {
 }
 
 #[test]
+fn a_pour_does_not_begin_anew_over_its_checkpoint() {
+    let place = Place::new();
+    let args = |seed, more: &[&'static str]| {
+        tiny(&["simulate", "drop", "--seed", seed, "--checkpoint", "a.ckpt"], more)
+    };
+    place.expect(0, &args("1", &[]));
+    let kept = fs::read(place.at("a.ckpt")).unwrap();
+    place.refused(&args("1", &[]), &["--checkpoint", "--resume a.ckpt", "delete it"]);
+    assert_eq!(fs::read(place.at("a.ckpt")).unwrap(), kept);
+    place.expect(0, &args("1", &["--resume", "a.ckpt"]));
+    assert_eq!(fs::read(place.at("a.ckpt")).unwrap(), kept);
+    // Of another pour, and damaged.
+    place.expect(0, &args("2", &[]));
+    let mut damaged = fs::read(place.at("a.ckpt")).unwrap();
+    let last = damaged.len() - 1;
+    damaged[last] ^= 1;
+    fs::write(place.at("a.ckpt"), damaged).unwrap();
+    place.expect(0, &args("2", &[]));
+    fs::remove_file(place.at("a.ckpt")).unwrap();
+    place.expect(0, &args("2", &[]));
+}
+
+#[test]
 fn an_unusable_pour_exits_with_3() {
     let place = Place::new();
     let args = tiny(&["simulate", "drop", "--json"], &["--set", "camera.height_threshold=0.5"]);

@@ -4,7 +4,7 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::Value;
 
@@ -70,4 +70,14 @@ pub fn text(bytes: &[u8]) -> String {
 
 pub fn json(out: &str) -> Value {
     serde_json::from_str(out).unwrap_or_else(|e| panic!("{e}: {out}"))
+}
+
+/// Asks a command to stop, as Ctrl-C does, or as `kill` where the tests run in a script's background, whose commands
+/// ignore Ctrl-C; returns whether it was there.
+pub fn interrupt(child: &Child) -> bool {
+    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).unwrap_or("0");
+    let ignores_it = u64::from_str_radix(ignored.trim(), 16).unwrap() & 2 != 0;
+    let signal = if ignores_it { "-TERM" } else { "-INT" };
+    Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success()
 }

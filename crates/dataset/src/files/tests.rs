@@ -134,6 +134,40 @@ fn a_temporary_file_of_somebody_else_is_left_alone() {
     assert!(fs::symlink_metadata(&planted).unwrap().is_symlink());
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn what_a_killed_process_has_left_goes_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut killed = std::process::Command::new("true").spawn().unwrap();
+    let (own, dead) = (std::process::id(), killed.id());
+    killed.wait().unwrap();
+    let left = format!(".a.json.{dead}-0{TEMPORARY}");
+    let kept = [
+        format!(".a.json.{own}-5{TEMPORARY}"),
+        format!(".a.json.1-0{TEMPORARY}"),
+        format!(".b.json.{dead}-0{TEMPORARY}"),
+        format!("a.json.{dead}-0{TEMPORARY}"),
+        format!(".a.json.{dead}-0.mine"),
+        format!(".a.json.{dead}x-0{TEMPORARY}"),
+    ];
+    for name in kept.iter().chain([&left]) {
+        let path = folder.path().join(name);
+        fs::write(&path, "half").unwrap();
+        let hour_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(3600);
+        File::options().write(true).open(&path).unwrap().set_modified(hour_ago).unwrap();
+    }
+    let young = folder.path().join(format!(".a.json.{dead}-7{TEMPORARY}"));
+    fs::write(&young, "half").unwrap();
+    let link = folder.path().join(format!(".a.json.{dead}-1{TEMPORARY}"));
+    std::os::unix::fs::symlink(&left, &link).unwrap();
+    write_file(&folder.path().join("a.json"), Form::Json, b"{}").unwrap();
+    assert!(!folder.path().join(&left).exists());
+    assert!(fs::symlink_metadata(&link).is_ok() && young.exists());
+    for name in kept {
+        assert!(folder.path().join(&name).exists(), "{name}");
+    }
+}
+
 #[test]
 fn a_file_that_is_read_only_stays_and_long_names_are_names() {
     let folder = tempfile::tempdir().unwrap();

@@ -19,6 +19,8 @@ pub struct Progress {
     pub out_of_view: u64,
     /// Rows, resumed or made, in which grains remain in the funnel.
     pub jammed: u64,
+    /// Rows, resumed or made, that were still moving at the horizon.
+    pub at_horizon: u64,
     /// Rows on disk beyond those asked for, left as they are.
     pub beyond: u64,
     /// Parts that were in the folder already and do not say what their rows hash to.
@@ -30,6 +32,7 @@ impl Progress {
     pub(super) fn count(&mut self, status: RowStatus) {
         self.unhealthy += u64::from(status == RowStatus::Pour(Status::Unhealthy));
         self.jammed += u64::from(status.is_jammed());
+        self.at_horizon += u64::from(status == RowStatus::Pour(Status::Horizon));
         self.out_of_view += u64::from(status == RowStatus::NoGrainsInView);
     }
 }

@@ -11,7 +11,7 @@ use crate::manifest::{self, Manifest};
 use crate::random::pour_seed;
 use crate::row::Row;
 use crate::table::Table;
-use crate::{DatasetError, table};
+use crate::{DatasetError, Room, table};
 
 /// An open folder; nobody else writes into it while this lives.
 #[derive(Debug)]
@@ -19,6 +19,8 @@ pub(super) struct Folder {
     pub(super) path: PathBuf,
     pub(super) header: Header,
     pub(super) chunk: u64,
+    /// The rows that the folder says were asked for.
+    asked: Option<u64>,
     /// The system drops the lock with the file, also when the process is killed.
     _lock: File,
 }
@@ -47,12 +49,42 @@ fn rows_of_shard(options: &GenerateOptions, chunk: u64) -> u64 {
 }
 
 impl Folder {
-    /// Opens or creates the folder, refuses one that was made from something else.
-    pub(super) fn open(
+    /// Opens or creates the folder and finds what is left to do; refuses what there is no `room` for, which is of the
+    /// rows that are missing and the rows in a part.
+    pub(super) fn begin(
         path: &Path,
         header: Header,
         options: &GenerateOptions,
-    ) -> Result<Self, DatasetError> {
+        room: &dyn Fn(u64, u64) -> Room,
+    ) -> Result<(Self, Remaining), DatasetError> {
+        // No folder is made for what has no room.
+        if !path.join(manifest::NAME).exists() {
+            let rows = rows_of_shard(options, options.chunk);
+            room(rows, options.chunk).require(Some(path))?;
+        }
+        let folder = Self::open(path, header, options)?;
+        let remaining = folder.remaining(options)?;
+        let Progress { total, resumed, .. } = remaining.progress;
+        let left = total.saturating_sub(resumed);
+        // What is complete needs none.
+        if left > 0 {
+            room(left, folder.chunk).require(Some(path))?;
+        }
+        folder.record(options.rows)?;
+        Ok((folder, remaining))
+    }
+
+    /// Writes down how many rows were asked for, if that is more than ever: whoever merges knows what is missing.
+    fn record(&self, rows: u64) -> Result<(), DatasetError> {
+        if self.asked.is_some_and(|asked| asked >= rows) {
+            return Ok(());
+        }
+        let (header, chunk) = (self.header.clone(), self.chunk);
+        Manifest { header, chunk, rows: Some(rows) }.write(&self.path)
+    }
+
+    /// Opens or creates the folder, refuses one that was made from something else.
+    fn open(path: &Path, header: Header, options: &GenerateOptions) -> Result<Self, DatasetError> {
         if path.exists() && !path.is_dir() {
             return Err(DatasetError::content(path, "the output", "a file", "a folder"));
         }
@@ -64,27 +96,27 @@ impl Folder {
             let found = format!("{} parts of a data set", parts.len());
             return Err(DatasetError::content(path, "the output", found, "empty unless resumed"));
         }
-        let chunk = match Manifest::read(path)? {
+        let (chunk, asked) = match Manifest::read(path)? {
             Some(manifest) => {
                 manifest.header.require_same(path, &header)?;
-                manifest.chunk
+                (manifest.chunk, manifest.rows)
             }
             None if parts.is_empty() => {
-                let manifest = Manifest { header: header.clone(), chunk: options.chunk };
-                manifest.write(path)?;
-                manifest.chunk
+                let (chunk, rows) = (options.chunk, Some(options.rows));
+                Manifest { header: header.clone(), chunk, rows }.write(path)?;
+                (chunk, rows)
             }
             None => {
                 let found = format!("{} parts without one", parts.len());
                 return Err(DatasetError::content(path, manifest::NAME, found, "present"));
             }
         };
-        Ok(Self { path: path.to_owned(), header, chunk, _lock: lock })
+        Ok(Self { path: path.to_owned(), header, chunk, asked, _lock: lock })
     }
 
     /// Reads and checks the parts that are there; what they lack is left to do. The rows of other chunks are not
     /// listed: there may be billions of them.
-    pub(super) fn remaining(&self, options: &GenerateOptions) -> Result<Remaining, DatasetError> {
+    fn remaining(&self, options: &GenerateOptions) -> Result<Remaining, DatasetError> {
         let mut remaining = Remaining::default();
         let chunks = options.rows.div_ceil(self.chunk);
         remaining.progress.total = rows_of_shard(options, self.chunk);
@@ -129,7 +161,7 @@ impl Folder {
         chunk: u64,
         table: Table,
     ) -> Result<(Vec<Row>, bool), DatasetError> {
-        let Table { header, rows, is_verified } = table;
+        let Table { header, rows, is_verified, .. } = table;
         header.require_same(path, &self.header)?;
         let range = chunk * self.chunk..(chunk + 1) * self.chunk;
         let allowed = format!("rising within {}..{}", range.start, range.end);
@@ -152,9 +184,27 @@ impl Folder {
     }
 }
 
+/// Takes the lock of the folder. What its file holds is left as it is: it may be somebody's.
 fn lock(folder: &Path) -> Result<File, DatasetError> {
     let path = folder.join(".lock");
-    let file = File::create(&path).map_err(DatasetError::io("create", &path))?;
+    let found = match fs::symlink_metadata(&path) {
+        Ok(there) if there.is_symlink() => Some("a link"),
+        Ok(there) if there.is_dir() => Some("a folder"),
+        Ok(there) if !there.is_file() => Some("a device or pipe"),
+        _ => None,
+    };
+    if let Some(found) = found {
+        return Err(DatasetError::content(&path, "the lock of the folder", found, "a plain file"));
+    }
+    let mut options = File::options();
+    options.write(true).create(true).truncate(false);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::OpenOptionsExt;
+        // What has become a link since is not followed either.
+        options.custom_flags(rustix::fs::OFlags::NOFOLLOW.bits() as i32);
+    }
+    let file = options.open(&path).map_err(DatasetError::io("create", &path))?;
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(DatasetError::Locked { path: folder.to_owned() }),

@@ -35,9 +35,9 @@ impl GatheredBatch {
     ) -> Result<Self, DatasetError> {
         check(options)?;
         let header = Header::new(scene, prior, options.seed)?;
-        Room::of_batch(scene, options.rows, 1, options.chunk).require(Some(out))?;
-        let folder = Folder::open(out, header, options)?;
-        let Remaining { missing: lacking, progress, .. } = folder.remaining(options)?;
+        let room = |rows, chunk| Room::of_batch(scene, rows, 1, chunk);
+        let (folder, remaining) = Folder::begin(out, header, options, &room)?;
+        let Remaining { missing: lacking, progress, .. } = remaining;
         let is_complete = |chunk: &u64| lacking.get(chunk).is_some_and(Vec::is_empty);
         let chunks = options.rows.div_ceil(folder.chunk);
         let missing = (0..chunks).filter(|chunk| !is_complete(chunk)).collect();

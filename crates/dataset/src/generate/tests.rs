@@ -257,6 +257,77 @@ fn one_writer_at_a_time() {
     assert!(matches!(inner, Some(Err(DatasetError::Locked { .. }))), "{inner:?}");
 }
 
+#[cfg(unix)]
+#[test]
+fn what_is_named_as_the_lock_is_left_alone() {
+    let place = Place::new();
+    let (path, mine) = (place.at("a"), place.at("mine.txt"));
+    fs::create_dir(&path).unwrap();
+    fs::write(&mine, "mine").unwrap();
+    let run = || generate(&small(), &Prior::default(), &options(1), &path, &mut |_| true);
+    std::os::unix::fs::symlink(&mine, path.join(".lock")).unwrap();
+    let error = run().unwrap_err();
+    assert!(error.is_bad_input() && error.to_string().contains("found a link"), "{error}");
+    assert_eq!(fs::read_to_string(&mine).unwrap(), "mine");
+    fs::remove_file(path.join(".lock")).unwrap();
+    fs::create_dir(path.join(".lock")).unwrap();
+    assert!(run().unwrap_err().to_string().contains("found a folder"));
+    fs::remove_dir(path.join(".lock")).unwrap();
+    fs::write(path.join(".lock"), "mine").unwrap();
+    run().unwrap();
+    assert_eq!(fs::read_to_string(path.join(".lock")).unwrap(), "mine");
+}
+
+#[test]
+fn rows_asked_for_are_written_down_and_those_missing_after_the_last_are_told() {
+    let place = Place::new();
+    for (name, text) in [("left", "0/2"), ("right", "1/2")] {
+        place.make(name, &GenerateOptions { shard: text.parse().unwrap(), ..options(10) });
+    }
+    let out = place.at("all.parquet");
+    let told = |names: &[&str]| {
+        let inputs: Vec<_> = names.iter().map(|name| place.at(name)).collect();
+        let merged = merge(&inputs, &out, 5).unwrap();
+        (merged.asked, merged.missing, merged.gaps)
+    };
+    assert_eq!(told(&["right"]), (Some(10), 6, vec![0, 1, 2, 3, 8]));
+    // What was merged knows it, too.
+    let (dataset, again) = (Dataset::open(&out).unwrap(), place.at("again.parquet"));
+    assert_eq!((dataset.asked, dataset.missing(), dataset.gaps(5).len()), (Some(10), 6, 5));
+    assert_eq!(merge(std::slice::from_ref(&out), &again, 0).unwrap().missing, 6);
+    assert_eq!(told(&["left", "right"]), (Some(10), 0, vec![]));
+
+    // The most that was ever asked for counts, as soon as it is asked for.
+    let asked = |rows, goes_on| {
+        let options = options(rows);
+        generate(&small(), &Prior::default(), &options, &place.at("a"), &mut |_| goes_on).unwrap();
+        let dataset = Dataset::open(&place.at("a")).unwrap();
+        (dataset.asked, dataset.missing())
+    };
+    assert_eq!(asked(2, true), (Some(2), 0));
+    assert_eq!(asked(5, false), (Some(5), 3));
+    assert_eq!(asked(1, true), (Some(5), 3));
+    // A folder of before it was written down.
+    let manifest = place.at("a/manifest.toml");
+    let text = fs::read_to_string(&manifest).unwrap();
+    fs::write(&manifest, text.replace("rows = 5\n", "")).unwrap();
+    assert_eq!(told(&["a"]), (None, 0, vec![]));
+    assert_eq!(asked(5, true), (Some(5), 0));
+}
+
+#[test]
+fn only_a_part_of_the_right_name_is_one() {
+    let place = Place::new();
+    place.make("a", &options(8));
+    let part = place.at("a/part-000001.parquet");
+    for name in ["part-1.parquet", "part-+00001.parquet", "part-0000001.parquet"] {
+        fs::copy(&part, place.at("a").join(name)).unwrap();
+    }
+    let progress = place.make("a", &options(8)).progress;
+    assert_eq!((progress.total, progress.resumed, progress.made), (8, 8, 0));
+    assert_eq!(Dataset::open(&place.at("a")).unwrap().rows.len(), 8);
+}
+
 #[test]
 fn shards_are_read_from_text() {
     assert_eq!("1/4".parse::<Shard>().unwrap(), Shard { index: 1, count: 4 });

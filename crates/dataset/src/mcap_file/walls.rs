@@ -4,7 +4,7 @@ use foxglove::messages::{
     Color, CubePrimitive, CylinderPrimitive, Point3, Pose, Quaternion, SceneEntity, SceneUpdate,
     TriangleListPrimitive, Vector3 as Vector,
 };
-use granulcal_scene::{BoxSide, Funnel, Motion, Scene, Shape};
+use granulcal_scene::{BoxSide, Funnel, Scene, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::stamp::{WORLD, timestamp};
@@ -40,7 +40,7 @@ pub(super) fn walls(scene: &Scene, time: f64) -> SceneUpdate {
 pub(super) fn move_ever(scene: &Scene) -> bool {
     let of_funnel = scene.funnel.iter().map(|funnel| &funnel.motion);
     let mut all = of_funnel.chain(scene.walls.iter().map(|wall| &wall.motion));
-    all.any(|motion| *motion != Motion::Still)
+    all.any(|motion| !motion.is_still())
 }
 
 fn empty(id: &str, time: f64) -> SceneEntity {

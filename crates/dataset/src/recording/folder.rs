@@ -67,6 +67,8 @@ pub(super) struct Average {
     pub(super) frames: usize,
     /// Why others were not, a line each.
     pub(super) damage: Vec<String>,
+    /// That they are not of one view, if they do not look so.
+    pub(super) unlike: Option<String>,
 }
 
 /// Averages frames that a camera took: its lens, its unit and the name of its file.
@@ -102,7 +104,7 @@ pub(super) fn average(
         let nothing = || DatasetError::content(folder, "the frames", "none", "at least one");
         return Err(first_error.unwrap_or_else(nothing));
     };
-    let frames = mean.frames();
+    let (frames, unlike) = (mean.frames(), mean.doubt());
     let image = mean.finish(unit).map_err(|fault| fault.in_file(folder))?;
-    Ok(Average { image, frames, damage })
+    Ok(Average { image, frames, damage, unlike })
 }

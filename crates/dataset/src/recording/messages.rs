@@ -27,6 +27,8 @@ pub(super) struct Averaged {
     pub(super) whole: u64,
     pub(super) lost: Option<Lost>,
     pub(super) damage: Vec<String>,
+    /// That the frames are not of one view, if they do not look so.
+    pub(super) unlike: Option<String>,
 }
 
 pub(super) fn read(
@@ -158,7 +160,7 @@ impl Pass<'_> {
             let nothing = || Fault::new("the frames", "none", "whole");
             return Err(self.fault.unwrap_or_else(nothing).in_file(path));
         };
-        let frames = mean.frames();
+        let (frames, unlike) = (mean.frames(), mean.doubt());
         let image = mean.finish(unit).map_err(|fault| fault.in_file(path))?;
         let colour = match (self.colour, &self.colour_message) {
             (Some(topic), Some((channel, data))) => {
@@ -184,6 +186,7 @@ impl Pass<'_> {
             whole: self.depth.whole() - self.undecodable,
             lost,
             damage,
+            unlike,
         })
     }
 }

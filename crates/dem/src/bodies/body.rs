@@ -5,12 +5,13 @@
 //! ```
 //!
 //! What is kept in flight is the angular momentum L in the axes of the scene; that omega changes although L does not is
-//! the gyroscopic term. A step turns the body about the angular velocity of its middle (second order).
+//! the gyroscopic term (`turning.rs`).
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::pose::Pose;
+use crate::turning::turned_on;
 use granulcal_scene::Solid;
 
 /// Place and motion.
@@ -128,10 +129,9 @@ impl Moving {
     pub fn moved(&self, solid: &Solid, dt: f64) -> RigidBody {
         let Pose { turned, axes, .. } = self.pose;
         let momentum = axes * self.pose.seen(&self.omega).component_mul(&solid.inertia);
-        let (goes, turns) = self.way(dt);
-        let half = Pose::new(self.pose.centre, UnitQuaternion::new(0.5 * turns) * turned);
-        let omega = half.inverse_inertia(&solid.inertia) * momentum;
-        let turned = UnitQuaternion::new(dt * omega + self.twist) * turned;
+        let (goes, _) = self.way(dt);
+        let spin = [&momentum, &self.omega];
+        let turned = turned_on(&turned, &solid.inertia, spin, &self.twist, dt);
         // Products of unit quaternions stay of unit length to rounding only.
         let turned = UnitQuaternion::new_normalize(turned.into_inner());
         RigidBody {

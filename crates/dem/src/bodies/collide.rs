@@ -43,9 +43,9 @@ pub(super) fn contacts(
     let mut clear_of_walls = Vec::with_capacity(bodies.len());
     for (i, pose) in poses.iter().enumerate() {
         let first = points.len();
-        let range = around.range(&motions[i], None);
-        let is_near = at_walls(around, pose, i, range, &mut points)
-            | at_rims(around, pose, i, range, &mut points);
+        let range = around.range(&motions[i], None) + around.way_of_walls(&pose.centre);
+        let is_near = at_walls(around, pose, i, (0.0, range), &mut points)
+            | at_rims(around, pose, i, (0.0, range), &mut points);
         clear_of_walls.push(if is_near { f64::NEG_INFINITY } else { range });
         points[first..].sort_by_key(Point::name);
     }
@@ -104,12 +104,13 @@ pub(super) fn clearance(solid: &Solid, a: &Pose, b: &Pose) -> f64 {
     (square - extent(a) - extent(b)) / square.sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// Adds the points of body `i` at all surfaces that are nearer than `range`; returns whether any may be so near.
+/// Adds the points of body `i` at all surfaces that are nearer than `range` at `now` `[s]` into the substep; returns
+/// whether any may be so near.
 pub(super) fn at_walls(
     around: &Around<'_>,
     body: &Pose,
     i: usize,
-    range: f64,
+    (now, range): (f64, f64),
     found: &mut Vec<Point>,
 ) -> bool {
     let (solid, walls) = (around.solid, around.walls);
@@ -119,7 +120,7 @@ pub(super) fn at_walls(
         let wall = walls.wall(surface);
         let mut touch = |mark: Vector3<f64>| {
             let arm = body.axes * mark;
-            let near = walls.nearest(surface, &(body.centre + arm), 0.0);
+            let near = walls.nearest(surface, &(body.centre + arm), now);
             // Beyond the end of a shell or a disc it is its rim that touches.
             let is_at_rim = near.side == 0 && near.distance > 0.0 && !wall.has_facets();
             if near.distance > range || is_at_rim {
@@ -130,7 +131,7 @@ pub(super) fn at_walls(
             let is_through = near.side != 0
                 && near.distance > 0.0
                 && from_wall.dot(&near.normal) < 0.0
-                && !walls.leads_round(surface, &body.centre, &(body.centre + arm));
+                && !walls.leads_round(surface, &body.centre, &(body.centre + arm), now);
             let (gap, normal) = if is_through {
                 (-near.distance, -near.normal)
             } else {
@@ -138,7 +139,7 @@ pub(super) fn at_walls(
             };
             found.push(Point::at_wall(i, surface, wall, body, mark, normal, gap));
         };
-        let seen = walls.nearest(surface, &body.centre, 0.0);
+        let seen = walls.nearest(surface, &body.centre, now);
         let towards = body.seen(&-seen.normal);
         solid.extremes(&towards, &mut touch);
         // A triangle that is not the nearest of its mesh to the centre does not tell on which side that is.

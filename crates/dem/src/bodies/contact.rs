@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 
 use super::body::Moving;
 use super::pose::Pose;
-use crate::law::{CORRECTION, CORRECTION_SPEED, SLOP};
+use crate::law::Small;
 use crate::wall::Wall;
 
 /// Points of a manifold are one within this distance in the bodies' reach and this cosine of their normals `[-]`.
@@ -161,14 +161,9 @@ impl Point {
     }
 
     /// The bias, from where the last motions of its bodies begin `[m/s]`.
-    pub fn bias(&self, bodies: &[Moving], dt: f64) -> f64 {
+    pub fn bias(&self, bodies: &[Moving], dt: f64, small: &Small) -> f64 {
         let aside = self.gap_of_last_motion(bodies) - self.gap;
-        if self.gap < 0.0 {
-            let push = (CORRECTION * (self.gap + SLOP) / dt).clamp(-CORRECTION_SPEED, 0.0);
-            push + aside / dt
-        } else {
-            (self.gap + aside) / dt
-        }
+        if self.gap < 0.0 { small.push(self.gap, dt) + aside / dt } else { (self.gap + aside) / dt }
     }
 
     /// The gap that the last motions of its bodies would have begun with at the begin of the substep `[m]`: bodies that

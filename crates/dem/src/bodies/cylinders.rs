@@ -34,8 +34,15 @@ pub(super) struct Cylinder {
 /// Points of two features, the first cylinder's first; `along` leads roughly from it to the second.
 type OfFeatures = fn([&Cylinder; 2], along: &Vector3<f64>) -> [Vector3<f64>; 2];
 
-const FEATURES: [OfFeatures; 6] =
-    [end_and_rim, rim_and_end, sides, side_and_rim, rim_and_side, rims];
+/// And whether they are the second's and the first's.
+const FEATURES: [(OfFeatures, bool); 6] = [
+    (end_and_rim, false),
+    (end_and_rim, true),
+    (sides, false),
+    (side_and_rim, false),
+    (side_and_rim, true),
+    (rims, false),
+];
 
 /// The nearest points of two cylinders that are no farther apart than `farthest`, to `near`; none where they meet, or
 /// where no pair of features answers.
@@ -43,8 +50,13 @@ pub(super) fn nearest([one, other]: &[Cylinder; 2], farthest: f64, near: f64) ->
     let pair = [one, other];
     let mut along = (other.centre - one.centre).try_normalize(0.0)?;
     let mut most = separation(pair, &along);
-    for of_features in FEATURES {
-        let [on_1, on_2] = of_features(pair, &along);
+    for (of_features, is_turned) in FEATURES {
+        let [on_1, on_2] = if is_turned {
+            let [on_2, on_1] = of_features([other, one], &-along);
+            [on_1, on_2]
+        } else {
+            of_features(pair, &along)
+        };
         // Features that are not there have no points: not a number.
         let Some((towards, distance)) = Unit::try_new_and_get(on_2 - on_1, near) else {
             continue;
@@ -116,11 +128,6 @@ fn end_and_rim([one, other]: [&Cylinder; 2], along: &Vector3<f64>) -> [Vector3<f
     [end + one.within(one.across(&(on_2 - end))), on_2]
 }
 
-fn rim_and_end([one, other]: [&Cylinder; 2], along: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let [on_2, on_1] = end_and_rim([other, one], &-along);
-    [on_1, on_2]
-}
-
 /// The nearest points of the axes, if the cylinders go so far, and those of the sides across them.
 fn sides([one, other]: [&Cylinder; 2], _: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let offset = other.centre - one.centre;
@@ -188,11 +195,6 @@ fn nearest_of_ellipse(half: [f64; 2], outside: [f64; 2]) -> [f64; 2] {
         }
     }
     [share(0, root), share(1, root)]
-}
-
-fn rim_and_side([one, other]: [&Cylinder; 2], along: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let [on_2, on_1] = side_and_rim([other, one], &-along);
-    [on_1, on_2]
 }
 
 /// The rims of the ends that look at each other: Newton's steps along both, from where they reach farthest.

@@ -4,6 +4,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::body::{Moving, RigidBody};
 use super::{Bodies, Step, Sweeps};
+use crate::energy::Falling;
+use crate::law::Small;
 use crate::wall::Walls;
 use crate::{GRAVITY, Material, Scene};
 use granulcal_scene::{Ends, GrainShape, Shape, Solid, Wall, WallMaterial};
@@ -28,7 +30,7 @@ impl Exam {
         let material = Material { sliding_friction, restitution, ..Material::default() };
         let scene = Scene { material, ..Scene::drop(0.1) };
         Self {
-            bodies: Bodies::new(solid, Vec::new()),
+            bodies: Bodies::new(solid, Small::OF_LARGE, Vec::new()),
             gravity: Vector3::new(0.0, 0.0, -GRAVITY),
             walls: Walls::of(&scene),
             material,
@@ -63,14 +65,7 @@ impl Exam {
     }
 
     fn energy(&self) -> f64 {
-        // Velocities are those of the middle of the substep before.
-        let ahead = |body: &RigidBody| {
-            let mut now = *body;
-            let velocity = Vector3::from(body.velocity) + 0.5 * DT * self.gravity;
-            now.velocity = velocity.into();
-            now.kinetic_energy(&self.bodies.solid) - self.gravity.dot(&Vector3::from(body.centre))
-        };
-        self.bodies.all.iter().map(ahead).sum()
+        self.bodies.energy(&Falling { gravity: self.gravity, dt: DT }).total()
     }
 }
 

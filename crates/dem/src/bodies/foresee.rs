@@ -37,10 +37,11 @@ impl Contacts {
         let mut later = Later::new(around, bodies);
         let mut new = Vec::new();
         for (i, way) in ways.iter().enumerate() {
-            if is_other[i] && way.length() > least.max(self.clear_of_walls[i]) {
+            let goes = way.length() + around.way_of_walls(&bodies[i].pose.centre);
+            if is_other[i] && goes > least.max(self.clear_of_walls[i]) {
                 let pose = later.pose(i);
-                at_walls(around, pose, i, 0.0, &mut new);
-                at_rims(around, pose, i, 0.0, &mut new);
+                at_walls(around, pose, i, (dt, 0.0), &mut new);
+                at_rims(around, pose, i, (dt, 0.0), &mut new);
             }
         }
         let mut asked = Vec::new();

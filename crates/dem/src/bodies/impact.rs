@@ -18,7 +18,7 @@ use nalgebra::Vector3;
 use super::body::Moving;
 use super::contact::Point;
 use super::motion::Motion;
-use crate::law::IMPACT_SPEED;
+use crate::law::Small;
 
 /// Sweeps over the points of a manifold at most, and the change over the impulse at which they stand.
 const SWEEPS: usize = 300;
@@ -33,8 +33,8 @@ const FARTHEST: f64 = 2.0;
 pub(super) fn resolve(
     points: &mut [Point],
     bodies: &mut [Moving],
-    reach: f64,
-    dt: f64,
+    (reach, dt): (f64, f64),
+    small: &Small,
 ) -> (usize, f64) {
     let manifolds = manifolds(points);
     let (mut count, mut work) = (0, 0.0);
@@ -47,7 +47,7 @@ pub(super) fn resolve(
             let (i, j) = (points[range.start].i(), points[range.start].j());
             if round == 1 {
                 // Two that are slow do not close fast, wherever they touch.
-                j.is_none_or(|j| fastest[i] + fastest[j] > IMPACT_SPEED)
+                j.is_none_or(|j| fastest[i] + fastest[j] > small.impact_speed)
             } else {
                 hit_in[i] + 1 == round || j.is_some_and(|j| hit_in[j] + 1 == round)
             }
@@ -57,7 +57,7 @@ pub(super) fn resolve(
             .enumerate()
             .filter(|(_, range)| may_be_due(range))
             .filter_map(|(number, range)| {
-                first_touch(&points[range.clone()], bodies, dt).map(|time| (time, number))
+                first_touch(&points[range.clone()], bodies, dt, small).map(|time| (time, number))
             })
             .collect();
         if due.is_empty() {
@@ -67,7 +67,7 @@ pub(super) fn resolve(
         for (_, number) in due {
             let group = &mut points[manifolds[number].clone()];
             // What has been hit meanwhile may be on its way out.
-            if let Some(time) = first_touch(group, bodies, dt) {
+            if let Some(time) = first_touch(group, bodies, dt, small) {
                 work += bounce(group, bodies, time, dt);
                 count += 1;
                 hit_in[group[0].i()] = round;
@@ -94,12 +94,12 @@ fn manifolds(points: &[Point]) -> Vec<Range<usize>> {
 
 /// When the first of the points that are fast enough touches, if one does within the substep `[s]`; not before its
 /// bodies were hit the last time.
-fn first_touch(group: &[Point], bodies: &[Moving], dt: f64) -> Option<f64> {
+fn first_touch(group: &[Point], bodies: &[Moving], dt: f64, small: &Small) -> Option<f64> {
     let since = group[0].last_hit(bodies);
     let of = |point: &Point| {
         let closing = -point.normal.dot(&point.velocity(bodies));
         let time = (point.gap_of_last_motion(bodies) / closing).max(since);
-        (point.restitution > 0.0 && closing > IMPACT_SPEED && time < dt).then_some(time)
+        (point.restitution > 0.0 && closing > small.impact_speed && time < dt).then_some(time)
     };
     group.iter().filter_map(of).min_by(f64::total_cmp)
 }

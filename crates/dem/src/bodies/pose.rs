@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+use crate::turning::inverse_inertia;
+
 /// Where a body is and how it is turned.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pose {
@@ -26,7 +28,6 @@ impl Pose {
 
     /// The inverse of the tensor of inertia over the mass, in the scene's axes, from its moments about the body's.
     pub fn inverse_inertia(&self, moments: &Vector3<f64>) -> Matrix3<f64> {
-        let inverse = Matrix3::from_diagonal(&moments.map(|moment| 1.0 / moment));
-        self.axes * inverse * self.axes.transpose()
+        inverse_inertia(&self.axes, moments)
     }
 }

@@ -19,13 +19,13 @@ const SAMPLES: usize = 8;
 const NARROWINGS: usize = 24;
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
-/// Adds the points of body `i` at all rims that are nearer than `range` `[m]`: one in each part of the circle, so that a
+/// Adds the points of body `i` at all rims that are nearer than `range` `[m]` at `now` `[s]` into the substep: one in each part of the circle, so that a
 /// face that lies on a rim has two or more. Returns whether any may be so near.
 pub(super) fn at_rims(
     around: &Around<'_>,
     body: &Pose,
     i: usize,
-    range: f64,
+    (now, range): (f64, f64),
     found: &mut Vec<Point>,
 ) -> bool {
     let mut is_near = false;
@@ -41,7 +41,7 @@ pub(super) fn at_rims(
                 found.push(point);
             }
         };
-        is_near |= nearest(around.solid, body, (wall, rim), range, touch);
+        is_near |= nearest(around.solid, body, (wall, rim), (now, range), touch);
     }
     is_near
 }
@@ -52,11 +52,11 @@ fn nearest(
     solid: &Solid,
     body: &Pose,
     (wall, rim): (&Wall, &Rim),
-    range: f64,
+    (now, range): (f64, f64),
     mut found: impl FnMut(f64, Vector3<f64>, Vector3<f64>),
 ) -> bool {
     let reach = solid.reach + range;
-    let centre = wall.seen_at_begin(&body.centre);
+    let centre = wall.stated_place(&body.centre, now);
     let offset = centre - rim.centre;
     let along = offset.dot(&rim.axis);
     let across = offset - along * rim.axis;

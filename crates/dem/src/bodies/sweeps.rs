@@ -124,9 +124,10 @@ impl<L: Lever> BatchesOf<L> {
             self.begin(moving, around.solid);
         }
         for (&(batch, lane), point) in self.places.iter().zip(points.iter()) {
-            self.all[batch as usize].aim(lane as usize, point.bias(moving, around.dt));
+            self.all[batch as usize]
+                .aim(lane as usize, point.bias(moving, around.dt, around.small));
         }
-        self.add(&points[known..], moving, around.dt);
+        self.add(&points[known..], moving, around);
         let settled = self.settle(rule);
         self.put_back(points, moving);
         settled
@@ -148,7 +149,7 @@ impl<L: Lever> BatchesOf<L> {
     }
 
     /// Puts points into batches of their own.
-    fn add(&mut self, points: &[Point], moving: &[Moving], dt: f64) {
+    fn add(&mut self, points: &[Point], moving: &[Moving], around: &Around<'_>) {
         let (first, resting) = (self.used, moving.len());
         let (colours, mut next) = colour(points, &mut self.masks);
         self.used += next[COLOURS + 1];
@@ -167,7 +168,8 @@ impl<L: Lever> BatchesOf<L> {
                 }
             };
             let batch = &mut batches[next[colour]];
-            let lane = batch.add(j, point, point.bias(moving, dt), &self.frames);
+            let bias = point.bias(moving, around.dt, around.small);
+            let lane = batch.add(j, point, bias, &self.frames);
             self.places.push(((first + next[colour]) as u32, lane));
             if batch.is_full() || colour == COLOURS {
                 next[colour] += 1;

@@ -214,7 +214,8 @@ impl Cluster {
     /// number, and whether they were cut short.
     fn ring(&mut self, settings: ImpactSettings, scenery: &Scenery) -> (usize, bool) {
         // A force, so that it does not depend on how finely time is cut.
-        let enough = settings.stopping_speed * settings.micro_step;
+        let slowness = scenery.around.small.slowness;
+        let enough = slowness * settings.stopping_speed * settings.micro_step;
         let mut rubbed = 0;
         // A rolling spring has a motion of its own to follow.
         let period = if self.links.iter().any(|link| link.rolling_spring.is_some()) {

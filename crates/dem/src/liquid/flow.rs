@@ -78,6 +78,18 @@ impl RadialFlow {
         between(&self.pressure, at)
     }
 
+    /// Mean kinetic energy of the liquid over its mass `[m^2/s^2]`.
+    pub fn kinetic_energy(&self) -> f64 {
+        let (mut energy, mut mass) = (0.0, 0.0);
+        for (ring, q) in self.thickness.iter().enumerate() {
+            let (volume, u) =
+                (q * Self::middle(ring), 0.5 * (self.speed[ring] + self.speed[ring + 1]));
+            energy += 0.5 * volume * u * u;
+            mass += volume;
+        }
+        if mass > 0.0 { energy / mass } else { 0.0 }
+    }
+
     /// Keeps dry rings around the liquid.
     pub fn make_room(&mut self) {
         let wet = self.thickness.iter().rposition(|&q| q > 0.0).map_or(0, |ring| ring + 1);

@@ -28,7 +28,7 @@ impl Simulation {
             self.particles.raise(grain, &lift);
             self.particles.let_in(grain, &back);
             let work = -self.around.effects.gravity.dot(&lift) * self.particles.mass(grain);
-            self.watch.see_work(work + self.particles.kinetic_energy(grain));
+            self.watch.see_work(work);
         }
         self.contacts.forget_list();
         self.bed_at_rest = Some(

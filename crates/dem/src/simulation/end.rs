@@ -40,9 +40,13 @@ impl Simulation {
         again.then_some(now)
     }
 
-    /// How the pour would end if it stayed as it is now.
+    /// How the pour would end if it stayed as it is now; a liquid must be as slow as the grains.
     fn at_rest(&self, energies: &[f64]) -> Option<Status> {
         let (scene, threshold) = (&self.origin.scene, self.origin.scene.end.kinetic_energy);
+        let flow = self.liquid.as_ref().and_then(|liquid| liquid.state());
+        if flow.is_some_and(|flow| flow.kinetic_energy() > threshold) {
+            return None;
+        }
         let jammed_or = |status| {
             let is_jammed = self.in_funnel().next().is_some();
             Some(if is_jammed { Status::Jammed } else { status })

@@ -245,7 +245,9 @@ impl Simulation {
         }
         let grains = (self.clumps.as_ref(), self.bodies.as_ref());
         let held = self.bonds.as_ref().map_or(0.0, |bonds| bonds.energy(&self.particles));
-        self.watch.see_energy(held + energy(&self.particles, grains, &self.around));
+        let mut energy = energy(&self.particles, grains, &self.around);
+        energy.potential += held;
+        self.watch.see_energy(&energy);
         self.ended = self.end_reached().map(|status| {
             let slack = if self.bodies.is_some() { CORNER_SLACK } else { 1.0 };
             let trusted = self.watch.is_healthy(slack * self.around.settings.max_penetration);

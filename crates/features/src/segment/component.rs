@@ -16,18 +16,23 @@ pub(super) fn remove_low(mask: &mut [bool], width: usize, is_peak: impl Fn(usize
 }
 
 fn keep_patches(mask: &mut [bool], width: usize, is_kept: impl Fn(&[usize]) -> bool) {
-    if width == 0 {
-        return;
+    for patch in patches(mask, width).into_iter().filter(|patch| !is_kept(patch)) {
+        for pixel in patch {
+            mask[pixel] = false;
+        }
     }
-    let height = mask.len() / width;
+}
+
+/// The pixels of each patch of a mask of `width` columns.
+pub(super) fn patches(mask: &[bool], width: usize) -> Vec<Vec<usize>> {
+    let Some(height) = mask.len().checked_div(width) else { return Vec::new() };
     let mut seen = vec![false; mask.len()];
-    let mut patch = Vec::new();
+    let mut found = Vec::new();
     for start in 0..mask.len() {
         if !mask[start] || seen[start] {
             continue;
         }
-        patch.clear();
-        patch.push(start);
+        let mut patch = vec![start];
         seen[start] = true;
         let mut next = 0;
         while let Some(&pixel) = patch.get(next) {
@@ -43,12 +48,9 @@ fn keep_patches(mask: &mut [bool], width: usize, is_kept: impl Fn(&[usize]) -> b
                 }
             }
         }
-        if !is_kept(&patch) {
-            for &pixel in &patch {
-                mask[pixel] = false;
-            }
-        }
+        found.push(patch);
     }
+    found
 }
 
 #[cfg(test)]

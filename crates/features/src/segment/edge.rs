@@ -4,6 +4,7 @@
 //! camera looks for a match reaches over the edge there. A few of them stand out of the ground as far as a grain does,
 //! and a formation that ends at 120 mm then has a largest radius of 220 mm.
 
+use super::component::patches;
 use super::formation::Formation;
 
 /// Pixels of grain that hang on the edge of an image, apart from the formation.
@@ -26,37 +27,26 @@ impl Formation {
 /// The pixels of a mask of `width` columns that are joined to its edge by sides or diagonals; `None` without any, or
 /// where they are not fewer than the rest: then the formation itself reaches the edge.
 fn edge_pixels(mask: &[bool], width: usize) -> Option<EdgePixels> {
-    let height = mask.len().checked_div(width)?;
-    let depth = |i: usize| {
-        let (column, row) = (i % width, i / width);
-        column.min(width - 1 - column).min(row).min(height - 1 - row)
-    };
-    let mut is_joined = vec![false; mask.len()];
-    let mut joined: Vec<usize> = (0..mask.len()).filter(|&i| mask[i] && depth(i) == 0).collect();
-    for &i in &joined {
-        is_joined[i] = true;
-    }
-    let mut next = 0;
-    while let Some(&i) = joined.get(next) {
-        next += 1;
-        let (column, row) = (i % width, i / width);
-        for r in row.saturating_sub(1)..=(row + 1).min(height - 1) {
-            for c in column.saturating_sub(1)..=(column + 1).min(width - 1) {
-                let j = r * width + c;
-                if mask[j] && !is_joined[j] {
-                    is_joined[j] = true;
-                    joined.push(j);
-                }
-            }
-        }
-    }
-    let all = mask.iter().filter(|&&is_grain| is_grain).count();
-    let count = joined.len();
-    if 2 * count >= all {
+    let depth = depth_in(mask.len(), width)?;
+    let all = patches(mask, width);
+    let (joined, apart): (Vec<_>, Vec<_>) =
+        all.iter().partition(|patch| patch.iter().any(|&pixel| depth(pixel) == 0));
+    let pixels = |patches: &[&Vec<usize>]| patches.iter().map(|patch| patch.len()).sum::<usize>();
+    let count = pixels(&joined);
+    if count >= pixels(&apart) {
         return None;
     }
-    let deepest = joined.iter().map(|&i| depth(i)).max()?;
+    let deepest = joined.into_iter().flatten().map(|&pixel| depth(pixel)).max()?;
     Some(EdgePixels { count, frame: deepest + 1 })
+}
+
+/// How far pixels of an image of `width` columns are from its edge `[px]`; `None` of an empty one.
+pub(super) fn depth_in(pixels: usize, width: usize) -> Option<impl Fn(usize) -> usize> {
+    let height = pixels.checked_div(width).filter(|&height| height > 0)?;
+    Some(move |pixel: usize| {
+        let (column, row) = (pixel % width, pixel / width);
+        column.min(width - 1 - column).min(row).min(height - 1 - row)
+    })
 }
 
 #[cfg(test)]

@@ -52,6 +52,16 @@ impl Effect for Polydispersity {
 }
 
 impl Polydispersity {
+    /// Diameter of the widest grain that may be drawn, of typical diameter `diameter` `[m]`.
+    pub(crate) fn widest(&self, diameter: f64) -> f64 {
+        if !self.diameters.is_empty() {
+            return self.diameters.iter().copied().fold(0.0, f64::max);
+        }
+        let variance = (1.0 + self.cv * self.cv).ln();
+        // Their size grows with z up to the cut.
+        diameter * (CUT * variance.sqrt() - 1.5 * variance).exp()
+    }
+
     /// Radii of `count` grains of typical radius `radius` `[m]`; `None` when they are all alike.
     pub fn radii(&self, count: usize, radius: f64, seed: u64) -> Option<Vec<f64>> {
         let mut random = Pcg64::seed_from_u64(seed ^ STREAM);

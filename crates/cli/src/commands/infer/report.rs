@@ -15,6 +15,8 @@ pub struct Report<'a> {
     observed: &'a [Vec<f64>],
     /// Why the recordings cannot be of the model's scene.
     impossible: Vec<String>,
+    /// What makes them doubtful.
+    doubts: Vec<String>,
     found: Option<Found>,
 }
 
@@ -44,7 +46,8 @@ impl<'a> Report<'a> {
             known: posterior.identifiability(),
             posterior,
         };
-        Ok(Self { model, recordings, observed, impossible: Vec::new(), found: Some(found) })
+        let (impossible, doubts) = (Vec::new(), Vec::new());
+        Ok(Self { model, recordings, observed, impossible, doubts, found: Some(found) })
     }
 
     /// Recordings that cannot be of the model's scene: a posterior would say nothing.
@@ -54,7 +57,12 @@ impl<'a> Report<'a> {
         observed: &'a [Vec<f64>],
         impossible: Vec<String>,
     ) -> Self {
-        Self { model, recordings, observed, impossible, found: None }
+        Self { model, recordings, observed, impossible, doubts: Vec::new(), found: None }
+    }
+
+    /// The report that says these doubts of the recordings, too.
+    pub fn with_doubts(self, doubts: Vec<String>) -> Self {
+        Self { doubts, ..self }
     }
 
     /// Whether the model explains the recordings.
@@ -74,9 +82,10 @@ impl<'a> Report<'a> {
             let names = self.model.x_names.iter().cloned();
             names.zip(row.iter().map(|&value| Value::from(value))).collect()
         };
-        let warnings: Vec<_> = found
-            .map(|found| found.posterior.warnings.iter().map(ToString::to_string).collect())
-            .unwrap_or_default();
+        let mut warnings = self.doubts.clone();
+        warnings.extend(
+            found.iter().flat_map(|found| &found.posterior.warnings).map(ToString::to_string),
+        );
         json!({
             "recordings": self.recordings,
             "parameters": found.map(Found::parameters),

@@ -8,6 +8,8 @@ use crate::region::Region;
 
 /// Share of the distance that no camera resolves.
 const LEAST_STEP: f64 = 1e-6;
+/// Widest baseline of a stereo camera `[m]`: what is wider was meant in millimetres.
+const WIDEST_BASELINE: f64 = 1.0;
 
 /// What is known of the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,7 +93,7 @@ impl FlatFrames {
         baseline: f64,
         depth_unit: f64,
     ) -> Result<Self, FeatureError> {
-        require_in("baseline [m]", baseline, 1e-6, 1e3)?;
+        require_in("baseline [m]", baseline, 1e-6, WIDEST_BASELINE)?;
         let focal_length = camera.intrinsics.fx;
         let optics = Optics::Stereo { focal_length, baseline, depth_unit };
         Self::from_depth(images, camera, depth_unit, optics, |z| focal_length * baseline / z)

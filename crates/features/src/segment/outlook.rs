@@ -1,0 +1,71 @@
+//! What of an image besides its points tells whether the formation was seen whole and alone.
+
+use super::component::patches;
+use super::edge::depth_in;
+use super::formation::Formation;
+
+/// A second heap: higher than so many grains, of the room of so many.
+const HEAP_HEIGHT: f64 = 2.5;
+const HEAP_GRAINS: f64 = 30.0;
+
+/// Grains that stand apart from the formation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OtherHeap {
+    /// Volume between the ground and its surface `[m³]`.
+    pub volume: f64,
+    /// Height of its highest pixel above the ground `[m]`.
+    pub height: f64,
+}
+
+impl Formation {
+    /// How near the formation comes to the edge of the image, over half the image's shorter side: 0 where it reaches
+    /// it, 1 where it is in the middle alone `[-]`.
+    pub fn margin(&self) -> f64 {
+        let Some(depth) = depth_in(self.mask.len(), self.width) else { return 0.0 };
+        let grains = (0..self.mask.len()).filter(|&pixel| self.mask[pixel]);
+        let least = grains.map(depth).min().unwrap_or(0);
+        2.0 * least as f64 / self.width.min(self.height) as f64
+    }
+
+    /// Whether the edge of the image cuts the formation off: its largest patch reaches it.
+    pub fn is_cut_off(&self) -> bool {
+        let Some(depth) = depth_in(self.mask.len(), self.width) else { return false };
+        let largest = patches(&self.mask, self.width).into_iter().max_by_key(Vec::len);
+        largest.is_some_and(|patch| patch.into_iter().any(|pixel| depth(pixel) == 0))
+    }
+
+    /// Share of the image that carries data, less a border all around that has none `[-]`.
+    pub fn seen_share(&self) -> f64 {
+        let Some(depth) = depth_in(self.heights.len(), self.width) else { return 0.0 };
+        let seen = |pixel: &usize| self.heights[*pixel].is_some();
+        let border = (0..self.heights.len()).filter(seen).map(&depth).min().unwrap_or(0);
+        let inside = (0..self.heights.len()).filter(|&pixel| depth(pixel) >= border);
+        let (mut all, mut with_data) = (0.0, 0.0);
+        for pixel in inside {
+            all += 1.0;
+            with_data += f64::from(u8::from(seen(&pixel)));
+        }
+        with_data / f64::max(all, 1.0)
+    }
+
+    /// What else stands as high and as wide as a heap of grains of `diameter` `[m]`, apart from the largest patch.
+    pub fn other_heaps(&self, diameter: f64) -> Vec<OtherHeap> {
+        let mut all = patches(&self.mask, self.width);
+        all.sort_by_key(|patch| std::cmp::Reverse(patch.len()));
+        let grain = std::f64::consts::PI / 6.0 * diameter.powi(3);
+        let area = self.resolution.0 * self.resolution.1;
+        let heap = |patch: &Vec<usize>| {
+            let heights = || patch.iter().filter_map(|&pixel| self.heights[pixel]);
+            OtherHeap {
+                volume: area * heights().sum::<f64>(),
+                height: heights().fold(0.0, f64::max),
+            }
+        };
+        let others = all.iter().skip(1).map(heap);
+        others
+            .filter(|heap| {
+                heap.height > HEAP_HEIGHT * diameter && heap.volume > HEAP_GRAINS * grain
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,289 @@
+//! What cannot be with what in one scene.
+
+use crate::camera::{Mask, Projection};
+use crate::effects::{Effect, Effects};
+use crate::end::RolledAway;
+use crate::error::SceneError;
+use crate::grain_shape::Solid;
+use crate::observe::Observe;
+use crate::preset::Preset;
+use crate::scene::Scene;
+use crate::start::Start;
+
+impl Scene {
+    /// Refuses what cannot be with something else that is there.
+    ///
+    /// # Errors
+    /// [`SceneError::Exclude`] and [`SceneError::Needs`] name both; [`SceneError::OutOfRange`] and [`SceneError::BadShape`] what is wrong with one.
+    pub(crate) fn check_together(&self) -> Result<(), SceneError> {
+        self.check_rolled_away()?;
+        self.check_clump()?;
+        self.check_shape()?;
+        self.check_bodies()?;
+        self.check_intruder()?;
+        self.check_bed()?;
+        self.check_fluid()?;
+        self.check_liquid()?;
+        self.check_bonds()?;
+        self.check_of_funnel()
+    }
+
+    /// What grains that are not round cannot be with.
+    fn check_clump(&self) -> Result<(), SceneError> {
+        let others = [
+            (self.effects.polydispersity.path(), self.effects.polydispersity.is_on()),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+        ];
+        if self.effects.clump.is_on() { exclude("effects.clump", &others) } else { Ok(()) }
+    }
+
+    /// What convex bodies cannot be with: they have walls, gravity and the plain law.
+    fn check_shape(&self) -> Result<(), SceneError> {
+        let Some(shape) = &self.grains.shape else { return Ok(()) };
+        shape.check()?;
+        Solid::new(shape, self.grains.diameter)?;
+        let Effects { ground, tilt, funnel, outlet, .. } = self.effects.clone();
+        let alone = Effects { ground, tilt, funnel, outlet, ..Effects::default() };
+        let looks = |observe: &Observe| {
+            observe.images.is_some() || observe.surface.is_some() || observe.front.is_some()
+        };
+        let others = [
+            ("effects but ground, tilt, funnel and outlet", self.effects != alone),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+            ("observe.images, surface or front", self.observe.as_ref().is_some_and(looks)),
+            ("an orthographic camera", self.camera.projection == Projection::Orthographic),
+            ("preset paper", self.preset == Preset::Paper),
+        ];
+        exclude("grains.shape", &others)
+    }
+
+    /// Refuses numbers of balls' impacts, the grains' or a wall's, where grains are not round.
+    fn check_bodies(&self) -> Result<(), SceneError> {
+        let body = match (self.effects.clump.is_on(), &self.grains.shape) {
+            (true, _) => self.effects.clump.path(),
+            (false, Some(_)) => "grains.shape",
+            (false, None) => return Ok(()),
+        };
+        let walls = self.walls.iter().enumerate();
+        let named = walls.map(|(index, wall)| (format!("walls.{index}.material"), wall.material));
+        let funnel = self.funnel.iter().map(|f| ("funnel.material".to_owned(), f.material));
+        let ground = std::iter::once(("ground.material".to_owned(), self.ground.material));
+        self.material.check_bodies("material", body)?;
+        ground
+            .chain(funnel)
+            .chain(named)
+            .try_for_each(|(name, wall)| wall.over(&self.material).check_bodies(&name, body))
+    }
+
+    /// What grains that leave once they have rolled away cannot be with: what might turn one back, what looks at where it
+    /// is, and bodies that do not roll as balls do.
+    fn check_rolled_away(&self) -> Result<(), SceneError> {
+        if self.end.rolled_away == RolledAway::Stay {
+            return Ok(());
+        }
+        let slopes = self.gravity[0] != 0.0 || self.gravity[1] != 0.0 || self.gravity[2] >= 0.0;
+        let others = [
+            ("walls", !self.walls.is_empty()),
+            ("gravity that is not along -z", slopes),
+            ("effects.tilt", self.effects.tilt.is_on()),
+            ("effects.vibration", self.effects.vibration.is_on()),
+            ("effects.clump", self.effects.clump.is_on()),
+            ("grains.shape", self.grains.shape.is_some()),
+            ("observe", self.observe.is_some()),
+            ("views", !self.views.is_empty()),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+            ("intruder", self.intruder.is_some()),
+            ("bed", self.bed.is_some()),
+        ];
+        exclude("end.rolled_away = \"leave\"", &others)
+    }
+
+    /// What an intruder cannot be with.
+    fn check_intruder(&self) -> Result<(), SceneError> {
+        let Some(intruder) = &self.intruder else { return Ok(()) };
+        intruder.check(&self.grains)?;
+        let others = [
+            ("grains.shape", self.grains.shape.is_some()),
+            ("effects.clump", self.effects.clump.is_on()),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+        ];
+        exclude("intruder", &others)?;
+        // The fluid's weight and drag are those of grains of one density.
+        let Effects { fluid, liquid, .. } = &self.effects;
+        let others = [(fluid.path(), fluid.is_on()), (liquid.path(), liquid.is_on())];
+        let is_like = intruder.density == self.grains.density;
+        if is_like { Ok(()) } else { exclude("intruder.density other than the grains'", &others) }
+    }
+
+    /// What a liquid that flows by itself cannot be with: it stands about the z axis on a level ground.
+    fn check_liquid(&self) -> Result<(), SceneError> {
+        let slopes = self.gravity[0] != 0.0 || self.gravity[1] != 0.0 || self.gravity[2] >= 0.0;
+        let others = [
+            ("effects.fluid", self.effects.fluid.is_on()),
+            ("gravity that is not along -z", slopes),
+            ("effects.tilt", self.effects.tilt.is_on()),
+            ("effects.vibration", self.effects.vibration.is_on()),
+            ("effects.clump", self.effects.clump.is_on()),
+            ("periodic", self.periodic.is_some()),
+            ("bed", self.bed.is_some()),
+        ];
+        if self.effects.liquid.is_on() {
+            return exclude("effects.liquid", &others);
+        }
+        if self.observe.as_ref().is_some_and(Observe::asks_for_liquid) {
+            let allowed = "positive where observe.liquid or observe.clock asks for its front";
+            let got = self.effects.liquid.height;
+            return Err(SceneError::range("effects.liquid.height", got, allowed));
+        }
+        Ok(())
+    }
+
+    /// What bonds cannot be with: bodies of several spheres.
+    fn check_bonds(&self) -> Result<(), SceneError> {
+        let others = [
+            ("effects.clump", self.effects.clump.is_on()),
+            ("grains.shape", self.grains.shape.is_some()),
+        ];
+        if self.effects.bonds.is_on() { exclude("effects.bonds", &others) } else { Ok(()) }
+    }
+
+    /// What a bed cannot be with. It is seen by what has become of it, which a map of heights tells.
+    fn check_bed(&self) -> Result<(), SceneError> {
+        let Some(bed) = &self.bed else { return Ok(()) };
+        bed.check(&self.grains)?;
+        let others = [
+            ("a start that is no ball", !matches!(self.start, Start::Ball { .. })),
+            (
+                "a camera that is not orthographic",
+                self.camera.projection != Projection::Orthographic,
+            ),
+            ("camera.mask = \"colour\"", self.camera.mask != Mask::Height),
+            ("grains.shape", self.grains.shape.is_some()),
+            ("effects.clump", self.effects.clump.is_on()),
+            (self.effects.polydispersity.path(), self.effects.polydispersity.is_on()),
+            ("funnel", self.funnel.is_some()),
+            ("outflow", self.outflow.is_some()),
+            ("periodic", self.periodic.is_some()),
+            ("intruder", self.intruder.is_some()),
+            ("observe", self.observe.is_some()),
+            ("views", !self.views.is_empty()),
+        ];
+        exclude("bed", &others)
+    }
+
+    /// What a fluid around the grains cannot be with: where it fills them up to their own surface that has an end.
+    fn check_fluid(&self) -> Result<(), SceneError> {
+        let is_in_them = self.effects.fluid.is_on() && self.effects.fluid.saturated > 0.0;
+        let others = [("periodic", self.periodic.is_some())];
+        if is_in_them { exclude("effects.fluid.saturated", &others) } else { Ok(()) }
+    }
+
+    /// Refuses what says how the funnel is where there is none.
+    fn check_of_funnel(&self) -> Result<(), SceneError> {
+        let Effects { funnel, outlet, .. } = &self.effects;
+        let of_it: [&dyn Effect; 2] = [funnel, outlet];
+        match of_it.into_iter().find(|effect| self.funnel.is_none() && effect.is_on()) {
+            Some(effect) => Err(SceneError::Needs { one: effect.path(), needs: "a funnel" }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Refuses the first of `others` that is there, beside `one`, which is.
+fn exclude(one: &'static str, others: &[(&'static str, bool)]) -> Result<(), SceneError> {
+    match others.iter().find(|(_, is_there)| *is_there) {
+        Some(&(other, _)) => Err(SceneError::Exclude { one, other }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{GrainShape, Intruder, Outflow, Periodic, PeriodicAxis};
+
+    #[test]
+    fn what_only_balls_impacts_read_is_refused_by_name_of_other_grains() {
+        let shape = GrainShape::Box { aspect: [1.0, 1.0, 2.0] };
+        for (body, clump, shape) in
+            [("effects.clump", 1.5, None), ("grains.shape", 1.0, Some(shape))]
+        {
+            let mut plain = Scene::drop(0.1);
+            plain.effects.clump.aspect = clump;
+            plain.grains.shape = shape;
+            plain.check().unwrap();
+            for (path, value) in [
+                ("material.tangential_restitution", 0.3),
+                ("material.softness", 0.01),
+                ("material.touching_exponent", 0.5),
+                ("material.impact_friction", 1.1),
+                ("material.rolling_dashpot", 0.7),
+                ("ground.material.softness", 0.0),
+            ] {
+                let said = plain.with(path, value).unwrap_err().to_string();
+                assert!(said.contains(path) && said.contains(body), "{said}");
+                Scene::drop(0.1).with(path, value).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn grains_leave_only_where_nothing_turns_them_back() {
+        let mut scene = Scene::funnel(0.12);
+        assert!(!scene.to_toml().unwrap().contains("rolled_away"));
+        scene.end.rolled_away = RolledAway::Leave;
+        scene.check().unwrap();
+        assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+        for (change, name) in [
+            ((|s: &mut Scene| s.gravity[0] = 0.1) as fn(&mut Scene), "gravity"),
+            (|s| s.outflow = Some(Outflow { below: -1.0, until: None }), "outflow"),
+            (|s| s.effects.tilt.x = 0.01, "effects.tilt"),
+        ] {
+            let mut scene = scene.clone();
+            change(&mut scene);
+            let text = scene.check().unwrap_err().to_string();
+            assert!(text.contains("rolled_away") && text.contains(name), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_intruder_in_a_fluid_is_of_the_grains_density() {
+        let mut scene = Scene::drop(0.1);
+        let density = scene.grains.density;
+        let (position, velocity) = ([0.0, 0.0, 0.2], [0.0; 3]);
+        let mut intruder = Intruder { diameter: 0.02, density, position, velocity, enters: 0.0 };
+        scene.effects.fluid.density = 1000.0;
+        scene.intruder = Some(intruder.clone());
+        scene.check().unwrap();
+        intruder.density = 2.0 * density;
+        scene.intruder = Some(intruder);
+        let said = scene.check().unwrap_err().to_string();
+        assert!(said.contains("intruder.density") && said.contains("effects.fluid"), "{said}");
+        scene.effects.fluid.density = 0.0;
+        scene.check().unwrap();
+    }
+
+    #[test]
+    fn what_would_do_nothing_or_end_at_a_seam_is_refused() {
+        let mut scene = Scene::drop(0.1);
+        scene.effects.outlet.aspect = 1.2;
+        let said = scene.check().unwrap_err().to_string();
+        assert!(said.contains("effects.outlet") && said.contains("funnel"), "{said}");
+        let mut scene = Scene::drop(0.1);
+        scene.periodic = Some(Periodic { axis: PeriodicAxis::X, from: -0.1, to: 0.1 });
+        scene.check().unwrap();
+        scene.effects.fluid.density = 1000.0;
+        scene.check().unwrap();
+        scene.effects.fluid.saturated = 1.0;
+        let said = scene.check().unwrap_err().to_string();
+        assert!(said.contains("saturated") && said.contains("periodic"), "{said}");
+        scene.effects.fluid.saturated = 0.0;
+        scene.effects.polydispersity.diameters = vec![4e-3, 0.06];
+        let said = scene.check().unwrap_err().to_string();
+        assert!(said.contains("periodic.to") && said.contains("widest"), "{said}");
+    }
+}
