@@ -1,4 +1,7 @@
-"""Arrays in files: read with a bound, without pickles, with the file's name in every error."""
+"""Arrays from outside: in files, read with a bound and without pickles, and as arguments.
+
+Errors name the file or the argument.
+"""
 
 import io
 from pathlib import Path
@@ -11,7 +14,7 @@ from numpy.typing import NDArray
 
 from granulcal.documents import read_bytes
 
-__all__ = ["read_array", "read_arrays"]
+__all__ = ["read_array", "read_arrays", "unmasked"]
 
 
 def read_array(path: Path) -> NDArray[np.float64]:
@@ -47,3 +50,19 @@ def read_arrays(path: Path, *names: str) -> dict[str, NDArray[Any]]:
     if missing := [name for name in names if name not in found]:
         raise ValueError(f"{path} must have the arrays {', '.join(names)}; it lacks {missing}")
     return found
+
+
+def unmasked(name: str, value: Any) -> NDArray[Any]:
+    """Returns `value` as an array; NumPy alone would take what a mask hides for data.
+
+    Raises:
+        ValueError: entries are masked.
+    """
+    parts = value if isinstance(value, list | tuple) else (value,)
+    if np.ma.is_masked(value) or any(np.ma.is_masked(part) for part in parts):
+        hidden = sum(np.ma.count_masked(part) for part in parts)
+        raise ValueError(
+            f"{name} must have no masked entries, got {hidden}: fill them, as with "
+            f"{name}.filled(...), or drop their rows"
+        )
+    return np.asarray(value)

@@ -20,6 +20,7 @@ from granulcal.commands import elsewhere
 from granulcal.commands.exit_code import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from granulcal.commands.program import Parser, describe
 from granulcal.one_thread import one_thread
+from granulcal.progress import quieted
 
 __all__ = ["main"]
 
@@ -52,6 +53,7 @@ _EXTRAS = {
     "ray": "ray",
 }
 _TRACEBACK = "GRANULCAL_TRACEBACK"
+_FLAGS = frozenset({"-q", "--quiet", "-v", "-vv", "--verbose"})
 
 _EPILOG = """\
 From a recording to a material:
@@ -68,14 +70,15 @@ From a recording to a material:
   granulcal predict loop --at funnel.height=0.07      where it was not measured
 
 Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours
-unhealthy, some frames of a recording lost, a recording outside the model, or a
-model that fails its check, 130 stopped."""
+unhealthy, some rows of a merge missing, some frames of a recording lost, a
+recording outside the model, or a model that fails its check, 130 stopped."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command line without the program's name; returns the exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
     parser = _parser()
+    words = _flags_last(words, _commands(parser))
     word = words[0] if words else ""
     if word in ("simulate", "generate") and elsewhere.is_asked(words):
         return _guarded(lambda: elsewhere.run(words))
@@ -91,7 +94,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     def command() -> int:
         paths.check(parser, options)
-        return _run_told(options)
+        with quieted(options.quiet):
+            return _run_told(options)
 
     return _guarded(command)
 
@@ -213,6 +217,14 @@ def _interruptible(*, raises: bool = True) -> Iterator[None]:
         os.close(read)
 
 
+def _flags_last(words: list[str], commands: set[str]) -> list[str]:
+    """Returns the words with the flags that stand before one of `commands` behind it."""
+    first = next((i for i, word in enumerate(words) if word not in _FLAGS), len(words))
+    if first in (0, len(words)) or words[first] not in commands:
+        return words
+    return [words[first], *words[:first], *words[first + 1 :]]
+
+
 def _commands(parser: argparse.ArgumentParser) -> set[str]:
     return {name for action in parser._actions for name in (action.choices or ())}
 
@@ -222,6 +234,11 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar="COMMAND", dest="command")
     for word in _WORDS:
         importlib.import_module(f"granulcal.commands.{word}").add(commands)
+    for inner in commands.choices.values():
+        inner.add_argument("-q", "--quiet", action="store_true", help="no progress")
+        inner.add_argument(
+            "-v", "--verbose", action="count", default=0, help="more messages, where there are any"
+        )
     return parser
 
 

@@ -1,6 +1,7 @@
 """Exceptions of the Python side: each says what was found and what is allowed."""
 
 __all__ = [
+    "DamagedPartWarning",
     "ExtrapolationError",
     "ModelFormatError",
     "ObservationError",
@@ -35,6 +36,10 @@ class UnverifiedModelWarning(UserWarning):
 
 class UnverifiedDataWarning(UserWarning):
     """A data set without hashes of its rows, as earlier versions wrote them."""
+
+
+class DamagedPartWarning(UserWarning):
+    """A part in the store of a cluster that cannot be read; its rows are poured again."""
 
 
 class OtherLawWarning(UserWarning):

@@ -12,13 +12,26 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple, TextIO, TypeVar
 
-__all__ = ["FirstSteps", "ProgressLine", "duration", "first_steps", "shown", "steps"]
+__all__ = ["FirstSteps", "ProgressLine", "duration", "first_steps", "quieted", "shown", "steps"]
 
 _T = TypeVar("_T")
 
 _WIDTH = 30
 _LOG_EVERY_S = 30.0
 _LEFT_OUT = ("unhealthy", "jammed", "without grains in view")
+
+
+_is_quiet: ContextVar[bool] = ContextVar("is_quiet", default=False)
+
+
+@contextmanager
+def quieted(is_quiet: bool = True) -> Generator[None, None, None]:
+    """Shows no progress of what runs in it."""
+    token = _is_quiet.set(is_quiet)
+    try:
+        yield
+    finally:
+        _is_quiet.reset(token)
 
 
 class ProgressLine:
@@ -30,6 +43,7 @@ class ProgressLine:
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = sys.stderr if stream is None else stream
+        self._is_quiet = _is_quiet.get()
         self._is_terminal = self._stream.isatty()
         self._started = time.monotonic()
         self._logged = self._started
@@ -83,6 +97,8 @@ class ProgressLine:
             self._shown = ""
 
     def _show(self, text: str, share: float, now: float) -> None:
+        if self._is_quiet:
+            return
         if self._is_terminal:
             filled = int(_WIDTH * share)
             bar = "#" * filled + "-" * (_WIDTH - filled)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
+from granulcal.arrays import unmasked
 from granulcal.files import write_beside
 from granulcal.pours.compare import Scale, comparison_table, nearest_row, standardised_distance
 from granulcal.pours.dataset import Dataset
@@ -122,11 +123,12 @@ def write_report(
         command: command line that makes the page again.
 
     Raises:
-        ValueError: no pour, or a pour without grains in view.
+        ValueError: no pour, a pour without grains in view, or masked entries.
     """
     if not pours:
         raise ValueError("a report needs at least one pour at the posterior's mode, got none")
-    measured = np.asarray(observed, dtype=float)
+    measured = np.asarray(unmasked("observed", observed), dtype=float)
+    measured_points = np.asarray(unmasked("observed_points", observed_points), dtype=float)
     scale = Scale.of(data)
     simulated = [np.asarray(pour.statistics()) for pour in pours]
     page = template(_TEMPLATE).render(
@@ -134,8 +136,8 @@ def write_report(
         summary=summary,
         notes=[*notes, *(str(warning) for warning in posterior.warnings)],
         command=command,
-        formations=_formations(np.asarray(observed_points, dtype=float), pours[0]),
-        profile=_profile(np.asarray(observed_points, dtype=float), pours, drawn),
+        formations=_formations(measured_points, pours[0]),
+        profile=_profile(measured_points, pours, drawn),
         drawn_count=len(drawn),
         pairs=_pair_plot(posterior, truth),
         parameters=_parameters(posterior, truth),

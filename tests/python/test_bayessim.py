@@ -275,6 +275,7 @@ def test_data_set_rows_are_excluded_counted_and_reordered(toy, capsys):
     options = {**QUICK, "quiet": False}
     model = BayesSim.fit(data, **options)
     assert model.summary.excluded == {
+        "repeated": 0,
         "unhealthy": 1,
         "jammed": 1,
         "no_grains_in_view": 1,

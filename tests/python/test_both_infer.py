@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -66,9 +68,21 @@ def both(capfd, code: int, words: list[str]) -> dict:
     return ours
 
 
+def _again(image: str, folder: Path) -> str:
+    """Another recording that shows the same: one that is given twice is refused."""
+    return str(shutil.copy(image, folder / "again.png"))
+
+
+def test_a_recording_given_twice_is_refused(model, recording, capfd):
+    words = ["infer", str(model[0]), recording[0], *recording]
+    assert cli.main(words) == 2
+    assert "given once" in capfd.readouterr().err
+
+
 @pytest.mark.parametrize("pours", [1, 2])
 def test_both_commands_print_and_write_the_same_json(model, recording, pours, tmp_path, capfd):
-    words = ["infer", str(model[0]), *[recording[0]] * pours, *recording[1:], "--json"]
+    images = [recording[0], _again(recording[0], tmp_path)][:pours]
+    words = ["infer", str(model[0]), *images, *recording[1:], "--json"]
     code = 0 if _is_inside(model[1], recording) else 3
     found = both(capfd, code, words)
     assert len(found["statistics"]) == len(found["recordings"]) == pours
@@ -113,8 +127,8 @@ def test_several_pours_of_a_network_are_multiplied_in_both(small_data, recording
     made = BayesSim.fit(small_data, quiet=True, seed=2, method="mdrff", **SMALL)
     made.save(tmp_path / "m")
     x = _statistics(made, recording)
-    image = recording[0]
-    words = ["infer", str(tmp_path / "m"), image, image, *recording[1:], "--json"]
+    images = [recording[0], _again(recording[0], tmp_path)]
+    words = ["infer", str(tmp_path / "m"), *images, *recording[1:], "--json"]
     code = 0 if made.misfit(np.array([x, x])).is_inside else 3
     found = both(capfd, code, words)
     posterior = made.posterior(np.array([x, x]))

@@ -3,6 +3,8 @@
 Ray runs in processes of the tests' own: it warns, and it leaves threads behind.
 """
 
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,9 +14,11 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal import _native
 from granulcal.pours.cluster import spread_over
 from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.part_store import PartStore
+from granulcal.pours.stored_parts import StoredParts
 
 pytest.importorskip("ray")
 
@@ -198,3 +202,96 @@ def test_an_engine_does_not_go_with_a_cluster(tmp_path: Path) -> None:
             ray="local",
         )
     assert not (tmp_path / "rows").exists()
+
+
+def stored(parts: Path, store: Path) -> Path:
+    """Copies the parts of a data set into a store."""
+    store.mkdir()
+    for part in parts.glob("part-*.parquet"):
+        shutil.copy(part, store)
+    return store
+
+
+def test_a_larger_batch_goes_on_with_a_store_that_has_short_and_damaged_parts(
+    tmp_path: Path,
+) -> None:
+    """Each had ended the command, and named a file of the folder that was not there."""
+    scene, prior = gc.Scene.drop(0.01, count=25), gc.Prior.default()
+    gc.generate(scene, prior, 36, seed=5, out=tmp_path / "before", progress=False)
+    store = stored(tmp_path / "before", tmp_path / "store")
+    (store / "part-000001.parquet").write_bytes(b"")
+    (tmp_path / "scene.toml").write_text(scene.to_toml())
+    words = [sys.executable, "-m", "granulcal.cli", "generate", str(tmp_path / "scene.toml")]
+    words += ["default", "-n", "48", "--seed", "5", "-q", "--ray", "local"]
+    words += ["-o", str(tmp_path / "rows"), "--ray-store", store.as_uri()]
+    told = subprocess.run(words, capture_output=True, text=True, timeout=300)
+    assert told.returncode in (0, 3), told.stderr[-3000:]
+    url = f"{store.as_uri()}/part-000001.parquet"
+    lines = [line for line in told.stderr.splitlines() if line.startswith("warning: ")]
+    assert len(lines) == 1 and lines[0].startswith(f"warning: {url} is truncated, damaged or no")
+    assert lines[0].endswith("; its rows are poured again")
+    whole = gc.generate(scene, prior, 48, seed=5, progress=False)
+    assert same(gc.Dataset.load(tmp_path / "rows"), whole)
+    # The store is whole now, and no cluster is asked.
+    cluster = gc.Cluster("nowhere:1", store=store.as_uri())
+    again = gc.generate(
+        scene, prior, 48, seed=5, out=tmp_path / "again", progress=False, ray=cluster
+    )
+    assert same(again, whole)
+
+
+def test_a_part_of_something_else_is_refused_by_its_url(tmp_path: Path) -> None:
+    scene, prior = gc.Scene.drop(0.01, count=25), gc.Prior.default()
+    gc.generate(scene, prior, 20, seed=5, out=tmp_path / "before", progress=False)
+    store = stored(tmp_path / "before", tmp_path / "store")
+    path = "material.restitution"
+    other = gc.Prior([gc.Parameter(path=path, distribution="uniform", low=0.2, high=0.3)])
+    cases = (
+        (scene.with_({"grains.count": 26}), prior, 5, "scene.grains.count is 25, but 26 is given"),
+        (scene, other, 5, "the prior is"),
+        (scene, prior, 6, "the seed is 5, but 6 is given"),
+    )
+    # Of a short part, too, what it is of counts before its length.
+    for number in (0, 1):
+        url = re.escape(f"{store.as_uri()}/part-{number:06}.parquet")
+        for case, (scene_of, prior_of, seed, why) in enumerate(cases):
+            cluster = gc.Cluster("nowhere:1", store=f"{store.as_uri()}/")
+            with pytest.raises(ValueError, match=f"^{url}: {why}.*use another store, or move"):
+                gc.generate(
+                    scene_of,
+                    prior_of,
+                    40,
+                    seed=seed,
+                    out=tmp_path / f"rows-{number}-{case}",
+                    progress=False,
+                    ray=cluster,
+                )
+        (store / f"part-{number:06}.parquet").unlink()
+
+
+def test_a_part_that_a_worker_left_damaged_is_told_by_its_url(tmp_path: Path) -> None:
+    scene, prior = gc.Scene.drop(0.01, count=5), gc.Prior.default()
+    batch = _native.GatheredBatch(
+        scene.native, prior.to_toml(), tmp_path / "rows", rows=4, seed=1, resume=True
+    )
+    store = PartStore((tmp_path / "store").as_uri())
+    work = {"scene": scene.native, "prior_toml": prior.to_toml(), "rows": 4, "seed": 1}
+    parts = StoredParts(store, batch, tmp_path / "rows", **work)
+    store.write(0, b"PAR1 and no more")
+    with pytest.raises(ValueError, match=f"^{re.escape(store.url_of(0))} is truncated"):
+        parts.take(0)
+    batch.close()
+
+
+def test_a_part_on_a_cluster_has_as_many_rows_as_asked(tmp_path: Path) -> None:
+    out = tmp_path / "rows"
+    words = ["generate", "drop", "default", "-n", "5", "--chunk", "2", "--preset", "fast", "-q"]
+    words += ["--set", "grains.count=5", "--ray", "local", "-o", str(out)]
+    command = [sys.executable, "-m", "granulcal.cli", *words]
+    told = subprocess.run([*command, "--dry-run"], capture_output=True, text=True, timeout=300)
+    assert told.returncode == 0 and "at most 5 pours" in told.stdout, told.stderr[-3000:]
+    assert not out.exists()
+    told = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert told.returncode in (0, 3), told.stderr[-3000:]
+    assert len(list(out.glob("part-*.parquet"))) == 3
+    assert gc.Dataset.load(out).scene.preset == "fast"

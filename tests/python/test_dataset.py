@@ -81,6 +81,9 @@ def test_errors_are_those_of_python(small_scene, tmp_path):
     prior = gc.Prior.default()
     with pytest.raises(ValueError, match="n must be at least 1, got 0"):
         gc.generate(small_scene, prior, 0)
+    for name in ("n", "threads", "seed", "chunk"):
+        with pytest.raises(ValueError, match=f"{name} must be at most [0-9]{{19,20}}, got 11805"):
+            gc.generate(small_scene, prior, **{"n": 1, name: 2**70})
     with pytest.raises(TypeError, match="n must be a whole number"):
         gc.generate(small_scene, prior, 2.5)  # pyright: ignore[reportArgumentType]
     with pytest.raises(FileNotFoundError, match=r"nothing"):

@@ -1,3 +1,4 @@
+import json
 import sys
 from pathlib import Path
 
@@ -7,8 +8,10 @@ import pytest
 import granulcal as gc
 from granulcal.arrays import read_array
 from granulcal.cli import main
+from granulcal.commands.sensor import with_sensor
 from granulcal.engines import CallableEngine, CommandEngine, ExportedEngine, engine_named, installed
 from granulcal.engines.files import read_grains
+from granulcal.starter.samples import SENSOR
 
 # A simulator of one's own in a dozen lines: a pile that is the steeper, the rougher the grains are.
 SIMULATOR = """\
@@ -32,6 +35,14 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> str:
     path = tmp_path_factory.mktemp("own") / "simulator.py"
     path.write_text(SIMULATOR)
     return f"{sys.executable} {path}"
+
+
+@pytest.fixture(scope="module")
+def folder_of_sensor(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Has a sensor.toml as `fit-sensor` writes it."""
+    place = tmp_path_factory.mktemp("sensor")
+    (place / "sensor.toml").write_text(SENSOR.format(focal=390.0, unit=1e-4))
+    return place
 
 
 def cone(scene: gc.Scene, seed: int) -> np.ndarray:
@@ -134,6 +145,61 @@ def test_the_words_simulate_and_generate_take_an_engine(
     words = ["generate", str(scene), str(prior), "-n", "3", "-o", str(tmp_path / "pours")]
     assert main([*words, f"--engine={command}", "--quiet"]) == 0
     assert len(gc.Dataset.load(tmp_path / "pours")) == 3
+
+
+def test_the_options_that_generate_shows_are_taken_or_refused_by_name_elsewhere(
+    command: str, folder_of_sensor: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They had been unknown: `did you mean --set?`."""
+    out, words = tmp_path / "pours", ["generate", "drop", "default", "-n", "12"]
+    words += ["--set", "grains.count=30", "-o", str(out)]
+    ours = f"--engine={command}"
+    for option, where, why in (
+        (["--shard", "0/4"], ["--ray", "local"], "--shard is not for --ray: the cluster divides"),
+        (["--shard", "0/4"], [ours], "--shard is not for --engine: one process"),
+        (["--flush-every", "5"], ["--ray", "local"], "--flush-every is not for --ray: a part"),
+        (["--flush-every", "5"], [ours], "--flush-every is not for --engine: rows"),
+        (["--chunk", "0"], [ours], "chunk must be at least 1, got 0"),
+    ):
+        assert main([*words, *option, *where]) == 2
+        assert why in capsys.readouterr().err
+    assert main([*words, ours, "--dry-run", "--json", "--threads", "2"]) == 0
+    assert json.loads(capsys.readouterr().out)["missing"] == 12
+    assert not out.exists()
+    sensor = folder_of_sensor / "sensor.toml"
+    more = ["--preset", "fast", "--sensor", str(sensor), "--chunk", "5", "-q", "-v"]
+    assert main([*words, ours, *more]) == 0
+    assert sorted(path.name for path in out.glob("*.parquet")) == [
+        f"part-{i:06}.parquet" for i in range(3)
+    ]
+    scene = gc.Dataset.load(out).scene
+    assert scene.preset == "fast" and scene.get("grains.count") == 30
+    assert scene.get("camera.sensor.noise.white") == 0.02
+
+
+def test_a_sensor_replaces_that_of_the_scene(
+    folder_of_sensor: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = folder_of_sensor / "sensor.toml"
+    once = with_sensor(gc.Scene.drop(0.1), path)
+    other = tmp_path / "other.toml"
+    other.write_text(path.read_text().replace("white = 0.02", "white = 0.05"))
+    twice = with_sensor(once.with_({"camera.sensor.baseline": 0.07}), other)
+    assert twice.get("camera.sensor.noise.white") == 0.05
+    assert twice.get("camera.sensor.baseline") == 0.05
+    # As the simulator's half reads it.
+    capfd.readouterr()
+    assert main(["scene", "drop", "--sensor", str(other)]) == 0
+    assert gc.Scene.from_toml(capfd.readouterr().out) == twice
+    for text, said in (
+        ("[camera.sensor", "not valid TOML"),
+        ("[camera]\nheight = 1.0\n", "camera.sensor must be there"),
+        (path.read_text().replace('"stereo"', '"echo"'), "not a sensor: unknown variant `echo`"),
+        (path.read_text() + "[grains]\ncount = 3\n", "grains must be absent"),
+    ):
+        other.write_text(text)
+        with pytest.raises(ValueError, match=f"other.toml.*{said}"):
+            with_sensor(once, other)
 
 
 # A bar that MuJoCo misses: its grains run twice as far (docs/export.md).

@@ -69,7 +69,7 @@ def looked(
     )
     monkeypatch.setattr(module, "model_scene", lambda _, condition, one: (condition.at, one))
     monkeypatch.setattr(module, "model_faults", lambda _, one: {})
-    monkeypatch.setattr(module, "seeds_of_replicates", lambda seed: seed)
+    monkeypatch.setattr(module, "seeds_of_replicates", lambda _, seed: seed)
     conditions = [SimpleNamespace(name=f"{c:g}", at=c, session="") for c in PLACES]
     task: Any = SimpleNamespace(of=lambda _: conditions, library=())
     plan: Any = SimpleNamespace(unit=lambda at: np.array([at]), design=surrogate.design)

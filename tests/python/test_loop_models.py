@@ -11,6 +11,7 @@ from granulcal.cli import main
 from granulcal.errors import ObservationError
 from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.pours.forward import Coarse, Forward
+from granulcal.loop.report.interval import of_one_more, t_factor
 from granulcal.loop.report.models import Maker, Models, condition_of
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.pours.scene import Scene
@@ -100,7 +101,9 @@ def test_lines_and_neighbours_need_no_pour(models: Models, tmp_path: Path) -> No
     assert line.middle == pytest.approx([0.021, 0.035])
     # Variance of the line's mean, (.75^2 + .25^2) s^2 / 4, and of one pour.
     sd = 0.001 * np.sqrt((0.75**2 + 0.25**2) / 4 + 1)
-    assert line.high[0] - line.low[0] == pytest.approx(2 * 1.6449 * sd, rel=1e-3)
+    # Student's t of as many degrees of freedom as the variance has.
+    t = t_factor(0.9, int((models.pours - 1).sum()))
+    assert t > 1.6449 and line.high[0] - line.low[0] == pytest.approx(2 * t * sd, rel=1e-3)
     assert models.predict("nearest", {"start.base": 0.055}, forward).middle[0] == 0.024
     assert forward.ran == 0
 
@@ -177,3 +180,14 @@ def test_transforms_have_inverses(kind: str) -> None:
     transform = Transform(kind, 0.4, 2.0, 0.7, 1.5)
     x = np.linspace(0.5, 9.0, 20)
     assert transform.inverse(transform(x)) == pytest.approx(x)
+
+
+@pytest.mark.parametrize("pours", [5, 10, 20, 40])
+@pytest.mark.parametrize("level", [0.9, 0.95])
+def test_the_interval_of_one_more_pour_holds_it_as_often_as_it_says(pours: int, level: float):
+    random = np.random.default_rng(pours)
+    low, high = of_one_more(random.standard_normal((pours, 20_000)), level, pours)
+    another = random.standard_normal(20_000)
+    held = np.mean((low <= another) & (another <= high))
+    # Quantiles of 20 pours had held 0.82 of 0.9.
+    assert abs(held - level) < 0.012

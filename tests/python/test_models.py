@@ -33,7 +33,12 @@ def test_a_model_is_found_by_its_scene_if_it_fits_the_simulator(cache: Path) -> 
     assert models.find_model("funnel") == shipped
     (own / "made.json").write_text(json.dumps({"fingerprint": fitting}))
     assert models.find_model("funnel") == own
-    assert models.model_named("pours/model") == Path("pours/model")
+    (cache / "own").mkdir()
+    assert models.model_named(cache / "own") == cache / "own"
+    with pytest.raises(FileNotFoundError, match="did you mean funnel"):
+        models.model_named("funel")
+    with pytest.raises(NotADirectoryError, match="is a file"):
+        models.model_named(own / "made.json")
 
 
 def test_infer_without_a_model_says_how_to_make_one(

@@ -50,6 +50,32 @@ def test_python_refuses_what_is_no_number():
         gc.statistics(np.zeros((4, 3), dtype=complex))
 
 
+def test_what_a_mask_hides_is_not_taken_for_data(points, tmp_path):
+    camera = gc.Camera.overhead(height=0.3, field_width=0.3, pixels=20)
+    radii = np.full(len(points), 0.002)
+    hidden = np.ma.array(points, mask=False)
+    hidden[7, 2] = np.ma.masked
+    for value in (np.ma.array(points, mask=True), hidden, list(hidden)):
+        with pytest.raises(
+            ValueError, match="points must have no masked .*: fill them, .* or drop"
+        ):
+            gc.statistics(value)
+        with pytest.raises(ValueError, match="points must have no masked entries"):
+            gc.diagnostic_statistics(value, grain_diameter=0.004, spacing=0.001)
+        with pytest.raises(ValueError, match="positions must have no masked entries"):
+            camera.render(value, radii)
+    image = np.ma.masked_equal(camera.render(points, radii), 0.0)
+    image[0, 0] = np.ma.masked
+    with pytest.raises(ValueError, match="image must have no masked entries"):
+        camera.save(image, tmp_path / "a.png", tmp_path / "a.toml")  # pyright: ignore
+    engine = gc.engines.CallableEngine(lambda scene, seed: (hidden, 0.002), name="masked")
+    with pytest.raises(ValueError, match="positions must have no masked entries, got 1"):
+        gc.simulate(gc.Scene.drop(0.1, count=400), engine=engine)
+    # A mask that hides nothing is none.
+    whole = gc.statistics(np.ma.array(points))
+    assert np.array_equal(whole.paper16, gc.statistics(points).paper16)
+
+
 def test_empty_and_nan_points_are_refused_with_numbers(points):
     with pytest.raises(ValueError, match="got 0"):
         gc.statistics(np.zeros((0, 3)))
@@ -104,7 +130,14 @@ def test_a_pour_outside_the_image_has_no_statistics(small_scene):
     [
         ({"seed": -1}, ValueError, "seed must be at least 0, got -1"),
         ({"seed": 1.5}, TypeError, "seed must be a whole number, got 1.5"),
+        (
+            {"seed": 2**64},
+            ValueError,
+            "seed must be at most 18446744073709551615, got 184467440737",
+        ),
+        ({"seed": 10**5000}, ValueError, "seed must be at most .*, got a number of 16610 bits"),
         ({"threads": 0}, ValueError, "threads must be at least 1, got 0"),
+        ({"threads": 2**70}, ValueError, "threads must be at most 9223372036854775807, got 1180"),
         ({"preset": "slow"}, ValueError, "preset must be one of fast, default, accurate, paper"),
     ],
 )

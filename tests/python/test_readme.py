@@ -154,6 +154,11 @@ def test_every_block_and_every_command_within_a_sentence_is_run_or_told_why_not(
     assert set(within_sentences()) == {*ELSEWHERE, *SHORT}
 
 
+def test_the_python_route_asks_for_the_misfit_before_the_posterior() -> None:
+    block = next(block for block in blocks("python") if "import granulcal" in block)
+    assert 0 < block.find("print(model.misfit(") < block.find("model.posterior(")
+
+
 def test_the_first_commands_run_as_written(place: Path) -> None:
     pytest.importorskip("rosbags")
     lines = commands()

@@ -1,5 +1,6 @@
 import pickle
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -72,3 +73,28 @@ def test_material_is_the_scenes():
     material = gc.Material(sliding_friction=0.3, rolling_friction=0.02, restitution=0.7)
     assert gc.Scene.drop(0.1, material=material).material == material
     assert gc.Scene.drop(0.1).with_material(material).material == material
+
+
+@pytest.mark.parametrize(
+    "count",
+    [10**30, 1e308, 2**63, 10**400, -(10**400), float("inf")],
+    ids=["1e30", "1e308", "2^63", "1e400", "-1e400", "inf"],
+)
+def test_a_count_that_no_scene_can_hold_is_refused(count):
+    """They had become 2^63 grains, or an OverflowError."""
+    with pytest.raises(ValueError, match=r"grains\.count.* must be (a (whole )?number|below 2\^53)"):
+        gc.Scene.drop(0.1, count=count)
+    with pytest.raises(ValueError, match=r"grains\.count.* must be (a (whole )?number|below 2\^53)"):
+        gc.Scene.drop(0.1).with_({"grains.count": count})
+
+
+def test_a_start_takes_the_seeds_that_a_pour_takes():
+    scene = gc.Scene.drop(0.1, count=5)
+    with pytest.raises(ValueError, match="seed must be at least 0, got -1"):
+        scene.start(-1)
+    with pytest.raises(ValueError, match="seed must be at most 18446744073709551615, got 1844674"):
+        scene.start(2**64)
+    with pytest.raises(TypeError, match=r"seed must be a whole number, got 1\.5"):
+        scene.start(1.5)  # pyright: ignore[reportArgumentType]
+    for seed in (0, np.int64(3), 2**64 - 1):
+        assert scene.start(seed)[0].shape == (5, 3)  # pyright: ignore[reportArgumentType]

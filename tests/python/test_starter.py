@@ -1,4 +1,5 @@
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -121,3 +122,28 @@ def test_what_is_not_there_says_what_would_be(capfd: pytest.CaptureFixture[str])
     ):
         assert main(words) == 2
         assert said in capfd.readouterr().err, words
+
+
+def test_a_folder_that_is_refused_is_left_empty(
+    folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A scene.toml that nothing could read had stayed there."""
+    good = (folder / "camera.toml").read_text()
+    place, camera = tmp_path / "new", tmp_path / "camera.toml"
+    words = ["init", str(place), "--recording", str(folder / "couscous.png")]
+    words += ["--camera", str(camera)]
+    for unit, scene, said in (
+        ("0.00001", "funnel", r"0.04 m from the camera, .* the funnel's tip at 0.12 m .* 1e-05 m"),
+        ("0.00001", "drop", r"is 0.04 m from the camera, .* at 0.1 m \(start.height\): .* unit"),
+        ("0.00000001", "funnel", "is 0 m from the camera, .* is the depth unit right"),
+    ):
+        camera.write_text(good.replace("depth_unit = 0.0001", f"depth_unit = {unit}"))
+        assert main([*words, "--scene", scene]) == 2
+        assert re.search(said, capfd.readouterr().err)
+        assert not place.exists()
+    # Who pours from that low is believed, and so is a camera of one's own.
+    camera.write_text(good.replace("depth_unit = 0.0001", "depth_unit = 0.00001"))
+    assert main([*words, "--set", "funnel.height=0.02"]) == 0
+    for wrong in ("grains.count=1.5", "grains.counts=3", "camera.pixels=0"):
+        assert main(["init", str(tmp_path / "wrong"), "--set", wrong]) == 2
+        assert not (tmp_path / "wrong").exists()

@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.arrays import unmasked
+
 __all__ = ["as_matrix", "as_real"]
 
 
@@ -13,7 +15,10 @@ def as_real(name: str, value: Any) -> NDArray[np.float64]:
 
     Raises:
         TypeError: `value` is not an array of real numbers.
+        ValueError: it has a mask that hides some of them.
     """
+    if np.ma.isMaskedArray(value):
+        value = unmasked(name, value)
     try:
         array = np.asarray(value)
     except ValueError as error:

@@ -194,6 +194,9 @@ class BayesSim:
     def posterior(self, x_obs: ArrayLike) -> Posterior:
         """Returns the posterior given one observation, or several of one material.
 
+        Ask `misfit` first: a posterior comes out whether or not any parameters explain the
+        observation, and is of no use if none do.
+
         Several pours share their parameters. Under the emulator they have one likelihood, in which
         what differs between them averages away and the emulator's own error does not; a network's
         posteriors are multiplied and the prior divided out k - 1 times. Neither is an average of

@@ -100,6 +100,7 @@ def _run(options: argparse.Namespace) -> int:
         from granulcal.loop.task import Task
 
         task = Task.load(_file(options))
+        task.require_readable()
         with pouring_with(engine):
             return say_how_long(options, task.at_first(), task.prior, options.budget)
     aside = contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext()

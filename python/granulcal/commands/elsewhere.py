@@ -4,19 +4,37 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from granulcal import paths
 from granulcal.commands.cluster import add_cluster, cluster_of
+from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.init import assignment
 from granulcal.commands.program import Parser
+from granulcal.commands.sensor import with_sensor
 from granulcal.files import beside
 from granulcal.paths import READS, writes
+
+if TYPE_CHECKING:
+    from granulcal.pours.scene import Scene
 
 __all__ = ["is_asked", "parser", "run"]
 
 _ENGINE, _RAY, _STORE = "--engine", "--ray", "--ray-store"
+_PRESETS = ("fast", "default", "accurate", "paper")
+# Options of `generate` that mean nothing here, and why: of a cluster, of another engine.
+_REFUSED = {
+    "shard": (
+        "the cluster divides the rows itself",
+        "one process makes all rows of another engine",
+    ),
+    "flush_every": (
+        "a part comes whole from the worker that makes it, and is written at once",
+        "rows of another engine are written every 30 s",
+    ),
+}
 _UNHEALTHY = 3
 
 
@@ -53,6 +71,10 @@ def parser() -> argparse.ArgumentParser:
     generate.add_argument("-n", "--rows", type=int, default=1000)
     generate.add_argument("-o", "--out", type=writes("data_set"), required=True)
     generate.add_argument("--threads", type=int)
+    generate.add_argument("--chunk", type=int)
+    add_dry_run(generate)
+    for name in _REFUSED:
+        generate.add_argument(f"--{name.replace('_', '-')}", help=argparse.SUPPRESS)
     generate.add_argument("--no-resume", action="store_true")
     generate.set_defaults(run=_generate)
     return whole
@@ -61,17 +83,31 @@ def parser() -> argparse.ArgumentParser:
 def _add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=READS)
     parser.add_argument("--set", action="append", default=[], type=assignment)
+    parser.add_argument("--preset", choices=_PRESETS)
+    parser.add_argument("--sensor", type=READS)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true")
     parser.add_argument("-q", "--quiet", action="store_true")
+    parser.add_argument("-v", "--verbose", action="count", default=0)
+
+
+def _scene(options: argparse.Namespace) -> "Scene":
+    """Returns the scene that the words describe: preset, sensor and numbers in place of its own."""
+    from granulcal.pours.scene import Scene
+
+    scene = Scene.named(options.scene)
+    if options.preset is not None:
+        scene = scene.with_(preset=options.preset)
+    if options.sensor is not None:
+        scene = with_sensor(scene, options.sensor)
+    return scene.with_(dict(options.set))
 
 
 def _simulate(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named
-    from granulcal.pours.scene import Scene
     from granulcal.pours.simulate import simulate
 
-    scene = Scene.named(options.scene).with_(dict(options.set))
+    scene = _scene(options)
     pour = simulate(scene, seed=options.seed, engine=engine_named(options.engine))
     statistics = pour.statistics().to_dict()
     if options.positions is not None:
@@ -98,22 +134,32 @@ def _simulate(options: argparse.Namespace) -> int:
 
 def _generate(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named
+    from granulcal.pours.cluster import cores_of, refuse_engine
     from granulcal.pours.dataset import generate
-    from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
 
-    scene = Scene.named(options.scene).with_(dict(options.set))
+    _refuse(options)
+    cluster = cluster_of(options)
+    engine = None if options.engine is None else engine_named(options.engine)
+    scene, prior = _scene(options), Prior.named(options.prior)
+    if cluster is not None:
+        refuse_engine(engine)
+    if options.dry_run:
+        if cluster is not None and options.threads is None:
+            options.threads = cores_of(cluster)
+        return say_how_long(options, scene, prior, options.rows, engine=engine)
     data = generate(
         scene,
-        Prior.named(options.prior),
+        prior,
         options.rows,
         seed=options.seed,
         out=options.out,
         threads=options.threads,
         resume=not options.no_resume,
         progress=not options.quiet,
-        engine=None if options.engine is None else engine_named(options.engine),
-        ray=cluster_of(options),
+        engine=engine,
+        ray=cluster,
+        chunk=options.chunk,
     )
     counts = data.status_counts()
     if options.json:
@@ -124,3 +170,15 @@ def _generate(options: argparse.Namespace) -> int:
     if left_out.total:
         print(f"note: pours that cannot be used: {left_out}", file=sys.stderr)
     return 0 if not left_out.total else _UNHEALTHY
+
+
+def _refuse(options: argparse.Namespace) -> None:
+    """Refuses options of `generate` that mean nothing here.
+
+    Raises:
+        ValueError: one is given; says why it is refused.
+    """
+    for name, (of_cluster, of_engine) in _REFUSED.items():
+        if getattr(options, name) is not None:
+            where, why = (_ENGINE, of_engine) if options.ray is None else (_RAY, of_cluster)
+            raise ValueError(f"--{name.replace('_', '-')} is not for {where}: {why}")

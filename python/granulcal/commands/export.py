@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.commands.init import assignment
 from granulcal.paths import READS, writes
 
@@ -112,10 +113,10 @@ def _loaded(options: argparse.Namespace) -> Any:
     return Scene.named(options.scene).with_(dict(options.set))
 
 
-def _told(options: argparse.Namespace, files: list[Path]) -> int:
+def _told(options: argparse.Namespace, files: list[Path], is_inside: bool = True) -> int:
     names = [str(path) for path in files]
     print(json.dumps({"files": names}, indent=1) if options.json else "\n".join(names))
-    return 0
+    return DONE if is_inside else UNHEALTHY
 
 
 def _material(options: argparse.Namespace) -> int:
@@ -146,18 +147,19 @@ def _posterior(options: argparse.Namespace) -> int:
         options.out,
         young=options.young,
     )
-    return _told(options, files)
+    return _told(options, files, found.is_inside)
 
 
 def _scene(options: argparse.Namespace) -> int:
     from granulcal.design.posterior_file import PosteriorDraws
     from granulcal.export import export_scene
 
-    scene = _loaded(options)
+    scene, is_inside = _loaded(options), True
     if options.posterior is not None:
-        scene = PosteriorDraws.load(options.posterior).at_mode(scene)
+        found = PosteriorDraws.load(options.posterior)
+        scene, is_inside = found.at_mode(scene), found.is_inside
     files = export_scene(scene, options.to, options.out, seed=options.seed, young=options.young)
-    return _told(options, files)
+    return _told(options, files, is_inside)
 
 
 def _bed(options: argparse.Namespace) -> int:

@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import importlib.util
 import io
+import sys
 from typing import Any
 
 from granulcal import _native
@@ -37,7 +38,8 @@ def _run(options: argparse.Namespace) -> int:
     if options.plot is not None and importlib.util.find_spec("torch") is None:
         raise ModuleNotFoundError("--plot needs PyTorch")
     model = model_named(str(options.model))
-    words = ["granulcal", "infer", str(model), *map(str, options.recording)]
+    flags = ["-q"] * options.quiet + ["-v"] * options.verbose
+    words = ["granulcal", *flags, "infer", str(model), *map(str, options.recording)]
     words += reading_words(options)
     for name in ("scene", "border", "samples", "seed", "out"):
         if getattr(options, name) is not None:
@@ -48,6 +50,9 @@ def _run(options: argparse.Namespace) -> int:
     if options.plot is not None and code in (DONE, UNHEALTHY):
         import numpy as np
 
+        from granulcal.measured.plausible import violations
+        from granulcal.pours.scene import Scene
+
         model = open_model(options)
         matched = {} if model.scene_toml is None else _matched(model.scene_toml)
         if options.border is not None:
@@ -55,8 +60,15 @@ def _run(options: argparse.Namespace) -> int:
         with contextlib.redirect_stderr(io.StringIO()):
             # What is lost of the recordings is told already.
             recordings = open_recordings(options)
+        if model.scene_toml is not None:
+            scene = Scene.from_toml(model.scene_toml)
+            if violations(scene, model.prior, recordings, options.recording):
+                print("no --plot: no posterior is given", file=sys.stderr)
+                return code
         observed = [recording.formation(**matched).statistics() for recording in recordings]
-        model.posterior(np.array([np.asarray(each) for each in observed])).pair_plot(options.plot)
+        x = np.array([np.asarray(each) for each in observed])
+        title = "" if model.misfit(x).is_inside else "OUTSIDE THE MODEL: its best compromise"
+        model.posterior(x).pair_plot(options.plot, title=title)
     return code
 
 

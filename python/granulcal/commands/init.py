@@ -94,15 +94,18 @@ def _add_sample(commands: Any) -> None:
 
 def _init(options: argparse.Namespace) -> int:
     from granulcal.starter.folder import D435, FILES, lens_of, write_folder
-    from granulcal.starter.numbers import set_numbers
 
     lens = D435 if options.recording is None else lens_of(options.recording, options.camera)
-    scene = write_folder(options.folder, scene=options.scene, lens=lens, force=options.force)
     changes: dict[str, float | str] = dict(options.set)
     if options.preset is not None:
         changes["preset"] = options.preset
-    if changes:
-        scene = set_numbers(options.folder / "scene.toml", changes)
+    scene = write_folder(
+        options.folder,
+        scene=options.scene,
+        lens=lens,
+        changes=changes,
+        force=options.force,
+    )
     files = [str(options.folder / name) for name in FILES]
     if options.json:
         print(json.dumps({"files": files, "scene": scene.name}, indent=1))

@@ -84,13 +84,18 @@ def open_model(options: argparse.Namespace) -> Any:
 
 def open_recordings(options: argparse.Namespace) -> list[Any]:
     """Returns the recordings of `add_reading`; what is lost of them is told on stderr."""
-    from granulcal.measured.recording import DamagedRecordingWarning, Recording
+    from granulcal.measured.recording import (
+        DamagedRecordingWarning,
+        Recording,
+        UnlikeFramesWarning,
+    )
 
     opened: list[Any] = []
     for path in options.recording:
         with warnings.catch_warnings():
             # Told below in the manner of a command line.
             warnings.simplefilter("ignore", DamagedRecordingWarning)
+            warnings.simplefilter("ignore", UnlikeFramesWarning)
             recording = Recording.open(
                 path,
                 camera=options.camera,
@@ -102,6 +107,8 @@ def open_recordings(options: argparse.Namespace) -> list[Any]:
             )
         for line in recording.damage:
             print(f"warning: {line}", file=sys.stderr)
+        if recording.unlike is not None:
+            print(f"warning: {path}: {recording.unlike}", file=sys.stderr)
         if recording.lost is not None:
             print(f"warning: {path}: {recording.lost}", file=sys.stderr)
         opened.append(recording)
@@ -130,4 +137,9 @@ def exit_code_of(recordings: Sequence[Any], is_healthy: bool = True) -> int:
 
 
 def _frames(text: str) -> int | None:
-    return None if text == "all" else int(text)
+    if text == "all":
+        return None
+    frames = int(text)
+    if frames < 1:
+        raise argparse.ArgumentTypeError(f"must be at least 1, or all, got {frames}")
+    return frames

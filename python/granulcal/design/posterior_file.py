@@ -1,15 +1,16 @@
 """Materials from the JSON that `granulcal infer -o` and `granulcal calibrate` write."""
 
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
 from os import PathLike
 
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, read_json
+from granulcal.documents import Flag, ListOf, Mapping, Maybe, Number, Table, read_json
 from granulcal.pours.scene import Scene
 
-__all__ = ["PosteriorDraws"]
+__all__ = ["OutsideModelWarning", "PosteriorDraws"]
 
 Array = NDArray[np.float64]
 
@@ -18,8 +19,13 @@ _SCHEMA = Table(
         "parameters": Maybe(Mapping(Table({"mode": Number()}, open=True))),
         "samples": ListOf(ListOf(Number())),
     },
+    optional={"inside_model": Table({"is_inside": Flag()}, open=True)},
     open=True,
 )
+
+
+class OutsideModelWarning(UserWarning):
+    """A posterior is that of recordings that no parameters of its model explain."""
 
 
 @dataclass(frozen=True)
@@ -30,15 +36,17 @@ class PosteriorDraws:
         names: paths of the parameters.
         samples: own units, shape (n, p).
         mode: most probable parameters, own units, shape (p,).
+        is_inside: whether the model explains the recordings; if not these are its best compromise.
     """
 
     names: tuple[str, ...]
     samples: Array
     mode: Array
+    is_inside: bool = True
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> "PosteriorDraws":
-        """Returns the draws in a file.
+        """Returns the draws in a file; warns of those of recordings that no parameters explain.
 
         Raises:
             FileNotFoundError: there is no such file.
@@ -57,13 +65,21 @@ class PosteriorDraws:
             raise ValueError(
                 f"{path} must have samples of shape (n, {len(names)}), got {samples.shape}"
             )
-        return cls(names, samples, mode)
+        is_inside = bool(document.get("inside_model", {}).get("is_inside", True))
+        if not is_inside:
+            warnings.warn(
+                f"{path}: OUTSIDE THE MODEL: no parameters explain the recordings; these are the "
+                "model's best compromise, and their intervals mean nothing",
+                OutsideModelWarning,
+                stacklevel=2,
+            )
+        return cls(names, samples, mode, is_inside)
 
     def without(self, name: str) -> "PosteriorDraws":
         """Returns the draws of all other parameters."""
         kept = [i for i, each in enumerate(self.names) if each != name]
         names = tuple(self.names[i] for i in kept)
-        return PosteriorDraws(names, self.samples[:, kept], self.mode[kept])
+        return replace(self, names=names, samples=self.samples[:, kept], mode=self.mode[kept])
 
     def at_mode(self, scene: Scene) -> Scene:
         """Returns the scene with the most probable parameters."""

@@ -8,6 +8,7 @@ from granulcal import _native
 
 if TYPE_CHECKING:
     from granulcal.engines.protocol import Engine
+    from granulcal.pours.scene import Scene
 
 __all__ = ["engine_in_use", "law_of_pours", "pouring_with", "version_of_pours"]
 
@@ -40,9 +41,9 @@ def engine_in_use() -> "Engine | None":
     return _in_use
 
 
-def law_of_pours() -> int:
-    """Returns the number of the law that kept pours follow, 0 where another engine pours."""
-    return _native.LAW if _in_use is None else 0
+def law_of_pours(scene: "Scene") -> int:
+    """Returns the number of the law that pours of a scene follow, 0 where another engine pours."""
+    return scene.native.law if _in_use is None else 0
 
 
 def version_of_pours() -> str:

@@ -6,6 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.arrays import unmasked
 from granulcal.pours.scene import Scene
 
 __all__ = ["CallableEngine", "Engine", "Left", "left"]
@@ -68,7 +69,7 @@ def left(name: str, found: Any) -> Left:
     """Returns what an engine left as arrays.
 
     Raises:
-        ValueError: neither (centres, radii) nor points.
+        ValueError: neither (centres, radii) nor points, or masked entries.
     """
     if isinstance(found, tuple):
         if len(found) != 2:
@@ -76,13 +77,14 @@ def left(name: str, found: Any) -> Left:
                 f"{name} must leave (centres, radii) or points, got {len(found)} things"
             )
         centres = _vectors(name, found[0])
-        radii = np.ascontiguousarray(np.broadcast_to(np.asarray(found[1], float), len(centres)))
+        radii = unmasked("radii", found[1]).astype(float)
+        radii = np.ascontiguousarray(np.broadcast_to(radii, len(centres)))
         return centres, radii
     return _vectors(name, found)
 
 
 def _vectors(name: str, values: Any) -> Array:
-    array = np.ascontiguousarray(values, dtype=float)
+    array = np.ascontiguousarray(unmasked("positions", values), dtype=float)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} must leave arrays of shape (n, 3), got {array.shape}")
     return array

@@ -9,6 +9,7 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import ArrayLike
 
+from granulcal.arrays import unmasked
 from granulcal.export import chrono, gazebo, isaac, lammps, liggghts, mujoco, newton, yade
 from granulcal.export.bed import bed_text
 from granulcal.export.setup import Setup
@@ -121,10 +122,12 @@ def export_posterior(
         return scene.with_(dict(zip(names, values.tolist(), strict=True)))
 
     written = [
-        export_material(at(np.asarray(mode, float)), to, place / f"mode{ending}", young=young)
+        export_material(
+            at(np.asarray(unmasked("mode", mode), float)), to, place / f"mode{ending}", young=young
+        )
     ]
     table = []
-    for i, row in enumerate(np.asarray(draws, float).reshape(-1, len(names))):
+    for i, row in enumerate(np.asarray(unmasked("draws", draws), float).reshape(-1, len(names))):
         file = export_material(at(row), to, place / f"draw-{i:03}{ending}", young=young)
         table.append({"file": file.name, **dict(zip(names, row.tolist(), strict=True))})
         written.append(file)
@@ -150,11 +153,11 @@ def export_bed(
         kind: `lammps-data`, `vtk`, `ply`, `csv`, `mjcf`, `sdf` or `urdf`.
         path: the file.
     """
-    centres = np.asarray(positions, float)
+    centres = np.asarray(unmasked("positions", positions), float)
     if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
         raise ValueError(f"positions must have shape (n, 3), got {centres.shape}")
     sizes = 0.5 * scene.get("grains.diameter") if radii is None else radii
-    sizes = np.broadcast_to(np.asarray(sizes, float), len(centres)).copy()
+    sizes = np.broadcast_to(np.asarray(unmasked("radii", sizes), float), len(centres)).copy()
     setup = replace(Setup.of(scene), centres=centres, radii=sizes, walls=())
     write_beside(Path(path), bed_text(setup, kind))
     return Path(path)

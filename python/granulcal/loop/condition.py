@@ -87,6 +87,8 @@ def condition_of(file: Path, table: dict[str, Any]) -> Condition:
         if not recording.exists():
             raise FileNotFoundError(f"{recording} of {file} is not there")
     camera = file.parent / table["camera"] if "camera" in table else None
+    if camera is not None and not camera.exists():
+        raise FileNotFoundError(f"{camera} of {file}, the camera of {table['name']}, is not there")
     at = {path: float(value) for path, value in table["at"].items()}
     known = {path: float(value) for path, value in table.get("known", {}).items()}
     return Condition(

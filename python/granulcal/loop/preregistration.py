@@ -38,7 +38,7 @@ def register(
     document: dict[str, Any] = (
         {
             "version": version_of_pours(),
-            "law": law_of_pours(),
+            "law": law_of_pours(plan.scene),
             "scene": plan.scene.to_toml(),
             "prior": plan.prior.to_toml(),
             "conditions": [

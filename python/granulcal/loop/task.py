@@ -336,6 +336,16 @@ class Task:
         """Returns an effect of the library with the scene's own numbers put in."""
         return next(e for e in self.library if e.name == name).at(self.at_first())
 
+    def require_readable(self) -> None:
+        """Reads every recording and lets go what it says: what cannot be read fails before pours.
+
+        Raises:
+            FileNotFoundError: a file that a condition names is not there.
+            ObservationError: a recording that cannot be one of the scene.
+        """
+        for condition in self.conditions:
+            condition.statistics(self.scene)
+
     def at_first(self) -> Scene:
         """Returns the scene with the numbers that all conditions share."""
         differing = set(self._differing)

@@ -43,6 +43,10 @@ class DamagedRecordingWarning(UserWarning):
     """A recording is cut off or damaged; the frames that are whole were used."""
 
 
+class UnlikeFramesWarning(UserWarning):
+    """Frames that are averaged do not look like images of one formation at rest."""
+
+
 @dataclass(frozen=True)
 class Lost:
     """Frames of a damaged recording that are lost.
@@ -142,6 +146,8 @@ class Recording:
         if recording.lost is not None:
             text = f"{path}: {recording.lost}; {'; '.join(recording.damage)}"
             warnings.warn(text, DamagedRecordingWarning, stacklevel=2)
+        if recording.unlike is not None:
+            warnings.warn(f"{path}: {recording.unlike}", UnlikeFramesWarning, stacklevel=2)
         return recording
 
     @property
@@ -164,6 +170,11 @@ class Recording:
         """Frames that are lost; None for a whole recording."""
         found = self._native.lost
         return None if found is None else Lost(*found)
+
+    @property
+    def unlike(self) -> str | None:
+        """That the frames do not look like images of one formation at rest; None if they do."""
+        return self._native.unlike
 
     @property
     def damage(self) -> list[str]:

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
+from granulcal.arrays import unmasked
 from granulcal.pours.statistics import as_points
+from granulcal.whole import check_seed, check_whole
 
 __all__ = ["Camera"]
 
@@ -38,6 +40,7 @@ class Camera:
         Raises:
             ValueError: a number is out of its range.
         """
+        check_whole("pixels", pixels, at_least=1)
         return cls(_native.Camera.overhead(height, field_width, pixels))
 
     @classmethod
@@ -88,9 +91,10 @@ class Camera:
             seed: seed of the noise.
 
         Raises:
-            TypeError: an array that does not hold real numbers.
+            TypeError: an array that does not hold real numbers, or a seed that is no whole number.
             ValueError: another shape, or a number out of its range.
         """
+        check_seed(seed)
         centres, sizes = as_points("positions", positions), as_points("radii", radii)
         return self._native.render(centres, sizes, depth_noise, blur_px, seed, sensor)
 
@@ -138,5 +142,9 @@ class Camera:
         *,
         depth_unit: float = _DEPTH_UNIT,
     ) -> None:
-        """Writes a depth image [m] of shape (h, w) as a 16-bit PNG, and the camera's TOML."""
-        self._native.save_image(image, png, toml, depth_unit)
+        """Writes a depth image [m] of shape (h, w) as a 16-bit PNG, and the camera's TOML.
+
+        Raises:
+            ValueError: another shape, or masked entries: 0 says that there is no data.
+        """
+        self._native.save_image(unmasked("image", image), png, toml, depth_unit)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from granulcal import _native
 from granulcal.pours.part_store import PartStore
+from granulcal.pours.stored_parts import StoredParts
 
 if TYPE_CHECKING:
     from granulcal.engines import Engine
@@ -31,6 +32,7 @@ __all__ = [
     "cluster_asked",
     "cluster_in_use",
     "connected",
+    "cores_of",
     "gather",
     "refuse_engine",
     "result_of",
@@ -124,6 +126,21 @@ def connected() -> Any:
     return ray
 
 
+def cores_of(cluster: Cluster) -> int:
+    """Returns how many pours a cluster makes at once, at least 1.
+
+    Raises:
+        ModuleNotFoundError: ray is not installed.
+        ConnectionError: there is no cluster at the address.
+    """
+    with spread_over(cluster):
+        return _cores(connected())
+
+
+def _cores(ray: Any) -> int:
+    return max(1, int(ray.cluster_resources().get("CPU", 1)))
+
+
 def _disconnect() -> None:
     """Ends the connection that `connected` has made."""
     global _is_connection_ours
@@ -159,6 +176,7 @@ def gather(
     seed: int,
     resume: bool,
     cluster: Cluster,
+    chunk: int | None = None,
     report: Callable[..., object] | None = None,
 ) -> tuple[int, int, int, int, int, int]:
     """Brings every part that `folder` lacks from a cluster; returns the counts of the batch.
@@ -171,26 +189,50 @@ def gather(
         seed: of the batch.
         resume: keep what is in the folder; else a folder with rows is refused.
         cluster: where the pours are made.
+        chunk: rows of a part in a folder that is new; the default is 16.
         report: called with (total, resumed, made, unhealthy, jammed, out of view).
 
     Raises:
         ModuleNotFoundError: ray is not installed.
         ConnectionError: there is no cluster at the address.
-        ValueError: a folder made from something else, or a worker with another granulcal.
+        ValueError: a folder or a part in the store made from something else, or a worker with
+            another granulcal.
     """
     import ray
 
+    if chunk is not None:
+        # A shard behind the last part pours nothing; it makes the folder, whose parts are so large.
+        _native.generate(
+            scene,
+            prior_toml,
+            folder,
+            rows=1,
+            seed=seed,
+            threads=1,
+            resume=resume,
+            progress=None,
+            shard=(1, 2),
+            chunk=chunk,
+        )
     batch = _native.GatheredBatch(scene, prior_toml, folder, rows=rows, seed=seed, resume=resume)
     try:
-        store = None if cluster.store is None else PartStore(cluster.store)
-        if store is not None:
-            for chunk in sorted(store.chunks() & set(batch.missing())):
-                batch.put(chunk, store.read(chunk))
+        stored = None
+        if cluster.store is not None:
+            stored = StoredParts(
+                PartStore(cluster.store),
+                batch,
+                folder,
+                scene=scene,
+                prior_toml=prior_toml,
+                rows=rows,
+                seed=seed,
+            )
+            stored.take_all()
         if batch.missing():
             with spread_over(cluster):
                 connected()
                 order = (scene.to_toml(), prior_toml, rows, seed, batch.chunk_size, batch.chunks)
-                _Gathering(ray, batch, order, store, report).run()
+                _Gathering(ray, batch, order, stored, report).run()
         return batch.counts()
     finally:
         batch.close()
@@ -243,10 +285,11 @@ class _Gathering:
         ray: Any,
         batch: _native.GatheredBatch,
         order: tuple[str, str, int, int, int, int],
-        store: PartStore | None,
+        stored: StoredParts | None,
         report: Callable[..., object] | None,
     ) -> None:
-        self.ray, self.batch, self.order, self.store, self.report = ray, batch, order, store, report
+        self.ray, self.batch, self.order = ray, batch, order
+        self.stored, self.report = stored, report
         self.remote = ray.remote(num_cpus=1, max_retries=RETRIES)(_make_part)
         self.waiting = deque(batch.missing())
         self.tasks: dict[Any, _Task] = {}
@@ -267,7 +310,7 @@ class _Gathering:
                 self.ray.cancel(reference, force=True)
 
     def _submit(self) -> None:
-        cores = max(1, int(self.ray.cluster_resources().get("CPU", 1)))
+        cores = _cores(self.ray)
         while self.waiting and len(self.tasks) < AHEAD * cores:
             self._start(self.waiting.popleft(), is_second=False)
         if self.waiting or not self.took or len(self.tasks) >= cores:
@@ -281,7 +324,7 @@ class _Gathering:
                 twice.add(task.chunk)
 
     def _start(self, chunk: int, *, is_second: bool) -> None:
-        store = None if self.store is None else self.store.url
+        store = None if self.stored is None else self.stored.store.url
         reference = self.remote.remote(*self.order, chunk, store)
         self.tasks[reference] = _Task(chunk, time.monotonic(), is_second)
 
@@ -293,9 +336,12 @@ class _Gathering:
             if task.chunk in self.batch.missing():
                 self.waiting.append(task.chunk)
             return
-        if self.store is not None:
-            part = self.store.read(task.chunk)
-        if self.batch.put(task.chunk, part):
+        is_new = (
+            self.batch.put(task.chunk, part)
+            if self.stored is None
+            else self.stored.take(task.chunk)
+        )
+        if is_new:
             self.took.append(time.monotonic() - task.since)
         for other, same in list(self.tasks.items()):
             if same.chunk == task.chunk:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from granulcal.arrays import unmasked
 from granulcal.pours.dataset import Dataset
 from granulcal.pours.statistics import NAMES, UNITS
 
@@ -42,7 +43,7 @@ class Scale:
         A statistic that never varied in the data set cannot be scaled and counts as 0 where `a`
         and `b` are equal, else as infinite.
         """
-        raw = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
+        raw = np.asarray(unmasked("a", a), float) - np.asarray(unmasked("b", b), float)
         with np.errstate(divide="ignore", invalid="ignore"):
             scaled = raw / self.sd
         return np.where(raw == 0, 0.0, scaled)
@@ -56,7 +57,7 @@ def standardised_distance(a: ArrayLike, b: ArrayLike, scale: Scale) -> float:
 def nearest_row(observed: ArrayLike, data: Dataset) -> int:
     """Returns the index of the usable pour of `data` that is nearest to `observed` (16,)."""
     usable = np.flatnonzero(data.is_usable)
-    scaled = Scale.of(data).difference(data.x[usable], np.asarray(observed))
+    scaled = Scale.of(data).difference(data.x[usable], unmasked("observed", observed))
     return int(usable[np.linalg.norm(scaled, axis=1).argmin()])
 
 
@@ -99,7 +100,7 @@ def comparison_table(
     pours = np.array([np.asarray(pour, dtype=float) for pour in simulated])
     mean = pours.mean(axis=0)
     sd = pours.std(axis=0, ddof=1) if len(pours) > 1 else np.full(len(NAMES), np.nan)
-    vector = np.asarray(measured, dtype=float)
+    vector = np.asarray(unmasked("measured", measured), dtype=float)
     differences = scale.difference(mean, vector)
     return [
         StatisticRow(

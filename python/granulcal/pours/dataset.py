@@ -18,11 +18,12 @@ from granulcal.errors import OtherLawWarning, UnverifiedDataWarning
 from granulcal.pours.cluster import Cluster, cluster_asked, gather, refuse_engine
 from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
-from granulcal.pours.simulate import check_whole, require_scene
+from granulcal.pours.simulate import require_scene
 from granulcal.pours.statistics import DIAGNOSTIC_NAMES, NAMES
 from granulcal.pours.status import NO_GRAINS, UNUSABLE
 from granulcal.prior import Prior
 from granulcal.progress import ProgressLine
+from granulcal.whole import check_seed, check_whole
 
 if TYPE_CHECKING:
     from granulcal.engines import Engine
@@ -189,6 +190,7 @@ def generate(
     progress: bool | Callable[..., object] = True,
     engine: "Engine | None" = None,
     ray: "str | Cluster | None" = None,
+    chunk: int | None = None,
 ) -> Dataset:
     """Returns `n` pours with parameters drawn from `prior`, simulating what `out` lacks.
 
@@ -208,9 +210,12 @@ def generate(
         engine: another simulator in place of ours; docs/engines.md says what it must do.
         ray: address of a Ray cluster that makes the pours, as `ray.init` takes it, or `local`;
             docs/cluster.md.
+        chunk: rows of a part, which one task of a cluster makes; the default is 16. A folder that
+            has parts already keeps their size.
 
     Raises:
-        ValueError: a parameter that does not fit the scene, or a folder made from something else.
+        ValueError: a number that is out of its range, a parameter that does not fit the scene, or
+            a folder made from something else.
         OSError: the folder cannot be written.
         KeyboardInterrupt: Ctrl-C; finished pours are on disk.
 
@@ -224,7 +229,9 @@ def generate(
     if not isinstance(prior, Prior):
         raise TypeError(f"prior must be a Prior, as Prior.load reads it, got {prior!r}")
     check_whole("n", n, at_least=1)
-    check_whole("seed", seed, at_least=0)
+    check_seed(seed)
+    if chunk is not None:
+        check_whole("chunk", chunk, at_least=1)
     if threads is not None:
         check_whole("threads", threads, at_least=1)
     folder = Path(tempfile.mkdtemp(prefix="granulcal-") if out is None else out)
@@ -243,6 +250,7 @@ def generate(
                 seed=seed,
                 resume=resume,
                 cluster=cluster,
+                chunk=chunk,
                 report=report,
             )
         else:
@@ -256,6 +264,7 @@ def generate(
                 resume=resume,
                 progress=report,
                 engine=None if engine is None else (engine.name, _asked(engine)),
+                chunk=chunk,
             )
         if report is not None:
             report(*counts)

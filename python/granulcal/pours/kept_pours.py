@@ -99,7 +99,7 @@ class KeptPours:
             text += f"\n{', '.join(self.x_names)}"
         text += "" if engine is None else f"\n{engine.name}"
         # Another simulator has another law, whatever it is.
-        self.law = law_of_pours() if engine is None else 0
+        self.law = law_of_pours(scene) if engine is None else 0
         self.key = hashlib.sha256(text.encode()).hexdigest()
         # Before it is read: what another run writes after that would be lost.
         self._held = OneRun.of(path)

@@ -51,5 +51,14 @@ class PartStore:
         self._files.pipe_file(beside, part)
         self._files.mv(beside, self._path(chunk))
 
+    @staticmethod
+    def name_of(chunk: int) -> str:
+        """Returns the name of a part's file, in the store and in the folder of its batch."""
+        return _NAME.format(chunk)
+
+    def url_of(self, chunk: int) -> str:
+        """Returns the URL of a part, for messages."""
+        return f"{self.url.rstrip('/')}/{self.name_of(chunk)}"
+
     def _path(self, chunk: int) -> str:
-        return f"{self._root}/{_NAME.format(chunk)}"
+        return f"{self._root}/{self.name_of(chunk)}"

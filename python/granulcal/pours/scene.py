@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.whole import check_seed
 from granulcal.words import not_there
 
 __all__ = ["Material", "Scene"]
@@ -185,7 +186,8 @@ class Scene:
             native = native.with_preset(_word("preset", wanted.pop("preset")))
         if "name" in wanted:
             native = native.with_name(_word("name", wanted.pop("name")))
-        return Scene(native.with_values([(path, _number(path, v)) for path, v in wanted.items()]))
+        numbers = [(path, _number(path, value)) for path, value in wanted.items()]
+        return Scene(native.with_values(numbers))
 
     def refusal(self, changes: Mapping[str, float]) -> ValueError | None:
         """Returns why `with_` refuses these values; None if it takes them."""
@@ -207,7 +209,12 @@ class Scene:
 
         Returns:
             Centres [m], shape (n, 3), and radii [m], shape (n,).
+
+        Raises:
+            TypeError: the seed is no whole number.
+            ValueError: the seed is not from 0 to 2^64 - 1, or the grains do not fit.
         """
+        check_seed(seed)
         return self.native.start(seed)
 
     def get(self, path: str) -> float:
@@ -296,4 +303,7 @@ def _word(path: str, value: float | str) -> str:
 def _number(path: str, value: float | str) -> float:
     if isinstance(value, str | bool):
         raise TypeError(f"{path} must be a number, got {value!r}")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{path} must be a number below 1.8e308, got a larger one") from None

@@ -10,6 +10,7 @@ from granulcal import _native
 from granulcal.engines.in_use import engine_in_use
 from granulcal.pours.scene import Material, Scene
 from granulcal.pours.statistics import DiagnosticStatistics, ObservedStatistics, Statistics
+from granulcal.whole import check_seed, check_whole
 
 if TYPE_CHECKING:
     from granulcal.engines import Engine
@@ -226,7 +227,7 @@ def simulate(
         ValueError: a number is out of its range, or more memory is needed than there is.
     """
     require_scene(scene)
-    check_whole("seed", seed, at_least=0)
+    check_seed(seed)
     check_whole("threads", threads, at_least=1)
     if material is not None:
         scene = scene.with_material(material)
@@ -253,16 +254,3 @@ def require_scene(scene: object) -> None:
     """
     if not isinstance(scene, Scene):
         raise TypeError(f"scene must be a Scene, as Scene.load reads it, got {scene!r}")
-
-
-def check_whole(name: str, value: int, *, at_least: int) -> None:
-    """Refuses what is not a whole number of at least `at_least`.
-
-    Raises:
-        TypeError: not a whole number.
-        ValueError: too small.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise TypeError(f"{name} must be a whole number, got {value!r}")
-    if value < at_least:
-        raise ValueError(f"{name} must be at least {at_least}, got {value}")

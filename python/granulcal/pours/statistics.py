@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
+from granulcal.arrays import unmasked
 
 __all__ = [
     "DIAGNOSTIC_NAMES",
@@ -182,7 +183,7 @@ def statistics(points: ArrayLike) -> Statistics:
 
     Raises:
         TypeError: `points` does not hold real numbers.
-        ValueError: another shape, a value that is not finite, or fewer than 3 points.
+        ValueError: another shape, a value that is masked or not finite, or fewer than 3 points.
 
     Examples:
         >>> ring = [[0.05, 0, 0.004], [0, 0.05, 0.004], [-0.05, 0, 0.004], [0, -0.05, 0.004]]
@@ -210,8 +211,8 @@ def diagnostic_statistics(
 
     Raises:
         TypeError: `points` does not hold real numbers.
-        ValueError: another shape, a value that is not finite, fewer than 3 points, or a length out
-            of range.
+        ValueError: another shape, a value that is masked or not finite, fewer than 3 points, or a
+            length out of range.
 
     Examples:
         >>> side = np.arange(-0.05, 0.05, 1e-3)
@@ -236,8 +237,9 @@ def as_points(name: str, value: ArrayLike) -> Array:
 
     Raises:
         TypeError: `value` does not hold real numbers.
+        ValueError: entries are masked.
     """
-    array = np.asarray(value)
+    array = unmasked(name, value)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name} must hold real numbers, got dtype {array.dtype}")
     return np.ascontiguousarray(array, dtype=np.float64)

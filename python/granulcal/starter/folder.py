@@ -1,12 +1,14 @@
 """Writes the commented files of `granulcal init`, fitted to the lens of a recording where there is one."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from granulcal.files import replace_file
 from granulcal.measured.recording import Recording
 from granulcal.pours.scene import Scene
+from granulcal.starter.numbers import with_numbers
 from granulcal.starter.texts import CAMERA, DROP_START, FUNNEL_START, LOOP, PRIOR, SCENE
 
 __all__ = ["CONDITIONS", "FILES", "SCENES", "Lens", "lens_of", "write_folder"]
@@ -17,6 +19,8 @@ FILES = ("scene.toml", "prior.toml", "camera.toml", "loop.toml")
 """What a folder begins with."""
 CONDITIONS = {"low": 0.06, "high": 0.12}
 """Conditions of loop.toml and what their one number is [m]."""
+# Path of the height [m] that each scene pours from.
+_TIPS = {"funnel": "funnel.height", "drop": "start.height"}
 _POURS = 2
 # Width of a pixel on the ground that images are compared at, over a grain's diameter.
 _PIXEL = 1.25
@@ -99,18 +103,27 @@ def lens_of(path: Path, camera: Path | None = None) -> Lens:
 
 
 def write_folder(
-    folder: Path, *, scene: str = "funnel", lens: Lens = D435, force: bool = False
+    folder: Path,
+    *,
+    scene: str = "funnel",
+    lens: Lens = D435,
+    changes: Mapping[str, float | str] | None = None,
+    force: bool = False,
 ) -> Scene:
     """Writes scene, prior, camera and task into `folder` and returns the scene.
+
+    What is refused is refused before anything is written.
 
     Args:
         folder: made if it does not exist.
         scene: `funnel` or `drop`.
         lens: of the camera that will look.
+        changes: other values in scene.toml by path, as `Scene.with_` takes them.
         force: overwrite files of these names.
 
     Raises:
-        ValueError: no built-in scene has this name.
+        ValueError: no built-in scene has this name, a value does not fit it, or the lens of a
+            recording is below what is poured from.
         FileExistsError: a file is there already.
     """
     if scene not in SCENES:
@@ -118,10 +131,15 @@ def write_folder(
     there = [name for name in FILES if (folder / name).exists()]
     if there and not force:
         raise FileExistsError(f"{folder} has {', '.join(there)} already; --force writes them anew")
-    replace_file(folder / "scene.toml", scene_text(scene, lens))
+    path, changes = _TIPS[scene], changes or {}
+    if lens != D435:
+        tip = Scene.built_in(scene).get(path)
+        _require_above(float(changes.get(path, tip)), scene, lens)
+    text = with_numbers(scene_text(scene, lens), changes, folder / "scene.toml")
+    written = Scene.from_toml(text)
+    replace_file(folder / "scene.toml", text)
     replace_file(folder / "prior.toml", PRIOR)
     replace_file(folder / "camera.toml", camera_text(lens))
-    path = "funnel.height" if scene == "funnel" else "start.height"
     names = {
         name: json.dumps([f"pours/{name}-{i}.png" for i in range(_POURS)]) for name in CONDITIONS
     }
@@ -129,17 +147,35 @@ def write_folder(
         folder / "loop.toml",
         LOOP.format(path=path, **CONDITIONS, low_names=names["low"], high_names=names["high"]),
     )
-    return Scene.load(folder / "scene.toml")
+    return written
+
+
+def _require_above(tip: float, name: str, lens: Lens) -> None:
+    """Refuses the lens of a recording that is not above what a built-in scene pours from.
+
+    Args:
+        tip: height that is poured from [m].
+        name: of the scene.
+        lens: of the recording.
+
+    Raises:
+        ValueError: it is not above; names both heights.
+    """
+    if lens.distance <= tip:
+        what = "the funnel's tip" if name == "funnel" else "the grains that are let go"
+        raise ValueError(
+            f"the ground of the recording is {lens.distance:g} m from the camera, which is not "
+            f"above {what} at {tip:g} m ({_TIPS[name]}): is the depth unit right, "
+            f"{lens.unit:g} m per count? A PNG has it from depth_unit in the TOML of --camera. "
+            f"If it is, give the true height by --set {_TIPS[name]}=METRES"
+        )
 
 
 def scene_text(name: str, lens: Lens) -> str:
     """Returns the commented TOML of a built-in scene under this camera."""
     built_in = Scene.built_in(name)
     diameter = built_in.get("grains.diameter")
-    paths = {
-        "jitter": "start.jitter",
-        "tip": "funnel.height" if name == "funnel" else "start.height",
-    }
+    paths = {"jitter": "start.jitter", "tip": _TIPS[name]}
     start, wanted = DROP_START, paths
     if name == "funnel":
         start, wanted = FUNNEL_START, paths | {"spacing": "start.spacing", "base": "start.base"}

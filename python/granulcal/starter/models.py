@@ -17,6 +17,7 @@ from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
 from granulcal.prior import Prior
 from granulcal.progress import shown
+from granulcal.words import did_you_mean
 
 if TYPE_CHECKING:
     from granulcal.pours.dataset import Dataset
@@ -51,10 +52,12 @@ def cache_folder() -> Path:
 def fingerprint(scene: Scene, prior: Prior) -> str:
     """Returns what a model of a scene depends on: scene, prior, and the simulator to the last bit.
 
-    The simulator is known by the final state of a small pour: a model that was made before the
-    contact law changed is not taken for one of today.
+    The simulator is known by where the grains of a small pour end: a model that was made before
+    the contact law changed is not taken for one of today.
     """
-    state = simulate(Scene.drop(0.03, count=40, preset="fast"), seed=1).state_hash
+    pour = simulate(Scene.drop(0.03, count=40, preset="fast"), seed=1)
+    ends = pour.positions.tobytes() + pour.velocities.tobytes()
+    state = hashlib.sha256(ends).hexdigest()
     text = "\n".join([scene.to_toml(), prior.to_toml(), state, _native.__version__])
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -80,10 +83,17 @@ def model_named(name: str | Path) -> Path:
     """Returns the folder of a model that a command line names: a folder, or a built-in scene.
 
     Raises:
-        FileNotFoundError: a built-in scene of which there is no model yet.
+        FileNotFoundError: nothing of this name, or a built-in scene of which there is no model yet.
+        NotADirectoryError: it is a file.
     """
-    if str(name) not in BUILT_IN or Path(name).exists():
-        return Path(name)
+    path, allowed = Path(name), f"the folder of a model, or {' or '.join(BUILT_IN)}"
+    if path.is_dir():
+        return path
+    if path.exists():
+        raise NotADirectoryError(f"{name} is a file; asked for is {allowed}")
+    if str(name) not in BUILT_IN:
+        meant = did_you_mean(str(name), BUILT_IN)
+        raise FileNotFoundError(f"there is no {name}; asked for is {allowed}{meant}")
     found = find_model(str(name))
     if found is None:
         raise FileNotFoundError(

@@ -6,7 +6,7 @@ from pathlib import Path
 from granulcal.files import replace_file
 from granulcal.pours.scene import Scene
 
-__all__ = ["set_numbers"]
+__all__ = ["set_numbers", "with_numbers"]
 
 
 def set_numbers(path: Path, changes: Mapping[str, float | str]) -> Scene:
@@ -19,16 +19,33 @@ def set_numbers(path: Path, changes: Mapping[str, float | str]) -> Scene:
     Raises:
         ValueError: a value does not fit the scene, or the file does not state this number.
     """
-    wanted = Scene.load(path).with_(changes)
-    lines = path.read_text(encoding="utf-8").splitlines()
+    # Its errors name the file.
+    Scene.load(path)
+    text = with_numbers(path.read_text(encoding="utf-8"), changes, path)
+    replace_file(path, text)
+    return Scene.from_toml(text)
+
+
+def with_numbers(text: str, changes: Mapping[str, float | str], path: Path) -> str:
+    """Returns a scene's TOML with other values; comments stay.
+
+    Args:
+        text: of a scene, one key a line.
+        changes: values by path, as `Scene.with_` takes them.
+        path: its file, for messages.
+
+    Raises:
+        ValueError: a value does not fit the scene, or the text does not state this number.
+    """
+    wanted = Scene.from_toml(text).with_(changes)
+    lines = text.splitlines()
     for name, value in changes.items():
         table, _, key = name.rpartition(".")
         lines = _set(path, lines, table, key, value)
-    text = "\n".join(lines) + "\n"
-    if Scene.from_toml(text) != wanted:
+    changed = "\n".join(lines) + "\n"
+    if Scene.from_toml(changed) != wanted:
         raise ValueError(f"{path} cannot be changed by line: set {', '.join(changes)} by hand")
-    replace_file(path, text)
-    return wanted
+    return changed
 
 
 def _set(path: Path, lines: list[str], table: str, key: str, value: float | str) -> list[str]:

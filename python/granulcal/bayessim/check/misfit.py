@@ -11,9 +11,9 @@ seen by either.
 
 For one pour the same is done with the held-out pairs of each fold, which no emulator has seen:
 p-values are ranks among them, so that the false alarm rate is what it says (conformal). For k pours
-the replicates are means of k such residuals around the fit; of their variance only the share
-$a / c^2$ (a of `likelihood.py`, c the widening) is the pours' own, and the rest an error of the
-emulator, which they share and which does not average away.
+the replicates are means of k such residuals around the fit, scaled to the noise there; of their
+variance only the share $a / c^2$ (a of `likelihood.py`, c the widening) is the pours' own, and the
+rest an error of the emulator, which they share and which does not average away.
 
 Evaluated by the extension (`crates/bayessim/src/misfit.rs`).
 
@@ -90,12 +90,15 @@ class MisfitReference:
     Attributes:
         squares: Q of each pair, shape (h,).
         residuals: residual at the fit of each pair, standardised statistics, shape (h, s).
-        noise: residual at the true parameters of each pair, signal axes, shape (h, s).
+        noise: residual at the true parameters of each pair, signal axes, shape (h, s), in the
+            emulator's standard deviations there, so that it is noise anywhere.
+        is_unit: false of models of before, whose noise is in the axes' own units.
     """
 
     squares: Array
     residuals: Array
     noise: Array
+    is_unit: bool = True
 
     @classmethod
     def of(cls, folds: Sequence[Fold], u: Array, z: Array) -> "MisfitReference":
@@ -104,7 +107,8 @@ class MisfitReference:
         for fold in folds:
             likelihood, held = fold.likelihood, z[fold.held]
             y = likelihood.axes.apply(held)
-            noise.append(y - likelihood.emulator.predict(u[fold.held]).means)
+            expected = likelihood.emulator.predict(u[fold.held])
+            noise.append((y - expected.means) / expected.scales)
             at_fit = likelihood.native.best_fits(np.ascontiguousarray(held))
             squares.append(at_fit[0])
             residuals.append(at_fit[1])
@@ -115,7 +119,7 @@ class MisfitReference:
         return {
             "misfit_squares": self.squares,
             "misfit_residuals": self.residuals,
-            "misfit_noise": self.noise,
+            "misfit_unit_noise" if self.is_unit else "misfit_noise": self.noise,
         }
 
     def test(self, likelihood: Likelihood, z: Array, names: Sequence[str]) -> Misfit:

@@ -28,6 +28,7 @@ Reference:
     a proposal for repairing it, Bayesian Analysis 12, 2017 (widening by held-out prediction).
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -58,6 +59,8 @@ _FOLDS = 4
 # Held-out pairs that choose, and that the fit is checked on afterwards.
 _HELD_OUT = 240
 _CELLS = 4096
+# As near to its largest value, and as far below that of a linear regression, a score says nothing.
+_AT_MOST = 0.5
 # Points of the prior that a posterior is made of, unless too few of them carry weight.
 _POOL = 16_384
 # Levels of held-out truths must be uniform with at least this Kolmogorov-Smirnov p-value.
@@ -85,11 +88,27 @@ class EmulatorChoice:
     def __str__(self) -> str:
         """One line."""
         noise = "varying" if self.varying_scale else "constant"
-        return (
+        text = (
             f"{self.axis_count} signal axes, {noise} noise widened {self.widening:g} times; "
             f"log density of held-out pairs {self.score:.2f} (linear regression "
             f"{self.linear_score:.2f})"
         )
+        if not self.is_decided:
+            text += (
+                "; UNDECIDED: posteriors are too small a part of the prior to choose the form by, "
+                "and may be too wide; a narrower prior, or calibrate, which pours in rounds, helps"
+            )
+        return text
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether held-out pairs could choose.
+
+        A truth that alone of the prior's cells has weight has a score of the logarithm of their
+        number, in whatever form of the emulator.
+        """
+        most = math.log(_CELLS + 1) - _AT_MOST
+        return self.score < most and self.linear_score < self.score + _AT_MOST
 
 
 class Scalars(TypedDict):

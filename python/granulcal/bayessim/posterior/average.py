@@ -45,6 +45,8 @@ Array = NDArray[np.float64]
 FORMS = ("geometric", "arithmetic")
 # An average of both is kept only if it gains so many standard errors on the better one.
 _WORTHWHILE = 1.0
+# With fewer held-out pairs the network is not taken, alone or in an average.
+_FEWEST_TO_CHOOSE = 10
 # An average in which one of both hardly counts is none.
 _SMALLEST_WEIGHT = 0.02
 _NEWTON_ROUNDS = 30
@@ -150,6 +152,9 @@ class HeldOut:
 
     def choose(self) -> Average:
         """Returns the average that says most, one alone where more is not worth it."""
+        if len(self.at_truth) < _FEWEST_TO_CHOOSE:
+            # So few say nothing of the network, and the emulator is checked on every pair.
+            return EMULATOR_ALONE
         alone = self.scores(EMULATOR_ALONE), self.scores(NETWORK_ALONE)
         is_emulator = bool(np.mean(alone[0]) >= np.mean(alone[1]))
         best = EMULATOR_ALONE if is_emulator else NETWORK_ALONE

@@ -58,6 +58,7 @@ def pair_plot(
     path: str | PathLike[str] | None = None,
     truth: ArrayLike | None = None,
     extra: Drawn | None = None,
+    title: str = "",
 ) -> "Figure":
     """Returns the figure; axes span the prior's bounds, log parameters have log axes.
 
@@ -69,6 +70,7 @@ def pair_plot(
         path: where to save the figure, or None.
         truth: true parameters, own units, shape (p,).
         extra: another posterior of the same parameters, drawn in a second colour.
+        title: over the figure.
 
     Raises:
         ValueError: `truth` has another shape, or `extra` other parameters.
@@ -96,6 +98,8 @@ def pair_plot(
         _draw(axes, each, colour)
     if true_values is not None:
         _mark_truth(axes, true_values)
+    if title:
+        figure.suptitle(title, fontsize=10)
     if path is not None:
         save_figure(figure, path, dpi=160)
     return figure

@@ -294,6 +294,7 @@ class Posterior:
         path: str | PathLike[str] | None = None,
         truth: ArrayLike | None = None,
         extra: "Posterior | None" = None,
+        title: str = "",
     ) -> "Figure":
         """Returns a figure of all marginals and pairs; see `granulcal.pair_plot`.
 
@@ -301,10 +302,11 @@ class Posterior:
             path: where to save the figure, or None.
             truth: true parameters to mark, own units, shape (p,).
             extra: another posterior of the same parameters to draw beside this one.
+            title: over the figure.
         """
         from granulcal.bayessim.posterior.pair_plot import pair_plot
 
-        return pair_plot(self, path=path, truth=truth, extra=extra)
+        return pair_plot(self, path=path, truth=truth, extra=extra, title=title)
 
     def _draws(self) -> tuple[Array, Array]:
         """Fixed draws of the coordinates and their log densities, made once."""

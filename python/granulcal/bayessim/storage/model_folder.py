@@ -97,11 +97,12 @@ def load_parts(path: str | PathLike[str]) -> Parts:
     law = document.get("law")
     # A model of pairs that were handed in states that it is of no law; 0 is another simulator's.
     is_older = "law" not in document and document["scene_toml"] is not None
-    if is_older or law not in (None, 0, _native.LAW):
+    today = _native.law_of(document["scene_toml"])
+    if is_older or law not in (None, 0, today):
         named = "one of before laws had numbers" if law is None else f"law {law}"
         warnings.warn(
             f"{folder} was trained on pours of another law of the solver, {named}, which is not "
-            f"today's {_native.LAW}: train again",
+            f"today's {today}: train again",
             OtherLawWarning,
             stacklevel=3,
         )

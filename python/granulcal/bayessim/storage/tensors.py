@@ -123,10 +123,12 @@ class Tensors:
 
     def misfit(self) -> MisfitReference:
         """Returns the residuals of held-out pairs."""
+        is_unit = "misfit_unit_noise" in self.arrays
         return MisfitReference(
             self.take("misfit_squares", None),
             self.take("misfit_residuals", None, self.s),
-            self.take("misfit_noise", None, self.s),
+            self.take("misfit_unit_noise" if is_unit else "misfit_noise", None, self.s),
+            is_unit,
         )
 
     def amortised(self, config: Config) -> Amortised:

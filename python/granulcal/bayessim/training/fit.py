@@ -244,8 +244,10 @@ class _Work:
         """Indices of `rows` as if they were drawn from the prior."""
         if self.weights is None or len(rows) == 0:
             return np.arange(len(rows))
-        share = self.weights[rows] / self.weights[rows].sum()
-        return np.random.default_rng(self.seed).choice(len(rows), size=len(rows), p=share)
+        # Each once at most: a truth that is drawn twice is one truth, and no evidence of two.
+        share = self.weights[rows] / self.weights[rows].max()
+        kept = np.random.default_rng(self.seed).random(len(rows)) < share
+        return np.flatnonzero(kept)
 
     def _summary(
         self, method: str, choice: str, result: TrainingResult | None, train: int, test: int

@@ -103,6 +103,10 @@ class TrainingPairs:
         is_finite = np.isfinite(statistics).all(axis=1)
         excluded["non_finite"] = int(np.sum(is_healthy & ~is_finite))
         keep = is_healthy & is_finite
+        # A pair that is there again would be on both sides of a split.
+        is_first = _is_first(np.column_stack([theta, statistics]))
+        excluded["repeated"] = int(np.sum(keep & ~is_first))
+        keep &= is_first
         _check_inside(theta[keep], prior)
         if keep.sum() < fewest:
             dropped = [f"{count} {reason}" for reason, count in excluded.items() if count]
@@ -121,6 +125,14 @@ class TrainingPairs:
             scene_toml=_scene_toml(scene),
             law=law,
         )
+
+
+def _is_first(rows: Array) -> NDArray[np.bool_]:
+    """Returns which rows are the first of their numbers; NaN is like NaN."""
+    _, first = np.unique(rows, axis=0, return_index=True, equal_nan=True)
+    found = np.zeros(len(rows), dtype=bool)
+    found[first] = True
+    return found
 
 
 def _matrix(name: str, value: Any) -> Array:

@@ -29,7 +29,6 @@ from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.pours.forward import scene_at
 from granulcal.pours.scene import Scene
-from granulcal.pours.simulate import simulate
 from granulcal.pours.statistics import statistics
 
 if TYPE_CHECKING:
@@ -292,13 +291,8 @@ def _picture(workshop: Workshop, recordings: Recordings, scene: Scene, theta: Ar
         if not len(rows):
             continue
         at = scene_at(scene.with_({"funnel.height": height}), three.VARIANTS[0].prior, theta)
-        pour = simulate(at, seed=_SEED)
-        view = eye.at(pour.positions, pour.radii, 0)
-        for row, points in (
-            (top, recordings.points(int(rows[0]), eye, threshold)),
-            (bottom, view.points(view.clean, threshold)),
-        ):
-            row.append(points - [*points[:, :2].mean(axis=0), 0.0])
+        top.append(recordings.points(int(rows[0]), eye, threshold))
+        bottom.append(workshop.formation(at, _SEED))
         titles.append(f"{100 * height:.0f} cm")
     path = workshop.own / f"{recordings.name}.png"
     return formations(path, [top, bottom], ["recording", "model"], titles)

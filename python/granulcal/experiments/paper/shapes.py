@@ -319,13 +319,8 @@ def _picture(
     top, bottom, titles = [], [], []
     workshop.say(f"{name}: {_EXAMPLES} formations of each shape for the picture")
     for truth, theta in list(zip(tests.theta, estimates, strict=True))[:_EXAMPLES]:
-        for row, at in (
-            (top, scene_at(scene, OF_TRUTH, truth)),
-            (bottom, scene_at(spheres, prior, theta)),
-        ):
-            points = workshop.formation(at, _PICTURE_SEED)
-            centre = points[:, :2].mean(axis=0) if len(points) else np.zeros(2)
-            row.append(points - [*centre, 0.0])
+        top.append(workshop.formation(scene_at(scene, OF_TRUTH, truth), _PICTURE_SEED))
+        bottom.append(workshop.formation(scene_at(spheres, prior, theta), _PICTURE_SEED))
         titles.append(f"sliding friction {truth[0]:.2f}")
     return formations(workshop.own / f"{name}.png", [top, bottom], [name, "spheres"], titles)
 

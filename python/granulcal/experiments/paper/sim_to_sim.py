@@ -14,7 +14,6 @@ from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.experiments.paper.common import three
 from granulcal.experiments.paper.common.draw import ACCENT, formations, new_figure, save
 from granulcal.experiments.paper.common.experiment import Experiment
-from granulcal.experiments.paper.common.eye import Eye
 from granulcal.experiments.paper.common.measure import (
     Published,
     error_row,
@@ -27,7 +26,6 @@ from granulcal.experiments.paper.common.sizes import Size
 from granulcal.experiments.paper.common.workshop import Pairs, Workshop
 from granulcal.pours.forward import scene_at
 from granulcal.pours.left_out import LeftOut
-from granulcal.pours.simulate import simulate
 
 __all__ = ["EXPERIMENT"]
 
@@ -246,14 +244,11 @@ def _notes(found: dict[str, _Found]) -> list[str]:
 def _pictures(workshop: Workshop, found: _Found) -> str:
     """Pours the first tests and their estimates again, for their pictures."""
     variant = three.VARIANTS[0]
-    scene, eye = variant.scene(workshop.size), Eye.of(variant.scene(workshop.size))
+    scene = variant.scene(workshop.size)
     top, bottom, titles = [], [], []
     for truth, theta in list(zip(found.tests.theta, found.estimates, strict=True))[:_EXAMPLES]:
         for row, values in ((top, truth), (bottom, theta)):
-            pour = simulate(scene_at(scene, variant.prior, values), seed=_AGAIN_SEED)
-            view = eye.at(pour.positions, pour.radii, pour.seed)
-            points = view.points(view.clean)
-            row.append(points - [*points[:, :2].mean(axis=0), 0.0])
+            row.append(workshop.formation(scene_at(scene, variant.prior, values), _AGAIN_SEED))
             titles.append(f"{values[0]:.2f}, {values[1]:.3f}, {values[2]:.2f}")
     order = titles[::2] + titles[1::2]
     path = workshop.own / "formations.png"

@@ -11,7 +11,12 @@ from granulcal.loop.check.recentre import Recentred, recentre
 from granulcal.loop.check.standing import Moved
 from granulcal.loop.check.trivial import Group, TrivialRow, trivial_rows
 from granulcal.loop.pours.measures import Measures
-from granulcal.loop.pours.replicates import FEWEST, ModelPours, seeds_of_replicates
+from granulcal.loop.pours.replicates import (
+    FEWEST,
+    ModelPours,
+    seed_under,
+    seeds_of_replicates,
+)
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.surrogate import Surrogate
@@ -64,7 +69,7 @@ def calibrated(
         observed = []
         for condition in analysis.fitted:
             scene = scene_of(task, condition, theta, {name: psi})
-            first = _PAIR_SEED + seed + _PAIR_STEP * b
+            first = _PAIR_SEED + seed_under(condition, seed) + _PAIR_STEP * b
             seeds = range(first, first + len(condition.recordings))
             faults = faults_of(task, {name: psi})
             rows = analysis.forward.limit(scene, seeds, faults, task.coarse)
@@ -128,7 +133,7 @@ def nearer(
     rows = []
     for condition in analysis.fitted:
         scene = scene_of(task, condition, seen.theta[0], strengths)
-        seeds, faults = seeds_of_replicates(seed), faults_of(task, strengths)
+        seeds, faults = seeds_of_replicates(condition, seed), faults_of(task, strengths)
         x = analysis.forward.limit(scene, seeds, faults, task.coarse)
         at_fit = simulated[condition.name].augmented
         if min(len(x), len(at_fit)) < FEWEST:

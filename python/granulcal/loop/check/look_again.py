@@ -150,7 +150,7 @@ def _rows(analysis: Analysis, one: Explanation, seed: int) -> list[Rows]:
     made = []
     for condition in analysis.fitted:
         scene, faults = model_scene(task, condition, one), model_faults(task, one)
-        x = analysis.forward.pours(scene, seeds_of_replicates(seed), faults)
+        x = analysis.forward.pours(scene, seeds_of_replicates(condition, seed), faults)
         at = one.theta, plan.unit(condition.at), psi
         theta, where, strengths = (np.tile(row, (len(x), 1)) for row in at)
         made.append(Rows(theta, where, strengths, x))

@@ -93,8 +93,12 @@ def placed(
     there = {name: ModelPours(two.base, fresh[name]) for name, two in simulated.items()}
     psi = fit.psi.copy()
     psi[list(fit.active)] = own.strengths
-    again = recentre(
-        surrogate, replace(fit, v=v, psi=psi), seen, poured, analysis.rules, seed=analysis.seed
+    there_fit = replace(fit, v=v, psi=psi)
+    again = recentre(surrogate, there_fit, seen, poured, analysis.rules, seed=analysis.seed)
+    # What is drawn from its fit, predictions among it, is drawn there.
+    models = tuple(
+        replace(model, fit=there_fit) if one is best else model
+        for one, model in zip(found.explanations, found.models, strict=True)
     )
-    moved_trace = replace(found, explanations=explanations)
+    moved_trace = replace(found, explanations=explanations, models=models)
     return same._replace(trace=moved_trace, simulated=there, own=again)

@@ -137,7 +137,7 @@ class Coarse:
 def _key(scene: Scene, seeds: Sequence[int], faults: Mapping[str, float] | None = None) -> str:
     """The name of a group among the kept ones."""
     names = Measures.of(scene).names
-    of = [version_of_pours(), law_of_pours(), names, scene.to_toml(), list(seeds)]
+    of = [version_of_pours(), law_of_pours(scene), names, scene.to_toml(), list(seeds)]
     text = json.dumps([*of, dict(faults)] if faults else of)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

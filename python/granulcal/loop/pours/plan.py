@@ -58,7 +58,7 @@ class ArchivePlan:
         """
         return {
             "version": version_of_pours(),
-            "law": law_of_pours(),
+            "law": law_of_pours(self.scene),
             "scene": self.scene.to_toml(),
             "prior": self.prior.to_toml(),
             "conditions": [list(condition) for condition in self.conditions],

@@ -1,5 +1,6 @@
 """Pours of the base and of the verdict's model at their fits, and their distance to the data."""
 
+import zlib
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ __all__ = [
     "model_scene",
     "placebo_of",
     "pours_of",
+    "seed_under",
     "seeds_of_replicates",
 ]
 
@@ -36,11 +38,22 @@ FEWEST = 2
 """Fewest of them that say something of an error."""
 # Seeds of replicates, apart from those of the archive.
 _SEED = 7_000_003
+# Those of a condition are apart from those of others by multiples of this.
+_OWN, _CONDITIONS = 10**9, 10**6
 
 
-def seeds_of_replicates(seed: int) -> list[int]:
-    """Returns the seeds of a model's pours at its fit."""
-    return [_SEED + seed + i for i in range(REPLICATES)]
+def seed_under(condition: Condition, seed: int) -> int:
+    """Returns a seed of a condition's own.
+
+    The same seed under two conditions begins with the same places of the grains, and what is left
+    of them in the statistics (correlations of 0 to 0.6) would count as independent.
+    """
+    return seed + _OWN * (1 + zlib.crc32(condition.name.encode()) % _CONDITIONS)
+
+
+def seeds_of_replicates(condition: Condition, seed: int) -> list[int]:
+    """Returns the seeds of a model's pours at its fit under a condition."""
+    return [_SEED + seed_under(condition, seed) + i for i in range(REPLICATES)]
 
 
 class ModelPours(NamedTuple):
@@ -76,7 +89,7 @@ def pours_of(
 ) -> Array:
     """Returns pours of a model at its best fit under a condition."""
     scene, faults = model_scene(task, condition, one), model_faults(task, one)
-    return forward.limit(scene, seeds_of_replicates(seed), faults, task.coarse)
+    return forward.limit(scene, seeds_of_replicates(condition, seed), faults, task.coarse)
 
 
 def both(forward: Forward, task: Task, condition: Condition, found: Trace, seed: int) -> ModelPours:
@@ -91,7 +104,8 @@ def placebo_of(
     forward: Forward, task: Task, condition: Condition, found: Trace, seed: int
 ) -> Array:
     """Returns as many pours of the base model at its fit as were measured."""
-    seeds = [_SEED + seed + REPLICATES + i for i in range(len(condition.recordings))]
+    first = _SEED + seed_under(condition, seed) + REPLICATES
+    seeds = [first + i for i in range(len(condition.recordings))]
     return forward.limit(model_scene(task, condition, found.base), seeds, None, task.coarse)
 
 

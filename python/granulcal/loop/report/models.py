@@ -21,13 +21,11 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal import _native
 from granulcal.documents import LARGEST_DOCUMENT, parse_json, read_bytes
 from granulcal.engines.in_use import law_of_pours
 from granulcal.errors import ObservationError, OtherLawWarning
@@ -36,6 +34,7 @@ from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.check.trivial import line_weights, nearest_weights
 from granulcal.loop.effects.definitions import is_definition
 from granulcal.loop.pours.forward import Coarse, Forward
+from granulcal.loop.report.interval import of_one_more, t_factor
 from granulcal.loop.report.models_schema import check_models
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.pours.scene import Scene
@@ -141,7 +140,7 @@ class Models:
     def write(self, folder: Path) -> Path:
         """Writes `models.json` into a folder and returns its path."""
         document = {
-            "law": law_of_pours(),
+            "law": law_of_pours(self.scene),
             "scene": self.scene.to_toml(),
             "verdict": self.verdict,
             "paths": self.paths,
@@ -175,9 +174,10 @@ class Models:
         data = read_bytes(path, most=LARGEST_DOCUMENT)
         d = parse_json(data, path, error=ObservationError)
         check_models(d, path)
-        if d.get("law") not in (0, _native.LAW):
+        today = Scene.from_toml(d["scene"]).native.law
+        if d.get("law") not in (0, today):
             warnings.warn(
-                f"{path} is of another law of the solver than today's {_native.LAW}: what it "
+                f"{path} is of another law of the solver than today's {today}: what it "
                 "fitted is not what is poured now; close the loop again",
                 OtherLawWarning,
                 stacklevel=2,
@@ -273,13 +273,16 @@ class Models:
         scene = self.scene.with_({**maker.numbers, **there})
         return forward.limit(scene, seeds, maker.faults, self.coarse)
 
-    def _of_rows(self, model: str, rows: Array, level: float) -> Prediction:
-        if len(rows) < _FEWEST:
+    def _of_rows(
+        self, model: str, rows: Array, level: float, pours: int | None = None
+    ) -> Prediction:
+        pours = len(rows) if pours is None else pours
+        if pours < _FEWEST:
             raise ObservationError(
-                f"{model}: {len(rows)} usable pours under this condition, at least {_FEWEST} are "
+                f"{model}: {pours} usable pours under this condition, at least {_FEWEST} are "
                 "needed: grains jam, leave the view or are unhealthy"
             )
-        low, high = np.quantile(rows, [(1 - level) / 2, (1 + level) / 2], axis=0)
+        low, high = of_one_more(rows, level, pours)
         return Prediction(model, self.names, rows.mean(axis=0), low, high, level)
 
     def _corrected(
@@ -297,7 +300,7 @@ class Models:
         for j, (column, transform) in enumerate(zip(self.columns, self.transforms, strict=True)):
             z = transform(drawn[:, column]) + shift[:, j]
             drawn[:, column] = transform.inverse(z)
-        return self._of_rows("corrected", drawn, level)
+        return self._of_rows("corrected", drawn, level, len(rows))
 
     def _row(self, model: str, at: Array, level: float) -> Prediction:
         of = {"line": line_weights, "nearest": nearest_weights}[model]
@@ -309,7 +312,7 @@ class Models:
             )
         own = self.scatter**2
         variance = (weights**2 / self.pours) @ own + own.mean(axis=0) + self._left_out(of)
-        half = NormalDist().inv_cdf((1 + level) / 2) * np.sqrt(variance)
+        half = t_factor(level, max(int((self.pours - 1).sum()), 1)) * np.sqrt(variance)
         middle = weights @ self.means
         return Prediction(model, self.names, middle, middle - half, middle + half, level)
 

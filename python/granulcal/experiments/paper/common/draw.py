@@ -40,10 +40,11 @@ def formations(
 
     Args:
         path: of the PNG.
-        rows: points [m] of each formation, centred, each of shape (n, 3).
+        rows: points [m] of each formation, each of shape (n, 3), drawn about their middles.
         labels: of the rows.
         titles: of the columns, or of every formation, row by row.
     """
+    rows = [[_about_middle(points) for points in row] for row in rows]
     flat = [points for row in rows for points in row]
     field = common_field(flat, share=0.95, sides=2.3)
     columns = max(len(row) for row in rows)
@@ -78,6 +79,10 @@ def formations(
     if image is not None:
         figure.colorbar(image, ax=axes, label="height [mm]", shrink=0.8)
     return save(figure, path)
+
+
+def _about_middle(points: Array) -> Array:
+    return points - [*points[:, :2].mean(axis=0), 0.0] if len(points) else points
 
 
 def posterior_image(

@@ -200,7 +200,7 @@ class Workshop:
 
     def formation(self, scene: Scene, seed: int) -> Array:
         """Returns the points of a pour's image, shape (n, 3) [m], for a picture: poured once."""
-        pour = f"{law_of_pours()} {seed}\n{scene.to_toml()}"
+        pour = f"{law_of_pours(scene)} {seed}\n{scene.to_toml()}"
         name = hashlib.sha256(pour.encode()).hexdigest()[:16]
         path = self.folder / "pours" / "formations" / f"{name}.npy"
         if path.exists():

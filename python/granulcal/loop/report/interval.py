@@ -1,0 +1,38 @@
+"""Intervals that hold one further pour, from few pours."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["of_one_more", "t_factor"]
+
+Array = NDArray[np.float64]
+
+
+def t_factor(level: float, freedom: float) -> float:
+    """Returns how many standard deviations with so many degrees of freedom hold `level`."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, (1 + level) / 2))
+
+
+def of_one_more(rows: Array, level: float, pours: int) -> tuple[Array, Array]:
+    """Returns the ends of the interval that holds one more pour, by statistic, shape (s,) each.
+
+    One of n + 1 pours is as likely to be at any rank: where there are ranks enough the ends are of
+    ranks q (n + 1) and (1 - q) (n + 1), q = (1 - level) / 2; else those of Student's t for normal
+    statistics, mean -+ t sd sqrt(1 + 1/n).
+
+    Args:
+        rows: draws, as many of each pour, shape (n, s).
+        level: of the interval.
+        pours: that the draws are of.
+    """
+    q = (1 - level) / 2
+    if q * (pours + 1) >= 1:
+        # Hazen's positions, in which the rank of a pour is that of the middle of its draws.
+        end = (q * (pours + 1) - 0.5) / pours
+        low, high = np.quantile(rows, [end, 1 - end], axis=0, method="hazen")
+        return low, high
+    half = t_factor(level, pours - 1) * np.sqrt((1 + 1 / pours) * rows.var(axis=0, ddof=1))
+    middle = rows.mean(axis=0)
+    return middle - half, middle + half
