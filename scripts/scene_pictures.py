@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 import granulcal as gc
-from granulcal import _native
 
 ROOT = Path(__file__).parents[1]
 OUT = ROOT / "docs" / "results"
@@ -68,7 +67,8 @@ def main() -> int:
     names = parser.parse_args().names or list(VIEWS)
     for name in names:
         view = VIEWS[name]
-        pour = gc.simulate(scene_of(name, view.at), seed=1)
+        scene = scene_of(name, view.at)
+        pour = gc.simulate(scene, seed=1)
         shown = (np.abs(pour.positions[:, :2]) <= view.within).all(axis=1)
         shown &= pour.positions[:, 1] >= view.behind
         side_view.draw(
@@ -77,7 +77,7 @@ def main() -> int:
             str(OUT / f"{name}.png"),
             from_above=view.from_above,
             inches=5.0,
-            metadata={"Law": str(_native.LAW)},
+            metadata={"Law": str(scene.native.law)},
         )
         print(f"{name}: {pour.status}", flush=True)
     return 0

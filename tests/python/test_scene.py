@@ -82,9 +82,13 @@ def test_material_is_the_scenes():
 )
 def test_a_count_that_no_scene_can_hold_is_refused(count):
     """They had become 2^63 grains, or an OverflowError."""
-    with pytest.raises(ValueError, match=r"grains\.count.* must be (a (whole )?number|below 2\^53)"):
+    with pytest.raises(
+        ValueError, match=r"grains\.count.* must be (a (whole )?number|below 2\^53)"
+    ):
         gc.Scene.drop(0.1, count=count)
-    with pytest.raises(ValueError, match=r"grains\.count.* must be (a (whole )?number|below 2\^53)"):
+    with pytest.raises(
+        ValueError, match=r"grains\.count.* must be (a (whole )?number|below 2\^53)"
+    ):
         gc.Scene.drop(0.1).with_({"grains.count": count})
 
 

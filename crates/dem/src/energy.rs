@@ -47,3 +47,12 @@ impl Falling {
         -self.gravity.dot(place)
     }
 }
+
+/// What grains' heights hold, per typical mass `[m^2/s^2]`: along z alone, so that how far they are aside says nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Heights {
+    /// Of all of them above the scene's origin.
+    pub sum: f64,
+    /// That sum if all were as low as the lowest point of one of them.
+    pub lowest: f64,
+}

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::energy::Energy;
+use crate::energy::{Energy, Heights};
 use crate::solver::solve_info::SolveInfo;
 
 /// Numbers that tell whether a pour can be trusted.
@@ -15,7 +15,7 @@ pub struct Health {
     /// Worst natural-map residual over rms normal impulse of the sampled substeps `[-]`.
     pub worst_residual: f64,
     /// Largest rise of mechanical energy above its lowest value so far `[-]`, over what the start had above the lowest
-    /// potential energy so far, or over what lifts every grain by its radius and sets it in motion as the end rule sees
+    /// point that a grain has come to, or over what lifts every grain by its radius and sets it in motion as the end rule sees
     /// it, if that is more.
     pub energy_created: f64,
     /// Grains whose centre passed through a wall; must be 0.
@@ -45,8 +45,10 @@ pub(crate) struct HealthWatch {
     residual_samples: usize,
     contacts_sum: f64,
     contacts_samples: usize,
+    /// Kinetic energy at the start and what came from outside, and that of the start's heights.
     start_energy: f64,
-    lowest_potential: f64,
+    /// Energy of the heights if all grains were where the lowest has been.
+    lowest: f64,
     least_scale: f64,
     energy: f64,
     lowest_energy: f64,
@@ -59,7 +61,7 @@ pub(crate) struct HealthWatch {
 
 impl HealthWatch {
     /// For so many grains with this energy at the start; energy created is compared with `least_scale` at least.
-    pub fn new(grains: usize, start: &Energy, least_scale: f64) -> Self {
+    pub fn new(grains: usize, start: &Energy, heights: &Heights, least_scale: f64) -> Self {
         let energy = start.total();
         Self {
             worst_penetration: 0.0,
@@ -68,8 +70,8 @@ impl HealthWatch {
             residual_samples: 0,
             contacts_sum: 0.0,
             contacts_samples: 0,
-            start_energy: energy,
-            lowest_potential: start.potential,
+            start_energy: start.kinetic + heights.sum,
+            lowest: heights.lowest,
             least_scale,
             energy,
             lowest_energy: energy,
@@ -107,10 +109,10 @@ impl HealthWatch {
         self.contacts_sum += contacts as f64;
     }
 
-    pub fn see_energy(&mut self, now: &Energy) {
+    pub fn see_energy(&mut self, now: &Energy, heights: &Heights) {
         let energy = now.total();
         self.energy = energy;
-        self.lowest_potential = self.lowest_potential.min(now.potential);
+        self.lowest = self.lowest.min(heights.lowest);
         self.created = self.created.max(energy - self.lowest_energy);
         self.lowest_energy = self.lowest_energy.min(energy);
     }
@@ -156,8 +158,9 @@ impl HealthWatch {
     }
 
     fn energy_created(&self) -> f64 {
-        // Above the lowest that they have been, wherever the scene's origin is.
-        let scale = (self.start_energy - self.lowest_potential).max(self.least_scale);
+        // Above the lowest that a grain has been, wherever the scene's origin is.
+        let lowest = if self.lowest.is_finite() { self.lowest } else { 0.0 };
+        let scale = (self.start_energy - lowest).max(self.least_scale);
         if scale > 0.0 { self.created / scale } else { 0.0 }
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::body::Body;
-use crate::energy::{Energy, Falling};
+use crate::energy::{Energy, Falling, Heights};
 use crate::lanes::Row;
 use crate::law::INVERSE_INERTIA;
 use crate::parallel::Threads;
@@ -213,6 +213,23 @@ impl Particles {
             }
         };
         (0..self.count()).map(of).sum()
+    }
+
+    /// What the heights of all grains hold; the lowest is one that is in the scene.
+    pub fn heights(&self, gravity: &Vector3<f64>) -> Heights {
+        let mut heights = Heights::default();
+        let (mut mass, mut low) = (0.0, f64::INFINITY);
+        for grain in 0..self.count() {
+            let potential = -gravity.z * self.position(grain).z;
+            heights.sum += self.mass(grain) * potential;
+            mass += self.mass(grain);
+            if !self.has_left(grain) {
+                low = low.min(potential - gravity.z.abs() * self.radius(grain));
+            }
+        }
+        // Where nobody is there is no lowest.
+        heights.lowest = if low.is_finite() { mass * low } else { f64::INFINITY };
+        heights
     }
 
     /// Work of an acceleration on all grains within `dt` `[s]`, per typical mass `[m^2/s^2]`.

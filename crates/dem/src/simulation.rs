@@ -87,11 +87,13 @@ impl Simulation {
         let around = ContactContext::new(scene);
         let gravity = around.gravity;
         let lift = gravity.norm() * scene.grains.radius();
+        let heights = particles.heights(&around.effects.gravity);
         let least_scale = (lift + scene.end.kinetic_energy) * particles.count() as f64;
         Ok(Self {
             watch: HealthWatch::new(
                 particles.count(),
                 &energy(&particles, (None, None), &around),
+                &heights,
                 least_scale,
             ),
             contacts: Contacts::default(),

@@ -247,7 +247,8 @@ impl Simulation {
         let held = self.bonds.as_ref().map_or(0.0, |bonds| bonds.energy(&self.particles));
         let mut energy = energy(&self.particles, grains, &self.around);
         energy.potential += held;
-        self.watch.see_energy(&energy);
+        let heights = self.particles.heights(&self.around.effects.gravity);
+        self.watch.see_energy(&energy, &heights);
         self.ended = self.end_reached().map(|status| {
             let slack = if self.bodies.is_some() { CORNER_SLACK } else { 1.0 };
             let trusted = self.watch.is_healthy(slack * self.around.settings.max_penetration);

@@ -6,7 +6,7 @@ use granulcal_scene::{Ends, Funnel, GrainShape, Shape, Start, Wall};
 
 use super::*;
 use crate::contact_set::ContactSet;
-use crate::energy::Energy;
+use crate::energy::{Energy, Heights};
 use crate::lanes::WIDEST;
 use crate::{Preset, WallMaterial};
 
@@ -183,7 +183,9 @@ fn a_state_that_nobody_has_written_is_refused() {
         ("grains that are not", |s| s.particles.spheres[3].0[3] = 0.1),
         ("grains that are not", |s| s.particles.bodies[500].velocity.0[0] = 0.1),
         ("grains that are not", |s| s.particles.inverse_mass[0] = 2.0),
-        ("another number of grains", |s| s.watch = HealthWatch::new(3, &Energy::default(), 0.0)),
+        ("another number of grains", |s| {
+            s.watch = HealthWatch::new(3, &Energy::default(), &Heights::default(), 0.0);
+        }),
         ("substeps", |s| s.seemed_ended = Some((Status::AtRest, usize::MAX))),
         ("grains that the scene has not", |s| s.contacts.pairs.batches[0].i[0] = 500),
         ("grains that the scene has not", |s| s.contacts.pairs.batches[0].j[0] = 500),
