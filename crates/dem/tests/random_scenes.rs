@@ -302,13 +302,23 @@ fn scaled_wall(wall: Wall, r: f64) -> Wall {
     Wall { shape, motion, ..wall }
 }
 
-/// Mechanical energy per mass of a grain, from what everybody can see `[m^2/s^2]`.
+/// Mechanical energy per mass of a grain, from what everybody can see `[m^2/s^2]`: velocities are half a substep old.
 fn energy(simulation: &Simulation, gravity: Vector3<f64>) -> f64 {
+    let half = 0.5 * simulation.settings().dt * gravity;
     let spins = simulation.angular_velocities();
     let moving = simulation.velocities().into_iter().zip(simulation.radii()).zip(spins);
-    let kinetic = moving.map(|((v, r), w)| 0.5 * v.norm_squared() + 0.2 * (r * w).norm_squared());
+    let kinetic =
+        moving.map(|((v, r), w)| 0.5 * (v + half).norm_squared() + 0.2 * (r * w).norm_squared());
     let potential = simulation.positions().into_iter().map(|x| -gravity.dot(&x));
     kinetic.sum::<f64>() + potential.sum::<f64>()
+}
+
+/// Energy of the grains' heights per mass of a grain, and that if all were where the lowest point of one is.
+fn heights(simulation: &Simulation, gravity: Vector3<f64>) -> [f64; 2] {
+    let grains = || simulation.positions().into_iter().zip(simulation.radii());
+    let low =
+        grains().map(|(x, r)| -gravity.z * x.z - gravity.z.abs() * r).fold(f64::MAX, f64::min);
+    [grains().map(|(x, _)| -gravity.z * x.z).sum(), grains().count() as f64 * low]
 }
 
 proptest! {
@@ -321,7 +331,7 @@ proptest! {
         let cut = cut * scene.end.horizon;
         let (mut lowest, mut created) = (energy(&simulation, gravity), 0f64);
         let lift = gravity.norm() * scene.grains.radius() + scene.end.kinetic_energy;
-        let scale = lowest.max(scene.grains.count as f64 * lift);
+        let [at_start, mut low] = heights(&simulation, gravity);
         let mut resumed = None;
         let searches = (scene.end.horizon / settings.dt / settings.list_period as f64) as usize + 20;
         for _ in 0..searches {
@@ -329,11 +339,13 @@ proptest! {
             let now = energy(&simulation, gravity);
             created = created.max(now - lowest);
             lowest = lowest.min(now);
+            low = low.min(heights(&simulation, gravity)[1]);
             if resumed.is_none() && simulation.time() >= cut {
                 let bytes = simulation.checkpoint();
                 resumed = Some(Simulation::new(&scene, 1).unwrap().resume(&bytes).unwrap());
             }
         }
+        let scale = (at_start - low).max(scene.grains.count as f64 * lift);
         // The horizon is the end, but for the searches that rest may take.
         prop_assert!(simulation.ended().is_some(), "{} s of {}", simulation.time(), scene.end.horizon);
         if let Some(resumed) = resumed {
