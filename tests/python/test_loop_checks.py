@@ -19,7 +19,9 @@ from granulcal.loop.check.coverage import Coverage, calibrate, needed_stretch
 from granulcal.loop.check.standing import stand
 from granulcal.loop.check.trivial import LINE, TrivialRow
 from granulcal.loop.effects.library import by_name
+from granulcal.loop.pours.replicates import REPLICATES, seeds_of_replicates
 from granulcal.loop.report.tables import candidates, conditions, residuals, write_tables
+from granulcal.loop.task import Condition
 from granulcal.loop.test.distance import compare
 from granulcal.loop.test.refit import interval
 
@@ -238,3 +240,12 @@ def test_tables_without_their_library_say_what_to_install(
     with pytest.raises(ModuleNotFoundError, match=r"pip install 'granulcal\[report\]'"):
         write_tables(closed(linear, surrogate, 0.6), tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_conditions_have_seeds_of_their_own() -> None:
+    """The same seed under two of them begins with the same places of the grains."""
+    one, other = (Condition(name, {}, "fit", ()) for name in ("4 cm", "8 cm"))
+    seeds = [set(seeds_of_replicates(each, 5)) for each in (one, other)]
+    assert len(seeds[0]) == len(seeds[1]) == REPLICATES and not seeds[0] & seeds[1]
+    assert seeds_of_replicates(one, 5) == seeds_of_replicates(Condition("4 cm", {}, "fit", ()), 5)
+    assert max(seeds_of_replicates(one, 2**31)) < 2**63

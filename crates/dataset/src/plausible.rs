@@ -179,3 +179,40 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     let at = ((values.len() - 1) as f64 * share).round() as usize;
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
+
+#[cfg(test)]
+mod tests {
+    use granulcal_features::{HeightMap, Segmentation, Threshold, segment_height_map};
+
+    use super::*;
+
+    /// A cone in the middle of a field of half a metre, 4 mm to a pixel.
+    fn cone(height: f64, radius: f64) -> Formation {
+        let (side, step) = (120, 4e-3);
+        let middle = 0.5 * side as f64;
+        let at = |pixel: usize| {
+            let (u, v) = ((pixel % side) as f64 - middle, (pixel / side) as f64 - middle);
+            (height * (1.0 - step * u.hypot(v) / radius)).max(0.0)
+        };
+        let z = (0..side * side).map(at).collect();
+        let map = HeightMap::new(side, side, step, step, z).unwrap();
+        let height_threshold = Threshold::Absolute(2e-4);
+        let settings = Segmentation { height_threshold, ..Segmentation::default() };
+        segment_height_map(&map, &settings).unwrap()
+    }
+
+    #[test]
+    fn a_heap_that_lacks_grains_or_is_in_another_unit_cannot_be_of_the_scene() {
+        let limits = Limits::of(&Scene::funnel(0.12), &Prior::default()).unwrap().unwrap();
+        // 2000 balls of 4 mm are 67 ml.
+        assert!((limits.least_volume / 0.7 - 6.7e-5).abs() < 1e-6, "{limits:?}");
+        assert_eq!(limits.violations(&cone(0.03, 0.06)), Vec::<String>::new());
+        let few = limits.violations(&cone(0.02, 0.04));
+        assert!(few.len() == 1 && few[0].contains("as many grains"), "{few:?}");
+        let small = limits.violations(&cone(1e-3, 0.06));
+        assert!(small.iter().any(|reason| reason.contains("unit of the depths")), "{small:?}");
+        // Leftovers of a pour that has rolled out of view are a formation of the scene.
+        assert_eq!(limits.violations(&cone(8e-3, 0.015)), Vec::<String>::new());
+        assert!(limits.doubts(&cone(0.03, 0.06)).is_empty());
+    }
+}

@@ -69,3 +69,53 @@ impl Formation {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{Formation, HeightMap, Segmentation, Threshold, segment_height_map};
+
+    const SIDE: usize = 80;
+    const DIAMETER: f64 = 4e-3;
+
+    /// Cones on level ground of 2 mm to a pixel: middle `[px]`, height and radius `[m]`; the first columns have no data.
+    fn seen(cones: &[([f64; 2], f64, f64)], blind: usize) -> Formation {
+        let (mut z, step) = (Vec::new(), 2e-3);
+        for row in 0..SIDE {
+            for column in 0..SIDE {
+                let height = |&([u, v], height, radius): &([f64; 2], f64, f64)| {
+                    let away = step * (column as f64 - u).hypot(row as f64 - v);
+                    height * (1.0 - away / radius)
+                };
+                let top = cones.iter().map(height).fold(0.0, f64::max);
+                z.push(if column < blind { f64::NAN } else { top });
+            }
+        }
+        let map = HeightMap::new(SIDE, SIDE, step, step, z).unwrap();
+        let height_threshold = Threshold::Absolute(1e-3);
+        let settings = Segmentation { height_threshold, ..Segmentation::default() };
+        segment_height_map(&map, &settings).unwrap()
+    }
+
+    #[test]
+    fn a_pile_in_the_middle_is_seen_whole_and_alone() {
+        let pile = seen(&[([40.0, 40.0], 0.02, 0.03)], 0);
+        assert!((pile.margin() - 0.64).abs() < 0.05, "{}", pile.margin());
+        assert!(!pile.is_cut_off() && pile.other_heaps(DIAMETER).is_empty());
+        assert_eq!(pile.seen_share(), 1.0);
+    }
+
+    #[test]
+    fn what_is_cut_off_blind_or_not_alone_is_known() {
+        let cut = seen(&[([2.0, 40.0], 0.02, 0.03)], 0);
+        assert!(cut.is_cut_off() && cut.margin() == 0.0);
+        let blind = seen(&[([60.0, 40.0], 0.02, 0.03)], 40);
+        assert!((blind.seen_share() - 0.5).abs() < 1e-12 && !blind.is_cut_off());
+        // A grain by itself is none.
+        let foot = ([70.0, 10.0], 0.03, 0.02);
+        let two = seen(&[([36.0, 44.0], 0.02, 0.03), foot, ([8.0, 8.0], 4e-3, 4e-3)], 0);
+        let [heap] = two.other_heaps(DIAMETER)[..] else { panic!("one heap") };
+        assert!((heap.height - 0.03).abs() < 1e-3, "{heap:?}");
+        let cone = std::f64::consts::PI / 3.0 * 0.02 * 0.02 * 0.03;
+        assert!((heap.volume / cone - 1.0).abs() < 0.1, "{heap:?} {cone}");
+    }
+}
