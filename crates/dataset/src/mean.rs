@@ -21,14 +21,17 @@ pub(crate) struct Mean {
 struct Unlike {
     /// Its number among those added.
     frame: usize,
-    /// Of the pixels with data those that are off by more than [`OFF`] `[-]`.
-    share: f64,
+    /// How many blocks of it differ.
+    blocks: usize,
 }
 
-/// Pixels of one view differ by less than this in depth, but for a few at edges `[-]`.
-const OFF: f64 = 0.02;
-/// How few that is `[-]`.
-const FEW: f64 = 0.03;
+/// Blocks along the shorter side of an image: noise averages out in one, a heap of another height does not.
+const ALONG: usize = 30;
+/// Least side of a block `[px]`.
+const LEAST_SIDE: usize = 4;
+/// Blocks of one view differ by less than this in depth `[-]`, but for a few.
+const OFF: f64 = 0.01;
+const FEW: usize = 4;
 
 enum State {
     /// Up to one image, as it came: most recordings of one image never need the sums.
@@ -86,9 +89,9 @@ impl Mean {
                 }
             };
         }
-        let share = self.share_off(&frame.values);
-        if share > self.unlike.map_or(FEW, |unlike| unlike.share) {
-            self.unlike = Some(Unlike { frame: self.frames, share });
+        let blocks = self.blocks_off(&frame.values);
+        if blocks > self.unlike.map_or(FEW, |unlike| unlike.blocks) {
+            self.unlike = Some(Unlike { frame: self.frames, blocks });
         }
         match (&mut self.state, &frame.values) {
             (State::Counts(sums), Values::Counts(counts)) => {
@@ -105,39 +108,47 @@ impl Mean {
         Ok(())
     }
 
-    /// Of the pixels with data in an image and before those that are off by more than [`OFF`] `[-]`.
-    fn share_off(&self, values: &Values) -> f64 {
-        let (mut both, mut off) = (0.0, 0.0);
-        let mut compare = |sum: f64, valid: u16, value: f64| {
+    /// How many blocks of an image are off the mean of those before by more than [`OFF`], at the pixels that both know.
+    fn blocks_off(&self, values: &Values) -> usize {
+        let side = (self.width.min(self.height) / ALONG).max(LEAST_SIDE);
+        let across = self.width.div_ceil(side);
+        // Of each block: pixels that both know, their means, and how far the image is from these.
+        let mut blocks = vec![(0_usize, 0.0, 0.0); across * self.height.div_ceil(side)];
+        let mut compare = |pixel: usize, sum: f64, valid: u16, value: f64| {
             if valid > 0 && value > 0.0 {
+                let (column, row) = (pixel % self.width, pixel / self.width);
+                let (known, means, off) = &mut blocks[row / side * across + column / side];
                 let mean = sum / f64::from(valid);
-                both += 1.0;
-                off += f64::from(u8::from((value - mean).abs() > OFF * mean));
+                *known += 1;
+                *means += mean;
+                *off += value - mean;
             }
         };
         match (&self.state, values) {
             (State::Counts(sums), Values::Counts(counts)) => {
-                for ((&sum, &valid), &count) in sums.sums.iter().zip(&sums.valid).zip(counts) {
-                    compare(f64::from(sum), valid, f64::from(count));
+                for (pixel, (&sum, &valid)) in sums.sums.iter().zip(&sums.valid).enumerate() {
+                    compare(pixel, f64::from(sum), valid, f64::from(counts[pixel]));
                 }
             }
             (State::Metres(sums), Values::Metres(metres)) => {
-                for ((&sum, &valid), &value) in sums.sums.iter().zip(&sums.valid).zip(metres) {
-                    compare(sum, valid, valid_metres(value));
+                for (pixel, (&sum, &valid)) in sums.sums.iter().zip(&sums.valid).enumerate() {
+                    compare(pixel, sum, valid, valid_metres(metres[pixel]));
                 }
             }
             _ => {}
         }
-        off / f64::max(both, 1.0)
+        let enough = side * side / 2;
+        let is_off =
+            |(known, means, off): &(usize, f64, f64)| *known >= enough && off.abs() > OFF * means;
+        blocks.iter().filter(|block| is_off(block)).count()
     }
 
     /// That the images are not of one view, if one is unlike the mean of those before it.
     pub(crate) fn doubt(&self) -> Option<String> {
-        let Unlike { frame, share } = self.unlike?;
+        let Unlike { frame, blocks } = self.unlike?;
         Some(format!(
-            "frame {frame} of those averaged differs from those before it in {:.0} % of its pixels: frames are averaged as \
-             images of one formation at rest; give several pours as several recordings",
-            100.0 * share
+            "frame {frame} of those averaged, from 0, differs from those before it by more than 1 % of the depth in {blocks} \
+             places: frames are averaged as images of one formation at rest; give several pours as several recordings"
         ))
     }
 
@@ -240,5 +251,27 @@ mod tests {
             let exact = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;
             prop_assert!((mean - exact).abs() <= 1e-7 * exact);
         }
+    }
+
+    #[test]
+    fn another_formation_among_the_frames_is_known_and_noise_is_none() {
+        let (width, height) = (120, 90);
+        // A floor at half a metre with 3 mm of noise, and a heap on it.
+        let frame = |heap: f64, seed: usize| {
+            let depth = (0..width * height).map(|pixel| {
+                let (u, v) = ((pixel % width) as f64 - 60.0, (pixel / width) as f64 - 45.0);
+                let noise = ((pixel * 7919 + seed * 104_729) % 61) as f64 / 10.0 - 3.0;
+                (500.0 - (heap - u.hypot(v)).max(0.0) + noise).round() as u16
+            });
+            DepthFrame { width, height, values: Values::Counts(depth.collect()) }
+        };
+        let doubt = |last: f64| {
+            let mut mean = Mean::new(frame(20.0, 0));
+            (1..5).for_each(|seed| mean.add(&frame(20.0, seed)).unwrap());
+            mean.add(&frame(last, 5)).unwrap();
+            mean.doubt()
+        };
+        assert_eq!(doubt(20.0), None);
+        assert!(doubt(32.0).is_some_and(|text| text.contains("frame 5")));
     }
 }

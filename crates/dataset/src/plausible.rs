@@ -151,6 +151,14 @@ impl Limits {
                 "the edge of the image cuts the formation off: its statistics are those of what is left".to_owned(),
             );
         }
+        if formation.volume < self.least_volume {
+            let [has, all] =
+                [formation.volume, self.least_volume / LEAST_VOLUME].map(|v| short(1e6 * v));
+            found.push(format!(
+                "the formation takes {has} ml, the scene's grains by themselves {all}: the others are out of view, or were \
+                 never there"
+            ));
+        }
         let seen = formation.seen_share();
         if seen < SEEN {
             found.push(format!("only {:.0} % of the image carries data", 100.0 * seen));
