@@ -13,6 +13,7 @@
 mod args;
 mod commands;
 mod context;
+mod edge;
 pub mod interrupt;
 mod outcome;
 mod program;

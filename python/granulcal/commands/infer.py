@@ -48,32 +48,35 @@ def _run(options: argparse.Namespace) -> int:
         words.append("--json")
     code = _native.run_cli(words)
     if options.plot is not None and code in (DONE, UNHEALTHY):
-        import numpy as np
-
-        from granulcal.measured.plausible import violations
-        from granulcal.pours.scene import Scene
-
-        model = open_model(options)
-        matched = {} if model.scene_toml is None else _matched(model.scene_toml)
-        if options.border is not None:
-            matched["border_px"] = options.border
-        with contextlib.redirect_stderr(io.StringIO()):
-            # What is lost of the recordings is told already.
-            recordings = open_recordings(options)
-        if model.scene_toml is not None:
-            scene = Scene.from_toml(model.scene_toml)
-            if violations(scene, model.prior, recordings, options.recording):
-                print("no --plot: no posterior is given", file=sys.stderr)
-                return code
-        observed = [recording.formation(**matched).statistics() for recording in recordings]
-        x = np.array([np.asarray(each) for each in observed])
-        title = "" if model.misfit(x).is_inside else "OUTSIDE THE MODEL: its best compromise"
-        model.posterior(x).pair_plot(options.plot, title=title)
+        _plot(options, code)
     return code
 
 
-def _matched(scene_toml: str) -> dict[str, Any]:
-    """Options with which a pixel is as wide on the ground as in the scene's images."""
+def _plot(options: argparse.Namespace, code: int) -> None:
+    """Draws the posterior that was told; none where none was given."""
+    import numpy as np
+
+    from granulcal.measured.plausible import violations
     from granulcal.pours.scene import Scene
 
-    return {"ground_resolution": Scene.from_toml(scene_toml).ground_resolution}
+    model = open_model(options)
+    with contextlib.redirect_stderr(io.StringIO()):
+        # What is lost of the recordings is told already.
+        recordings = open_recordings(options)
+    matched: dict[str, Any] = {}
+    if model.scene_toml is not None:
+        scene = Scene.from_toml(model.scene_toml)
+        # A pixel is as wide on the ground as in the scene's images.
+        matched["ground_resolution"] = scene.ground_resolution
+        impossible = code == UNHEALTHY and violations(
+            scene, model.prior, recordings, options.recording
+        )
+        if impossible:
+            print("no --plot: no posterior is given", file=sys.stderr)
+            return
+    if options.border is not None:
+        matched["border_px"] = options.border
+    observed = [recording.formation(**matched).statistics() for recording in recordings]
+    x = np.array([np.asarray(each) for each in observed])
+    title = "" if model.misfit(x).is_inside else "OUTSIDE THE MODEL: its best compromise"
+    model.posterior(x).pair_plot(options.plot, title=title)

@@ -128,13 +128,14 @@ def close_loop(
             "test calls a right model wrong more often than it says, one in eight at p = 0.05; it "
             f"is level from {_LEVEL_BASE} and {_LEVEL_EACH} (docs/theory/loop.md)"
         )
-    # Before hours of pours; what the recordings say is not looked at yet.
-    task.require_readable()
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
     say(time_needed(task, store, budget - plan.pours, workers))
-    # Told before the first pour; whoever goes on has been told.
-    for sentence in drifts(task) if store.missing else []:
-        say(sentence)
+    if store.missing:
+        # Before hours of pours; what the recordings say is not looked at yet.
+        task.require_readable()
+        # Told before the first pour; whoever goes on has been told.
+        for sentence in drifts(task):
+            say(sentence)
     store.fill(threads=threads, say=say)
     if surrogate is None:
         surrogate = fit_surrogate(store, seed=seed, say=say)

@@ -11,6 +11,7 @@ use granulcal_features::{
 use serde_json::{Map, Value, json};
 
 use crate::context::{note, print_json, print_line};
+use crate::edge::pixels_at_edge;
 use crate::outcome::{BadArgument, Outcome};
 use crate::run::{Run, Setting};
 use crate::scene;
@@ -53,13 +54,8 @@ fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
         sides.keep(written.context("writing --debug-images"));
     }
     let formation = recording.formation_of(levelled)?;
-    if let (None, Some(edge)) = (args.border, formation.edge()) {
-        let width = edge.frame * formation.downsample;
-        eprintln!(
-            "{} pixels at the edge of the image, apart from the formation, are taken for grains; --border {width} \
-             leaves them out",
-            edge.count
-        );
+    if let (None, Some(edge)) = (args.border, pixels_at_edge(&formation)) {
+        eprintln!("{edge}");
     }
     let mut statistics = vec![named(&PAPER16, &recording.statistics_of(&formation)?)];
     if args.diagnostics {

@@ -9,13 +9,14 @@ use clap::Args;
 use granulcal_bayessim::Model;
 use granulcal_dataset::{Form, Limits, Product, Recording, scene_from_text, write_file};
 use granulcal_dem::{LAW, law_of};
-use granulcal_features::{Formation, PAPER16};
+use granulcal_features::PAPER16;
 use granulcal_scene::Scene;
 use serde_json::json;
 
 use crate::args::ReadArgs;
 use crate::args::paths::{Reads, Writes, recording, writes};
 use crate::context::{note, print_json};
+use crate::edge::pixels_at_edge;
 use crate::outcome::{BadArgument, Outcome};
 use crate::run::{Run, Setting};
 use crate::scene;
@@ -130,7 +131,8 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
         let formation = recording.formation_with(&segmentation)?;
         if args.border.is_none() {
             // Before the limits: these pixels may be why the extent cannot be the scene's.
-            doubts.extend(pixels_at_edge(path, &formation));
+            let edge = pixels_at_edge(&formation);
+            doubts.extend(edge.map(|edge| format!("{}: {edge}", path.display())));
         }
         if let Some(limits) = &limits {
             let name = path.display();
@@ -178,17 +180,6 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
     let outcome =
         if report.is_inside() { Outcome::whole_if(is_whole) } else { Outcome::OutsideModel };
     Ok(sides.finish(outcome))
-}
-
-/// Pixels at the edge of the image that are taken for grains, and what leaves them out.
-fn pixels_at_edge(path: &Path, formation: &Formation) -> Option<String> {
-    let edge = formation.edge()?;
-    let (path, width) = (path.display(), edge.frame * formation.downsample);
-    Some(format!(
-        "{path}: {} pixels at the edge of the image, apart from the formation, are taken for grains; --border {width} \
-         leaves them out",
-        edge.count
-    ))
 }
 
 /// Refuses a recording that is given twice: it would count as two pours.
