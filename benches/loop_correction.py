@@ -107,9 +107,7 @@ def main() -> None:
     parser.add_argument("--pours", type=int, default=3)
     options = parser.parse_args()
     toy = PileLoopToy()
-    surrogate = Surrogate.fit(
-        toy.design, *toy.archive(1500, 150, 100), names=toy.names, features=64
-    )
+    surrogate = Surrogate.fit(toy.design, *toy.archive(1500, 150, 100), names=toy.names)
     squares = np.array(
         [one_set(toy, surrogate, options.seed, i, options.pours) for i in range(options.sets)]
     )

@@ -181,7 +181,7 @@ def run(path: Path, archive: int, sets: int, truths: int | None = None) -> None:
     done = {row["index"] for row in _read([path])} if path.exists() else set()
     toy = PileLoopToy()
     pours = toy.archive(1500, 150, 100 + archive)
-    surrogate = Surrogate.fit(toy.design, *pours, names=toy.names, features=64, seed=archive)
+    surrogate = Surrogate.fit(toy.design, *pours, names=toy.names, seed=archive)
     with path.open("a", encoding="utf-8") as file:
         for index in range(sets):
             if index not in done:

@@ -19,7 +19,9 @@ def main() -> None:
     model = gc.BayesSim.fit(data)
 
     truth = gc.Material(sliding_friction=0.4, rolling_friction=0.05, restitution=0.5)
-    posterior = model.posterior(gc.simulate(scene, truth, seed=7).statistics())
+    observed = gc.simulate(scene, truth, seed=7).statistics()
+    print(model.misfit(observed))
+    posterior = model.posterior(observed)
     region = posterior.credible_region(0.9)
     for name, value in zip(posterior.names, posterior.mode(), strict=True):
         low, high = region[name]

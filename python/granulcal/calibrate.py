@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from granulcal.measured.different import require_different
 from granulcal.measured.formation import Formation
 from granulcal.measured.recording import Recording
 from granulcal.pours.dataset import Dataset
@@ -116,7 +117,8 @@ def calibrate(
         diagnostics: names of the diagnostic statistics that the model was trained on after the 16.
 
     Raises:
-        ValueError: no recording, another scene, or a pour without grains in view.
+        ValueError: no recording, one that is given twice, another scene, or a pour without grains
+            in view.
     """
     if not recordings:
         raise ValueError("calibrate needs at least one recording, got none")
@@ -125,6 +127,7 @@ def calibrate(
     options |= segmentation or {}
     formations = [recording.formation(**options) for recording in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
+    require_different(observed)
     known = np.hstack([observed, _diagnostics(formations, data.scene, diagnostics)])
     posterior = model.posterior(known)
     misfit = model.misfit(known)

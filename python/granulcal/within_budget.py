@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from granulcal.measured.different import require_different
 from granulcal.measured.recording import Recording
 from granulcal.pours.cluster import Cluster, cluster_asked, spread_over
 from granulcal.pours.kept_pours import KeptPours
@@ -53,6 +54,9 @@ def calibrate_within(
         engine: another simulator in place of ours; docs/engines.md says what it must do.
         ray: address of a Ray cluster that makes the pours, as `ray.init` takes it, or `local`;
             None for this machine's threads.
+
+    Raises:
+        ValueError: no recording, one that is given twice, or too small a budget.
     """
     from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
 
@@ -62,6 +66,7 @@ def calibrate_within(
     resolution = scene.ground_resolution
     formations = [each.formation(ground_resolution=resolution) for each in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
+    require_different(observed)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     pours = KeptPours(

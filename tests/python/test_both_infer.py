@@ -204,6 +204,19 @@ def test_report_and_calibrate_say_what_is_outside_too(model, small_scene, tmp_pa
     assert not (tmp_path / "run").exists()
 
 
+def test_calibrate_refuses_a_copy_of_a_recording_before_it_pours(
+    model, small_scene, recording, tmp_path, capfd
+):
+    scene, prior = tmp_path / "scene.toml", tmp_path / "prior.toml"
+    scene.write_text(small_scene.to_toml())
+    prior.write_text(model[1].prior.to_toml())
+    images = [recording[0], _again(recording[0], tmp_path)]
+    words = ["calibrate", str(scene), str(prior), *images, *recording[1:]]
+    assert cli.main([*words, "-o", str(tmp_path / "run")]) == 2
+    assert "recordings 1 and 2 show one formation" in capfd.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_pile_that_no_material_explains_is_outside_for_report_and_calibrate(
     model, small_scene, small_data, tmp_path, capfd
 ):

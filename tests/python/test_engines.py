@@ -8,9 +8,9 @@ import pytest
 import granulcal as gc
 from granulcal.arrays import read_array
 from granulcal.cli import main
-from granulcal.commands.sensor import with_sensor
 from granulcal.engines import CallableEngine, CommandEngine, ExportedEngine, engine_named, installed
 from granulcal.engines.files import read_grains
+from granulcal.pours.statistics import DIAGNOSTIC_NAMES
 from granulcal.starter.samples import SENSOR
 
 # A simulator of one's own in a dozen lines: a pile that is the steeper, the rougher the grains are.
@@ -142,6 +142,16 @@ def test_the_words_simulate_and_generate_take_an_engine(
     prior.write_text(gc.Prior.default().to_toml())
     assert main(["simulate", str(scene), "--engine", command, "--json"]) == 0
     assert '"status": "at_rest"' in capsys.readouterr().out
+    once = ["simulate", str(scene), "--engine", command]
+    assert main([*once, "--json", "--diagnostics"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (len(told["statistics"]), len(told["diagnostics"])) == (16, len(DIAGNOSTIC_NAMES))
+    for option, why in (
+        (["--mcap", str(tmp_path / "film.mcap")], "--mcap is not for --engine: only its grains"),
+        (["--threads", "2"], "--threads is not for --engine: it takes the cores"),
+    ):
+        assert main([*once, *option]) == 2
+        assert why in capsys.readouterr().err
     words = ["generate", str(scene), str(prior), "-n", "3", "-o", str(tmp_path / "pours")]
     assert main([*words, f"--engine={command}", "--quiet"]) == 0
     assert len(gc.Dataset.load(tmp_path / "pours")) == 3
@@ -159,6 +169,7 @@ def test_the_options_that_generate_shows_are_taken_or_refused_by_name_elsewhere(
         (["--shard", "0/4"], [ours], "--shard is not for --engine: one process"),
         (["--flush-every", "5"], ["--ray", "local"], "--flush-every is not for --ray: a part"),
         (["--flush-every", "5"], [ours], "--flush-every is not for --engine: rows"),
+        (["--threads", "2"], ["--ray", "local"], "--threads is not for --ray: as many pours run"),
         (["--chunk", "0"], [ours], "chunk must be at least 1, got 0"),
     ):
         assert main([*words, *option, *where]) == 2
@@ -181,10 +192,10 @@ def test_a_sensor_replaces_that_of_the_scene(
     folder_of_sensor: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = folder_of_sensor / "sensor.toml"
-    once = with_sensor(gc.Scene.drop(0.1), path)
+    once = gc.Scene.drop(0.1).with_sensor(path)
     other = tmp_path / "other.toml"
     other.write_text(path.read_text().replace("white = 0.02", "white = 0.05"))
-    twice = with_sensor(once.with_({"camera.sensor.baseline": 0.07}), other)
+    twice = once.with_({"camera.sensor.baseline": 0.07}).with_sensor(other)
     assert twice.get("camera.sensor.noise.white") == 0.05
     assert twice.get("camera.sensor.baseline") == 0.05
     # As the simulator's half reads it.
@@ -192,14 +203,14 @@ def test_a_sensor_replaces_that_of_the_scene(
     assert main(["scene", "drop", "--sensor", str(other)]) == 0
     assert gc.Scene.from_toml(capfd.readouterr().out) == twice
     for text, said in (
-        ("[camera.sensor", "not valid TOML"),
-        ("[camera]\nheight = 1.0\n", "camera.sensor must be there"),
-        (path.read_text().replace('"stereo"', '"echo"'), "not a sensor: unknown variant `echo`"),
-        (path.read_text() + "[grains]\ncount = 3\n", "grains must be absent"),
+        ("[camera.sensor", "unclosed table"),
+        ("[camera]\nheight = 1.0\n", "unknown field `height`, expected `sensor`"),
+        (path.read_text().replace('"stereo"', '"echo"'), "unknown variant `echo`"),
+        (path.read_text() + "[grains]\ncount = 3\n", "unknown field `grains`"),
     ):
         other.write_text(text)
-        with pytest.raises(ValueError, match=f"other.toml.*{said}"):
-            with_sensor(once, other)
+        with pytest.raises(ValueError, match=f"(?s)other.toml.*{said}"):
+            once.with_sensor(other)
 
 
 # A bar that MuJoCo misses: its grains run twice as far (docs/export.md).

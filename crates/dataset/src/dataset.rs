@@ -10,7 +10,7 @@ use crate::gaps::Gaps;
 use crate::header::Header;
 use crate::manifest::{self, Manifest};
 use crate::row::Row;
-use crate::table::Table;
+use crate::table::{GroupWriter, Table};
 use crate::{DatasetError, ObservedStatistic, table};
 
 /// All rows of a data set, in order of their index.
@@ -67,12 +67,14 @@ impl Dataset {
         }
     }
 
-    /// Writes the data set as one Parquet file.
+    /// Writes the data set as one Parquet file, which says how many rows were asked for, too.
     ///
     /// # Errors
     /// [`DatasetError::Io`].
     pub fn write(&self, path: &Path) -> Result<(), DatasetError> {
-        table::write(path, &self.header, &self.rows)
+        let mut file = GroupWriter::create(path, &self.header)?;
+        self.rows.iter().try_for_each(|row| file.push(row.clone()))?;
+        file.commit(self.asked)
     }
 
     /// Paths of the parameters that vary, the columns of [`Dataset::theta`].
@@ -102,7 +104,7 @@ impl Dataset {
         DIAGNOSTICS.map(|statistic| statistic.name)
     }
 
-    /// The diagnostic statistics, row by row, shape `[n, 40]`; NaN where the others are, and in data sets
+    /// The diagnostic statistics, row by row, shape `[n, d]`; NaN where the others are, and in data sets
     /// that were made without them.
     pub fn diagnostics(&self) -> Vec<f64> {
         self.rows.iter().flat_map(|row| row.diagnostics).collect()

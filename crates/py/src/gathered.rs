@@ -22,7 +22,8 @@ impl GatheredBatch {
 #[pymethods]
 impl GatheredBatch {
     #[new]
-    #[pyo3(signature = (scene, prior_toml, out, *, rows, seed, resume))]
+    #[pyo3(signature = (scene, prior_toml, out, *, rows, seed, resume, chunk = None))]
+    #[allow(clippy::too_many_arguments)] // Python's keywords.
     fn new(
         py: Python<'_>,
         scene: &Scene,
@@ -31,9 +32,12 @@ impl GatheredBatch {
         rows: u64,
         seed: u64,
         resume: bool,
+        chunk: Option<u64>,
     ) -> PyResult<Self> {
         let prior = Prior::from_toml(prior_toml).map_err(error::dem)?;
-        let options = GenerateOptions { rows, seed, resume, ..GenerateOptions::default() };
+        let plain = GenerateOptions::default();
+        let chunk = chunk.unwrap_or(plain.chunk);
+        let options = GenerateOptions { rows, seed, resume, chunk, ..plain };
         let scene = &scene.inner;
         py.detach(|| Inner::open(scene, &prior, &options, &out))
             .map(|batch| Self(Some(batch)))

@@ -90,6 +90,13 @@ impl Scene {
         Ok(Self { inner: dem::Scene { preset, ..self.inner.clone() } })
     }
 
+    /// The scene whose camera has the sensor of a file.
+    fn with_sensor(&self, path: PathBuf) -> PyResult<Self> {
+        let mut inner = self.inner.clone();
+        inner.camera.sensor = Some(granulcal_dataset::load_sensor(&path).map_err(error::dataset)?);
+        Self::checked(inner)
+    }
+
     fn with_name(&self, name: String) -> Self {
         Self { inner: dem::Scene { name, ..self.inner.clone() } }
     }

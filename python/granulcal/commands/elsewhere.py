@@ -13,7 +13,6 @@ from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.init import assignment
 from granulcal.commands.program import Parser
-from granulcal.commands.sensor import with_sensor
 from granulcal.files import beside
 from granulcal.paths import READS, writes
 
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 __all__ = ["is_asked", "parser", "run"]
 
 _ENGINE, _RAY, _STORE = "--engine", "--ray", "--ray-store"
-_PRESETS = ("fast", "default", "accurate", "paper")
 # Options of `generate` that mean nothing here, and why: of a cluster, of another engine.
 _REFUSED = {
     "shard": (
@@ -34,6 +32,17 @@ _REFUSED = {
         "a part comes whole from the worker that makes it, and is written at once",
         "rows of another engine are written every 30 s",
     ),
+}
+# Options of `simulate` that mean nothing for another engine, and why.
+_OURS = {
+    "threads": "it takes the cores that it wants",
+    "depth": "only its grains at rest come back; gc.Camera.record makes an image of them",
+    "depth_unit": "only its grains at rest come back",
+    "mcap": "only its grains at rest come back",
+    "fps": "only its grains at rest come back",
+    "checkpoint": "it is run to its end",
+    "checkpoint_every": "it is run to its end",
+    "resume": "it is run to its end",
 }
 _UNHEALTHY = 3
 
@@ -62,6 +71,9 @@ def parser() -> argparse.ArgumentParser:
     _add_common(simulate)
     simulate.add_argument(_ENGINE, required=True)
     simulate.add_argument("--positions", type=writes("array"))
+    simulate.add_argument("--diagnostics", action="store_true")
+    for name in _OURS:
+        simulate.add_argument(f"--{name.replace('_', '-')}", help=argparse.SUPPRESS)
     simulate.set_defaults(run=_simulate)
     generate = commands.add_parser("generate")
     _add_common(generate)
@@ -83,7 +95,7 @@ def parser() -> argparse.ArgumentParser:
 def _add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=READS)
     parser.add_argument("--set", action="append", default=[], type=assignment)
-    parser.add_argument("--preset", choices=_PRESETS)
+    parser.add_argument("--preset")
     parser.add_argument("--sensor", type=READS)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true")
@@ -99,7 +111,7 @@ def _scene(options: argparse.Namespace) -> "Scene":
     if options.preset is not None:
         scene = scene.with_(preset=options.preset)
     if options.sensor is not None:
-        scene = with_sensor(scene, options.sensor)
+        scene = scene.with_sensor(options.sensor)
     return scene.with_(dict(options.set))
 
 
@@ -107,6 +119,9 @@ def _simulate(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named
     from granulcal.pours.simulate import simulate
 
+    for name, why in _OURS.items():
+        if getattr(options, name) is not None:
+            raise ValueError(f"--{name.replace('_', '-')} is not for {_ENGINE}: {why}")
     scene = _scene(options)
     pour = simulate(scene, seed=options.seed, engine=engine_named(options.engine))
     statistics = pour.statistics().to_dict()
@@ -121,13 +136,16 @@ def _simulate(options: argparse.Namespace) -> int:
         "grains_in_funnel": pour.grains_in_funnel,
         "statistics": statistics,
     }
+    diagnostics = pour.diagnostic_statistics().to_dict() if options.diagnostics else {}
+    if options.diagnostics:
+        document["diagnostics"] = diagnostics
     if options.json:
         print(json.dumps(document, indent=1))
     else:
         print(f"scene              {scene.name} (seed {options.seed})")
         print(f"engine             {options.engine}")
         print(f"status             {pour.status}")
-        for name, value in statistics.items():
+        for name, value in (statistics | diagnostics).items():
             print(f"{name:<18} {value:<12.6f}")
     return 0 if pour.status != "unhealthy" else _UNHEALTHY
 
@@ -182,3 +200,7 @@ def _refuse(options: argparse.Namespace) -> None:
         if getattr(options, name) is not None:
             where, why = (_ENGINE, of_engine) if options.ray is None else (_RAY, of_cluster)
             raise ValueError(f"--{name.replace('_', '-')} is not for {where}: {why}")
+    if options.ray is not None and options.threads is not None and not options.dry_run:
+        raise ValueError(
+            f"--threads is not for {_RAY}: as many pours run at once as the cluster has cores"
+        )

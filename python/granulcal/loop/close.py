@@ -66,7 +66,7 @@ PAIRS = 20
 """Simulated pairs of a named effect, unless told otherwise."""
 # Fewest pours of the base and of each effect from which a surrogate is any use.
 _LEAST_BASE, _LEAST_EACH = 300, 40
-# From so many on the residual test is level (benches/loop_level.py).
+# From so many on the residual test is nearly level (benches/loop_level.py).
 _LEVEL_BASE, _LEVEL_EACH = 1500, 150
 # Shares of a budget: the base model has more directions than any one effect.
 _BASE_SHARE = 0.4
@@ -125,8 +125,8 @@ def close_loop(
     if plan.base < _LEVEL_BASE or (0 < plan.each < _LEVEL_EACH):
         say(
             f"note: with {plan.base} pours of the base and {plan.each} of each effect the residual "
-            "test calls a right model wrong more often than it says, one in eight at p = 0.05; it "
-            f"is level from {_LEVEL_BASE} and {_LEVEL_EACH} (docs/theory/loop.md)"
+            "test calls a right model wrong more often than it says, at p = 0.05 up to one in six; "
+            f"from {_LEVEL_BASE} and {_LEVEL_EACH} on one in twelve (docs/theory/loop.md)"
         )
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
     say(time_needed(task, store, budget - plan.pours, workers))

@@ -200,21 +200,9 @@ def gather(
     """
     import ray
 
-    if chunk is not None:
-        # A shard behind the last part pours nothing; it makes the folder, whose parts are so large.
-        _native.generate(
-            scene,
-            prior_toml,
-            folder,
-            rows=1,
-            seed=seed,
-            threads=1,
-            resume=resume,
-            progress=None,
-            shard=(1, 2),
-            chunk=chunk,
-        )
-    batch = _native.GatheredBatch(scene, prior_toml, folder, rows=rows, seed=seed, resume=resume)
+    batch = _native.GatheredBatch(
+        scene, prior_toml, folder, rows=rows, seed=seed, resume=resume, chunk=chunk
+    )
     try:
         stored = None
         if cluster.store is not None:

@@ -203,7 +203,8 @@ def generate(
         n: number of pours.
         seed: seed of the draws and of the pours.
         out: folder of the Parquet files; the default is a new temporary folder, which stays.
-        threads: pours at once; the default is one for each core.
+        threads: pours at once; the default is one for each core. A cluster has one for each of its
+            own.
         resume: keep the rows that are in `out` already; else a folder with rows is refused.
         progress: show a line on stderr; or a function of (total, resumed, made, unhealthy,
             jammed, out of view), the last three of all rows that are there.

@@ -201,6 +201,15 @@ class Scene:
         """Returns a copy whose grains have this material."""
         return self.with_(material.values())
 
+    def with_sensor(self, path: str | PathLike[str]) -> "Scene":
+        """Returns a copy whose camera has the sensor that `granulcal fit-sensor` wrote.
+
+        Raises:
+            OSError: the file cannot be read.
+            ValueError: it is no sensor, or not one of this camera.
+        """
+        return Scene(self.native.with_sensor(path))
+
     def start(self, seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Returns where the grains are when the pour begins.
 

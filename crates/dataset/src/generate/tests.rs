@@ -295,6 +295,9 @@ fn rows_asked_for_are_written_down_and_those_missing_after_the_last_are_told() {
     let (dataset, again) = (Dataset::open(&out).unwrap(), place.at("again.parquet"));
     assert_eq!((dataset.asked, dataset.missing(), dataset.gaps(5).len()), (Some(10), 6, 5));
     assert_eq!(merge(std::slice::from_ref(&out), &again, 0).unwrap().missing, 6);
+    // And so does what is saved as one file.
+    dataset.write(&again).unwrap();
+    assert_eq!(Dataset::open(&again).unwrap().missing(), 6);
     assert_eq!(told(&["left", "right"]), (Some(10), 0, vec![]));
 
     // The most that was ever asked for counts, as soon as it is asked for.

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from granulcal.bayessim.emulator.basis import Basis, polynomial
 from granulcal.errors import TrainingDataError
+from granulcal.loop.surrogate.leading import LeadingBasis
 
 __all__ = [
     "crossed_columns",
@@ -43,11 +44,10 @@ def held_residuals(noise: Array) -> Array:
 
 
 def lack_of_fit(
-    basis: Basis, u: Array, features: Array, roots: Array, white: Array, scales: Array
+    basis: LeadingBasis, u: Array, features: Array, roots: Array, white: Array, scales: Array
 ) -> Array:
     """Lambda of each axis; pairs are each of up to `_LACK_ROWS` rows with its nearest."""
-    metric = np.sqrt(np.mean(basis.frequencies**2, axis=0)) / basis.scale
-    v = u * metric
+    v = u * basis.rates
     chosen = np.random.default_rng(0).permutation(len(u))[:_LACK_ROWS]
     gaps = np.sum(v[chosen] ** 2, axis=1)[:, None] + np.sum(v**2, axis=1) - 2 * v[chosen] @ v.T
     gaps[np.arange(len(chosen)), chosen] = np.inf
@@ -90,7 +90,7 @@ def usable_statistics(x: Array, labels: tuple[str, ...]) -> tuple[NDArray[np.int
 
 
 def mean_columns(
-    basis: Basis,
+    basis: LeadingBasis,
     u: Array,
     psi: Array,
     bent: NDArray[np.bool_],
@@ -109,8 +109,7 @@ def mean_columns(
     """
     first, second = _effect_columns(u)
     main = basis(u)
-    waves = 2 * len(basis.frequencies)
-    widths = [main.shape[1] - waves, waves]
+    widths = [main.shape[1] - basis.size, basis.size]
     parts = [main]
     for k in range(psi.shape[1]):
         strength = psi[:, k : k + 1]

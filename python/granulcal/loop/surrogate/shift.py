@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.bayessim.emulator.basis import Basis
 from granulcal.loop.surrogate.inverse import inverse_of
+from granulcal.loop.surrogate.leading import LeadingBasis
 
 __all__ = ["Shift"]
 
@@ -44,7 +44,7 @@ class Shift:
         roots: of the posterior covariance of each effect's numbers, shape (K, p (1 + p + q), r).
     """
 
-    basis: Basis
+    basis: LeadingBasis
     coefficients: Array
     parameters: int
     shifts: Array
@@ -53,7 +53,7 @@ class Shift:
     @classmethod
     def fit(
         cls,
-        basis: Basis,
+        basis: LeadingBasis,
         coefficients: Array,
         sizes: Array,
         u: Array,

@@ -10,14 +10,15 @@ $$ m(\theta, c, \psi) = f_0(\theta, c)
    + \sum_{k < l} \psi_k \psi_l q_{kl}(c), \qquad
    y = m + s(\theta, c, \psi) \epsilon, \quad \epsilon \sim (0, R) $$
 
-$f_0$ is a quadratic and random features of a Matern kernel; $J a_k$ the part of an effect that is a
-shift of theta (`shift.py`), $\tilde g_k$ a quadratic and $h_k$ a linear function, each with a prior
-width learnt for every statistic and effect (`blocks.py`). $q_{kl}$, linear in c, is what two
-effects do together, learnt of those that the archive has poured or read together. log s is a
-function of the same coordinates and of the strengths. What the archive leaves unknown about m is
-the posterior of the coefficients, the same for all pours of a condition and correlated between
-conditions; nothing about it averages away with more measured pours. What the features cannot follow
-would pass for noise of a pour; it shows as left-out residuals that near rows share,
+$f_0$ is a quadratic and the leading eigenfunctions of a Matern kernel (`leading.py`); $J a_k$ the
+part of an effect that is a shift of theta (`shift.py`), $\tilde g_k$ a quadratic and $h_k$ a linear
+function, each with a prior width learnt for every statistic and effect (`blocks.py`). $q_{kl}$,
+linear in c, is what two effects do together, learnt of those that the archive has poured or read
+together. log s is a function of the same coordinates and of the strengths. What the archive leaves
+unknown about m is the posterior of the coefficients, the same for all pours of a condition and
+correlated between conditions; nothing about it averages away with more measured pours. What the
+features cannot follow would pass for noise of a pour; it shows as left-out residuals that near rows
+share,
 
 $$ \lambda_j = \overline{(e_i / s_i)(e_{i'} / s_{i'})} + \overline{h_{ii'}} $$
 
@@ -55,6 +56,7 @@ from granulcal.loop.surrogate.columns import (
     usable_statistics,
 )
 from granulcal.loop.surrogate.condition_pours import ConditionPours
+from granulcal.loop.surrogate.leading import LeadingBasis
 from granulcal.loop.surrogate.shift import Shift
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.progress import steps
@@ -63,7 +65,8 @@ __all__ = ["DONOR_SHARE", "Surrogate"]
 
 Array = NDArray[np.float64]
 
-_FEATURES = 96
+_FEATURES = 192
+_LENGTH_FREQUENCIES = 64
 _SCALE_FEATURES = 10
 _SCALE_STRETCH = 2.0
 _LEAST_ROWS = 60
@@ -113,7 +116,7 @@ class Surrogate:
     labels: tuple[str, ...]
     raw_spread: Array
     raw_range: Array
-    basis: Basis
+    basis: LeadingBasis
     shift: Shift
     coefficients: Array
     roots: Array
@@ -152,7 +155,7 @@ class Surrogate:
             psi: shape (n, K), 0 where an effect is off.
             x: statistics in their own units, shape (n, s).
             names: of the statistics, s of them.
-            features: random frequencies of f_0.
+            features: largest number of the kernel's eigenfunctions in f_0.
             seed: seed of frequencies and of the choice of donors.
 
         Raises:
@@ -183,9 +186,9 @@ class Surrogate:
         z = z @ axes
         spread = z[base].std(axis=0)
         lengths = learn_length_scales(
-            u[base], z[base] / spread, features=min(features, 64), seed=seed
+            u[base], z[base] / spread, features=_LENGTH_FREQUENCIES, seed=seed
         )
-        basis = Basis.draw(u, lengths, features=features, seed=seed, degree=2)
+        basis = LeadingBasis.draw(u, lengths, most=features, seed=seed)
         scale_basis = Basis.draw(
             u, _SCALE_STRETCH * lengths, features=_SCALE_FEATURES, seed=seed + 1, degree=2
         )
@@ -390,7 +393,7 @@ class Surrogate:
 
 def _shift(
     design: Design,
-    basis: Basis,
+    basis: LeadingBasis,
     u: Array,
     psi: Array,
     z: Array,
@@ -398,8 +401,8 @@ def _shift(
 ) -> Shift:
     """Shifts of theta, from slopes that pours without effects have."""
     plain = basis(u[base])
-    waves = 2 * len(basis.frequencies)
-    blocks = [slice(0, plain.shape[1] - waves), slice(plain.shape[1] - waves, plain.shape[1])]
+    start = plain.shape[1] - basis.size
+    blocks = [slice(0, start), slice(start, plain.shape[1])]
     gram, ones = plain.T @ plain, np.ones(len(plain))
     fits = [fit_blocks(plain, z[base, j], ones, blocks, gram) for j in range(z.shape[1])]
     coefficients = np.array([fit.coefficients for fit in fits])
