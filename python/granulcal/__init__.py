@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from granulcal.bayessim.posterior.posterior import Posterior
     from granulcal.loop.close import close_loop
     from granulcal.loop.task import Task
+    from granulcal.within_budget import calibrate_within
 
 __all__ = [
     "BayesSim",
@@ -61,6 +62,7 @@ __all__ = [
     "Statistics",
     "Task",
     "__version__",
+    "calibrate_within",
     "close_loop",
     "design_rings",
     "design_spill",
@@ -74,6 +76,7 @@ _LAZY = {
     "BayesSim": "granulcal.bayessim",
     "Posterior": "granulcal.bayessim.posterior.posterior",
     "Task": "granulcal.loop.task",
+    "calibrate_within": "granulcal.within_budget",
     "close_loop": "granulcal.loop.close",
 }
 

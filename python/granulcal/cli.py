@@ -70,8 +70,9 @@ From a recording to a material:
   granulcal predict loop --at funnel.height=0.07      where it was not measured
 
 Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours
-unhealthy, some rows of a merge missing, some frames of a recording lost, a
-recording outside the model, or a model that fails its check, 130 stopped."""
+unhealthy or without grains in view, some rows of a merge missing, some frames
+of a recording lost, a recording outside the model, or a model that fails its
+check, 130 stopped."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

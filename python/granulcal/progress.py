@@ -56,7 +56,8 @@ class ProgressLine:
             total: pours wanted.
             resumed: pours found on disk.
             made: pours simulated since.
-            *left_out: pours that are unhealthy, jammed and out of view, as far as they are known.
+            *left_out: pours that are unhealthy, jammed and without grains in view, as far as they
+                are known.
         """
         now = time.monotonic()
         done = resumed + made

@@ -114,7 +114,7 @@ def write_report(
         data: the pours that the model was trained on.
         prior_pours: pours at the prior's mean, for comparison.
         drawn: pours at draws of the posterior, for the band of the profile; none leaves it out.
-        calibration: the model's check on pairs that it has not seen.
+        calibration: the model's check on pairs left out of its fit.
         misfit: whether any parameters explain the measurement.
         truth: the true parameters, where they are known, shape (p,).
         title: heading of the page.

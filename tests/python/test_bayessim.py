@@ -109,7 +109,11 @@ def test_several_pours_are_close_to_the_exact_posterior(toy, trained):
 def test_own_calibration_check_is_stored_and_holds(toy, trained):
     assert trained.calibration.test_count == 240
     assert trained.calibration.posterior_loss < trained.calibration.prior_loss - 2
+    # They were left out in turn, and chose the form, which the check says.
+    assert "240 pours, each by a fit without it" in str(trained.calibration)
+    assert "check --data" in str(trained.calibration)
     theta, x = toy.simulate(200, seed=500)
+    assert "50 pours it had not seen" in str(trained.check(theta[:50], x[:50], draw_count=50))
     # Over four levels bands of 95 % raise one false alarm in seven, and training rounds
     # differently on every machine.
     for count in trained.check(theta, x, draw_count=300).coverage.counts:
@@ -191,6 +195,25 @@ def test_save_and_load_are_identical_to_the_bit(quick, toy, tmp_path):
     for name in ("model.json", "weights.safetensors"):
         first, second = (tmp_path / folder / name for folder in ("model", "again"))
         assert first.read_bytes() == second.read_bytes()
+
+
+def test_models_say_whether_the_check_chose_their_form(models, quick, tmp_path):
+    def chose_form(model: BayesSim) -> bool:
+        assert model.calibration is not None
+        return model.calibration.chose_form
+
+    said = {method: chose_form(model) for method, model in models.items()}
+    assert said == {"auto": True, "emulated": True, "mdrff": False}
+    assert not chose_form(quick)
+    # Files of before it was stated: where an emulator counts, its folds were the check.
+    for model, expected in ((models["emulated"], True), (quick, False)):
+        folder = tmp_path / str(expected)
+        model.save(folder)
+        assert chose_form(BayesSim.load(folder)) is expected
+        document = json.loads((folder / "model.json").read_text())
+        assert document["calibration"].pop("chose_form") is expected
+        _edit_json(folder, calibration=document["calibration"])
+        assert chose_form(BayesSim.load(folder)) is expected
 
 
 def _edit_json(folder, **changes):

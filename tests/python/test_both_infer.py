@@ -38,11 +38,20 @@ def model(small_data, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def recording(small_scene, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("recording")
+    return _poured(small_scene, tmp_path_factory.mktemp("recording"), seed=11)
+
+
+@pytest.fixture(scope="module")
+def second(small_scene, tmp_path_factory):
+    """Another pour of the same material, by the same camera."""
+    return _poured(small_scene, tmp_path_factory.mktemp("second"), seed=12)[0]
+
+
+def _poured(small_scene, folder: Path, seed: int) -> list[str]:
     pour = gc.simulate(
         small_scene,
         gc.Material(sliding_friction=0.5, rolling_friction=0.2, restitution=0.4),
-        seed=11,
+        seed=seed,
     )
     camera = gc.Camera.overhead(
         height=small_scene.get("camera.height"),
@@ -69,21 +78,27 @@ def both(capfd, code: int, words: list[str]) -> dict:
 
 
 def _again(image: str, folder: Path) -> str:
-    """Another recording that shows the same: one that is given twice is refused."""
+    """A copy of a recording under another name."""
     return str(shutil.copy(image, folder / "again.png"))
 
 
-def test_a_recording_given_twice_is_refused(model, recording, capfd):
+def test_a_recording_given_twice_is_refused(model, recording, second, tmp_path, capfd):
     words = ["infer", str(model[0]), recording[0], *recording]
     assert cli.main(words) == 2
     assert "given once" in capfd.readouterr().err
+    # A copy under another name is the same pour.
+    words = ["infer", str(model[0]), _again(recording[0], tmp_path), second, *recording]
+    assert cli.main(words) == 2
+    assert "recordings 1 and 3 show one formation" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("pours", [1, 2])
-def test_both_commands_print_and_write_the_same_json(model, recording, pours, tmp_path, capfd):
-    images = [recording[0], _again(recording[0], tmp_path)][:pours]
+def test_both_commands_print_and_write_the_same_json(
+    model, recording, second, pours, tmp_path, capfd
+):
+    images = [recording[0], second][:pours]
     words = ["infer", str(model[0]), *images, *recording[1:], "--json"]
-    code = 0 if _is_inside(model[1], recording) else 3
+    code = 0 if _is_inside(model[1], recording, *images[1:]) else 3
     found = both(capfd, code, words)
     assert len(found["statistics"]) == len(found["recordings"]) == pours
     for values in found["parameters"].values():
@@ -123,15 +138,16 @@ def test_rust_says_what_python_says(model, recording, capfd):
     assert dimension == pytest.approx(known.effective_dimension, abs=0.25)
 
 
-def test_several_pours_of_a_network_are_multiplied_in_both(small_data, recording, tmp_path, capfd):
+def test_several_pours_of_a_network_are_multiplied_in_both(
+    small_data, recording, second, tmp_path, capfd
+):
     made = BayesSim.fit(small_data, quiet=True, seed=2, method="mdrff", **SMALL)
     made.save(tmp_path / "m")
-    x = _statistics(made, recording)
-    images = [recording[0], _again(recording[0], tmp_path)]
-    words = ["infer", str(tmp_path / "m"), *images, *recording[1:], "--json"]
-    code = 0 if made.misfit(np.array([x, x])).is_inside else 3
+    x = np.array([_statistics(made, [image, *recording[1:]]) for image in (recording[0], second)])
+    words = ["infer", str(tmp_path / "m"), recording[0], second, *recording[1:], "--json"]
+    code = 0 if made.misfit(x).is_inside else 3
     found = both(capfd, code, words)
-    posterior = made.posterior(np.array([x, x]))
+    posterior = made.posterior(x)
     spread = posterior.sample(2000, seed=1).std(axis=0)
     for i, name in enumerate(posterior.names):
         assert abs(found["parameters"][name]["mean"] - posterior.mean()[i]) < 0.25 * spread[i]
@@ -175,8 +191,10 @@ def _statistics(model: BayesSim, recording: list[str]) -> np.ndarray:
     return np.asarray(opened.formation(ground_resolution=resolution).statistics())
 
 
-def _is_inside(model: BayesSim, recording: list[str]) -> bool:
-    return model.misfit(_statistics(model, recording)).is_inside
+def _is_inside(model: BayesSim, recording: list[str], *more: str) -> bool:
+    images = (recording[0], *more)
+    seen = [_statistics(model, [image, *recording[1:]]) for image in images]
+    return model.misfit(np.array(seen)).is_inside
 
 
 def test_report_and_calibrate_say_what_is_outside_too(model, small_scene, tmp_path, capfd):
@@ -215,6 +233,33 @@ def test_calibrate_refuses_a_copy_of_a_recording_before_it_pours(
     assert cli.main([*words, "-o", str(tmp_path / "run")]) == 2
     assert "recordings 1 and 2 show one formation" in capfd.readouterr().err
     assert not (tmp_path / "run").exists()
+
+
+def test_calibrate_tells_what_makes_a_recording_doubtful(
+    model, small_scene, tmp_path, capfd, monkeypatch
+):
+    scene, prior = tmp_path / "scene.toml", tmp_path / "prior.toml"
+    scene.write_text(small_scene.to_toml())
+    prior.write_text(model[1].prior.to_toml())
+    # Half of the grains lie beyond the image's edge.
+    field, pour = small_scene.get("camera.field_width"), gc.simulate(small_scene, seed=11)
+    camera = gc.Camera.overhead(
+        height=small_scene.get("camera.height"),
+        field_width=field,
+        pixels=int(small_scene.get("camera.pixels")),
+    )
+    image, toml = camera.record(
+        pour.positions + np.array([0.5 * field, 0, 0]), pour.radii, tmp_path
+    )
+
+    def stopped(*_: Any, **__: Any) -> None:
+        raise ValueError("no pours here")
+
+    monkeypatch.setattr("granulcal.within_budget.calibrate_within", stopped)
+    words = ["calibrate", str(scene), str(prior), str(image), "--camera", str(toml)]
+    assert cli.main([*words, "-o", str(tmp_path / "run")]) == 2
+    err = capfd.readouterr().err
+    assert f"warning: {image}: " in err and "the others are out of view" in err
 
 
 def test_a_pile_that_no_material_explains_is_outside_for_report_and_calibrate(
@@ -257,7 +302,7 @@ def test_a_pile_that_no_material_explains_is_outside_for_report_and_calibrate(
     run = ["calibrate", str(scene), str(prior), *recording, "--budget", "60", "--json"]
     found = said(capfd, 3, [*run, "-o", str(tmp_path / "run")])
     assert found["inside_model"]["is_inside"] is False and found["parameters"] is not None
-    assert set(found["left_out"]) == {"unhealthy", "jammed", "out_of_view", "unseen"}
+    assert set(found["left_out"]) == {"unhealthy", "jammed", "no_grains_in_view", "unseen"}
 
 
 def _recorded(folder, *, height: float, field_width: float, pixels: int, seed: int) -> list[str]:

@@ -2,6 +2,7 @@ import csv
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -170,6 +171,40 @@ def test_later_pours_keep_the_grains_of_earlier_ones(line):
     assert pattern.is_whole
 
 
+def test_a_plan_of_a_volume_has_all_its_grains(line):
+    """Two rings had failed there, after all their pours."""
+    volume = 30 * np.pi / 6 * 0.004**3
+    text = line.scene.to_toml().replace("count = 100", f"volume = {volume:.9e}")
+    plan = replace(gc.design_rings(line, [_at(0.12), _at(0.05)]), scene_toml=text)
+    pattern = simulate_plan(plan, seed=1)
+    assert np.bincount(pattern.pour).tolist() == [30, 30]
+
+
+def test_a_plan_of_grains_that_differ_is_of_one_ring(line, tmp_path):
+    mixed = line.scene.with_({"effects.polydispersity.cv": 0.1, "grains.count": 20})
+    plan = replace(gc.design_rings(line, [_at(0.12), _at(0.05)]), scene_toml=mixed.to_toml())
+    with pytest.raises(ValueError, match=r"effects\.polydispersity must be left out"):
+        simulate_plan(plan)
+    one = simulate_plan(replace(plan, pours=plan.pours[:1]))
+    assert np.ptp(one.radii) > 0
+    (tmp_path / "scene.toml").write_text(mixed.to_toml())
+    words = ["rings", str(tmp_path / "scene.toml"), "--pile", "0.1", "--pile", "0.05"]
+    refused = _run(*words, "-o", str(tmp_path / "plan"))
+    assert refused.returncode == 2 and "effects.polydispersity" in refused.stderr
+    # Before any pour.
+    assert not (tmp_path / "plan").exists()
+
+
+def test_unhealthy_pours_and_posteriors_outside_end_with_3(capsys):
+    from granulcal.commands.design import _code
+
+    assert _code(LeftOut(jammed=3), True) == 0
+    assert capsys.readouterr().err == ""
+    assert _code(LeftOut(unhealthy=1), True) == 3
+    assert "1 unhealthy" in capsys.readouterr().err
+    assert _code(LeftOut(), False) == 3
+
+
 def test_a_pour_that_jams_is_told():
     grains = np.zeros((2, 3)), np.full(2, 1e-3), np.array([0, 1])
     pattern = Pattern(*grains, ("at_rest", "jammed"), np.zeros((2, 2)), gc.Scene.funnel())
@@ -244,6 +279,41 @@ def test_more_spread_than_chance_is_seen():
     assert 0.6 * rho < model.rho < 1.6 * rho
 
 
+@pytest.mark.parametrize("all_spill", [False, True])
+@pytest.mark.parametrize("drawn", [0, 2])
+def test_pours_that_never_spill_or_always_leave_little_doubt(all_spill, drawn):
+    """A normal about the estimate had given P(>= 1) of 0.07 to 0.2 after 200 clean pours."""
+    total, count = 200, 200
+    heights = np.linspace(0.06, 0.3, count)
+    material = np.random.default_rng(1).normal(size=(count, drawn))
+    counts = np.full(count, float(total if all_spill else 0))
+    forecast = forecast_of(heights, material, counts, total, grains=(1, total))
+    rare = 1 - forecast.probability[1] if all_spill else forecast.probability[0]
+    assert rare.max() < 0.015
+    # And some: 200 pours exclude no chance of a thousandth.
+    assert rare.max() > 1e-5
+
+
+def test_draws_are_those_of_the_posterior():
+    """By quadrature over the two coefficients, with one pour of ten that spills a grain."""
+    heights = np.linspace(0.1, 0.2, 10)
+    counts = np.zeros(10)
+    counts[7] = 1
+    model = CountModel.fit(heights, np.empty((10, 0)), counts, 50, degrees=(1,))
+    drawn = model.draw(2000, np.random.default_rng(0))
+    level, slope = np.meshgrid(np.linspace(-25, 0, 400), np.linspace(-15, 15, 400), indexing="ij")
+    share = 1 / (1 + np.exp(-(level[..., None] + slope[..., None] * model.rows[:, 1])))
+    size = 1 / model.rho - 1
+    log = stats.betabinom.logpmf(counts, 50, share * size, (1 - share) * size).sum(axis=-1)
+    log -= 0.5 * (level / 20) ** 2 + 0.5 * (slope / 5) ** 2
+    weight = np.exp(log - log.max())
+    for values, found in ((level, drawn[:, 0]), (slope, drawn[:, 1])):
+        mean = np.average(values, weights=weight)
+        sd = np.average((values - mean) ** 2, weights=weight) ** 0.5
+        assert found.mean() == pytest.approx(mean, abs=0.1 * sd)
+        assert found.std() == pytest.approx(sd, rel=0.1)
+
+
 def test_unknown_material_widens_the_band():
     generator = np.random.default_rng(4)
     heights, material = generator.uniform(0.05, 0.3, 300), generator.normal(size=(300, 1))
@@ -297,6 +367,10 @@ def test_spill_command_resumes_and_writes(tmp_path):
     more = json.loads((out / "pours.json").read_text())["pours"]
     assert len(more) == 26
     assert {i: more[i] for i in again} == again
+    document = {"parameters": parameters, "samples": draws.tolist()}
+    posterior.write_text(json.dumps({**document, "inside_model": {"is_inside": False}}))
+    outside = _run(*words)
+    assert outside.returncode == 3 and "OUTSIDE THE MODEL" in outside.stderr
     rows = list(csv.DictReader(before.splitlines()))
     assert all(0 <= float(row["low"]) <= float(row["high"]) <= 1 for row in rows)
     assert json.loads((out / "spill.json").read_text())["drawn"] == names

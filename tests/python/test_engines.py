@@ -102,6 +102,25 @@ def test_the_error_of_a_function_is_the_callers(
         gc.simulate(small_scene, engine=CallableEngine(cone))
 
 
+def test_a_command_is_asked_by_nine_coefficients_and_a_whole_count(
+    small_scene: gc.Scene, tmp_path: Path
+) -> None:
+    asked = tmp_path / "asked.json"
+    asks = tmp_path / "asks.py"
+    asks.write_text(
+        "import pathlib, sys\n"
+        f"request = pathlib.Path(sys.argv[-1]) / 'request.json'\n"
+        f"pathlib.Path({str(asked)!r}).write_text(request.read_text())\n"
+        "raise SystemExit('asked')\n"
+    )
+    with pytest.raises(ValueError, match="ended with 1: asked"):
+        CommandEngine(f"{sys.executable} {asks}")(small_scene, 4)
+    request = json.loads(asked.read_text())
+    assert request["seed"] == 4 and len(request["material"]) == 9
+    assert request["grains"] == {"count": 60, "diameter": 0.004, "density": 1300.0}
+    assert isinstance(request["grains"]["count"], int)
+
+
 def test_a_command_that_fails_says_why(small_scene: gc.Scene, tmp_path: Path) -> None:
     failing = tmp_path / "fails.py"
     failing.write_text("raise SystemExit('no licence')")
@@ -349,6 +368,8 @@ def test_what_is_no_array_of_numbers_is_refused_by_name(
     [
         ("grains.csv", "x,y,z\n1,2,three\n"),
         ("grains.csv", "x,y\n1,2\n"),
+        ("grains.csv", "0.1,0.2,0.002\n0.1,0.3,0.002\n"),
+        ("grains.csv", "x,y,z,z\n1,2,3,4\n"),
         ("grains.dump", "no dump"),
         ("grains.dump", "ITEM: ATOMS id x y z radius\n1 2 3\n"),
         ("grains.npy", "no array"),
@@ -358,3 +379,91 @@ def test_files_of_an_engine_are_refused_by_name(tmp_path: Path, name: str, text:
     (tmp_path / name).write_text(text)
     with pytest.raises(ValueError, match=name):
         read_grains(tmp_path, 0.002)
+
+
+def test_columns_are_read_by_name(tmp_path: Path) -> None:
+    file = tmp_path / "grains.csv"
+    file.write_text("id, Z,x,y ,radius\n7,0.3,0.1,0.2,0.004\n")
+    found = read_grains(tmp_path, 0.002)
+    assert found is not None
+    assert found[0].tolist() == [[0.1, 0.2, 0.3]] and found[1].tolist() == [0.004]
+    file.write_text("z,x,y\n")
+    found = read_grains(tmp_path, 0.002)
+    assert found is not None and found[0].shape == (0, 3)
+    file.write_text("0.1,0.2,0.002\n0.1,0.3,0.002\n")
+    with pytest.raises(ValueError, match=r"first line must name the columns.*'0\.1,0\.2,0\.002'"):
+        read_grains(tmp_path, 0.002)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the program is a shell script")
+def test_an_engine_that_ships_and_loses_grains_is_unhealthy(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import granulcal.engines
+
+    program = tmp_path / "lmp"
+    rows = "1 0 0 0.002 0.002\\n3 0.01 0 0.002 0.002\\n"
+    program.write_text(f"#!/bin/sh\nprintf 'ITEM: ATOMS id x y z radius\\n{rows}' > grains.dump\n")
+    program.chmod(0o755)
+    engine = ExportedEngine("lammps", python=str(program))
+    pour = gc.simulate(gc.Scene.drop(0.02, count=4, preset="fast"), seed=1, engine=engine)
+    assert pour.status == "unhealthy" and len(pour.radii) == 4
+    assert np.isnan(pour.positions).any(axis=1).sum() == 2
+    # The command tells so, with its positions on disk.
+    monkeypatch.setattr(granulcal.engines, "engine_named", lambda name: engine)
+    positions = tmp_path / "p.npy"
+    words = ["simulate", "drop", "--set", "grains.count=4", "--engine", "lammps", "--json"]
+    assert main([*words, "--positions", str(positions), "--diagnostics"]) == 3
+    assert json.loads(capsys.readouterr().out)["status"] == "unhealthy"
+    assert np.load(positions).shape == (4, 3)
+
+
+def test_an_engine_of_ones_own_with_fewer_grains_is_warned_of_once(small_scene: gc.Scene) -> None:
+    from granulcal.engines.protocol import FewerGrainsWarning
+
+    def lossy(scene: gc.Scene, seed: int) -> tuple[np.ndarray, float]:
+        return scene.start(seed)[0][:50], 0.002
+
+    engine = CallableEngine(lossy, name="lossy")
+    with pytest.warns(FewerGrainsWarning, match="'lossy' left 50 grains of the scene's 60"):
+        assert len(gc.simulate(small_scene, engine=engine).radii) == 50
+    gc.simulate(small_scene, engine=engine)
+
+
+def test_a_pour_without_grains_in_view_is_told_and_ends_with_3(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    away = tmp_path / "away.py"
+    away.write_text(SIMULATOR.replace("r * np.cos(angle)", "9 + r"))
+    positions = tmp_path / "p.npy"
+    words = ["simulate", "drop", "--set", "grains.count=30", "--engine", f"{sys.executable} {away}"]
+    assert main([*words, "--json", "--diagnostics", "--positions", str(positions)]) == 3
+    told = json.loads(capsys.readouterr().out)
+    assert told["status"] == "no_grains_in_view"
+    assert told["statistics"] is None and told["diagnostics"] is None
+    assert np.load(positions).shape == (30, 3)
+    assert main(words) == 3
+    assert "no statistics" in capsys.readouterr().err
+
+
+def test_kept_pours_of_two_engines_are_not_mixed(
+    small_scene: gc.Scene, small_prior: gc.Prior, tmp_path: Path
+) -> None:
+    """They had been, where the engine was in use and not given."""
+    from granulcal.engines import pouring_with
+    from granulcal.pours.kept_pours import KeptPours
+
+    path, theta = tmp_path / "pours.json", small_prior.sample(1, seed=1)
+    hanging, lifted = (
+        CallableEngine(
+            lambda scene, seed, up=up: (scene.start(seed)[0] + [0, 0, up], 0.002), name=name
+        )
+        for name, up in (("hanging", 0.0), ("lifted", 0.1))
+    )
+    with pouring_with(hanging):
+        KeptPours(small_scene, small_prior, path)(theta, 0)
+        assert len(KeptPours(small_scene, small_prior, path).rows) == 1
+    with pouring_with(lifted), pytest.raises(ValueError, match="prior or seed, or engine"):
+        KeptPours(small_scene, small_prior, path)
+    with pytest.raises(ValueError, match="law"):
+        KeptPours(small_scene, small_prior, path)

@@ -246,3 +246,154 @@ def test_a_posterior_is_a_mode_and_draws(
     assert table[1] == {"file": "draw-001.xml", names[0]: 0.25, names[1]: 0.45}
     assert main([*command, "--draws", "4"]) == 2
     assert "at most 3" in capsys.readouterr().err
+
+
+ROUND = {"kind": "cylinder", "from": [0, 0, 0.0], "to": [0, 0, 0.04], "radius": 0.08}
+BOX = {"kind": "box", "min": [-0.1, -0.1, 0.0], "max": [0.1, 0.1, 0.03]}
+
+
+def with_wall(scene: gc.Scene, **shape: object) -> gc.Scene:
+    """Returns the scene with one wall more."""
+    words = ", ".join(f"{key} = {json.dumps(value)}" for key, value in shape.items())
+    return gc.Scene.from_toml(f"{scene.to_toml()}\n[[walls]]\nshape = {{ {words} }}\n")
+
+
+def shaped(scene: gc.Scene) -> gc.Scene:
+    """Returns the scene with grains that are boxes."""
+    box = '[grains]\nshape = { kind = "box", aspect = [1.0, 1.0, 1.0] }\n'
+    return gc.Scene.from_toml(scene.to_toml().replace("[grains]\n", box))
+
+
+def test_grains_that_are_not_round_are_refused_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They had become balls without a word."""
+    from granulcal.engines import ExportedEngine
+    from granulcal.pours.film import _outlines
+
+    scene = shaped(gc.Scene.drop(0.02, count=4, preset="fast"))
+    with pytest.raises(ValueError, match="`grains.shape` has no counterpart"):
+        export_material(scene, "mujoco", tmp_path)
+    with pytest.raises(ValueError, match="`grains.shape` has no counterpart"):
+        ExportedEngine("mujoco", python="python")(scene, 0)
+    path = tmp_path / "scene.toml"
+    path.write_text(scene.to_toml())
+    words = ["export", "bed", str(path), "--to", "csv", "-o", str(tmp_path / "bed.csv")]
+    assert main(words) == 2
+    assert "`grains.shape`" in capsys.readouterr().err
+    # A film draws their walls all the same.
+    assert _outlines(shaped(gc.Scene.funnel(0.06, count=4)))
+
+
+@pytest.mark.parametrize(
+    ("shape", "sides"),
+    [
+        (BOX, 2),
+        ({**BOX, "open": ["z_max"]}, 1),
+        ({**ROUND, "closed": "both"}, 2),
+        ({**ROUND, "closed": "to"}, 1),
+        (ROUND, 1),
+    ],
+)
+def test_a_closed_wall_of_lammps_is_felt_from_both_sides(
+    scene: gc.Scene, shape: dict[str, object], sides: int
+) -> None:
+    text = ENGINES["lammps"].scene(Setup.of(with_wall(scene, **shape)))["in.pour"]
+    regions = [line for line in text.splitlines() if line.startswith("region        wall_0")]
+    assert len(regions) == sides == text.count("all wall/gran/region") - 2
+    assert [line.endswith(" side out") for line in regions] == [False, True][:sides]
+
+
+def test_grains_stay_on_a_closed_box_in_lammps(scene: gc.Scene) -> None:
+    from granulcal.engines import ExportedEngine, installed
+
+    if not installed("lammps"):
+        pytest.skip("lammps is not installed")
+    wide = {**BOX, "min": [-0.5, -0.5, 0.0], "max": [0.5, 0.5, 0.03]}
+    pour = gc.simulate(with_wall(scene, **wide), seed=1, engine=ExportedEngine("lammps"))
+    assert pour.positions[:, 2].min() > 0.03 + 0.9 * RADIUS
+
+
+def test_the_space_of_a_pour_is_as_wide_as_its_grains_roll(scene: gc.Scene) -> None:
+    usual = Setup.of(scene).half_width
+    assert Setup.of(scene.with_({"material.rolling_friction": 10.0})).half_width == 0.8
+    # Rolling from h stops after h / (5/7 mu_r).
+    top = Setup.of(scene).centres[:, 2].max()
+    start = np.abs(scene.start(0)[0][:, :2]).max()
+    assert usual == pytest.approx(start + top / (5 / 7 * 0.12) + 2 * RADIUS)
+    smooth = Setup.of(scene.with_({"material.rolling_friction": 0.0}))
+    assert smooth.half_width == pytest.approx(start + 4.0 + 2 * RADIUS)
+    brief = Setup.of(scene.with_({"material.rolling_friction": 0.0, "end.horizon": 1.0}))
+    assert brief.half_width < smooth.half_width
+    far = with_wall(scene, kind="disc", centre=[5.0, 0.0, 0.0], normal=[0, 0, 1], radius=0.5)
+    assert Setup.of(far).half_width == pytest.approx(5.5 + 2 * RADIUS, rel=1e-3)
+    # No engine has bins of neighbours without end.
+    assert "binsize" in ENGINES["liggghts"].scene(smooth)["in.pour"]
+
+
+def test_radii_that_differ_are_written_and_not_called_left_out(
+    scene: gc.Scene, tmp_path: Path
+) -> None:
+    mixed = scene.with_({"effects.polydispersity.cv": 0.2})
+    assert Setup.of(mixed).left_out == ()
+    centres, radii = mixed.start(3)
+    rows = export_bed(mixed, centres, None, "csv", tmp_path / "bed.csv", seed=3).read_text()
+    found = np.loadtxt(rows.splitlines(), delimiter=",", skiprows=1)[:, 3]
+    assert np.allclose(found, radii, rtol=1e-8) and np.ptp(found) > 0
+    with pytest.raises(ValueError, match=r"radii of their own.*must be 20"):
+        export_bed(mixed, centres[:7], None, "csv", tmp_path / "bed.csv")
+    # Grains of one size may be any of them.
+    assert export_bed(scene, centres[:7], None, "csv", tmp_path / "few.csv").exists()
+
+
+def test_older_draws_are_removed_and_what_others_wrote_is_not(
+    scene: gc.Scene, tmp_path: Path
+) -> None:
+    from granulcal.export import export_posterior
+
+    def write(to: str, count: int) -> None:
+        draws = np.linspace(0.2, 0.4, count)[:, None]
+        export_posterior(["material.sliding_friction"], [0.3], draws, scene, to, tmp_path)
+
+    write("mujoco", 5)
+    (tmp_path / "draw-mine.xml").write_text("mine")
+    write("lammps", 2)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {
+        "mode.xml",
+        "mode.in",
+        "draw-mine.xml",
+        "draw-000.in",
+        "draw-001.in",
+        "draws.json",
+    }
+    write("lammps", 0)
+    assert not list(tmp_path.glob("draw-0*")) and not (tmp_path / "draws.json").exists()
+
+
+def test_mujocos_walls_lie_behind_themselves(scene: gc.Scene) -> None:
+    walls = with_wall(with_wall(scene, **BOX), kind="plane", point=[0, 0, 0.1], normal=[0, 0, 1])
+    text = ENGINES["mujoco"].mjcf(Setup.of(walls))
+    boxes = [geom for geom in ET.fromstring(text).iter("geom") if geom.get("type") == "box"][-7:]
+    places = np.array([str(box.get("pos")).split() for box in boxes], float)
+    # Half as thick as 4 mm: the inner faces are at 0.1, 0, 0.03, and the plane's at 0.1.
+    assert np.sort(places[:6, 0])[[0, -1]] == pytest.approx([-0.102, 0.102])
+    assert np.sort(places[:6, 2])[[0, -1]] == pytest.approx([-0.002, 0.032])
+    assert places[6, 2] == pytest.approx(0.098)
+
+
+def test_mujocos_material_states_its_time_step(scene: gc.Scene, tmp_path: Path) -> None:
+    root = ET.parse(export_material(scene, "mujoco", tmp_path)).getroot()
+    option, geom = root.find("option"), root.find(".//geom")
+    assert root.tag == "mujocoinclude" and option is not None and geom is not None
+    k = -float(str(geom.get("solref")).split()[0])
+    assert k == pytest.approx((math.pi / (20 * float(option.attrib["timestep"]))) ** 2, rel=1e-5)
+
+
+def test_newton_says_where_a_mean_cannot_be_met(scene: gc.Scene, tmp_path: Path) -> None:
+    smooth = gc.Scene.from_toml(f"{scene.to_toml()}\n[ground.material]\nsliding_friction = 0.1\n")
+    told = "ground: sliding_friction is half of the grains' own"
+    for each, is_told in ((scene, False), (smooth, True)):
+        files = export_scene(each, "newton", tmp_path / each.name)
+        texts = {path.name: path.read_text() for path in files}
+        assert (told in texts["pour.py"], told in texts["README.txt"]) == (is_told, is_told)

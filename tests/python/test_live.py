@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import granulcal as gc
-from granulcal.measured.live import RealSense, _frame_of, record
+from granulcal.measured.live import RealSense, Ros2, _frame_of, record
 from granulcal.measured.ros_files import DepthFrame, write_bag, write_mcap
 
 pytest.importorskip("rosbags")
@@ -112,14 +112,51 @@ def test_messages_of_ros_become_metres() -> None:
     # Rows may be longer than the image.
     rows = np.hstack([counts.view(np.uint8), np.zeros((2, 2), np.uint8)])
     message = SimpleNamespace(
-        header=header, encoding="16UC1", width=2, height=2, step=6, data=rows.tobytes()
+        header=header,
+        encoding="16UC1",
+        is_bigendian=0,
+        width=2,
+        height=2,
+        step=6,
+        data=rows.tobytes(),
     )
     frame = _frame_of(message)
     assert frame.time_ns == 2_000_000_005
     assert np.allclose(frame.depth, [[0.5, 0.0], [0.501, 0.502]])
+    message.is_bigendian, message.data = 1, rows.view("<u2").astype(">u2").tobytes()
+    assert np.allclose(_frame_of(message).depth, frame.depth)
     message.encoding = "rgb8"
     with pytest.raises(ValueError, match="got 'rgb8'"):
         _frame_of(message)
+
+
+def test_metres_of_ros_keep_a_tenth_of_a_millimetre(tmp_path: Path) -> None:
+    # What is infinitely far, or no number, is no data.
+    metres = depth(0).astype("<f4")
+    metres[0, :3] = np.inf, -np.inf, np.nan
+    message = SimpleNamespace(
+        header=SimpleNamespace(stamp=SimpleNamespace(sec=1, nanosec=0)),
+        encoding="32FC1",
+        is_bigendian=0,
+        width=64,
+        height=48,
+        step=4 * 64,
+        data=metres.tobytes(),
+    )
+    source = Ros2.__new__(Ros2)
+    source.lens, source.depth_unit, source._farthest = LENS, 1e-3, 0.0
+    source._wait = lambda arrived, topic: message
+    source._arrived, source._topic = [], "/depth"
+    assert record(source, tmp_path / "ros.bag", frames=2) == 2
+    found = gc.Recording.open(tmp_path / "ros.bag")
+    assert found.depth_unit == pytest.approx(1e-4) and found.depth is not None
+    assert (found.depth[0, :3] == 0).all()
+    assert found.depth[1, 3] == pytest.approx(depth(0)[1, 3], abs=6e-5)
+    # Beyond 6.55 m it does not fit into 16 bits.
+    metres[5, 5] = 8.0
+    message.data = metres.tobytes()
+    next(source.frames())
+    assert source.depth_unit == 1e-3
 
 
 def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
@@ -143,3 +180,16 @@ def test_a_recording_that_is_there_stays(name: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="may not be had again"):
         write(path, source.frames(), LENS)
     assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["late.bag", "late.mcap"])
+def test_the_last_frames_are_the_last_in_time(name: str, tmp_path: Path) -> None:
+    # As files are that were put together of two: later frames first.
+    late, early = depth(0), np.full((48, 64), 0.7)
+    frames = [DepthFrame(late if t > 3 else early, t * 1_000_000_000) for t in (4, 5, 6, 1, 2, 3)]
+    path = tmp_path / name
+    assert (write_bag if name.endswith("bag") else write_mcap)(path, frames, LENS) == 6
+    last = gc.Recording.open(path, frames=3).depth
+    first = gc.Recording.open(path, frames=3, first_frame=0).depth
+    assert last is not None and np.allclose(last, late, atol=6e-5)
+    assert first is not None and np.allclose(first, early, atol=6e-5)

@@ -175,6 +175,41 @@ def test_the_command_prints_and_writes_json(
     assert "the correction holds up to" in capsys.readouterr().err
 
 
+def test_a_model_pours_with_the_engine_of_its_loop_alone(
+    models: Models, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What had been fitted to another simulator was poured with ours."""
+    from granulcal.engines import CallableEngine, pouring_with
+
+    hanging = CallableEngine(lambda scene, seed: scene.start(seed), name="hanging")
+    theirs = replace(models, engine="hanging")
+    file = theirs.write(tmp_path)
+    assert Models.load(tmp_path).engine == "hanging"
+    for name in ("base", "named", "corrected"):
+        with pytest.raises(ObservationError, match="pours by 'hanging'.*got our own simulator"):
+            theirs.require_engine(name)
+        with pouring_with(hanging), pytest.raises(ObservationError, match="got 'hanging'"):
+            models.require_engine(name)
+        with pouring_with(hanging):
+            theirs.require_engine(name)
+    for name in ("line", "nearest"):
+        theirs.require_engine(name)
+    words = ["predict", str(tmp_path), "--at", "funnel.height=0.07", "--dry-run"]
+    assert main(words) == 2
+    assert "--engine" in capsys.readouterr().err
+    # Files of before: the law tells ours from another, which then must be given.
+    document = json.loads(file.read_text())
+    del document["engine"]
+    file.write_text(json.dumps({**document, "law": 0}))
+    unnamed = Models.load(tmp_path)
+    with pytest.raises(ObservationError, match="pours by another engine"):
+        unnamed.require_engine("base")
+    with pouring_with(hanging):
+        unnamed.require_engine("base")
+    file.write_text(json.dumps(document))
+    Models.load(tmp_path).require_engine("base")
+
+
 @pytest.mark.parametrize("kind", ["identity", "log", "asinh"])
 def test_transforms_have_inverses(kind: str) -> None:
     transform = Transform(kind, 0.4, 2.0, 0.7, 1.5)

@@ -172,6 +172,20 @@ def test_a_discharge_curve_gives_shares_and_rate(scene: gc.Scene, tmp_path: Path
     assert observed["discharge_rate"] == pytest.approx(240.0)
     with pytest.raises(ValueError, match=r"\['a', 'b'\], got None"):
         DischargeCurve.open(path)
+    cases = {
+        "a,0,0;a,1,inf;a,2,20": "line 3 must be a finite time",
+        "a,nan,0;a,1,50": "line 2 must be a finite time",
+        "a,0,0;a,1,120": "line 3 must be .* from 0 to 100 %",
+        "a,0,100;a,1,60;a,2,10": "line 3: what has run out cannot fall",
+        "a,0,0;a,1,0.4;a,2,0.9": "ends at 0.9 %, must pass 5 %",
+    }
+    for text, match in cases.items():
+        path.write_text("\n".join([rows[0], *text.split(";")]) + "\n")
+        with pytest.raises(ValueError, match=match):
+            DischargeCurve.open(path)
+    # A balance swings: measured curves fall by a tenth of a percent.
+    path.write_text("\n".join([rows[0], "a,0,-0.2", "a,1,50", "a,2,49.9", "a,3,100.3"]) + "\n")
+    assert len(DischargeCurve.open(path).time) == 4
     path.write_text("time,percent\n0,0\n")
     with pytest.raises(ValueError, match="the columns must be"):
         DischargeCurve.open(path)
@@ -195,6 +209,24 @@ def test_a_drum_picture_gives_its_surface(scene: gc.Scene, tmp_path: Path) -> No
     assert np.isnan(observed["spilled"])
     with pytest.raises(ValueError, match="width"):
         gc.Recording.observed(path, scene)
+    # As many bits as the file has: 16 are not cut off at 255.
+    deep = tmp_path / "deep.png"
+    image.fromarray(grey.astype(np.uint16) * 257).save(deep)
+    assert gc.Recording.observed(deep, scene, width=width) == pytest.approx(observed, nan_ok=True)
+    image.fromarray(grey.astype(np.float32)).save(tmp_path / "drum.tiff")
+    with pytest.raises(ValueError, match="8 or 16 bits of grey"):
+        DrumImage.open(tmp_path / "drum.tiff", width=width)
+    # A picture whose sides are cut off is not filled by the drum.
+    image.fromarray(grey[:, 10:-10]).save(deep)
+    with pytest.raises(ValueError, match="must be square, .* got 180x200 pixels"):
+        gc.Recording.observed(deep, scene, width=width)
+    wall = "shape = { kind = 'cylinder', from = [0, -1, 0], to = [0, 1, 0], radius = 0.02 }"
+    drum = gc.Scene.from_toml(
+        f"{scene.to_toml()}\n[[walls]]\n{wall}\n".replace("0.02 }", "0.0201 }")
+    )
+    assert gc.Recording.observed(path, drum, width=width)["surface_slope"] > 0
+    with pytest.raises(ValueError, match=r"the scene's drum, 0.0402 m, got 40 m"):
+        gc.Recording.observed(path, drum, width=1e3 * width)
     image.fromarray(np.full((50, 50), 9, np.uint8)).save(path)
     with pytest.raises(ValueError, match="shows no grains"):
         DrumImage.open(path, width=width)

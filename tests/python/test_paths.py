@@ -104,6 +104,8 @@ def test_every_path_says_whether_it_is_read_or_written():
         "preset",
         "shard",
         "flush_every",
+        # Of another engine these are refused, whatever they say.
+        *elsewhere._OURS,
     }, texts
 
 
@@ -297,3 +299,22 @@ def test_a_film_takes_no_name_that_is_taken_and_no_number_that_never_ends(tmp_pa
     assert cli.main([*words, "--fps", "5", "--slow", "1"]) == 0
     assert path.read_bytes()[:4] == b"GIF8"
     assert (tmp_path / "film.gif.part").read_text() == TEXT
+
+
+def test_a_film_lasts_as_long_as_its_rate_says_and_tells_what_it_lacks(tmp_path, capsys):
+    from PIL import Image
+
+    from granulcal.pours.film import _frame_times
+
+    # Frames of a GIF are whole hundredths: 15 a second had been 17.
+    assert sum(_frame_times(15, 15.0)) == 1000
+    assert set(_frame_times(15, 15.0)) == {60, 70}
+    path = tmp_path / "film.gif"
+    words = ["film", "drop", "--set", "grains.count=12", "-o", str(path), "--width", "64"]
+    assert cli.main([*words, "--most-frames", "4"]) == 0
+    told = capsys.readouterr()
+    assert "frames of the pour are left out" in told.err and "--most-frames" in told.err
+    with Image.open(path) as image:
+        assert image.n_frames == 5
+    assert cli.main([*words, "--most-frames", "100"]) == 0
+    assert "left out" not in capsys.readouterr().err

@@ -41,14 +41,17 @@ impl RowProgress {
 
     /// Shows how far the batch is.
     pub fn show(&mut self, progress: &Progress) {
-        let Progress { total, resumed, made, unhealthy, out_of_view, jammed, .. } = *progress;
+        let Progress { total, resumed, made, unhealthy, no_grains_in_view, jammed, .. } = *progress;
         let done = resumed + made;
         if self.bar.length() != Some(total) {
             self.bar.set_length(total);
         }
         self.bar.set_position(done);
-        let counts =
-            [(unhealthy, "unhealthy"), (out_of_view, "without grains in view"), (jammed, "jammed")];
+        let counts = [
+            (unhealthy, "unhealthy"),
+            (no_grains_in_view, "without grains in view"),
+            (jammed, "jammed"),
+        ];
         let told: Vec<_> = counts
             .iter()
             .filter(|(count, _)| *count > 0)

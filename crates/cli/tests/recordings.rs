@@ -189,7 +189,12 @@ fn infer_evaluates_a_model_without_python() {
     let mode = friction["mode"].as_f64().unwrap();
     assert!((0.0..=1.0).contains(&mode));
     place.refused(&["infer", &model, BAG, BAG], &["given once", BAG]);
-    let lines = place.expect(3, &["infer", &model, BAG, "again.bag"]);
+    // A copy under another name is the same pour.
+    place.refused(&["infer", &model, BAG, "again.bag"], &["recordings 1 and 2 show one formation"]);
+    // One whose depths are rounded otherwise stands for another pour.
+    let other = "ros2_inverse_depth.mcap";
+    copied(&place, other);
+    let lines = place.expect(3, &["infer", &model, BAG, other]);
     assert!(lines.contains("OUTSIDE THE MODEL"), "{lines}");
     assert!(lines.contains("material.restitution") && lines.contains("90 % interval"), "{lines}");
     let other = models.join("auto").display().to_string();

@@ -44,7 +44,7 @@ pub struct Limits {
     pub least_height: f64,
     /// Greatest volume under the surface `[m³]`.
     pub volume: f64,
-    /// Least volume under it where all grains are in view `[m³]`.
+    /// Least volume under it where all grains are in view `[m³]`; none where some are a bed.
     pub least_volume: f64,
     /// Diameter of a typical grain `[m]`.
     pub diameter: f64,
@@ -88,11 +88,13 @@ impl Limits {
         let tops = positions.iter().zip(&*radii).map(|(at, radius)| at.z + radius);
         let grains: f64 = radii.iter().map(|r| 4.0 / 3.0 * std::f64::consts::PI * r.powi(3)).sum();
         let field = scene.camera.field_width;
+        // The grains of a bed are the ground that a formation lies on, and no part of it.
+        let all_seen = if scene.bed.is_some() { 0.0 } else { LEAST_VOLUME * grains };
         Some(Self {
             height: HEIGHT_MARGIN * tops.fold(0.0, f64::max),
             least_height: 2.0 * LEAST_HEIGHT * radii.iter().copied().fold(f64::INFINITY, f64::min),
             volume: VOLUME_MARGIN * grains,
-            least_volume: LEAST_VOLUME * grains,
+            least_volume: all_seen,
             diameter: scene.grains.diameter,
             extent: EXTENT_MARGIN * field * 0.5_f64.sqrt(),
             ground_sd: (GROUND_DIAMETERS * scene.grains.diameter).max(GROUND_FLOOR),
@@ -191,6 +193,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use granulcal_features::{HeightMap, Segmentation, Threshold, segment_height_map};
+    use granulcal_scene::{Bed, Projection};
 
     use super::*;
 
@@ -222,5 +225,13 @@ mod tests {
         // Leftovers of a pour that has rolled out of view are a formation of the scene.
         assert_eq!(limits.violations(&cone(8e-3, 0.015)), Vec::<String>::new());
         assert!(limits.doubts(&cone(0.03, 0.06)).is_empty());
+        // On a bed of some 10,000 grains it may be as small as it likes.
+        let bed = Bed { radius: 0.1, height: 0.03, spacing: 4.5e-3, jitter: 0.0, settle: 0.3 };
+        let mut on_bed = Scene { bed: Some(bed), ..Scene::drop(0.1) };
+        on_bed.camera.projection = Projection::Orthographic;
+        (on_bed.camera.pixels, on_bed.camera.downsample) = (200, 1);
+        let limits = Limits::of(&on_bed, &Prior::default()).unwrap().unwrap();
+        assert_eq!(limits.violations(&cone(0.02, 0.04)), Vec::<String>::new());
+        assert!(limits.doubts(&cone(0.02, 0.04)).is_empty());
     }
 }

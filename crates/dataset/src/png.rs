@@ -30,7 +30,9 @@ pub fn read_depth(path: &Path, depth_unit: f64) -> Result<DepthImage, DatasetErr
     let bytes = files::read_at_most(path, files::LARGEST_PART)?;
     image_file::depth(&bytes, unpack_limit(bytes.len() as u64))
         .map_err(|error| unreadable(path, error))
-        .and_then(|frame| Mean::new(frame).finish(depth_unit).map_err(|fault| fault.in_file(path)))
+        .and_then(|frame| {
+            Mean::new(frame, depth_unit).finish().map_err(|fault| fault.in_file(path))
+        })
 }
 
 /// Reads an 8-bit RGB PNG or JPEG; an alpha channel is dropped.

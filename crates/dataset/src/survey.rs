@@ -2,9 +2,9 @@
 
 mod choose;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::fmt;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
@@ -49,6 +49,8 @@ pub struct Topic {
     /// Why the first of those cannot be read.
     fault: Option<Fault>,
     content: Content,
+    /// When its readable images were recorded, in the order of the file `[ns]`.
+    times: Vec<u64>,
 }
 
 /// What the first readable message of a topic says.
@@ -204,6 +206,7 @@ impl Topic {
             unreadable: 0,
             fault: None,
             content: Content::Other,
+            times: Vec::new(),
         }
     }
 
@@ -211,6 +214,9 @@ impl Topic {
         self.messages += 1;
         match Content::of(message) {
             Ok(content) => {
+                if matches!(content, Content::Picture { .. }) {
+                    self.times.push(message.time_ns);
+                }
                 if matches!(self.content, Content::Other) {
                     self.content = content;
                 }
@@ -225,6 +231,17 @@ impl Topic {
     /// Messages that can be read.
     pub fn whole(&self) -> u64 {
         self.messages - self.unreadable
+    }
+
+    /// Which of its images, in the order of the file, are those of a window in time, and where the last of them ends.
+    pub(crate) fn taken_within(&self, window: &Range<u64>) -> (HashSet<u64>, u64) {
+        let mut order: Vec<u64> = (0..self.times.len() as u64).collect();
+        // Files are in order of time, as a rule, but need not be.
+        order.sort_by_key(|&image| self.times[image as usize]);
+        let [first, end] = [window.start, window.end].map(|at| order.len().min(at as usize));
+        let chosen: HashSet<u64> = order[first..end].iter().copied().collect();
+        let end = chosen.iter().max().map_or(0, |last| last + 1);
+        (chosen, end)
     }
 
     /// The frame of reference of its images, empty where none is given.
@@ -287,5 +304,30 @@ impl fmt::Display for Topic {
             _ => write!(f, ", {}", self.encoding)?,
         }
         write!(f, ", {} messages)", self.messages)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_is_of_times_wherever_the_messages_stand() {
+        let [topic, schema, encoding] = ["/depth", "Image", "cdr"].map(str::to_owned);
+        let mut depth = Topic::new(&Channel { topic, schema, encoding });
+        depth.times = vec![9, 8, 7, 1, 2, 3];
+        let taken = |window| {
+            let (chosen, end) = depth.taken_within(&window);
+            let chosen: std::collections::BTreeSet<_> = chosen.into_iter().collect();
+            (chosen.into_iter().collect::<Vec<_>>(), end)
+        };
+        // The last three in time are the first of the file.
+        assert_eq!(taken(3..6), (vec![0, 1, 2], 3));
+        assert_eq!(taken(0..2), (vec![3, 4], 5));
+        assert_eq!(taken(0..6), (vec![0, 1, 2, 3, 4, 5], 6));
+        // Frames of one time stay in the order of the file.
+        depth.times = vec![5; 4];
+        let (chosen, end) = depth.taken_within(&(2..4));
+        assert!(chosen.contains(&2) && chosen.contains(&3) && (chosen.len(), end) == (2, 4));
     }
 }

@@ -90,6 +90,16 @@ impl Acting {
         self.effects.iter().fold(restitution, |e, effect| effect.restitution_at(e, speed))
     }
 
+    /// Lets act what does so before gravity: what it finds is how grains move, not how they would fall; returns the work
+    /// of moving walls, per typical mass `[m^2/s^2]`.
+    pub fn act_before_gravity(
+        &self,
+        particles: &mut Particles,
+        context: &EffectContext<'_>,
+    ) -> f64 {
+        self.effects.iter().map(|effect| effect.act_before_gravity(particles, context)).sum()
+    }
+
     /// Lets act what does so with gravity, before contacts are assembled; returns the energy that it gives, per typical
     /// mass `[m^2/s^2]`.
     pub fn act_with_gravity(&self, particles: &mut Particles, context: &EffectContext<'_>) -> f64 {
@@ -97,14 +107,14 @@ impl Acting {
     }
 
     /// Lets act what does so across gaps, after the impacts: what a pull adds in a substep to a closed contact is not
-    /// an impact.
+    /// an impact. Returns the work of moving walls, per typical mass `[m^2/s^2]`.
     pub fn act_across_gaps(
         &self,
         particles: &mut Particles,
         context: &EffectContext<'_>,
         bridges: &mut Bridges,
-    ) {
-        self.effects.iter().for_each(|effect| effect.act_across_gaps(particles, context, bridges));
+    ) -> f64 {
+        self.effects.iter().map(|effect| effect.act_across_gaps(particles, context, bridges)).sum()
     }
 
     /// Whether an effect has contacts of its own.

@@ -2,7 +2,7 @@
 //!
 //! Pure functions without loops over contacts; docs/theory/contact.md derives them.
 
-use granulcal_scene::{Effect, GrainShape, Scene};
+use granulcal_scene::{Effect, Effects, GrainShape, Scene, Start};
 use nalgebra::Vector3;
 
 use crate::lanes::{Reg, Reg3, Width};
@@ -11,14 +11,26 @@ use crate::turning::nutates;
 /// Number of the law that pours follow: of contacts, impacts, starts and of how all of it is solved.
 ///
 /// It counts up whenever the physics of a pour changes, whatever the version of the package: data sets, checkpoints,
-/// models and kept pours state it, so that pours of two laws are never mixed. 1 had impacts one by one; 2 has them as
+/// models and kept pours state it, so that pours of two laws are never mixed. Laws that only some scenes follow have
+/// numbers of their own. 1 had impacts one by one; 2 has them as
 /// springs in the limit of infinite stiffness. Of grains below 4 mm it is another, [`law_of`].
 pub const LAW: u32 = 2;
 /// The number of the law of smaller grains, whose small lengths and speeds go with their size (`Small`).
 const LAW_OF_SMALL: u32 = 3;
+/// The number of the law of scenes with forces across gaps, of any size: pulls take the work that parting costs, and
+/// films what they take along a way, whatever the substep; of a fluid between crowded grains; of a funnel that is moved
+/// with the grains of every start.
+const LAW_ACROSS_GAPS: u32 = 4;
 
 /// Number of the law that pours of a scene follow.
 pub fn law_of(scene: &Scene) -> u32 {
+    let Effects { adhesion, capillary, lubrication, fluid, funnel, .. } = &scene.effects;
+    let is_between = fluid.is_on() && fluid.crowding > 0.0 && fluid.crowding < 1.0;
+    let is_moved = funnel.is_on() && !matches!(scene.start, Start::Grid { .. });
+    let reaches = adhesion.is_on() || capillary.is_on() || lubrication.is_on();
+    if reaches || is_between || is_moved {
+        return LAW_ACROSS_GAPS;
+    }
     if scene.grains.radius() < LARGE { LAW_OF_SMALL } else { LAW }
 }
 
@@ -192,6 +204,8 @@ mod tests {
         sand.grains.diameter = 1e-3;
         let small = Small::of(&sand);
         assert_eq!((law_of(&sand), small.slowness, small.impact_speed), (LAW_OF_SMALL, 0.5, 0.025));
+        sand.effects.adhesion.bond = 1.0;
+        assert_eq!(law_of(&sand), LAW_ACROSS_GAPS);
         // At the substep of large grains nothing below 12 mm/s is an impact.
         sand.grains.diameter = 1e-5;
         assert!((Small::of(&sand).impact_speed - 2.5 * 9.81 / 2000.0).abs() < 1e-12);

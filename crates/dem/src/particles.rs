@@ -22,6 +22,9 @@ pub(crate) struct Particles {
     pub bodies: Vec<Body>,
     /// How far into the substep each grain's sphere is `[s]`: the time of its last impact, else 0.
     pub clocks: Vec<f64>,
+    /// The clocks of this substep once the spheres are back at its begin; empty without an impact.
+    #[serde(skip)]
+    pub struck: Vec<f64>,
     /// Mass of a typical grain over the grain's mass `[-]`; impulses are in units of that mass.
     pub inverse_mass: Vec<f64>,
     /// Whether each grain has left the scene; empty as long as none has.
@@ -40,6 +43,7 @@ impl Particles {
             spheres,
             bodies: vec![Body::default(); count + 1],
             clocks: vec![0.0; count],
+            struck: Vec::new(),
             inverse_mass,
             left: Vec::new(),
             period,
@@ -286,6 +290,7 @@ impl Particles {
 
     /// Takes every grain back to the begin of the substep, to where its present motion would have begun.
     pub fn rewind(&mut self) {
+        self.struck.clone_from(&self.clocks);
         for ((sphere, body), clock) in
             self.spheres.iter_mut().zip(&self.bodies).zip(&mut self.clocks)
         {

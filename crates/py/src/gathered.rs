@@ -63,9 +63,9 @@ impl GatheredBatch {
 
     /// Rows in all, found, brought, unhealthy, jammed, without grains in view.
     fn counts(&self) -> PyResult<(u64, u64, u64, u64, u64, u64)> {
-        let Progress { total, resumed, made, unhealthy, jammed, out_of_view, .. } =
+        let Progress { total, resumed, made, unhealthy, jammed, no_grains_in_view, .. } =
             self.open()?.progress();
-        Ok((total, resumed, made, unhealthy, jammed, out_of_view))
+        Ok((total, resumed, made, unhealthy, jammed, no_grains_in_view))
     }
 
     /// Takes the bytes of a part; returns whether the batch lacked it.

@@ -14,7 +14,7 @@ use crate::signals::Watch;
 
 /// Makes the rows that a folder lacks, by our simulator or by `engine`, a pair of its name and a function of
 /// (scene, seed) that returns (positions, radii), or points alone; `progress` is called with (total, resumed, made,
-/// unhealthy, jammed, out of view). Of `shard`, a pair (index, count), those of this shard;
+/// unhealthy, jammed, without grains in view). Of `shard`, a pair (index, count), those of this shard;
 /// `chunk` rows are a part.
 ///
 /// On Ctrl-C the finished rows are written before KeyboardInterrupt is raised.
@@ -91,6 +91,6 @@ fn foreign(py: Python<'_>, call: &Py<PyAny>, scene: &dem::Scene, seed: u64) -> P
 type Counts = (u64, u64, u64, u64, u64, u64);
 
 fn counts(progress: &Progress) -> Counts {
-    let Progress { total, resumed, made, unhealthy, jammed, out_of_view, .. } = *progress;
-    (total, resumed, made, unhealthy, jammed, out_of_view)
+    let Progress { total, resumed, made, unhealthy, jammed, no_grains_in_view, .. } = *progress;
+    (total, resumed, made, unhealthy, jammed, no_grains_in_view)
 }

@@ -4,13 +4,15 @@ use std::path::{Path, PathBuf};
 
 use granulcal_dataset::{Limits, Prior, Room};
 use granulcal_dem as dem;
+use granulcal_features::Formation;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::array::{Numbers, Vectors};
 use crate::pour::Pour;
 use crate::recording::Recording;
-use crate::{array, error};
+use crate::{array, error, segmentation};
 
 /// A scene, checked.
 #[pyclass(frozen, module = "granulcal._native")]
@@ -22,6 +24,27 @@ impl Scene {
     fn checked(inner: dem::Scene) -> PyResult<Self> {
         inner.check().map_err(error::dem)?;
         Ok(Self { inner })
+    }
+
+    /// What `judge` says of a recording's formation; nothing where the scene cannot begin.
+    fn judged(
+        &self,
+        py: Python<'_>,
+        prior_toml: &str,
+        recording: &Recording,
+        settings: Option<&Bound<'_, PyDict>>,
+        judge: fn(&Limits, &Formation) -> Vec<String>,
+    ) -> PyResult<Vec<String>> {
+        let prior = Prior::from_toml(prior_toml).map_err(error::dem)?;
+        let mut own = recording.inner.segmentation.clone();
+        own.ground_resolution = Some(self.inner.camera.ground_resolution());
+        let settings = segmentation::changed(&own, settings)?;
+        let found = py.detach(|| {
+            let Some(limits) = Limits::of(&self.inner, &prior)? else { return Ok(Vec::new()) };
+            let formation = recording.inner.formation_with(&settings);
+            formation.map(|formation| judge(&limits, &formation))
+        });
+        found.map_err(error::dataset)
     }
 }
 
@@ -56,22 +79,28 @@ impl Scene {
     }
 
     /// Why what a recording shows cannot be of this scene whose parameters are of a prior, a sentence each; none if it
-    /// can, or if that cannot be told.
+    /// can, or if that cannot be told. Keywords as `formation` of the recording.
+    #[pyo3(signature = (prior_toml, recording, **settings))]
     fn violations(
         &self,
         py: Python<'_>,
         prior_toml: &str,
         recording: &Recording,
+        settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Vec<String>> {
-        let prior = Prior::from_toml(prior_toml).map_err(error::dem)?;
-        let found = py.detach(|| {
-            let mut settings = recording.inner.segmentation.clone();
-            settings.ground_resolution = Some(self.inner.camera.ground_resolution());
-            let Some(limits) = Limits::of(&self.inner, &prior)? else { return Ok(Vec::new()) };
-            let formation = recording.inner.formation_with(&settings);
-            formation.map(|formation| limits.violations(&formation))
-        });
-        found.map_err(error::dataset)
+        self.judged(py, prior_toml, recording, settings, Limits::violations)
+    }
+
+    /// What makes it doubtful where it may be of this scene, a sentence each.
+    #[pyo3(signature = (prior_toml, recording, **settings))]
+    fn doubts(
+        &self,
+        py: Python<'_>,
+        prior_toml: &str,
+        recording: &Recording,
+        settings: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Vec<String>> {
+        self.judged(py, prior_toml, recording, settings, Limits::doubts)
     }
 
     fn to_toml(&self) -> PyResult<String> {

@@ -19,7 +19,7 @@ pub enum Preset {
     /// For data sets: penetration below 0.1 radii.
     #[default]
     Default,
-    /// For checking the others: a quarter of the step of `default` and twice the sweeps.
+    /// For checking the others: a third of the step of `default` and three times the sweeps.
     Accurate,
     /// For comparison with Matl et al. 2020: their solver and iterations, guarded.
     Paper,

@@ -135,13 +135,7 @@ impl Start {
         let (mut positions, jitter) = match self {
             &Self::Grid { counts, spacing, jitter, base } => {
                 let floor = funnel.map_or(0.0, Funnel::rim_height);
-                let mut points = grid(grains.count, counts, spacing, floor + base);
-                if let Some(pose) = pose {
-                    for point in &mut points {
-                        *point = (pose * Point3::from(*point)).coords;
-                    }
-                }
-                (points, jitter)
+                (grid(grains.count, counts, spacing, floor + base), jitter)
             }
             &Self::Ball { height, solid_fraction, jitter, turned } => {
                 let spacing = lattice_spacing(grains.diameter, solid_fraction);
@@ -155,10 +149,18 @@ impl Start {
                 (points, jitter)
             }
             Self::Positions { positions } => {
-                return positions.iter().map(|&position| Vector3::from(position)).collect();
+                (positions.iter().map(|&position| Vector3::from(position)).collect(), 0.0)
             }
         };
-        displace(&mut positions, jitter, &mut random);
+        // The grains hang with the funnel, however they are placed.
+        if let Some(pose) = pose {
+            for point in &mut positions {
+                *point = (pose * Point3::from(*point)).coords;
+            }
+        }
+        if !matches!(self, Self::Positions { .. }) {
+            displace(&mut positions, jitter, &mut random);
+        }
         positions
     }
 }
@@ -336,6 +338,27 @@ mod tests {
             let points = scene.starting_positions(3);
             assert_eq!(points.len(), 700);
             assert!(nearest_pair(&points) >= scene.grains.diameter);
+        }
+    }
+
+    #[test]
+    fn grains_hang_with_the_funnel_however_they_are_placed() {
+        let (from, to) = ([0.0, 0.0, 0.3], [0.0, 0.0, 0.5]);
+        let starts = [
+            Start::Cylinder { from, to, radius: 0.03, spacing: 5e-3, jitter: 0.0 },
+            Start::Ball { height: 0.3, solid_fraction: 0.5, jitter: 0.0, turned: false },
+            Start::Positions { positions: vec![[0.0, 0.0, 0.3]] },
+        ];
+        for start in starts {
+            let mut scene = Scene { start, ..Scene::funnel(0.12) };
+            if let Start::Positions { positions } = &scene.start {
+                scene.grains.count = positions.len();
+            }
+            let there = scene.starting_positions(1);
+            scene.effects.funnel.x = 0.03;
+            for (moved, place) in scene.starting_positions(1).iter().zip(&there) {
+                assert!((moved - place - Vector3::new(0.03, 0.0, 0.0)).norm() < 1e-12);
+            }
         }
     }
 

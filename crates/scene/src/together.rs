@@ -10,6 +10,9 @@ use crate::preset::Preset;
 use crate::scene::Scene;
 use crate::start::Start;
 
+/// Fewest substeps in a period of a table that shakes `[-]`.
+const LEAST_OF_PERIOD: f64 = 10.0;
+
 impl Scene {
     /// Refuses what cannot be with something else that is there.
     ///
@@ -25,13 +28,25 @@ impl Scene {
         self.check_fluid()?;
         self.check_liquid()?;
         self.check_bonds()?;
+        self.check_layer()?;
+        self.check_vibration()?;
         self.check_of_funnel()
     }
 
     /// What grains that are not round cannot be with.
     fn check_clump(&self) -> Result<(), SceneError> {
+        let Effects { polydispersity, adhesion, capillary, lubrication, fluid, .. } = &self.effects;
+        let among_grains = [fluid.crowding, fluid.entrained, fluid.saturated];
         let others = [
-            (self.effects.polydispersity.path(), self.effects.polydispersity.is_on()),
+            (polydispersity.path(), polydispersity.is_on()),
+            // They would act once for each pair of a clump's spheres.
+            (adhesion.path(), adhesion.is_on()),
+            (capillary.path(), capillary.is_on()),
+            (lubrication.path(), lubrication.is_on()),
+            (
+                "effects.fluid.crowding, entrained or saturated",
+                fluid.is_on() && among_grains.iter().any(|&share| share > 0.0),
+            ),
             ("outflow", self.outflow.is_some()),
             ("periodic", self.periodic.is_some()),
         ];
@@ -178,8 +193,38 @@ impl Scene {
     /// What a fluid around the grains cannot be with: where it fills them up to their own surface that has an end.
     fn check_fluid(&self) -> Result<(), SceneError> {
         let is_in_them = self.effects.fluid.is_on() && self.effects.fluid.saturated > 0.0;
-        let others = [("periodic", self.periodic.is_some())];
+        let slopes = self.gravity[0] != 0.0 || self.gravity[1] != 0.0 || self.gravity[2] >= 0.0;
+        let others = [
+            ("periodic", self.periodic.is_some()),
+            // Its pressure is that of a fluid below a surface that is told along the ground's normal.
+            ("effects.tilt", self.effects.tilt.is_on()),
+            ("gravity that is not along -z", slopes),
+        ];
         if is_in_them { exclude("effects.fluid.saturated", &others) } else { Ok(()) }
+    }
+
+    /// What pulls and films cannot be with: the ground that they see is the hard one, below a soft layer.
+    fn check_layer(&self) -> Result<(), SceneError> {
+        let Effects { layer, adhesion, capillary, lubrication, .. } = &self.effects;
+        let others: [&dyn Effect; 3] = [adhesion, capillary, lubrication];
+        let others = others.map(|other| (other.path(), other.is_on()));
+        if layer.is_on() { exclude(layer.path(), &others) } else { Ok(()) }
+    }
+
+    /// Refuses a table that shakes too fast for the substeps.
+    fn check_vibration(&self) -> Result<(), SceneError> {
+        let vibration = &self.effects.vibration;
+        let in_period = 1.0 / (vibration.frequency * self.settings().dt);
+        // A period of exactly so many is not refused for its rounding.
+        if vibration.is_on() && in_period < (1.0 - 1e-9) * LEAST_OF_PERIOD {
+            let allowed = "at most one period in ten substeps, 200 Hz with preset default";
+            return Err(SceneError::range(
+                "effects.vibration.frequency",
+                vibration.frequency,
+                allowed,
+            ));
+        }
+        Ok(())
     }
 
     /// Refuses what says how the funnel is where there is none.
@@ -229,6 +274,37 @@ mod tests {
                 Scene::drop(0.1).with(path, value).unwrap();
             }
         }
+    }
+
+    #[test]
+    fn effects_that_would_be_wrong_together_are_refused_by_name() {
+        let refused = |base: Scene, path: &str, value: f64, other: &str| {
+            let said = base.with(path, value).unwrap_err().to_string();
+            assert!(said.contains(other), "{path}: {said}");
+        };
+        let drop = || Scene::drop(0.1);
+        let mut clumps = drop();
+        clumps.effects.clump.aspect = 1.3;
+        for path in
+            ["effects.adhesion.bond", "effects.capillary.bond", "effects.lubrication.viscosity"]
+        {
+            let other = path.rsplit_once('.').unwrap().0;
+            drop().with(path, 0.5).unwrap();
+            refused(clumps.clone(), path, 0.5, other);
+            refused(drop().with("effects.layer.thickness", 1e-3).unwrap(), path, 0.5, other);
+        }
+        clumps.effects.fluid.density = 1000.0;
+        clumps.check().unwrap();
+        refused(clumps, "effects.fluid.crowding", 1.0, "effects.fluid.crowding");
+        let mut wet = drop();
+        (wet.effects.fluid.density, wet.effects.fluid.saturated) = (1000.0, 1.0);
+        wet.check().unwrap();
+        refused(wet.clone(), "effects.tilt.x", 0.1, "effects.tilt");
+        wet.gravity[0] = 1.0;
+        assert!(wet.check().unwrap_err().to_string().contains("gravity"));
+        let shaken = drop().with("effects.vibration.acceleration", 0.3).unwrap();
+        shaken.with("effects.vibration.frequency", 200.0).unwrap();
+        refused(shaken, "effects.vibration.frequency", 201.0, "ten substeps");
     }
 
     #[test]

@@ -53,7 +53,7 @@ class BayesSim:
         average: how much both count in the posterior of one pour.
         summary: what the training did, with every excluded pair counted.
         misfit_reference: residuals that an observation of a right model can have.
-        calibration: check on pairs that were not trained on, or None if there were too few.
+        calibration: check on pairs, each by a fit without it, or None if there were too few.
         identifiability: what an observation tells on average, or None likewise.
         scene_toml: the scene of the training data, or None.
         law: number of the solver's law that the training's pours follow; 0 for another simulator,
@@ -165,7 +165,11 @@ class BayesSim:
             misfit_reference=made.misfit,
             summary=made.summary,
             calibration=Calibration.of(
-                pairs.prior, made.posteriors, made.truth, draw_count=_CHECK_DRAWS
+                pairs.prior,
+                made.posteriors,
+                made.truth,
+                draw_count=_CHECK_DRAWS,
+                chose_form=made.chose_form,
             )
             if enough
             else None,

@@ -49,7 +49,7 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named
-    from granulcal.measured.plausible import violations
+    from granulcal.measured.plausible import doubts, violations
     from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
     from granulcal.progress import shown
@@ -65,6 +65,11 @@ def _run(options: argparse.Namespace) -> int:
         document = told_outside(options, impossible)
         print(json.dumps(document, indent=1) if options.json else outside(impossible))
         return UNHEALTHY
+    doubtful = doubts(scene, prior, recordings, options.recording)
+    for doubt in doubtful:
+        print(f"warning: {doubt}", file=sys.stderr)
+    # Told when the recordings were opened.
+    unlike = [f"{r.path}: {r.unlike}" for r in recordings if r.unlike is not None]
     first: list[int] = []
 
     def poured(kept: int) -> None:
@@ -98,7 +103,7 @@ def _run(options: argparse.Namespace) -> int:
         "pours": len(found.x),
         "usable": found.rounds[-1].usable,
         "left_out": found.left_out.to_dict(),
-        "warnings": [str(warning) for warning in posterior.warnings],
+        "warnings": [*unlike, *doubtful, *map(str, posterior.warnings)],
         "samples": posterior.sample(_SAMPLES).tolist(),
     }
     write_beside(options.out / "posterior.json", json.dumps(document, indent=1) + "\n")
@@ -110,7 +115,7 @@ def _run(options: argparse.Namespace) -> int:
     _print_parameters(document["parameters"])
     print(f"{found.rounds[-1]}; {found.choice}")
     print(f"pours that cannot be used: {found.left_out}")
-    for warning in document["warnings"]:
+    for warning in posterior.warnings:
         print(f"note: {warning}", file=sys.stderr)
     return exit_code_of(recordings, found.misfit.is_inside)
 

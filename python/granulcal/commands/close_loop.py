@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import shlex
 import sys
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -100,7 +101,8 @@ def _run(options: argparse.Namespace) -> int:
         from granulcal.loop.task import Task
 
         task = Task.load(_file(options))
-        task.require_readable()
+        for doubt in task.require_readable():
+            print(f"warning: {doubt}", file=sys.stderr)
         with pouring_with(engine):
             return say_how_long(options, task.at_first(), task.prior, options.budget)
     aside = contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext()
@@ -121,13 +123,16 @@ def _close(options: argparse.Namespace) -> int:
     from granulcal.loop.effects.tolerance import Tolerances
     from granulcal.loop.report.folder import write_report
     from granulcal.loop.task import Task
+    from granulcal.measured.recording import UnlikeFramesWarning
 
     path = _file(options)
     task = Task.load(path)
     if options.tolerances is not None:
         task = replace(task, tolerances=Tolerances.load(options.tolerances))
     task = _told(task)
-    with shown():
+    with shown(), warnings.catch_warnings():
+        # Told among the doubts of the recordings.
+        warnings.simplefilter("ignore", UnlikeFramesWarning)
         closed = close_loop(
             task,
             options.out,
@@ -138,18 +143,23 @@ def _close(options: argparse.Namespace) -> int:
             pairs=options.pairs,
             rounds=options.rounds,
         )
-    words: list[str | Path] = ["granulcal", "close-loop", path, "-o", options.out]
-    for name in ("archive", "tolerances", "pairs", "rounds", "engine"):
-        if value := getattr(options, name):
-            words += [f"--{name}", str(value)]
-    words += ["--budget", str(options.budget), "--seed", str(options.seed)]
     write_report(
         closed,
         options.out,
-        command=shlex.join(map(str, words)),
+        command=_command(options, path),
         title=f"Closing the loop on {path}",
     )
     return 0 if closed.standing.stands else _FALLEN
+
+
+def _command(options: argparse.Namespace, task: Path) -> str:
+    """The command line that makes the report again."""
+    words: list[str | Path] = ["granulcal", "close-loop", task, "-o", options.out]
+    for name in ("archive", "tolerances", "pairs", "rounds", "engine", "budget", "seed"):
+        # A zero is not the default.
+        if (value := getattr(options, name)) is not None:
+            words += [f"--{name}", str(value)]
+    return shlex.join(map(str, words))
 
 
 def _told(task: "Task") -> "Task":

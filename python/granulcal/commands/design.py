@@ -3,11 +3,16 @@
 import argparse
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.counts import pour_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
+from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.paths import READS, writes
+
+if TYPE_CHECKING:
+    from granulcal.design.ring_model import RingModel
+    from granulcal.pours.left_out import LeftOut
 
 __all__ = ["add"]
 
@@ -30,6 +35,7 @@ observe radius[5] and radius[50].
 Written to -o: plan.csv and plan.json (height with its 90 % interval, expected radii with the spread
 between pours), plan.png (all pours simulated one after another). A ring beyond the heights of the
 training is refused unless --extrapolate, radii that no height gives together always.
+Exit code 3: pours are unhealthy or jam the plan, or the posterior is outside its model.
 """
 _SPILL = """\
 Find the probability that a pour spills grains, against the height of the funnel.
@@ -43,9 +49,9 @@ of spilled grains is modelled, so that each --grains k has its P(spilled >= k) w
 
 With --posterior every pour has a material of its own from that file, and the band holds what is not
 known of the material; without it the scene's material is taken as known.
-Written to -o: pours.json, spill.csv, spill.json, spill.png.
+Written to -o: pours.json, spill.csv, spill.json, spill.png. Exit code 3: pours are unhealthy, or the
+posterior is outside its model.
 """
-_UNHEALTHY = 3
 
 
 def add(commands: Any) -> None:
@@ -190,16 +196,19 @@ def _rings(options: argparse.Namespace) -> int:
     rings += [Ring(outer=outer) for outer in options.pile]
     if not rings and options.held_out is None:
         raise ValueError("nothing is wanted: give --ring INNER OUTER, --pile OUTER or --held-out N")
-    model = _ring_model(options)
+    model, is_inside = _ring_model(options)
     print(model, file=sys.stderr if options.json else sys.stdout)
+    unusable = model.unusable
     if options.held_out is not None:
         # Seeds of the training and of its check must differ.
         held_out = model.held_out(
             options.held_out, seed=options.seed + 1, out=options.out, threads=options.threads
         )
         print(held_out, file=sys.stderr if options.json else sys.stdout)
+        unusable += held_out.unusable
+    code = _code(unusable, is_inside)
     if not rings:
-        return 0
+        return code
     plan = design_rings(model, rings, tolerance=options.tolerance, extrapolate=options.extrapolate)
     plan.save(options.out)
     pattern = simulate_plan(plan, seed=options.seed)
@@ -212,21 +221,33 @@ def _rings(options: argparse.Namespace) -> int:
         print(f"written to {options.out}: plan.csv, plan.json, plan.png")
     for note in pattern.notes:
         print(f"note: {note}", file=sys.stderr)
-    return 0 if pattern.is_whole else _UNHEALTHY
+    return code if pattern.is_whole else UNHEALTHY
 
 
-def _ring_model(options: argparse.Namespace) -> Any:
+def _code(unusable: "LeftOut", is_inside: bool) -> int:
+    """Returns the exit code of pours, and of a posterior that is inside of its model or not."""
+    if unusable.unhealthy:
+        print(f"note: pours that cannot be used: {unusable}", file=sys.stderr)
+    return UNHEALTHY if unusable.unhealthy or not is_inside else DONE
+
+
+def _ring_model(options: argparse.Namespace) -> "tuple[RingModel, bool]":
+    """Returns the model, and whether the posterior of its material is inside of its own."""
+    from granulcal.design.pattern import require_one_size
     from granulcal.design.posterior_file import PosteriorDraws
     from granulcal.design.ring_model import HEIGHT, RingModel
 
     if options.scene.is_dir():
         if options.set or options.posterior is not None:
             raise ValueError("--set and --posterior need a scene; a trained model has its material")
-        return RingModel.load(options.scene)
-    scene = _scene(options)
+        return RingModel.load(options.scene), True
+    scene, is_inside = _scene(options), True
+    if len(options.ring) + len(options.pile) > 1:
+        require_one_size(scene)
     if options.posterior is not None:
-        scene = PosteriorDraws.load(options.posterior).without(HEIGHT).at_mode(scene)
-    return RingModel.train(
+        draws = PosteriorDraws.load(options.posterior).without(HEIGHT)
+        scene, is_inside = draws.at_mode(scene), draws.is_inside
+    model = RingModel.train(
         scene,
         heights=tuple(options.heights),
         pours=options.pours,
@@ -234,6 +255,7 @@ def _ring_model(options: argparse.Namespace) -> Any:
         seed=options.seed,
         threads=options.threads,
     )
+    return model, is_inside
 
 
 def _spill(options: argparse.Namespace) -> int:
@@ -252,14 +274,15 @@ def _spill(options: argparse.Namespace) -> int:
         threads=options.threads,
     )
     forecast.save(options.out)
+    code = _code(forecast.unusable, draws is None or draws.is_inside)
     if options.json:
         print((options.out / "spill.json").read_text(encoding="utf-8"), end="")
-        return 0
+        return code
     print(forecast)
     for k in forecast.grains:
         print(forecast.advice(k, options.at_most))
     print(f"written to {options.out}: spill.csv, spill.json, spill.png")
-    return 0
+    return code
 
 
 def _scene(options: argparse.Namespace) -> Any:

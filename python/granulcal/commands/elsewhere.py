@@ -11,13 +11,16 @@ import numpy as np
 from granulcal import paths
 from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.dry_run import add_dry_run, say_how_long
+from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.commands.init import assignment
 from granulcal.commands.program import Parser
 from granulcal.files import beside
 from granulcal.paths import READS, writes
+from granulcal.pours.status import NO_GRAINS, UNUSABLE
 
 if TYPE_CHECKING:
     from granulcal.pours.scene import Scene
+    from granulcal.pours.simulate import Pour
 
 __all__ = ["is_asked", "parser", "run"]
 
@@ -44,7 +47,6 @@ _OURS = {
     "checkpoint_every": "it is run to its end",
     "resume": "it is run to its end",
 }
-_UNHEALTHY = 3
 
 
 def is_asked(words: Sequence[str]) -> bool:
@@ -124,19 +126,19 @@ def _simulate(options: argparse.Namespace) -> int:
             raise ValueError(f"--{name.replace('_', '-')} is not for {_ENGINE}: {why}")
     scene = _scene(options)
     pour = simulate(scene, seed=options.seed, engine=engine_named(options.engine))
-    statistics = pour.statistics().to_dict()
+    # Before anything is told of them: a pour may have taken hours.
     if options.positions is not None:
         with beside(options.positions) as temporary:
             np.save(temporary, pour.positions)
+    status, statistics, diagnostics = _seen(pour, options.diagnostics)
     document = {
         "scene": scene.name,
         "seed": options.seed,
         "engine": options.engine,
-        "status": pour.status,
+        "status": status,
         "grains_in_funnel": pour.grains_in_funnel,
         "statistics": statistics,
     }
-    diagnostics = pour.diagnostic_statistics().to_dict() if options.diagnostics else {}
     if options.diagnostics:
         document["diagnostics"] = diagnostics
     if options.json:
@@ -144,10 +146,24 @@ def _simulate(options: argparse.Namespace) -> int:
     else:
         print(f"scene              {scene.name} (seed {options.seed})")
         print(f"engine             {options.engine}")
-        print(f"status             {pour.status}")
-        for name, value in (statistics | diagnostics).items():
+        print(f"status             {status}")
+        for name, value in ((statistics or {}) | (diagnostics or {})).items():
             print(f"{name:<18} {value:<12.6f}")
-    return 0 if pour.status != "unhealthy" else _UNHEALTHY
+    return UNHEALTHY if status in ("unhealthy", NO_GRAINS) else DONE
+
+
+def _seen(
+    pour: "Pour", with_diagnostics: bool
+) -> tuple[str, dict[str, float] | None, dict[str, float] | None]:
+    """Returns status, statistics and diagnostics of a pour, None where they cannot be told."""
+    try:
+        statistics = pour.statistics().to_dict()
+        diagnostics = pour.diagnostic_statistics().to_dict() if with_diagnostics else None
+    except ValueError as error:
+        print(f"warning: no statistics: {error}", file=sys.stderr)
+        says_enough = pour.status in UNUSABLE or pour.scene.observed_names
+        return (pour.status if says_enough else NO_GRAINS), None, None
+    return pour.status, statistics, diagnostics
 
 
 def _generate(options: argparse.Namespace) -> int:
@@ -187,7 +203,7 @@ def _generate(options: argparse.Namespace) -> int:
     left_out = data.left_out
     if left_out.total:
         print(f"note: pours that cannot be used: {left_out}", file=sys.stderr)
-    return 0 if not left_out.total else _UNHEALTHY
+    return UNHEALTHY if left_out.total else DONE
 
 
 def _refuse(options: argparse.Namespace) -> None:

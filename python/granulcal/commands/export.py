@@ -102,7 +102,9 @@ def _add_bed(words: Any) -> None:
     parser.add_argument(
         "--positions", type=READS, help="centres [m] of `simulate --positions`, instead of a pour"
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the pour (default: 0)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="seed of the pour, of --positions too (default: 0)"
+    )
     _add_common(parser, "the file")
     parser.set_defaults(run=_bed)
 
@@ -165,12 +167,16 @@ def _scene(options: argparse.Namespace) -> int:
 def _bed(options: argparse.Namespace) -> int:
     from granulcal.arrays import read_array
     from granulcal.export import export_bed
+    from granulcal.export.setup import Setup
     from granulcal.pours.simulate import simulate
 
     scene = _loaded(options)
+    # What cannot be exported is told before a pour.
+    Setup.of(scene, options.seed)
     if options.positions is not None:
         positions, radii = read_array(options.positions), None
     else:
         pour = simulate(scene, seed=options.seed)
         positions, radii = pour.positions, pour.radii
-    return _told(options, [export_bed(scene, positions, radii, options.to, options.out)])
+    file = export_bed(scene, positions, radii, options.to, options.out, seed=options.seed)
+    return _told(options, [file])

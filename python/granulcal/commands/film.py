@@ -38,6 +38,10 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--slow", type=float, default=2.0, help="seconds of film for one of the pour (default: 2)"
     )
+    parser.add_argument(
+        "--most-frames", type=int, default=120,
+        help="the film ends there, with the pour's last frame (default: 120)",
+    )  # fmt: skip
     parser.add_argument("--width", type=int, default=480, help="pixels (default: 480)")
     parser.add_argument(
         "--set", action="append", default=[], type=assignment, metavar="PATH=VALUE",
@@ -59,13 +63,23 @@ def _run(options: argparse.Namespace) -> int:
         fps=options.fps,
         slow=options.slow,
         width=options.width,
+        most_frames=options.most_frames,
         progress=_line if sys.stderr.isatty() else None,
+        dropped=lambda count: _tell_dropped(count, options.most_frames),
     )
     if options.json:
         print(json.dumps({"file": str(options.out), "frames": frames}))
     else:
         print(f"{options.out}: {frames} frames")
     return 0
+
+
+def _tell_dropped(count: int, most: int) -> None:
+    print(
+        f"note: {count} frames of the pour are left out before the last one, for the film has at "
+        f"most {most}: --most-frames sets another number",
+        file=sys.stderr,
+    )
 
 
 def _line(time: float) -> None:

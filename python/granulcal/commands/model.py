@@ -15,7 +15,7 @@ _TEXT = "make a model of a built-in scene once, for `infer funnel RECORDING`"
 _DESCRIPTION = """\
 Simulate a built-in scene, train a model on it and keep it where `infer` finds it by the scene's name:
 
-  granulcal model funnel                      1000 pours, about 35 minutes on 2 cores; it goes on after a stop
+  granulcal model funnel                      1000 pours, 20 to 25 minutes on 2 cores; it goes on after a stop
   granulcal infer funnel couscous.bag
 
   granulcal generate funnel default -n 1000 -o pours     the same pours, made elsewhere or long ago

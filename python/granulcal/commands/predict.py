@@ -31,7 +31,7 @@ differ:
     granulcal predict loop --at funnel.height=0.07 --model line  straight line through the means
 
 The correction knows no physics and holds between and near the measured conditions alone; farther
-away it is refused. Intervals are those of one pour. Exit code 3: the loop's verdict
+away it is refused. A loop closed with --engine pours with the same. Intervals are those of one pour. Exit code 3: the loop's verdict
 does not stand.
 """
 
@@ -70,20 +70,28 @@ def add(commands: Any) -> None:
         "--pours", type=pour_count, default=20, help="simulated pours (default: 20)"
     )
     parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument(
+        "--engine", help="the simulator with which the loop was closed, if not ours"
+    )
     add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="everything as JSON on stdout")
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
+    from granulcal.engines import engine_named, pouring_with
     from granulcal.loop.pours.forward import Forward
     from granulcal.loop.report.models import Models, condition_of
 
     models, threads = Models.load(options.loop), options.threads or os.cpu_count() or 1
-    at = condition_of(options.at)
+    at, engine = condition_of(options.at), None
+    if options.engine is not None:
+        engine = engine_named(options.engine)
     if options.dry_run:
-        return _say_how_long(options, models.scenes(options.model or "named", at), threads)
-    with shown():
+        with pouring_with(engine):
+            models.require_engine(options.model or "named")
+            return _say_how_long(options, models.scenes(options.model or "named", at), threads)
+    with shown(), pouring_with(engine):
         found = models.predict(
             options.model or "named",
             at,

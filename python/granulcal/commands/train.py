@@ -1,4 +1,4 @@
-"""The word `train`: BayesSim on a data set, checked on pours kept aside."""
+"""The word `train`: BayesSim on a data set, checked on pours left out of a fit."""
 
 import argparse
 from typing import Any
@@ -14,8 +14,13 @@ __all__ = ["add"]
 
 def add(commands: Any) -> None:
     """Adds the word to the command line."""
-    text = "train BayesSim on a data set and check its calibration on pours kept aside"
-    parser = commands.add_parser("train", help=text, description=text)
+    text = "train BayesSim on a data set and check its calibration on pours left out of it"
+    more = (
+        "train BayesSim on a data set and check its calibration on pours left out of it in turn; "
+        "the emulator's form is chosen by the same pours, so that `check --data` with others is "
+        "stricter"
+    )
+    parser = commands.add_parser("train", help=text, description=more)
     parser.add_argument("data", type=READS, help="folder of `generate`, or one Parquet file")
     parser.add_argument(
         "-o", "--out", type=writes("model"), required=True, help="folder of the model"

@@ -7,16 +7,20 @@ $$ y \sim \mathrm{BetaBinomial}(n, p, \rho), \qquad
 
 with Chebyshev polynomials T_j and rho the correlation of two grains of one pour: the variance is
 $n p (1 - p) (1 + (n - 1) \rho)$, so that rho = 0 is a binomial. The coefficients are those of
-iterated weighted least squares under a weak normal prior, rho has the largest likelihood, and the
-coefficients' uncertainty is the normal one at their place. The polynomial has the degree, 1 to 3,
-of the least BIC: a bend that few grains hint at would turn the curve up where none are spilled.
+iterated weighted least squares under a weak normal prior, and rho has the largest likelihood. The
+coefficients' uncertainty is their posterior at that rho: draws of a multivariate t about their
+place, weighted by posterior over t, and drawn again by their weights. A normal in its place is far
+off where no pour spills: the likelihood is flat on one side, and half of the normal lies on the
+other. The polynomial has the degree, 1 to 3, of the least BIC: a bend that few grains hint at would
+turn the curve up where none are spilled.
 
 Reference:
     Williams, Extra-binomial variation in logistic linear models, Applied Statistics 31, 1982.
 """
 
+import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +33,10 @@ _DEGREES = (1, 2, 3)
 # Standard deviations of the coefficients' prior: of the level, of the height, of the material.
 _LEVEL_SD, _HEIGHT_SD, _MATERIAL_SD = 20.0, 5.0, 1.0
 _ROUNDS = 60
+# Draws to weight, the share of them that must count, and how often the t is moved for that.
+_DRAWN, _ENOUGH, _ADAPTATIONS = 4000, 0.2, 10
+# Degrees of freedom of the t, and how much wider it is than what it stands for.
+_FREEDOM, _WIDER = 5.0, 1.5
 _RHO = (1e-7, 0.5)
 _RHO_ROUNDS = 40
 _GOLDEN = (np.sqrt(5) - 1) / 2
@@ -46,9 +54,11 @@ class CountModel:
         low: lowest height [m].
         high: highest height [m].
         coefficients: a, b, c, shape (d,).
-        covariance: of their uncertainty, shape (d, d).
+        covariance: of a normal at their place, shape (d, d).
         rho: correlation of two grains of one pour [-].
         log_likelihood: of the counts that it was fitted to.
+        rows, counts, precision: what it was fitted to, shapes (m, d) and (m,), and that of the
+            coefficients' prior, (d, d).
     """
 
     total: int
@@ -57,7 +67,10 @@ class CountModel:
     coefficients: Array
     covariance: Array
     rho: float
-    log_likelihood: float = float("nan")
+    log_likelihood: float
+    rows: Array = field(repr=False)
+    counts: Array = field(repr=False)
+    precision: Array = field(repr=False)
 
     @classmethod
     def fit(
@@ -100,7 +113,9 @@ class CountModel:
         log_rho = _maximise(lambda x: at(x)[0], *np.log(_RHO))
         likelihood, coefficients, covariance = at(log_rho)
         rho = float(np.exp(log_rho))
-        return cls(total, low, high, coefficients, covariance, rho, likelihood)
+        return cls(
+            total, low, high, coefficients, covariance, rho, likelihood, rows, counts, precision
+        )
 
     def shares(self, heights: Array, material: Array, coefficients: Array) -> Array:
         """Returns p at heights (h,) for m draws, shape (h, m).
@@ -118,8 +133,48 @@ class CountModel:
         return found
 
     def draw(self, count: int, generator: np.random.Generator) -> Array:
-        """Returns draws of the coefficients, shape (count, d)."""
-        return generator.multivariate_normal(self.coefficients, self.covariance, count)
+        """Returns draws of the coefficients' posterior at rho, shape (count, d)."""
+        middle, scale = self.coefficients, _WIDER * self.covariance
+        drawn, weight = self._weighted_draws(middle, scale, generator)
+        for _ in range(_ADAPTATIONS):
+            if _effective(weight) >= _ENOUGH * _DRAWN:
+                break
+            # Milder weights, of which enough count, say where the next draws must be.
+            power = 1.0
+            while _effective(weight**power) < _ENOUGH * _DRAWN / 4:
+                power /= 1.5
+            mild = weight**power / np.sum(weight**power)
+            middle = mild @ drawn
+            scale = _WIDER * np.cov(drawn.T, aweights=mild, bias=True).reshape(2 * [len(middle)])
+            drawn, weight = self._weighted_draws(middle, scale, generator)
+        if _effective(weight) < count:
+            warnings.warn(
+                f"the forecast's band is of {_effective(weight):.0f} draws that count, where "
+                f"{count} are wanted: pours at other heights would tell more",
+                stacklevel=2,
+            )
+        # Systematic: each draw as often as its weight says, to within one.
+        share = np.cumsum(weight) / weight.sum()
+        at = (generator.random() + np.arange(count)) / count
+        chosen = np.minimum(np.searchsorted(share, at), len(share) - 1)
+        return generator.permutation(drawn[chosen])
+
+    def _weighted_draws(
+        self, middle: Array, scale: Array, generator: np.random.Generator
+    ) -> tuple[Array, Array]:
+        """Returns draws of a multivariate t, and posterior over t but for a factor."""
+        dimension = len(middle)
+        root = np.linalg.cholesky(scale)
+        normal = generator.standard_normal((_DRAWN, dimension))
+        stretch = np.sqrt(_FREEDOM / generator.chisquare(_FREEDOM, _DRAWN))
+        unit = normal * stretch[:, None]
+        drawn = middle + unit @ root.T
+        log_t = -0.5 * (_FREEDOM + dimension) * np.log1p(np.sum(unit**2, axis=1) / _FREEDOM)
+        shares = _logistic(drawn @ self.rows.T)
+        log_prior = -0.5 * np.einsum("ij,jk,ik->i", drawn, self.precision, drawn)
+        log_likelihood = _log_likelihoods(self.counts, self.total, shares, self.rho)
+        log_weight = log_likelihood + log_prior - log_t
+        return drawn, np.exp(log_weight - log_weight.max())
 
 
 def beta_binomial_tail(least: int, total: int, share: Array, rho: float) -> Array:
@@ -154,12 +209,12 @@ def beta_binomial_tail(least: int, total: int, share: Array, rho: float) -> Arra
 def log_gamma(x: Array) -> Array:
     """Returns log Gamma of positive numbers by Stirling's series above 10."""
     x = np.asarray(x, float)
-    shift: Array = np.zeros_like(x)
+    factor: Array = np.ones_like(x)
     up: Array = x.copy()
-    for _ in range(10):
-        small = (up < 10).astype(float)
-        shift = shift + small * np.log(up)
+    while (small := up < 10).any():
+        factor = np.where(small, factor * up, factor)
         up = up + small
+    shift = np.log(factor)
     series = 1 / (12 * up) - 1 / (360 * up**3) + 1 / (1260 * up**5) - 1 / (1680 * up**7)
     return (up - 0.5) * np.log(up) - up + _HALF_LOG_TWO_PI + series - shift
 
@@ -192,13 +247,23 @@ def _weighted(
     return coefficients, np.asarray(np.linalg.inv(hessian), float)
 
 
+def _effective(weight: Array) -> float:
+    """How many equal draws say as much as weighted ones."""
+    return float(np.sum(weight) ** 2 / np.sum(weight**2))
+
+
 def _log_likelihood(counts: Array, total: int, share: Array, rho: float) -> float:
+    return float(_log_likelihoods(counts, total, share, rho))
+
+
+def _log_likelihoods(counts: Array, total: int, share: Array, rho: float) -> Array:
+    """Of shares (..., m) of counts (m,), shape (...)."""
     size = 1 / rho - 1
     alpha, beta = share * size, (1 - share) * size
     terms = log_gamma(counts + alpha) - log_gamma(alpha)
     terms += log_gamma(total - counts + beta) - log_gamma(beta)
     terms += log_gamma(np.array(size)) - log_gamma(np.array(total + size))
-    return float(terms.sum())
+    return terms.sum(axis=-1)
 
 
 def _maximise(function: Callable[[float], float], low: float, high: float) -> float:

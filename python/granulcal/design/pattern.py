@@ -1,6 +1,7 @@
 """The whole plan simulated: each pour falls beside the grains of those before it."""
 
 import re
+import tomllib
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
 from granulcal.pours.status import UNUSABLE
 
-__all__ = ["Pattern", "simulate_plan"]
+__all__ = ["Pattern", "require_one_size", "simulate_plan"]
 
 Array = NDArray[np.float64]
 
@@ -72,8 +73,13 @@ def simulate_plan(plan: Plan, *, seed: int = 0) -> Pattern:
     Args:
         plan: the pours.
         seed: of the first pour; the next has the next.
+
+    Raises:
+        ValueError: several pours of grains that differ in size.
     """
     scene = Scene.from_toml(plan.scene_toml)
+    if len(plan.pours) > 1:
+        require_one_size(scene)
     positions, owner = np.empty((0, 3)), np.empty(0, np.intp)
     pours = []
     for i, planned in enumerate(plan.pours):
@@ -91,10 +97,25 @@ def simulate_plan(plan: Plan, *, seed: int = 0) -> Pattern:
     return Pattern(positions, pours[-1].radii, owner, statuses, np.array(rings), pours[-1].scene)
 
 
+def require_one_size(scene: Scene) -> None:
+    """Refuses grains that differ in size: those on the ground would get others with the next pour.
+
+    Raises:
+        ValueError: names what makes them differ.
+    """
+    if "polydispersity" in tomllib.loads(scene.to_toml()).get("effects", {}):
+        raise ValueError(
+            f"{scene.name}: a plan of several rings pours grains of one size beside each other; "
+            "effects.polydispersity must be left out, or one ring asked for"
+        )
+
+
 def _starting_at(scene: Scene, positions: Array) -> Scene:
     """The scene with these grains at rest in place of its start [m], shape (n, 3)."""
     listed = ", ".join(f"[{x:.9g}, {y:.9g}, {z:.9g}]" for x, y, z in positions)
     start = f'[start]\nkind = "positions"\npositions = [{listed}]\n\n'
     text = re.sub(r"(?ms)^\[start\]\n.*?(?=^\[)", start, scene.to_toml(), count=1)
-    text = re.sub(r"(?m)(?<=^count = )\d+$", str(len(positions)), text, count=1)
+    # Of every grain that is there, where the scene states the volume of a pour, too.
+    stated = r"(?ms)(^\[grains\]\n(?:(?!^\[).)*?)^(?:count|volume) = [^\n]*$"
+    text = re.sub(stated, rf"\g<1>count = {len(positions)}", text, count=1)
     return Scene.from_toml(text)

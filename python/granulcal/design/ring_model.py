@@ -80,6 +80,7 @@ class RingModel:
         reach: what heights give, from the usable pours.
         scene: the scene of the pours; its material is that of the plan.
         pour_count: pours simulated, the unusable ones too.
+        unusable: those, by why.
     """
 
     def __init__(self, bayes: "BayesSim", data: Dataset) -> None:
@@ -94,6 +95,7 @@ class RingModel:
                 f"{', '.join(bayes.prior.names)} from {', '.join(bayes.x_names)}"
             )
         self.bayes, self.scene, self.pour_count = bayes, data.scene, len(data)
+        self.unusable = data.left_out
         usable = data.is_usable
         self.reach = Reach(data.theta[usable, 0], data.x[usable])
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from granulcal.arrays import read_array
 from granulcal.engines.files import read_grains
-from granulcal.engines.protocol import Left, left
+from granulcal.engines.protocol import Fewer, Left, left
 from granulcal.pours.scene import Scene
 
 __all__ = ["CommandEngine", "last_words"]
@@ -33,9 +33,10 @@ class CommandEngine:
         self.name = text
         """The command."""
         self.timeout_s = timeout_s
+        self._fewer = Fewer(self.name)
 
     def __call__(self, scene: Scene, seed: int) -> Left:
-        """Returns what the command left.
+        """Returns what the command left; warns, once, of fewer grains than the scene's.
 
         Raises:
             ValueError: it failed, or left nothing; with its last words.
@@ -70,7 +71,9 @@ class CommandEngine:
                 raise ValueError(
                     f"engine {self.name!r} left no grains.npy, .csv, .dump or points.npy"
                 )
-            return left(self.name, grains)
+            found = left(self.name, grains)
+            self._fewer(found, scene)
+            return found
 
 
 def last_words(done: subprocess.CompletedProcess[str]) -> str:
@@ -83,5 +86,6 @@ def last_words(done: subprocess.CompletedProcess[str]) -> str:
 
 
 def _request(scene: Scene, seed: int) -> dict[str, object]:
-    grains = {name: scene.get(f"grains.{name}") for name in ("count", "diameter", "density")}
+    grains = {name: scene.get(f"grains.{name}") for name in ("diameter", "density")}
+    grains = {"count": round(scene.get("grains.count")), **grains}
     return {"seed": seed, "material": vars(scene.material), "grains": grains}

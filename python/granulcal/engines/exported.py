@@ -8,6 +8,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from granulcal.engines.command import last_words
 from granulcal.engines.files import read_grains
 from granulcal.engines.protocol import Left
@@ -112,6 +115,8 @@ class ExportedEngine:
     def run(self, scene: Scene, seed: int, folder: Path) -> Left:
         """Exports the pour into `folder`, runs it there and returns the grains.
 
+        Grains that it has lost have no place, NaN: such a pour is unhealthy.
+
         Raises:
             ValueError: the scene has effects, which no engine's file can be told; or it failed.
         """
@@ -133,7 +138,18 @@ class ExportedEngine:
         if grains is None:
             old = _too_old(self.engine, done.stdout)
             raise ValueError(f"engine {self.engine} left no grains: {last_words(done)}{old}")
-        return grains
+        return _whole(*grains, scene.start(seed)[1])
+
+
+def _whole(
+    centres: NDArray[np.float64], radii: NDArray[np.float64], all_radii: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Returns as many grains as began; those that are missing without a place."""
+    lost = len(all_radii) - len(radii)
+    if lost <= 0:
+        return centres, radii
+    nowhere = np.full((lost, 3), np.nan)
+    return np.concatenate([centres, nowhere]), np.concatenate([radii, all_radii[:lost]])
 
 
 def _too_old(engine: str, said: str) -> str:

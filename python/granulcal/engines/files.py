@@ -14,14 +14,15 @@ __all__ = ["read_grains"]
 Array = NDArray[np.float64]
 NAMES = ("grains.npy", "grains.csv", "grains.dump")
 """Where grains may stand, the first that is there."""
+_PLACES = ("x", "y", "z")
 
 
 def read_grains(folder: Path, radius: float | None = None) -> tuple[Array, Array] | None:
     """Returns centres [m] (n, 3) and radii [m] (n,) in a folder, None if there is no such file.
 
     Args:
-        folder: with one of grains.npy (x, y, z and perhaps radius), grains.csv (the same, with a
-            head) or grains.dump (of LAMMPS, columns id, x, y, z, radius).
+        folder: with one of grains.npy (x, y, z and perhaps radius), grains.csv (the same, in the
+            order that its first line names) or grains.dump (of LAMMPS, columns id, x, y, z, radius).
         radius: of all grains, where the file states none [m].
 
     Raises:
@@ -44,12 +45,28 @@ def _table(path: Path) -> Array:
     if path.suffix == ".npy":
         return read_array(path)
     if path.suffix == ".csv":
-        text = read_bytes(path).decode("utf-8", "replace")
-        try:
-            return np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1, ndmin=2)
-        except ValueError as error:
-            raise ValueError(f"{path}: not a table of numbers: {error}") from None
+        return _csv(path)
     return _dump(path)
+
+
+def _csv(path: Path) -> Array:
+    """Returns x, y, z and perhaps radius by the names in the first line."""
+    text = read_bytes(path).decode("utf-8-sig", "replace")
+    first, _, rest = text.lstrip().partition("\n")
+    names = [word.strip(" \t\r\"'").lower() for word in first.lstrip("# ").split(",")]
+    wanted = [*_PLACES, "radius"] if "radius" in names else list(_PLACES)
+    if set(wanted) - set(names) or len(set(names)) < len(names):
+        raise ValueError(
+            f"{path}: its first line must name the columns x, y, z and perhaps radius, "
+            f"got {first.strip()[:80]!r}"
+        )
+    if not rest.strip():
+        return np.empty((0, len(wanted)))
+    columns = [names.index(name) for name in wanted]
+    try:
+        return np.loadtxt(io.StringIO(rest), delimiter=",", usecols=columns, ndmin=2)
+    except ValueError as error:
+        raise ValueError(f"{path}: not a table of numbers: {error}") from None
 
 
 def _dump(path: Path) -> Array:

@@ -1,5 +1,7 @@
 """What another simulator must do: take a scene and a seed, leave grains or points."""
 
+import tomllib
+import warnings
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -9,7 +11,7 @@ from numpy.typing import NDArray
 from granulcal.arrays import unmasked
 from granulcal.pours.scene import Scene
 
-__all__ = ["CallableEngine", "Engine", "Left", "left"]
+__all__ = ["CallableEngine", "Engine", "Fewer", "FewerGrainsWarning", "Left", "left"]
 
 Array = NDArray[np.float64]
 Left = tuple[Array, Array] | Array
@@ -59,10 +61,46 @@ class CallableEngine:
         self.function = function
         self.name = name or f"{function.__module__}:{getattr(function, '__qualname__', function)}"
         """What it is called."""
+        self._fewer = Fewer(self.name)
 
     def __call__(self, scene: Scene, seed: int) -> Left:
-        """Returns what the function left, checked."""
-        return left(self.name, self.function(scene, seed))
+        """Returns what the function left, checked; warns, once, of fewer grains than the scene's."""
+        found = left(self.name, self.function(scene, seed))
+        self._fewer(found, scene)
+        return found
+
+
+class FewerGrainsWarning(UserWarning):
+    """An engine of one's own left fewer grains than the scene has."""
+
+
+class Fewer:
+    """Warns once of an engine that leaves fewer grains than the scene has.
+
+    It may: coarser grains stand for more. One that loses grains makes formations that are too small.
+
+    Args:
+        name: of the engine.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name, self._told = name, False
+
+    def __call__(self, found: Left, scene: Scene) -> None:
+        """Looks at what was left of a scene."""
+        table = tomllib.loads(scene.to_toml())
+        leave = "outflow" in table or table["end"].get("rolled_away") == "leave"
+        if self._told or leave or not isinstance(found, tuple):
+            return
+        wanted = round(scene.get("grains.count"))
+        if len(found[0]) < wanted:
+            self._told = True
+            warnings.warn(
+                f"engine {self.name!r} left {len(found[0])} grains of the scene's {wanted}: "
+                "if it has lost them, what is seen of its pours is too small",
+                FewerGrainsWarning,
+                stacklevel=3,
+            )
 
 
 def left(name: str, found: Any) -> Left:

@@ -1,15 +1,17 @@
 """Writes materials, scenes, posteriors and beds for an engine, with what has no counterpart."""
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from granulcal.arrays import unmasked
+from granulcal.documents import ListOf, Table, Text, read_json
 from granulcal.export import chrono, gazebo, isaac, lammps, liggghts, mujoco, newton, yade
 from granulcal.export.bed import bed_text
 from granulcal.export.setup import Setup
@@ -27,6 +29,7 @@ _MATERIAL_ENDINGS = {
     "lammps": ".in", "liggghts": ".in", "yade": ".py", "mujoco": ".xml",
     "chrono": ".py", "isaac": ".usda", "gazebo": ".sdf", "newton": ".py",
 }  # fmt: skip
+_DRAWS = ListOf(Table({"file": Text()}, open=True))
 _COMMENTS = {".in": "# ", ".py": "# ", ".usda": "# "}
 
 
@@ -103,7 +106,8 @@ def export_posterior(
 ) -> list[Path]:
     """Writes a posterior for an engine: the material at its mode, and one for each draw.
 
-    draws.json has every draw in our own coefficients beside the name of its file.
+    draws.json has every draw in our own coefficients beside the name of its file. The draws that an
+    earlier call left in the folder are removed.
 
     Args:
         names: paths of the parameters in the scene.
@@ -117,6 +121,7 @@ def export_posterior(
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     ending = _MATERIAL_ENDINGS[_engine(to).ENGINE]
+    _remove_draws(place)
 
     def at(values: np.ndarray) -> Scene:
         return scene.with_(dict(zip(names, values.tolist(), strict=True)))
@@ -137,30 +142,61 @@ def export_posterior(
     return written
 
 
+def _remove_draws(place: Path) -> None:
+    """Removes the files that draws.json lists, and itself: not what another program wrote."""
+    table = place / "draws.json"
+    if not table.is_file():
+        return
+    for row in read_json(table, _DRAWS):
+        if re.fullmatch(r"draw-\d{3,}\.(in|py|xml|usda|sdf)", row["file"]):
+            (place / row["file"]).unlink(missing_ok=True)
+    table.unlink()
+
+
 def export_bed(
     scene: Scene,
     positions: ArrayLike,
     radii: ArrayLike | None,
     kind: str,
     path: str | Path,
+    *,
+    seed: int = 0,
 ) -> Path:
     """Writes grains, for example those of a pour at rest, in one of `bed.FORMATS`.
 
     Args:
         scene: whose density, material and walls go with them.
         positions: centres [m], shape (n, 3).
-        radii: [m], shape (n,); the scene's if None.
+        radii: [m], shape (n,); those with which a pour of the scene begins if None.
         kind: `lammps-data`, `vtk`, `ply`, `csv`, `mjcf`, `sdf` or `urdf`.
         path: the file.
+        seed: of the pour, which draws radii that differ.
+
+    Raises:
+        ValueError: a scene that cannot be exported, positions of another shape, or no radii where
+            the scene's differ and are not as many.
     """
+    setup = Setup.of(scene, seed)
     centres = np.asarray(unmasked("positions", positions), float)
     if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
         raise ValueError(f"positions must have shape (n, 3), got {centres.shape}")
-    sizes = 0.5 * scene.get("grains.diameter") if radii is None else radii
+    sizes = _radii(setup, len(centres)) if radii is None else radii
     sizes = np.broadcast_to(np.asarray(unmasked("radii", sizes), float), len(centres)).copy()
-    setup = replace(Setup.of(scene), centres=centres, radii=sizes, walls=())
+    setup = replace(setup, centres=centres, radii=sizes, walls=())
     write_beside(Path(path), bed_text(setup, kind))
     return Path(path)
+
+
+def _radii(setup: Setup, count: int) -> NDArray[np.float64]:
+    """Returns the radii of so many grains of a pour, which keep their order."""
+    if len(setup.radii) == count:
+        return setup.radii
+    if float(np.ptp(setup.radii)) > 0:
+        raise ValueError(
+            f"{setup.name}: its grains have radii of their own, which {count} positions must have "
+            f"by number: they must be {len(setup.radii)}"
+        )
+    return np.full(count, setup.smallest)
 
 
 _RUN = {
@@ -185,7 +221,8 @@ def _head(scene: Scene, setup: Setup, module: ModuleType) -> list[str]:
         f"grain radius {radius:.6g} m, R_eff = {0.5 * radius:.6g} m of two grains, {radius:.6g} m at a wall"
     )
     lines.append("No exact counterpart:")
-    lines += [f"  {note}" for note in module.NOTES]
+    own = newton.notes(setup) if module is newton else []
+    lines += [f"  {note}" for note in (*module.NOTES, *own)]
     lines.append(
         "  softness, touching_exponent, impact_friction: the engine's own stiffness and dashpots decide them"
     )

@@ -20,6 +20,8 @@ NOTES = (
 _ROLLING_RATE, _ROLLING_DAMPING = 0.25, 0.7
 # A_r of docs/theory/contact.md, 5/2 (l_i^2 + l_j^2).
 _ROLLING_INERTIA = {"pair": 1.25, "wall": 2.5}
+# Most bins of neighbours.
+_BINS = 3e5
 _LOOK, _SLOW, _RESTING = 0.01, 0.01, 0.995
 
 
@@ -90,7 +92,7 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     script = f"""\
 units         si
 atom_style    sphere
-boundary      f f f
+boundary      s s fs
 newton        off
 comm_modify   vel yes
 read_data     pour.data
@@ -113,6 +115,9 @@ thermo_style  custom step time atoms ke c_resting
 thermo_modify lost ignore
 run           0 post no
 label         again
+# Bins as fine as the grains would be too many where some have rolled far.
+variable      bin equal "ternary(lx*ly*lz > {_BINS * (4 * largest) ** 3:.6g}, (lx*ly*lz/{_BINS:g})^(1/3), {4 * largest:.6g})"
+neigh_modify  binsize ${{bin}}
 run           {look} post no
 variable      now equal time
 variable      share equal c_resting
@@ -127,22 +132,32 @@ write_dump    all custom grains.dump id x y z radius modify sort id format float
 
 def _wall(body: Body, stiffness: Stiffness) -> str:
     words = contact(body.law, "wall", stiffness)
-    return (
-        f"region        {body.name} {_region(body)}\n"
-        f"fix           {body.name} all wall/gran/region granular {words} region {body.name}"
+    # A region without an open face holds grains inside alone; ours are felt from both sides.
+    sides = {"": "", "_out": " side out"} if _is_closed(body) else {"": ""}
+    return "\n".join(
+        f"region        {body.name}{end} {_region(body)}{side}\n"
+        f"fix           {body.name}{end} all wall/gran/region granular {words} "
+        f"region {body.name}{end}"
+        for end, side in sides.items()
     )
+
+
+def _is_closed(body: Body) -> bool:
+    if body.shape["kind"] == "box":
+        return not body.shape.get("open")
+    return body.shape.get("closed", "none") == "both"
 
 
 def _region(body: Body) -> str:
     shape, kind = body.shape, body.shape["kind"]
     if kind in ("cone", "cylinder"):
         axis, (a, b), (low, high) = _along(body)
-        ends = {"none": "open 1 open 2", "from": "open 2", "to": "open 1", "both": ""}
+        ends = {"none": " open 1 open 2", "from": " open 2", "to": " open 1", "both": ""}
         rest = ends[shape.get("closed", "none")]
         if kind == "cylinder":
-            return f"cylinder {axis} {a:g} {b:g} {shape['radius']:.9g} {low:.9g} {high:.9g} {rest}"
+            return f"cylinder {axis} {a:g} {b:g} {shape['radius']:.9g} {low:.9g} {high:.9g}{rest}"
         radii = f"{shape['radius_from']:.9g} {shape['radius_to']:.9g}"
-        return f"cone {axis} {a:g} {b:g} {radii} {low:.9g} {high:.9g} {rest}"
+        return f"cone {axis} {a:g} {b:g} {radii} {low:.9g} {high:.9g}{rest}"
     if kind == "plane":
         numbers = " ".join(f"{float(x):.9g}" for x in (*shape["point"], *shape["normal"]))
         return f"plane {numbers}"

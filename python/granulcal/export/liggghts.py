@@ -22,6 +22,8 @@ _WORDS = "model hertz tangential history rolling_friction"
 _LEAST_RESTITUTION = 0.05
 # LIGGGHTS refuses softer grains unless told `soft_particles yes`.
 _LEAST_YOUNG = 5e6
+# How much farther than they touch grains are neighbours, over the largest radius; most bins of them.
+_SKIN, _BINS = 0.25, 2e7
 _LOOK, _SLOW, _RESTING = 0.02, 0.01, 0.995
 
 
@@ -102,10 +104,10 @@ boundary      f f f
 newton        off
 communicate   single vel yes
 units         si
-region        space block {-w} {w} {-w} {w} {-setup.smallest:g} {setup.top:g} units box
+region        space block {-w:g} {w:g} {-w:g} {w:g} {-setup.smallest:g} {setup.top:g} units box
 create_box    {2 + len(setup.walls)} space
-neighbor      {0.25 * largest:.6g} bin
-neigh_modify  delay 0
+neighbor      {_SKIN * largest:.6g} bin
+neigh_modify  delay 0{_bins(setup)}
 {material(setup, young)}
 fix           gravity all gravity {g:.9g} vector {direction}
 {meshes}
@@ -133,6 +135,13 @@ dump          end all custom 1 grains.dump id x y z radius
 run           1
 """
     return files
+
+
+def _bins(setup: Setup) -> str:
+    """Returns the word for wider bins of neighbours, where a wide space would have too many."""
+    usual = (1.0 + 0.5 * _SKIN) * float(setup.radii.max())
+    widest = (4.0 * setup.half_width**2 * setup.top / _BINS) ** (1.0 / 3.0)
+    return f" binsize {widest:.6g}" if widest > usual else ""
 
 
 def _sizes(setup: Setup) -> list[str]:

@@ -20,6 +20,7 @@ NOTES = (
     "a pair takes the larger friction of its two geoms: a wall smoother than the grains is as rough as they are",
     "friction is regularised: a heap creeps by impratio, which is 10 here",
     "round walls are rings of 24 boxes: MuJoCo's meshes are convex",
+    "walls are 4 mm thick: outside a box or a round wall, grains touch it 4 mm farther out",
 )
 _DT = 1e-4
 # Time of an impact over the time step: fewer steps would not resolve the dashpot.
@@ -42,8 +43,15 @@ def _friction(of: Contact, lever: float) -> str:
 
 
 def material(setup: Setup, young: float | None = None) -> str:
-    """Returns the defaults of the grains' geoms."""
+    """Returns time step and defaults of the grains' geoms as MJCF to include: `solref` is of that step."""
     del young
+    return (
+        f'<mujocoinclude>\n  <option timestep="{_DT:g}"/>\n'
+        f"  <default>{_grain(setup)}</default>\n</mujocoinclude>\n"
+    )
+
+
+def _grain(setup: Setup) -> str:
     k, b = solref(setup.grains.restitution)
     return (
         f'<default class="grain"><geom type="sphere" condim="6" density="{setup.density:g}" '
@@ -78,7 +86,7 @@ def mjcf(setup: Setup) -> str:
             f'  <option timestep="{_DT:g}" gravity="{gravity}" cone="elliptic" impratio="10" '
             'integrator="implicitfast" solver="Newton" iterations="20" jacobian="sparse"/>',
             '  <size memory="512M"/>',
-            f"  <default>{material(setup)}</default>",
+            f"  <default>{_grain(setup)}</default>",
             "  <worldbody>",
             '    <light pos="0 0 1"/>',
             f'    <geom name="ground" type="plane" size="1 1 .01" condim="6" '
@@ -124,12 +132,10 @@ def _boxes(shape: dict) -> list[str]:
         x = along / np.linalg.norm(along)
         normal = np.cross(x, up)
         normal /= np.linalg.norm(normal)
-        # Away from the axis, so that the inner face is the wall.
-        outward = centre * [1, 1, 0]
-        if shape["kind"] in ("cone", "cylinder"):
-            normal = normal if normal @ outward > 0 else -normal
+        # The box lies behind the wall, so that its inner face is the wall.
+        normal = normal if normal @ _outward(shape, centre) > 0 else -normal
         y = np.cross(normal, x)
-        at = centre + normal * _THICKNESS if shape["kind"] in ("cone", "cylinder") else centre
+        at = centre + normal * _THICKNESS
         rotation = np.column_stack([x, y, normal])
         q = _quaternion(rotation)
         size = f"{0.5 * width:.6g} {0.5 * np.linalg.norm(up):.6g} {_THICKNESS:g}"
@@ -137,6 +143,19 @@ def _boxes(shape: dict) -> list[str]:
         turn = " ".join(f"{v:.9g}" for v in q)
         found.append(f'<geom type="box" pos="{where}" quat="{turn}" size="{size}" {{words}}/>')
     return found
+
+
+def _outward(shape: dict, at):
+    """Returns a direction from a wall's grains to behind it: from an axis, a middle, a plane's side."""
+    import numpy as np
+
+    if shape["kind"] == "plane":
+        return -np.asarray(shape["normal"], float)
+    if shape["kind"] == "box":
+        return at - np.mean([shape["min"], shape["max"]], axis=0)
+    low, high = np.asarray(shape["from"], float), np.asarray(shape["to"], float)
+    axis = (high - low) / np.linalg.norm(high - low)
+    return (at - low) - ((at - low) @ axis) * axis
 
 
 def _quaternion(rotation) -> tuple[float, float, float, float]:

@@ -10,7 +10,7 @@ import json
 from granulcal.export.mesh import triangles
 from granulcal.export.setup import Contact, Setup
 
-__all__ = ["ENGINE", "NOTES", "material", "scene"]
+__all__ = ["ENGINE", "NOTES", "material", "notes", "scene"]
 
 ENGINE = "newton"
 NOTES = (
@@ -40,6 +40,32 @@ def _config(
     )
 
 
+def notes(setup: Setup) -> list[str]:
+    """Returns what of this pour Newton cannot be told: a contact below half of the grains' own."""
+    own, wide, grains = setup.effective_radius, setup.smallest, setup.grains
+    inside = {
+        "sliding_friction": grains.sliding_friction,
+        "restitution": grains.restitution,
+        "rolling_friction": grains.rolling_length(own),
+        "torsional_friction": grains.torsional_length(own),
+    }
+    found = []
+    for name, of in [("ground", setup.ground), *((b.name, b.law) for b in setup.walls)]:
+        asked = {
+            "sliding_friction": of.sliding_friction,
+            "restitution": of.restitution,
+            "rolling_friction": of.rolling_length(wide),
+            "torsional_friction": of.torsional_length(wide),
+        }
+        low = [word for word, value in asked.items() if 2.0 * value < inside[word]]
+        if low:
+            found.append(
+                f"{name}: {', '.join(low)} is half of the grains' own, and not less: Newton takes the "
+                "mean of two shapes, and none is below 0"
+            )
+    return found
+
+
 def material(setup: Setup, young: float | None = None) -> str:
     """Returns the lines of a material."""
     del young
@@ -62,7 +88,7 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     names = ", ".join(f"wall_{i}" for i in range(len(setup.walls)))
     script = f"""\
 \"\"\"Pours {setup.name} in Newton and leaves grains.csv: python pour.py\"\"\"
-
+{"".join(f"# {note}" + chr(10) for note in notes(setup))}
 import json
 
 import newton

@@ -8,15 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.export.law import Contact, Stiffness
+from granulcal.export.mesh import triangles
 from granulcal.pours.scene import Scene
 
-__all__ = ["Body", "Contact", "Setup", "Stiffness"]
+__all__ = ["Body", "Contact", "Setup", "Stiffness", "walls_of"]
 
 Array = NDArray[np.float64]
 
-# Walls that are sized for grains leave a little way to roll.
-_HALF_WIDTH = 0.8
+# Half width of the space in which grains are followed [m]: at least, and at most beyond the start.
+_LEAST_WIDTH, _FARTHEST = 0.8, 4.0
+# A ball that rolls without sliding slows down by 5/7 mu_r g.
+_ROLLING_LOSS = 5.0 / 7.0
 _FALLEN = 0.25
+# What no engine's file can say, by path in the scene.
+_REFUSED = ("periodic", "outflow", "intruder", "bed", "grains.shape")
 
 
 @dataclass(frozen=True)
@@ -47,7 +52,8 @@ class Setup:
         walls: all other walls.
         horizon: when the pour ends at the latest [s].
         earliest: nothing rests before the grains have fallen [s].
-        half_width: of the space about the axis in which grains are followed [m].
+        half_width: of the space about the axis in which grains are followed: start, walls, and
+            as far as a grain rolls until the horizon, at most 4 m [m].
         left_out: what the scene has and no other engine is told, a phrase each.
     """
 
@@ -69,22 +75,19 @@ class Setup:
         """Returns the pour of a scene with a seed.
 
         Raises:
-            ValueError: the scene has moving or meshed walls, a period, an outflow, an intruder
-                or a bed.
+            ValueError: the scene has grains that are not round, moving or meshed walls, a period,
+                an outflow, an intruder or a bed.
         """
         table = tomllib.loads(scene.to_toml())
-        for key in ("periodic", "outflow", "intruder", "bed"):
-            if key in table:
+        for path in _REFUSED:
+            *places, key = path.split(".")
+            if key in (table[places[0]] if places else table):
                 raise ValueError(
-                    f"{scene.name}: `{key}` has no counterpart in other engines' files"
+                    f"{scene.name}: `{path}` has no counterpart in other engines' files"
                 )
         grains = Contact.of(table["material"])
         ground = Contact.of(table.get("ground", {}).get("material", {}), grains)
-        walls = [*_funnel(table.get("funnel"), grains)]
-        for i, wall in enumerate(table.get("walls", [])):
-            _refuse_motion(f"walls.{i}", wall)
-            law = Contact.of(wall.get("material", {}), grains)
-            walls.append(Body(f"wall_{i}", wall["shape"], law))
+        walls = _walls(table, grains)
         centres, radii = scene.start(seed)
         gravity = tuple(float(g) for g in table["gravity"])
         fall = float(np.sqrt(2.0 * centres[:, 2].max() / max(np.linalg.norm(gravity), 1e-9)))
@@ -99,7 +102,13 @@ class Setup:
             walls=tuple(walls),
             horizon=float(table["end"]["horizon"]),
             earliest=max(_FALLEN, fall),
-            half_width=_HALF_WIDTH,
+            half_width=_half_width(
+                table,
+                centres,
+                float(radii.max()),
+                walls,
+                min(grains.rolling_friction, ground.rolling_friction),
+            ),
             left_out=tuple(_left_out(table)),
         )
 
@@ -121,6 +130,43 @@ class Setup:
     def stiffness(self, young: float | None = None) -> Stiffness:
         """Returns stiffness and time step for an elastic engine."""
         return Stiffness.of(self.smallest, self.density, young)
+
+
+def walls_of(scene: Scene) -> tuple[Body, ...]:
+    """Returns the walls of a scene besides the ground, whatever its grains are.
+
+    Raises:
+        ValueError: one of them moves, or is a mesh.
+    """
+    table = tomllib.loads(scene.to_toml())
+    return tuple(_walls(table, Contact.of(table["material"])))
+
+
+def _walls(table: dict[str, Any], grains: Contact) -> list[Body]:
+    walls = [*_funnel(table.get("funnel"), grains)]
+    for i, wall in enumerate(table.get("walls", [])):
+        _refuse_motion(f"walls.{i}", wall)
+        law = Contact.of(wall.get("material", {}), grains)
+        walls.append(Body(f"wall_{i}", wall["shape"], law))
+    return walls
+
+
+def _half_width(
+    table: dict[str, Any], centres: Array, radius: float, walls: list[Body], rolling: float
+) -> float:
+    """Returns the half width of a space that holds start and walls, and how far grains roll [m]."""
+    gravity = np.array(table["gravity"], float)
+    g = float(np.linalg.norm(gravity))
+    speed = float(np.sqrt(2.0 * g * centres[:, 2].max()))
+    # Where gravity is not along z, grains may roll for ever.
+    loss = _ROLLING_LOSS * g * rolling - float(np.hypot(*gravity[:2]))
+    stops = speed**2 / (2.0 * loss) if loss > 0 else np.inf
+    rolled = min(speed * float(table["end"]["horizon"]), stops, _FARTHEST)
+    # A plane has no end.
+    shapes = [body.shape for body in walls if body.shape["kind"] != "plane"]
+    ends = [np.abs(triangles(shape).vertices[:, :2]).max() for shape in shapes]
+    farthest = max([np.abs(centres[:, :2]).max() + rolled, *ends])
+    return float(max(_LEAST_WIDTH, farthest + 2.0 * radius))
 
 
 def _funnel(table: dict[str, Any] | None, grains: Contact) -> list[Body]:
@@ -155,7 +201,8 @@ def _refuse_motion(name: str, table: dict[str, Any]) -> None:
 
 
 def _left_out(table: dict[str, Any]) -> list[str]:
-    found = [f"effects.{name}" for name in table.get("effects", {})]
+    # Radii that differ are written with the grains.
+    found = [f"effects.{name}" for name in table.get("effects", {}) if name != "polydispersity"]
     known = {field.name for field in fields(Contact)}
     found += [f"material.{name}" for name in table["material"] if name not in known]
     if "observe" in table:

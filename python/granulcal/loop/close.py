@@ -9,6 +9,7 @@ the placebo; write the report.
 
 import json
 import os
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -130,9 +131,11 @@ def close_loop(
         )
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
     say(time_needed(task, store, budget - plan.pours, workers))
+    # Before hours of pours; what the recordings say is not looked at yet.
+    doubts = task.require_readable()
+    for doubt in doubts:
+        print(f"warning: {doubt}", file=sys.stderr)
     if store.missing:
-        # Before hours of pours; what the recordings say is not looked at yet.
-        task.require_readable()
         # Told before the first pour; whoever goes on has been told.
         for sentence in drifts(task):
             say(sentence)
@@ -234,6 +237,7 @@ def close_loop(
         simulated=recorded,
         corrections=corrected(analysis, surrogate, found, measured, recorded),
         calibrated=wide,
+        doubts=doubts,
     )
     said = {"kind": standing.verdict.kind, "named": list(standing.verdict.named)}
     models_of(task, analysis.plan, surrogate, found, said, measured, simulated).write(folder)

@@ -42,6 +42,7 @@ class Closed:
         simulated: of the base and of the augmented model, by condition's name.
         corrections: what the correction without physics leaves; none where nothing was detected.
         calibrated: the interval of the named effect's strength by simulated pairs; None without.
+        doubts: what makes recordings doubtful that may be of the scene, a sentence each.
     """
 
     task: Task
@@ -58,6 +59,7 @@ class Closed:
     simulated: dict[str, ModelPours]
     corrections: tuple[Correction, ...] = ()
     calibrated: Coverage | None = None
+    doubts: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -123,6 +125,7 @@ class Closed:
             "families": list(verdict.families),
             "p": verdict.p,
             "reason": verdict.reason,
+            "doubts": list(self.doubts),
             "strength": self.strengths(),
             "misfit": {"fit": squares(self.fit), "sealed": squares(self.sealed)},
             **self.standing.to_dict(),

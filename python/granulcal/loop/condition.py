@@ -1,5 +1,6 @@
 """One condition of a task: numbers of the scene, recordings, and how they are read."""
 
+import hashlib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from granulcal.loop.effects.definitions import Definition
 from granulcal.loop.pours.measures import Measures
 from granulcal.pours.scene import Scene
 
-__all__ = ["Condition", "condition_of", "require_different"]
+__all__ = ["Condition", "condition_of", "digest_of", "require_different"]
 
 Array = NDArray[np.float64]
 
@@ -102,6 +103,16 @@ def condition_of(file: Path, table: dict[str, Any]) -> Condition:
         averaged=table.get("averaged", False),
         session=table.get("session", ""),
     )
+
+
+def digest_of(recording: Path) -> str:
+    """Returns the SHA-256 of a recording's file, or of all files of its folder."""
+    is_folder = recording.is_dir()
+    files = sorted(p for p in recording.rglob("*") if p.is_file()) if is_folder else [recording]
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
 
 
 def require_different(conditions: tuple[Condition, ...]) -> None:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import tomllib
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,14 +11,18 @@ from granulcal.documents import LARGEST_DOCUMENT, Table, check, parse_json, read
 from granulcal.engines.in_use import law_of_pours, version_of_pours
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
+from granulcal.loop.condition import digest_of
 from granulcal.loop.effects.library import described, fingerprint
 from granulcal.loop.pours.archive import ArchivePlan
-from granulcal.loop.task import Task
+from granulcal.loop.pours.measures import camera_used
+from granulcal.loop.task import Condition, Task
 from granulcal.loop.test.thresholds import Thresholds
 
 __all__ = ["register"]
 
 _NAME = "preregistration.json"
+# Keys of a condition that registrations of before have not.
+_CAMERAS, _KNOWN = "cameras", "known"
 
 
 def register(
@@ -32,6 +37,8 @@ def register(
 ) -> str:
     """Writes the file, or finds it as it is; returns its SHA-256.
 
+    One of before, which does not say by which camera recordings are read, is taken as it stands.
+
     Raises:
         ObservationError: the folder holds the registration of another analysis.
     """
@@ -43,6 +50,8 @@ def register(
             "prior": plan.prior.to_toml(),
             "conditions": [
                 {"name": c.name, "at": c.at, "use": c.use, "recordings": _digests(c.recordings)}
+                | {_CAMERAS: _cameras(c, task)}
+                | ({_KNOWN: c.known} if c.known else {})
                 | ({"reading": c.reading} if c.reading else {})
                 | ({"averaged": True} if c.averaged else {})
                 | ({"session": c.session} if c.session else {})
@@ -68,6 +77,8 @@ def register(
             theirs = parse_json(found, path, error=ObservationError)
             check(theirs, Table({}, open=True), path, error=ObservationError)
             mine = parse_json(text.encode(), path)
+            if theirs == _as_before(mine):
+                return hashlib.sha256(found).hexdigest()
             differing = [k for k, v in mine.items() if theirs.get(k) != v]
             raise ObservationError(
                 f"{path} was registered for another analysis ({', '.join(differing)} differ); "
@@ -80,11 +91,41 @@ def register(
 
 def _digests(recordings: tuple[Path, ...]) -> list[str]:
     """Hashes of the files, so that they cannot be exchanged; nothing of them is read."""
-    found = []
-    for path in recordings:
-        files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
-        digest = hashlib.sha256()
-        for file in files:
-            digest.update(file.read_bytes())
-        found.append(f"{path.name} {digest.hexdigest()}")
+    return [f"{path.name} {digest_of(path)}" for path in recordings]
+
+
+def _cameras(condition: Condition, task: Task) -> list[str | None]:
+    """Hashes of the cameras by which images are read, with the colour images that they name."""
+    if task.scene.observed_names:
+        return []
+    found: list[str | None] = []
+    for recording in condition.recordings:
+        camera = camera_used(recording, condition.camera)
+        if camera is None:
+            found.append(None)
+            continue
+        text = camera.read_bytes()
+        digest = hashlib.sha256(text)
+        colour = _colour_of(text)
+        if colour is not None and (image := camera.parent / colour).is_file():
+            digest.update(image.read_bytes())
+        found.append(f"{camera.name} {digest.hexdigest()}")
     return found
+
+
+def _colour_of(camera: bytes) -> str | None:
+    """The colour image that a camera's TOML names; what is no TOML is refused where it is read."""
+    try:
+        found = tomllib.loads(camera.decode()).get("colour")
+    except ValueError:
+        return None
+    return found if isinstance(found, str) else None
+
+
+def _as_before(document: dict[str, Any]) -> dict[str, Any]:
+    """Returns a registration as it was written before cameras were fixed in it."""
+    kept = [
+        {k: v for k, v in condition.items() if k not in (_CAMERAS, _KNOWN)}
+        for condition in document["conditions"]
+    ]
+    return {**document, "conditions": kept}

@@ -74,6 +74,7 @@ from granulcal.loop.effects.resolution import Resolution
 from granulcal.loop.effects.series_faults import require_series
 from granulcal.loop.effects.tolerance import Tolerances
 from granulcal.loop.pours.forward import Coarse
+from granulcal.loop.recorded import doubts_of, require_no_copies
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
@@ -336,15 +337,21 @@ class Task:
         """Returns an effect of the library with the scene's own numbers put in."""
         return next(e for e in self.library if e.name == name).at(self.at_first())
 
-    def require_readable(self) -> None:
+    def require_readable(self) -> tuple[str, ...]:
         """Reads every recording and lets go what it says: what cannot be read fails before pours.
+
+        Returns what makes recordings doubtful, a sentence each.
 
         Raises:
             FileNotFoundError: a file that a condition names is not there.
-            ObservationError: a recording that cannot be one of the scene.
+            ObservationError: a recording that cannot be one of the scene, or a copy of another.
         """
-        for condition in self.conditions:
-            condition.statistics(self.scene)
+        rows = [condition.statistics(self.scene) for condition in self.conditions]
+        # The few numbers that a scene observes may be the same of two pours.
+        is_image = not self.scene.observed_names
+        require_no_copies(self.conditions, rows if is_image else [row[:0] for row in rows])
+        of_each = (doubts_of(c, self.scene, self.prior, self.library) for c in self.conditions)
+        return tuple(doubt for found in of_each for doubt in found)
 
     def at_first(self) -> Scene:
         """Returns the scene with the numbers that all conditions share."""

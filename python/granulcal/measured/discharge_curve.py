@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 _HEADER = ["series", "time_s", "discharged_percent"]
 # As the simulated `discharge_rate`: after the start, before the end.
 _RATE_RANGE = (5.0, 85.0)
+# Percent by which a weighed share may be off: what swings on a balance falls and overshoots.
+_MARGIN = 1.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,10 +43,10 @@ class DischargeCurve:
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: other columns, a line that is no numbers, or no such series; the message
-                says what there is.
+            ValueError: other columns, a line that is no finite numbers or no percentage, no such
+                series, or one that falls or hardly begins; the message says what there is.
         """
-        points: dict[str, list[tuple[float, float]]] = {}
+        points: dict[str, list[tuple[float, float, int]]] = {}
         with Path(path).open(newline="") as file:
             rows = csv.reader(file)
             header = next(rows, [])
@@ -53,15 +55,22 @@ class DischargeCurve:
             for number, row in enumerate(rows, start=2):
                 try:
                     name, time, percent = row
-                    points.setdefault(name, []).append((float(time), float(percent)))
+                    point = float(time), float(percent), number
                 except ValueError:
                     message = f"{path}: line {number} must be a name and two numbers, got {row}"
                     raise ValueError(message) from None
+                if not (np.isfinite(point[0]) and -_MARGIN <= point[1] <= 100.0 + _MARGIN):
+                    raise ValueError(
+                        f"{path}: line {number} must be a finite time and a share from 0 to 100 %, "
+                        f"got {row}"
+                    )
+                points.setdefault(name, []).append(point)
         if series is None and len(points) == 1:
             series = next(iter(points))
         if series is None or series not in points:
             raise ValueError(f"{path}: series must be one of {sorted(points)}, got {series!r}")
-        time, percent = np.array(sorted(points[series])).T
+        time, percent, lines = np.array(sorted(points[series])).T
+        _require_rising(path, series, percent, lines)
         return cls(series=series, time=time, percent=percent)
 
     def rate(self) -> float:
@@ -84,3 +93,19 @@ class DischargeCurve:
 
         kinds = {"discharged": discharged, "discharge_rate": lambda _: self.rate()}
         return observed_of(scene, kinds, "a discharge curve")
+
+
+def _require_rising(path: str | PathLike[str], series: str, percent: Array, lines: Array) -> None:
+    """Refuses a curve that falls, and one that ends before the rate can be read."""
+    fallen = np.maximum.accumulate(percent) - percent
+    if fallen.max() > _MARGIN:
+        at = int(np.argmax(fallen > _MARGIN))
+        raise ValueError(
+            f"{path}: line {lines[at]:.0f}: what has run out cannot fall, series {series!r} does "
+            f"by {fallen[at]:.3g} % to {percent[at]:.4g} %: is it the share that is left?"
+        )
+    if not percent.max() > _RATE_RANGE[0]:
+        raise ValueError(
+            f"{path}: series {series!r} ends at {percent.max():.3g} %, must pass "
+            f"{_RATE_RANGE[0]:g} %: is it in percent?"
+        )

@@ -1,5 +1,7 @@
 """Time-averaged pictures of a drum against a light: dark is grain, light is air."""
 
+import math
+import tomllib
 from dataclasses import dataclass
 from os import PathLike
 
@@ -20,6 +22,10 @@ _RIM_PIXELS = 3
 _DARK_PERCENTILE, _LIGHT_PERCENTILE = 5.0, 75.0
 # Columns of the slope's line over its width, as in a simulated profile.
 _SLOPE_COLUMNS = 41
+# Modes of Pillow that keep more than eight bits of grey, which its conversion would cut off.
+_DEEP = ("I;16", "I;16L", "I;16B", "I;16N", "I")
+# Share by which a picture may be off a square, and its width off the scene's drum.
+_OFF = 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +53,8 @@ class DrumImage:
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: it is no picture, has no contrast, or the width is not positive.
+            ValueError: it is no picture, is not square, has no contrast or numbers that are no
+                grey values, or the width is not positive.
             ModuleNotFoundError: Pillow, which comes with `granulcal[plot]`, is not installed.
         """
         from PIL import Image, UnidentifiedImageError
@@ -56,9 +63,17 @@ class DrumImage:
             raise ValueError(f"width must be positive and finite [m], got {width}")
         try:
             with Image.open(path) as image:
-                grey = np.asarray(image.convert("L"), dtype=np.float64)
+                if image.mode == "F":
+                    raise ValueError(f"{path} must have 8 or 16 bits of grey, got fractions")
+                whole = image if image.mode in _DEEP else image.convert("L")
+                grey = np.asarray(whole, dtype=np.float64)
         except UnidentifiedImageError:
             raise ValueError(f"{path} is no picture that can be read") from None
+        rows, columns = grey.shape
+        if abs(rows - columns) > _OFF * columns:
+            raise ValueError(
+                f"{path} must be square, for the drum fills it: got {columns}x{rows} pixels"
+            )
         made = cls(grey=grey, width=width)
         dark, light = made._levels()
         if light - dark < 1.0:
@@ -100,10 +115,16 @@ class DrumImage:
         """Returns the measured `surface_z[x]` of the scene's x and the `surface_slope`.
 
         Raises:
-            ValueError: the scene observes no surface.
+            ValueError: the scene observes no surface, or its drum is not as wide as the picture.
         """
         if not any(name == "surface_slope" for name in scene.observed_names):
             return observed_of(scene, {"surface_z": lambda _: np.nan}, "a drum's picture")
+        drums = _drums(scene)
+        if drums and all(abs(self.width - drum) > _OFF * drum for drum in drums):
+            raise ValueError(
+                f"width must be the inner diameter of the scene's drum, "
+                f"{' or '.join(f'{drum:g}' for drum in drums)} m, got {self.width:g} m"
+            )
         x, z = self.surface(scene.get("observe.surface.level"))
         within = scene.get("observe.surface.slope_within")
 
@@ -119,3 +140,18 @@ class DrumImage:
             "surface_slope": slope,
         }
         return observed_of(scene, kinds, "a drum's picture")
+
+
+def _drums(scene: Scene) -> list[float]:
+    """Diameters of the cylinders along y about the centre of the scene's surface [m]."""
+    document = tomllib.loads(scene.to_toml())
+    centre = document["observe"]["surface"]["centre"]
+    found = []
+    for wall in document.get("walls", []):
+        shape = wall["shape"]
+        if shape["kind"] != "cylinder":
+            continue
+        ends = ((shape[end][0], shape[end][2]) for end in ("from", "to"))
+        if all(math.dist(end, centre) < _OFF * shape["radius"] for end in ends):
+            found.append(2.0 * shape["radius"])
+    return sorted(set(found))

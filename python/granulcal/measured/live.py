@@ -17,6 +17,8 @@ _WARM_UP = 30
 _PATIENCE_S = 5.0
 # All of them are in memory until the file is written: 2.5 GB of a RealSense.
 _MOST_FRAMES = 1000
+# Metres per count of depths that come in metres: the finer while the farthest fits into 16 bits.
+_FINE, _MILLIMETRE = 1e-4, 1e-3
 
 
 class Source(Protocol):
@@ -119,13 +121,20 @@ class Ros2:
             "cx": k[2], "cy": k[5],
         }  # fmt: skip
         """Lens [px]."""
-        self.depth_unit = 1e-3
-        """Metres per count of 16UC1, by REP 118."""
+        self.depth_unit = _MILLIMETRE
+        """Metres per count: of 16UC1 by REP 118; of 32FC1 finer, where what it sees is near."""
+        self._farthest = 0.0
 
     def frames(self) -> Iterator[DepthFrame]:
         """Yields frames as they arrive."""
         while True:
-            yield _frame_of(self._wait(self._arrived, self._topic))
+            message = self._wait(self._arrived, self._topic)
+            frame = _frame_of(message)
+            if message.encoding == "32FC1":
+                self._farthest = max(self._farthest, float(frame.depth.max(initial=0.0)))
+                is_near = self._farthest <= _FINE * np.iinfo(np.uint16).max
+                self.depth_unit = _FINE if is_near else _MILLIMETRE
+            yield frame
 
     def _wait(self, arrived: list[Any], topic: str) -> Any:
         end = time.monotonic() + _PATIENCE_S
@@ -137,15 +146,18 @@ class Ros2:
 
 
 def _frame_of(message: Any) -> DepthFrame:
-    kinds = {"16UC1": ("<u2", 1e-3), "mono16": ("<u2", 1e-3), "32FC1": ("<f4", 1.0)}
+    kinds = {"16UC1": ("u2", _MILLIMETRE), "mono16": ("u2", _MILLIMETRE), "32FC1": ("f4", 1.0)}
     if message.encoding not in kinds:
         raise ValueError(f"depth must be one of {', '.join(kinds)}, got {message.encoding!r}")
-    kind, unit = kinds[message.encoding]
+    letters, unit = kinds[message.encoding]
+    kind = f"{'>' if message.is_bigendian else '<'}{letters}"
     rows = np.frombuffer(bytes(message.data), np.uint8).reshape(message.height, message.step)
     width = message.width * np.dtype(kind).itemsize
     depth = np.ascontiguousarray(rows[:, :width]).view(kind).astype(float) * unit
     stamp = message.header.stamp
-    return DepthFrame(np.nan_to_num(depth), stamp.sec * 1_000_000_000 + stamp.nanosec)
+    # Infinite is too far, or too near: no data, as NaN.
+    depth = np.nan_to_num(depth, posinf=0.0, neginf=0.0)
+    return DepthFrame(depth, stamp.sec * 1_000_000_000 + stamp.nanosec)
 
 
 def record(source: Source, path: str | PathLike[str], *, frames: int = 10) -> int:

@@ -1,18 +1,22 @@
 """Whether recordings can be of a scene at all, asked before anything is inferred from them."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from granulcal.measured.recording import Recording
     from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
 
-__all__ = ["violations"]
+__all__ = ["doubts", "violations"]
 
 
 def violations(
-    scene: "Scene", prior: "Prior", recordings: "Sequence[Recording]", names: Sequence[object]
+    scene: "Scene",
+    prior: "Prior",
+    recordings: "Sequence[Recording]",
+    names: Sequence[object],
+    reading: Mapping[str, Any] | None = None,
 ) -> list[str]:
     """Returns why recordings cannot show the scene, whatever its material, a sentence each.
 
@@ -24,10 +28,32 @@ def violations(
         prior: of its parameters.
         recordings: what was measured.
         names: of the recordings, for the sentences.
+        reading: arguments of `Recording.formation`, if the formation is read with any.
     """
     found = []
-    text = prior.to_toml()
+    text, settings = prior.to_toml(), reading or {}
     for name, recording in zip(names, recordings, strict=True):
-        reasons = scene.native.violations(text, recording.native)
+        reasons = scene.native.violations(text, recording.native, **settings)
+        found += [f"{name}: {reason}" for reason in reasons]
+    return found
+
+
+def doubts(
+    scene: "Scene",
+    prior: "Prior",
+    recordings: "Sequence[Recording]",
+    names: Sequence[object],
+    reading: Mapping[str, Any] | None = None,
+) -> list[str]:
+    """Returns what makes recordings doubtful that may show the scene, a sentence each.
+
+    A formation that the image's edge cuts off, that takes less room than the scene's grains, an
+    image without much data, a second heap; the bounds are those of `infer`, the arguments those of
+    `violations`.
+    """
+    found = []
+    text, settings = prior.to_toml(), reading or {}
+    for name, recording in zip(names, recordings, strict=True):
+        reasons = scene.native.doubts(text, recording.native, **settings)
         found += [f"{name}: {reason}" for reason in reasons]
     return found

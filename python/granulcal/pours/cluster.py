@@ -190,7 +190,8 @@ def gather(
         resume: keep what is in the folder; else a folder with rows is refused.
         cluster: where the pours are made.
         chunk: rows of a part in a folder that is new; the default is 16.
-        report: called with (total, resumed, made, unhealthy, jammed, out of view).
+        report: called with (total, resumed, made, unhealthy, jammed, without grains
+            in view).
 
     Raises:
         ModuleNotFoundError: ray is not installed.

@@ -49,7 +49,7 @@ class Dataset:
         paper16: the paper's statistics, shape (n, 16); NaN where no grains were in view.
         observed: the statistics that the scene observes, shape (n, k).
         observed_names: their names.
-        diagnostics: the diagnostic statistics, shape (n, 40); NaN where no grains were in view, and
+        diagnostics: the diagnostic statistics, shape (n, 43); NaN where no grains were in view, and
             in data sets that were made before there were any.
         diagnostic_names: their names.
         status: how each pour ended.
@@ -207,7 +207,7 @@ def generate(
             own.
         resume: keep the rows that are in `out` already; else a folder with rows is refused.
         progress: show a line on stderr; or a function of (total, resumed, made, unhealthy,
-            jammed, out of view), the last three of all rows that are there.
+            jammed, without grains in view), the last three of all rows that are there.
         engine: another simulator in place of ours; docs/engines.md says what it must do.
         ray: address of a Ray cluster that makes the pours, as `ray.init` takes it, or `local`;
             docs/cluster.md.

@@ -68,6 +68,7 @@ def film(
     rise_deg: float = 20.0,
     most_frames: int = 120,
     progress: Callable[[float], object] | None = None,
+    dropped: Callable[[int], object] | None = None,
 ) -> int:
     """Pours a scene, writes an animated GIF or an MP4 and returns the number of its frames.
 
@@ -81,6 +82,7 @@ def film(
         rise_deg: how far above the horizon one looks from [deg].
         most_frames: the film ends there, a long pour with its last frame.
         progress: called with the simulated time of each frame [s].
+        dropped: called at the end with how many frames the film lacks, where it was cut short.
 
     Raises:
         ModuleNotFoundError: Pillow, which comes with the extra `plot`, is not installed, or for an
@@ -106,23 +108,35 @@ def film(
     eye = _Eye(everything.min(axis=0) - pad, everything.max(axis=0) + pad, width, rise_deg)
     frames: list[Image.Image] = []
     last: list[Image.Image] = []
+    over = 0
 
     def see(time: float, centres: Array, sizes: Array) -> None:
+        nonlocal over
         if progress is not None:
             progress(time)
         if len(frames) < most_frames:
             frames.append(_picture(eye, centres, sizes, lines))
         else:
+            over += 1
             last[:] = [_picture(eye, centres, sizes, lines)]
 
     _native.film(scene.native, seed, fps * slow, see)
     frames += last
     _WRITERS[ending](Path(path), frames, fps)
+    # The last one is there.
+    if over > 1 and dropped is not None:
+        dropped(over - 1)
     return len(frames)
 
 
+def _frame_times(count: int, fps: float) -> list[int]:
+    """Returns how long a GIF shows each frame [ms]: hundredths of a second, k / fps in sum."""
+    ends = [round(100 * k / fps) for k in range(count + 1)]
+    return [10 * (b - a) for a, b in itertools.pairwise(ends)]
+
+
 def _write_gif(path: Path, frames: "list[Image.Image]", fps: float) -> None:
-    times = [round(1000 / fps)] * (len(frames) - 1) + [_HOLD_MS]
+    times = [*_frame_times(len(frames) - 1, fps), _HOLD_MS]
     options: dict[str, Any] = {"append_images": frames[1:], "duration": times, "loop": 0}
     buffer = BytesIO()
     frames[0].save(buffer, "GIF", save_all=True, optimize=True, **options)
@@ -179,10 +193,10 @@ def _ball(draw: Any, at: Array, r: float) -> None:
 
 def _outlines(scene: Scene) -> list[Array]:
     """Returns lines along the walls at rest [m], each of shape (k, 3)."""
-    from granulcal.export.setup import Setup
+    from granulcal.export.setup import walls_of
 
     try:
-        walls = Setup.of(scene).walls
+        walls = walls_of(scene)
     except ValueError:
         # Walls that move are not drawn; the grains show them.
         return []

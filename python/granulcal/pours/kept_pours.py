@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
 from granulcal.documents import ListOf, Mapping, Maybe, Number, Table, Text, Whole, read_json
-from granulcal.engines.in_use import law_of_pours
+from granulcal.engines.in_use import engine_in_use, law_of_pours
 from granulcal.files import write_beside
 from granulcal.pours.at_once import at_once
 from granulcal.pours.cluster import cluster_in_use, refuse_engine
@@ -68,10 +68,10 @@ class KeptPours:
         observed: keep the statistics that the scene observes in place of the paper's 16.
         look: what to keep of a pour in place of both: names, and the function that measures them;
             a ValueError of the function says that too few grains are in view.
-        engine: another simulator in place of ours.
+        engine: another simulator in place of ours, or of the one in use.
 
     Raises:
-        ValueError: the file is that of another scene, prior, seed or law, or is damaged.
+        ValueError: the file is that of another scene, prior, seed, law or engine, or is damaged.
         BlockingIOError: another process pours into the file.
     """
 
@@ -91,6 +91,7 @@ class KeptPours:
         """Reads what is kept already."""
         own = (scene.observed_names, Pour.observed) if observed else (NAMES, Pour.statistics)
         self.x_names, self.look = own if look is None else look
+        engine = engine or engine_in_use()
         self.engine = engine
         self.scene, self.prior, self.path, self.seed = scene, prior, path, seed
         self.threads, self.progress = threads or os.cpu_count() or 1, progress
@@ -151,7 +152,9 @@ class KeptPours:
                 "statistics must not be mixed; give another folder, or remove the file"
             )
         if key != self.key:
-            raise ValueError(f"{self.path} has the pours of another scene, prior or seed")
+            raise ValueError(
+                f"{self.path} has the pours of another scene, prior or seed, or engine"
+            )
         return rows
 
     def _write(self) -> None:
@@ -174,6 +177,8 @@ def _poured(
     if engine is not None:
         left = engine(scene, seed)
         if not isinstance(left, tuple):
+            if look is not Pour.statistics:
+                raise ValueError(f"{engine.name} gave points of a surface and no grains")
             x = np.asarray(statistics(left)).tolist()
             return {"theta": theta.tolist(), "status": "at_rest", "x": x}
         pour = Pour(scene.native.pour_of(*left, seed), scene, seed)

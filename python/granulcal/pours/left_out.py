@@ -1,4 +1,4 @@
-"""Pours that nothing is learnt from, counted by why: unhealthy, jammed, out of view."""
+"""Pours that nothing is learnt from, counted by why: unhealthy, jammed, without grains in view."""
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 __all__ = ["LeftOut"]
 
 # The status `out_of_view` is of a pour of which enough is seen: it is used.
-_WHY = {"unhealthy": "unhealthy", "jammed": "jammed", "no_grains_in_view": "out_of_view"}
+_WHY = ("unhealthy", "jammed", "no_grains_in_view")
 
 
 @dataclass(frozen=True)
@@ -20,13 +20,13 @@ class LeftOut:
     Attributes:
         unhealthy: the solver lost its accuracy.
         jammed: grains remain in the funnel.
-        out_of_view: too few grains in view for a statistic.
+        no_grains_in_view: too few grains in view for a statistic.
         unseen: at rest and in view, but a statistic that is asked for is not a number.
     """
 
     unhealthy: int = 0
     jammed: int = 0
-    out_of_view: int = 0
+    no_grains_in_view: int = 0
     unseen: int = 0
 
     @classmethod
@@ -37,11 +37,11 @@ class LeftOut:
             status: how each pour ended, (n,).
             is_usable: whether each is used, (n,).
         """
-        counts: dict[str, int] = dict.fromkeys((*_WHY.values(), "unseen"), 0)
+        counts: dict[str, int] = dict.fromkeys((*_WHY, "unseen"), 0)
         for word, kept in zip(status, is_usable, strict=True):
             if kept:
                 continue
-            counts[_WHY.get(str(word), "unseen")] += 1
+            counts[str(word) if str(word) in _WHY else "unseen"] += 1
         return cls(**counts)
 
     @classmethod
@@ -57,8 +57,8 @@ class LeftOut:
 
     @property
     def counts(self) -> tuple[int, int, int]:
-        """Unhealthy, jammed and out of view, as a line of progress takes them."""
-        return self.unhealthy, self.jammed, self.out_of_view
+        """Unhealthy, jammed and without grains in view, as a line of progress takes them."""
+        return self.unhealthy, self.jammed, self.no_grains_in_view
 
     def to_dict(self) -> dict[str, int]:
         """Returns the counts by name, for JSON."""
@@ -73,7 +73,7 @@ class LeftOut:
         words = {
             "unhealthy": "unhealthy",
             "jammed": "jammed",
-            "out_of_view": "without grains in view",
+            "no_grains_in_view": "without grains in view",
             "unseen": "with a statistic that is no number",
         }
         found = [f"{count} {words[name]}" for name, count in self.to_dict().items() if count]

@@ -187,7 +187,7 @@ fn report(args: &GenerateArgs, summary: &Summary) -> anyhow::Result<Outcome> {
             "made": progress.made,
             "resumed": progress.resumed,
             "unhealthy": progress.unhealthy,
-            "out_of_view": progress.out_of_view,
+            "no_grains_in_view": progress.no_grains_in_view,
             "jammed": progress.jammed,
             "at_horizon": progress.at_horizon,
             "stopped": stopped,
@@ -200,7 +200,7 @@ fn report(args: &GenerateArgs, summary: &Summary) -> anyhow::Result<Outcome> {
             progress.total,
             progress.made,
             progress.unhealthy,
-            progress.out_of_view,
+            progress.no_grains_in_view,
             progress.jammed,
             progress.at_horizon
         ))?;
@@ -225,5 +225,5 @@ fn report(args: &GenerateArgs, summary: &Summary) -> anyhow::Result<Outcome> {
         tracing::warn!("stopped; the same command makes the remaining rows");
         return Ok(Outcome::Stopped);
     }
-    Ok(Outcome::healthy_if(progress.unhealthy + progress.out_of_view == 0))
+    Ok(Outcome::healthy_if(progress.unhealthy + progress.no_grains_in_view == 0))
 }

@@ -148,6 +148,7 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
             Err(error) => return Err(error),
         });
     }
+    require_no_copies(&observed)?;
     let paths: Vec<_> = args.recordings.iter().map(|path| path.display().to_string()).collect();
     for doubt in &doubts {
         note(&format!("warning: {doubt}"));
@@ -190,6 +191,21 @@ fn require_different(recordings: &[Reads]) -> anyhow::Result<()> {
         if !seen.insert(there) {
             let refusal =
                 format!("each recording must be given once, got {} twice", path.display());
+            return Err(BadArgument(refusal).into());
+        }
+    }
+    Ok(())
+}
+
+/// Refuses copies of a recording under other names: no two pours agree to the last digit of all statistics.
+fn require_no_copies(observed: &[Vec<f64>]) -> anyhow::Result<()> {
+    for (second, row) in observed.iter().enumerate().filter(|(_, row)| !row.is_empty()) {
+        if let Some(first) = observed[..second].iter().position(|other| other == row) {
+            let refusal = format!(
+                "recordings {} and {} show one formation, to the last digit of all statistics: each pour counts once",
+                first + 1,
+                second + 1
+            );
             return Err(BadArgument(refusal).into());
         }
     }

@@ -16,7 +16,7 @@ pub struct Progress {
     /// Rows, resumed or made, whose numbers cannot be used.
     pub unhealthy: u64,
     /// Rows, resumed or made, with too few grains in view.
-    pub out_of_view: u64,
+    pub no_grains_in_view: u64,
     /// Rows, resumed or made, in which grains remain in the funnel.
     pub jammed: u64,
     /// Rows, resumed or made, that were still moving at the horizon.
@@ -33,7 +33,7 @@ impl Progress {
         self.unhealthy += u64::from(status == RowStatus::Pour(Status::Unhealthy));
         self.jammed += u64::from(status.is_jammed());
         self.at_horizon += u64::from(status == RowStatus::Pour(Status::Horizon));
-        self.out_of_view += u64::from(status == RowStatus::NoGrainsInView);
+        self.no_grains_in_view += u64::from(status == RowStatus::NoGrainsInView);
     }
 }
 

@@ -231,13 +231,13 @@ fn damaged_parts_are_named_and_leftovers_removed() {
 }
 
 #[test]
-fn rows_out_of_view_are_rows() {
+fn rows_without_grains_in_view_are_rows() {
     let place = Place::new();
     let mut scene = small();
     scene.camera.height_threshold = 0.2;
     let summary =
         generate(&scene, &Prior::default(), &options(2), &place.at("a"), &mut |_| true).unwrap();
-    assert_eq!((summary.progress.out_of_view, summary.progress.unhealthy), (2, 0));
+    assert_eq!((summary.progress.no_grains_in_view, summary.progress.unhealthy), (2, 0));
     let dataset = Dataset::open(&place.at("a")).unwrap();
     assert_eq!(dataset.status_counts().get("no_grains_in_view"), Some(&2));
     assert!(dataset.x().iter().all(|value| value.is_nan()));

@@ -1,5 +1,6 @@
 //! A .bag or .mcap: a first pass finds the topics, a second averages the frames.
 
+use std::collections::HashSet;
 use std::ops::{ControlFlow, Range};
 
 use granulcal_features::{ColourImage, DepthImage, Intrinsics, register_colour};
@@ -53,13 +54,18 @@ pub(super) fn read(
         None if !wants_colour => None,
         name => Some(survey.colour(name.as_deref())?),
     };
+    let window = options.window(input.path(), depth.whole())?;
+    let (chosen, end) = depth.taken_within(&window);
     let mut pass = Pass {
         survey: &survey,
         depth,
         colour,
         size: (intrinsics.width, intrinsics.height),
         limit: input.unpack_limit(),
-        window: options.window(input.path(), depth.whole())?,
+        unit,
+        window,
+        chosen,
+        end,
         next: 0,
         mean: None,
         undecodable: 0,
@@ -67,7 +73,7 @@ pub(super) fn read(
         colour_message: None,
     };
     walk(survey.format, input, &mut |message| pass.take(message))?;
-    pass.finish(intrinsics, unit)
+    pass.finish(intrinsics)
 }
 
 /// The second pass.
@@ -78,8 +84,14 @@ struct Pass<'s> {
     /// Columns and rows that the lens has.
     size: (usize, usize),
     limit: u64,
+    /// Metres per count.
+    unit: f64,
+    /// Frames that are averaged, by their places in time.
     window: Range<u64>,
-    /// Index of the next depth frame.
+    /// The same by their places in the file, and where the last of them ends there.
+    chosen: HashSet<u64>,
+    end: u64,
+    /// Place in the file of the next depth frame.
     next: u64,
     mean: Option<Mean>,
     /// Frames of the window whose pixels cannot be unpacked, and why the first cannot.
@@ -91,7 +103,7 @@ struct Pass<'s> {
 
 impl Pass<'_> {
     fn take(&mut self, message: &Message<'_>) -> Result<ControlFlow<()>, DatasetError> {
-        let is_done = self.next >= self.window.end;
+        let is_done = self.next >= self.end;
         if self.depth.is_of(message.channel) && !is_done {
             self.depth_frame(message)?;
         } else if self.colour.is_some_and(|colour| colour.is_of(message.channel))
@@ -100,7 +112,7 @@ impl Pass<'_> {
             self.colour_message = Some((message.channel.clone(), message.data.to_vec()));
         }
         let has_colour = self.colour.is_none() || self.colour_message.is_some();
-        Ok(if self.next >= self.window.end && has_colour {
+        Ok(if self.next >= self.end && has_colour {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
@@ -116,7 +128,7 @@ impl Pass<'_> {
         }
         let index = self.next;
         self.next += 1;
-        if !self.window.contains(&index) {
+        if !self.chosen.contains(&index) {
             return Ok(());
         }
         let place = format!("frame {index} of {}", self.depth.topic);
@@ -135,13 +147,13 @@ impl Pass<'_> {
             return Err(refuse(Fault::new("the size", found, allowed)));
         }
         match &mut self.mean {
-            None => self.mean = Some(Mean::new(frame)),
+            None => self.mean = Some(Mean::new(frame, self.unit)),
             Some(mean) => mean.add(&frame).map_err(refuse)?,
         }
         Ok(())
     }
 
-    fn finish(self, intrinsics: Intrinsics, unit: f64) -> Result<Averaged, DatasetError> {
+    fn finish(self, intrinsics: Intrinsics) -> Result<Averaged, DatasetError> {
         let path = &self.survey.path;
         let mut damage: Vec<_> = self
             .survey
@@ -161,7 +173,7 @@ impl Pass<'_> {
             return Err(self.fault.unwrap_or_else(nothing).in_file(path));
         };
         let (frames, unlike) = (mean.frames(), mean.doubt());
-        let image = mean.finish(unit).map_err(|fault| fault.in_file(path))?;
+        let image = mean.finish().map_err(|fault| fault.in_file(path))?;
         let colour = match (self.colour, &self.colour_message) {
             (Some(topic), Some((channel, data))) => {
                 let refuse = |fault: Fault| fault.of(&channel.topic).in_file(path);
@@ -178,7 +190,7 @@ impl Pass<'_> {
         Ok(Averaged {
             intrinsics,
             image,
-            unit,
+            unit: self.unit,
             colour,
             topic: self.depth.topic.clone(),
             frames,

@@ -191,7 +191,7 @@ impl Survey {
         lens: &Lens,
         depth: &Topic,
     ) -> Result<Intrinsics, DatasetError> {
-        let is_rectified = depth.topic.rsplit('/').any(|part| part.contains("rect"));
+        let is_rectified = is_rectified(&depth.topic);
         let [fx, _, cx, _, fy, cy, ..] = if is_rectified && lens.p[0] > 0.0 {
             let [fx, a, cx, _, b, fy, cy, ..] = lens.p;
             [fx, a, cx, b, fy, cy, 0.0, 0.0, 1.0]
@@ -275,6 +275,14 @@ impl<'a> Stream<'a> {
     }
 }
 
+/// Whether the images of a topic are rectified, by the last part of its name but for that of a transport: `image_rect`,
+/// `image_rect_raw/compressedDepth`.
+fn is_rectified(topic: &str) -> bool {
+    let is_transport = |part: &&str| part.starts_with("compressed");
+    let last = topic.rsplit('/').find(|part| !is_transport(part));
+    last.is_some_and(|part| part.split('_').any(|word| ["rect", "rectified"].contains(&word)))
+}
+
 /// Leading parts that two names share.
 fn shared(a: &str, b: &str) -> usize {
     a.split('/').zip(b.split('/')).take_while(|(a, b)| a == b).count()
@@ -288,6 +296,23 @@ fn list<'a>(topics: impl Iterator<Item = &'a Topic>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rectified_images_are_told_by_the_last_part_of_their_topic() {
+        for rectified in [
+            "/camera/depth/image_rect_raw",
+            "/camera/depth/image_rect_raw/compressedDepth",
+            "/depth/image_rect",
+            "image_rectified",
+        ] {
+            assert!(is_rectified(rectified), "{rectified}");
+        }
+        for raw in
+            ["/directory/image_raw", "/cam_direct/image_raw", "/image_rect/raw", "/a/rectangle", ""]
+        {
+            assert!(!is_rectified(raw), "{raw}");
+        }
+    }
 
     #[test]
     fn streams_are_told_from_other_topics() {

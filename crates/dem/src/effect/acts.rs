@@ -37,6 +37,12 @@ pub(crate) trait Acts: Debug + Send + Sync {
         None
     }
 
+    /// Changes velocities as they are at the begin of the substep, before gravity acts; returns the work of moving walls,
+    /// per typical mass `[m^2/s^2]`.
+    fn act_before_gravity(&self, _particles: &mut Particles, _context: &EffectContext<'_>) -> f64 {
+        0.0
+    }
+
     /// Changes velocities once gravity has acted, before contacts are assembled; returns the energy that it gives, per
     /// typical mass `[m^2/s^2]`.
     fn act_with_gravity(&self, _particles: &mut Particles, _context: &EffectContext<'_>) -> f64 {
@@ -48,13 +54,15 @@ pub(crate) trait Acts: Debug + Send + Sync {
         restitution
     }
 
-    /// Changes velocities after the impacts; `bridges` is what is remembered of pairs that have touched.
+    /// Changes velocities after the impacts; `bridges` is what is remembered of pairs that have touched. Returns the
+    /// work of moving walls, per typical mass `[m^2/s^2]`.
     fn act_across_gaps(
         &self,
         _particles: &mut Particles,
         _context: &EffectContext<'_>,
         _bridges: &mut Bridges,
-    ) {
+    ) -> f64 {
+        0.0
     }
 
     /// How far its force across a gap reaches `[m]`: so far pairs are listed.

@@ -106,8 +106,8 @@ impl Drag {
 
     /// The rates of [`Drag::rates`] among neighbours, `crowd` between 0 and 1.
     pub fn crowded_rates(&self, radius: f64, speed: f64, crowd: f64) -> [f64; 2] {
-        let crowd = crowd * self.fluid.crowding;
-        if crowd == 0.0 {
+        let crowding = self.fluid.crowding;
+        if crowd == 0.0 || crowding == 0.0 {
             return self.rates(radius, speed);
         }
         let void = 1.0 - PACKED * crowd;
@@ -116,7 +116,7 @@ impl Drag {
         // Where nothing is viscous the exponent is its limit of fast flow.
         let reynolds = 2.0 * radius * density * void * speed / viscosity;
         let bell = 1.5 - reynolds.max(f64::MIN_POSITIVE).log10();
-        let exponent = 3.7 - 0.65 * (-0.5 * bell * bell).exp();
+        let exponent = crowding * (3.7 - 0.65 * (-0.5 * bell * bell).exp());
         // One eps is of w, one of the pressure that drives the flow, which acts on the grains as well (model B).
         [linear * void.powf(-exponent), angular]
     }

@@ -1,14 +1,16 @@
 //! A fluid film between surfaces that come near: `scene/effects/lubrication.rs` has its law.
 //!
-//! Implicit in the speed at which a gap closes, one pair after the other: with k = F dt / (m v_n), m a typical mass,
-//! and the inverse masses w of both,
+//! The force is `-C v_n / h` at an opening speed v_n, with C over the pair's mass and the gap cut at h_0. Along the way
+//! of a substep that is `dv = -C dh / h`, hence, whatever the way and the step,
 //!
 //! ```text
-//! J = -k v_n / (1 + k (w_i + w_j)),   v_n -> v_n / (1 + k (w_i + w_j))
+//! v' = v - C (Phi(h') - Phi(h)),   h' = h + v' dt,   Phi(h) = ln(h / h_0) from h_0 on, (h - h_0) / h_0 below
 //! ```
 //!
-//! the gap being that at the middle of the substep, so that no film is too thick for the substep, and none can turn a
-//! motion round. What slides past each other at u_t is resisted likewise, by an impulse at both surfaces,
+//! one pair after the other: no film is too thick for the substep, and none can turn a motion round. What comes together
+//! is slowed before gravity acts and impacts are looked for, up to the contact; what parts, after both, from the contact
+//! on. So grains that rest on each other, which gravity brings together for the length of a substep, have no film
+//! between them that would carry them. What slides past each other at u_t is resisted by an impulse at both surfaces,
 //!
 //! ```text
 //! J_t = -k_t u_t / (1 + (1 + 5/2) k_t (w_i + w_j))
@@ -18,14 +20,17 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use granulcal_scene::{Effect, Scene};
+use nalgebra::Vector3;
 
 use super::acts::{Acts, EffectContext};
 use super::bridges::Bridges;
 use super::drag;
-use super::near::{Near, at_walls, pairs};
+use super::near::{Meeting, Near, at_walls, pairs};
 use crate::law::INVERSE_INERTIA;
 use crate::particles::Particles;
-use crate::wall::Walls;
+
+/// Halvings of the interval in which a speed is looked for: to its last bits.
+const HALVINGS: usize = 50;
 
 /// The film of a scene.
 #[derive(Clone, Debug)]
@@ -58,58 +63,115 @@ impl Acts for Film {
         self.range
     }
 
-    /// Resists what comes together and what parts: pairs of grains and grains at walls.
+    /// Resists what comes together, and what slides.
+    fn act_before_gravity(&self, particles: &mut Particles, context: &EffectContext<'_>) -> f64 {
+        self.resist(particles, context, |film, particles, near, meeting| {
+            let slid = film.resist_sliding(particles, near, meeting, context.dt);
+            if meeting.opening < 0.0 {
+                slid + film.slow(particles, near, meeting, context.dt)
+            } else {
+                slid
+            }
+        })
+    }
+
+    /// Resists what parts.
     fn act_across_gaps(
         &self,
         particles: &mut Particles,
         context: &EffectContext<'_>,
         _bridges: &mut Bridges,
-    ) {
-        // Velocities change while the film acts, spheres do not.
-        let spheres = particles.spheres.clone();
-        let between = pairs(context.pairs, &spheres, particles.period);
-        let count = particles.count() as u32;
-        for near in between.chain(at_walls(context.at_walls, &spheres, count, context.walls)) {
-            if near.gap < self.range {
-                self.resist(particles, context.walls, &near, count, context.dt);
+    ) -> f64 {
+        self.resist(particles, context, |film, particles, near, meeting| {
+            if meeting.opening > 0.0 {
+                film.slow(particles, near, meeting, context.dt)
+            } else {
+                0.0
             }
-        }
+        })
     }
 }
 
 impl Film {
-    fn resist(&self, particles: &mut Particles, walls: &Walls, near: &Near, count: u32, dt: f64) {
-        let (i, j) = (near.pair.0 as usize, near.pair.1 as usize);
-        let normal = near.normal;
-        let (other, inverse_mass) = if near.is_wall {
-            let wall = walls.wall(j - count as usize);
-            (wall.motion_at(&near.point).0, particles.inverse_mass[i])
-        } else {
-            (particles.velocity(j), particles.inverse_mass[i] + particles.inverse_mass[j])
-        };
-        let opening = (particles.velocity(i) - other).dot(&normal);
-        // The gap at the middle of the substep: with that at its begin a film would take a tenth too little.
-        let gap = (near.gap + 0.5 * dt * opening).max(self.roughness);
-        let k = self.strength * near.derjaguin.powi(2) / gap * dt;
-        let impulse = -k * opening / (1.0 + k * inverse_mass) * normal;
-        particles.kick(i, &impulse);
-        if !near.is_wall {
-            particles.kick(j, &-impulse);
+    /// Lets `by` act on all that is near: pairs of grains and grains at walls; returns the sum.
+    fn resist(
+        &self,
+        particles: &mut Particles,
+        context: &EffectContext<'_>,
+        by: impl Fn(&Self, &mut Particles, &Near, &Meeting) -> f64,
+    ) -> f64 {
+        // Velocities change while the film acts, spheres do not.
+        let spheres = particles.spheres.clone();
+        let between = pairs(context.pairs, &spheres, particles.period);
+        let count = particles.count() as u32;
+        let near = between.chain(at_walls(context.at_walls, &spheres, count, context.walls));
+        near.filter(|near| near.gap < self.range)
+            .map(|near| {
+                let meeting = Meeting::of(&near, particles, context.walls);
+                by(self, particles, &near, &meeting)
+            })
+            .sum()
+    }
+
+    /// Slows the opening or closing of a pair along its way in a substep; returns the work of a wall.
+    fn slow(&self, particles: &mut Particles, near: &Near, meeting: &Meeting, dt: f64) -> f64 {
+        let c = self.strength * near.derjaguin.powi(2) * meeting.inverse_mass;
+        let slowed = self.slowed(c, near.gap, meeting.opening, dt);
+        let impulse = (slowed - meeting.opening) / meeting.inverse_mass * near.normal;
+        meeting.push(particles, near, &impulse)
+    }
+
+    /// The speed v' that is left of an opening speed `v`, of C `c` `[m/s]`.
+    fn slowed(&self, c: f64, gap: f64, v: f64, dt: f64) -> f64 {
+        let from = gap.max(0.0);
+        let left = |to: f64| v - c * (self.phi(to.clamp(0.0, self.range)) - self.phi(from));
+        // The root of v' = left(gap + v' dt), between a standstill and v; what is left falls as the way grows.
+        let (mut still, mut moving) = (0.0, v);
+        let lacks = |speed: f64| (left(gap + speed * dt) - speed) * v.signum();
+        if lacks(moving) >= 0.0 {
+            return moving;
         }
-        if self.shear > 0.0 {
-            // The surface of a wall moves as its point does, that of a grain turns as well.
-            let surface =
-                if near.is_wall { other } else { other + particles.spin(j).cross(&normal) };
-            let sliding = particles.velocity(i) - particles.spin(i).cross(&normal) - surface;
-            let sliding = sliding - sliding.dot(&normal) * normal;
-            let other = (!near.is_wall).then(|| particles.radius(j));
-            let k = self.shear * dt * shear_over_viscosity(particles.radius(i), other, gap);
-            let impulse = -k / (1.0 + (1.0 + INVERSE_INERTIA) * k * inverse_mass) * sliding;
-            particles.kick_at(i, &impulse, &-normal);
-            if !near.is_wall {
-                particles.kick_at(j, &-impulse, &normal);
-            }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (still + moving);
+            if lacks(middle) >= 0.0 { still = middle } else { moving = middle }
         }
+        still
+    }
+
+    /// The integral of 1 / max(h, h_0) from h_0 to a gap `[-]`.
+    fn phi(&self, gap: f64) -> f64 {
+        let ratio = gap / self.roughness;
+        if ratio < 1.0 { ratio - 1.0 } else { ratio.ln() }
+    }
+
+    /// Resists what slides past each other; returns the work of a wall.
+    fn resist_sliding(
+        &self,
+        particles: &mut Particles,
+        near: &Near,
+        meeting: &Meeting,
+        dt: f64,
+    ) -> f64 {
+        if self.shear == 0.0 {
+            return 0.0;
+        }
+        let (i, j, normal) = (near.pair.0 as usize, near.pair.1 as usize, near.normal);
+        // The gap at the middle of the substep.
+        let gap = (near.gap + 0.5 * dt * meeting.opening).max(self.roughness);
+        // The surface of a wall moves as its point does, that of a grain turns as well.
+        let spin = if near.is_wall { Vector3::zeros() } else { particles.spin(j) };
+        let surface = meeting.other + spin.cross(&normal);
+        let sliding = particles.velocity(i) - particles.spin(i).cross(&normal) - surface;
+        let sliding = sliding - sliding.dot(&normal) * normal;
+        let other = (!near.is_wall).then(|| particles.radius(j));
+        let k = self.shear * dt * shear_over_viscosity(particles.radius(i), other, gap);
+        let impulse = -k / (1.0 + (1.0 + INVERSE_INERTIA) * k * meeting.inverse_mass) * sliding;
+        particles.kick_at(i, &impulse, &-normal);
+        if near.is_wall {
+            return impulse.dot(&meeting.other);
+        }
+        particles.kick_at(j, &-impulse, &normal);
+        0.0
     }
 }
 

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use crate::contact_set::ContactSet;
 use crate::lanes::Row;
+use crate::particles::Particles;
 use crate::period::Period;
 use crate::wall::Walls;
 
@@ -19,6 +20,45 @@ pub(super) struct Near {
     /// The nearest point of the wall; of a pair nothing.
     pub point: Vector3<f64>,
     pub is_wall: bool,
+}
+
+/// How two surfaces move against each other.
+pub(super) struct Meeting {
+    /// Velocity of the wall's point, or of the second grain `[m/s]`.
+    pub other: Vector3<f64>,
+    /// How fast their gap opens `[m/s]`.
+    pub opening: f64,
+    /// Of both together, over that of a typical grain `[-]`.
+    pub inverse_mass: f64,
+    /// When in this substep one of them has had its last impact `[s]`; 0 for none, and before impacts are resolved.
+    pub struck: f64,
+}
+
+impl Meeting {
+    pub fn of(near: &Near, particles: &Particles, walls: &Walls) -> Self {
+        let (i, j) = (near.pair.0 as usize, near.pair.1 as usize);
+        let (other, inverse_mass) = if near.is_wall {
+            let wall = walls.wall(j - particles.count());
+            (wall.motion_at(&near.point).0, particles.inverse_mass[i])
+        } else {
+            (particles.velocity(j), particles.inverse_mass[i] + particles.inverse_mass[j])
+        };
+        let opening = (particles.velocity(i) - other).dot(&near.normal);
+        let of = |grain: usize| particles.struck.get(grain).copied().unwrap_or(0.0);
+        let struck = if near.is_wall { of(i) } else { of(i).max(of(j)) };
+        Self { other, opening, inverse_mass, struck }
+    }
+
+    /// Gives the first grain an impulse over a typical mass `[m/s]` and the second the opposite one; returns the work
+    /// of a wall, per typical mass `[m^2/s^2]`.
+    pub fn push(&self, particles: &mut Particles, near: &Near, impulse: &Vector3<f64>) -> f64 {
+        particles.kick(near.pair.0 as usize, impulse);
+        if near.is_wall {
+            return impulse.dot(&self.other);
+        }
+        particles.kick(near.pair.1 as usize, &-impulse);
+        0.0
+    }
 }
 
 /// The pairs that are listed.

@@ -122,8 +122,9 @@ impl Simulation {
             self.watch.see_work(self.particles.work_of(&added, dt));
         }
         let (particles, around) = (&mut self.particles, &self.around);
-        particles.accelerate(&around.gravity, dt, &around.threads);
         let context = around.for_effects([&self.contacts.pairs, &self.contacts.at_walls]);
+        self.watch.see_work(around.effects.act_before_gravity(particles, &context));
+        particles.accelerate(&around.gravity, dt, &around.threads);
         self.watch.see_work(around.effects.act_with_gravity(particles, &context));
         if let Some(liquid) = &mut self.liquid {
             self.watch.see_work(liquid.act(particles, &context, time));
@@ -144,6 +145,7 @@ impl Simulation {
         if self.clumps.is_some() {
             self.impacts.candidates.clear();
         }
+        particles.struck.clear();
         let hit = self.impacts.resolve(particles, contacts, around);
         if let Some(bonds) = &self.bonds {
             bonds.pull(particles, around.settings.dt);
@@ -164,7 +166,9 @@ impl Simulation {
     fn act_across_gaps(&mut self) {
         let around = &self.around;
         let context = around.for_effects([&self.contacts.pairs, &self.contacts.at_walls]);
-        around.effects.act_across_gaps(&mut self.particles, &context, &mut self.bridges);
+        let of_walls =
+            around.effects.act_across_gaps(&mut self.particles, &context, &mut self.bridges);
+        self.watch.see_work(of_walls);
     }
 
     /// Joins the grains of the start, where bonds do: those of a ball above a bed when it is let go.

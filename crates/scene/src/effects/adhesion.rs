@@ -64,4 +64,10 @@ impl Adhesion {
     pub fn pull(&self, gap: f64, derjaguin: f64) -> f64 {
         if gap <= self.range { derjaguin } else { 0.0 }
     }
+
+    /// Work to part surfaces from `gap` on, over the pull of touching typical grains times a radius `[-]`: the integral
+    /// of [`Adhesion::pull`].
+    pub fn work(&self, gap: f64, derjaguin: f64) -> f64 {
+        derjaguin * (self.range - gap.max(0.0)).max(0.0)
+    }
 }

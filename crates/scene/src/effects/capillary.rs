@@ -85,6 +85,17 @@ impl Capillary {
         let s = gap.max(0.0) * (derjaguin / self.volume).sqrt();
         derjaguin / (1.0 + 1.05 * s + 2.5 * s * s)
     }
+
+    /// Work to part a bridge from `gap` until it ruptures, over the pull of touching typical grains times a radius `[-]`:
+    /// the integral of [`Capillary::pull`].
+    pub fn work(&self, gap: f64, derjaguin: f64) -> f64 {
+        // Of 1 / (1 + a s + b s^2) with 4 b > a^2: 2 / q atan((2 b s + a) / q), q^2 = 4 b - a^2.
+        let (a, b): (f64, f64) = (1.05, 2.5);
+        let (q, scale) = ((4.0 * b - a * a).sqrt(), (derjaguin / self.volume).sqrt());
+        let until = |gap: f64| ((2.0 * b * scale * gap + a) / q).atan();
+        let parted = until(self.rupture()) - until(gap.max(0.0));
+        (derjaguin / scale * 2.0 / q * parted).max(0.0)
+    }
 }
 
 #[cfg(test)]
@@ -99,6 +110,19 @@ mod tests {
         // s = S sqrt(R / V) = 1 at S = sqrt(1e-3) r.
         assert!((wet.pull(1e-3f64.sqrt(), 1.0) - 1.0 / 4.55).abs() < 1e-12);
         assert!((wet.rupture() - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn work_is_the_integral_of_the_pull() {
+        let wet = Capillary { bond: 1.0, contact_angle: 0.3, ..Capillary::default() };
+        for (from, derjaguin) in [(0.0, 1.0), (-1e-3, 2.0), (0.05, 0.8)] {
+            let (start, parts) = (f64::max(from, 0.0), 1000);
+            let step = (wet.rupture() - start) / f64::from(parts);
+            let middle = |k: i32| wet.pull(start + (f64::from(k) + 0.5) * step, derjaguin);
+            let sum = step * (0..parts).map(middle).sum::<f64>();
+            assert!((wet.work(from, derjaguin) / sum - 1.0).abs() < 1e-5);
+        }
+        assert_eq!(wet.work(1.1 * wet.rupture(), 1.0), 0.0);
     }
 
     #[test]

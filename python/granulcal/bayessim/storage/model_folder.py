@@ -112,13 +112,17 @@ def load_parts(path: str | PathLike[str]) -> Parts:
         x_names = tuple(document["x_names"])
         tensors = Tensors(tensors, folder / _TENSORS_NAME, len(prior.names), len(x_names))
         calibration, known = document["calibration"], document["identifiability"]
+        average = _average(document, where)
+        if calibration is not None:
+            # Files of before it was stated: where an emulator counts, its folds were the check.
+            calibration = {"chose_form": average.emulator > 0, **calibration}
         return Parts(
             prior=prior,
             config=config,
             standardiser=tensors.standardiser(),
             likelihood=tensors.likelihood(prior, config, document["emulator"]),
             amortised=tensors.amortised(config) if document["has_network"] else None,
-            average=_average(document, where),
+            average=average,
             x_names=x_names,
             misfit_reference=tensors.misfit(),
             identifiability=None if known is None else Identifiability.from_dict(known),

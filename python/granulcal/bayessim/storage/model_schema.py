@@ -101,7 +101,8 @@ _CALIBRATION = Table(
         "rank_p_values": _NUMBERS,
         "tarp_shares": _NUMBERS,
         "tarp_p_value": Number(),
-    }
+    },
+    {"chose_form": Flag()},
 )
 _WEIGHT = Number(0, 1e6)
 

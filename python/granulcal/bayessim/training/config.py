@@ -48,7 +48,7 @@ class Config:
         max_epochs: passes over the pairs at most; fewer from 1500 pairs on.
         patience: passes without a better validation loss before a member stops.
         validation_share: share of the pairs that only decide when to stop.
-        test_share: share of the pairs kept for the calibration check, never trained on.
+        test_share: share of the pairs that no network is trained on, to check and weigh it by.
         synthetic: synthetic pairs of `distilled`.
         emulator_features: random frequencies of the emulator.
         weight_decay: decoupled decay of the weights on the random features (AdamW).

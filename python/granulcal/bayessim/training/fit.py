@@ -43,6 +43,7 @@ class Trained:
         summary: what was done.
         posteriors: posteriors of pairs that were not trained on.
         truth: their parameters, own units, shape (t, p).
+        chose_form: whether these pairs chose the emulator's form, or how much the network counts.
     """
 
     standardiser: Standardiser
@@ -53,6 +54,7 @@ class Trained:
     summary: TrainingSummary
     posteriors: list[Posterior]
     truth: Array
+    chose_form: bool
 
 
 def train_model(
@@ -140,7 +142,8 @@ class _Work:
         told = f"on {len(rows)} pairs unseen by both: emulator {alone[0]:.2f}"
         told += f", network {alone[1]:.2f} nat above the prior"
         if average == NETWORK_ALONE:
-            return self._by_network(likelihood, amortised, result, f"network alone; {told}")
+            made = self._by_network(likelihood, amortised, result, f"network alone; {told}")
+            return replace(made, chose_form=True)
         if average == EMULATOR_ALONE:
             made = self._by_emulator(likelihood, folds, choice)
             told = f"{made.summary.choice}\n  {told}: the emulator alone"
@@ -164,6 +167,7 @@ class _Work:
             summary,
             posteriors,
             self.pairs.theta[rows[chosen]],
+            chose_form=True,
         )
 
     def _held_out(
@@ -219,6 +223,7 @@ class _Work:
             summary,
             posteriors,
             self.pairs.theta[rows[chosen]],
+            chose_form=True,
         )
 
     def _by_network(
@@ -238,6 +243,7 @@ class _Work:
             summary,
             posteriors,
             self.pairs.theta[rows],
+            chose_form=False,
         )
 
     def _of_the_prior(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -89,6 +89,13 @@ class Standing:
         return self.verdict.kind not in FALLEN
 
     @property
+    def surrogate_p(self) -> float | None:
+        """P of the fits, where that of the base model's own pours decided; else None."""
+        p, before = self.verdict.p, self.before.p
+        is_of_base = self.of_base is not None and p == self.of_base.residual_test.p
+        return before if is_of_base and p != before else None
+
+    @property
     def unbeaten(self) -> tuple[str, ...]:
         """Rows without physics that the named effect does not beat at the sealed conditions."""
         if self.before.kind not in NAMING:
@@ -100,6 +107,7 @@ class Standing:
         return {
             "stands": self.stands,
             "verdict_before_checks": self.before.kind,
+            "p_before_checks": self.before.p,
             "confirmed_p": None if self.confirmed != self.confirmed else self.confirmed,
             "anchors": self.anchors,
             "looked_again": self.looked,
@@ -221,10 +229,10 @@ def _left_by_base(before: Verdict, of_base: Recentred | None, rules: Thresholds)
     p = of_base.residual_test.p
     leaves = f"{_said(before)}, but pours of the base model at its fit leave"
     if p > rules.detect:
-        return Verdict("NONE", (), (), before.p, f"{leaves} nothing (p = {p:.3g})")
+        return Verdict("NONE", (), (), p, f"{leaves} nothing (p = {p:.3g})")
     if p > rules.name and before.kind != "RESIDUAL":
         why = f"{leaves} too little for more (p = {p:.3g}, at most {rules.name:g} asked)"
-        return Verdict("RESIDUAL", (), (), before.p, why)
+        return Verdict("RESIDUAL", (), (), p, why)
     return before
 
 

@@ -179,13 +179,13 @@ FUNNEL: tuple[LibraryEffect, ...] = (
 
 LIBRARY: tuple[LibraryEffect, ...] = (
     *FUNNEL,
+    # Of a fluid that is thin the inertia alone drags: where it weighs nothing, it does nothing.
     LibraryEffect(
         name="fluid.density",
         family="fluid",
         path="effects.fluid.density",
         full=1500.0,
         unit="kg/m3",
-        also=(("effects.fluid.viscosity", 1e-3),),
         doc="grains stand in a thin fluid: buoyancy, added mass, drag",
     ),
     LibraryEffect(
@@ -194,8 +194,7 @@ LIBRARY: tuple[LibraryEffect, ...] = (
         path="effects.fluid.viscosity",
         full=0.2,
         unit="Pa s",
-        also=(("effects.fluid.density", 1000.0),),
-        doc="grains stand in a thick fluid of the density of water",
+        doc="grains stand in a thick fluid, of the scene's density: Stokes' drag",
     ),
     LibraryEffect(
         name="fluid.saturated",
@@ -204,7 +203,6 @@ LIBRARY: tuple[LibraryEffect, ...] = (
         full=1500.0,
         unit="kg/m3",
         also=(
-            ("effects.fluid.viscosity", 1e-3),
             ("effects.fluid.saturated", 1.0),
             ("effects.fluid.crowding", 1.0),
             # Of the fluid between grains of a solid fraction of 0.6.
@@ -219,7 +217,6 @@ LIBRARY: tuple[LibraryEffect, ...] = (
         full=1500.0,
         unit="kg/m3",
         also=(
-            ("effects.fluid.viscosity", 1e-3),
             ("effects.fluid.entrained", 1.0),
             ("effects.fluid.crowding", 1.0),
         ),

@@ -23,7 +23,7 @@ from granulcal.pours.statistics import (
     statistics,
 )
 
-__all__ = ["Measures", "formation_of"]
+__all__ = ["Measures", "camera_used", "formation_of"]
 
 Array = NDArray[np.float64]
 
@@ -127,9 +127,14 @@ def formation_of(
     path: Path, scene: Scene, camera: Path | None, reading: Mapping[str, Any] | None = None
 ) -> tuple[Recording, Formation]:
     """Returns a recording and its formation, its pixels as wide as those of the scene's images."""
-    recording = Recording.open(path, camera=camera or _camera_beside(path))
+    recording = Recording.open(path, camera=camera_used(path, camera))
     settings = {"ground_resolution": scene.ground_resolution, **(reading or {})}
     return recording, recording.formation(**settings)
+
+
+def camera_used(path: Path, given: Path | None) -> Path | None:
+    """Returns the TOML of the camera by which a recording is read; None for its own."""
+    return given or _camera_beside(path)
 
 
 def _camera_beside(path: Path) -> Path | None:

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.documents import LARGEST_DOCUMENT, parse_json, read_bytes
-from granulcal.engines.in_use import law_of_pours
+from granulcal.engines.in_use import engine_in_use, law_of_pours
 from granulcal.errors import ObservationError, OtherLawWarning
 from granulcal.files import write_beside
 from granulcal.loop.check.discrepancy import Discrepancy
@@ -120,6 +120,8 @@ class Models:
         scatter: standard deviation of one pour under each, shape (H, s).
         pours: measured under each, shape (H,).
         coarse: the second size of grains; None without.
+        engine: name of the simulator that poured for the loop; None is ours, and empty another one
+            that an older file does not name.
     """
 
     scene: Scene
@@ -136,11 +138,13 @@ class Models:
     scatter: Array
     pours: Array
     coarse: Coarse | None = None
+    engine: str | None = None
 
     def write(self, folder: Path) -> Path:
         """Writes `models.json` into a folder and returns its path."""
         document = {
             "law": law_of_pours(self.scene),
+            "engine": self.engine,
             "scene": self.scene.to_toml(),
             "verdict": self.verdict,
             "paths": self.paths,
@@ -199,6 +203,8 @@ class Models:
             scatter=np.array(d["scatter"], dtype=float),
             pours=np.array(d["pours"], dtype=float),
             coarse=Coarse(**d["coarse"]) if d["coarse"] else None,
+            # Older files name none; their law tells ours from others.
+            engine=d.get("engine", "" if d.get("law") == 0 else None),
         )
 
     def predict(
@@ -221,7 +227,8 @@ class Models:
 
         Raises:
             ObservationError: an unknown model, a condition that lacks an input of the archive, a
-                correction too far from the tested conditions, or too few usable pours.
+                correction too far from the tested conditions, too few usable pours, or another
+                engine in use than that of the loop.
         """
         if model not in MODELS:
             raise ObservationError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
@@ -236,6 +243,7 @@ class Models:
                 f"the condition must state {', '.join(p for p, _, _ in self.inputs)}; "
                 f"it lacks {', '.join(missing)}"
             )
+        self.require_engine(model)
         if model in ("line", "nearest"):
             return self._row(model, self._unit(at), level)
         if model == "corrected":
@@ -246,6 +254,25 @@ class Models:
             for i in steps("pours", range(pours))
         ]
         return self._of_rows(model, np.concatenate(rows), level)
+
+    def require_engine(self, model: str) -> None:
+        """Refuses a model that pours where another engine is in use than that of the loop.
+
+        Raises:
+            ObservationError: says which it was.
+        """
+        used = engine_in_use()
+        name = None if used is None else used.name
+        if model in ("line", "nearest") or name == self.engine or (self.engine == "" and name):
+            return
+        was, now = (
+            "another engine" if each == "" else "our own simulator" if each is None else repr(each)
+            for each in (self.engine, name)
+        )
+        raise ObservationError(
+            f"{model}: the loop was closed with pours by {was}, and what it fitted is of that "
+            f"alone; got {now}: pour with the same (`predict --engine`), or ask for line or nearest"
+        )
 
     def scenes(self, model: str, at: Mapping[str, float]) -> list[Scene]:
         """Returns the scenes that one pour of a prediction needs: none, one, or one of each size.

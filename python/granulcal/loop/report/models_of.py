@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.engines.in_use import engine_in_use
 from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.cube import from_cube
@@ -66,6 +67,7 @@ def models_of(
         scatter=np.array(scatter),
         pours=np.array([float(len(measured[c.name])) for c in fitted]),
         coarse=task.coarse,
+        engine=None if (engine := engine_in_use()) is None else engine.name,
     )
 
 

@@ -56,7 +56,7 @@ _SCHEMA: Schema = Table(
         "pours": ListOf(Number(1), least=1),
         "coarse": Maybe(Table({"numbers": Mapping(Number()), "held": Number(high=0)})),
     },
-    {"law": Whole(0, 2**32 - 1)},
+    {"law": Whole(0, 2**32 - 1), "engine": Maybe(Text())},
 )
 
 

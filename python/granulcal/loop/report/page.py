@@ -10,6 +10,7 @@ import numpy as np
 from granulcal.engines.in_use import version_of_pours
 from granulcal.files import write_beside
 from granulcal.loop.check.own_errors import in_told_sessions
+from granulcal.loop.check.standing import Standing
 from granulcal.loop.closed import Closed
 from granulcal.loop.effects.image_faults import Frame
 from granulcal.loop.pours.measures import Measures, formation_of
@@ -18,7 +19,7 @@ from granulcal.pours.formation_image import formation_figure
 from granulcal.pours.simulate import simulate
 from granulcal.report import data_uri, template
 
-__all__ = ["write_page"]
+__all__ = ["sentence_of", "write_page"]
 
 _SENTENCES = {
     "NONE": "The model explains these pours: no residual was found.",
@@ -46,12 +47,15 @@ def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
     page = template("loop.html.j2").render(
         title=title,
         headline=f"{verdict.kind}: {named}" if named else verdict.kind,
-        sentence=_SENTENCES[verdict.kind],
+        sentence=sentence_of(closed.standing),
         reason=verdict.reason[:1].upper() + verdict.reason[1:],
         made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         version=version_of_pours(),
         registration=closed.registration,
         p=verdict.p,
+        surrogate_p=closed.standing.surrogate_p,
+        doubts=closed.doubts,
+        beyond=closed.trace.beyond,
         totals=[("fit", closed.fit)] + ([("sealed", closed.sealed)] if closed.sealed else []),
         placebo=closed.placebo.verdict,
         errors=_errors(closed),
@@ -75,6 +79,13 @@ def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
         number=_number,
     )
     write_beside(path, page)
+
+
+def sentence_of(standing: Standing) -> str:
+    """Returns what the verdict says, in a sentence."""
+    if standing.verdict.kind == "NONE" and standing.surrogate_p is not None:
+        return "The model explains these pours: pours of it leave no more than chance does."
+    return _SENTENCES[standing.verdict.kind]
 
 
 def _errors(closed: Closed) -> list[dict[str, Any]]:

@@ -40,7 +40,8 @@ class Verdict:
         named: effects of the finding, the most probable first; for SET all that are not
             distinguished; else none.
         families: of `named`, each once.
-        p: of the residual test before any effect was fitted.
+        p: of the residual test before any effect was fitted; of that of the base model's own pours
+            where these decided.
         reason: one sentence with the numbers that decided.
     """
 

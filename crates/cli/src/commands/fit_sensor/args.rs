@@ -34,6 +34,11 @@ Example:
   granulcal-cli fit-sensor d0.png d1.png --camera d435.toml --baseline 0.05 \\
       --region 30,10,100,290 --check-region 130,10,100,290
   granulcal-cli fit-sensor bed_1.npz bed_2.npz bed_3.npz --check bed_4.npz bed_5.npz")]
+// Frames are averaged by the other commands that read recordings, not here.
+#[command(mut_arg("frames", |frames| frames.help("Read so many frames, or `all`")))]
+#[command(mut_arg("first_frame", |first| {
+    first.help("Index of the first frame that is read, from 0 [default: so that the last are]")
+}))]
 pub struct FitSensorArgs {
     /// Recordings of a flat surface
     #[arg(required = true, value_name = "RECORDING", value_parser = recording())]

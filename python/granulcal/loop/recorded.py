@@ -1,0 +1,95 @@
+"""Whether a task's recordings are pours of its scene, each another one: asked before any pour.
+
+A measurement that is none must not become a finding: a file in another unit would be a strong one.
+A recording is refused where it could be of neither the scene nor the scene with any effect of the
+task at full strength.
+"""
+
+import warnings
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granulcal.errors import ObservationError
+from granulcal.loop.condition import Condition, digest_of
+from granulcal.loop.effects.library import LibraryEffect
+from granulcal.loop.pours.measures import camera_used
+from granulcal.measured.plausible import doubts, violations
+from granulcal.measured.recording import Recording, UnlikeFramesWarning
+from granulcal.pours.scene import Scene
+from granulcal.prior import Prior
+
+__all__ = ["doubts_of", "require_no_copies"]
+
+Array = NDArray[np.float64]
+
+
+def require_no_copies(conditions: Sequence[Condition], rows: Sequence[Array]) -> None:
+    """Refuses copies of one pour under other names: they would count as several.
+
+    Args:
+        conditions: all of a task.
+        rows: statistics of the pours of each, shape (n, s); none where equal numbers are no copies.
+
+    Raises:
+        ObservationError: two recordings are the same.
+    """
+    seen: dict[tuple[str, str], str] = {}
+    read: list[tuple[str, Array]] = []
+    for condition, own in zip(conditions, rows, strict=True):
+        for path in condition.recordings:
+            # One file may hold several curves.
+            key = digest_of(path), str(condition.reading.get("series"))
+            _refuse_copy(seen.get(key), f"{path} of {condition.name!r}", "the same bytes")
+            seen[key] = f"{path} of {condition.name!r}"
+        for path, row in zip(condition.recordings, own, strict=False):
+            name = f"{path} of {condition.name!r}"
+            first = next((n for n, other in read if np.array_equal(row, other)), None)
+            _refuse_copy(first, name, "the same statistics, to the last digit")
+            read.append((name, row))
+
+
+def _refuse_copy(first: str | None, second: str, what: str) -> None:
+    if first is not None:
+        raise ObservationError(f"{first} and {second} have {what}: each pour counts once")
+
+
+def doubts_of(
+    condition: Condition, scene: Scene, prior: Prior, library: Sequence[LibraryEffect]
+) -> list[str]:
+    """Returns what makes the images of a condition doubtful, a sentence each.
+
+    Raises:
+        ObservationError: an image that can be neither of the scene nor of it with an effect.
+    """
+    there = scene.with_(condition.at)
+    if there.observed_names:
+        return []
+    found: list[str] = []
+    for path in condition.recordings:
+        with warnings.catch_warnings():
+            # Told by the doubts.
+            warnings.simplefilter("ignore", UnlikeFramesWarning)
+            recording = Recording.open(path, camera=camera_used(path, condition.camera))
+        of_it = ([recording], [path], condition.reading)
+        impossible = violations(there, prior, *of_it)
+        if impossible and all(violations(s, prior, *of_it) for s in _with_effects(there, library)):
+            raise ObservationError(
+                f"{'; '.join(impossible)}: this can be no formation of the scene under "
+                f"{condition.name!r}, whatever its material and with any effect of the task"
+            )
+        if recording.unlike is not None:
+            found.append(f"{path}: {recording.unlike}")
+        found += doubts(there, prior, *of_it)
+    return found
+
+
+def _with_effects(there: Scene, library: Sequence[LibraryEffect]) -> Iterator[Scene]:
+    """Scenes with each effect at full strength, to both sides if it has two."""
+    for entry in library:
+        effect = entry.at(there)
+        for psi in (1.0, -1.0) if effect.is_two_sided else (1.0,):
+            numbers = effect.numbers(psi)
+            if numbers and there.refusal(numbers) is None:
+                yield there.with_(numbers)

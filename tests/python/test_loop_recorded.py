@@ -1,0 +1,220 @@
+"""What the loop asks of its recordings before it pours, and what it fixes of them."""
+
+import argparse
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+import granulcal as gc
+from granulcal.commands.close_loop import _command
+from granulcal.errors import ObservationError
+from granulcal.loop.check.standing import stand
+from granulcal.loop.condition import Condition
+from granulcal.loop.effects.library import by_name
+from granulcal.loop.pours.archive import ArchivePlan
+from granulcal.loop.preregistration import register
+from granulcal.loop.recorded import require_no_copies
+from granulcal.loop.report.page import sentence_of
+from granulcal.loop.task import Task
+from granulcal.loop.test.thresholds import Thresholds
+from granulcal.loop.test.verdict import Verdict
+from granulcal.report import template
+
+PRIOR = """
+[[parameter]]
+path = "material.sliding_friction"
+distribution = "uniform"
+low = 0.2
+high = 0.8
+"""
+
+
+@pytest.fixture(scope="module")
+def scene() -> gc.Scene:
+    camera = {"camera.field_width": 0.2, "camera.pixels": 200, "camera.downsample": 1}
+    return gc.Scene.drop(0.02, count=60).with_({"camera.height": 0.3, **camera})
+
+
+@pytest.fixture(scope="module")
+def recorded(scene: gc.Scene, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Three pours as images, all of one camera."""
+    folder = tmp_path_factory.mktemp("recorded")
+    camera = gc.Camera.overhead(height=0.3, field_width=0.2, pixels=200)
+    found = []
+    for seed in range(3):
+        pour = gc.simulate(scene, seed=seed)
+        image, toml = camera.record(pour.positions, pour.radii, folder / str(seed))
+        found.append(shutil.copy(image, folder / f"pour-{seed}.png"))
+        shutil.copy(toml, folder / "camera.toml")
+    return [Path(path) for path in found]
+
+
+def task_of(scene: gc.Scene, images: list[Path], **condition: Any) -> Task:
+    at = {"start.height": scene.get("start.height")}
+    one = Condition("here", at, "fit", tuple(images), **condition)
+    prior = gc.Prior.from_toml(PRIOR)
+    return Task(scene=scene, prior=prior, conditions=(one,), library=by_name(["tilt.y"]))
+
+
+def registered(task: Task, folder: Path) -> str:
+    plan = ArchivePlan(
+        scene=task.scene, prior=task.prior, conditions=(), library=task.library, base=4, each=4
+    )
+    return register(folder, task, plan, Thresholds(), 0, ("max_z",))
+
+
+def test_cameras_colours_and_what_is_known_are_fixed(
+    scene: gc.Scene, recorded: list[Path], tmp_path: Path
+) -> None:
+    folder = tmp_path / "pours"
+    shutil.copytree(recorded[0].parent, folder)
+    images, camera = [folder / path.name for path in recorded], folder / "camera.toml"
+    task, out = task_of(scene, images), tmp_path / "out"
+    out.mkdir()
+    first = registered(task, out)
+    assert registered(task, out) == first
+    text = camera.read_text()
+
+    def refused(changed: Task) -> None:
+        with pytest.raises(ObservationError, match=r"another analysis \(conditions differ\)"):
+            registered(changed, out)
+
+    # Another lens beside the images, a camera of one image alone, and one that is given.
+    camera.write_text(text.replace("fx = ", "fx = 1"))
+    refused(task)
+    camera.write_text(text)
+    assert registered(task, out) == first
+    own = images[0].with_suffix(".toml")
+    own.write_text(text + "\n")
+    refused(task)
+    own.unlink()
+    given = tmp_path / "given.toml"
+    given.write_text(text + "\n")
+    refused(task_of(scene, images, camera=given))
+    refused(task_of(scene, images, known={"effects.tilt.y": 0.01}))
+    # And the colour image that the camera names.
+    colour = tmp_path / "colour.png"
+    colour.write_bytes(b"one")
+    given.write_text('colour = "colour.png"\n' + text)
+    task, out = task_of(scene, images, camera=given), tmp_path / "coloured"
+    out.mkdir()
+    registered(task, out)
+    colour.write_bytes(b"another")
+    refused(task)
+
+
+def test_a_registration_of_before_stays(
+    scene: gc.Scene, recorded: list[Path], tmp_path: Path
+) -> None:
+    task = task_of(scene, recorded)
+    new = registered(task, tmp_path)
+    path = tmp_path / "preregistration.json"
+    document = json.loads(path.read_text())
+    cameras = document["conditions"][0].pop("cameras")
+    assert len(cameras) == 3 and len(set(cameras)) == 1 and cameras[0].startswith("camera.toml ")
+    path.write_text(json.dumps(document, indent=1) + "\n")
+    old = registered(task, tmp_path)
+    assert old != new and "cameras" not in path.read_text()
+    with pytest.raises(ObservationError, match=r"another analysis \(conditions differ\)"):
+        registered(task_of(scene, recorded[::-1]), tmp_path)
+
+
+def test_a_copy_under_another_name_is_refused(recorded: list[Path], tmp_path: Path) -> None:
+    copy = Path(shutil.copy(recorded[0], tmp_path / "copy.png"))
+    one = Condition("one", {}, "fit", tuple(recorded[:2]))
+    other = Condition("other", {}, "sealed", (copy,))
+    none = [np.empty((2, 0)), np.empty((1, 0))]
+    with pytest.raises(ObservationError, match=r"pour-0.png of 'one' and .*copy.png of 'other'"):
+        require_no_copies((one, other), [row[:0] for row in none])
+    # Two curves of one file are not one pour.
+    read = [replace(c, reading={"series": c.name}) for c in (one, other)]
+    require_no_copies(read, [row[:0] for row in none])
+    # Another file that shows the same, to the last digit.
+    rows = [np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([[1.0, 2.0]])]
+    third = replace(other, recordings=(recorded[2],))
+    with pytest.raises(ObservationError, match="the same statistics, to the last digit"):
+        require_no_copies((one, third), rows)
+    rows[1][0, 1] += 1e-12
+    require_no_copies((one, third), rows)
+
+
+def test_recordings_are_asked_whether_they_can_be_of_the_scene(
+    scene: gc.Scene, recorded: list[Path], tmp_path: Path
+) -> None:
+    assert task_of(scene, recorded).require_readable() == ()
+    with pytest.raises(ObservationError, match="the same bytes: each pour counts once"):
+        again = Path(shutil.copy(recorded[0], tmp_path / "again.png"))
+        shutil.copy(recorded[0].parent / "camera.toml", tmp_path)
+        task_of(scene, [*recorded, again]).require_readable()
+    # A few grains far away make the formation wider than the scene's field; the volume fits.
+    camera = gc.Camera.overhead(height=0.6, field_width=0.8, pixels=400)
+    places = np.stack(np.meshgrid(*[np.linspace(-0.3, 0.3, 8)] * 2), axis=-1).reshape(-1, 2)
+    spheres = np.c_[places, np.full(64, 2e-3)]
+    image, toml = camera.record(spheres, np.full(64, 2e-3), tmp_path / "wide")
+    with pytest.raises(ObservationError, match=r"extent .*no formation of the scene under 'here'"):
+        task_of(scene, [Path(image)], camera=Path(toml), averaged=True).require_readable()
+    # Half of the grains beyond the image's edge are told.
+    pour = gc.simulate(scene, seed=7)
+    camera = gc.Camera.overhead(height=0.3, field_width=0.2, pixels=200)
+    image, toml = camera.record(
+        pour.positions + np.array([0.1, 0, 0]), pour.radii, tmp_path / "half"
+    )
+    doubts = task_of(scene, [Path(image)], camera=Path(toml), averaged=True).require_readable()
+    assert any("the others are out of view" in doubt for doubt in doubts)
+    assert all(str(image) in doubt for doubt in doubts)
+
+
+def test_a_none_by_the_base_models_own_pours_shows_the_p_that_decided() -> None:
+    fits = Verdict("EFFECT", ("drag",), ("drag",), 0.002, "")
+    of_base = cast(Any, SimpleNamespace(residual_test=SimpleNamespace(p=0.3), to_dict=dict))
+    found = stand(fits, Thresholds(), confirmed=0.5, of_base=of_base)
+    assert (found.verdict.kind, found.verdict.p, found.surrogate_p) == ("NONE", 0.3, 0.002)
+    assert found.to_dict()["p_before_checks"] == 0.002
+    assert "no residual was found" not in sentence_of(found)
+    none = stand(replace(fits, kind="NONE", named=(), p=0.3), Thresholds(), confirmed=0.5)
+    assert none.surrogate_p is None and "no residual was found" in sentence_of(none)
+
+
+def page(**values: Any) -> str:
+    """The page with nothing on it but `values`."""
+    filled: dict[str, Any] = dict.fromkeys(
+        ("totals", "errors", "told", "corrections", "strengths", "rivals", "hidden", "experiments"),
+        (),
+    )
+    words = dict.fromkeys(
+        ("title", "headline", "sentence", "reason", "made", "version", "residuals", "pictures"), ""
+    )
+    words |= dict.fromkeys(("picture_of", "command"), "")
+    lists = dict.fromkeys(("nearest", "beyond", "doubts", "held"), ())
+    standing = SimpleNamespace(trivial=(), moved=(), draws=0, anchors=0, confirmed=0.5)
+    placebo = SimpleNamespace(kind="NONE", p=0.5)
+    return template("loop.html.j2").render(
+        **{**filled, **words, **lists, "standing": standing, "placebo": placebo, "pours": 0}
+        | {"registration": "0" * 64, "parameters": {}, "number": "{:.3g}".format, "p": 0.3}
+        | {"surrogate_p": None, "calibrated": None, **values}
+    )
+
+
+def test_the_page_says_what_is_beyond_doubtful_and_which_p_decided() -> None:
+    plain = page()
+    assert "p of the residual of the base model" in plain
+    assert "comes near" not in plain and "Doubts" not in plain
+    found = page(surrogate_p=0.002, beyond=("max_z at low: 4",), doubts=("a.png: a heap",))
+    assert "by the surrogate alone 0.002" in found
+    assert "<li>max_z at low: 4</li>" in found and "<li>a.png: a heap</li>" in found
+    row = SimpleNamespace(label="low", before=2.0, after=1.0, refused="")
+    assert "may repeat what the\nparameters could have done" in page(corrections=(row,))
+
+
+def test_a_zero_is_in_the_command_of_the_page() -> None:
+    given = {"archive": None, "tolerances": None, "engine": None, "out": Path("out")}
+    options = argparse.Namespace(**given, pairs=0, rounds=0, budget=900, seed=0)
+    assert _command(options, Path("loop.toml")) == (
+        "granulcal close-loop loop.toml -o out --pairs 0 --rounds 0 --budget 900 --seed 0"
+    )
