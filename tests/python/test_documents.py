@@ -129,6 +129,7 @@ def test_every_document_is_read_through_one_place():
     # What these parse is text that this program has just made, or checked beforehand.
     allowed = {"documents.py", "prior.py", "damage.py", "ring_model.py", "image_faults.py"}
     allowed |= {"camera.py", "samples.py", "models.py", "setup.py", "pattern.py", "protocol.py"}
+    allowed |= {"drum_image.py"}
     for path in package.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
         if path.name not in allowed and "experiments" not in path.parts:

@@ -89,8 +89,10 @@ def folder(small_data, small_scene, small_prior, tmp_path_factory) -> Path:
     )
     pour = gc.simulate(small_scene, seed=11)
     camera.record(pour.positions, pour.radii, place)
-    for name in ("second", "third", "fourth"):
-        (place / f"{name}.png").write_bytes((place / "depth.png").read_bytes())
+    for seed, name in enumerate(("second", "third", "fourth"), start=12):
+        pour = gc.simulate(small_scene, seed=seed)
+        image, _ = camera.record(pour.positions, pour.radii, place / name)
+        image.rename(place / f"{name}.png")
     (place / "loop.toml").write_text(TASK)
     return place
 

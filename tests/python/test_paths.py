@@ -315,6 +315,6 @@ def test_a_film_lasts_as_long_as_its_rate_says_and_tells_what_it_lacks(tmp_path,
     told = capsys.readouterr()
     assert "frames of the pour are left out" in told.err and "--most-frames" in told.err
     with Image.open(path) as image:
-        assert image.n_frames == 5
+        assert getattr(image, "n_frames", 1) == 5
     assert cli.main([*words, "--most-frames", "100"]) == 0
     assert "left out" not in capsys.readouterr().err

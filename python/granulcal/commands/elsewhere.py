@@ -203,7 +203,8 @@ def _generate(options: argparse.Namespace) -> int:
     left_out = data.left_out
     if left_out.total:
         print(f"note: pours that cannot be used: {left_out}", file=sys.stderr)
-    return UNHEALTHY if left_out.total else DONE
+    # As our own simulator's: a jammed pour is a good one that tells nothing.
+    return UNHEALTHY if left_out.unhealthy or left_out.no_grains_in_view else DONE
 
 
 def _refuse(options: argparse.Namespace) -> None:

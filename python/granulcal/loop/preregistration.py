@@ -2,12 +2,11 @@
 
 import hashlib
 import json
-import tomllib
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from granulcal.documents import LARGEST_DOCUMENT, Table, check, parse_json, read_bytes
+from granulcal.documents import LARGEST_DOCUMENT, Table, check, parse_json, parse_toml, read_bytes
 from granulcal.engines.in_use import law_of_pours, version_of_pours
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
@@ -116,9 +115,10 @@ def _cameras(condition: Condition, task: Task) -> list[str | None]:
 def _colour_of(camera: bytes) -> str | None:
     """The colour image that a camera's TOML names; what is no TOML is refused where it is read."""
     try:
-        found = tomllib.loads(camera.decode()).get("colour")
+        document = parse_toml(camera, "camera")
     except ValueError:
         return None
+    found = document.get("colour") if isinstance(document, dict) else None
     return found if isinstance(found, str) else None
 
 
