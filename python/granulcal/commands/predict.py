@@ -31,8 +31,8 @@ differ:
     granulcal predict loop --at funnel.height=0.07 --model line  straight line through the means
 
 The correction knows no physics and holds between and near the measured conditions alone; farther
-away it is refused. A loop closed with --engine pours with the same. Intervals are those of one pour. Exit code 3: the loop's verdict
-does not stand.
+away it is refused. A loop closed with --engine pours with the same. Intervals are those of one
+pour. Exit code 3: the loop's verdict does not stand.
 """
 
 

@@ -1,7 +1,6 @@
 """The whole plan simulated: each pour falls beside the grains of those before it."""
 
 import re
-import tomllib
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,7 +102,7 @@ def require_one_size(scene: Scene) -> None:
     Raises:
         ValueError: names what makes them differ.
     """
-    if "polydispersity" in tomllib.loads(scene.to_toml()).get("effects", {}):
+    if "polydispersity" in scene.to_dict().get("effects", {}):
         raise ValueError(
             f"{scene.name}: a plan of several rings pours grains of one size beside each other; "
             "effects.polydispersity must be left out, or one ring asked for"

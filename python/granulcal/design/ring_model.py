@@ -1,6 +1,5 @@
 """Height of the funnel from the radii of a ring: pours, BayesSim, and what they can reach."""
 
-import tomllib
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -227,7 +226,7 @@ def observing_radii(scene: Scene) -> Scene:
     scene.get(HEIGHT)
     if scene.observed_names == STATISTICS:
         return scene
-    if "observe" in tomllib.loads(scene.to_toml()):
+    if "observe" in scene.to_dict():
         raise ValueError(
             f"a scene for rings observes {', '.join(STATISTICS)} or nothing; {scene.name!r} "
             f"observes {', '.join(scene.observed_names) or 'something without statistics'}"

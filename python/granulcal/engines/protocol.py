@@ -1,6 +1,5 @@
 """What another simulator must do: take a scene and a seed, leave grains or points."""
 
-import tomllib
 import warnings
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -88,9 +87,10 @@ class Fewer:
 
     def __call__(self, found: Left, scene: Scene) -> None:
         """Looks at what was left of a scene."""
-        table = tomllib.loads(scene.to_toml())
-        leave = "outflow" in table or table["end"].get("rolled_away") == "leave"
-        if self._told or leave or not isinstance(found, tuple):
+        if self._told or not isinstance(found, tuple):
+            return
+        table = scene.to_dict()
+        if "outflow" in table or table["end"].get("rolled_away") == "leave":
             return
         wanted = round(scene.get("grains.count"))
         if len(found[0]) < wanted:

@@ -42,21 +42,10 @@ def _config(
 
 def notes(setup: Setup) -> list[str]:
     """Returns what of this pour Newton cannot be told: a contact below half of the grains' own."""
-    own, wide, grains = setup.effective_radius, setup.smallest, setup.grains
-    inside = {
-        "sliding_friction": grains.sliding_friction,
-        "restitution": grains.restitution,
-        "rolling_friction": grains.rolling_length(own),
-        "torsional_friction": grains.torsional_length(own),
-    }
+    inside = _lengths(setup.grains, setup.effective_radius)
     found = []
     for name, of in [("ground", setup.ground), *((b.name, b.law) for b in setup.walls)]:
-        asked = {
-            "sliding_friction": of.sliding_friction,
-            "restitution": of.restitution,
-            "rolling_friction": of.rolling_length(wide),
-            "torsional_friction": of.torsional_length(wide),
-        }
+        asked = _lengths(of, setup.smallest)
         low = [word for word, value in asked.items() if 2.0 * value < inside[word]]
         if low:
             found.append(
@@ -64,6 +53,16 @@ def notes(setup: Setup) -> list[str]:
                 "mean of two shapes, and none is below 0"
             )
     return found
+
+
+def _lengths(of: Contact, lever: float) -> dict[str, float]:
+    """Returns the numbers of a contact that Newton takes the mean of."""
+    return {
+        "sliding_friction": of.sliding_friction,
+        "restitution": of.restitution,
+        "rolling_friction": of.rolling_length(lever),
+        "torsional_friction": of.torsional_length(lever),
+    }
 
 
 def material(setup: Setup, young: float | None = None) -> str:

@@ -1,6 +1,5 @@
 """All of a scene that another engine must know, as plain numbers."""
 
-import tomllib
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -78,7 +77,7 @@ class Setup:
             ValueError: the scene has grains that are not round, moving or meshed walls, a period,
                 an outflow, an intruder or a bed.
         """
-        table = tomllib.loads(scene.to_toml())
+        table = scene.to_dict()
         for path in _REFUSED:
             *places, key = path.split(".")
             if key in (table[places[0]] if places else table):
@@ -138,7 +137,7 @@ def walls_of(scene: Scene) -> tuple[Body, ...]:
     Raises:
         ValueError: one of them moves, or is a mesh.
     """
-    table = tomllib.loads(scene.to_toml())
+    table = scene.to_dict()
     return tuple(_walls(table, Contact.of(table["material"])))
 
 

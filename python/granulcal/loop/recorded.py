@@ -15,6 +15,7 @@ from granulcal.errors import ObservationError
 from granulcal.loop.condition import Condition, digest_of
 from granulcal.loop.effects.library import LibraryEffect
 from granulcal.loop.pours.measures import camera_used
+from granulcal.measured.different import first_copy
 from granulcal.measured.plausible import doubts, violations
 from granulcal.measured.recording import Recording, UnlikeFramesWarning
 from granulcal.pours.scene import Scene
@@ -36,7 +37,8 @@ def require_no_copies(conditions: Sequence[Condition], rows: Sequence[Array]) ->
         ObservationError: two recordings are the same.
     """
     seen: dict[tuple[str, str], str] = {}
-    read: list[tuple[str, Array]] = []
+    read: list[Array] = []
+    names: list[str] = []
     for condition, own in zip(conditions, rows, strict=True):
         for path in condition.recordings:
             # One file may hold several curves.
@@ -44,10 +46,10 @@ def require_no_copies(conditions: Sequence[Condition], rows: Sequence[Array]) ->
             _refuse_copy(seen.get(key), f"{path} of {condition.name!r}", "the same bytes")
             seen[key] = f"{path} of {condition.name!r}"
         for path, row in zip(condition.recordings, own, strict=False):
-            name = f"{path} of {condition.name!r}"
-            first = next((n for n, other in read if np.array_equal(row, other)), None)
-            _refuse_copy(first, name, "the same statistics, to the last digit")
-            read.append((name, row))
+            names.append(f"{path} of {condition.name!r}")
+            read.append(row)
+    if (copy := first_copy(read)) is not None:
+        _refuse_copy(names[copy[0]], names[copy[1]], "the same statistics, to the last digit")
 
 
 def _refuse_copy(first: str | None, second: str, what: str) -> None:

@@ -1,7 +1,6 @@
 """Time-averaged pictures of a drum against a light: dark is grain, light is air."""
 
 import math
-import tomllib
 from dataclasses import dataclass
 from os import PathLike
 
@@ -144,7 +143,7 @@ class DrumImage:
 
 def _drums(scene: Scene) -> list[float]:
     """Diameters of the cylinders along y about the centre of the scene's surface [m]."""
-    document = tomllib.loads(scene.to_toml())
+    document = scene.to_dict()
     centre = document["observe"]["surface"]["centre"]
     found = []
     for wall in document.get("walls", []):

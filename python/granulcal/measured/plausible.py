@@ -1,6 +1,6 @@
 """Whether recordings can be of a scene at all, asked before anything is inferred from them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -30,12 +30,7 @@ def violations(
         names: of the recordings, for the sentences.
         reading: arguments of `Recording.formation`, if the formation is read with any.
     """
-    found = []
-    text, settings = prior.to_toml(), reading or {}
-    for name, recording in zip(names, recordings, strict=True):
-        reasons = scene.native.violations(text, recording.native, **settings)
-        found += [f"{name}: {reason}" for reason in reasons]
-    return found
+    return _told(scene.native.violations, prior, recordings, names, reading)
 
 
 def doubts(
@@ -51,9 +46,20 @@ def doubts(
     image without much data, a second heap; the bounds are those of `infer`, the arguments those of
     `violations`.
     """
-    found = []
+    return _told(scene.native.doubts, prior, recordings, names, reading)
+
+
+def _told(
+    judge: Callable[..., list[str]],
+    prior: "Prior",
+    recordings: "Sequence[Recording]",
+    names: Sequence[object],
+    reading: Mapping[str, Any] | None,
+) -> list[str]:
+    """What is said of each recording, under its name."""
     text, settings = prior.to_toml(), reading or {}
-    for name, recording in zip(names, recordings, strict=True):
-        reasons = scene.native.doubts(text, recording.native, **settings)
-        found += [f"{name}: {reason}" for reason in reasons]
-    return found
+    return [
+        f"{name}: {reason}"
+        for name, recording in zip(names, recordings, strict=True)
+        for reason in judge(text, recording.native, **settings)
+    ]

@@ -1,9 +1,11 @@
 """Scenes and materials: what is poured, onto what, and who looks at it."""
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,6 +167,10 @@ class Scene:
     def to_toml(self) -> str:
         """Returns the scene as TOML; `from_toml` reads it back unchanged."""
         return self.native.to_toml()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the tables of `to_toml`."""
+        return tomllib.loads(self.to_toml())
 
     def with_(
         self, changes: Mapping[str, float | str] | None = None, /, **more: float | str

@@ -18,7 +18,6 @@ Reference:
     (flying pixels are mixtures of both sides of an edge).
 """
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
@@ -71,7 +70,7 @@ class Frame:
     def of(cls, pour: Pour) -> "Frame":
         """Returns what the scene's camera delivered of a pour, its noise included."""
         scene = pour.scene
-        camera = tomllib.loads(scene.to_toml())["camera"]
+        camera = scene.to_dict()["camera"]
         if camera["projection"] == "pinhole":
             depth = pour.depth_image().astype(np.float64)
             eye = float(camera["height"])
@@ -207,7 +206,7 @@ def require_image(scene: Scene, effects: Iterable[str]) -> None:
             f"{names}: effects of the image do not apply to a scene that observes statistics of "
             f"its own ({', '.join(scene.observed_names)}); name other effects"
         )
-    if tomllib.loads(scene.to_toml())["camera"].get("mask") == "colour":
+    if scene.to_dict()["camera"].get("mask") == "colour":
         raise ObservationError(
             f"{names}: effects of the image need a camera that tells grains by height "
             '(camera.mask = "height"); name other effects'

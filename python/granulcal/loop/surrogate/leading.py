@@ -18,7 +18,6 @@ Reference:
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from granulcal.bayessim.emulator.basis import Basis
@@ -54,6 +53,8 @@ class LeadingBasis:
             most: largest number of eigenfunctions.
             seed: seed of frequencies and points.
         """
+        import torch
+
         basis = Basis.draw(u, length_scales, features=_FREQUENCIES, seed=seed, degree=2)
         sobol = torch.quasirandom.SobolEngine(u.shape[1], scramble=True, seed=seed)
         waves = basis(sobol.draw(_POINTS, dtype=torch.float64).numpy())[:, -2 * _FREQUENCIES :]

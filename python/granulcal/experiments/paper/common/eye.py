@@ -4,7 +4,6 @@ Grains are told from the ground as by colour, as the paper does on velvet: a pix
 the undisturbed image shows a grain, whatever the disturbed depth says.
 """
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -66,7 +65,7 @@ class Eye:
     @classmethod
     def of(cls, scene: Scene) -> "Eye":
         """Returns the camera of a scene."""
-        camera = tomllib.loads(scene.to_toml())["camera"]
+        camera = scene.to_dict()["camera"]
         return cls(
             camera["height"],
             camera["field_width"],
