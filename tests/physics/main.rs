@@ -3,6 +3,7 @@
 //! One topic a module. Every tolerance stands beside its number with what it was measured from; see
 //! docs/theory/contact.md for the equations.
 
+mod across_gaps;
 mod bonds;
 mod bulk;
 mod bulk_laws;

@@ -12,8 +12,8 @@ use crate::turning::nutates;
 ///
 /// It counts up whenever the physics of a pour changes, whatever the version of the package: data sets, checkpoints,
 /// models and kept pours state it, so that pours of two laws are never mixed. Laws that only some scenes follow have
-/// numbers of their own. 1 had impacts one by one; 2 has them as
-/// springs in the limit of infinite stiffness. Of grains below 4 mm it is another, [`law_of`].
+/// numbers of their own ([`law_of`]). 1 had impacts one by one; 2 has them as springs in the limit of infinite
+/// stiffness.
 pub const LAW: u32 = 2;
 /// The number of the law of smaller grains, whose small lengths and speeds go with their size (`Small`).
 const LAW_OF_SMALL: u32 = 3;

@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 use super::acts::{Acts, EffectContext};
 use super::bridges::Bridges;
 use super::drag;
-use super::near::{Meeting, Near, at_walls, pairs};
+use super::near::{self, Meeting, Near};
 use crate::particles::Particles;
 
 /// What pulls in a scene.
@@ -65,20 +65,15 @@ impl Acts for Attraction {
         bridges: &mut Bridges,
     ) -> f64 {
         bridges.next.clear();
-        // Velocities change while the pull acts, spheres do not.
-        let spheres = particles.spheres.clone();
-        let between = pairs(context.pairs, &spheres, particles.period);
-        let count = particles.count() as u32;
-        let mut of_walls = 0.0;
-        for near in between.chain(at_walls(context.at_walls, &spheres, count, context.walls)) {
-            let forces = self.forces(&near, bridges);
-            if forces.iter().any(Force::is_on) {
-                let meeting = Meeting::of(&near, particles, context.walls);
-                let impulse =
-                    meeting.pull(&forces, near.gap / self.radius, self.radius, context.dt);
-                of_walls += meeting.push(particles, &near, &(-impulse * near.normal));
+        let of_walls = near::each(particles, context, |particles, near| {
+            let forces = self.forces(near, bridges);
+            if !forces.iter().any(Force::is_on) {
+                return 0.0;
             }
-        }
+            let meeting = Meeting::of(near, particles, context.walls);
+            let impulse = meeting.pull(&forces, near.gap / self.radius, self.radius, context.dt);
+            meeting.push(particles, near, &(-impulse * near.normal))
+        });
         bridges.next.sort_unstable();
         std::mem::swap(&mut bridges.joined, &mut bridges.next);
         of_walls

@@ -25,7 +25,7 @@ use nalgebra::Vector3;
 use super::acts::{Acts, EffectContext};
 use super::bridges::Bridges;
 use super::drag;
-use super::near::{Meeting, Near, at_walls, pairs};
+use super::near::{self, Meeting, Near};
 use crate::law::INVERSE_INERTIA;
 use crate::particles::Particles;
 
@@ -65,10 +65,10 @@ impl Acts for Film {
 
     /// Resists what comes together, and what slides.
     fn act_before_gravity(&self, particles: &mut Particles, context: &EffectContext<'_>) -> f64 {
-        self.resist(particles, context, |film, particles, near, meeting| {
-            let slid = film.resist_sliding(particles, near, meeting, context.dt);
+        self.resist(particles, context, |particles, near, meeting| {
+            let slid = self.resist_sliding(particles, near, meeting, context.dt);
             if meeting.opening < 0.0 {
-                slid + film.slow(particles, near, meeting, context.dt)
+                slid + self.slow(particles, near, meeting, context.dt)
             } else {
                 slid
             }
@@ -82,9 +82,9 @@ impl Acts for Film {
         context: &EffectContext<'_>,
         _bridges: &mut Bridges,
     ) -> f64 {
-        self.resist(particles, context, |film, particles, near, meeting| {
+        self.resist(particles, context, |particles, near, meeting| {
             if meeting.opening > 0.0 {
-                film.slow(particles, near, meeting, context.dt)
+                self.slow(particles, near, meeting, context.dt)
             } else {
                 0.0
             }
@@ -93,24 +93,20 @@ impl Acts for Film {
 }
 
 impl Film {
-    /// Lets `by` act on all that is near: pairs of grains and grains at walls; returns the sum.
+    /// Lets `by` act on all that the film reaches; returns the sum.
     fn resist(
         &self,
         particles: &mut Particles,
         context: &EffectContext<'_>,
-        by: impl Fn(&Self, &mut Particles, &Near, &Meeting) -> f64,
+        by: impl Fn(&mut Particles, &Near, &Meeting) -> f64,
     ) -> f64 {
-        // Velocities change while the film acts, spheres do not.
-        let spheres = particles.spheres.clone();
-        let between = pairs(context.pairs, &spheres, particles.period);
-        let count = particles.count() as u32;
-        let near = between.chain(at_walls(context.at_walls, &spheres, count, context.walls));
-        near.filter(|near| near.gap < self.range)
-            .map(|near| {
-                let meeting = Meeting::of(&near, particles, context.walls);
-                by(self, particles, &near, &meeting)
-            })
-            .sum()
+        near::each(particles, context, |particles, near| {
+            if near.gap >= self.range {
+                return 0.0;
+            }
+            let meeting = Meeting::of(near, particles, context.walls);
+            by(particles, near, &meeting)
+        })
     }
 
     /// Slows the opening or closing of a pair along its way in a substep; returns the work of a wall.

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::acts::EffectContext;
 use crate::contact_set::ContactSet;
 use crate::lanes::Row;
 use crate::particles::Particles;
@@ -61,12 +62,22 @@ impl Meeting {
     }
 }
 
+/// Lets `act` act on all that is near, pairs of grains and then grains at walls; returns the sum of what it returns.
+pub(super) fn each(
+    particles: &mut Particles,
+    context: &EffectContext<'_>,
+    mut act: impl FnMut(&mut Particles, &Near) -> f64,
+) -> f64 {
+    // Velocities change while the force acts, spheres do not.
+    let spheres = particles.spheres.clone();
+    let between = pairs(context.pairs, &spheres, particles.period);
+    let count = particles.count() as u32;
+    let near = between.chain(at_walls(context.at_walls, &spheres, count, context.walls));
+    near.map(|near| act(particles, &near)).sum()
+}
+
 /// The pairs that are listed.
-pub(super) fn pairs(
-    set: &ContactSet,
-    spheres: &[Row],
-    period: Option<Period>,
-) -> impl Iterator<Item = Near> {
+fn pairs(set: &ContactSet, spheres: &[Row], period: Option<Period>) -> impl Iterator<Item = Near> {
     set.lanes().map(move |(number, lane)| {
         let batch = &set.batches[number];
         let (i, j) = (batch.i[lane], batch.j[lane]);
@@ -86,7 +97,7 @@ pub(super) fn pairs(
 }
 
 /// The grains that are listed at walls.
-pub(super) fn at_walls(
+fn at_walls(
     set: &ContactSet,
     spheres: &[Row],
     count: u32,
