@@ -181,6 +181,8 @@ class Prior:
 
     def sample(self, n: int, seed: int = 0) -> Array:
         """Returns `n` draws, own units, shape (n, p); the same seed gives the same draws."""
+        if n < 0:
+            raise ValueError(f"n must be at least 0, got {n}")
         uniform = np.random.default_rng(seed).random((n, len(self.free)))
         columns = [p.quantile(uniform[:, i]) for i, p in enumerate(self.free)]
         return np.column_stack(columns)

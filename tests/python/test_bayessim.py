@@ -106,6 +106,54 @@ def test_several_pours_are_close_to_the_exact_posterior(toy, trained):
     assert np.all(ours.sample(2000).std(axis=0) < 0.75 * single.sample(2000).std(axis=0))
 
 
+def test_pours_of_two_materials_are_outside_though_a_third_has_their_mean(toy, trained):
+    one = toy.prior.from_unconstrained([[0.3, -0.5, 0.8]])
+    generator = np.random.default_rng(0)
+    inside = []
+    for seed in range(40):
+        theta = toy.prior.from_unconstrained(generator.standard_normal((1, 3)))
+        inside.append(
+            trained.misfit(toy.simulate_at(np.repeat(theta, 3, axis=0), seed=seed)).is_inside
+        )
+    assert np.mean(inside) >= 0.85
+    other = toy.prior.from_unconstrained([[-1.7, 1.5, -1.2]])
+    mixed = trained.misfit(toy.simulate_at(np.repeat([one[0], other[0]], 2, axis=0), seed=1))
+    assert mixed.scatter_p_value is not None and mixed.scatter_p_value <= 0.01
+    assert not mixed.is_inside and "differ more from each other than pours of one" in str(mixed)
+    assert trained.misfit(toy.simulate_at(one, seed=1)).scatter_p_value is None
+
+
+def test_a_data_set_is_not_learnt_under_another_prior(toy):
+    theta, x = toy.simulate(60, seed=1)
+    data = SimpleNamespace(theta=theta, x=x, prior=toy.prior, theta_names=toy.prior.names)
+    wide = Prior(
+        Parameter(path=name, distribution="normal", mean=0.0, sd=9.0) for name in toy.prior.names
+    )
+    with pytest.raises(TrainingDataError, match="drawn from another prior"):
+        BayesSim.fit(data, prior=wide, **QUICK)
+    fixed = Prior(
+        [
+            *toy.prior.free[:2],
+            Parameter(path=toy.prior.names[2], distribution="fixed", value=0.0),
+        ]
+    )
+    with pytest.raises(TrainingDataError, match="which the prior fixes"):
+        BayesSim.fit(data, prior=fixed, proposal=toy.prior, **QUICK)
+
+
+def test_a_check_needs_pairs(quick, toy):
+    theta, x = toy.simulate(20, seed=3)
+    with pytest.raises(TrainingDataError, match="at least 10 usable pairs"):
+        quick.check(theta[:1], x[:1])
+    with pytest.raises(TrainingDataError, match="as many rows"):
+        quick.check(theta, x[:15])
+    with pytest.raises(ValueError, match="draw_count must be a whole number of at least 1, got 0"):
+        quick.check(theta, x, draw_count=0)
+    theta[3, 0] = np.nan
+    with pytest.raises(TrainingDataError, match="NaN or infinite in 1"):
+        quick.check(theta, x)
+
+
 def test_own_calibration_check_is_stored_and_holds(toy, trained):
     assert trained.calibration.test_count == 240
     assert trained.calibration.posterior_loss < trained.calibration.prior_loss - 2
@@ -389,6 +437,13 @@ THETA, X = Prior.default().sample(80, seed=0), np.random.default_rng(0).random((
         ((THETA, X, Prior.default()), {"status": ["asleep"] * 80}, TrainingDataError, "asleep"),
         ((THETA, X, Prior.default()), {"status": ["at_rest"]}, TrainingDataError, "80 entries"),
         ((THETA, X, Prior.default()), {"x_names": ["a"]}, TrainingDataError, "1 x_names"),
+        ((THETA, X, Prior.default()), {"x_names": ["a"] * 16}, TrainingDataError, "a more than"),
+        (
+            (THETA * [1, 1, 0] + [0, 0, 0.5], X, Prior.default()),
+            {},
+            TrainingDataError,
+            r"material\.restitution is the same in all 80",
+        ),
         ((THETA, X, Prior.default(), -1), {}, ValueError, "seed must be"),
         ((THETA, X, Prior.default()), {"scene": 3}, TypeError, "scene must be"),
         ((THETA, X, Prior.default()), {"epochs": 3}, ValueError, "unknown option epochs"),

@@ -16,9 +16,11 @@ from granulcal.bayessim.check.identifiability import Identifiability
 
 FIELDS = {
     "recordings", "parameters", "inside_model", "identifiability", "calibrated", "warnings",
-    "statistics",
+    "statistics", "fixed",
 }  # fmt: skip
-OF_INSIDE = {"is_inside", "impossible", "p_value", "joint_p_value", "statistics"}
+OF_INSIDE = {
+    "is_inside", "impossible", "p_value", "joint_p_value", "scatter_p_value", "statistics",
+}  # fmt: skip
 SMALL: dict[str, Any] = {
     "features": 8,
     "ensemble": 2,
@@ -138,7 +140,7 @@ def test_rust_says_what_python_says(model, recording, capfd):
     assert dimension == pytest.approx(known.effective_dimension, abs=0.25)
 
 
-def test_several_pours_of_a_network_are_multiplied_in_both(
+def test_several_pours_of_a_network_count_as_one_in_both(
     small_data, recording, second, tmp_path, capfd
 ):
     made = BayesSim.fit(small_data, quiet=True, seed=2, method="mdrff", **SMALL)

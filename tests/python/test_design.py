@@ -387,6 +387,15 @@ def test_spill_refuses_what_it_cannot_answer(tmp_path):
         gc.design_spill(bowl, heights=(0.2, 0.1), out=tmp_path)
     with pytest.raises(ValueError, match="pours must be at least 20, got 3"):
         gc.design_spill(bowl, pours=3, out=tmp_path)
+    posterior = {
+        "parameters": {"material.sliding_friction": {"mode": 0.4}},
+        "fixed": {"material.restitution": 0.3},
+        "samples": [[0.4], [0.5]],
+    }
+    (tmp_path / "posterior.json").write_text(json.dumps(posterior))
+    there = PosteriorDraws.load(tmp_path / "posterior.json").at_mode(gc.Scene.funnel())
+    assert there.get("material.sliding_friction") == 0.4
+    assert there.get("material.restitution") == 0.3
     (tmp_path / "none.json").write_text("{}")
     with pytest.raises(ValueError, match="parameters must be there"):
         PosteriorDraws.load(tmp_path / "none.json")

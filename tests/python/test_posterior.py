@@ -9,6 +9,7 @@ from scipy import stats
 
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.bayessim.network.mixture import Mixture
+from granulcal.bayessim.posterior.average import NETWORK_ALONE
 from granulcal.bayessim.posterior.posterior import MassOutsidePrior, Posterior, PoursDisagree
 from granulcal.parameter import Parameter
 from granulcal.prior import Prior
@@ -157,6 +158,28 @@ def test_product_of_exact_posteriors_is_the_exact_posterior(bounded: bool, pours
     np.testing.assert_allclose(ours.std(axis=0), spread, rtol=0.08)
 
 
+def test_several_pours_of_a_network_are_no_wider_than_its_posteriors():
+    # A parameter that leaves no trace: each posterior is a little wider than the prior, so that
+    # their product over the prior has no end.
+    prior = unbounded(2)
+    wide = Mixture.from_covariances(np.ones(1), np.array([[0.3, 0.0]]), np.diag([0.2, 1.3])[None])
+    found = Posterior._of(prior, [], [wide] * 5, NETWORK_ALONE, ())
+    assert found.warnings == ()
+    draws = found.sample(4000, seed=1)
+    np.testing.assert_allclose(draws.mean(axis=0), [0.3, 0.0], atol=0.06)
+    np.testing.assert_allclose(draws.var(axis=0), [0.2, 1.3], rtol=0.12)
+
+
+def test_settings_are_all_that_a_scene_is_told():
+    fixed = Parameter(path="a.fixed", distribution="fixed", value=0.3)
+    posterior = Posterior.from_mixture(Prior([*BOX.free, fixed]), random_mixture(9))
+    mode = dict(zip(posterior.names, posterior.mode().tolist(), strict=True))
+    assert posterior.settings() == {"a.fixed": 0.3, **mode}
+    assert posterior.settings([0.5, 0.2]) == {"a.fixed": 0.3, "a.flat": 0.5, "a.log": 0.2}
+    with pytest.raises(ValueError, match="one row"):
+        posterior.settings([[0.5, 0.2], [0.5, 0.2]])
+
+
 def test_pours_that_contradict_each_other_are_reported():
     apart = [
         Mixture.from_covariances(np.ones(1), np.array([[m, m]]), 1e-6 * np.eye(2)[None])
@@ -181,6 +204,10 @@ def test_bad_arguments():
     posterior = Posterior.from_mixture(BOX, random_mixture(9))
     with pytest.raises(ValueError, match="n must be"):
         posterior.sample(-1)
+    with pytest.raises(ValueError, match="seed must be a whole number of at least 0, got -1"):
+        posterior.sample(3, seed=-1)
+    with pytest.raises(KeyError, match=r"no parameter 'b'; there are a\.flat, a\.log"):
+        posterior.credible_region()["b"]
     with pytest.raises(ValueError, match=r"\(rows, 2\)"):
         posterior.log_prob([[1.0, 2.0, 3.0]])
     assert posterior.sample(0).shape == (0, 2)

@@ -192,6 +192,9 @@ def test_a_dry_run_of_training_and_check_says_how_long_and_makes_nothing(
     assert list(tmp_path.iterdir()) == []
     assert main([*words, "--method", "emulated"]) == 0
     capsys.readouterr()
+    assert main(["check", model, "--data", pours]) == 2
+    assert "are among those that" in capsys.readouterr().err
+    (tmp_path / "model" / "training.parquet").unlink()
     assert main(["check", model, "--data", pours, "--dry-run"]) == 0
     assert capsys.readouterr().out.startswith("about ")
     assert main(["check", model, "--data", pours, "--dry-run", "--json"]) == 0

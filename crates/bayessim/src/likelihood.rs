@@ -159,14 +159,22 @@ impl Likelihood {
         let share = observed.share(at.noise);
         let averaged = (1.0 - 1.0 / observed.pours) * share;
         let widened = self.widening * self.widening;
+        let variance = |j: usize| widened * (at.noise[j] + at.unknown[j]) - averaged * at.noise[j];
         scaled.clear();
         let mut product = 1.0;
         for j in 0..size {
-            let variance = widened * (at.noise[j] + at.unknown[j]) - averaged * at.noise[j];
+            let variance = variance(j);
             product *= variance;
             scaled.push((observed.mean[j] - at.means[j]) / variance.sqrt());
         }
-        self.noise.log_density(scaled, 0.5 * product.ln())
+        let log_product = if product.is_normal() {
+            product.ln()
+        } else {
+            (0..size).map(|j| variance(j).ln()).sum()
+        };
+        let found = self.noise.log_density(scaled, 0.5 * log_product);
+        // Far out in an unbounded prior the emulator's polynomials overflow.
+        if found.is_finite() { found } else { f64::NEG_INFINITY }
     }
 }
 

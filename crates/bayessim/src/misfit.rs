@@ -4,7 +4,8 @@
 //! smaller p-value of Q and max |r|, ranked among those of held-out pairs, is itself ranked among theirs. For several
 //! pours of one material the held-out residuals are bootstrapped: the share that pours have each for themselves is
 //! averaged over as many of them, the share that they have in common is taken from one, and what the emulator does not
-//! know of its means is drawn. `python/granulcal/bayessim/check/misfit.py` has the derivation.
+//! know of its means is drawn. Their scatter, `sum_ij (1 - s_j^2) (y_ij - mean_j)^2 / s_j^2`, is ranked as well: pours of two
+//! materials may have the mean of a third. `python/granulcal/bayessim/check/misfit.py` has the derivation.
 
 use std::fmt;
 
@@ -46,6 +47,8 @@ pub struct Misfit {
     pub p_value: f64,
     /// Of the squared length of all residuals.
     pub joint_p_value: f64,
+    /// Of how much several pours differ from each other; none of one pour.
+    pub scatter_p_value: Option<f64>,
     /// Each statistic, the largest residual first.
     pub statistics: Vec<StatisticMisfit>,
 }
@@ -66,6 +69,14 @@ impl fmt::Display for Misfit {
         let p = format!("{:.2}", self.p_value);
         if self.is_inside() {
             return write!(f, "inside the model: some parameters explain {what} (p = {p})");
+        }
+        let others = self.statistics.iter().map(|s| s.p_value).fold(self.joint_p_value, f64::min);
+        if let Some(scatter) = self.scatter_p_value.filter(|&scatter| scatter <= others) {
+            return write!(
+                f,
+                "OUTSIDE THE MODEL: {what} differ more from each other than pours of one material do (p = \
+                 {scatter:.3}). The posterior below is of none of them.",
+            );
         }
         let mut worst: Vec<_> =
             self.statistics.iter().filter(|s| s.p_value < SIGNIFICANCE).take(NAMED).collect();
@@ -129,48 +140,53 @@ impl MisfitReference {
         let noise = Prediction::of(&nearest).noise;
         let pooled = Pooled { pours, share: averaging_share(pours, &variance, noise) };
         let best = fit.of(&mean, pooled);
-        let replicates = (z.len() > 1).then(|| self.replicates(fit, &best.u, z.len(), pooled));
-        let (null_squares, null_residuals) = match &replicates {
-            Some((squares, residuals)) => (squares, residuals),
-            None => (&self.squares, &self.residuals),
-        };
         let left = fit.back.after(&best.left);
-        compared(names, z.len(), best.square, &left, null_squares, null_residuals)
+        let found = Left { square: best.square, residuals: &left };
+        if z.len() == 1 {
+            return compared(names, 1, &found, &self.squares, &self.residuals, None);
+        }
+        let null = self.replicates(fit, &best.u, z.len(), pooled);
+        let here = fit.predict(&best.u);
+        let noise = Prediction::of(&here).noise;
+        let scatter = (0..size).map(|j| signal(noise[j]) * spread(j) / noise[j]).sum();
+        let scatters = Some((scatter, &null.scatters[..]));
+        compared(names, z.len(), &found, &null.squares, &null.residuals, scatters)
     }
 
-    /// Squared lengths and residuals of sets of pours at `u`.
-    fn replicates(
-        &self,
-        fit: &BestFit,
-        u: &[f64],
-        pours: usize,
-        pooled: Pooled,
-    ) -> (Vec<f64>, Matrix) {
+    /// What sets of pours at `u` leave.
+    fn replicates(&self, fit: &BestFit, u: &[f64], pours: usize, pooled: Pooled) -> Replicates {
         let (mut random, size) = (Random::new(0), fit.axes.columns);
         let here = fit.predict(u);
         let here = Prediction::of(&here);
         let shared = 1.0 - pooled.share / (fit.widening * fit.widening);
         // The noise of pairs from the whole prior, as large as it is here.
         let scale = |j: usize| if self.is_unit { here.noise[j].sqrt() } else { 1.0 };
+        let weight =
+            |j: usize| signal(here.noise[j]) / if self.is_unit { 1.0 } else { here.noise[j] };
         // All that is random is drawn first, so that threads may share the fits.
-        let errors: Vec<Vec<f64>> = (0..REPLICATES)
+        let (errors, scatters): (Vec<Vec<f64>>, Vec<f64>) = (0..REPLICATES)
             .map(|_| {
+                let rows: Vec<_> = (0..pours)
+                    .map(|_| self.own_noise.row(random.below(self.own_noise.rows())))
+                    .collect();
                 let mut own = vec![0.0; size];
-                for _ in 0..pours {
-                    let row = self.own_noise.row(random.below(self.own_noise.rows()));
-                    own.iter_mut().zip(row).for_each(|(sum, n)| *sum += n / pours as f64);
+                for row in &rows {
+                    own.iter_mut().zip(*row).for_each(|(sum, n)| *sum += n / pours as f64);
                 }
+                let spread = |j: usize| {
+                    weight(j) * rows.iter().map(|row| (row[j] - own[j]).powi(2)).sum::<f64>()
+                };
+                let scatter: f64 = (0..size).map(spread).sum();
                 let common = self.own_noise.row(random.below(self.own_noise.rows()));
                 let normal: Vec<_> = (0..size).map(|_| random.normal()).collect();
                 let unknown = |j: usize| here.unknown[j].sqrt() * dot(fit.root.row(j), &normal);
-                (0..size)
-                    .map(|j| {
-                        let noise = (1.0 - shared).sqrt() * own[j] + shared.sqrt() * common[j];
-                        scale(j) * noise + unknown(j)
-                    })
-                    .collect()
+                let error = |j: usize| {
+                    let noise = (1.0 - shared).sqrt() * own[j] + shared.sqrt() * common[j];
+                    scale(j) * noise + unknown(j)
+                };
+                ((0..size).map(error).collect(), scatter)
             })
-            .collect();
+            .unzip();
         // A fit near u is no better than the best one: false alarms can only become fewer.
         let fits: Vec<_> = errors
             .par_iter()
@@ -181,18 +197,41 @@ impl MisfitReference {
             })
             .collect();
         let (squares, residuals): (Vec<_>, Vec<_>) = fits.into_iter().unzip();
-        (squares, Matrix { data: residuals.concat(), columns: size })
+        let residuals = Matrix { data: residuals.concat(), columns: size };
+        Replicates { squares, residuals, scatters }
     }
 }
 
-/// P-values of a fit among those of the model itself.
+/// Share of an axis' variance over the prior, 1, that its noise leaves to the parameters: where they do not show, pours of
+/// two materials differ no more than those of one.
+fn signal(noise: f64) -> f64 {
+    (1.0 - noise).max(0.0)
+}
+
+/// What sets of pours of the model itself leave.
+struct Replicates {
+    /// Squared length of what each leaves at its fit.
+    squares: Vec<f64>,
+    /// A row of residuals for each.
+    residuals: Matrix,
+    /// How much the pours of each differ from each other.
+    scatters: Vec<f64>,
+}
+
+/// What an observation leaves at its fit.
+struct Left<'a> {
+    square: f64,
+    residuals: &'a [f64],
+}
+
+/// P-values of a fit among those of the model itself; of several pours with the scatter of both.
 fn compared(
     names: &[String],
     pours: usize,
-    square: f64,
-    left: &[f64],
+    found: &Left<'_>,
     null_squares: &[f64],
     null_residuals: &Matrix,
+    scatters: Option<(f64, &[f64])>,
 ) -> Misfit {
     let (size, count) = (names.len(), null_squares.len());
     let column = |j: usize| (0..count).map(move |i| null_residuals.row(i)[j]);
@@ -203,11 +242,12 @@ fn compared(
             variance.sqrt().max(LEAST_SPREAD)
         })
         .collect();
-    let sizes: Vec<_> = left.iter().zip(&spread).map(|(left, sd)| left / sd).collect();
+    let sizes: Vec<_> = found.residuals.iter().zip(&spread).map(|(left, sd)| left / sd).collect();
     let largest =
         |row: &[f64]| row.iter().zip(&spread).map(|(r, sd)| (r / sd).abs()).fold(0.0, f64::max);
     let null_largest: Vec<_> = (0..count).map(|i| largest(null_residuals.row(i))).collect();
-    let joint_p_value = p_value(null_squares, square);
+    let joint_p_value = p_value(null_squares, found.square);
+    let scatter_p_value = scatters.map(|(scatter, null)| p_value(null, scatter));
     let mut statistics: Vec<_> = names
         .iter()
         .zip(&sizes)
@@ -218,14 +258,17 @@ fn compared(
         })
         .collect();
     statistics.sort_by(|a, b| b.residual.abs().total_cmp(&a.residual.abs()));
-    // The smaller of two p-values, itself ranked among held-out pairs.
-    let smallest = statistics.iter().map(|s| s.p_value).fold(joint_p_value, f64::min);
+    // The smallest of the p-values, itself ranked among held-out pairs.
+    let all = joint_p_value.min(scatter_p_value.unwrap_or(1.0));
+    let smallest = statistics.iter().map(|s| s.p_value).fold(all, f64::min);
     let null = |i: usize| {
-        p_value(null_squares, null_squares[i]).min(p_value(&null_largest, null_largest[i]))
+        let scatter = scatters.map_or(1.0, |(_, null)| p_value(null, null[i]));
+        let largest = p_value(&null_largest, null_largest[i]);
+        p_value(null_squares, null_squares[i]).min(largest).min(scatter)
     };
     let below = (0..count).filter(|&i| null(i) <= smallest).count();
     let p_value = (1 + below) as f64 / (1 + count) as f64;
-    Misfit { pours, p_value, joint_p_value, statistics }
+    Misfit { pours, p_value, joint_p_value, scatter_p_value, statistics }
 }
 
 /// Rank among values of the model itself.

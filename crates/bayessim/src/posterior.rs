@@ -106,7 +106,7 @@ pub struct Marginal {
 /// How draws come from weighted ones.
 #[derive(Clone, Copy)]
 enum Draws {
-    /// Those that weigh most several times: enough for quantiles.
+    /// Those that weigh most several times: enough to begin a climb from.
     Resampled,
     /// Each then walks, so that hardly any two are the same.
     Walked,
@@ -141,7 +141,7 @@ impl Weighted {
 
 /// Where a posterior comes from.
 enum Source {
-    /// The emulator, alone or in a geometric average with the network; or a product of networks' posteriors.
+    /// The emulator, alone or in a geometric average with the network; or networks' posteriors of several pours.
     Weighted(Weighted),
     /// The network alone, of one pour.
     Learnt(TruncatedMixture),
@@ -171,10 +171,10 @@ pub struct Posterior {
 impl Posterior {
     /// The posterior of one material.
     ///
-    /// Under the emulator several pours have one likelihood. A network's posteriors are multiplied and the prior is
-    /// divided out all but once. Where both are averaged, the networks' posteriors together count as much as one does
-    /// for one pour: their error is the same in all. An arithmetic average is of one pour: several are the emulator's
-    /// alone.
+    /// Under the emulator several pours have one likelihood. A network's posteriors of k pours count as much as its
+    /// weight b says, `prod (q_i / p)^(b / k)`: together as one at b = 1, because their error is the same in all. At
+    /// b = k they are multiplied and the prior is divided out all but once, which is right of exact ones. An arithmetic
+    /// average is of one pour: several are the emulator's alone.
     pub fn of(coordinates: &Arc<Coordinates>, evidence: Evidence) -> Self {
         let Evidence { conditions, mut mixtures, average } = evidence;
         let is_sum = average.form == Form::Arithmetic && average.emulator > 0.0;
@@ -188,7 +188,8 @@ impl Posterior {
             warnings.push(Warning::MassOutsidePrior { pour, inside: cut.log_mass.exp() });
         }
         let log_masses: f64 = learnt.iter().map(|cut| cut.log_mass).sum();
-        let is_product = average.emulator == 0.0 && learnt.len() > 1;
+        let is_product =
+            average.emulator == 0.0 && learnt.len() > 1 && average.network == learnt.len() as f64;
         let conditions: Vec<_> = if average.emulator > 0.0 || learnt.is_empty() {
             conditions.into_iter().map(|(emulated, z)| (emulated.likelihood, z)).collect()
         } else {
@@ -199,11 +200,7 @@ impl Posterior {
             |learnt: Vec<TruncatedMixture>| learnt.into_iter().map(|cut| cut.mixture).collect();
         let source = if learnt.is_empty() {
             Source::Weighted(Weighted::of(ratio))
-        } else if is_product {
-            // The product of the pours' posteriors over prior^(k - 1).
-            let average = Average { network: learnt.len() as f64, ..average };
-            Source::Weighted(Weighted::of(ratio.averaged(all(learnt), average)))
-        } else if average.emulator == 0.0 {
+        } else if average.emulator == 0.0 && learnt.len() == 1 {
             Source::Learnt(learnt.remove(0))
         } else if is_sum {
             Source::Sum(Weighted::of(ratio), learnt.remove(0), average.emulator)
@@ -269,7 +266,7 @@ impl Posterior {
 
     /// `n` draws in own units; the same seed gives the same draws on any number of threads.
     pub fn sample(&self, n: usize, seed: u64) -> Vec<Vec<f64>> {
-        self.values(n, seed, Draws::Walked)
+        self.coordinate_sample(n, seed).iter().map(|u| self.coordinates.values(u)).collect()
     }
 
     /// The parameters of highest density in coordinates, in own units; always the same.
@@ -302,10 +299,6 @@ impl Posterior {
         (Identifiability::of(&self.coordinates, &draws), rows)
     }
 
-    fn values(&self, n: usize, seed: u64, kind: Draws) -> Vec<Vec<f64>> {
-        self.draws(n, seed, kind).iter().map(|u| self.coordinates.values(u)).collect()
-    }
-
     fn draws(&self, n: usize, seed: u64, kind: Draws) -> Vec<Vec<f64>> {
         let (coordinates, mut random) = (&self.coordinates, Random::new(seed));
         match &self.source {
@@ -325,7 +318,8 @@ impl Posterior {
 
     /// Mean, median and central interval of each parameter.
     pub fn marginals(&self, draws: usize, seed: u64) -> Vec<Marginal> {
-        let values = self.values(draws, seed, Draws::Resampled);
+        // The draws that `sample` gives, so that an interval is one of them.
+        let values = self.sample(draws, seed);
         let marginal = |(i, name): (usize, &String)| {
             let mut column: Vec<_> = values.iter().map(|row| row[i]).collect();
             column.sort_by(f64::total_cmp);

@@ -13,8 +13,8 @@ use crate::error;
 /// What arrays that are handed in are called in messages.
 const NAME: &str = "the emulator";
 
-/// P-value, joint p-value, name, residual and p-value of each statistic, and all of it in words.
-type Found = (f64, f64, Vec<(String, f64, f64)>, String);
+/// P-value, joint p-value, that of the scatter, name, residual and p-value of each statistic, and all of it in words.
+type Found = (f64, f64, Option<f64>, Vec<(String, f64, f64)>, String);
 /// Squared lengths, shape (n,), and residuals, shape (n, s).
 type BestFits<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
@@ -99,9 +99,9 @@ impl Emulated {
         let (reference, z) = (reference.map_err(error::model)?, self.pours(z)?);
         let found = py.detach(|| self.inner.misfit(&reference, &z, &names));
         let text = found.to_string();
-        let Misfit { p_value, joint_p_value, statistics, .. } = found;
+        let Misfit { p_value, joint_p_value, scatter_p_value, statistics, .. } = found;
         let each = statistics.into_iter().map(|s| (s.name, s.residual, s.p_value)).collect();
-        Ok((p_value, joint_p_value, each, text))
+        Ok((p_value, joint_p_value, scatter_p_value, each, text))
     }
 }
 

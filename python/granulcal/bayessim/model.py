@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from granulcal.bayessim.arrays import as_real
+from granulcal.bayessim.arrays import as_real, whole_number
 from granulcal.bayessim.check.calibration import Calibration
 from granulcal.bayessim.check.identifiability import Identifiability
 from granulcal.bayessim.check.misfit import Misfit, MisfitReference
@@ -18,11 +18,12 @@ from granulcal.bayessim.network.amortised import Amortised
 from granulcal.bayessim.network.standardise import Standardiser
 from granulcal.bayessim.network.trainer import Progress
 from granulcal.bayessim.posterior.average import Average
-from granulcal.bayessim.posterior.posterior import OutOfRange, Posterior
+from granulcal.bayessim.posterior.doubts import out_of_range
+from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.bayessim.storage.model_folder import load_parts, save_model
 from granulcal.bayessim.training.config import Config
 from granulcal.bayessim.training.fit import train_model
-from granulcal.bayessim.training.pairs import TrainingPairs
+from granulcal.bayessim.training.pairs import TrainingPairs, require_same_prior
 from granulcal.bayessim.training.summary import TrainingSummary
 from granulcal.errors import ObservationError
 from granulcal.one_thread import one_thread
@@ -34,7 +35,7 @@ __all__ = ["BayesSim"]
 Array = NDArray[np.float64]
 
 # Below ten test pairs a coverage says nothing.
-_FEWEST_TEST_PAIRS = 10
+FEWEST_TO_CHECK = 10
 _CHECK_DRAWS = 1000
 
 
@@ -129,7 +130,8 @@ class BayesSim:
             data_or_theta: a data set with attributes theta (n, p), theta_names, x (n, s), status
                 and prior; or parameters in own units, shape (n, p).
             x: statistics, own units, shape (n, s), if the first argument is an array.
-            prior: the prior that the parameters were drawn from, unless the data set has it.
+            prior: the prior that the parameters were drawn from, unless the data set has it;
+                another than the data set's needs `proposal`.
             seed: seed of every random choice.
             status: status of each pour; `unhealthy`, `jammed` and `no_grains_in_view` are excluded.
             x_names: names of the statistics.
@@ -144,16 +146,18 @@ class BayesSim:
             ValueError: a setting that does not exist or has an impossible value.
         """
         settings = Config.from_options(**config)
-        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-            raise ValueError(f"seed must be a whole number of at least 0, got {seed!r}")
+        seed = whole_number("seed", seed)
+        if x is None and proposal is None:
+            require_same_prior(getattr(data_or_theta, "prior", None), prior)
         pairs = TrainingPairs.gather(
             data_or_theta, x, prior=prior, status=status, x_names=x_names, scene=scene
         )
-        made = train_model(pairs, settings, int(seed), proposal=proposal, progress=progress)
+        pairs.require_varied()
+        made = train_model(pairs, settings, seed, proposal=proposal, progress=progress)
         kept = settings.component_counts[0]
         if made.amortised is not None:
             kept = made.amortised.network.layout.components
-        enough = len(made.posteriors) >= _FEWEST_TEST_PAIRS
+        enough = len(made.posteriors) >= FEWEST_TO_CHECK
         model = cls(
             prior=pairs.prior,
             config=replace(settings, components=kept),
@@ -202,10 +206,10 @@ class BayesSim:
         observation, and is of no use if none do.
 
         Several pours share their parameters. Under the emulator they have one likelihood, in which
-        what differs between them averages away and the emulator's own error does not; a network's
-        posteriors are multiplied and the prior divided out k - 1 times. Neither is an average of
-        posteriors. Where emulator and network are averaged, the networks' posteriors together count
-        as much as one does for one pour: their error is the same in all.
+        what differs between them averages away and the emulator's own error does not. A network's
+        posteriors of several pours together count as much as one does for one pour, alone and in
+        the average with an emulator: their error is the same in all, and multiplied with itself it
+        would be taken for knowledge.
 
         Args:
             x_obs: statistics, own units, shape (s,) for one pour or (k, s) for k pours.
@@ -214,14 +218,12 @@ class BayesSim:
             ObservationError: another shape, or a statistic that is not finite.
         """
         observed = self._checked(x_obs)
-        warnings = self._range_warnings(observed)
+        warnings = out_of_range(self.standardiser, observed, self.x_names)
         z = self.standardiser.apply(observed)
         condition = self.likelihood, z
         if self.amortised is None:
             return Posterior.from_conditions(self.prior, [condition], warnings=warnings)
         mixtures = self.amortised.mixtures(z)
-        if self.average.emulator == 0:
-            return Posterior.from_mixtures(self.prior, mixtures, warnings=warnings)
         return Posterior.from_average(
             self.prior, condition, mixtures, self.average, warnings=warnings
         )
@@ -248,9 +250,16 @@ class BayesSim:
         Args:
             theta: true parameters drawn from the prior, own units, shape (n, p).
             x: their statistics, own units, shape (n, s).
-            draw_count: draws of each posterior.
+            draw_count: draws of each posterior, at least 1.
+
+        Raises:
+            TrainingDataError: pairs that cannot be checked with; the message says why.
         """
-        truth, observed = as_real("theta", theta), self._checked(x)
+        draw_count = whole_number("draw_count", draw_count, least=1)
+        pairs = TrainingPairs.gather(
+            theta, x, prior=self.prior, x_names=self.x_names, fewest=FEWEST_TO_CHECK
+        )
+        truth, observed = pairs.theta, pairs.x
         posteriors = [self.posterior(row) for row in steps("posteriors", list(observed))]
         return Calibration.of(self.prior, posteriors, truth, draw_count=draw_count)
 
@@ -286,19 +295,3 @@ class BayesSim:
             names = [self.x_names[i] for i in np.flatnonzero(bad.any(axis=0))]
             raise ObservationError(f"x_obs must be finite, it is not in {', '.join(names)}")
         return rows
-
-    def _range_warnings(self, observed: Array) -> tuple[OutOfRange, ...]:
-        found = []
-        low, high = self.standardiser.low, self.standardiser.high
-        for pour, outside in enumerate(self.standardiser.is_outside(observed)):
-            where = np.flatnonzero(outside)
-            if len(where):
-                found.append(
-                    OutOfRange(
-                        pour,
-                        tuple(self.x_names[i] for i in where),
-                        tuple(float(observed[pour, i]) for i in where),
-                        tuple((float(low[i]), float(high[i])) for i in where),
-                    )
-                )
-        return tuple(found)

@@ -95,6 +95,7 @@ def _run(options: argparse.Namespace) -> int:
     document = {
         "recordings": [str(path) for path in options.recording],
         "parameters": _parameters(posterior),
+        "fixed": dict(prior.fixed),
         "inside_model": {
             "is_inside": found.misfit.is_inside,
             "p_value": found.misfit.p_value,

@@ -5,11 +5,14 @@ from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.dry_run import add_dry_run, say_seconds
 from granulcal.commands.exit_code import DONE, UNHEALTHY
+from granulcal.commands.reading import TRAINING
 from granulcal.paths import READS, writes
+from granulcal.starter.models import model_named
 
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
     from granulcal.bayessim.training.pairs import TrainingPairs
+    from granulcal.pours.dataset import Dataset
 
 __all__ = ["add"]
 
@@ -35,7 +38,6 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     from granulcal.bayessim import BayesSim
     from granulcal.progress import shown
-    from granulcal.starter.models import model_named
 
     model = BayesSim.load(model_named(options.model))
     pairs = None if options.data is None else _pairs(options, model)
@@ -64,15 +66,42 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _pairs(options: argparse.Namespace, model: "BayesSim") -> "TrainingPairs":
-    from granulcal.bayessim.training.pairs import TrainingPairs
+    from granulcal.bayessim.model import FEWEST_TO_CHECK
+    from granulcal.bayessim.training.pairs import TrainingPairs, require_same_prior
+    from granulcal.calibrate import require_same_scene
     from granulcal.pours.dataset import Dataset
 
-    pairs = TrainingPairs.gather(Dataset.load(options.data), prior=model.prior, fewest=10)
+    data = Dataset.load(options.data)
+    require_same_prior(data.prior, model.prior)
+    if model.scene_toml is not None:
+        require_same_scene(model, data.scene)
+    pairs = TrainingPairs.gather(data, prior=model.prior, fewest=FEWEST_TO_CHECK)
     if pairs.x_names != model.x_names:
         raise ValueError(
             f"{options.data} has the statistics {pairs.x_names}, the model {model.x_names}"
         )
+    training = model_named(options.model) / TRAINING
+    if training.exists():
+        _require_unseen(options, pairs, Dataset.load(training))
     return pairs
+
+
+def _require_unseen(
+    options: argparse.Namespace, pairs: "TrainingPairs", training: "Dataset"
+) -> None:
+    """Refuses pours that the model was trained on.
+
+    Raises:
+        ValueError: some are among the training data.
+    """
+    seen = {row.tobytes() for row in training.theta}
+    count = sum(row.tobytes() in seen for row in pairs.theta)
+    if count:
+        raise ValueError(
+            f"{count} of the {len(pairs.theta)} pours of {options.data} are among those that "
+            f"{options.model} was trained on: a check needs pours that it has not seen, "
+            "as `granulcal generate` makes with another --seed"
+        )
 
 
 def _say_how_long(

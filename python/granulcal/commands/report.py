@@ -48,7 +48,7 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     from granulcal.calibrate import calibrate, require_same_scene
-    from granulcal.measured.plausible import violations
+    from granulcal.measured.plausible import doubts, violations
     from granulcal.pours.dataset import Dataset
     from granulcal.pours.left_out import LeftOut
     from granulcal.starter.models import model_named
@@ -74,6 +74,9 @@ def _run(options: argparse.Namespace) -> int:
         options.told |= told_outside(options, impossible)
         print(outside(impossible))
         return UNHEALTHY
+    doubtful = doubts(data.scene, model.prior, recordings, options.recording)
+    for doubt in doubtful:
+        print(f"warning: {doubt}", file=sys.stderr)
     names = " ".join(str(path) for path in options.recording)
     words = ["granulcal", "report", str(options.model), *map(str, options.recording)]
     words += reading_words(options)
@@ -94,6 +97,7 @@ def _run(options: argparse.Namespace) -> int:
             summary=f"Parameters of the scene {data.scene.name!r}, inferred from {names} "
             f"with a model trained on {len(data)} pours.",
             command=shlex.join(words),
+            notes=doubtful,
         )
     if not found.misfit.is_inside:
         print(found.misfit)
@@ -105,5 +109,6 @@ def _run(options: argparse.Namespace) -> int:
         "report": str(found.report),
         "inside_model": {"is_inside": found.misfit.is_inside, "p_value": found.misfit.p_value},
         "left_out": left_out.to_dict(),
+        "warnings": doubtful,
     }
     return exit_code_of(recordings, not left_out.unhealthy and found.misfit.is_inside)

@@ -1,7 +1,7 @@
 """Materials from the JSON that `granulcal infer -o` and `granulcal calibrate` write."""
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 
 import numpy as np
@@ -19,7 +19,10 @@ _SCHEMA = Table(
         "parameters": Maybe(Mapping(Table({"mode": Number()}, open=True))),
         "samples": ListOf(ListOf(Number())),
     },
-    optional={"inside_model": Table({"is_inside": Flag()}, open=True)},
+    optional={
+        "inside_model": Table({"is_inside": Flag()}, open=True),
+        "fixed": Mapping(Number()),
+    },
     open=True,
 )
 
@@ -37,12 +40,14 @@ class PosteriorDraws:
         samples: own units, shape (n, p).
         mode: most probable parameters, own units, shape (p,).
         is_inside: whether the model explains the recordings; if not these are its best compromise.
+        fixed: values of the parameters that the prior fixed, by path.
     """
 
     names: tuple[str, ...]
     samples: Array
     mode: Array
     is_inside: bool = True
+    fixed: dict[str, float] = field(default_factory=dict)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> "PosteriorDraws":
@@ -73,14 +78,17 @@ class PosteriorDraws:
                 OutsideModelWarning,
                 stacklevel=2,
             )
-        return cls(names, samples, mode, is_inside)
+        return cls(names, samples, mode, is_inside, document.get("fixed", {}))
 
     def without(self, name: str) -> "PosteriorDraws":
-        """Returns the draws of all other parameters."""
+        """Returns the draws of all other parameters, fixed ones too."""
         kept = [i for i, each in enumerate(self.names) if each != name]
         names = tuple(self.names[i] for i in kept)
-        return replace(self, names=names, samples=self.samples[:, kept], mode=self.mode[kept])
+        fixed = {path: value for path, value in self.fixed.items() if path != name}
+        samples, mode = self.samples[:, kept], self.mode[kept]
+        return replace(self, names=names, samples=samples, mode=mode, fixed=fixed)
 
     def at_mode(self, scene: Scene) -> Scene:
-        """Returns the scene with the most probable parameters."""
-        return scene.with_(dict(zip(self.names, self.mode.tolist(), strict=True)))
+        """Returns the scene with the most probable parameters and those that the prior fixed."""
+        mode = dict(zip(self.names, self.mode.tolist(), strict=True))
+        return scene.with_({**self.fixed, **mode})

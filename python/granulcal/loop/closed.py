@@ -42,7 +42,7 @@ class Closed:
         simulated: of the base and of the augmented model, by condition's name.
         corrections: what the correction without physics leaves; none where nothing was detected.
         calibrated: the interval of the named effect's strength by simulated pairs; None without.
-        doubts: what makes recordings doubtful that may be of the scene, a sentence each.
+        doubts: what makes recordings or the verdict doubtful, a sentence each.
     """
 
     task: Task

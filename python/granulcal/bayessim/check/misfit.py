@@ -13,7 +13,14 @@ For one pour the same is done with the held-out pairs of each fold, which no emu
 p-values are ranks among them, so that the false alarm rate is what it says (conformal). For k pours
 the replicates are means of k such residuals around the fit, scaled to the noise there; of their
 variance only the share $a / c^2$ (a of `likelihood.py`, c the widening) is the pours' own, and the
-rest an error of the emulator, which they share and which does not average away.
+rest an error of the emulator, which they share and which does not average away. Pours of two
+materials may have the mean of a third, so that their scatter about it,
+
+$$ W = \sum_{ij} (1 - s_j^2) (y_{ij} - \bar y_j)^2 / s_j^2 $$
+
+with the noise s at the fit (an axis has variance 1 over the prior, so that 1 - s^2 is what shows of
+the parameters there), is ranked among that of as many held-out residuals, and the smallest p-value
+of all is ranked once more.
 
 Evaluated by the extension (`crates/bayessim/src/misfit.rs`).
 
@@ -61,10 +68,12 @@ class Misfit:
 
     Attributes:
         pours: number of pours k.
-        p_value: of joint and single residuals together; small if no parameters explain them.
+        p_value: of joint and single residuals and of the scatter together; small if no parameters
+            explain them.
         joint_p_value: of Q.
         statistics: each statistic, largest residual first.
         text: the same in words.
+        scatter_p_value: of how much several pours differ from each other; None of one pour.
     """
 
     pours: int
@@ -72,6 +81,7 @@ class Misfit:
     joint_p_value: float
     statistics: tuple[StatisticMisfit, ...]
     text: str = field(default="", repr=False, compare=False)
+    scatter_p_value: float | None = None
 
     @property
     def is_inside(self) -> bool:
@@ -125,8 +135,8 @@ class MisfitReference:
     def test(self, likelihood: Likelihood, z: Array, names: Sequence[str]) -> Misfit:
         """Returns the test of k pours `z` (k, s), standardised; `names` are the statistics."""
         arrays = {name: np.ascontiguousarray(array) for name, array in self.arrays().items()}
-        p_value, joint, statistics, text = likelihood.native.misfit(
+        p_value, joint, scatter, statistics, text = likelihood.native.misfit(
             arrays, np.ascontiguousarray(z), list(names)
         )
         each = tuple(StatisticMisfit(*found) for found in statistics)
-        return Misfit(len(z), p_value, joint, each, text)
+        return Misfit(len(z), p_value, joint, each, text, scatter)

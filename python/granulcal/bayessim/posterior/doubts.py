@@ -1,10 +1,22 @@
 """What a posterior warns of: an observation or a prior for which it says less than it seems to."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from granulcal import _native
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["FewEffectiveDraws", "MassOutsidePrior", "OutOfRange", "PoursDisagree", "doubts_of"]
+from granulcal import _native
+from granulcal.bayessim.network.standardise import Standardiser
+
+__all__ = [
+    "FewEffectiveDraws",
+    "MassOutsidePrior",
+    "OutOfRange",
+    "PoursDisagree",
+    "doubts_of",
+    "out_of_range",
+]
 
 
 @dataclass(frozen=True)
@@ -97,4 +109,24 @@ def doubts_of(density: _native.Posterior) -> tuple[Doubt, ...]:
             found.append(FewEffectiveDraws(first, second, text=text))
         else:
             found.append(PoursDisagree(first, second, text=text))
+    return tuple(found)
+
+
+def out_of_range(
+    standardiser: Standardiser, observed: NDArray[np.float64], names: Sequence[str]
+) -> tuple[OutOfRange, ...]:
+    """Returns for each of the pours `observed` (k, s) what lies beyond the training data."""
+    found = []
+    low, high = standardiser.low, standardiser.high
+    for pour, outside in enumerate(standardiser.is_outside(observed)):
+        where = np.flatnonzero(outside).tolist()
+        if where:
+            found.append(
+                OutOfRange(
+                    pour,
+                    tuple(names[i] for i in where),
+                    tuple(float(observed[pour, i]) for i in where),
+                    tuple((float(low[i]), float(high[i])) for i in where),
+                )
+            )
     return tuple(found)

@@ -45,7 +45,13 @@ class CredibleRegion:
         return self.posterior.coordinate_log_prob(theta) >= self.log_density_threshold
 
     def __getitem__(self, name: str) -> tuple[float, float]:
-        """Returns the interval of one parameter."""
+        """Returns the interval of one parameter.
+
+        Raises:
+            KeyError: there is no such parameter.
+        """
+        if name not in self.names:
+            raise KeyError(f"no parameter {name!r}; there are {', '.join(self.names)}")
         low, high = self.intervals[self.names.index(name)]
         return float(low), float(high)
 

@@ -1,5 +1,6 @@
 """Posterior of the free parameters given an observation: draws, density, regions, marginals."""
 
+from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
-from granulcal.bayessim.arrays import as_matrix
+from granulcal.bayessim.arrays import as_matrix, whole_number
 from granulcal.bayessim.emulator.likelihood import Likelihood
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.posterior.average import EMULATOR_ALONE, NETWORK_ALONE, Average
@@ -89,9 +90,12 @@ class Posterior:
 
         $$ p(u | x_1, ..., x_k) \propto p(u)^{1 - k} \prod_i p(u | x_i) $$
 
-        by importance sampling; it is not the average of the pours' posteriors.
+        by importance sampling; it is not the average of the pours' posteriors. Errors of the
+        mixtures are multiplied as well: of a network, whose error is the same for all pours, ask
+        `from_average`.
         """
-        return cls._of(prior, [], mixtures, NETWORK_ALONE, warnings)
+        product = replace(NETWORK_ALONE, network=float(len(mixtures)))
+        return cls._of(prior, [], mixtures, product, warnings)
 
     @classmethod
     def from_conditions(
@@ -127,7 +131,8 @@ class Posterior:
 
         with the emulator's likelihood L of k pours of one material and the network's mixture q of
         each; the network's errors are the same for all pours, so that all of them together count
-        as one. The arithmetic average is for one pour: several are the emulator's alone.
+        as one, of a network alone (a = 0, b = 1) too. The arithmetic average is for one pour:
+        several are the emulator's alone.
 
         Args:
             prior: the prior.
@@ -163,11 +168,10 @@ class Posterior:
     @one_thread()
     def sample(self, n: int, seed: int = 0) -> Array:
         """Returns `n` draws, own units, shape (n, p); the same seed gives the same draws."""
-        if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 0:
-            raise ValueError(f"n must be a whole number of at least 0, got {n!r}")
+        n, seed = whole_number("n", n), whole_number("seed", seed)
         # Checks ask the same draws one after the other.
         if self._last is None or self._last[0] != (n, seed):
-            coordinates = self.density.sample(int(n), seed)
+            coordinates = self.density.sample(n, seed)
             self._last = (n, seed), self.prior.from_unconstrained(coordinates)
         return self._last[1].copy()
 
@@ -209,6 +213,21 @@ class Posterior:
         Found by climbing from the best draws with random steps that shrink; always the same.
         """
         return self.prior.from_unconstrained(self.density.mode()[None])[0]
+
+    def settings(self, theta: ArrayLike | None = None) -> dict[str, float]:
+        """Returns the value of every parameter of the prior by its path, for `Scene.with_`.
+
+        Those that the prior fixes are part of the material, too.
+
+        Args:
+            theta: own units, shape (p,); the mode unless given.
+        """
+        values = as_matrix(
+            "theta", self.mode() if theta is None else theta, columns=len(self.names)
+        )
+        if len(values) != 1:
+            raise ValueError(f"theta must be one row of parameters, got {len(values)}")
+        return {**self.prior.fixed, **dict(zip(self.names, values[0].tolist(), strict=True))}
 
     @one_thread()
     def credible_region(self, level: float = 0.9) -> CredibleRegion:

@@ -126,6 +126,36 @@ class TrainingPairs:
             law=law,
         )
 
+    def require_varied(self) -> None:
+        """Refuses pairs that say nothing of a parameter.
+
+        Raises:
+            TrainingDataError: a parameter is the same in all of them.
+        """
+        still = [
+            n for n, each in zip(self.prior.names, self.theta.T, strict=True) if not np.ptp(each)
+        ]
+        if still:
+            raise TrainingDataError(
+                f"theta: {', '.join(still)} is the same in all {len(self.theta)} usable pairs; "
+                "nothing can be learnt of it"
+            )
+
+
+def require_same_prior(stated: Prior | None, given: Prior | None) -> None:
+    """Refuses a prior that pours were not drawn from.
+
+    Raises:
+        TrainingDataError: the data set states another.
+    """
+    if stated is None or given is None or stated.to_toml() == given.to_toml():
+        return
+    raise TrainingDataError(
+        f"the pours were drawn from another prior than the one given:\n{stated.to_toml().strip()}\n"
+        "its posterior would be wrong; leave `prior` out, or say proposal=data.prior so that the "
+        "pours are weighted"
+    )
+
 
 def _is_first(rows: Array) -> NDArray[np.bool_]:
     """Returns which rows are the first of their numbers; NaN is like NaN."""
@@ -156,6 +186,8 @@ def _columns(count: int, theta_names: Sequence[str] | None, prior: Prior) -> lis
     names = list(theta_names)
     if len(names) != count:
         raise TrainingDataError(f"theta has {count} columns but {len(names)} theta_names")
+    if fixed := [name for name in prior.fixed if name in names]:
+        raise TrainingDataError(f"theta has a column {', '.join(fixed)}, which the prior fixes")
     missing = [name for name in prior.names if name not in names]
     if missing:
         raise TrainingDataError(f"theta has no column {', '.join(missing)}; it has {names}")
@@ -167,7 +199,10 @@ def _statistic_names(x_names: Sequence[str] | None, count: int) -> tuple[str, ..
         return tuple(f"statistic_{i}" for i in range(count))
     if len(x_names) != count:
         raise TrainingDataError(f"x has {count} columns but {len(x_names)} x_names")
-    return tuple(str(name) for name in x_names)
+    names = tuple(str(name) for name in x_names)
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise TrainingDataError(f"x_names must differ, got {', '.join(twice)} more than once")
+    return names
 
 
 def _statuses(status: Sequence[str] | None, count: int) -> NDArray[np.str_]:

@@ -1,5 +1,6 @@
 """The emulator after one round, and where the next round pours."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from granulcal import _native
 from granulcal.bayessim.check.misfit import MisfitReference
 from granulcal.bayessim.emulator.likelihood import EmulatorChoice, Fold, Likelihood
 from granulcal.bayessim.network.standardise import Standardiser
+from granulcal.bayessim.posterior.doubts import out_of_range
 from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.prior import Prior
 
@@ -48,13 +50,25 @@ class RoundFit:
     posterior: Posterior
 
     @classmethod
-    def of(cls, prior: Prior, u: Array, x: Array, x_obs: Array, seed: int) -> "RoundFit":
-        """Returns the emulator of pours at `u` (n, p) and the posterior given `x_obs` (k, s)."""
+    def of(
+        cls, prior: Prior, u: Array, x: Array, x_obs: Array, names: Sequence[str], seed: int
+    ) -> "RoundFit":
+        """Returns the emulator of pours at `u` (n, p) and the posterior given `x_obs` (k, s).
+
+        Args:
+            prior: the prior.
+            u: coordinates, shape (n, p).
+            x: their statistics, own units, shape (n, s).
+            x_obs: the observation, own units, shape (k, s).
+            names: of the statistics.
+            seed: of every random choice.
+        """
         standardiser = Standardiser.fit(x)
         z = standardiser.apply(x)
         likelihood, folds, choice = Likelihood.fit(u, z, prior, features=_FEATURES, seed=seed)
         observed = standardiser.apply(x_obs)
-        posterior = Posterior.from_conditions(prior, [(likelihood, observed)])
+        warnings = out_of_range(standardiser, x_obs, names)
+        posterior = Posterior.from_conditions(prior, [(likelihood, observed)], warnings=warnings)
         return cls(prior, u, z, observed, standardiser, likelihood, folds, choice, posterior)
 
     def reference(self) -> MisfitReference:

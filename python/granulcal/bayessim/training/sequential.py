@@ -204,7 +204,7 @@ def rounds_of(
                 f"at least {FEWEST_PAIRS} pours must be usable, {usable.sum()} of {len(u)} are: "
                 "a larger budget or a narrower prior is needed"
             )
-        fit = RoundFit.of(prior, u[usable], x[usable], observed, seed)
+        fit = RoundFit.of(prior, u[usable], x[usable], observed, names, seed)
         draws = prior.to_unconstrained(fit.posterior.sample(2000))
         spread = draws.std(axis=0) / fit.likelihood.pool.std(axis=0)
         rounds.append(Round(number, len(sizes), len(u), int(usable.sum()), budget, spread))

@@ -1,6 +1,8 @@
 //! What `infer` says, as JSON and as a table.
 
 use granulcal_bayessim::{Identifiability, Marginal, Misfit, Model, ModelError, Posterior};
+use granulcal_numbers::short;
+use granulcal_scene::{Distribution, Parameter};
 use serde_json::{Map, Value, json};
 
 use crate::context::{note, print_line};
@@ -89,12 +91,22 @@ impl<'a> Report<'a> {
         json!({
             "recordings": self.recordings,
             "parameters": found.map(Found::parameters),
+            "fixed": self.fixed(),
             "inside_model": self.inside_model(),
             "identifiability": found.map(|found| &found.known),
             "calibrated": self.model.is_calibrated == Some(true),
             "warnings": warnings,
             "statistics": self.observed.iter().map(statistics).collect::<Vec<_>>(),
         })
+    }
+
+    /// What the prior fixed: part of the material as much as what was inferred.
+    fn fixed(&self) -> Map<String, Value> {
+        let value = |p: &Parameter| match p.distribution {
+            Distribution::Fixed { value } => Some((p.path.clone(), Value::from(value))),
+            _ => None,
+        };
+        self.model.prior.parameters().iter().filter_map(value).collect()
     }
 
     fn inside_model(&self) -> Value {
@@ -110,6 +122,7 @@ impl<'a> Report<'a> {
             "impossible": self.impossible,
             "p_value": misfit.map(|misfit| misfit.p_value),
             "joint_p_value": misfit.map(|misfit| misfit.joint_p_value),
+            "scatter_p_value": misfit.and_then(|misfit| misfit.scatter_p_value),
             "statistics": statistics,
         })
     }
@@ -127,12 +140,10 @@ impl<'a> Report<'a> {
         };
         print_line(&found.misfit.to_string())?;
         print_line(&format!("{:<30}{:>10}{:>10}   90 % interval", "parameter", "mode", "mean"))?;
-        for (m, mode) in found.marginals.iter().zip(&found.mode) {
-            let (low, high) = m.interval90;
-            print_line(&format!(
-                "{:<30}{mode:>10.4}{:>10.4}   {low:.4} to {high:.4}",
-                m.name, m.mean
-            ))?;
+        for (m, &mode) in found.marginals.iter().zip(&found.mode) {
+            let [mode, mean, low, high] = [mode, m.mean, m.interval90.0, m.interval90.1]
+                .map(|value| short(value).to_string());
+            print_line(&format!("{:<30}{mode:>10}{mean:>10}   {low} to {high}", m.name))?;
         }
         print_line(&found.known.to_string())?;
         for warning in &found.posterior.warnings {
