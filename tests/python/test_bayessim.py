@@ -381,6 +381,14 @@ def test_constant_statistics_are_noted_and_harmless(toy):
         assert np.all(np.isfinite(model.posterior(x[0]).sample(50)))
 
 
+def test_a_pair_that_has_all_of_the_spread_is_named(toy):
+    theta, x = toy.simulate(80, seed=1)
+    assert not BayesSim.fit(theta, x, toy.prior, **QUICK).summary.notes
+    x[7, 4] = -1e12
+    (note,) = BayesSim.fit(theta, x, toy.prior, **QUICK).summary.notes
+    assert "one pair has nearly all of the spread of statistic_4 (9 sd)" in note
+
+
 def test_wide_positive_statistics_are_taken_in_logarithms():
     generator = np.random.default_rng(0)
     x = np.column_stack([np.exp(3 * generator.standard_normal(500)), generator.random(500)])

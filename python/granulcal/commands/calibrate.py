@@ -6,7 +6,7 @@ import sys
 from typing import Any
 
 from granulcal.commands.cluster import add_cluster, cluster_of
-from granulcal.commands.counts import pour_count
+from granulcal.commands.counts import pour_count, seed_number, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
 from granulcal.commands.reading import (
@@ -38,8 +38,8 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "-o", "--out", type=writes("calibration"), required=True, help="folder; holds the pours"
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the run (default: 0)")
-    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--seed", type=seed_number, default=0, help="seed of the run (default: 0)")
+    parser.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
     parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
     add_cluster(parser, store=False)
     add_dry_run(parser)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.cluster import add_cluster, cluster_of
-from granulcal.commands.counts import pour_count
+from granulcal.commands.counts import pour_count, seed_number, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import KEPT, READS, writes
 from granulcal.progress import shown
@@ -83,8 +83,10 @@ def add(commands: Any) -> None:
         help="rounds of further pours where the fits are, once a residual is found, after each of "
         "which everything is asked again; 96 pours of the budget each (default: none)",
     )
-    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
-    parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
+    parser.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
+    parser.add_argument(
+        "--seed", type=seed_number, default=0, help="seed of everything (default: 0)"
+    )
     add_dry_run(parser)
     parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
     add_cluster(parser)

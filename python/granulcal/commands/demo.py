@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from granulcal.commands.counts import pour_count
+from granulcal.commands.counts import pour_count, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import writes
 from granulcal.progress import shown
@@ -30,7 +30,7 @@ def add(commands: Any) -> None:
         default=_POURS,
         help="pours to train on; fewer are faster and less sharp (default: %(default)s)",
     )
-    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
     add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_run)

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from granulcal.commands.counts import pour_count
+from granulcal.commands.counts import pour_count, seed_number, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.paths import READS, writes
@@ -89,8 +89,10 @@ def _add_common(
     parser.add_argument(
         "-o", "--out", type=writes(kind), required=True, help="folder; holds the pours"
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
-    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument(
+        "--seed", type=seed_number, default=0, help="seed of everything (default: 0)"
+    )
+    parser.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
     add_dry_run(parser)
     parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")

@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from granulcal.commands.counts import seed_number
 from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.commands.init import assignment
 from granulcal.paths import READS, writes
@@ -88,7 +89,9 @@ def _add_scene(words: Any) -> None:
     parser = words.add_parser("scene", help=text, description=text)
     parser.add_argument("scene", type=READS, help="TOML, or the word funnel or drop")
     parser.add_argument("--posterior", type=READS, help="take the most probable material of this")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the start (default: 0)")
+    parser.add_argument(
+        "--seed", type=seed_number, default=0, help="seed of the start (default: 0)"
+    )
     _add_engine(parser)
     _add_common(parser, "the folder")
     parser.set_defaults(run=_scene)
@@ -103,7 +106,10 @@ def _add_bed(words: Any) -> None:
         "--positions", type=READS, help="centres [m] of `simulate --positions`, instead of a pour"
     )
     parser.add_argument(
-        "--seed", type=int, default=0, help="seed of the pour, of --positions too (default: 0)"
+        "--seed",
+        type=seed_number,
+        default=0,
+        help="seed of the pour, of --positions too (default: 0)",
     )
     _add_common(parser, "the file")
     parser.set_defaults(run=_bed)

@@ -5,6 +5,7 @@ import json
 import sys
 from typing import Any
 
+from granulcal.commands.counts import seed_number
 from granulcal.commands.init import assignment
 from granulcal.paths import READS, writes
 
@@ -33,7 +34,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "-o", "--out", type=writes("film"), required=True, help="the film, .gif or .mp4"
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the pour (default: 0)")
+    parser.add_argument("--seed", type=seed_number, default=0, help="seed of the pour (default: 0)")
     parser.add_argument("--fps", type=float, default=15.0, help="frames a second (default: 15)")
     parser.add_argument(
         "--slow", type=float, default=2.0, help="seconds of film for one of the pour (default: 2)"

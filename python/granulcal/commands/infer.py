@@ -8,6 +8,7 @@ import sys
 from typing import Any
 
 from granulcal import _native
+from granulcal.commands.counts import seed_number
 from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.commands.reading import add_recordings, open_model, open_recordings, reading_words
 from granulcal.paths import writes
@@ -23,7 +24,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--border", type=int, help="ignore a frame of so many pixels")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.add_argument("--samples", type=int, help="print so many draws in the JSON")
-    parser.add_argument("--seed", type=int, help="seed of the draws (default 0)")
+    parser.add_argument("--seed", type=seed_number, help="seed of the draws (default 0)")
     parser.add_argument(
         "-o", "--out", type=writes("json"), help="write JSON with samples to this file"
     )

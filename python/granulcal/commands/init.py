@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from granulcal.commands.counts import seed_number
 from granulcal.paths import READS, RECORDING, writes
 
 __all__ = ["add", "assignment"]
@@ -79,7 +80,7 @@ def _add_sample(commands: Any) -> None:
         default=Path(),
         help="of `init` (default: this one)",
     )
-    parser.add_argument("--seed", type=int, help="seed of the pours and of the noise")
+    parser.add_argument("--seed", type=seed_number, help="seed of the pours and of the noise")
     parser.add_argument(
         "--set",
         action="append",

@@ -6,6 +6,7 @@ import json
 import sys
 from typing import Any
 
+from granulcal.commands.counts import seed_number, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import READS, writes
 
@@ -49,8 +50,10 @@ def add(commands: Any) -> None:
         action="store_true",
         help="without the training pours, which `report` wants: the form that ships",
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
-    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument(
+        "--seed", type=seed_number, default=0, help="seed of everything (default: 0)"
+    )
+    parser.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
     add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_run)

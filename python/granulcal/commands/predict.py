@@ -6,7 +6,7 @@ import os
 import sys
 from typing import TYPE_CHECKING, Any
 
-from granulcal.commands.counts import pour_count
+from granulcal.commands.counts import pour_count, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_seconds
 from granulcal.paths import READS
 from granulcal.progress import shown
@@ -69,7 +69,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--pours", type=pour_count, default=20, help="simulated pours (default: 20)"
     )
-    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
     parser.add_argument(
         "--engine", help="the simulator with which the loop was closed, if not ours"
     )

@@ -5,7 +5,7 @@ import shlex
 import sys
 from typing import Any
 
-from granulcal.commands.counts import pour_count
+from granulcal.commands.counts import pour_count, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
 from granulcal.commands.reading import (
@@ -37,7 +37,7 @@ def add(commands: Any) -> None:
         default=8,
         help="pours at draws of the posterior, for the band of the profile (default: 8)",
     )
-    parser.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    parser.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
     parser.add_argument(
         "--data", type=READS, help=f"training data (default: {TRAINING} in the model's folder)"
     )

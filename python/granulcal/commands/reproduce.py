@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.cluster import add_cluster, cluster_of
+from granulcal.commands.counts import thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long_of
 from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.paths import READS, writes
@@ -64,7 +65,7 @@ def add(commands: Any) -> None:
         action="store_true",
         help="write one HTML page of all experiments; those that have run are not run again",
     )
-    paper.add_argument("--threads", type=int, help="pours at once (default: all cores)")
+    paper.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
     parser.set_defaults(run=_with_json)
 
 

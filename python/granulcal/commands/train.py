@@ -3,6 +3,7 @@
 import argparse
 from typing import Any
 
+from granulcal.commands.counts import seed_number
 from granulcal.commands.dry_run import add_dry_run, say_seconds
 from granulcal.commands.exit_code import DONE
 from granulcal.commands.reading import TRAINING
@@ -25,7 +26,9 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "-o", "--out", type=writes("model"), required=True, help="folder of the model"
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the training (default: 0)")
+    parser.add_argument(
+        "--seed", type=seed_number, default=0, help="seed of the training (default: 0)"
+    )
     parser.add_argument(
         "--method",
         choices=("auto", "emulated", "distilled", "mdrff", "plain"),

@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 # From 300 pairs on, at least 50 are spared to check a network.
 _WORTHWHILE_TEST_PAIRS = 50
 _PAIRS_FOR_A_WORTHWHILE_TEST = 300
+# One of n values is at most sqrt(n) standard deviations out; there it has 4/5 of the variance.
+_FAR = 0.9
 
 
 @dataclass(frozen=True)
@@ -255,12 +257,27 @@ class _Work:
         kept = np.random.default_rng(self.seed).random(len(rows)) < share
         return np.flatnonzero(kept)
 
+    def _notes(self) -> tuple[str, ...]:
+        """What is odd about the statistics."""
+        names, apart = self.pairs.x_names, np.abs(self.z).max(axis=0)
+        is_constant = self.standardiser.is_constant
+        constant = [name for name, c in zip(names, is_constant, strict=True) if c]
+        far = [
+            f"{name} ({size:.0f} sd)"
+            for name, size in zip(names, apart, strict=True)
+            if size > _FAR * np.sqrt(len(self.z))
+        ]
+        notes = [f"never changed in training: {', '.join(constant)}"] if constant else []
+        if far:
+            notes.append(
+                f"one pair has nearly all of the spread of {', '.join(far)}: is it a pour at all?"
+            )
+        return tuple(notes)
+
     def _summary(
         self, method: str, choice: str, result: TrainingResult | None, train: int, test: int
     ) -> TrainingSummary:
         pairs = self.pairs
-        is_constant = self.standardiser.is_constant
-        constant = [name for name, c in zip(pairs.x_names, is_constant, strict=True) if c]
         summary = TrainingSummary(
             method=method,
             choice=choice,
@@ -269,7 +286,7 @@ class _Work:
             test_count=test,
             excluded=pairs.excluded,
             horizon_count=pairs.horizon_count,
-            notes=(f"never changed in training: {', '.join(constant)}",) if constant else (),
+            notes=self._notes(),
         )
         if result is None:
             return summary
