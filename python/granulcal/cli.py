@@ -127,9 +127,12 @@ def _guarded(command: Callable[[], int]) -> int:
     except BrokenPipeError:
         return DONE
     except ModuleNotFoundError as error:
-        extra = _EXTRAS.get((error.name or "").partition(".")[0], "all")
-        told = str(error)
-        _tell(told if "pip install" in told else f"{told}; pip install 'granulcal[{extra}]'")
+        module, told = (error.name or "").partition(".")[0], str(error)
+        if module == "rclpy":
+            told += "; it comes with ROS 2: source /opt/ros/DISTRIBUTION/setup.bash before"
+        elif "pip install" not in told:
+            told += f"; pip install 'granulcal[{_EXTRAS.get(module, 'all')}]'"
+        _tell(told)
         return FAILED
     except (ValueError, TypeError, FileNotFoundError, NotADirectoryError) as error:
         _tell(error)

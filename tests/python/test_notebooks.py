@@ -64,7 +64,7 @@ def test_the_guide_runs_as_a_notebook(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.chdir(tmp_path)
     names = run("own_couscous")
     assert np.isfinite(names["posterior"].mode()).all()
-    assert (tmp_path / "couscous" / "materials-nb" / "mode.xml").exists()
+    assert (tmp_path / "couscous-notebook" / "materials-nb" / "mode.xml").exists()
 
 
 @pytest.mark.slow

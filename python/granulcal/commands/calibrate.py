@@ -3,7 +3,7 @@
 import argparse
 import json
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.counts import pour_count, seed_number, thread_count
@@ -19,6 +19,10 @@ from granulcal.commands.reading import (
 from granulcal.files import write_beside
 from granulcal.paths import READS, writes
 
+if TYPE_CHECKING:
+    from granulcal.bayessim.training.sequential import SequentialFit
+    from granulcal.measured.recording import Recording
+
 __all__ = ["add"]
 
 
@@ -29,11 +33,11 @@ def add(commands: Any) -> None:
     """Adds the word to the command line."""
     text = "infer the parameters from recordings with few pours, made in rounds for them alone"
     parser = commands.add_parser("calibrate", help=text, description=text)
-    parser.add_argument("scene", type=READS, help="scene as TOML, or the word funnel")
+    parser.add_argument("scene", type=READS, help="scene as TOML, or the word funnel or drop")
     parser.add_argument("prior", type=READS, help="prior as TOML, or the word default")
     add_reading(parser)
     parser.add_argument(
-        "--budget", type=pour_count, default=100, help="pours in all (default: 100)"
+        "--budget", type=pour_count, default=100, help="pours in all, at least 60 (default: 100)"
     )
     parser.add_argument(
         "-o", "--out", type=writes("calibration"), required=True, help="folder; holds the pours"
@@ -48,6 +52,7 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from granulcal.bayessim.training.sequential import round_sizes
     from granulcal.engines import engine_named
     from granulcal.measured.plausible import doubts, violations
     from granulcal.pours.scene import Scene
@@ -58,6 +63,7 @@ def _run(options: argparse.Namespace) -> int:
     scene = Scene.named(options.scene)
     prior = Prior.named(options.prior)
     engine = None if options.engine is None else engine_named(options.engine)
+    round_sizes(options.budget)
     if options.dry_run:
         return say_how_long(options, scene, prior, options.budget, engine=engine)
     recordings = open_recordings(options)
@@ -107,7 +113,26 @@ def _run(options: argparse.Namespace) -> int:
         "warnings": [*unlike, *doubtful, *map(str, posterior.warnings)],
         "samples": posterior.sample(_SAMPLES).tolist(),
     }
-    write_beside(options.out / "posterior.json", json.dumps(document, indent=1) + "\n")
+    # What has been found is printed, whatever becomes of the file.
+    lost: OSError | None = None
+    try:
+        write_beside(options.out / "posterior.json", json.dumps(document, indent=1) + "\n")
+    except OSError as error:
+        lost = error
+    code = _say(options, found, document, recordings)
+    if lost is not None:
+        raise lost
+    return code
+
+
+def _say(
+    options: argparse.Namespace,
+    found: "SequentialFit",
+    document: dict[str, Any],
+    recordings: "list[Recording]",
+) -> int:
+    """Prints what was found; returns the exit code."""
+    posterior = found.posterior
     if options.json:
         del document["samples"]
         print(json.dumps(document, indent=1))

@@ -265,8 +265,9 @@ def _spill(options: argparse.Namespace) -> int:
     from granulcal.design.spill import design_spill
 
     draws = None if options.posterior is None else PosteriorDraws.load(options.posterior)
+    scene = _scene(options)
     forecast = design_spill(
-        _scene(options),
+        scene if draws is None else draws.on(scene),
         heights=tuple(options.heights),
         grains=options.grains,
         pours=options.pours,

@@ -150,7 +150,7 @@ def _posterior(options: argparse.Namespace) -> int:
         found.names,
         found.mode,
         found.samples[: options.draws],
-        _loaded(options),
+        found.on(_loaded(options)),
         options.to,
         options.out,
         young=options.young,

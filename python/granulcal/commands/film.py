@@ -48,6 +48,7 @@ def add(commands: Any) -> None:
         "--set", action="append", default=[], type=assignment, metavar="PATH=VALUE",
         help="another number of the scene; may be repeated",
     )  # fmt: skip
+    parser.add_argument("--preset", help="settings of the solver, in place of the scene's")
     parser.add_argument("--json", action="store_true", help="print JSON at the end")
     parser.set_defaults(run=_run)
 
@@ -56,7 +57,10 @@ def _run(options: argparse.Namespace) -> int:
     from granulcal.pours.film import film
     from granulcal.pours.scene import Scene
 
-    scene = Scene.named(options.scene).with_(dict(options.set))
+    scene = Scene.named(options.scene)
+    if options.preset is not None:
+        scene = scene.with_(preset=options.preset)
+    scene = scene.with_(dict(options.set))
     frames = film(
         scene,
         options.out,

@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from granulcal.commands.counts import seed_number
@@ -112,9 +113,9 @@ def _init(options: argparse.Namespace) -> int:
         print(json.dumps({"files": files, "scene": scene.name}, indent=1))
         return 0
     print(f"written: {', '.join(files)}")
-    print(f"next: granulcal simulate {options.folder / 'scene.toml'}")
+    print(f"next: granulcal simulate {quote(str(options.folder / 'scene.toml'))}")
     if options.recording is None:
-        print(f"no recording yet? granulcal sample {options.folder}")
+        print(f"no recording yet? granulcal sample {quote(str(options.folder))}")
     return 0
 
 

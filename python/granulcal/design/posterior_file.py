@@ -88,7 +88,11 @@ class PosteriorDraws:
         samples, mode = self.samples[:, kept], self.mode[kept]
         return replace(self, names=names, samples=samples, mode=mode, fixed=fixed)
 
+    def on(self, scene: Scene) -> Scene:
+        """Returns the scene with what the prior fixed: what the draws are of."""
+        return scene.with_(self.fixed)
+
     def at_mode(self, scene: Scene) -> Scene:
         """Returns the scene with the most probable parameters and those that the prior fixed."""
         mode = dict(zip(self.names, self.mode.tolist(), strict=True))
-        return scene.with_({**self.fixed, **mode})
+        return self.on(scene).with_(mode)

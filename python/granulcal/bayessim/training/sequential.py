@@ -58,6 +58,7 @@ class Round:
         usable: of them, with statistics.
         budget: pours in all.
         spread: standard deviations of the posterior over those of the prior, shape (p,).
+        names: paths of the parameters.
     """
 
     number: int
@@ -66,10 +67,13 @@ class Round:
     usable: int
     budget: int
     spread: Array
+    names: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """One line."""
-        spread = ", ".join(f"{each:.2f}" for each in self.spread)
+        words = [name.rpartition(".")[2] for name in self.names] or [""] * len(self.spread)
+        each = zip(words, self.spread, strict=True)
+        spread = ", ".join(f"{word} {share:.2f}".strip() for word, share in each)
         return (
             f"round {self.number} of {self.rounds}: {self.pours} of {self.budget} pours, "
             f"{self.usable} usable; spread of the posterior over the prior's: {spread}"
@@ -207,7 +211,8 @@ def rounds_of(
         fit = RoundFit.of(prior, u[usable], x[usable], observed, names, seed)
         draws = prior.to_unconstrained(fit.posterior.sample(2000))
         spread = draws.std(axis=0) / fit.likelihood.pool.std(axis=0)
-        rounds.append(Round(number, len(sizes), len(u), int(usable.sum()), budget, spread))
+        counts = (number, len(sizes), len(u), int(usable.sum()), budget)
+        rounds.append(Round(*counts, spread, tuple(prior.names)))
         if progress is not None:
             progress(rounds[-1])
     assert fit is not None

@@ -236,6 +236,12 @@ class Models:
             raise ObservationError(f"level must be between 0 and 1, got {level}")
         # How a pour is observed goes without saying.
         observed = {p: self.scene.get(p) for p, _, _ in self.inputs if is_definition(p)}
+        inputs = [path for path, _, _ in self.inputs]
+        if unknown := [path for path in at if path not in inputs]:
+            raise ObservationError(
+                f"no condition of the loop has a number {', '.join(unknown)}; its numbers are "
+                f"{', '.join(inputs)}"
+            )
         at = {**observed, **at}
         missing = [path for path, _, _ in self.inputs if path not in at]
         if missing:
