@@ -56,7 +56,9 @@ impl Further {
     fn command(self) -> Command {
         let arguments = self.options.into_iter().map(FurtherOption::argument);
         let commands = self.commands.into_iter().map(Further::command);
-        Command::new(self.name).about(self.about).args(arguments).subcommands(commands)
+        // Only the program has a version.
+        let command = Command::new(self.name).about(self.about).disable_version_flag(true);
+        command.args(arguments).subcommands(commands)
     }
 }
 

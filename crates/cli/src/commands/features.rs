@@ -175,7 +175,8 @@ fn print(recording: &Recording, formation: &Formation, statistics: &[Named]) -> 
         plane.tilt_rad.to_degrees(),
         plane.rms * 1e3,
         plane.inliers,
-        formation.ground_sd * 1e3
+        // No sign of a zero.
+        formation.ground_sd * 1e3 + 0.0
     ))?;
     print_line(&format!(
         "formation          {}, {:.1} cm3, half of it within {:.1} mm",
