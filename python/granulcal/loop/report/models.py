@@ -237,17 +237,14 @@ class Models:
         # How a pour is observed goes without saying.
         observed = {p: self.scene.get(p) for p, _, _ in self.inputs if is_definition(p)}
         inputs = [path for path, _, _ in self.inputs]
-        if unknown := [path for path in at if path not in inputs]:
-            raise ObservationError(
-                f"no condition of the loop has a number {', '.join(unknown)}; its numbers are "
-                f"{', '.join(inputs)}"
-            )
+        others = [path for path in at if path not in inputs]
         at = {**observed, **at}
-        missing = [path for path, _, _ in self.inputs if path not in at]
+        missing = [path for path in inputs if path not in at]
         if missing:
+            besides = f", and {', '.join(others)} is none of them" if others else ""
             raise ObservationError(
-                f"the condition must state {', '.join(p for p, _, _ in self.inputs)}; "
-                f"it lacks {', '.join(missing)}"
+                f"the condition must state {', '.join(inputs)}; it lacks "
+                f"{', '.join(missing)}{besides}"
             )
         self.require_engine(model)
         if model in ("line", "nearest"):
