@@ -80,6 +80,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     parser = _parser()
     words = _flags_last(words, _commands(parser))
+    if words[:1] == ["help"] and words[1:] and words[1] in _commands(parser):
+        # Only its own parser knows what a word of here takes.
+        words = [*words[1:], "--help"]
     word = words[0] if words else ""
     if word in ("simulate", "generate") and elsewhere.is_asked(words):
         return _guarded(lambda: elsewhere.run(words))

@@ -147,7 +147,7 @@ def test_a_check_needs_pairs(quick, toy):
         quick.check(theta[:1], x[:1])
     with pytest.raises(TrainingDataError, match="as many rows"):
         quick.check(theta, x[:15])
-    with pytest.raises(ValueError, match="draw_count must be a whole number of at least 1, got 0"):
+    with pytest.raises(ValueError, match="draw_count must be at least 1, got 0"):
         quick.check(theta, x, draw_count=0)
     theta[3, 0] = np.nan
     with pytest.raises(TrainingDataError, match="NaN or infinite in 1"):

@@ -168,9 +168,11 @@ def test_the_command_prints_and_writes_json(
     assert found["model"] == "corrected" and found["level"] == 0.9
     row = found["statistics"]["radius[50]"]
     assert row["low"] < row["middle"] < row["high"]
+    assert found["units"] == {"radius[50]": "m", "radius[90]": "m"}
     assert main([*words, "--model", "line"]) == 0
     told = capsys.readouterr().out
     assert "EFFECT tilt.x" in told and "radius[90]" in told and "0.035" in told
+    assert "unit" in told and told.rstrip().endswith(" m")
     assert main([*words[:3], "start.base=0.2", "--corrected"]) == 2
     assert "the correction holds up to" in capsys.readouterr().err
 

@@ -35,6 +35,12 @@ def test_help_names_every_command_once_and_the_program() -> None:
     assert "Usage: granulcal " in text and "granulcal-cli" not in text
 
 
+@pytest.mark.parametrize("words", [["infer"], ["export", "posterior"], ["generate"]])
+def test_the_word_help_says_what_the_option_does(words: list[str]) -> None:
+    asked = _told("help", *words)
+    assert asked.returncode == 0 and asked.stdout == _told(*words, "--help").stdout
+
+
 @pytest.mark.parametrize("word", ["simulate", "features", "completions", "fit-sensor"])
 def test_help_of_the_simulators_half_names_granulcal(word: str) -> None:
     text = _told(word, "--help").stdout

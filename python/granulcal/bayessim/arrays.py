@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from granulcal.arrays import unmasked
 
-__all__ = ["as_matrix", "as_real", "whole_number"]
+__all__ = ["as_matrix", "as_real"]
 
 
 def as_real(name: str, value: Any) -> NDArray[np.float64]:
@@ -43,14 +43,3 @@ def as_matrix(name: str, value: Any, *, columns: int | None = None) -> NDArray[n
         found = np.shape(value)
         raise ValueError(f"{name} must have shape {expected}, got {found}")
     return array
-
-
-def whole_number(name: str, value: Any, *, least: int = 0) -> int:
-    """Returns `value` as an int.
-
-    Raises:
-        ValueError: it is no whole number, or less than `least`.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ValueError(f"{name} must be a whole number of at least {least}, got {value!r}")
-    return int(value)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from granulcal.bayessim.arrays import as_real, whole_number
+from granulcal.bayessim.arrays import as_real
 from granulcal.bayessim.check.calibration import Calibration
 from granulcal.bayessim.check.identifiability import Identifiability
 from granulcal.bayessim.check.misfit import Misfit, MisfitReference
@@ -29,6 +29,7 @@ from granulcal.errors import ObservationError
 from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
 from granulcal.progress import steps
+from granulcal.whole import check_seed, check_whole
 
 __all__ = ["BayesSim"]
 
@@ -143,17 +144,18 @@ class BayesSim:
 
         Raises:
             TrainingDataError: pairs that cannot be trained on; the message says why.
+            TypeError: a seed that is no whole number.
             ValueError: a setting that does not exist or has an impossible value.
         """
         settings = Config.from_options(**config)
-        seed = whole_number("seed", seed)
+        check_seed(seed)
         if x is None and proposal is None:
             require_same_prior(getattr(data_or_theta, "prior", None), prior)
         pairs = TrainingPairs.gather(
             data_or_theta, x, prior=prior, status=status, x_names=x_names, scene=scene
         )
         pairs.require_varied()
-        made = train_model(pairs, settings, seed, proposal=proposal, progress=progress)
+        made = train_model(pairs, settings, int(seed), proposal=proposal, progress=progress)
         kept = settings.component_counts[0]
         if made.amortised is not None:
             kept = made.amortised.network.layout.components
@@ -254,8 +256,10 @@ class BayesSim:
 
         Raises:
             TrainingDataError: pairs that cannot be checked with; the message says why.
+            TypeError: `draw_count` is no whole number.
+            ValueError: it is less than 1.
         """
-        draw_count = whole_number("draw_count", draw_count, least=1)
+        check_whole("draw_count", draw_count, at_least=1)
         pairs = TrainingPairs.gather(
             theta, x, prior=self.prior, x_names=self.x_names, fewest=FEWEST_TO_CHECK
         )

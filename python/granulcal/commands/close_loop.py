@@ -100,7 +100,6 @@ def _run(options: argparse.Namespace) -> int:
 
     engine = None if options.engine is None else engine_named(options.engine)
     if options.dry_run:
-        from granulcal.loop.check.prior_rounds import ROUNDS
         from granulcal.loop.close import planned
         from granulcal.loop.task import Task
         from granulcal.loop.test.thresholds import Thresholds
@@ -108,8 +107,7 @@ def _run(options: argparse.Namespace) -> int:
         task = Task.load(_file(options))
         for doubt in task.require_readable():
             print(f"warning: {doubt}", file=sys.stderr)
-        looks = ROUNDS * Thresholds().look
-        planned(task, options.budget, options.seed, options.pairs, options.rounds, looks)
+        planned(task, options.budget, options.seed, options.pairs, options.rounds, Thresholds())
         with pouring_with(engine):
             return say_how_long(options, task.at_first(), task.prior, options.budget)
     aside = contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext()

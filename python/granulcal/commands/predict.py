@@ -100,15 +100,17 @@ def _run(options: argparse.Namespace) -> int:
             pours=options.pours,
         )
     if options.json:
-        print(json.dumps({"at": at, "verdict": models.verdict, **found.to_dict()}, indent=1))
+        print(json.dumps({"at": at, "verdict": models.verdict, "units": models.units, **found.to_dict()}, indent=1))
         return _outcome(models.verdict["kind"])
     word = " ".join([models.verdict["kind"], *models.verdict["named"]])
     print(f"{found.model} at {', '.join(options.at)}; the loop's verdict: {word}")
-    print(f"{'statistic':<24}{'middle':>12}{f'{100 * found.level:g} % from':>14}{'to':>12}")
+    share = f"{100 * found.level:g} % from"
+    print(f"{'statistic':<24}{'middle':>12}{share:>14}{'to':>12}  unit")
     for name, middle, low, high in zip(
         found.names, found.middle, found.low, found.high, strict=True
     ):
-        print(f"{name:<24}{middle:>12.5g}{low:>14.5g}{high:>12.5g}")
+        unit = models.units[name]
+        print(f"{name:<24}{middle:>12.5g}{low:>14.5g}{high:>12.5g}  {unit}")
     return _outcome(models.verdict["kind"])
 
 

@@ -118,7 +118,7 @@ def close_loop(
         )
     folder, rules = Path(out), thresholds or Thresholds()
     workers = threads or os.cpu_count() or 1
-    plan = planned(task, budget, seed, pairs, rounds, ROUNDS * rules.look)
+    plan = planned(task, budget, seed, pairs, rounds, rules)
     names = Measures.of(plan.scene).names
     registration = register(folder, task, plan, rules, seed, names, pairs, rounds)
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
@@ -262,15 +262,17 @@ def _of_placebo(placebo: Trace, rules: Thresholds) -> tuple[str, ...]:
 
 @one_thread()
 def planned(
-    task: Task, budget: int, seed: int, pairs: int = 0, rounds: int = 0, draws: int = 0
+    task: Task, budget: int, seed: int, pairs: int, rounds: int, rules: Thresholds
 ) -> ArchivePlan:
-    """Returns the archive that a budget affords; `pairs`, `rounds` and `draws` are kept back.
+    """Returns the archive that a budget affords.
+
+    Kept back are the pours of `pairs` and `rounds`, and the draws that `rules` look at.
 
     Raises:
         ObservationError: it affords too little, with what would be enough.
     """
     own = sum(not effect.is_free for effect in task.library)
-    kept = _needed(task, pairs, draws) + rounds * ROUND
+    kept = _needed(task, pairs, ROUNDS * rules.look) + rounds * ROUND
     spare = budget - kept
     # A small budget has fewer pours to share than the base model needs.
     base = max(int(_BASE_SHARE * spare), min(_LEAST_BASE, spare - _LEAST_EACH * own))

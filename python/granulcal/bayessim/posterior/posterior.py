@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
-from granulcal.bayessim.arrays import as_matrix, whole_number
+from granulcal.bayessim.arrays import as_matrix
 from granulcal.bayessim.emulator.likelihood import Likelihood
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.posterior.average import EMULATOR_ALONE, NETWORK_ALONE, Average
@@ -24,6 +24,7 @@ from granulcal.bayessim.posterior.doubts import (
 from granulcal.bayessim.posterior.marginal import CredibleRegion, Marginal, kernel_density
 from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
+from granulcal.whole import check_seed, check_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -168,7 +169,8 @@ class Posterior:
     @one_thread()
     def sample(self, n: int, seed: int = 0) -> Array:
         """Returns `n` draws, own units, shape (n, p); the same seed gives the same draws."""
-        n, seed = whole_number("n", n), whole_number("seed", seed)
+        check_whole("n", n, at_least=0)
+        check_seed(seed)
         # Checks ask the same draws one after the other.
         if self._last is None or self._last[0] != (n, seed):
             coordinates = self.density.sample(n, seed)

@@ -35,6 +35,7 @@ from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.one_thread import one_thread
 from granulcal.pours.left_out import LeftOut
 from granulcal.prior import Prior
+from granulcal.whole import check_whole
 
 __all__ = ["Round", "SequentialFit", "infer_within_budget", "round_sizes", "rounds_of"]
 
@@ -107,12 +108,10 @@ def round_sizes(budget: int) -> list[int]:
     """Returns the pours of each round: two fifths from the prior, then three equal rounds.
 
     Raises:
+        TypeError: not a whole number.
         ValueError: a budget below 60.
     """
-    if isinstance(budget, bool) or not isinstance(budget, int) or budget < _FEWEST_BUDGET:
-        raise ValueError(
-            f"budget must be a whole number of at least {_FEWEST_BUDGET} pours, got {budget!r}"
-        )
+    check_whole("budget", budget, at_least=_FEWEST_BUDGET)
     first = round(_FIRST_SHARE * budget)
     ends = np.linspace(first, budget, len(_POWERS) + 1).round().astype(int)
     return [first, *np.diff(ends).tolist()]
@@ -147,6 +146,7 @@ def infer_within_budget(
     Raises:
         ObservationError: an observation that is not finite.
         TrainingDataError: fewer than 20 pours of the first round can be used.
+        TypeError: not a whole number.
         ValueError: a budget below 60.
     """
 

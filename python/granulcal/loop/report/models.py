@@ -38,6 +38,7 @@ from granulcal.loop.report.interval import of_one_more, t_factor
 from granulcal.loop.report.models_schema import check_models
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.pours.scene import Scene
+from granulcal.pours.statistics import REGISTRY
 from granulcal.progress import steps
 
 __all__ = ["MODELS", "Maker", "Models", "Prediction", "condition_of"]
@@ -139,6 +140,12 @@ class Models:
     pours: Array
     coarse: Coarse | None = None
     engine: str | None = None
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each statistic; `-` if it has none."""
+        known = {each.name: each.unit for each in REGISTRY} | self.scene.observed_units
+        return {name: known[name] for name in self.names}
 
     def write(self, folder: Path) -> Path:
         """Writes `models.json` into a folder and returns its path."""
