@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use clock::CpuTime;
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
-use granulcal_bayessim::Model;
+use granulcal::bayessim::Model;
 use rayon::ThreadPoolBuilder;
 
 const DRAWS: usize = 1000;

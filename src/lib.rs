@@ -1,8 +1,8 @@
 //! granulcal calibrates a granular simulator from depth images.
 //!
 //! This crate is the front door; the rooms are [`scene`] (what is asked: scenes, sensors, priors), [`dem`] (grains,
-//! contact law, solver), [`features`] (camera, depth raster, segmentation, the 16 statistics) and [`dataset`]
-//! (recordings, resumable batches, Parquet, MCAP).
+//! contact law, solver), [`features`] (camera, depth raster, segmentation, the 16 statistics), [`dataset`] (recordings,
+//! resumable batches, Parquet, MCAP) and [`bayessim`] (the posterior that a trained model gives).
 //!
 //! ```
 //! use granulcal::dem::{Scene, Simulation};
@@ -14,6 +14,7 @@
 //! # Ok::<(), granulcal::dem::DemError>(())
 //! ```
 
+pub use granulcal_bayessim as bayessim;
 pub use granulcal_dataset as dataset;
 pub use granulcal_dem as dem;
 pub use granulcal_features as features;

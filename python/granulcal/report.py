@@ -177,7 +177,8 @@ def template(name: str) -> Any:
 def _formations(measured: Array, pour: Pour) -> str:
     simulated = pour.points()
     centred = simulated - np.array([*simulated[:, :2].mean(axis=0), 0.0])
-    return data_uri(formation_figure({"measured": measured, "simulated": centred}))
+    clouds = {"measured": measured, "simulated": centred}
+    return data_uri(formation_figure(clouds, resolution=pour.scene.ground_resolution))
 
 
 def _profile(measured: Array, pours: Sequence[Pour], drawn: Sequence[Pour]) -> str | None:

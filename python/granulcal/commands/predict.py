@@ -100,7 +100,12 @@ def _run(options: argparse.Namespace) -> int:
             pours=options.pours,
         )
     if options.json:
-        print(json.dumps({"at": at, "verdict": models.verdict, "units": models.units, **found.to_dict()}, indent=1))
+        print(
+            json.dumps(
+                {"at": at, "verdict": models.verdict, "units": models.units, **found.to_dict()},
+                indent=1,
+            )
+        )
         return _outcome(models.verdict["kind"])
     word = " ".join([models.verdict["kind"], *models.verdict["named"]])
     print(f"{found.model} at {', '.join(options.at)}; the loop's verdict: {word}")

@@ -21,6 +21,8 @@ _PIXELS = 240
 _MM = 1e3
 # Points whose nearest neighbours set the size of a point's patch.
 _SPACING_SAMPLE = 400
+# Widest patch of a point, in widths of a pixel: grains that lie alone are farther apart.
+_WIDEST = 1.5
 
 
 def common_field(clouds: Sequence[Array], *, share: float = 0.97, sides: float = 2.4) -> float:
@@ -65,17 +67,21 @@ def height_grid(
     return np.where(np.isfinite(grid), grid, np.nan)
 
 
-def formation_figure(clouds: dict[str, Array]) -> bytes:
+def formation_figure(clouds: dict[str, Array], *, resolution: float) -> bytes:
     """Returns a PNG of the formations side by side: one field, one colour scale in mm.
 
     Args:
         clouds: points [m] by title, each of shape (n, 3), centred.
+        resolution: width of a pixel on the ground [m]: `Scene.ground_resolution`.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     field = common_field(list(clouds.values()))
-    grids = [_MM * height_grid(points, field=field) for points in clouds.values()]
+    grids = []
+    for points in clouds.values():
+        patch = min(point_spacing(points), _WIDEST * resolution) if len(points) > 1 else resolution
+        grids.append(_MM * height_grid(points, field=field, patch=patch))
     tallest = max((float(np.nanmax(g)) for g in grids if np.isfinite(g).any()), default=1.0)
     figure = Figure(figsize=(3.6 * len(clouds) + 0.8, 3.7), layout="constrained")
     FigureCanvasAgg(figure)

@@ -162,7 +162,7 @@ def _pictures(closed: Closed) -> str:
         pour, faults = simulate(closed.scene(condition, one), seed=0), closed.faults(one)
         points = Frame.of(pour).with_(faults, 0).points() if faults else pour.points()
         clouds[label] = points - np.array([*points[:, :2].mean(axis=0), 0.0])
-    return data_uri(formation_figure(clouds))
+    return data_uri(formation_figure(clouds, resolution=closed.task.scene.ground_resolution))
 
 
 def _measured_points(closed: Closed, condition: Condition) -> Any:
