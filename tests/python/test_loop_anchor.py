@@ -15,7 +15,7 @@ from granulcal.loop.check.confirm import confirm
 from granulcal.loop.check.settle import ANCHORS, Settled, anchored, settle
 from granulcal.loop.effects.design import cube_from_normal
 from granulcal.loop.pours.replicates import ModelPours
-from granulcal.loop.surrogate.anchor import Anchor
+from granulcal.loop.surrogate.anchor import Anchor, Hold
 from granulcal.loop.test.trace import Explanation, Trace
 
 Array = NDArray[np.float64]
@@ -28,7 +28,8 @@ U = 0.4
 
 def test_gaps_are_exact_where_they_are_known_and_gone_far_away() -> None:
     gaps = np.array([[1.0, -2.0], [0.5, 3.0]])
-    anchor = Anchor(np.array([[0.0], [1.0]]), gaps, np.stack([np.eye(2), 4 * np.eye(2)]))
+    sizes = np.stack([np.eye(2), 4 * np.eye(2)])
+    anchor = Hold(np.zeros(2), np.array([[0.0], [1.0]]), gaps, sizes)
     assert anchor.at(np.array([[1.0], [0.0]])) == pytest.approx(gaps[::-1])
     assert np.abs(anchor.at(np.array([[4.0]]))).max() < 1e-9
     between = anchor.at(np.array([[0.5]]))[0]
@@ -43,7 +44,7 @@ def test_gaps_are_exact_where_they_are_known_and_gone_far_away() -> None:
 @pytest.mark.parametrize("inputs", [0, 1])
 def test_repeats_of_one_condition_have_the_mean_of_their_gaps(inputs: int) -> None:
     where, gaps = np.full((2, inputs), 0.3), np.array([[1.0, 4.0], [3.0, 0.0]])
-    anchor = Anchor(where, gaps, np.stack([np.eye(2)] * 2))
+    anchor = Hold(np.zeros(2), where, gaps, np.stack([np.eye(2)] * 2))
     assert anchor.at(where) == pytest.approx(np.tile([2.0, 2.0], (2, 1)))
     # The mean of two has half the variance, and both rows are this one mean.
     for i in range(2):
@@ -51,22 +52,63 @@ def test_repeats_of_one_condition_have_the_mean_of_their_gaps(inputs: int) -> No
             assert anchor.covariance(where)[i, :, j] == pytest.approx(0.5 * np.eye(2))
 
 
+def test_each_fit_has_its_own_gap_and_far_places_the_mean() -> None:
+    where, sizes = np.zeros((1, 1)), np.eye(2)[None]
+    gaps = np.array([[[1.0, -2.0]], [[0.5, 3.0]]])
+    places = np.array([[0.3, 0.0], [0.8, 2.0]])
+    holds = [Hold(z, where, gap, sizes) for z, gap in zip(places, gaps, strict=True)]
+    anchor = Anchor(tuple(holds))
+
+    def at(z: Array) -> Array:
+        return anchor.at(z[None, :1], where, z[None, 1:])[0]
+
+    mean = gaps.mean(axis=0)[0]
+    for z, gap in zip(places, gaps, strict=True):
+        assert np.abs(at(z) - gap[0]).max() < 0.1 * np.abs(gap[0] - mean).max()
+        covariance = anchor.covariance(z[:1], where, z[1:])[0, :, 0]
+        assert covariance == pytest.approx(np.eye(2), rel=0.1, abs=0.1)
+    for far in (places.mean(axis=0), np.array([0.5, 9.0])):
+        assert at(far) == pytest.approx(mean, abs=0.05)
+        # The mean of two has half the variance.
+        covariance = anchor.covariance(far[:1], where, far[1:])[0, :, 0]
+        assert covariance == pytest.approx(0.5 * np.eye(2), abs=0.02)
+    # One alone holds everywhere.
+    alone = Anchor(tuple(holds[:1]))
+    assert alone.at(np.array([[9.0]]), where, np.array([[-3.0]])) == pytest.approx(gaps[0])
+
+
+def test_pours_of_one_fit_again_count_as_more_of_the_same() -> None:
+    where, sizes, z = np.zeros((1, 1)), np.eye(2)[None], np.array([0.3, 0.0])
+    gaps = np.array([[[1.0, -2.0]], [[0.0, 2.0]]])
+    anchor = Anchor(tuple(Hold(z, where, gap, sizes) for gap in gaps))
+    assert anchor.at(z[None, :1], where, z[None, 1:])[0] == pytest.approx([0.5, 0.0])
+    covariance = anchor.covariance(z[:1], where, z[1:])[0, :, 0]
+    assert covariance == pytest.approx(0.5 * np.eye(2))
+
+
 @dataclass(frozen=True)
 class Linear:
-    """x = A (2 u - 1) + psi D (1 + c) + offset B + noise, and its archive's surrogate."""
+    """x = A (2 u - 1) + psi D (1 + c) + offset B + noise, and its archive's surrogate.
+
+    With a `bend`, pours have psi times that of B besides, which neither the archive nor what was
+    measured has.
+    """
 
     slopes: Array
     direction: Array
     alien: Array
+    bend: float = 0.0
 
     def pours(self, u: float, c: float, psi: float, count: int, seed: list[int]) -> Array:
         mean = (2 * u - 1) * self.slopes + (1 + c) * psi * self.direction
+        mean = mean + self.bend * psi * self.alien
         noise = 0.3 * np.random.default_rng(seed).standard_normal((count, SIZE))
         return mean + noise
 
     def observe(self, psi: float, seed: int) -> list[ConditionPours]:
+        straight = replace(self, bend=0.0)
         return [
-            ConditionPours.of(f"{c:g}", [c], self.pours(U, c, psi, POURS, [seed, i]))
+            ConditionPours.of(f"{c:g}", [c], straight.pours(U, c, psi, POURS, [seed, i]))
             for i, c in enumerate(PLACES)
         ]
 
@@ -167,20 +209,39 @@ def test_an_effect_is_found_by_the_surrogate_that_is_held(
     assert abs(np.mean(errors)) < 0.05
 
 
-def test_the_verdicts_model_has_its_turn_where_the_base_stays_wrong(
+def test_a_gap_of_the_verdicts_model_is_not_the_bases(
     linear: Linear, right: Surrogate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    held: list[bool] = []
+    """The base was held by the gap of a model far away: it was wrong there, and blanks alarmed."""
+    bent, held, alarms = replace(linear, bend=1.0), 0, 0
+    for number in range(SETS):
+        _, after = settled(bent, right, 0.6, number, monkeypatch)
+        held += after.anchors > 0
+        base = after.trace.base_fit
+        u = float(cube_from_normal(base.v)[0])
+        blank = [
+            ConditionPours.of(f"{c:g}", [c], linear.pours(u, c, 0.0, POURS, [800, number, i]))
+            for i, c in enumerate(PLACES)
+        ]
+        alarms += trace(after.surrogate, blank, RULES, seed=number).verdict.kind != "NONE"
+    assert held >= 0.8 * SETS
+    assert alarms <= 2
 
-    def hold(surrogate: Surrogate, fit: Any, _: Any) -> Surrogate:
-        held.append(bool(fit.active))
+
+def test_both_fits_are_held_as_often_as_it_takes(
+    linear: Linear, right: Surrogate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held: list[list[bool]] = []
+
+    def hold(surrogate: Surrogate, fits: Any) -> Surrogate:
+        held.append([bool(fit.active) for fit, _ in fits])
         return surrogate
 
     monkeypatch.setattr(module, "confirm", lambda *_: 0.0)
     monkeypatch.setattr(module, "anchored", hold)
     found, after = settled(linear, right, 0.6, 1, monkeypatch)
     assert found.verdict.named == ("first",) and after.anchors == ANCHORS
-    assert held == [False] + [True] * (ANCHORS - 1)
+    assert held == [[False, True]] * ANCHORS
 
 
 def test_an_anchor_is_right_at_its_fit_for_other_pours(linear: Linear, wrong: Surrogate) -> None:
@@ -193,12 +254,13 @@ def test_an_anchor_is_right_at_its_fit_for_other_pours(linear: Linear, wrong: Su
             for i, c in enumerate(PLACES)
         ]
 
-    held = anchored(wrong, found.base_fit, fresh(0))
+    held = anchored(wrong, [(found.base_fit, fresh(0))])
     assert confirm(wrong, found.base_fit, fresh(1)) < 0.001
     p = [confirm(held, found.base_fit, fresh(i)) for i in range(1, 21)]
     assert np.mean(np.array(p) < 0.05) <= 0.2
-    # A second anchor takes the place of the first.
-    again = anchored(held, found.base_fit, fresh(0))
+    # A second anchor joins the first; both are gaps of the surrogate without any.
+    again = anchored(held, [(found.base_fit, fresh(0))])
     assert again.anchor is not None and held.anchor is not None
-    assert again.anchor.gaps == pytest.approx(held.anchor.gaps)
+    first, second = again.anchor.holds
+    assert first is held.anchor.holds[0] and second.gaps == pytest.approx(first.gaps)
     assert replace(again, anchor=None).coefficients is wrong.coefficients

@@ -2,14 +2,15 @@ r"""Pours of the models at their fits, again and again until the surrogate is ri
 
     repeat
         pour the base model and the verdict's at their fits, with fresh seeds
-        p <- are these pours where the surrogate says?                        (confirm.py)
-        stop if p > `confirm`, or after `ANCHORS` anchors
-        hold the surrogate at a fit by these pours                            (anchor.py):
-            the base model's, if this is the first round and it is wrong there; else the verdict's
+        p <- are these pours where the surrogate says, of either?             (confirm.py)
+        stop if both p > `confirm`, or after `ANCHORS` anchors
+        hold the surrogate at both fits, at each by its own pours             (anchor.py)
         ask everything again
 
 A surrogate is worst where it stands at the edge of its archive, and there fits are led astray. Each
-round's pours test the anchor of the round before, which has not seen them.
+round's pours test the anchor of the round before, which has not seen them. Both fits are held, for
+the word weighs one against the other: a gap of the verdict's model that were taken for the base's
+too would speak against a base where the surrogate is right.
 """
 
 from collections.abc import Sequence
@@ -20,8 +21,9 @@ from numpy.typing import NDArray
 
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.check.confirm import confirm
+from granulcal.loop.effects.design import cube_from_normal
 from granulcal.loop.pours.replicates import FEWEST, ModelPours, both
-from granulcal.loop.surrogate.anchor import Anchor
+from granulcal.loop.surrogate.anchor import Anchor, Hold
 from granulcal.loop.surrogate.baseline import Fit, Start
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
@@ -47,7 +49,7 @@ class Settled:
         trace: what the surrogate says that is held.
         surrogate: that surrogate.
         simulated: pours of both models at their fits, by name of the condition to fit.
-        confirmed: p of these pours; NaN where too few are usable.
+        confirmed: p of the pours of the verdict's model; NaN where too few are usable.
         anchors: how often the surrogate was moved.
         seed: of the pours.
         before: pours of the rounds before the last.
@@ -74,20 +76,18 @@ def settle(
         }
         of_base = _usable(analysis, {name: two.base for name, two in simulated.items()})
         of_best = _usable(analysis, {name: two.augmented for name, two in simulated.items()})
-        fit = found.fit_of(found.best)
+        fit, base = found.fit_of(found.best), found.base_fit
         right = confirm(surrogate, fit, of_best) if of_best else float("nan")
-        say(
-            f"fresh pours of the verdict's model: the surrogate is right there with p = {right:.3g}"
-        )
-        if number == ANCHORS or not of_base or not right <= rules.confirm:
+        at_base = confirm(surrogate, base, of_base) if of_base else float("nan")
+        where = f"p = {right:.3g} there"
+        if fit is not base:
+            where += f", p = {at_base:.3g} at the base model's fit"
+        say(f"fresh pours of the verdict's model: the surrogate is right with {where}")
+        is_wrong = right <= rules.confirm or at_base <= rules.confirm
+        if number == ANCHORS or not of_base or not of_best or not is_wrong:
             return Settled(found, surrogate, simulated, right, number, own, before)
-        # What is wrong without effects is wrong with them: all models start from the base's mean.
-        # Where holding it there has not mended the verdict's model, that one's turn comes.
-        base, is_first = found.base_fit, number == 0
-        if fit is base or (is_first and confirm(surrogate, base, of_base) <= rules.confirm):
-            surrogate = anchored(surrogate, base, of_base)
-        else:
-            surrogate = anchored(surrogate, fit, of_best)
+        fits = [(base, of_base)] if fit is base else [(base, of_base), (fit, of_best)]
+        surrogate = anchored(surrogate, fits)
         before += sum(two.pours for two in simulated.values())
         number += 1
         start = Start(fit.v, fit.psi)
@@ -95,19 +95,27 @@ def settle(
         say(f"held by these pours, {found.verdict.kind}: {found.verdict.reason}")
 
 
-def anchored(surrogate: Surrogate, fit: Fit, fresh: Sequence[ConditionPours]) -> Surrogate:
-    """Returns the surrogate held at a fit by fresh pours there; an older anchor is gone."""
+def anchored(
+    surrogate: Surrogate, fits: Sequence[tuple[Fit, Sequence[ConditionPours]]]
+) -> Surrogate:
+    """Returns the surrogate held at each fit by fresh pours there, and where it was before."""
     plain = replace(surrogate, anchor=None)
+    before = () if surrogate.anchor is None else surrogate.anchor.holds
+    holds = (*before, *(_hold(plain, *each) for each in fits))
+    return replace(plain, anchor=Anchor(holds))
+
+
+def _hold(plain: Surrogate, fit: Fit, fresh: Sequence[ConditionPours]) -> Hold:
     stack = StackedMeans.of(plain, fresh)
     local = LinearisedSurrogate.at(plain, stack.conditions, stack.counts, fit.v)
     count, size = stack.means.shape
     noise = local.pour_covariance(fit.v, fit.psi).reshape(count, size, count, size)
-    anchor = Anchor(
+    return Hold(
+        place=np.concatenate([cube_from_normal(fit.v), fit.psi]),
         conditions=stack.conditions,
         gaps=stack.means - local.mean(fit.v, fit.psi).reshape(count, size),
         covariances=noise[range(count), :, range(count), :],
     )
-    return replace(plain, anchor=anchor)
 
 
 def _usable(analysis: Analysis, rows: dict[str, Array]) -> list[ConditionPours]:

@@ -196,7 +196,8 @@ class LinearisedSurrogate:
         lack = self.surrogate.lack * self._scales(v, psi) ** 2
         total[np.diag_indices_from(total)] += lack.ravel()
         if self.surrogate.anchor is not None:
-            of_anchor = self.surrogate.anchor.covariance(self.conditions)
+            theta = cube_from_normal(v)
+            of_anchor = self.surrogate.anchor.covariance(theta, self.conditions, psi)
             total += of_anchor.reshape(total.shape)
         return total
 

@@ -104,7 +104,7 @@ class Surrogate:
         dof: rows less coefficients that they decided, mean over statistics.
         excluded: rows that were not finite.
         crossed: two effects each that have a q_kl.
-        anchor: what true pours at a fit have shown; None before any.
+        anchor: what true pours at fits have shown; None before any.
     """
 
     design: Design
@@ -337,7 +337,7 @@ class Surrogate:
         width = main.shape[1]
         total = main @ self.coefficients[:, :width].T
         if self.anchor is not None:
-            total += self.anchor.at(condition)
+            total += self.anchor.at(theta, condition, psi)
         active = np.nonzero(psi.any(axis=0))[0]
         if len(active) == 0:
             return total
