@@ -1,10 +1,13 @@
-"""What experiment 6 (`granulcal reproduce paper shapes --medium`) owes to chance and to its size.
+"""What experiment 6 (`granulcal reproduce paper shapes`) owes to chance and to its size.
 
     python benches/paper/shapes.py again    # another 50 tests of each shape, by spheres
     python benches/paper/shapes.py few      # models of the right shape from fewer training pours
+    python benches/paper/shapes.py itself --shape cylinders --tests 25 --training 32 --scale 300
+                                            # of 2,000 grains: one shape by itself, fewer pours
 
-Both go on with the pours below `--out` (default: out/paper-medium, where the experiment keeps
-them), and can be stopped and started again.
+The first two are of 400 grains (`--medium`). All go on with the pours below `--out` (default:
+out/paper-medium and out/paper, where the experiment keeps them), and can be stopped and started
+again.
 """
 
 import argparse
@@ -13,10 +16,20 @@ from pathlib import Path
 
 import numpy as np
 
+from granulcal.bayessim import BayesSim
 from granulcal.experiments.paper.common import three
-from granulcal.experiments.paper.common.sizes import MEDIUM
+from granulcal.experiments.paper.common.sizes import FULL, MEDIUM, Size
 from granulcal.experiments.paper.common.workshop import Workshop
-from granulcal.experiments.paper.shapes import OF_MODEL, OF_TRUTH, SHAPES, by_spheres
+from granulcal.experiments.paper.shapes import (
+    OF_MODEL,
+    OF_TRUTH,
+    SHAPES,
+    add_itself,
+    beside,
+    by_spheres,
+    usable,
+)
+from granulcal.starter.models import model_named
 
 OTHER_SEEDS = 1000
 """Added to the seeds of the experiment."""
@@ -62,15 +75,56 @@ def few(workshop: Workshop) -> None:
             )
 
 
+def itself(workshop: Workshop, name: str) -> None:
+    """Prints L2 of a shape by spheres and by itself; the model of spheres is the one that ships."""
+    shape = next(each for each in SHAPES if each.name == name)
+    variant = three.VARIANTS[0]
+    scene = variant.scene(workshop.size)
+    spheres = workshop.pairs(
+        f"{variant.name}-training", scene, variant.prior, workshop.size.training, variant.seed
+    )
+    sd = spheres.x.std(axis=0, ddof=1)
+    found = by_spheres(workshop, shape, BayesSim.load(model_named("funnel")), sd, picture=False)
+    add_itself(workshop, shape, found, sd)
+    by_itself, errors = found.by_itself, found.errors
+    assert by_itself is not None and errors is not None
+    for what, each in (("spheres", found.by_spheres), (name, by_itself)):
+        distance = usable(each)
+        error = distance.std(ddof=1) / np.sqrt(len(distance))
+        print(
+            f"{name} by {what}: L2 {distance.mean():.2f} ± {distance.std(ddof=1):.2f} "
+            f"(n = {len(distance)}, standard error {error:.2f})"
+        )
+    told = ", ".join(beside(found.by_spheres, by_itself))
+    print(f"both usable; L2 by spheres, by {name}; nearer by {name}, standard error: {told}")
+    for what, off in (("spheres", found.errors_by_spheres), (name, errors)):
+        print(f"sliding friction by {what}: off by {off.mean():.3f} ± {off.std(ddof=1):.3f}")
+    print(f"training pours not usable: {found.unusable}; tests: {found.tests.unusable}")
+
+
 def main() -> None:
     """Runs what the command line names."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("what", choices=["again", "few"])
-    parser.add_argument("--out", type=Path, default=Path("out/paper-medium"))
+    parser.add_argument("what", choices=["again", "few", "itself"])
+    parser.add_argument("--out", type=Path, help="folder of the experiment's pours")
     parser.add_argument("--threads", type=int, default=2, help="pours at once")
+    of_itself = parser.add_argument_group("itself")
+    of_itself.add_argument("--shape", default="cylinders", choices=[s.name for s in SHAPES])
+    of_itself.add_argument("--tests", type=int, default=FULL.tests)
+    of_itself.add_argument("--training", type=int, default=FULL.shapes, help="of the shape")
+    of_itself.add_argument(
+        "--scale", type=int, default=FULL.training, help="pours of spheres that L2 is scaled by"
+    )
     args = parser.parse_args()
-    workshop = Workshop(args.out, f"shapes-{args.what}", MEDIUM, threads=args.threads)
-    (again if args.what == "again" else few)(workshop)
+    size: Size = MEDIUM
+    if args.what == "itself":
+        size = replace(FULL, tests=args.tests, shapes=args.training, training=args.scale)
+    folder = args.out or Path("out/paper" if args.what == "itself" else "out/paper-medium")
+    workshop = Workshop(folder, f"shapes-{args.what}", size, threads=args.threads)
+    if args.what == "itself":
+        itself(workshop, args.shape)
+    else:
+        (again if args.what == "again" else few)(workshop)
 
 
 if __name__ == "__main__":

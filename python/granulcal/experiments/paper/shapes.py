@@ -30,7 +30,19 @@ from granulcal.prior import Parameter, Prior
 if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
 
-__all__ = ["EXPERIMENT", "OF_MODEL", "OF_TRUTH", "SHAPES", "Found", "Shape", "by_spheres", "shaped"]
+__all__ = [
+    "EXPERIMENT",
+    "OF_MODEL",
+    "OF_TRUTH",
+    "SHAPES",
+    "Found",
+    "Shape",
+    "add_itself",
+    "beside",
+    "by_spheres",
+    "shaped",
+    "usable",
+]
 
 Array = NDArray[np.float64]
 
@@ -97,7 +109,7 @@ class Found:
             here and below NaN where a pour cannot be used.
         errors_by_spheres: of the sliding friction by that model, shape (n,).
         height: of the heaps of these spheres over that of the tests', mean over mean [-].
-        figure: formations beside those of the spheres.
+        figure: formations beside those of the spheres; None without.
         floor: L2 of a second pour of each test, shape (n,); None: not poured yet.
         by_itself: L2 of grains of the shape at what the model of the shape infers, shape (n,).
         errors: of the sliding friction by that model, shape (n,).
@@ -109,7 +121,7 @@ class Found:
     by_spheres: Array
     errors_by_spheres: Array
     height: float
-    figure: Figure
+    figure: Figure | None
     floor: Array | None = None
     by_itself: Array | None = None
     errors: Array | None = None
@@ -144,12 +156,14 @@ def run(workshop: Workshop) -> Outcome:
         workshop.so_far(_outcome(workshop.size, found))
         _add_floor(workshop, shape, found[shape.name], sd)
         workshop.so_far(_outcome(workshop.size, found))
-        _add_itself(workshop, shape, found[shape.name], sd)
+        add_itself(workshop, shape, found[shape.name], sd)
         workshop.so_far(_outcome(workshop.size, found))
     return _outcome(workshop.size, found)
 
 
-def by_spheres(workshop: Workshop, shape: Shape, model: "BayesSim", sd: Array) -> Found:
+def by_spheres(
+    workshop: Workshop, shape: Shape, model: "BayesSim", sd: Array, *, picture: bool = True
+) -> Found:
     """Pours the tests of a shape, infers them with a model of spheres, and pours spheres there.
 
     Args:
@@ -157,6 +171,7 @@ def by_spheres(workshop: Workshop, shape: Shape, model: "BayesSim", sd: Array) -
         shape: of the tests.
         model: of spheres.
         sd: of its training set's statistics, shape (s,).
+        picture: pour some of the tests again, for a picture.
     """
     variant = three.VARIANTS[0]
     spheres = variant.scene(workshop.size)
@@ -164,15 +179,18 @@ def by_spheres(workshop: Workshop, shape: Shape, model: "BayesSim", sd: Array) -
     tests = workshop.tests(f"{name}-tests", scene, OF_TRUTH, workshop.size.tests, shape.seed)
     estimates, x = _again(workshop, f"{name}-by-spheres", model.posterior, tests,
                           spheres, variant.prior, shape.seed + 2)  # fmt: skip
-    file = _picture(workshop, name, scene, tests, spheres, variant.prior, estimates)
-    caption = f"{name} (top), and spheres at the parameters inferred from them (bottom)."
+    figure = None
+    if picture:
+        file = _picture(workshop, name, scene, tests, spheres, variant.prior, estimates)
+        caption = f"{name} (top), and spheres at the parameters inferred from them (bottom)."
+        figure = Figure(file=file, caption=caption)
     return Found(
         tests=tests,
         unexplained=float(np.mean([not model.misfit(x).is_inside for x in tests.x])),
         by_spheres=_distances(x, tests.x, sd),
         errors_by_spheres=estimates[:, 0] - tests.theta[:, 0],
         height=_height(x, tests),
-        figure=Figure(file=file, caption=caption),
+        figure=figure,
     )
 
 
@@ -183,7 +201,8 @@ def _add_floor(workshop: Workshop, shape: Shape, found: Found, sd: Array) -> Non
     found.floor = _distances(workshop.poured(name, scene, OF_MODEL, theta, seed=seed), tests.x, sd)
 
 
-def _add_itself(workshop: Workshop, shape: Shape, found: Found, sd: Array) -> None:
+def add_itself(workshop: Workshop, shape: Shape, found: Found, sd: Array) -> None:
+    """Infers the tests of a shape with a model of that shape, and pours at what it says."""
     tests, name, scene = found.tests, shape.name, shape.scene(workshop.size)
     right = workshop.pairs(
         f"{name}-training", scene, OF_MODEL, workshop.size.shapes, shape.seed + 1
@@ -198,26 +217,24 @@ def _add_itself(workshop: Workshop, shape: Shape, found: Found, sd: Array) -> No
 
 def _outcome(size: Size, found: dict[str, Found]) -> Outcome:
     """What has been found so far."""
-    rows, cells, beside, missing = [], [], [], []
+    rows, cells, compared, missing = [], [], [], []
     for shape in SHAPES:
         name, each = shape.name, found.get(shape.name)
         if each is None:
             missing.append(f"{name} by spheres")
             continue
-        rows.append(
-            level_row(f"L2, {name} by spheres", _usable(each.by_spheres), size, shape.paper)
-        )
+        rows.append(level_row(f"L2, {name} by spheres", usable(each.by_spheres), size, shape.paper))
         if each.by_itself is None:
             missing.append(f"{name} by {name}")
         else:
-            rows.append(level_row(f"L2, {name} by {name}", _usable(each.by_itself), size))
+            rows.append(level_row(f"L2, {name} by {name}", usable(each.by_itself), size))
         floor = f"L2 of two pours of one material, {name} (floor)"
         if each.floor is None:
             missing.append(floor)
         else:
-            rows.append(level_row(floor, _usable(each.floor), size))
+            rows.append(level_row(floor, usable(each.floor), size))
         if each.floor is not None and each.by_itself is not None:
-            beside.append([name, *_beside(each.by_spheres, each.by_itself, each.floor)])
+            compared.append([name, *beside(each.by_spheres, each.by_itself, each.floor)])
         unusable = "-" if each.unusable is None else str(each.unusable)
         spheres = [f"{each.unexplained:.0%}", f"{each.height:.0%}", _spread(each.errors_by_spheres)]
         cells.append([name, *spheres, _spread(each.errors), unusable, str(each.tests.unusable)])
@@ -244,14 +261,14 @@ def _outcome(size: Size, found: dict[str, Found]) -> Outcome:
             "of second pours",
             "nearer by itself than by spheres, with its standard error",
         ],
-        rows=beside,
+        rows=compared,
     )
     return Outcome(
         rows=rows,
         answer="; ".join(f"{row.quantity}: {row.ours}" for row in rows),
         missing=missing,
-        tables=[of_models, of_all_three] if beside else [of_models],
-        figures=[each.figure for each in found.values()],
+        tables=[of_models, of_all_three] if compared else [of_models],
+        figures=[each.figure for each in found.values() if each.figure is not None],
         notes=[
             "Distances are in standard deviations of the training set of spheres, as everywhere.",
             "Grains with a shape have the same diameter of 4 mm as the spheres, not the same "
@@ -261,15 +278,15 @@ def _outcome(size: Size, found: dict[str, Found]) -> Outcome:
     )
 
 
-def _beside(by_spheres: Array, by_itself: Array, floor: Array) -> list[str]:
-    """Three pours of each formation, where none is missing: their number and mean distances."""
-    all_three = np.column_stack([by_spheres, by_itself, floor])
-    all_three = all_three[np.isfinite(all_three).all(axis=1)]
-    if len(all_three) < 2:
-        return [str(len(all_three)), "-", "-", "-", "-"]
-    nearer = all_three[:, 0] - all_three[:, 1]
+def beside(by_spheres: Array, by_itself: Array, *others: Array) -> list[str]:
+    """Pours of each formation, where none is missing: their number and mean distances."""
+    each = np.column_stack([by_spheres, by_itself, *others])
+    each = each[np.isfinite(each).all(axis=1)]
+    if len(each) < 2:
+        return [str(len(each)), *["-"] * (each.shape[1] + 1)]
+    nearer = each[:, 0] - each[:, 1]
     error = nearer.std(ddof=1) / np.sqrt(len(nearer))
-    means = [f"{mean:.2f}" for mean in all_three.mean(axis=0)]
+    means = [f"{mean:.2f}" for mean in each.mean(axis=0)]
     return [str(len(nearer)), *means, f"{nearer.mean():.2f} ± {error:.2f}"]
 
 
@@ -284,7 +301,8 @@ def _spread(errors: Array | None) -> str:
     return "-" if errors is None else f"{errors.mean():.3f} ± {errors.std(ddof=1):.3f}"
 
 
-def _usable(distances: Array) -> Array:
+def usable(distances: Array) -> Array:
+    """Returns the distances that are none of pours that cannot be used."""
     return distances[np.isfinite(distances)]
 
 
