@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.analysis import Analysis
+from granulcal.loop.check.alarms import of_error, of_placebo
 from granulcal.loop.check.checks import (
     calibrated,
     corrected,
@@ -56,7 +57,7 @@ from granulcal.loop.surrogate.store_surrogate import fit_surrogate
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED, Task
 from granulcal.loop.test.thresholds import Thresholds
-from granulcal.loop.test.trace import Power, Trace, power, trace
+from granulcal.loop.test.trace import Power, power, trace
 from granulcal.one_thread import one_thread
 
 __all__ = ["PAIRS", "Closed", "close_loop", "fit_surrogate", "planned"]
@@ -216,7 +217,7 @@ def close_loop(
     blank = [analysis.pours(c, rows) for c, rows in pretended if len(rows)]
     placebo = trace(surrogate, blank, rules, seed=seed + 1)
     say(f"placebo {placebo.verdict.kind}: {placebo.verdict.reason}")
-    alarms = _of_placebo(placebo, rules)
+    alarms = of_error(standing.verdict, fit, sealed) + of_placebo(placebo.verdict, rules)
     for alarm in alarms:
         say(f"warning: {alarm}")
     experiments = next_experiment(surrogate, found, _candidates(analysis.plan))
@@ -246,18 +247,6 @@ def close_loop(
     models_of(task, analysis.plan, surrogate, found, said, measured, simulated).write(folder)
     write_beside(folder / "verdict.json", json.dumps(closed.to_dict(), indent=1) + "\n")
     return closed
-
-
-def _of_placebo(placebo: Trace, rules: Thresholds) -> tuple[str, ...]:
-    """What an alarm says where there is nothing to be found."""
-    verdict = placebo.verdict
-    if verdict.p >= rules.confirm:
-        return ()
-    return (
-        f"the same analysis of as many pours of the base model at its fit says {verdict.kind} (p = "
-        f"{verdict.p:.2g}; {verdict.reason}), where there is nothing to be found: the surrogate is "
-        "wrong there by as much, and a verdict has to be far more probable than that",
-    )
 
 
 @one_thread()
