@@ -18,6 +18,7 @@ from granulcal.loop.check.look_again import look_again
 from granulcal.loop.check.standing import stand
 from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.forward import Forward
+from granulcal.loop.pours.replicates import error_of
 from granulcal.loop.task import FIT, Condition, Task
 
 __all__ = ["Checks"]
@@ -82,6 +83,9 @@ class Checks:
             anchors=settled.anchors,
             own=own,
             of_base=of_base,
+            error=error_of(
+                self.task, analysis.fitted, sets, there.simulated, settled.surrogate, seed
+            ),
         )
         word: dict[str, Any] = {
             "verdict": standing.verdict.kind,

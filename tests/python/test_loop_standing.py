@@ -168,6 +168,19 @@ def test_a_random_draw_that_is_nearer_than_the_fit_takes_the_word_away() -> None
     assert stand(NONE, RULES, confirmed=0.5, draws=24, nearer=worse).verdict is NONE
 
 
+def test_a_name_that_is_farther_off_than_the_base_model_falls() -> None:
+    generator = np.random.default_rng(0)
+    data, near, far = (m + 0.1 * generator.standard_normal((10, 3)) for m in (0.0, 0.05, 1.0))
+    worse = compare(["c"], [data], [near], [far], np.ones(3))
+    found = stand(EFFECT, RULES, confirmed=0.5, error=worse)
+    assert found.verdict.kind == "UNCONFIRMED" and not found.stands
+    assert "but the base model is nearer to the data" in found.verdict.reason
+    better = compare(["c"], [data], [far], [near], np.ones(3))
+    assert stand(EFFECT, RULES, confirmed=0.5, error=better).verdict is EFFECT
+    # Of a word that names nothing both models are one.
+    assert stand(NONE, RULES, confirmed=0.5, error=worse).verdict is NONE
+
+
 def test_a_verdict_that_a_definition_overturns_is_none() -> None:
     other = Verdict("EFFECT", ("tilt.x",), ("tilt",), 0.001, "")
     same = Verdict("SET", ("tilt.x", "drag"), ("tilt", "drag"), 0.001, "")

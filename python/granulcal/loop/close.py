@@ -208,6 +208,7 @@ def close_loop(
         of_base=of_base,
         draws=draws,
         nearer=nearer(analysis, surrogate, found, best, measured, simulated),
+        error=fit,
         moved=elsewhere,
         trivial=trivial(analysis, surrogate, measured, recorded),
     )

@@ -147,6 +147,7 @@ def stand(
     of_base: Recentred | None = None,
     draws: int = 0,
     nearer: Improvement | None = None,
+    error: Improvement | None = None,
     moved: Sequence[Moved] = (),
     trivial: Sequence[TrivialRow] = (),
 ) -> Standing:
@@ -162,6 +163,7 @@ def stand(
         of_base: what fresh pours of the base model say of them.
         draws: random draws that were poured.
         nearer: from the best of them (before) to the fit (after), conditions to fit.
+        error: from the base model (before) to the verdict's (after), conditions to fit.
         moved: verdicts under other definitions.
         trivial: rows of the sealed conditions.
     """
@@ -176,6 +178,11 @@ def stand(
             "a random draw of the model is nearer to the data than its fit "
             f"(D² {best:.3g}, {off:.3g})"
         )
+        verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
+    if word.kind in NAMING and error is not None and error.gain_interval[1] < 0:
+        # The base model is the same with strengths of 0: a fit that is farther off is none.
+        off, base = error.total_after.square, error.total_before.square
+        why = f"the base model is nearer to the data (D² {base:.3g}, {off:.3g})"
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
     least = {"NONE": rules.name, **dict.fromkeys(NAMING, rules.adequate)}.get(word.kind, 0.0)
     pours = own if word is before else of_base
