@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop import ConditionPours, Surrogate, Thresholds, Trace
+from granulcal.errors import ObservationError
+from granulcal.loop import ConditionPours, Improvement, Surrogate, Thresholds, Trace
 from granulcal.loop.analysis import Analysis
-from granulcal.loop.check.look_again import look_again
+from granulcal.loop.check.look_again import Looked, look_again
 from granulcal.loop.check.standing import stand
 from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.forward import Forward
@@ -83,9 +84,7 @@ class Checks:
             anchors=settled.anchors,
             own=own,
             of_base=of_base,
-            error=error_of(
-                self.task, analysis.fitted, sets, there.simulated, settled.surrogate, seed
-            ),
+            error=self._error(analysis, sets, looked, seed),
         )
         word: dict[str, Any] = {
             "verdict": standing.verdict.kind,
@@ -100,3 +99,13 @@ class Checks:
             "base_p": None if of_base is None else of_base.residual_test.p,
         }
         return word, held
+
+    def _error(
+        self, analysis: Analysis, sets: dict[str, Array], looked: Looked, seed: int
+    ) -> Improvement | None:
+        """The error at the heights to fit before and after; None where too few pours are usable."""
+        pours, surrogate = looked.placed.simulated, looked.settled.surrogate
+        try:
+            return error_of(self.task, analysis.fitted, sets, pours, surrogate, seed)
+        except ObservationError:
+            return None
