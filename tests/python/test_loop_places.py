@@ -20,7 +20,6 @@ from granulcal.experiments import (
     loop_rings,
     loop_tube,
 )
-from granulcal.loop.check.prior_rounds import ROUNDS
 from granulcal.loop.close import Closed, _candidates, planned
 from granulcal.loop.effects.design import Design, Effect, normal_from_cube
 from granulcal.loop.effects.library import LibraryEffect, by_name
@@ -217,7 +216,7 @@ def test_the_columns_are_read_by_their_outline_and_their_own_errors_have_no_name
     assert asked.at_first().get("observe.front.link") == 1.5
     assert asked.places == ({"gravity.2": -9.81},)
     # What might be poured next is where the archive is, observed as the verdict is.
-    ((label, at),) = _candidates(planned(asked, 996, 0, rounds=1, draws=48))
+    ((label, at),) = _candidates(planned(asked, 996, 0, rounds=1, rules=Thresholds()))
     assert label == "gravity.2 = -9.81" and at == pytest.approx([1.0, 0.375])
     (one, *_) = asked.under(asked.definitions[3], FIT)
     assert one.reading == {"camera": 1} and one.at["observe.front.link"] == 1.5
@@ -268,9 +267,8 @@ def test_columns_in_the_centrifuge_hold_each_their_own_liquid_and_have_no_end(
     for entry in asked.library:
         if not entry.is_free:
             assert scene.with_(entry.at(scene).numbers(1.0)).get(entry.path) == entry.full
-    draws = ROUNDS * Thresholds().look
     [kind] = loop_centrifuge.poured(tmp_path)
-    assert planned(asked, kind.count, 0, rounds=1, draws=draws).pours < kind.count
+    assert planned(asked, kind.count, 0, rounds=1, rules=Thresholds()).pours < kind.count
 
 
 def test_columns_of_all_gravities_are_one_in_units_of_free_fall(tmp_path: Path) -> None:
@@ -316,8 +314,7 @@ def test_columns_of_all_gravities_are_one_in_units_of_free_fall(tmp_path: Path) 
         entry.name for entry in asked.library
     ]
     [kind] = loop_liquid.poured(tmp_path)
-    draws = ROUNDS * Thresholds().look
-    assert planned(asked, kind.count, 0, rounds=1, draws=draws).pours < kind.count
+    assert planned(asked, kind.count, 0, rounds=1, rules=Thresholds()).pours < kind.count
 
 
 def test_draws_around_a_fit_have_its_spread_and_stay_in_the_prior() -> None:
@@ -414,17 +411,16 @@ def test_a_groups_verdict_says_which_models_were_not_tested() -> None:
 
 
 def test_the_budgets_of_the_measured_studies_afford_their_libraries(tmp_path: Path) -> None:
-    draws = ROUNDS * Thresholds().look
     rings = [loop_rings.task(tmp_path, group) for group in loop_rings.GROUPS]
     drums = [loop_drum.task(tmp_path, fitted) for fitted in ((15, 45), (15,), (45,))]
     budget = [study.poured(tmp_path)[0].count for study in (loop_rings, loop_drum, loop_column)]
     mounds = [loop_mounds.task(tmp_path, group) for group in loop_mounds.GROUPS]
     of_mounds = loop_mounds.poured(tmp_path)[0].count
     for tasks, pours in ((rings, budget[0]), (drums, budget[1]), (mounds, of_mounds)):
-        plans = [planned(asked, pours, 0, draws=draws) for asked in tasks]
+        plans = [planned(asked, pours, 0, rules=Thresholds()) for asked in tasks]
         assert all(plan.pours < pours for plan in plans)
     rounds = loop_column._ROUNDS
-    plan = planned(loop_column.task(tmp_path), budget[2], 0, rounds=rounds, draws=draws)
+    plan = planned(loop_column.task(tmp_path), budget[2], 0, rounds=rounds, rules=Thresholds())
     assert plan.pours < budget[2]
 
 

@@ -252,17 +252,23 @@ def close_loop(
 
 @one_thread()
 def planned(
-    task: Task, budget: int, seed: int, pairs: int, rounds: int, rules: Thresholds
+    task: Task,
+    budget: int,
+    seed: int,
+    pairs: int = 0,
+    rounds: int = 0,
+    rules: Thresholds | None = None,
 ) -> ArchivePlan:
     """Returns the archive that a budget affords.
 
-    Kept back are the pours of `pairs` and `rounds`, and the draws that `rules` look at.
+    Kept back are the pours of `pairs` and `rounds`, and the draws that `rules` look at, if any.
 
     Raises:
         ObservationError: it affords too little, with what would be enough.
     """
     own = sum(not effect.is_free for effect in task.library)
-    kept = _needed(task, pairs, ROUNDS * rules.look) + rounds * ROUND
+    draws = 0 if rules is None else ROUNDS * rules.look
+    kept = _needed(task, pairs, draws) + rounds * ROUND
     spare = budget - kept
     # A small budget has fewer pours to share than the base model needs.
     base = max(int(_BASE_SHARE * spare), min(_LEAST_BASE, spare - _LEAST_EACH * own))
