@@ -9,8 +9,8 @@ r"""Pours of the models at their fits, again and again until the surrogate is ri
 
 A surrogate is worst where it stands at the edge of its archive, and there fits are led astray. Each
 round's pours test the anchor of the round before, which has not seen them. Both fits are held, for
-the word weighs one against the other: a gap of the verdict's model that were taken for the base's
-too would speak against a base where the surrogate is right.
+the word weighs one against the other: a gap of the verdict's model that is taken for the base's
+too speaks against a base where the surrogate is right.
 """
 
 from collections.abc import Sequence
@@ -78,9 +78,9 @@ def settle(
         of_best = _usable(analysis, {name: two.augmented for name, two in simulated.items()})
         fit, base = found.fit_of(found.best), found.base_fit
         right = confirm(surrogate, fit, of_best) if of_best else float("nan")
-        at_base = confirm(surrogate, base, of_base) if of_base else float("nan")
-        where = f"p = {right:.3g} there"
-        if fit is not base:
+        at_base, where = right, f"p = {right:.3g} there"
+        if fit is not base and of_base:
+            at_base = confirm(surrogate, base, of_base)
             where += f", p = {at_base:.3g} at the base model's fit"
         say(f"fresh pours of the verdict's model: the surrogate is right with {where}")
         is_wrong = right <= rules.confirm or at_base <= rules.confirm

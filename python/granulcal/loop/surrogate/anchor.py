@@ -19,17 +19,18 @@ their mean.
 
 What the surrogate lacks at one fit says little of a model far away. So models that are compared are
 held each by its own pours, in every round anew, and a place z of parameters and strengths has of
-the gaps the weights of ordinary kriging,
+the gaps the weights of ordinary kriging, with the same k over places and K of the fits,
 
 $$ \lambda(z) = C^{-1} k(z) + \frac{1 - 1^T C^{-1} k(z)}{1^T C^{-1} 1} C^{-1} 1, \qquad
    C = K + \eta, $$
 
 near a fit nearly its own gap, far from all of them their mean.
 
-Reference:
+References:
     Alexandrov, Dennis, Lewis and Torczon, A trust-region framework for managing the use of
     approximation models in optimization, Structural Optimization 15, 1998: a cheap model corrected
     to agree with the true one where the search stands, and again where that leads.
+    Cressie, Statistics for Spatial Data, Wiley 1993, section 3.2 (ordinary kriging).
 """
 
 from dataclasses import dataclass
