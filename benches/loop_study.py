@@ -39,6 +39,7 @@ from granulcal.loop.surrogate.baseline import fit_base
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.test.refit import fit_single
 from granulcal.loop.test.verdict import NAMING
+from granulcal.one_thread import one_thread
 from granulcal.pours.statistics import NAMES
 
 Array = NDArray[np.float64]
@@ -314,6 +315,7 @@ def _name(height: float) -> str:
     return f"{100 * height:g} cm"
 
 
+@one_thread()
 def run(options: argparse.Namespace) -> None:
     """Appends the rows that are not there yet."""
     path: Path = options.out

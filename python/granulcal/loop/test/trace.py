@@ -19,6 +19,7 @@ from granulcal.loop.test.residual_test import ResidualTest, residual_test
 from granulcal.loop.test.score import Scores, families
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.verdict import NAMING, Verdict, decide
+from granulcal.one_thread import one_thread
 from granulcal.progress import steps
 
 __all__ = ["Explanation", "Power", "Trace", "power", "trace"]
@@ -204,6 +205,7 @@ class Trace:
         }
 
 
+@one_thread()
 def trace(
     surrogate: Surrogate,
     observations: Sequence[ConditionPours],
@@ -276,6 +278,7 @@ def _residuals(local: LinearisedSurrogate, fit: Fit) -> Array:
     return (local.in_statistics(fit.residual) / spread).reshape(len(local.counts), -1)
 
 
+@one_thread()
 def power(
     surrogate: Surrogate,
     theta: ArrayLike,
