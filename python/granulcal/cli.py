@@ -79,14 +79,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command line without the program's name; returns the exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
     parser = _parser()
-    words = _flags_last(words, _commands(parser))
-    if words[:1] == ["help"] and words[1:] and words[1] in _commands(parser):
+    known = _commands(parser)
+    words = _flags_last(words, known)
+    if words[:1] == ["help"] and words[1:] and words[1] in known:
         # Only its own parser knows what a word of here takes.
         words = [*words[1:], "--help"]
     word = words[0] if words else ""
     if word in ("simulate", "generate") and elsewhere.is_asked(words):
         return _guarded(lambda: elsewhere.run(words))
-    if word not in _commands(parser):
+    if word not in known:
         with _interruptible(raises=False):
             return _native.run_cli(["granulcal", *words], describe(parser, after_help=_EPILOG))
     try:

@@ -172,14 +172,14 @@ def stand(
     if against:
         words = ", ".join(f"{one.verdict.kind} under {one.definition}" for one in against)
         verdict = _fallen("OVERTURNED", before, f"{_said(before)}, but {words}")
-    if nearer is not None and nearer.gain_interval[1] < 0:
+    if nearer is not None and nearer.is_worse:
         off, best = nearer.total_after.square, nearer.total_before.square
         why = (
             "a random draw of the model is nearer to the data than its fit "
             f"(D² {best:.3g}, {off:.3g})"
         )
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
-    if word.kind in NAMING and error is not None and error.gain_interval[1] < 0:
+    if word.kind in NAMING and error is not None and error.is_worse:
         # The base model is the same with strengths of 0: a fit that is farther off is none.
         off, base = error.total_after.square, error.total_before.square
         why = f"the base model is nearer to the data (D² {base:.3g}, {off:.3g})"

@@ -77,6 +77,11 @@ class Improvement:
         return self.gain_interval[0] > 0
 
     @property
+    def is_worse(self) -> bool:
+        """Whether the gain is below nothing at 97.5 %."""
+        return self.gain_interval[1] < 0
+
+    @property
     def is_at_floor(self) -> bool:
         """Whether nothing may be left."""
         return self.total_after.interval[0] <= 0
