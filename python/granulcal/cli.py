@@ -71,8 +71,9 @@ From a recording to a material:
 
 Exit codes: 0 done, 1 failed, 2 bad arguments or input, 3 done but some pours
 unhealthy or without grains in view, some rows of a merge missing, some frames
-of a recording lost, a recording outside the model, or a model that fails its
-check, 130 stopped."""
+of a recording lost, a recording (or an exported posterior) outside the model,
+a model that fails its check, or a loop whose verdict does not stand, 130
+stopped."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -86,7 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         words = [*words[1:], "--help"]
     word = words[0] if words else ""
     if word in ("simulate", "generate") and elsewhere.is_asked(words):
-        return _guarded(lambda: elsewhere.run(words))
+        return _guarded(lambda: elsewhere.run(words), goes_on=word == "generate")
     if word not in known:
         with _interruptible(raises=False):
             return _native.run_cli(["granulcal", *words], describe(parser, after_help=_EPILOG))
@@ -102,7 +103,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with quieted(options.quiet):
             return _run_told(options)
 
-    return _guarded(command)
+    return _guarded(command, goes_on=getattr(options, "goes_on", False))
 
 
 def _run_told(options: argparse.Namespace) -> int:
@@ -119,14 +120,18 @@ def _run_told(options: argparse.Namespace) -> int:
     return code
 
 
-def _guarded(command: Callable[[], int]) -> int:
-    """Runs a command; tells what was wrong in one line instead of a traceback."""
+def _guarded(command: Callable[[], int], *, goes_on: bool = False) -> int:
+    """Runs a command; tells what was wrong in one line instead of a traceback.
+
+    `goes_on`: given again, it goes on where it was stopped (a parser's default of that name).
+    """
     try:
         with _interruptible(), one_thread(), warnings.catch_warnings():
             warnings.showwarning = _show
             return command()
     except KeyboardInterrupt:
-        print("granulcal: stopped", file=sys.stderr)
+        told = "stopped; the same command goes on where it was" if goes_on else "stopped"
+        print(f"granulcal: {told}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         return DONE

@@ -1,3 +1,4 @@
+import importlib
 import json
 import shutil
 import subprocess
@@ -203,6 +204,30 @@ def test_a_folder_that_is_no_model_is_left_alone(small_data, tmp_path, capsys):
     assert main(["train", str(small_data.path), "-o", str(tmp_path)]) == 1
     assert "not a saved model" in capsys.readouterr().err
     assert (tmp_path / "precious.txt").read_text() == "keep"
+
+
+def test_check_tells_its_coverage_as_json(model, small_data, capfd):
+    code = main(["check", str(model), "--json"])
+    told = json.loads(capfd.readouterr().out)
+    assert code == (0 if told["calibrated"] else 3) and told["calibrated"] is (not told["failures"])
+    assert len(told["coverage"]) >= 2
+    for count in told["coverage"]:
+        assert 0 <= count["inside"] <= count["total"] and count["low"] <= count["high"]
+    assert len(told["rank_p_values"]) == len(small_data.prior.names)
+    assert 0 < told["tarp_p_value"] <= 1 and told["gain_nat"] > 0
+
+
+@pytest.mark.parametrize(("words", "goes_on"), [("calibrate", True), ("check", False)])
+def test_who_stops_a_command_is_told_whether_it_goes_on(words, goes_on, capfd, monkeypatch):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    module = importlib.import_module(f"granulcal.commands.{words}")
+    monkeypatch.setattr(module, "_run", stopped)
+    arguments = {"calibrate": ["funnel", "default", "d.png", "-o", "run"], "check": ["funnel"]}
+    assert main([words, *arguments[words]]) == 130
+    error = capfd.readouterr().err
+    assert error == f"granulcal: stopped{'; the same command goes on where it was' * goes_on}\n"
 
 
 def test_an_error_of_its_own_is_one_line(capfd, monkeypatch):

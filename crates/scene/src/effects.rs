@@ -1,7 +1,8 @@
 //! Effects that the paper's model lacks, as numbers: one file each, off by default (docs/theory/effects.md). What they
 //! do in a substep is in `effect.rs`.
 //!
-//! A number of an effect has a path like any other of a scene, for example `effects.capillary.bond`.
+//! A number of an effect has a path like any other of a scene, for example `effects.capillary.bond`. Ranges
+//! to try are in the same page, "Ranges and dimensional screens".
 
 mod adhesion;
 mod bonds;

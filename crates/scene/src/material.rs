@@ -26,7 +26,7 @@ use crate::error::SceneError;
 pub struct Material {
     /// Coulomb's coefficient of sliding friction mu_s `[-]`.
     pub sliding_friction: f64,
-    /// Rolling and torsional friction mu_r `[-]`.
+    /// Rolling friction mu_r `[-]`.
     pub rolling_friction: f64,
     /// Newton's coefficient of restitution e `[-]`.
     pub restitution: f64,

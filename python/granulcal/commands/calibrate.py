@@ -48,7 +48,7 @@ def add(commands: Any) -> None:
     add_cluster(parser, store=False)
     add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
-    parser.set_defaults(run=_run)
+    parser.set_defaults(run=_run, goes_on=True)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -55,6 +55,13 @@ def _run(options: argparse.Namespace) -> int:
         print("  not checked: too few pours to keep some aside; give some with --data")
         return UNHEALTHY
     print(calibration)
+    options.told |= {
+        "failures": list(calibration.failures),
+        "gain_nat": calibration.gain,
+        "coverage": [vars(count) for count in calibration.coverage.counts],
+        "rank_p_values": calibration.ranks.p_values.tolist(),
+        "tarp_p_value": calibration.tarp.p_value,
+    }
     if model.identifiability is not None:
         print(model.identifiability)
     if options.plots is not None:

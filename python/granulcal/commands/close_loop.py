@@ -91,7 +91,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--engine", help="another simulator in place of ours: docs/engines.md")
     add_cluster(parser)
     parser.add_argument("--json", action="store_true", help="print the verdict as JSON at the end")
-    parser.set_defaults(run=_run)
+    parser.set_defaults(run=_run, goes_on=True)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -139,7 +139,7 @@ def _add_rings(words: Any) -> None:
         help="infer the heights of N more pours and say how far they are off",
     )
     _add_common(parser, kind="rings", pours=400, heights=(0.01, 0.13))
-    parser.set_defaults(run=_with_engine(_rings))
+    parser.set_defaults(run=_with_engine(_rings), goes_on=True)
 
 
 def _add_spill(words: Any) -> None:
@@ -166,7 +166,7 @@ def _add_spill(words: Any) -> None:
         help="say from which height on each K is more probable than P (default: 0.05)",
     )
     _add_common(parser, kind="spill", pours=200, heights=(0.06, 0.3))
-    parser.set_defaults(run=_with_engine(_spill))
+    parser.set_defaults(run=_with_engine(_spill), goes_on=True)
 
 
 def _with_engine(

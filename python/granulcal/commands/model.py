@@ -56,7 +56,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
     add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="print JSON at the end")
-    parser.set_defaults(run=_run)
+    parser.set_defaults(run=_run, goes_on=True)
 
 
 def _run(options: argparse.Namespace) -> int:

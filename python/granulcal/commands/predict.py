@@ -75,7 +75,7 @@ def add(commands: Any) -> None:
     )
     add_dry_run(parser)
     parser.add_argument("--json", action="store_true", help="everything as JSON on stdout")
-    parser.set_defaults(run=_run)
+    parser.set_defaults(run=_run, goes_on=True)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -66,7 +66,7 @@ def add(commands: Any) -> None:
         help="write one HTML page of all experiments; those that have run are not run again",
     )
     paper.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
-    parser.set_defaults(run=_with_json)
+    parser.set_defaults(run=_with_json, goes_on=True)
 
 
 def _with_json(options: argparse.Namespace) -> int:

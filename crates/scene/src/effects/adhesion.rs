@@ -16,7 +16,7 @@ use super::tension::either;
 use crate::check::{non_negative, positive};
 use crate::error::SceneError;
 
-/// Dry adhesion; prior of `bond`: log-uniform over 0.003 to 0.3.
+/// Dry adhesion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Adhesion {

@@ -10,7 +10,7 @@ use super::effect::Effect;
 use crate::check::{non_negative, positive};
 use crate::error::SceneError;
 
-/// Breakable bonds between the grains of the start; prior of `bond`: log-uniform over 0.3 to 10.
+/// Breakable bonds between the grains of the start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Bonds {

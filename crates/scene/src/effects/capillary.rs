@@ -21,7 +21,7 @@ use super::tension::either;
 use crate::check::{non_negative, positive};
 use crate::error::SceneError;
 
-/// Liquid bridges; prior of `bond`: log-uniform over 0.03 to 3.
+/// Liquid bridges.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Capillary {

@@ -7,8 +7,8 @@
 //! ```
 //!
 //! The union of the spheres is a body of revolution, whose volume and inertia these integrals are, whatever the
-//! overlap; rho is such that V is the volume of the ball that the scene states. An aspect of 1 is that ball. Prior of
-//! the aspect: uniform over 1 to 1.8; couscous has about 1.2, rice 2 to 3.
+//! overlap; rho is such that V is the volume of the ball that the scene states. An aspect of 1 is that ball;
+//! couscous has about 1.2, rice 2 to 3.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

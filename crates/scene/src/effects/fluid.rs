@@ -6,7 +6,7 @@ use super::effect::Effect;
 use crate::check::non_negative;
 use crate::error::SceneError;
 
-/// A fluid; known, or a prior of its viscosity.
+/// A fluid; known, or of a viscosity to infer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Fluid {

@@ -1,9 +1,8 @@
 //! A ground unlike the grains: its coefficients as multiples of those between grain and ground that the scene states.
 //!
 //! The paper assumes a ground of the grains' own material. As ratios the effect is the same question whatever the
-//! material is: 1 is off. A soft ground is a small `restitution`. Prior: restitution uniform over 0 to 1.2 (a grain
-//! never leaves with more than it came), ln of the others normal with sd 0.7. Its coefficients by themselves, not as
-//! ratios, are the scene's `ground.material`.
+//! material is: 1 is off. A soft ground is a small `restitution`. A grain never leaves with more than
+//! it came. Its coefficients by themselves, not as ratios, are the scene's `ground.material`.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,7 @@
 //! A soft layer on the ground: a bed of springs and dampers above the hard ground. The equations are in
 //! `effect/elastic_layer.rs`.
 //!
-//! The hard ground lies below it and keeps its own coefficients: no thickness is no layer. Prior of the thickness:
-//! uniform over 0 to a radius.
+//! The hard ground lies below it and keeps its own coefficients: no thickness is no layer.
 
 use serde::{Deserialize, Serialize};
 

@@ -9,7 +9,7 @@ use super::effect::Effect;
 use crate::check::{non_negative, positive};
 use crate::error::SceneError;
 
-/// A liquid that flows by itself; known, or a prior of its permeability.
+/// A liquid that flows by itself; known, or of a permeability to infer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Liquid {

@@ -2,7 +2,7 @@
 //!
 //! The stem is an elliptic cylinder of the round one's area, its long axis along x: half axes `r sqrt(aspect)` and
 //! `r / sqrt(aspect)`. The cone goes over from that ellipse to the round rim. Both are made of flat facets. What leaves
-//! has the outlet's shape, so that a pour has a mode of order two about its axis. Prior: uniform from 1 to 1.3.
+//! has the outlet's shape, so that a pour has a mode of order two about its axis.
 
 use std::f64::consts::TAU;
 

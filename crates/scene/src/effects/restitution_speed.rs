@@ -11,7 +11,7 @@ use super::effect::Effect;
 use crate::check::{finite, positive};
 use crate::error::SceneError;
 
-/// Restitution and speed; prior of `exponent`: uniform over -0.1 to 0.25.
+/// Restitution and speed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RestitutionSpeed {

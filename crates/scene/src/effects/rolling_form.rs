@@ -6,7 +6,7 @@
 //!
 //! With v_0 = 0 it is the base model's moment, which holds a grain that does not roll; with any other nothing holds it,
 //! and a heap creeps. Source: the viscous and the constant-torque model (B and A) of Ai et al., Powder Technology 206
-//! (2011) 269, doi:10.1016/j.powtec.2010.09.030; one in the other's limit. Prior of v_0: uniform over 0 to 0.05 m/s.
+//! (2011) 269, doi:10.1016/j.powtec.2010.09.030; one in the other's limit.
 
 use serde::{Deserialize, Serialize};
 

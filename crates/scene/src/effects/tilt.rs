@@ -1,7 +1,7 @@
 //! A table that is not level: gravity, seen from the table, is turned about its axes.
 //!
 //! The funnel stands on the table and is turned with it. A pour of a tilted table lands downhill of the funnel's axis
-//! and spreads downhill; nothing in the material does that. Prior: normal with sd 1.5 degrees about either axis.
+//! and spreads downhill; nothing in the material does that.
 
 use nalgebra::{Rotation3, Vector3};
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! A table that shakes up and down for a while: in its frame gravity swings by `Gamma g sin(2 pi f (t - begin))`,
 //! g = 9.81 m/s^2 wherever the scene is.
 //!
-//! A pile slumps under it. Grains lift off above Gamma = 1. Prior of Gamma: uniform over 0 to 0.5.
+//! A pile slumps under it. Grains lift off above Gamma = 1.
 
 use std::f64::consts::TAU;
 
