@@ -112,8 +112,8 @@ def calibrate(
         summary: one paragraph that says what was done.
         notes: further sentences that a reader must know.
         command: command line that makes the page again.
-        segmentation: options of `Recording.formation` for every recording; the down-sampling is
-            matched to the scene's images unless they, or the camera's file, say otherwise.
+        segmentation: options of `Recording.formation` for every recording, over those that make
+            them like the scene's images (`Scene.reading`).
         diagnostics: names of the diagnostic statistics that the model was trained on after the 16.
 
     Raises:
@@ -123,7 +123,7 @@ def calibrate(
     if not recordings:
         raise ValueError("calibrate needs at least one recording, got none")
     require_same_scene(model, data.scene)
-    options: dict[str, Any] = {"ground_resolution": data.scene.ground_resolution}
+    options: dict[str, Any] = dict(data.scene.reading)
     options |= segmentation or {}
     formations = [recording.formation(**options) for recording in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])

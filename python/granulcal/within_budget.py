@@ -63,8 +63,7 @@ def calibrate_within(
     if not recordings:
         raise ValueError("calibrate_within needs at least one recording, got none")
     round_sizes(budget)
-    resolution = scene.ground_resolution
-    formations = [each.formation(ground_resolution=resolution) for each in recordings]
+    formations = [each.formation(**scene.reading) for each in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
     require_different(observed)
     folder = Path(out)

@@ -62,6 +62,17 @@ def test_train_writes_a_model_with_its_data(model, small_data):
     assert np.array_equal(gc.Dataset.load(model / "training.parquet").x, small_data.x)
 
 
+def test_training_on_a_part_of_a_batch_is_told(small_data, tmp_path, capfd):
+    part = tmp_path / "part"
+    shutil.copytree(small_data.path, part)
+    for file in sorted(part.glob("part-*.parquet"))[-1:]:
+        file.unlink()
+    missing = gc.Dataset.load(part).missing
+    assert missing > 0 and gc.Dataset.load(small_data.path).missing == 0
+    assert main(["train", str(part), "-o", str(tmp_path / "model"), "--dry-run"]) == 0
+    assert f"{missing} more were asked for" in capfd.readouterr().err
+
+
 def test_infer_prints_json_and_writes_files(model, recording, tmp_path, capfd):
     out, plot = tmp_path / "posterior.json", tmp_path / "pair.png"
     capfd.readouterr()

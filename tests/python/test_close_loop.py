@@ -17,6 +17,7 @@ from granulcal.loop.effects.library import FUNNEL, by_name, fingerprint
 from granulcal.loop.pours.archive import Archive, ArchivePlan
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
+from granulcal.loop.pours.parts import parts_of
 from granulcal.loop.pours.refine import further
 from granulcal.loop.pours.time_needed import time_needed
 from granulcal.loop.task import Task
@@ -284,6 +285,9 @@ def test_an_archive_of_something_else_is_refused(tmp_path: Path) -> None:
         each=4,
     )
     folder = tmp_path / "archive"
+    assert Archive(folder, plan).missing == 8
+    # As a run leaves it that is killed before its first part is begun.
+    (folder / parts_of(plan)[0].name).mkdir(parents=True)
     assert Archive(folder, plan).missing == 8
     Archive(folder, plan).fill(threads=1, say=lambda _: None, progress=False)
     assert Archive(folder, plan).missing == 0

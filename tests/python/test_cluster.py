@@ -6,6 +6,7 @@ Ray runs in processes of the tests' own: it warns, and it leaves threads behind.
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -177,6 +178,14 @@ def test_pours_one_by_one_are_those_of_threads_whoever_is_killed(tmp_path: Path)
     told = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert told.returncode == 0, told.stderr[-3000:]
     assert "1 False" in told.stdout.splitlines(), told.stdout[-2000:]
+
+
+def test_an_address_where_nobody_listens_is_refused_at_once(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    scene, prior = gc.Scene.drop(0.01, count=5), gc.Prior.default()
+    with pytest.raises(ConnectionError, match=f"no Ray cluster answers at 127.0.0.1:{port}"):
+        gc.generate(scene, prior, 2, out=tmp_path / "rows", ray=f"127.0.0.1:{port}")
 
 
 def test_pours_of_another_engine_are_not_spread(tmp_path: Path) -> None:

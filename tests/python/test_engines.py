@@ -1,4 +1,5 @@
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -174,6 +175,16 @@ def test_the_words_simulate_and_generate_take_an_engine(
     words = ["generate", str(scene), str(prior), "-n", "3", "-o", str(tmp_path / "pours")]
     assert main([*words, f"--engine={command}", "--quiet"]) == 0
     assert len(gc.Dataset.load(tmp_path / "pours")) == 3
+    capsys.readouterr()
+    more = [*words, f"--engine={command}", "--quiet", "--json", "-n", "5"]
+    assert main(more) == 0
+    told = json.loads(capsys.readouterr().out)
+    own = ["generate", str(scene), str(prior), "-n", "2", "-o", str(tmp_path / "own"), "--json"]
+    own = [sys.executable, "-m", "granulcal.cli", *own, "--quiet"]
+    ours = json.loads(subprocess.run(own, capture_output=True, text=True, check=True).stdout)
+    assert set(ours) <= set(told)
+    assert (told["rows"], told["total"], told["resumed"], told["made"]) == (5, 5, 3, 2)
+    assert told["status"] == gc.Dataset.load(tmp_path / "pours").status_counts()
 
 
 def test_the_options_that_generate_shows_are_taken_or_refused_by_name_elsewhere(

@@ -65,7 +65,7 @@ def words(text: str, name: str, count: int) -> list[float]:
 
 def test_lammps_has_the_rolling_ratio_and_the_torsional_length(scene: gc.Scene) -> None:
     text = ENGINES["lammps"].material(Setup.of(scene))
-    pair, wall = text.splitlines()[2:4]
+    pair, wall = text.splitlines()[3:5]
     assert words(pair, "rolling sds", 3)[2] == words(wall, "rolling sds", 3)[2] == 0.12
     assert words(pair, "twisting sds", 3)[2] == pytest.approx(0.02 * RADIUS / 2)
     assert words(wall, "twisting sds", 3)[2] == pytest.approx(0.02 * RADIUS)
@@ -360,7 +360,6 @@ def test_older_draws_are_removed_and_what_others_wrote_is_not(
     write("lammps", 2)
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {
-        "mode.xml",
         "mode.in",
         "draw-mine.xml",
         "draw-000.in",

@@ -152,12 +152,13 @@ def test_recordings_are_asked_whether_they_can_be_of_the_scene(
         again = Path(shutil.copy(recorded[0], tmp_path / "again.png"))
         shutil.copy(recorded[0].parent / "camera.toml", tmp_path)
         task_of(scene, [*recorded, again]).require_readable()
-    # A few grains far away make the formation wider than the scene's field; the volume fits.
-    camera = gc.Camera.overhead(height=0.6, field_width=0.8, pixels=400)
-    places = np.stack(np.meshgrid(*[np.linspace(-0.3, 0.3, 8)] * 2), axis=-1).reshape(-1, 2)
+    # A grain higher than the scene's can come to lie; the volume fits.
+    camera = gc.Camera.overhead(height=0.6, field_width=0.4, pixels=400)
+    places = np.stack(np.meshgrid(*[np.linspace(-0.1, 0.1, 8)] * 2), axis=-1).reshape(-1, 2)
     spheres = np.c_[places, np.full(64, 2e-3)]
-    image, toml = camera.record(spheres, np.full(64, 2e-3), tmp_path / "wide")
-    with pytest.raises(ObservationError, match=r"extent .*no formation of the scene under 'here'"):
+    spheres[:8, 2] = 0.12
+    image, toml = camera.record(spheres, np.full(64, 2e-3), tmp_path / "high")
+    with pytest.raises(ObservationError, match=r"height .*no formation of the scene under 'here'"):
         task_of(scene, [Path(image)], camera=Path(toml), averaged=True).require_readable()
     # Half of the grains beyond the image's edge are told.
     pour = gc.simulate(scene, seed=7)

@@ -51,6 +51,24 @@ def test_tilt_and_noise_are_undone(pour, camera, tmp_path, tilt):
     assert recording.statistics()["max_z"] == pytest.approx(expected["max_z"], abs=3 * 3e-4)
 
 
+def test_what_the_scenes_images_do_not_show_is_cut_off(pour, tmp_path):
+    """A grain that has rolled farther than the scene's camera sees is in no simulated image."""
+    scene = pour.scene.with_({"camera.field_width": 0.4, "camera.pixels": 400})
+    positions = np.vstack([pour.positions, [[0.3, 0.0, pour.radii[0]]]])
+    radii = np.append(pour.radii, pour.radii[0])
+    seen = {}
+    for name, width in (("as the scene", 0.4), ("wide", 0.8)):
+        camera = gc.Camera.overhead(height=0.4, field_width=width, pixels=int(1000 * width))
+        image, toml = camera.record(positions, radii, tmp_path / name)
+        seen[name] = gc.Recording.open(image, camera=toml)
+    assert seen["wide"].formation(border_px=0).statistics()["max_r"] > 0.28
+    own, wide = (each.formation(**scene.reading).statistics() for each in seen.values())
+    for name in ("max_r", "sd_x", "sd_y", "mean_r"):
+        assert wide[name] == pytest.approx(own[name], rel=0.03), name
+    with pytest.raises(ValueError, match="field_width"):
+        seen["wide"].formation(field_width=-1.0)
+
+
 def test_segmentation_options_are_honoured(pour, camera, tmp_path):
     image, toml = camera.record(pour.positions, pour.radii, tmp_path)
     recording = gc.Recording.open(image, camera=toml)

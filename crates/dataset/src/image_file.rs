@@ -59,7 +59,12 @@ pub(crate) fn depth(bytes: &[u8], limit: u64) -> Result<DepthFrame, Unreadable> 
 pub(crate) fn colour(bytes: &[u8], limit: u64) -> Result<ColourImage, Unreadable> {
     let image = match decode(bytes, limit)? {
         image @ (DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_)) => image.into_rgb8(),
-        other => return Err(unfit(&other, "8-bit colour (Rgb8)")),
+        other => {
+            return Err(unfit(
+                &other,
+                "16-bit grey for a depth, 8-bit colour (Rgb8) for a colour image",
+            ));
+        }
     };
     let (width, height) = (image.width() as usize, image.height() as usize);
     ColourImage::new(width, height, image.into_raw())

@@ -94,7 +94,7 @@ pub use observer::{
     Observed, ObservedStatistic, Observer, POLL_INTERVAL, Series, observed_statistics,
 };
 pub use pictures::{Pictures, write_mask, write_pictures};
-pub use plausible::Limits;
+pub use plausible::{LEAST_SHOWN, Limits};
 pub use readable::{plain, readable};
 pub use recording::{FRAMES, Folder, Frame, ReadOptions, Recording, Source, measured_data};
 pub use room::Room;

@@ -7,7 +7,7 @@
 use granulcal_dem::Simulation;
 use granulcal_features::{Formation, OtherHeap};
 use granulcal_numbers::short;
-use granulcal_scene::{Prior, Scene};
+use granulcal_scene::{Mask, Prior, Scene};
 
 use crate::{DatasetError, Room};
 
@@ -24,8 +24,23 @@ const LEAST_HEIGHT: f64 = 0.5;
 /// none out of view: of 60 pours of the default prior each that had came within 0.06 of it, or held less than 0.05.
 const WITHIN: f64 = 0.2;
 const LEFT_OVER: f64 = 0.2;
+/// Grains come to the edge if one is nearer to it than that, over half the image `[-]`.
+const AT_EDGE: f64 = 0.03;
 /// Share of the image that carries data, below which that is said: depth cameras lose some in shadows.
 const SEEN: f64 = 0.7;
+/// Share of the formation's outline beyond which nothing is seen, above which that is said. A stereo camera's shadows at
+/// its foot stay below.
+const HIDDEN: f64 = 0.1;
+/// Share of the scene's field of view that a recording shows, at least, where grains come to its edge.
+pub const LEAST_SHOWN: f64 = 0.95;
+/// Factor between the scene's threshold of height and the recording's, above which that is said.
+const THRESHOLD: f64 = 1.25;
+/// Standard deviation of the ground about its plane, over a grain's diameter and in metres, above both of which it is
+/// said to be uneven.
+const UNEVEN: f64 = 0.5;
+const UNEVEN_FLOOR: f64 = 1.5e-3;
+/// Sentences of one kind at most.
+const MOST_ALIKE: usize = 3;
 /// Factor on half the diagonal of the field of view.
 const EXTENT_MARGIN: f64 = 1.5;
 /// Grain diameters that the ground's residual may have as standard deviation, and metres that are always allowed.
@@ -48,6 +63,10 @@ pub struct Limits {
     pub least_volume: f64,
     /// Diameter of a typical grain `[m]`.
     pub diameter: f64,
+    /// Side of the square of ground that its images show `[m]`.
+    pub field: f64,
+    /// Height from which its images' pixels count as grain `[m]`; none where a colour decides.
+    pub threshold: Option<f64>,
     /// Greatest distance of most points from their middle `[m]`.
     pub extent: f64,
     /// Greatest standard deviation of the ground about its plane `[m]`.
@@ -77,6 +96,8 @@ impl Limits {
             volume: a.volume.max(b.volume),
             least_volume: a.least_volume.min(b.least_volume),
             diameter: a.diameter.max(b.diameter),
+            field: a.field.max(b.field),
+            threshold: a.threshold,
             extent: a.extent.max(b.extent),
             ground_sd: a.ground_sd.max(b.ground_sd),
         }))
@@ -96,6 +117,8 @@ impl Limits {
             volume: VOLUME_MARGIN * grains,
             least_volume: all_seen,
             diameter: scene.grains.diameter,
+            field,
+            threshold: (scene.camera.mask == Mask::Height).then_some(scene.camera.height_threshold),
             extent: EXTENT_MARGIN * field * 0.5_f64.sqrt(),
             ground_sd: (GROUND_DIAMETERS * scene.grains.diameter).max(GROUND_FLOOR),
         })
@@ -137,7 +160,8 @@ impl Limits {
         let hint = ": is the unit of the depths right?";
         require("the height of its highest point", "m", top, self.least_height, hint);
         let is_left_over = formation.volume < LEFT_OVER * self.least_volume;
-        if formation.margin() > WITHIN && !is_left_over {
+        let is_whole = formation.margin() > WITHIN && formation.hidden_share() < HIDDEN;
+        if is_whole && !is_left_over {
             let (volume, least) = (litres * formation.volume, litres * self.least_volume);
             let hint = ": are there as many grains, as wide as the scene's?";
             require("the formation's volume, all of it in view,", "l", volume, least, hint);
@@ -161,17 +185,58 @@ impl Limits {
                  never there"
             ));
         }
+        let hidden = formation.hidden_share();
+        if hidden >= HIDDEN && !formation.is_cut_off() {
+            found.push(format!(
+                "at {:.0} % of the formation's outline nothing is seen of what goes on there (no data, a border, or above \
+                 max_height): its statistics are those of what is left",
+                100.0 * hidden
+            ));
+        }
+        let shown = formation.shown.unwrap_or(1.0);
+        if shown < LEAST_SHOWN && formation.margin() < AT_EDGE {
+            found.push(format!(
+                "it shows {:.0} % of the {} m x {} m of ground that the scene's images show, and grains come to its edge: \
+                 those that have rolled on are missing",
+                100.0 * shown,
+                short(self.field),
+                short(self.field)
+            ));
+        }
+        if let Some(threshold) = self.threshold {
+            let ratio = formation.threshold / threshold;
+            if !(1.0 / THRESHOLD..=THRESHOLD).contains(&ratio) {
+                found.push(format!(
+                    "pixels count as grain from {} mm on, in the scene's images from {} mm on: the edge of a formation and \
+                     single layers differ by that; say height_threshold in both, or average more frames",
+                    short(1e3 * formation.threshold),
+                    short(1e3 * threshold)
+                ));
+            }
+        }
+        if formation.ground_sd > (UNEVEN * self.diameter).max(UNEVEN_FLOOR) {
+            found.push(format!(
+                "the ground deviates from a plane by {} mm (standard deviation), grains are {} mm wide: is it bent, or of \
+                 two levels?",
+                short(1e3 * formation.ground_sd),
+                short(1e3 * self.diameter)
+            ));
+        }
         let seen = formation.seen_share();
         if seen < SEEN {
             found.push(format!("only {:.0} % of the image carries data", 100.0 * seen));
         }
-        for OtherHeap { volume, height } in formation.other_heaps(self.diameter) {
+        let others = formation.other_heaps(self.diameter);
+        for OtherHeap { volume, height } in others.iter().take(MOST_ALIKE) {
             found.push(format!(
                 "{} ml, {} mm high, stand apart from the formation and are taken for grains: if they are none, \
                  take them away or out of the image",
                 short(1e6 * volume),
                 short(1e3 * height)
             ));
+        }
+        if let more @ 1.. = others.len().saturating_sub(MOST_ALIKE) {
+            found.push(format!("{more} more stand apart from it like these"));
         }
         found
     }
@@ -224,13 +289,34 @@ mod tests {
         assert!(small.iter().any(|reason| reason.contains("unit of the depths")), "{small:?}");
         // Leftovers of a pour that has rolled out of view are a formation of the scene.
         assert_eq!(limits.violations(&cone(8e-3, 0.015)), Vec::<String>::new());
+        let of_threshold = limits.doubts(&cone(0.03, 0.06));
+        assert!(of_threshold.len() == 1 && of_threshold[0].contains("height_threshold"));
+        let limits = Limits { threshold: None, ..limits };
         assert!(limits.doubts(&cone(0.03, 0.06)).is_empty());
+        let doubt = |formation: &Formation| limits.doubts(formation).join("; ");
+        let seen = cone(0.03, 0.06);
+        let mut heights = seen.heights.clone();
+        // Of 120 columns those from the middle on are not seen.
+        let blind = |pixel: &usize| pixel % 120 >= 60;
+        (0..heights.len()).filter(blind).for_each(|pixel| heights[pixel] = None);
+        let mask = (0..heights.len()).map(|pixel| seen.mask[pixel] && !blind(&pixel)).collect();
+        let half = Formation { mask, heights, ..seen.clone() };
+        assert!(doubt(&half).contains("of the formation's outline nothing is seen"));
+        let uneven = Formation { ground_sd: 3e-3, ..seen.clone() };
+        assert!(doubt(&uneven).contains("of two levels?"), "{}", doubt(&uneven));
+        // It shows less than the scene's images, which matters where grains come to its edge.
+        let mut mask = seen.mask.clone();
+        mask[0] = true;
+        let small = Formation { shown: Some(0.8), ..seen.clone() };
+        let at_edge = Formation { mask, ..small.clone() };
+        assert!(doubt(&small).is_empty() && doubt(&at_edge).contains("those that have rolled on"));
         // On a bed of some 10,000 grains it may be as small as it likes.
         let bed = Bed { radius: 0.1, height: 0.03, spacing: 4.5e-3, jitter: 0.0, settle: 0.3 };
         let mut on_bed = Scene { bed: Some(bed), ..Scene::drop(0.1) };
         on_bed.camera.projection = Projection::Orthographic;
         (on_bed.camera.pixels, on_bed.camera.downsample) = (200, 1);
         let limits = Limits::of(&on_bed, &Prior::default()).unwrap().unwrap();
+        let limits = Limits { threshold: None, ..limits };
         assert_eq!(limits.violations(&cone(0.02, 0.04)), Vec::<String>::new());
         assert!(limits.doubts(&cone(0.02, 0.04)).is_empty());
     }

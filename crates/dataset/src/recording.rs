@@ -55,7 +55,8 @@ pub struct Recording {
     pub lost: Option<Lost>,
     /// What is damaged, a line each.
     pub damage: Vec<String>,
-    /// That its frames are not of one formation at rest, if they do not look so.
+    /// That its frames are not of one formation at rest, if they do not look so, and what of its own lens and unit the
+    /// camera's file contradicts.
     pub unlike: Option<String>,
     /// Metres per count of a depth image.
     pub depth_unit: Option<f64>,

@@ -107,8 +107,20 @@ fn free_memory() -> Option<f64> {
     let number = |name: &str| -> Option<f64> {
         fs::read_to_string(format!("/sys/fs/cgroup/{name}")).ok()?.trim().parse().ok()
     };
-    let of_group = number("memory.max").map(|most| most - number("memory.current").unwrap_or(0.0));
+    let used = || {
+        let stat = fs::read_to_string("/sys/fs/cgroup/memory.stat").unwrap_or_default();
+        number("memory.current").unwrap_or(0.0) - reclaimable(&stat)
+    };
+    let of_group = number("memory.max").map(|most| most - used());
     Some(of_group.map_or(of_system, |of_group| of_system.min(of_group)))
+}
+
+/// Bytes of pages of files among what a group uses, which the system takes back when memory is asked for.
+fn reclaimable(stat: &str) -> f64 {
+    let of = |name: &str| -> Option<f64> {
+        stat.lines().find_map(|line| line.strip_prefix(name))?.trim().parse().ok()
+    };
+    ["inactive_file ", "active_file "].iter().filter_map(|name| of(name)).sum()
 }
 
 /// Free bytes of the file system in which `folder` is, or will be.
@@ -128,6 +140,13 @@ fn free_disk(_: &Path) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pages_of_files_are_taken_back() {
+        let stat = "anon 4096\nfile 9000\nactive_file 1000\ninactive_file 500\nshmem 3\n";
+        assert_eq!(reclaimable(stat), 1500.0);
+        assert_eq!(reclaimable(""), 0.0);
+    }
 
     #[test]
     fn what_cannot_be_is_refused_before_it_is_begun() {

@@ -123,9 +123,10 @@ pub enum FeatureError {
     },
     /// No pixel was taken for a grain.
     #[error(
-        "none of {valid} valid pixels belongs to a grain (highest is {} m, threshold {} m)",
+        "none of {valid} valid pixels belongs to a grain (highest is {} m, threshold {} m){}",
         General(*highest),
-        General(*threshold)
+        General(*threshold),
+        too_high(*above)
     )]
     EmptyMask {
         /// Valid pixels.
@@ -134,6 +135,8 @@ pub enum FeatureError {
         highest: f64,
         /// Height above which a pixel counts as grain `[m]`.
         threshold: f64,
+        /// Pixels above `max_height`, which are none of them.
+        above: usize,
     },
     /// Segmentation by colour was half asked for.
     #[error(
@@ -160,6 +163,16 @@ pub enum FeatureError {
         /// The extent needed `[m]`.
         min: f64,
     },
+}
+
+/// What is said of pixels above the greatest height.
+fn too_high(count: usize) -> String {
+    match count {
+        0 => String::new(),
+        count => format!(
+            "; {count} more are above max_height: has another surface been taken for the ground?"
+        ),
+    }
 }
 
 /// Refuses the first value of `values` that is not finite.

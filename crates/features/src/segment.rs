@@ -6,6 +6,7 @@
 
 mod component;
 mod edge;
+mod field;
 mod flying;
 mod formation;
 mod levelled;
@@ -107,7 +108,17 @@ pub fn level_depth(
     } else {
         segmentation.factor(1.0, side)
     };
-    cloud(n)?.level(segmentation, grains(n)?.as_deref(), up)
+    let levelled = cloud(n)?.level(segmentation, grains(n)?.as_deref(), up)?;
+    let along = camera.camera_from_world.inverse_transform_vector(&Vector3::x());
+    Ok(in_field(levelled, segmentation, &along))
+}
+
+/// What of it lies in the field of view that is asked for; columns of the image go `along`.
+fn in_field(levelled: Levelled, segmentation: &Segmentation, along: &Vector3<f64>) -> Levelled {
+    match segmentation.field_width {
+        Some(width) => levelled.within(width, along),
+        None => levelled,
+    }
 }
 
 /// The points of a depth image down-sampled by `n`.
@@ -153,7 +164,8 @@ pub fn level_height_map(
         let point = small.point(u, v);
         (inside(u, v) && point.z.is_finite()).then_some(point)
     });
-    cloud.level(segmentation, None, |fit| fit)
+    let levelled = cloud.level(segmentation, None, |fit| fit)?;
+    Ok(in_field(levelled, segmentation, &Vector3::x()))
 }
 
 /// The points of a noise-free image that lie above `threshold` `[m]`, in the world, not centred.
@@ -188,7 +200,7 @@ pub fn grain_points(
         return Err(FeatureError::NoValidDepth { pixels: image.depth.len(), got: 0, min: 1 });
     }
     if points.is_empty() {
-        return Err(FeatureError::EmptyMask { valid, highest, threshold });
+        return Err(FeatureError::EmptyMask { valid, highest, threshold, above: 0 });
     }
     Ok(points)
 }

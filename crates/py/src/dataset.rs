@@ -43,6 +43,12 @@ impl Dataset {
         self.inner.unverified.len()
     }
 
+    /// Rows that are missing of those asked for.
+    #[getter]
+    fn missing(&self) -> u64 {
+        self.inner.missing()
+    }
+
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.inner.write(&path)).map_err(error::dataset)
     }

@@ -36,8 +36,7 @@ impl Scene {
         judge: fn(&Limits, &Formation) -> Vec<String>,
     ) -> PyResult<Vec<String>> {
         let prior = Prior::from_toml(prior_toml).map_err(error::dem)?;
-        let mut own = recording.inner.segmentation.clone();
-        own.ground_resolution = Some(self.inner.camera.ground_resolution());
+        let own = recording.inner.segmentation.as_seen_by(&self.inner.camera);
         let settings = segmentation::changed(&own, settings)?;
         let found = py.detach(|| {
             let Some(limits) = Limits::of(&self.inner, &prior)? else { return Ok(Vec::new()) };

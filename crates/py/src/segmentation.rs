@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// Every keyword, in the order of the page.
-const KEYWORDS: &str = "height_threshold, threshold_floor, border_px, downsample, ground_resolution, inlier_distance, \
+const KEYWORDS: &str = "height_threshold, threshold_floor, border_px, downsample, ground_resolution, field_width, inlier_distance, \
                         max_tilt_deg, flying_deg, max_height, min_component_px, plane_seed";
 
 /// A recording's own segmentation with what the keywords change; what is None stays.
@@ -20,6 +20,14 @@ pub(crate) fn changed(
 ) -> PyResult<Segmentation> {
     let mut settings = own.clone();
     let (mut threshold, mut floor) = (None, None);
+    let is_given = |keyword: &str| -> PyResult<bool> {
+        let value = keywords.map(|all| all.get_item(keyword)).transpose()?.flatten();
+        Ok(value.is_some_and(|value| !value.is_none()))
+    };
+    // What a pixel shall be wide on the ground is no longer what the camera's file makes of it.
+    if is_given("ground_resolution")? {
+        settings.downsample = None;
+    }
     for (keyword, value) in keywords.into_iter().flatten() {
         let keyword: String = keyword.extract()?;
         if value.is_none() {
@@ -38,6 +46,7 @@ pub(crate) fn changed(
             "border_px" => settings.border_px = whole()?,
             "downsample" => settings.downsample = Some(whole()?),
             "ground_resolution" => settings.ground_resolution = Some(real()?),
+            "field_width" => settings.field_width = Some(real()?),
             "inlier_distance" => settings.inlier_distance = Some(real()?),
             "max_tilt_deg" => settings.max_tilt_deg = real()?,
             "flying_deg" => settings.flying_deg = real()?,

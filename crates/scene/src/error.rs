@@ -152,6 +152,16 @@ pub enum SceneError {
         /// What the scene says.
         source: Box<SceneError>,
     },
+    /// Values that the prior draws together have no place in the scene.
+    #[error(
+        "row {row} of the prior's draws does not fit the scene: its values, each allowed by itself, do not go together"
+    )]
+    DrawDoesNotFit {
+        /// Index of the row.
+        row: u64,
+        /// What the scene says.
+        source: Box<SceneError>,
+    },
     /// A sensor that the camera cannot have.
     #[error(
         "camera.sensor of kind stereo needs camera.projection = \"pinhole\", got \"orthographic\""

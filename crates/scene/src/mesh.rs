@@ -175,6 +175,22 @@ mod tests {
     }
 
     #[test]
+    fn a_file_that_is_known_by_its_hash_may_lie_elsewhere() {
+        let text = |place: &str, hash: &str| {
+            format!("[shape]\nfile = \"{place}/vessel.stl\"\nunit = 0.001\nhash = \"{hash}\"\n")
+        };
+        let differ = |one: String, other: String| {
+            let [one, other] = [one, other].map(|text| text.parse::<toml::Table>().unwrap());
+            crate::first_difference("", Some(&one.into()), Some(&other.into())).map(|found| found.0)
+        };
+        assert_eq!(differ(text("/here", "a1"), text("/there", "a1")), None);
+        let other = differ(text("/here", "a1"), text("/there", "b2"));
+        assert!(other.is_some_and(|path| path.starts_with("shape.")));
+        let unknown = |place: &str| format!("[shape]\nfile = \"{place}/vessel.stl\"\n");
+        assert_eq!(differ(unknown("a"), unknown("b")), Some("shape.file".to_owned()));
+    }
+
+    #[test]
     fn soup_is_welded_and_slivers_are_dropped() {
         let soup: Vec<[f64; 3]> =
             FACES.iter().flat_map(|f| f.map(|v| CORNERS[v as usize])).collect();

@@ -28,6 +28,8 @@ pub use parameter::{Keys, Parameter};
 
 /// Rows of a batch whose draws are checked before its first pour, at most.
 const MOST_CHECKED: u64 = 1 << 20;
+/// Rows whose values are tried together, at most: each takes a tenth of a millisecond.
+const MOST_CHECKED_TOGETHER: u64 = 1 << 14;
 
 /// Independent parameters, each named by its path in the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,23 +119,34 @@ impl Prior {
         Ok(())
     }
 
-    /// Checks the values that the first `rows` rows of a seed draw where [`Self::check`] cannot tell: from a normal that is
-    /// not cut off.
+    /// Checks what the first `rows` rows of a seed draw where [`Self::check`] cannot tell: values of a normal that is not cut
+    /// off, and numbers of the scene that hang together, such as a diameter and a spacing.
     ///
     /// # Errors
-    /// [`SceneError::PriorDoesNotFit`] names the first parameter and value that does not fit.
+    /// [`SceneError::PriorDoesNotFit`] names the first parameter and value that does not fit,
+    /// [`SceneError::DrawDoesNotFit`] the first row whose values do not fit together.
     pub fn check_draws(&self, scene: &Scene, seed: u64, rows: u64) -> Result<(), SceneError> {
         let unbounded: Vec<_> = (0..self.parameters.len())
             .filter(|&number| self.parameters[number].distribution.is_unbounded())
             .collect();
-        let rows = if unbounded.is_empty() { 0 } else { rows.min(MOST_CHECKED) };
-        for row in 0..rows {
+        // A material's numbers bound each other nowhere.
+        let is_of_scene = |&n: &usize| !plain(&self.parameters[n].path).starts_with("material.");
+        let together = self.free().iter().filter(|number| is_of_scene(number)).count() > 1;
+        let together = if together { rows.min(MOST_CHECKED_TOGETHER) } else { 0 };
+        let alone = if unbounded.is_empty() { 0 } else { rows.min(MOST_CHECKED) };
+        for row in 0..alone.max(together) {
             let values = self.sample(seed, row);
-            for &number in &unbounded {
+            for &number in unbounded.iter().filter(|_| row < alone) {
                 let (path, value) = (&self.parameters[number].path, values[number]);
                 scene.with(path, value).map_err(|source| SceneError::PriorDoesNotFit {
                     parameter: path.clone(),
                     value,
+                    source: Box::new(source),
+                })?;
+            }
+            if row < together {
+                self.apply(scene, &values).map_err(|source| SceneError::DrawDoesNotFit {
+                    row,
                     source: Box::new(source),
                 })?;
             }
@@ -225,6 +238,24 @@ mod tests {
         );
         let cut = Prior::from_toml(&text("\nlow = 0.0")).unwrap();
         cut.check_draws(&scene, 0, 2000).unwrap();
+    }
+
+    #[test]
+    fn numbers_that_hang_together_are_checked_row_by_row() {
+        let text = |low: f64| {
+            format!(
+                "[[parameter]]\npath = \"grains.diameter\"\ndistribution = \"uniform\"\nlow = 0.003\nhigh = 0.006\n\
+                 [[parameter]]\npath = \"start.spacing\"\ndistribution = \"uniform\"\nlow = {low}\nhigh = 0.02\n"
+            )
+        };
+        let mut scene = Scene::funnel(0.12);
+        scene.set(&[("start.spacing", 0.01), ("start.jitter", 1e-5)]).unwrap();
+        let prior = Prior::from_toml(&text(0.0045)).unwrap();
+        let error = prior.check_draws(&scene, 0, 2000).unwrap_err();
+        let SceneError::DrawDoesNotFit { row, .. } = error else { panic!("{error}") };
+        assert!(prior.apply(&scene, &prior.sample(0, row)).is_err());
+        assert!((0..row).all(|row| prior.apply(&scene, &prior.sample(0, row)).is_ok()));
+        Prior::from_toml(&text(0.0065)).unwrap().check_draws(&scene, 0, 2000).unwrap();
     }
 
     #[test]

@@ -5,12 +5,16 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from granulcal.commands.counts import pour_count, seed_number, thread_count
+from granulcal.commands.counts import seed_number, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import DONE, UNHEALTHY
+from granulcal.commands.numbers import at_least, positive, probability
+from granulcal.commands.setting import require_apart, setting
 from granulcal.paths import READS, writes
 
 if TYPE_CHECKING:
+    from granulcal.design.posterior_file import PosteriorDraws
+    from granulcal.design.ring import Ring
     from granulcal.design.ring_model import RingModel
     from granulcal.pours.left_out import LeftOut
 
@@ -35,7 +39,8 @@ observe radius[5] and radius[50].
 Written to -o: plan.csv and plan.json (height with its 90 % interval, expected radii with the spread
 between pours), plan.png (all pours simulated one after another). A ring beyond the heights of the
 training is refused unless --extrapolate, radii that no height gives together always.
-Exit code 3: pours are unhealthy or jam the plan, or the posterior is outside its model.
+Exit code 3: pours are unhealthy, jam the plan or do not come to rest in it, the model fails its own
+check, or the posterior is outside its model.
 """
 _SPILL = """\
 Find the probability that a pour spills grains, against the height of the funnel.
@@ -64,15 +69,20 @@ def add(commands: Any) -> None:
 
 
 def _add_common(
-    parser: argparse.ArgumentParser, *, kind: str, pours: int, heights: tuple[float, ...]
+    parser: argparse.ArgumentParser,
+    *,
+    kind: str,
+    pours: int,
+    fewest: int,
+    heights: tuple[float, ...],
 ) -> None:
     parser.add_argument(
         "--set",
         action="append",
         default=[],
-        type=_assignment,
-        metavar="PATH=VALUE",
-        help="another number of the scene, as material.restitution=0.5; may be repeated",
+        type=setting,
+        metavar="PATH=NUMBER",
+        help="another number of the scene, as material.restitution=0.5, and none that --posterior has; may be repeated",
     )
     parser.add_argument("--posterior", type=READS, help="JSON of `infer -o` or `calibrate`")
     parser.add_argument(
@@ -84,7 +94,10 @@ def _add_common(
         help=f"heights of the funnel's tip in metres (default: {heights[0]:g} {heights[1]:g})",
     )
     parser.add_argument(
-        "--pours", type=pour_count, default=pours, help=f"how many (default: {pours})"
+        "--pours",
+        type=at_least(fewest),
+        default=pours,
+        help=f"how many, at least {fewest} (default: {pours})",
     )
     parser.add_argument(
         "-o", "--out", type=writes(kind), required=True, help="folder; holds the pours"
@@ -125,7 +138,7 @@ def _add_rings(words: Any) -> None:
     )
     parser.add_argument(
         "--tolerance",
-        type=float,
+        type=positive,
         default=0.1,
         help="how far a radius may be off, over the outer radius (default: 0.1)",
     )
@@ -134,11 +147,11 @@ def _add_rings(words: Any) -> None:
     )
     parser.add_argument(
         "--held-out",
-        type=int,
+        type=at_least(2),
         metavar="N",
-        help="infer the heights of N more pours and say how far they are off",
+        help="infer the heights of N more pours, at least 2, and say how far they are off",
     )
-    _add_common(parser, kind="rings", pours=400, heights=(0.01, 0.13))
+    _add_common(parser, kind="rings", pours=400, fewest=50, heights=(0.01, 0.13))
     parser.set_defaults(run=_with_engine(_rings), goes_on=True)
 
 
@@ -160,12 +173,12 @@ def _add_spill(words: Any) -> None:
     )
     parser.add_argument(
         "--at-most",
-        type=float,
+        type=probability,
         default=0.05,
         metavar="P",
         help="say from which height on each K is more probable than P (default: 0.05)",
     )
-    _add_common(parser, kind="spill", pours=200, heights=(0.06, 0.3))
+    _add_common(parser, kind="spill", pours=200, fewest=20, heights=(0.06, 0.3))
     parser.set_defaults(run=_with_engine(_spill), goes_on=True)
 
 
@@ -178,26 +191,47 @@ def _with_engine(
         from granulcal.engines import engine_named, pouring_with
 
         with pouring_with(None if options.engine is None else engine_named(options.engine)):
-            if options.dry_run:
-                from granulcal.design.ring_model import height_prior
-
-                prior = height_prior(tuple(options.heights))
-                return say_how_long(options, _scene(options), prior, options.pours)
-            return command(options)
+            return _dry_run(options) if options.dry_run else command(options)
 
     return run
 
 
-def _rings(options: argparse.Namespace) -> int:
-    from granulcal.design.pattern import simulate_plan
-    from granulcal.design.picture import plan_picture
+def _dry_run(options: argparse.Namespace) -> int:
+    from granulcal.design.ring_model import RingModel, height_prior
+
+    if options.scene.is_dir() and options.word == "rings":
+        # A trained model pours what is held out, and the plan.
+        _require_no_scene(options)
+        model, pours = RingModel.load(options.scene), len(_wanted(options))
+        pours += options.held_out or 0
+        return say_how_long(options, model.scene, model.bayes.prior, pours)
+    scene = _scene(options)
+    if (draws := _draws(options)) is not None:
+        scene = draws.at_mode(scene)
+    return say_how_long(options, scene, height_prior(tuple(options.heights)), options.pours)
+
+
+def _wanted(options: argparse.Namespace) -> "list[Ring]":
+    """Returns the rings and piles that are asked for.
+
+    Raises:
+        ValueError: nothing is, and no pour is held out either.
+    """
     from granulcal.design.ring import Ring
-    from granulcal.design.rings import design_rings
 
     rings = [Ring(outer=outer, inner=inner) for inner, outer in options.ring]
     rings += [Ring(outer=outer) for outer in options.pile]
     if not rings and options.held_out is None:
         raise ValueError("nothing is wanted: give --ring INNER OUTER, --pile OUTER or --held-out N")
+    return rings
+
+
+def _rings(options: argparse.Namespace) -> int:
+    from granulcal.design.pattern import simulate_plan
+    from granulcal.design.picture import plan_picture
+    from granulcal.design.rings import design_rings
+
+    rings = _wanted(options)
     model, is_inside = _ring_model(options)
     print(model, file=sys.stderr if options.json else sys.stdout)
     unusable = model.unusable
@@ -209,6 +243,9 @@ def _rings(options: argparse.Namespace) -> int:
         print(held_out, file=sys.stderr if options.json else sys.stdout)
         unusable += held_out.unusable
     code = _code(unusable, is_inside)
+    if model.fails_its_check:
+        print("warning: the model of the heights fails its own check", file=sys.stderr)
+        code = UNHEALTHY
     if not rings:
         return code
     plan = design_rings(model, rings, tolerance=options.tolerance, extrapolate=options.extrapolate)
@@ -236,18 +273,15 @@ def _code(unusable: "LeftOut", is_inside: bool) -> int:
 def _ring_model(options: argparse.Namespace) -> "tuple[RingModel, bool]":
     """Returns the model, and whether the posterior of its material is inside of its own."""
     from granulcal.design.pattern import require_one_size
-    from granulcal.design.posterior_file import PosteriorDraws
-    from granulcal.design.ring_model import HEIGHT, RingModel
+    from granulcal.design.ring_model import RingModel
 
     if options.scene.is_dir():
-        if options.set or options.posterior is not None:
-            raise ValueError("--set and --posterior need a scene; a trained model has its material")
+        _require_no_scene(options)
         return RingModel.load(options.scene), True
     scene, is_inside = _scene(options), True
     if len(options.ring) + len(options.pile) > 1:
         require_one_size(scene)
-    if options.posterior is not None:
-        draws = PosteriorDraws.load(options.posterior).without(HEIGHT)
+    if (draws := _draws(options)) is not None:
         scene, is_inside = draws.at_mode(scene), draws.is_inside
     model = RingModel.train(
         scene,
@@ -260,12 +294,27 @@ def _ring_model(options: argparse.Namespace) -> "tuple[RingModel, bool]":
     return model, is_inside
 
 
-def _spill(options: argparse.Namespace) -> int:
+def _require_no_scene(options: argparse.Namespace) -> None:
+    if options.set or options.posterior is not None:
+        raise ValueError("--set and --posterior need a scene; a trained model has its material")
+
+
+def _draws(options: argparse.Namespace) -> "PosteriorDraws | None":
+    """Returns the material of --posterior, without a height of the funnel; None without it."""
     from granulcal.design.posterior_file import PosteriorDraws
+    from granulcal.design.ring_model import HEIGHT
+
+    if options.posterior is None:
+        return None
+    draws = PosteriorDraws.load(options.posterior).without(HEIGHT)
+    require_apart(options.set, draws, options.posterior)
+    return draws
+
+
+def _spill(options: argparse.Namespace) -> int:
     from granulcal.design.spill import design_spill
 
-    draws = None if options.posterior is None else PosteriorDraws.load(options.posterior)
-    scene = _scene(options)
+    draws, scene = _draws(options), _scene(options)
     forecast = design_spill(
         scene if draws is None else draws.on(scene),
         heights=tuple(options.heights),
@@ -293,10 +342,3 @@ def _scene(options: argparse.Namespace) -> Any:
 
     scene = Scene.named(options.scene)
     return scene.with_(dict(options.set))
-
-
-def _assignment(text: str) -> tuple[str, float]:
-    path, mark, value = text.partition("=")
-    if not mark:
-        raise argparse.ArgumentTypeError(f"must be PATH=VALUE, got {text!r}")
-    return path, float(value)

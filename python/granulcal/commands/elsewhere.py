@@ -171,6 +171,7 @@ def _generate(options: argparse.Namespace) -> int:
     from granulcal.pours.cluster import cores_of, refuse_engine
     from granulcal.pours.dataset import generate
     from granulcal.prior import Prior
+    from granulcal.progress import ProgressLine
 
     _refuse(options)
     cluster = cluster_of(options)
@@ -182,22 +183,40 @@ def _generate(options: argparse.Namespace) -> int:
         if cluster is not None and options.threads is None:
             options.threads = cores_of(cluster)
         return say_how_long(options, scene, prior, options.rows, engine=engine)
-    data = generate(
-        scene,
-        prior,
-        options.rows,
-        seed=options.seed,
-        out=options.out,
-        threads=options.threads,
-        resume=not options.no_resume,
-        progress=not options.quiet,
-        engine=engine,
-        ray=cluster,
-        chunk=options.chunk,
-    )
-    counts = data.status_counts()
+    line = None if options.quiet else ProgressLine()
+    total, resumed, made = options.rows, 0, 0
+
+    def poured(*counts: int) -> None:
+        nonlocal total, resumed, made
+        total, resumed, made = counts[:3]
+        if line is not None:
+            line(*counts)
+
+    try:
+        data = generate(
+            scene,
+            prior,
+            options.rows,
+            seed=options.seed,
+            out=options.out,
+            threads=options.threads,
+            resume=not options.no_resume,
+            progress=poured,
+            engine=engine,
+            ray=cluster,
+            chunk=options.chunk,
+        )
+    finally:
+        if line is not None:
+            line.close()
     if options.json:
-        print(json.dumps({"folder": str(options.out), "rows": len(data), "status": counts}))
+        counts = data.status_counts()
+        told = {"folder": str(options.out), "rows": len(data), "total": total, "made": made}
+        told |= {"resumed": resumed, "stopped": False, "status": counts}
+        # The keys of `granulcal-cli generate --json`.
+        told |= {key: counts.get(key, 0) for key in ("unhealthy", "no_grains_in_view", "jammed")}
+        told["at_horizon"] = counts.get("horizon", 0)
+        print(json.dumps(told))
     else:
         print(f"{options.out}: {data}")
     left_out = data.left_out

@@ -2,13 +2,17 @@
 
 import argparse
 import json
+import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.counts import seed_number
 from granulcal.commands.exit_code import DONE, UNHEALTHY
-from granulcal.commands.init import assignment
+from granulcal.commands.setting import require_apart, setting
 from granulcal.paths import READS, writes
+
+if TYPE_CHECKING:
+    from granulcal.design.posterior_file import PosteriorDraws
 
 __all__ = ["add"]
 
@@ -22,9 +26,16 @@ a ratio or as a length, restitution as a dashpot, what has no counterpart said i
   granulcal export scene scene.toml --to liggghts -o pour        a whole pour; README.txt says how to run it
   granulcal export bed scene.toml --to vtk -o pile.vtk           the grains at rest
 
-posterior.json is what `infer -o` or `calibrate` wrote.
+posterior.json is what `infer -o` or `calibrate` wrote. A file that granulcal did not export is not
+replaced. Exit code 3: the posterior is outside its model, or the pour of a bed did not come to rest.
 """
 _ENGINES = ("lammps", "liggghts", "yade", "mujoco", "chrono", "isaac", "gazebo", "newton")
+# What is wrong with pours whose grains are not at rest on the ground, by status.
+_UNSETTLED = {
+    "horizon": "its grains still move; a longer end.horizon lets them come to rest",
+    "jammed": "grains wait in the funnel",
+    "unhealthy": "the simulation lost its accuracy; try another seed",
+}
 _FORMATS = ("lammps-data", "vtk", "ply", "csv", "mjcf", "sdf", "urdf")
 
 
@@ -50,9 +61,9 @@ def _add_common(parser: argparse.ArgumentParser, out: str) -> None:
         "--set",
         action="append",
         default=[],
-        type=assignment,
-        metavar="PATH=VALUE",
-        help="another number of the scene, as material.restitution=0.5; may be repeated",
+        type=setting,
+        metavar="PATH=NUMBER",
+        help="another number of the scene, as material.restitution=0.5, and none that --posterior has; may be repeated",
     )
     parser.add_argument("--json", action="store_true", help="print JSON instead of a list")
 
@@ -60,7 +71,10 @@ def _add_common(parser: argparse.ArgumentParser, out: str) -> None:
 def _add_engine(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--to", required=True, choices=_ENGINES, help="the engine")
     parser.add_argument(
-        "--young", type=float, metavar="PA", help="Young's modulus of elastic engines"
+        "--young",
+        type=float,
+        metavar="PA",
+        help="Young's modulus, 1e4 to 1e12; lammps, liggghts and yade alone",
     )
 
 
@@ -121,10 +135,10 @@ def _loaded(options: argparse.Namespace) -> Any:
     return Scene.named(options.scene).with_(dict(options.set))
 
 
-def _told(options: argparse.Namespace, files: list[Path], is_inside: bool = True) -> int:
+def _told(options: argparse.Namespace, files: list[Path], is_whole: bool = True) -> int:
     names = [str(path) for path in files]
     print(json.dumps({"files": names}, indent=1) if options.json else "\n".join(names))
-    return DONE if is_inside else UNHEALTHY
+    return DONE if is_whole else UNHEALTHY
 
 
 def _material(options: argparse.Namespace) -> int:
@@ -141,6 +155,7 @@ def _posterior(options: argparse.Namespace) -> int:
     if options.draws < 0:
         raise ValueError(f"--draws must be at least 0, got {options.draws}")
     found = PosteriorDraws.load(options.posterior)
+    require_apart(options.set, found, options.posterior)
     if options.draws > len(found.samples):
         raise ValueError(
             f"--draws must be at most {len(found.samples)}, the samples in {options.posterior}; "
@@ -154,35 +169,57 @@ def _posterior(options: argparse.Namespace) -> int:
         options.to,
         options.out,
         young=options.young,
+        source=_source(found, options.posterior),
     )
     return _told(options, files, found.is_inside)
+
+
+def _source(found: "PosteriorDraws", file: Path) -> list[str]:
+    """Returns what a head says of a posterior: its file, and what its prior fixed."""
+    from granulcal.export.mark import plain
+
+    fixed = f"; fixed by its prior: {', '.join(found.fixed)}" if found.fixed else ""
+    return [f"posterior: {plain(file.name)}{fixed}"]
 
 
 def _scene(options: argparse.Namespace) -> int:
     from granulcal.design.posterior_file import PosteriorDraws
     from granulcal.export import export_scene
 
-    scene, is_inside = _loaded(options), True
+    scene, is_inside, source = _loaded(options), True, []
     if options.posterior is not None:
         found = PosteriorDraws.load(options.posterior)
+        require_apart(options.set, found, options.posterior)
         scene, is_inside = found.at_mode(scene), found.is_inside
-    files = export_scene(scene, options.to, options.out, seed=options.seed, young=options.young)
+        taken = f"the most probable of a posterior: {', '.join(found.names)}"
+        source = [taken, *_source(found, options.posterior)]
+    files = export_scene(
+        scene, options.to, options.out, seed=options.seed, young=options.young, source=source
+    )
     return _told(options, files, is_inside)
 
 
 def _bed(options: argparse.Namespace) -> int:
     from granulcal.arrays import read_array
     from granulcal.export import export_bed
+    from granulcal.export.mark import require_replaceable
     from granulcal.export.setup import Setup
     from granulcal.pours.simulate import simulate
 
     scene = _loaded(options)
-    # What cannot be exported is told before a pour.
+    # What cannot be exported, and where it cannot be written, is told before a pour.
     Setup.of(scene, options.seed)
+    if options.to != "csv":
+        require_replaceable([options.out])
+    status = "at_rest"
     if options.positions is not None:
         positions, radii = read_array(options.positions), None
     else:
         pour = simulate(scene, seed=options.seed)
         positions, radii = pour.positions, pour.radii
+        status = pour.status
+    if status in _UNSETTLED:
+        told = _UNSETTLED[status]
+        print(f"warning: the pour ended as {status}: {told}", file=sys.stderr)
     file = export_bed(scene, positions, radii, options.to, options.out, seed=options.seed)
-    return _told(options, [file])
+    return _told(options, [file], status not in _UNSETTLED)

@@ -67,8 +67,7 @@ def _plot(options: argparse.Namespace, code: int) -> None:
     matched: dict[str, Any] = {}
     if model.scene_toml is not None:
         scene = Scene.from_toml(model.scene_toml)
-        # A pixel is as wide on the ground as in the scene's images.
-        matched["ground_resolution"] = scene.ground_resolution
+        matched |= scene.reading
         impossible = code == UNHEALTHY and violations(
             scene, model.prior, recordings, options.recording
         )

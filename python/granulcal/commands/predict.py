@@ -6,8 +6,9 @@ import os
 import sys
 from typing import TYPE_CHECKING, Any
 
-from granulcal.commands.counts import pour_count, thread_count
+from granulcal.commands.counts import thread_count
 from granulcal.commands.dry_run import add_dry_run, say_seconds
+from granulcal.commands.numbers import at_least, probability
 from granulcal.paths import READS
 from granulcal.progress import shown
 
@@ -30,9 +31,10 @@ differ:
     granulcal predict loop --at funnel.height=0.07 --corrected   base model + its own residual
     granulcal predict loop --at funnel.height=0.07 --model line  straight line through the means
 
-The correction knows no physics and holds between and near the measured conditions alone; farther
-away it is refused. A loop closed with --engine pours with the same. Intervals are those of one
-pour. Exit code 3: the loop's verdict does not stand.
+The correction, the line and the nearest condition know no physics and hold between and near the
+measured conditions alone; farther away they are refused, and the other models warn. A loop closed
+with --engine pours with the same. Intervals are those of one pour. Exit code 3: the loop's verdict
+does not stand.
 """
 
 
@@ -65,9 +67,11 @@ def add(commands: Any) -> None:
         choices=("base", "named", "corrected", "line", "nearest"),
         help="which model predicts (default: named, the verdict's)",
     )
-    parser.add_argument("--level", type=float, default=0.9, help="of the interval (default: 0.9)")
     parser.add_argument(
-        "--pours", type=pour_count, default=20, help="simulated pours (default: 20)"
+        "--level", type=probability, default=0.9, help="of the interval (default: 0.9)"
+    )
+    parser.add_argument(
+        "--pours", type=at_least(2), default=20, help="simulated pours, at least 2 (default: 20)"
     )
     parser.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
     parser.add_argument(
@@ -81,10 +85,17 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named, pouring_with
     from granulcal.loop.pours.forward import Forward
-    from granulcal.loop.report.models import Models, condition_of
+    from granulcal.loop.report.asked import condition_of, shown_outside
+    from granulcal.loop.report.models import Models
 
     models, threads = Models.load(options.loop), options.threads or os.cpu_count() or 1
     at, engine = condition_of(options.at), None
+    if options.model in (None, "base", "named"):
+        for told in shown_outside(at, models.inputs):
+            print(
+                f"warning: {told}, the conditions of the loop: nothing was measured there",
+                file=sys.stderr,
+            )
     if options.engine is not None:
         engine = engine_named(options.engine)
     if options.dry_run:
@@ -104,6 +115,7 @@ def _run(options: argparse.Namespace) -> int:
             json.dumps(
                 {"at": at, "verdict": models.verdict, "units": models.units, **found.to_dict()},
                 indent=1,
+                allow_nan=False,
             )
         )
         return _outcome(models.verdict["kind"])

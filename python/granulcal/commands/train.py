@@ -1,6 +1,7 @@
 """The word `train`: BayesSim on a data set, checked on pours left out of a fit."""
 
 import argparse
+import sys
 from typing import Any
 
 from granulcal.commands.counts import seed_number
@@ -57,6 +58,12 @@ def _run(options: argparse.Namespace) -> int:
 
     data = Dataset.load(options.data)
     told = options.told
+    if data.missing:
+        print(
+            f"warning: {options.data} has {len(data)} rows, {data.missing} more were asked for: a "
+            "batch that was stopped, or one of several shards",
+            file=sys.stderr,
+        )
     settings: dict[str, Any] = {}
     if options.components:
         settings["components"] = tuple(options.components)
@@ -68,7 +75,12 @@ def _run(options: argparse.Namespace) -> int:
     data.save(options.out / TRAINING)
     print(f"model written to {options.out}")
     checked = None if model.calibration is None else model.calibration.is_calibrated
-    told |= {"model": str(options.out), "pours": len(data), "calibrated": checked}
+    told |= {
+        "model": str(options.out),
+        "pours": len(data),
+        "missing": data.missing,
+        "calibrated": checked,
+    }
     return DONE
 
 

@@ -58,16 +58,18 @@ class SpillForecast:
     def highest(self, k: int, at_most: float) -> float | None:
         """Returns the height up to which P(spilled >= k) stays within `at_most` [m], or None.
 
-        Upper ends of the band count, so that what is not known makes the height lower.
+        Upper ends of the band count, so that what is not known makes the height lower, and the
+        probability itself where a few draws lift it above them.
         """
-        within = self.high[self.grains.index(k)] <= at_most
+        i = self.grains.index(k)
+        within = np.maximum(self.high[i], self.probability[i]) <= at_most
         last = len(within) if within.all() else int(np.argmin(within))
         return float(self.heights[last - 1]) if last else None
 
     def advice(self, k: int, at_most: float) -> str:
         """Returns in a sentence up to which height k grains are spilled at most that often."""
         top = self.highest(k, at_most)
-        wanted = f"P(spilled >= {k}) <= {at_most:g}, at the upper end of the band"
+        wanted = f"P(spilled >= {k}) <= {at_most:g}, at the upper end of the band, too"
         if top is None:
             return f"{wanted}: at no height from {_CM * self.heights[0]:.1f} cm on"
         if top == self.heights[-1]:

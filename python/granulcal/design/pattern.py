@@ -11,11 +11,17 @@ from granulcal.design.ring import PERCENTILES
 from granulcal.design.ring_model import HEIGHT
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import simulate
-from granulcal.pours.status import UNUSABLE
 
 __all__ = ["Pattern", "require_one_size", "simulate_plan"]
 
 Array = NDArray[np.float64]
+
+_WRONG = {
+    "jammed": "jams: its grains, held together by those around them, reach the funnel's tip; "
+    "pour it from higher",
+    "unhealthy": "is unhealthy: the simulation lost its accuracy, try another seed",
+    "horizon": "has not come to rest: its grains still move at end.horizon; take a longer one",
+}
 
 
 @dataclass(frozen=True)
@@ -40,19 +46,16 @@ class Pattern:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What went wrong, a sentence for each pour that cannot be used."""
+        """What went wrong, a sentence for each pour that is not at rest or cannot be used."""
         return tuple(
-            f"pour {i} jams: its grains, held together by those around them, reach the funnel's "
-            "tip; pour it from higher"
-            if status == "jammed"
-            else f"pour {i} is unhealthy: the simulation lost its accuracy, try another seed"
+            f"pour {i} {_WRONG[status]}"
             for i, status in enumerate(self.statuses, start=1)
-            if status in UNUSABLE
+            if status in _WRONG
         )
 
     @property
     def is_whole(self) -> bool:
-        """Whether every pour left the funnel and can be trusted."""
+        """Whether every pour left the funnel, came to rest and can be trusted."""
         return not self.notes
 
     def __str__(self) -> str:

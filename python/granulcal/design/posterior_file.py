@@ -7,10 +7,10 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.documents import Flag, ListOf, Mapping, Maybe, Number, Table, read_json
+from granulcal.documents import Flag, ListOf, Mapping, Maybe, Number, Table, Text, read_json
 from granulcal.pours.scene import Scene
 
-__all__ = ["OutsideModelWarning", "PosteriorDraws"]
+__all__ = ["OutsideModelWarning", "PosteriorDraws", "UncheckedModelWarning"]
 
 Array = NDArray[np.float64]
 
@@ -22,6 +22,8 @@ _SCHEMA = Table(
     optional={
         "inside_model": Table({"is_inside": Flag()}, open=True),
         "fixed": Mapping(Number()),
+        "calibrated": Flag(),
+        "warnings": ListOf(Text()),
     },
     open=True,
 )
@@ -29,6 +31,10 @@ _SCHEMA = Table(
 
 class OutsideModelWarning(UserWarning):
     """A posterior is that of recordings that no parameters of its model explain."""
+
+
+class UncheckedModelWarning(UserWarning):
+    """A posterior is by a model that has not passed a check of its own."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,9 @@ class PosteriorDraws:
     def load(cls, path: str | PathLike[str]) -> "PosteriorDraws":
         """Returns the draws in a file; warns of those of recordings that no parameters explain.
 
+        Those by a model that has not passed a check of its own are warned of, too, each with what
+        the file says of them.
+
         Raises:
             FileNotFoundError: there is no such file.
             ValueError: it is not a posterior of `granulcal infer -o` or `granulcal calibrate`.
@@ -76,6 +85,14 @@ class PosteriorDraws:
                 f"{path}: OUTSIDE THE MODEL: no parameters explain the recordings; these are the "
                 "model's best compromise, and their intervals mean nothing",
                 OutsideModelWarning,
+                stacklevel=2,
+            )
+        if not document.get("calibrated", True):
+            told = "".join(f"; {each}" for each in document.get("warnings", []))
+            warnings.warn(
+                f"{path}: its model has not passed a check of its own (`granulcal check`): its "
+                f"intervals may be too narrow{told}",
+                UncheckedModelWarning,
                 stacklevel=2,
             )
         return cls(names, samples, mode, is_inside, document.get("fixed", {}))

@@ -27,6 +27,8 @@ HEIGHT = "funnel.height"
 """Path of the height that is designed."""
 _MODEL, _POURS, _HELD_OUT = "model", "pours", "held-out"
 _TRAINING = "training.parquet"
+# A model needs as many usable pours, and one that is held out has no spread.
+_FEWEST_POURS, _FEWEST_HELD_OUT = 50, 2
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,12 @@ class RingModel:
         usable = data.is_usable
         self.reach = Reach(data.theta[usable, 0], data.x[usable])
 
+    @property
+    def fails_its_check(self) -> bool:
+        """Whether the check on pours that were left out found the model's intervals wrong."""
+        calibration = self.bayes.calibration
+        return calibration is not None and not calibration.is_calibrated
+
     def __str__(self) -> str:
         """What it was trained on."""
         low, high = 100 * self.reach.low, 100 * self.reach.high
@@ -128,9 +136,15 @@ class RingModel:
             seed: seed of heights, pours and training.
             threads: pours at once; the default is one for each core.
             progress: show pours on stderr.
+
+        Raises:
+            ValueError: fewer than 50 pours are asked for, or the scene does not fit.
+            TrainingDataError: fewer than 50 of them are usable.
         """
         from granulcal.bayessim import BayesSim
 
+        if pours < _FEWEST_POURS:
+            raise ValueError(f"pours must be at least {_FEWEST_POURS}, got {pours}")
         folder = None if out is None else Path(out)
         data = generate(
             observing_radii(scene),
@@ -175,12 +189,17 @@ class RingModel:
         """Returns heights inferred from `count` usable pours at fresh heights of the prior.
 
         Args:
-            count: usable pours; others are made and counted besides.
+            count: usable pours, at least two; others are made and counted besides.
             seed: another one than that of the training.
             out: folder of a ring model; its subfolder `held-out` keeps the pours.
             threads: pours at once.
             progress: show pours on stderr.
+
+        Raises:
+            ValueError: fewer than two.
         """
+        if count < _FEWEST_HELD_OUT:
+            raise ValueError(f"count must be at least {_FEWEST_HELD_OUT}, got {count}")
         folder = None if out is None else Path(out) / _HELD_OUT
         wanted, data = count, None
         while data is None or data.is_usable.sum() < count:

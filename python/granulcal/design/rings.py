@@ -10,12 +10,16 @@ from granulcal.design.ring import Ring
 from granulcal.design.ring_model import HEIGHT, RingModel
 from granulcal.errors import ExtrapolationError, UnreachableRingError
 
-__all__ = ["design_rings"]
+__all__ = ["design_rings", "require_tolerance"]
 
 # Pours of the height at an end of the range that are wider or narrower are still pours of it.
 _NOISE_SPREADS = 2.0
 # Half width of a central 90 % interval of a normal in standard deviations.
 _HALF_90 = 1.645
+_FAILED = (
+    "the model of the heights fails its own check on pours that were left out of it: heights and "
+    "intervals may be wrong; pour more (`--pours`)"
+)
 
 
 def design_rings(
@@ -50,10 +54,9 @@ def design_rings(
     """
     if not rings:
         raise ValueError("design_rings needs at least one ring, got none")
-    if not (np.isfinite(tolerance) and tolerance > 0):
-        raise ValueError(f"tolerance must be positive, got {tolerance}")
+    require_tolerance(tolerance)
     reach = model.reach
-    pours, notes = [], []
+    pours, notes = [], [_FAILED] if model.fails_its_check else []
     for order, ring in enumerate(sorted(rings, key=lambda r: -r.outer), start=1):
         if _is_outside(reach, ring):
             pour = _extrapolated(reach, ring, order, extrapolate)
@@ -74,6 +77,16 @@ def design_rings(
         scene_toml=model.scene.to_toml(),
         notes=tuple(notes),
     )
+
+
+def require_tolerance(tolerance: float) -> None:
+    """Refuses a share of the outer radius that is not positive [-].
+
+    Raises:
+        ValueError: says what was found.
+    """
+    if not (np.isfinite(tolerance) and tolerance > 0):
+        raise ValueError(f"tolerance must be positive, got {tolerance}")
 
 
 def _inferred(model: RingModel, ring: Ring, order: int, tolerance: float) -> PlannedPour:

@@ -1,12 +1,12 @@
 """Grains at one time as files that other programs read: LAMMPS data, VTK, PLY, CSV, MJCF, SDF, URDF."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.export import gazebo, lammps, mujoco
+from granulcal.export.mark import MARK, signed
 from granulcal.export.setup import Setup
 
 __all__ = ["FORMATS", "bed_text"]
@@ -51,7 +51,7 @@ def bed_text(setup: Setup, kind: str) -> str:
 def _vtk(centres: Array, radii: Array) -> str:
     """Returns legacy VTK of points with their radii; ParaView draws them by Glyph, scaled by radius."""
     n = len(radii)
-    lines = ["# vtk DataFile Version 3.0", "grains [m]", "ASCII", "DATASET POLYDATA"]
+    lines = ["# vtk DataFile Version 3.0", f"grains [m], {MARK}", "ASCII", "DATASET POLYDATA"]
     lines += [f"POINTS {n} double", *(" ".join(f"{c:.9g}" for c in at) for at in centres)]
     lines += [f"VERTICES {n} {2 * n}", *(f"1 {i}" for i in range(n))]
     lines += [f"POINT_DATA {n}", "SCALARS radius double 1", "LOOKUP_TABLE default"]
@@ -59,7 +59,7 @@ def _vtk(centres: Array, radii: Array) -> str:
 
 
 def _ply(centres: Array, radii: Array) -> str:
-    head = ["ply", "format ascii 1.0", "comment grains, lengths in metres"]
+    head = ["ply", "format ascii 1.0", f"comment grains, lengths in metres, {MARK}"]
     head += [f"element vertex {len(radii)}"]
     head += [f"property double {name}" for name in ("x", "y", "z", "radius")] + ["end_header"]
     rows = (" ".join(f"{v:.9g}" for v in (*at, r)) for at, r in zip(centres, radii, strict=True))
@@ -75,7 +75,8 @@ def _urdf(setup: Setup) -> str:
     """Returns URDF of floating grains; it states no gravity and no friction of rolling."""
     parts = [
         '<?xml version="1.0"?>',
-        f'<robot name="{Path(setup.name).name}">',
+        f"<!-- {signed(setup.name, 'urdf')} -->",
+        f'<robot name="{setup.name}">',
         '<link name="world"/>',
     ]
     for i, (centre, r) in enumerate(zip(setup.centres, setup.radii, strict=True)):

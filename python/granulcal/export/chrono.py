@@ -6,10 +6,11 @@ smaller coefficient counts, so a grain's mu_r R / 2 decides at walls too.
 
 import json
 
+from granulcal.export.mark import signed
 from granulcal.export.mesh import triangles
 from granulcal.export.setup import Contact, Setup
 
-__all__ = ["ENGINE", "NOTES", "material", "scene"]
+__all__ = ["ENGINE", "NOTES", "UNEQUAL", "material", "notes", "scene"]
 
 ENGINE = "chrono"
 NOTES = (
@@ -18,6 +19,12 @@ NOTES = (
     "tangential_restitution has no counterpart",
     "round walls are meshes of 64 sides",
 )
+UNEQUAL = "rolling and torsional lengths are those of the smallest"
+"""What of a material is not each grain's own where they differ in size."""
+# By itself Chrono lets nothing bounce that is slower than 0.15 m/s [m/s].
+_SLOWEST_BOUNCE = 0.01
+# Skins of what collides, over the radius; by themselves 3 cm outside and 1 cm inside.
+_ENVELOPE, _MARGIN = 0.1, 0.05
 
 
 def _lines(name: str, of: Contact, lever: float) -> str:
@@ -28,6 +35,24 @@ def _lines(name: str, of: Contact, lever: float) -> str:
 {name}.SetSpinningFriction({of.torsional_length(lever):.9g})
 {name}.SetRestitution({of.restitution:.9g})
 """
+
+
+def notes(setup: Setup) -> list[str]:
+    """Returns what a system must be told besides the material, before the first body is made."""
+    return [
+        "a system by itself lets nothing slower than 0.15 m/s bounce and puts skins of 3 and 1 cm on what "
+        f"collides: write system.SetMinBounceSpeed({_SLOWEST_BOUNCE:g}) and, before the first body,",
+        *(f"  {line}" for line in _skins(setup)),
+    ]
+
+
+def _skins(setup: Setup) -> list[str]:
+    """Returns the lines that make the skins of collision as thin as the grains need."""
+    model, radius = "chrono.ChCollisionModel", setup.smallest
+    return [
+        f"{model}.SetDefaultSuggestedEnvelope({_ENVELOPE * radius:.6g})",
+        f"{model}.SetDefaultSuggestedMargin({_MARGIN * radius:.6g})",
+    ]
 
 
 def material(setup: Setup, young: float | None = None) -> str:
@@ -42,13 +67,18 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
         {"vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist()}
         for mesh in (triangles(body.shape) for body in setup.walls)
     ]
-    table = {"centres": setup.centres.tolist(), "radii": setup.radii.tolist(), "walls": walls}
+    table = {
+        "file": signed(setup.name, ENGINE),
+        "centres": setup.centres.tolist(),
+        "radii": setup.radii.tolist(),
+        "walls": walls,
+    }
     laws = "".join(
         _lines(f"wall_{i}", body.law, setup.smallest) for i, body in enumerate(setup.walls)
     )
     names = ", ".join(f"wall_{i}" for i in range(len(setup.walls)))
     script = f"""\
-\"\"\"Pours {setup.name} in Chrono and leaves grains.csv: python pour.py\"\"\"
+\"\"\"{signed(setup.name, ENGINE)}; it leaves grains.csv: python pour.py\"\"\"
 
 import json
 
@@ -60,6 +90,9 @@ system = chrono.ChSystemNSC()
 system.SetCollisionSystemType(chrono.ChCollisionSystem.Type_BULLET)
 system.SetGravitationalAcceleration(chrono.ChVector3d{setup.gravity})
 system.SetSolverType(chrono.ChSolver.Type_APGD)
+system.SetMinBounceSpeed({_SLOWEST_BOUNCE:g})
+# Before the first body: what is made before has other skins.
+{chr(10).join(_skins(setup))}
 floor = chrono.ChBodyEasyBox(2, 2, 0.1, 1000, False, True, ground)
 floor.SetPos(chrono.ChVector3d(0, 0, -0.05))
 floor.SetFixed(True)

@@ -1,7 +1,6 @@
-"""Writes materials, scenes, posteriors and beds for an engine, with what has no counterpart."""
+"""Writes materials, scenes and beds for an engine, with what has no counterpart."""
 
-import json
-import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,26 +10,41 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal.arrays import unmasked
-from granulcal.documents import ListOf, Table, Text, read_json
 from granulcal.export import chrono, gazebo, isaac, lammps, liggghts, mujoco, newton, yade
 from granulcal.export.bed import bed_text
-from granulcal.export.setup import Setup
+from granulcal.export.head import commented, head
+from granulcal.export.mark import require_replaceable
+from granulcal.export.setup import Setup, require_funnel_in_place
 from granulcal.files import write_beside
 from granulcal.pours.scene import Scene
 
-__all__ = ["ENGINES", "export_bed", "export_material", "export_posterior", "export_scene"]
+__all__ = [
+    "ENGINES",
+    "MATERIAL_ENDINGS",
+    "SofterWarning",
+    "export_bed",
+    "export_material",
+    "export_scene",
+    "material_text",
+]
 
 ENGINES: dict[str, ModuleType] = {
     module.ENGINE: module
     for module in (lammps, liggghts, yade, mujoco, chrono, isaac, gazebo, newton)
 }
 """The writers by the engine's name."""
-_MATERIAL_ENDINGS = {
+MATERIAL_ENDINGS = {
     "lammps": ".in", "liggghts": ".in", "yade": ".py", "mujoco": ".xml",
     "chrono": ".py", "isaac": ".usda", "gazebo": ".sdf", "newton": ".py",
 }  # fmt: skip
-_DRAWS = ListOf(Table({"file": Text()}, open=True))
-_COMMENTS = {".in": "# ", ".py": "# ", ".usda": "# "}
+"""How the file of a material ends, by the engine's name."""
+_ELASTIC = ("lammps", "liggghts", "yade")
+# Softer than any gel, and stiffer than diamond [Pa].
+_LEAST_YOUNG, _LARGEST_YOUNG = 1e4, 1e12
+
+
+class SofterWarning(UserWarning):
+    """Grains were asked for that are softer than the engine takes."""
 
 
 def _engine(name: str) -> ModuleType:
@@ -39,7 +53,47 @@ def _engine(name: str) -> ModuleType:
     return ENGINES[name]
 
 
-def export_material(scene: Scene, to: str, path: str | Path, *, young: float | None = None) -> Path:
+def _check_young(to: str, young: float | None) -> None:
+    """Refuses a Young's modulus [Pa] that no grain has, and any where grains are rigid."""
+    if young is None:
+        return
+    if to not in _ELASTIC:
+        raise ValueError(
+            f"young must be left out for {to}, whose grains are rigid: only {', '.join(_ELASTIC)} "
+            f"take it; got {young:g}"
+        )
+    if not _LEAST_YOUNG <= young <= _LARGEST_YOUNG:
+        raise ValueError(
+            f"young must be from {_LEAST_YOUNG:g} to {_LARGEST_YOUNG:g} Pa, got {young:g}"
+        )
+    if to == "liggghts" and young < liggghts.LEAST_YOUNG:
+        warnings.warn(
+            f"LIGGGHTS takes no grains softer than {liggghts.LEAST_YOUNG:g} Pa: that is written in "
+            f"place of {young:g} Pa",
+            SofterWarning,
+            stacklevel=3,
+        )
+
+
+def material_text(
+    scene: Scene, to: str, *, young: float | None = None, source: Sequence[str] = ()
+) -> str:
+    """Returns the material of a scene for an engine, with its head; arguments as `export_material`."""
+    module = _engine(to)
+    _check_young(to, young)
+    setup = Setup.of(scene)
+    lines = head(setup, module, source)
+    return commented(lines, module.material(setup, young), MATERIAL_ENDINGS[to])
+
+
+def export_material(
+    scene: Scene,
+    to: str,
+    path: str | Path,
+    *,
+    young: float | None = None,
+    source: Sequence[str] = (),
+) -> Path:
     """Writes the material of a scene for an engine; returns the file.
 
     The file says at its head what our coefficients are, and which have no counterpart there.
@@ -48,24 +102,30 @@ def export_material(scene: Scene, to: str, path: str | Path, *, young: float | N
         scene: whose grains and material; the smallest grain decides lengths and stiffness.
         to: the engine.
         path: the file, or a folder for `material` with the engine's ending.
-        young: Young's modulus of engines with elastic grains [Pa]; by default soft enough to be fast
-            and stiff enough that piles do not change, docs/export.md.
+        young: Young's modulus of engines with elastic grains, 1e4 to 1e12 [Pa]; by default soft
+            enough to be fast and stiff enough that piles do not change, docs/export.md.
+        source: lines for the head that say where numbers of the material come from.
 
     Raises:
-        ValueError: no such engine, or a scene that cannot be exported.
+        ValueError: no such engine, a scene that cannot be exported, a Young's modulus of rigid
+            grains, or a file stands there that granulcal did not export.
     """
-    module, setup = _engine(to), Setup.of(scene)
-    ending = _MATERIAL_ENDINGS[to]
-    file = Path(path)
+    text, file = material_text(scene, to, young=young, source=source), Path(path)
     if file.is_dir() or not file.suffix:
-        file = file / f"material-{to}{ending}"
-    text = module.material(setup, young)
-    write_beside(file, _commented(_head(scene, setup, module), text, ending))
+        file = file / f"material-{to}{MATERIAL_ENDINGS[to]}"
+    require_replaceable([file])
+    write_beside(file, text)
     return file
 
 
 def export_scene(
-    scene: Scene, to: str, folder: str | Path, *, seed: int = 0, young: float | None = None
+    scene: Scene,
+    to: str,
+    folder: str | Path,
+    *,
+    seed: int = 0,
+    young: float | None = None,
+    source: Sequence[str] = (),
 ) -> list[Path]:
     """Writes the whole pour of a scene for an engine; returns the files.
 
@@ -78,79 +138,24 @@ def export_scene(
         folder: made if it does not exist.
         seed: of the grains' jitter at the start.
         young: as for `export_material`.
+        source: as for `export_material`, in README.txt.
 
     Raises:
-        ValueError: no such engine, or a scene that has what the engine cannot be told.
+        ValueError: no such engine, a scene that has what the engine cannot be told, a Young's
+            modulus of rigid grains, or the folder has a file of these that granulcal did not export.
         ModuleNotFoundError: isaac without usd-core.
     """
-    module, setup, place = _engine(to), Setup.of(scene, seed), Path(folder)
+    module, place = _engine(to), Path(folder)
+    _check_young(to, young)
+    require_funnel_in_place(scene)
+    setup = Setup.of(scene, seed)
+    texts = dict(module.scene(setup, young))
+    texts["README.txt"] = "\n".join([_RUN[to], "", *head(setup, module, source)]) + "\n"
+    require_replaceable(place / name for name in texts)
     place.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, text in module.scene(setup, young).items():
+    for name, text in texts.items():
         write_beside(place / name, text)
-        written.append(place / name)
-    head = "\n".join([_RUN[to], "", *_head(scene, setup, module)])
-    write_beside(place / "README.txt", head + "\n")
-    return [*written, place / "README.txt"]
-
-
-def export_posterior(
-    names: Sequence[str],
-    mode: ArrayLike,
-    draws: ArrayLike,
-    scene: Scene,
-    to: str,
-    folder: str | Path,
-    *,
-    young: float | None = None,
-) -> list[Path]:
-    """Writes a posterior for an engine: the material at its mode, and one for each draw.
-
-    draws.json has every draw in our own coefficients beside the name of its file. The draws that an
-    earlier call left in the folder are removed.
-
-    Args:
-        names: paths of the parameters in the scene.
-        mode: most probable parameters, own units, shape (p,).
-        draws: samples, own units, shape (n, p); none is enough where the mode is.
-        scene: what is poured.
-        to: the engine.
-        folder: made if it does not exist.
-        young: as for `export_material`.
-    """
-    place = Path(folder)
-    place.mkdir(parents=True, exist_ok=True)
-    ending = _MATERIAL_ENDINGS[_engine(to).ENGINE]
-    _remove_draws(place)
-
-    def at(values: np.ndarray) -> Scene:
-        return scene.with_(dict(zip(names, values.tolist(), strict=True)))
-
-    written = [
-        export_material(
-            at(np.asarray(unmasked("mode", mode), float)), to, place / f"mode{ending}", young=young
-        )
-    ]
-    table = []
-    for i, row in enumerate(np.asarray(unmasked("draws", draws), float).reshape(-1, len(names))):
-        file = export_material(at(row), to, place / f"draw-{i:03}{ending}", young=young)
-        table.append({"file": file.name, **dict(zip(names, row.tolist(), strict=True))})
-        written.append(file)
-    if table:
-        write_beside(place / "draws.json", json.dumps(table, indent=1) + "\n")
-        written.append(place / "draws.json")
-    return written
-
-
-def _remove_draws(place: Path) -> None:
-    """Removes the files that draws.json lists, and itself: not what another program wrote."""
-    table = place / "draws.json"
-    if not table.is_file():
-        return
-    for row in read_json(table, _DRAWS):
-        if re.fullmatch(r"draw-\d{3,}\.(in|py|xml|usda|sdf)", row["file"]):
-            (place / row["file"]).unlink(missing_ok=True)
-    table.unlink()
+    return [place / name for name in texts]
 
 
 def export_bed(
@@ -166,32 +171,42 @@ def export_bed(
 
     Args:
         scene: whose density, material and walls go with them.
-        positions: centres [m], shape (n, 3).
+        positions: centres [m], shape (n, 3), all finite.
         radii: [m], shape (n,); those with which a pour of the scene begins if None.
         kind: `lammps-data`, `vtk`, `ply`, `csv`, `mjcf`, `sdf` or `urdf`.
         path: the file.
         seed: of the pour, which draws radii that differ.
 
     Raises:
-        ValueError: a scene that cannot be exported, positions of another shape, or no radii where
-            the scene's differ and are not as many.
+        ValueError: a scene that cannot be exported, positions of another shape or that are no
+            numbers, no radii where the scene's differ and are not as many, or a file stands there
+            that granulcal did not export.
     """
     setup = Setup.of(scene, seed)
     centres = np.asarray(unmasked("positions", positions), float)
     if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
         raise ValueError(f"positions must have shape (n, 3), got {centres.shape}")
+    lost = int((~np.isfinite(centres).all(axis=1)).sum())
+    if lost:
+        raise ValueError(f"positions must be finite [m]; those of {lost} grains are not")
     sizes = _radii(setup, len(centres)) if radii is None else radii
     sizes = np.broadcast_to(np.asarray(unmasked("radii", sizes), float), len(centres)).copy()
+    if not (np.isfinite(sizes).all() and (sizes > 0).all()):
+        raise ValueError(f"radii must be positive [m], got {sizes.min():g} to {sizes.max():g}")
     setup = replace(setup, centres=centres, radii=sizes, walls=())
-    write_beside(Path(path), bed_text(setup, kind))
-    return Path(path)
+    text, file = bed_text(setup, kind), Path(path)
+    # CSV has no comments: there the kind of the file decides alone.
+    if kind != "csv":
+        require_replaceable([file])
+    write_beside(file, text)
+    return file
 
 
 def _radii(setup: Setup, count: int) -> NDArray[np.float64]:
     """Returns the radii of so many grains of a pour, which keep their order."""
     if len(setup.radii) == count:
         return setup.radii
-    if float(np.ptp(setup.radii)) > 0:
+    if setup.has_sizes:
         raise ValueError(
             f"{setup.name}: its grains have radii of their own, which {count} positions must have "
             f"by number: they must be {len(setup.radii)}"
@@ -209,38 +224,3 @@ _RUN = {
     "gazebo": "Run: gz sim pour.sdf.",
     "isaac": "Open pour.usda in Isaac Sim.",
 }
-
-
-def _head(scene: Scene, setup: Setup, module: ModuleType) -> list[str]:
-    """Returns what stands at the head of a file: our numbers, and what has no counterpart."""
-    lines = [f"{scene.name}, exported by granulcal for {module.ENGINE}. In granulcal:"]
-    for name, value in vars(setup.grains).items():
-        lines.append(f"  material.{name} = {value:.9g}")
-    radius = setup.smallest
-    lines.append(
-        f"grain radius {radius:.6g} m, R_eff = {0.5 * radius:.6g} m of two grains, {radius:.6g} m at a wall"
-    )
-    lines.append("No exact counterpart:")
-    own = newton.notes(setup) if module is newton else []
-    lines += [f"  {note}" for note in (*module.NOTES, *own)]
-    lines.append(
-        "  softness, touching_exponent, impact_friction: the engine's own stiffness and dashpots decide them"
-    )
-    if module is not liggghts:
-        lines.append("  rolling_dashpot: only LIGGGHTS' epsd has it")
-    if setup.left_out:
-        lines.append(f"Left out: {', '.join(setup.left_out)}")
-    return lines
-
-
-def _commented(head: list[str], text: str, ending: str) -> str:
-    if ending in (".xml", ".sdf"):
-        # Two dashes end a comment of XML.
-        body = "\n".join(head).replace("--", "- -")
-        return f"<!--\n{body}\n-->\n{text}"
-    mark = _COMMENTS[ending]
-    comment = "".join(f"{mark}{line}".rstrip() + "\n" for line in head)
-    if ending == ".usda":
-        first, _, rest = text.partition("\n")
-        return f"{first}\n{comment}{rest}"
-    return comment + text

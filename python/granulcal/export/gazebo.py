@@ -6,18 +6,23 @@ a = R the coefficient is 16 mu_t R_eff / (3 pi R).
 
 import math
 
+from granulcal.export.mark import signed
 from granulcal.export.mesh import stl, triangles
 from granulcal.export.setup import Contact, Setup
 
-__all__ = ["ENGINE", "NOTES", "material", "scene"]
+__all__ = ["ENGINE", "NOTES", "UNEQUAL", "material", "scene"]
 
 ENGINE = "gazebo"
 NOTES = (
     "rolling_friction has no counterpart in SDFormat: grains roll on, heaps come out flatter and wider",
     "tangential_restitution has no counterpart",
     "restitution is of the `bounce` element, which not every physics engine of Gazebo honours",
+    "torsional friction at walls is half of ours: of two surfaces the smaller coefficient counts",
+    "mu and bounce of two surfaces: the smaller, so a wall rougher than the grains is as smooth as they are",
     "round walls are STL meshes of 64 sides",
 )
+UNEQUAL = "the patch of torsional friction is that of the smallest"
+"""What of a material is not each grain's own where they differ in size."""
 
 
 def _surface(of: Contact, lever: float, radius: float) -> str:
@@ -72,7 +77,8 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     )
     body = "\n".join([ground, *models])
     files["pour.sdf"] = (
-        '<?xml version="1.0"?>\n<sdf version="1.9"><world name="pour">\n'
+        f'<?xml version="1.0"?>\n<!-- {signed(setup.name, ENGINE)} -->\n'
+        '<sdf version="1.9"><world name="pour">\n'
         f"<gravity>{gravity}</gravity>\n"
         '<physics name="fine" type="ode"><max_step_size>0.0005</max_step_size>'
         "<real_time_factor>0</real_time_factor></physics>\n"

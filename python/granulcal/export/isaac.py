@@ -6,10 +6,11 @@ the PhysX material schema says; here as the mean, and grains that meet carry the
 
 from typing import Any
 
+from granulcal.export.mark import signed
 from granulcal.export.mesh import triangles
 from granulcal.export.setup import Contact, Setup
 
-__all__ = ["ENGINE", "NOTES", "material", "scene"]
+__all__ = ["ENGINE", "NOTES", "UNEQUAL", "material", "scene"]
 
 ENGINE = "isaac"
 NOTES = (
@@ -18,13 +19,16 @@ NOTES = (
     "tangential_restitution has no counterpart",
     "at walls friction and restitution are the mean of the grains' and the wall's, unless they are equal",
 )
+UNEQUAL = "the material is the same for all sizes"
+"""What of a material is not each grain's own where they differ in size."""
 
 
 def material(setup: Setup, young: float | None = None) -> str:
     """Returns a UsdPhysics material as text of a .usda file."""
     del young
     return (
-        '#usda 1.0\n(\n    defaultPrim = "grain"\n)\n\n'
+        '#usda 1.0\n(\n    defaultPrim = "grain"\n    kilogramsPerUnit = 1\n    metersPerUnit = 1\n'
+        '    upAxis = "Z"\n)\n\n'
         'def Material "grain" (\n    prepend apiSchemas = ["PhysicsMaterialAPI"]\n)\n{\n'
         f"    float physics:staticFriction = {setup.grains.sliding_friction:.9g}\n"
         f"    float physics:dynamicFriction = {setup.grains.sliding_friction:.9g}\n"
@@ -54,9 +58,12 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     stage: Any = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
     physics = UsdPhysics.Scene.Define(stage, "/physics")
     magnitude = sum(g * g for g in setup.gravity) ** 0.5
-    physics.CreateGravityDirectionAttr(Gf.Vec3f(*(g / magnitude for g in setup.gravity)))
+    # Without gravity the direction stays as it is by itself.
+    if magnitude > 0.0:
+        physics.CreateGravityDirectionAttr(Gf.Vec3f(*(g / magnitude for g in setup.gravity)))
     physics.CreateGravityMagnitudeAttr(magnitude)
 
     def law(name: str, of: Contact) -> Any:
@@ -90,4 +97,5 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
         ball.AddTranslateOp().Set(Gf.Vec3d(*map(float, centre)))
         UsdPhysics.RigidBodyAPI.Apply(ball.GetPrim())
         bind(ball.GetPrim(), grain)
-    return {"pour.usda": stage.GetRootLayer().ExportToString()}
+    first, _, rest = stage.GetRootLayer().ExportToString().partition("\n")
+    return {"pour.usda": f"{first}\n# {signed(setup.name, ENGINE)}\n{rest}"}

@@ -6,10 +6,13 @@ mu is our mu_r. `twisting sds` limits a moment to mu F_n: mu is the length mu_t 
 would give if it did not, so the number in the file is not our e.
 """
 
+import numpy as np
+
 from granulcal.export import law
+from granulcal.export.mark import MARK, signed
 from granulcal.export.setup import Body, Contact, Setup, Stiffness
 
-__all__ = ["ENGINE", "NOTES", "contact", "data", "material", "scene"]
+__all__ = ["ENGINE", "NOTES", "UNEQUAL", "contact", "data", "material", "scene"]
 
 ENGINE = "lammps"
 NOTES = (
@@ -17,6 +20,10 @@ NOTES = (
     "rolling and torsion are stiff springs with a dashpot up to the limit; ours are rigid up to it",
     "tangential_restitution is 0: the tangential dashpot is critical",
 )
+UNEQUAL = (
+    "torsional lengths, rolling and torsional springs and the time step are those of the smallest"
+)
+"""What of a material is not each grain's own where they differ in size."""
 _ROLLING_RATE, _ROLLING_DAMPING = 0.25, 0.7
 # A_r of docs/theory/contact.md, 5/2 (l_i^2 + l_j^2).
 _ROLLING_INERTIA = {"pair": 1.25, "wall": 2.5}
@@ -48,10 +55,14 @@ def material(setup: Setup, young: float | None = None) -> str:
     """Returns the lines of a material: pair style, its coefficients, the time step."""
     stiffness = setup.stiffness(young)
     return (
-        f"timestep {stiffness.dt:.6g}\npair_style granular\n"
-        f"pair_coeff * * {contact(setup.grains, 'pair', stiffness)}\n"
+        "# before the box: units si; atom_style sphere; newton off; comm_modify vel yes\n"
+        f"timestep {stiffness.dt:.6g}\n{_pair(setup, stiffness)}\n"
         f"# at walls: fix NAME all wall/gran granular {contact(setup.ground, 'wall', stiffness)} ...\n"
     )
+
+
+def _pair(setup: Setup, stiffness: Stiffness) -> str:
+    return f"pair_style granular\npair_coeff * * {contact(setup.grains, 'pair', stiffness)}"
 
 
 def data(setup: Setup) -> str:
@@ -60,17 +71,17 @@ def data(setup: Setup) -> str:
 
 
 def atoms(setup: Setup, centres, radii) -> str:
-    """Returns spheres as a LAMMPS data file, atom_style sphere."""
-    w = setup.half_width
+    """Returns spheres as a LAMMPS data file, atom_style sphere; its box holds all of them."""
+    (x_low, y_low, bottom), (x_high, y_high, top) = _box(setup, centres, radii)
     lines = [
-        f"LAMMPS data file of {setup.name}: atom_style sphere, units si",
+        f"LAMMPS data file of {setup.name}, {MARK}: atom_style sphere, units si",
         "",
         f"{len(radii)} atoms",
         "1 atom types",
         "",
-        f"{-w:g} {w:g} xlo xhi",
-        f"{-w:g} {w:g} ylo yhi",
-        f"{-setup.smallest:g} {setup.top:g} zlo zhi",
+        f"{x_low:.9g} {x_high:.9g} xlo xhi",
+        f"{y_low:.9g} {y_high:.9g} ylo yhi",
+        f"{bottom:.9g} {top:.9g} zlo zhi",
         "",
         "Atoms # sphere",
         "",
@@ -81,15 +92,23 @@ def atoms(setup: Setup, centres, radii) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _box(setup: Setup, centres, radii) -> tuple[list[float], list[float]]:
+    """Returns the corners of the space of a pour, wider where grains lie outside of it [m]."""
+    w = setup.half_width
+    reach = np.asarray(radii, float)[:, None]
+    low = np.minimum((np.asarray(centres, float) - reach).min(axis=0), [-w, -w, -setup.smallest])
+    high = np.maximum((np.asarray(centres, float) + reach).max(axis=0), [w, w, setup.top])
+    return low.tolist(), high.tolist()
+
+
 def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     """Returns the files of a pour: `lmp -in in.pour` leaves grains.dump."""
     stiffness = setup.stiffness(young)
     largest = float(setup.radii.max())
-    g = sum(c * c for c in setup.gravity) ** 0.5
-    direction = " ".join(f"{c / g:.9g}" for c in setup.gravity)
     walls = "\n".join(_wall(body, stiffness) for body in setup.walls)
     look = max(1, round(_LOOK / stiffness.dt))
     script = f"""\
+# {signed(setup.name, ENGINE)}
 units         si
 atom_style    sphere
 boundary      s s fs
@@ -98,9 +117,8 @@ comm_modify   vel yes
 read_data     pour.data
 neighbor      {0.5 * largest:.6g} bin
 neigh_modify  delay 0 every 1 check yes binsize {4 * largest:.6g}
-{material(setup, young).splitlines()[1]}
-{material(setup, young).splitlines()[2]}
-fix           gravity all gravity {g:.9g} vector {direction}
+{_pair(setup, stiffness)}
+{setup.gravity_line}
 fix           ground all wall/gran granular {contact(setup.ground, "wall", stiffness)} zplane 0 NULL
 {walls}
 fix           motion all nve/sphere

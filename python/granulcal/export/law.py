@@ -27,6 +27,8 @@ LEAST_WITHOUT_TENSION = math.exp(-2.0)
 POISSON = 0.25
 """Poisson's ratio of engines that ask for one [-]; ours has none."""
 _LEAST_RESTITUTION = 0.01
+# Least e that an engine is told, and -ln of it.
+_NOMINAL, _DECREMENT = 1e-100, 100.0 * math.log(10.0)
 _RIGID_YOUNG = 3e6
 _RIGID_DENSITY = 1300.0
 _STEP = 0.2
@@ -148,8 +150,12 @@ def pulling_duration(restitution: float) -> float:
 
 
 def nominal_restitution(beta: float) -> float:
-    """Returns the e with which an engine that lets dashpots pull takes the damping beta [-]."""
-    return math.exp(-math.pi * beta / math.sqrt(1.0 - beta * beta))
+    """Returns the e with which an engine that lets dashpots pull takes the damping beta [-].
+
+    Critical damping has none: there it is 1e-100, whose logarithm is still a number.
+    """
+    root = math.sqrt(max(1.0 - beta * beta, 0.0))
+    return math.exp(-math.pi * beta / root) if math.pi * beta < _DECREMENT * root else _NOMINAL
 
 
 def critical_tangential_damping(beta: float) -> float:

@@ -6,10 +6,11 @@ and then gives the e that it is told, whatever the speed.
 """
 
 from granulcal.export import law
+from granulcal.export.mark import signed
 from granulcal.export.mesh import stl, triangles
 from granulcal.export.setup import Contact, Setup, Stiffness
 
-__all__ = ["ENGINE", "NOTES", "material", "scene"]
+__all__ = ["ENGINE", "LEAST_YOUNG", "NOTES", "UNEQUAL", "material", "scene"]
 
 ENGINE = "liggghts"
 NOTES = (
@@ -18,10 +19,12 @@ NOTES = (
     "restitution below 0.05 is written as 0.05, the least that LIGGGHTS takes",
     "round walls are meshes of 64 sides: LIGGGHTS has no cones",
 )
+UNEQUAL = "the time step is that of the smallest"
+"""What of a material is not each grain's own where they differ in size."""
 _WORDS = "model hertz tangential history rolling_friction"
 _LEAST_RESTITUTION = 0.05
-# LIGGGHTS refuses softer grains unless told `soft_particles yes`.
-_LEAST_YOUNG = 5e6
+LEAST_YOUNG = 5e6
+"""LIGGGHTS refuses softer grains unless told `soft_particles yes` [Pa]."""
 # How much farther than they touch grains are neighbours, over the largest radius; most bins of them.
 _SKIN, _BINS = 0.25, 2e7
 _LOOK, _SLOW, _RESTING = 0.02, 0.01, 0.995
@@ -64,7 +67,7 @@ def _rolling(setup: Setup) -> str:
 
 def _stiffness(setup: Setup, young: float | None) -> Stiffness:
     usual = setup.stiffness(young)
-    return usual if usual.young >= _LEAST_YOUNG else setup.stiffness(_LEAST_YOUNG)
+    return usual if usual.young >= LEAST_YOUNG else setup.stiffness(LEAST_YOUNG)
 
 
 def _value(of: Contact, name: str) -> float:
@@ -90,14 +93,13 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
         if setup.walls
         else ""
     )
-    g = sum(c * c for c in setup.gravity) ** 0.5
-    direction = " ".join(f"{c / g:.9g}" for c in setup.gravity)
     grains = "\n".join(
         "create_atoms  1 single {:.9g} {:.9g} {:.9g} units box".format(*centre)
         for centre in setup.centres
     )
     sizes = "\n".join(_sizes(setup))
     files["in.pour"] = f"""\
+# {signed(setup.name, ENGINE)}
 atom_style    granular
 atom_modify   map array
 boundary      f f f
@@ -109,7 +111,7 @@ create_box    {2 + len(setup.walls)} space
 neighbor      {_SKIN * largest:.6g} bin
 neigh_modify  delay 0{_bins(setup)}
 {material(setup, young)}
-fix           gravity all gravity {g:.9g} vector {direction}
+{setup.gravity_line}
 {meshes}
 {walls}
 fix           ground all wall/gran {_WORDS} {_rolling(setup)} primitive type 2 zplane 0.0
@@ -145,7 +147,7 @@ def _bins(setup: Setup) -> str:
 
 
 def _sizes(setup: Setup) -> list[str]:
-    if float(setup.radii.max() - setup.radii.min()) == 0.0:
+    if not setup.has_sizes:
         return [
             f"set           group all density {setup.density:g} diameter {2 * setup.smallest:.9g}"
         ]

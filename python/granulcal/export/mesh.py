@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.export.mark import MARK
+
 __all__ = ["Mesh", "stl", "triangles"]
 
 Array = NDArray[np.float64]
@@ -69,7 +71,7 @@ def stl(mesh: Mesh, name: str) -> str:
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    lines = [f"solid {name}"]
+    lines = [f"solid {name} {MARK}"]
     for normal, triangle in zip(normals, corners, strict=True):
         lines += ["facet normal {:.9g} {:.9g} {:.9g}".format(*normal), "outer loop"]
         lines += ["vertex {:.9g} {:.9g} {:.9g}".format(*corner) for corner in triangle]

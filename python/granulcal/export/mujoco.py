@@ -9,10 +9,11 @@ effective mass, whose dashpot cannot pull: docs/export.md.
 import math
 
 from granulcal.export import law
+from granulcal.export.mark import signed
 from granulcal.export.mesh import triangles
 from granulcal.export.setup import Contact, Setup
 
-__all__ = ["ENGINE", "NOTES", "material", "mjcf", "scene"]
+__all__ = ["ENGINE", "NOTES", "UNEQUAL", "material", "mjcf", "scene"]
 
 ENGINE = "mujoco"
 NOTES = (
@@ -22,6 +23,11 @@ NOTES = (
     "round walls are rings of 24 boxes: MuJoCo's meshes are convex",
     "walls are 4 mm thick: outside a box or a round wall, grains touch it 4 mm farther out",
 )
+UNEQUAL = (
+    "the class `grain`, the ground and the walls have rolling and torsional lengths of the smallest; in a "
+    "scene and a bed every grain has those of its own radius, and of two the larger count"
+)
+"""What of a material is not each grain's own where they differ in size."""
 _DT = 1e-4
 # Time of an impact over the time step: fewer steps would not resolve the dashpot.
 _STEPS = 20
@@ -75,13 +81,15 @@ def mjcf(setup: Setup) -> str:
     grains = []
     for i, (centre, size) in enumerate(zip(setup.centres, setup.radii, strict=True)):
         x, y, z = centre
+        own = f' friction="{_friction(setup.grains, 0.5 * size)}"' if setup.has_sizes else ""
         grains.append(
             f'    <body name="grain{i}" pos="{x:.9g} {y:.9g} {z:.9g}"><freejoint/>'
-            f'<geom class="grain" size="{size:.9g}"/></body>'
+            f'<geom class="grain" size="{size:.9g}"{own}/></body>'
         )
     gravity = " ".join(f"{g:.9g}" for g in setup.gravity)
     return "\n".join(
         [
+            f"<!-- {signed(setup.name, ENGINE)} -->",
             f'<mujoco model="{setup.name}">',
             f'  <option timestep="{_DT:g}" gravity="{gravity}" cone="elliptic" impratio="10" '
             'integrator="implicitfast" solver="Newton" iterations="20" jacobian="sparse"/>',
@@ -177,7 +185,7 @@ def _quaternion(rotation) -> tuple[float, float, float, float]:
 
 
 _RUN = '''\
-"""Pours pour.xml in MuJoCo and leaves grains.csv: python pour.py"""
+"""{title}; it pours pour.xml and leaves grains.csv: python pour.py"""
 
 import mujoco
 import numpy as np
@@ -203,5 +211,7 @@ np.savetxt("grains.csv", table, delimiter=",", header="x,y,z,radius", comments="
 def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     """Returns the files of a pour: `python pour.py` leaves grains.csv."""
     del young
-    run = _RUN.format(earliest=setup.earliest, horizon=setup.horizon)
+    run = _RUN.format(
+        title=signed(setup.name, ENGINE), earliest=setup.earliest, horizon=setup.horizon
+    )
     return {"pour.xml": mjcf(setup), "pour.py": run}

@@ -7,10 +7,11 @@ e, of two shapes the mean, where `enable_restitution` is on.
 
 import json
 
+from granulcal.export.mark import signed
 from granulcal.export.mesh import triangles
 from granulcal.export.setup import Contact, Setup
 
-__all__ = ["ENGINE", "NOTES", "material", "notes", "scene"]
+__all__ = ["ENGINE", "NOTES", "UNEQUAL", "material", "notes", "scene"]
 
 ENGINE = "newton"
 NOTES = (
@@ -18,6 +19,8 @@ NOTES = (
     "tangential_restitution has no counterpart",
     "round walls are meshes of 64 sides",
 )
+UNEQUAL = "rolling and torsional lengths are those of the smallest"
+"""What of a material is not each grain's own where they differ in size."""
 _DT = 5e-4
 
 
@@ -77,7 +80,12 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
         {"vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist()}
         for mesh in (triangles(body.shape) for body in setup.walls)
     ]
-    table = {"centres": setup.centres.tolist(), "radii": setup.radii.tolist(), "walls": walls}
+    table = {
+        "file": signed(setup.name, ENGINE),
+        "centres": setup.centres.tolist(),
+        "radii": setup.radii.tolist(),
+        "walls": walls,
+    }
     own, wide = setup.effective_radius, setup.smallest
     laws = _config("ground", setup.ground, wide, 0.0, setup.grains, own)
     laws += "".join(
@@ -86,7 +94,7 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     )
     names = ", ".join(f"wall_{i}" for i in range(len(setup.walls)))
     script = f"""\
-\"\"\"Pours {setup.name} in Newton and leaves grains.csv: python pour.py\"\"\"
+\"\"\"{signed(setup.name, ENGINE)}; it leaves grains.csv: python pour.py\"\"\"
 {"".join(f"# {note}" + chr(10) for note in notes(setup))}
 import json
 

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.export.law import Contact, Stiffness
+from granulcal.export.mark import plain
 from granulcal.export.mesh import triangles
 from granulcal.pours.scene import Scene
 
-__all__ = ["Body", "Contact", "Setup", "Stiffness", "walls_of"]
+__all__ = ["Body", "Contact", "Setup", "Stiffness", "require_funnel_in_place", "walls_of"]
 
 Array = NDArray[np.float64]
 
@@ -20,7 +21,8 @@ _LEAST_WIDTH, _FARTHEST = 0.8, 4.0
 _ROLLING_LOSS = 5.0 / 7.0
 _FALLEN = 0.25
 # What no engine's file can say, by path in the scene.
-_REFUSED = ("periodic", "outflow", "intruder", "bed", "grains.shape")
+_REFUSED = ("periodic", "outflow", "intruder", "bed", "grains.shape", "effects.clump")
+_POSE = ("x", "y", "lean_x", "lean_y")
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class Setup:
     """A pour.
 
     Attributes:
-        name: of the scene.
+        name: of the scene, without characters that are code or markup somewhere.
         centres, radii: the grains at the start [m], shapes (n, 3) and (n,).
         density: of a grain [kg/m^3].
         gravity: acceleration [m/s^2].
@@ -74,13 +76,13 @@ class Setup:
         """Returns the pour of a scene with a seed.
 
         Raises:
-            ValueError: the scene has grains that are not round, moving or meshed walls, a period,
-                an outflow, an intruder or a bed.
+            ValueError: the scene has grains that are not round or are clumps, moving or meshed
+                walls, a period, an outflow, an intruder or a bed.
         """
         table = scene.to_dict()
         for path in _REFUSED:
             *places, key = path.split(".")
-            if key in (table[places[0]] if places else table):
+            if key in (table.get(places[0], {}) if places else table):
                 raise ValueError(
                     f"{scene.name}: `{path}` has no counterpart in other engines' files"
                 )
@@ -91,7 +93,7 @@ class Setup:
         gravity = tuple(float(g) for g in table["gravity"])
         fall = float(np.sqrt(2.0 * centres[:, 2].max() / max(np.linalg.norm(gravity), 1e-9)))
         return cls(
-            name=scene.name,
+            name=plain(scene.name),
             centres=centres,
             radii=radii,
             density=float(table["grains"]["density"]),
@@ -117,6 +119,20 @@ class Setup:
         return float(self.radii.min())
 
     @property
+    def has_sizes(self) -> bool:
+        """Whether the grains differ in size."""
+        return bool(np.ptp(self.radii) > 0.0)
+
+    @property
+    def gravity_line(self) -> str:
+        """The fix of LAMMPS and LIGGGHTS for gravity; nothing where there is none."""
+        g = float(np.linalg.norm(self.gravity))
+        if g == 0.0:
+            return ""
+        direction = " ".join(f"{c / g:.9g}" for c in self.gravity)
+        return f"fix           gravity all gravity {g:.9g} vector {direction}"
+
+    @property
     def effective_radius(self) -> float:
         """R_eff of two of the smallest grains, R / 2 [m]."""
         return 0.5 * self.smallest
@@ -129,6 +145,21 @@ class Setup:
     def stiffness(self, young: float | None = None) -> Stiffness:
         """Returns stiffness and time step for an elastic engine."""
         return Stiffness.of(self.smallest, self.density, young)
+
+
+def require_funnel_in_place(scene: Scene) -> None:
+    """Refuses a funnel that hangs beside its place or leans: the grains' start follows it alone.
+
+    Raises:
+        ValueError: names the offset or the angle.
+    """
+    pose = scene.to_dict().get("effects", {}).get("funnel", {})
+    moved = [f"{name} = {pose[name]:g}" for name in _POSE if pose.get(name, 0.0) != 0.0]
+    if moved:
+        raise ValueError(
+            f"{scene.name}: `effects.funnel` has {', '.join(moved)}, and a funnel is exported in its "
+            f"place alone: {', '.join(_POSE)} must be 0"
+        )
 
 
 def walls_of(scene: Scene) -> tuple[Body, ...]:

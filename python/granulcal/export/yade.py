@@ -8,10 +8,11 @@ contact that ends when its force is zero, as ours does.
 
 import json
 
+from granulcal.export.mark import signed
 from granulcal.export.mesh import triangles
 from granulcal.export.setup import Setup
 
-__all__ = ["ENGINE", "NOTES", "material", "scene"]
+__all__ = ["ENGINE", "NOTES", "UNEQUAL", "material", "scene"]
 
 ENGINE = "yade"
 NOTES = (
@@ -22,6 +23,11 @@ NOTES = (
     "tangential_restitution has no counterpart: es follows en",
     "round walls are meshes of 64 sides",
 )
+UNEQUAL = (
+    "rolling friction of two has half of the mean of their radii as lever, which is more than R_eff; "
+    "the rolling spring and the time step are those of the smallest"
+)
+"""What of a material is not each grain's own where they differ in size."""
 _RATE = 0.25
 
 
@@ -55,10 +61,15 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
         [*map(float, centre), float(radius)]
         for centre, radius in zip(setup.centres, setup.radii, strict=True)
     ]
-    table = {"grains": grains, "walls": walls, "ground": setup.ground.friction_angle}
+    table = {
+        "file": signed(setup.name, ENGINE),
+        "grains": grains,
+        "walls": walls,
+        "ground": setup.ground.friction_angle,
+    }
     w, stiffness = setup.half_width, setup.stiffness(young)
     script = f"""\
-\"\"\"Pours {setup.name} in YADE and leaves grains.csv: yade -n -x pour.py\"\"\"
+\"\"\"{signed(setup.name, ENGINE)}; it leaves grains.csv: yade -n -x pour.py\"\"\"
 
 import json
 import os

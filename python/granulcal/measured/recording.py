@@ -173,7 +173,10 @@ class Recording:
 
     @property
     def unlike(self) -> str | None:
-        """That the frames do not look like images of one formation at rest; None if they do."""
+        """That the frames do not look like images of one formation at rest; None if they do.
+
+        Also what of the recording's own lens and unit the camera's file contradicts.
+        """
         return self._native.unlike
 
     @property

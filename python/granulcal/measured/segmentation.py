@@ -19,7 +19,10 @@ class SegmentationSettings(TypedDict, total=False):
         downsample: keep one pixel of every block of this side; the default matches
             `ground_resolution`, or is 1 without.
         ground_resolution: width on the ground that a pixel should have [m], as in the
-            simulated images to compare with; see `Scene.ground_resolution`.
+            simulated images to compare with; see `Scene.reading`. It comes before a `downsample` of
+            the camera's file.
+        field_width: side of the square of ground about the formation that is kept of an image that
+            shows more [m], as in those images; default none.
         inlier_distance: distance within which a pixel can be ground [m]; the default is
             automatic, from 3 mm on.
         max_tilt_deg: tilt beyond which a plane is a wall and not the ground [deg]; default 45.
@@ -35,6 +38,7 @@ class SegmentationSettings(TypedDict, total=False):
     border_px: int | None
     downsample: int | None
     ground_resolution: float | None
+    field_width: float | None
     inlier_distance: float | None
     max_tilt_deg: float | None
     flying_deg: float | None

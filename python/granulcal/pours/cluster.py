@@ -7,6 +7,7 @@ again asks for what is missing.
 """
 
 import contextlib
+import socket
 import statistics
 import tempfile
 import time
@@ -48,6 +49,10 @@ PATIENCE_S = 0.5
 """How long the driver waits for a task before it looks around [s]."""
 RETRIES = 20
 """Workers that are killed under the same part so often are not killed by chance."""
+
+
+# How long an address may take to answer [s].
+_PATIENCE_OF_ADDRESS_S = 20.0
 
 
 class LostResultError(Exception):
@@ -121,9 +126,27 @@ def connected() -> Any:
     quiet = {"log_to_driver": False, "logging_level": "ERROR", "include_dashboard": False}
     if cluster.address != "local":
         del quiet["include_dashboard"]
+        _require_listener(cluster.address)
     ray.init(address=cluster.address, **quiet)
     _is_connection_ours = True
     return ray
+
+
+def _require_listener(address: str) -> None:
+    """Refuses HOST:PORT at which nobody listens, for which Ray would wait ten minutes.
+
+    Raises:
+        ConnectionError: nobody answers there.
+    """
+    host, mark, port = address.removeprefix("ray://").rpartition(":")
+    if not mark or not port.isdecimal():
+        return
+    try:
+        socket.create_connection(
+            (host.strip("[]"), int(port)), timeout=_PATIENCE_OF_ADDRESS_S
+        ).close()
+    except (OSError, OverflowError) as error:
+        raise ConnectionError(f"no Ray cluster answers at {address}: {error}") from error
 
 
 def cores_of(cluster: Cluster) -> int:

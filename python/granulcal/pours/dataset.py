@@ -119,6 +119,11 @@ class Dataset:
         return Scene.from_toml(self.scene_toml)
 
     @property
+    def missing(self) -> int:
+        """Rows that are missing of those asked for: of a batch that was stopped, or a shard."""
+        return self._native.missing
+
+    @property
     def is_usable(self) -> NDArray[np.bool_]:
         """Which pours are healthy, left the funnel and show every statistic of `x`, shape (n,)."""
         return ~np.isin(self.status, (*UNUSABLE, NO_GRAINS)) & np.isfinite(self.x).all(axis=1)

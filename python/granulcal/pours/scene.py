@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from granulcal import _native
 from granulcal.whole import check_seed
 from granulcal.words import not_there
+
+if TYPE_CHECKING:
+    from granulcal.measured.segmentation import SegmentationSettings
 
 __all__ = ["Material", "Scene"]
 
@@ -268,6 +271,16 @@ class Scene:
         """Width of a pixel of the camera's down-sampled image on the ground [m]."""
         width = self.get("camera.field_width") / self.get("camera.pixels")
         return width * self.get("camera.downsample")
+
+    @property
+    def reading(self) -> "SegmentationSettings":
+        """Arguments of `Recording.formation` that make a recording like this scene's images.
+
+        Pixels as wide on the ground, and where a recording shows more of it, the square that the
+        images show, about the formation.
+        """
+        field = self.get("camera.field_width")
+        return {"ground_resolution": self.ground_resolution, "field_width": field}
 
     @property
     def name(self) -> str:

@@ -22,6 +22,8 @@ CONDITIONS = {"low": 0.06, "high": 0.12}
 # Path of the height [m] that each scene pours from.
 _TIPS = {"funnel": "funnel.height", "drop": "start.height"}
 _POURS = 2
+# Height above which nothing is data, over that of the funnel's tip.
+_BELOW_TIP = 0.8
 # Width of a pixel on the ground that images are compared at, over a grain's diameter.
 _PIXEL = 1.25
 _LEAST_THRESHOLD = 1e-3
@@ -139,7 +141,7 @@ def write_folder(
     written = Scene.from_toml(text)
     replace_file(folder / "scene.toml", text)
     replace_file(folder / "prior.toml", PRIOR)
-    replace_file(folder / "camera.toml", camera_text(lens))
+    replace_file(folder / "camera.toml", camera_text(lens, written.get(path)))
     names = {
         name: json.dumps([f"pours/{name}-{i}.png" for i in range(_POURS)]) for name in CONDITIONS
     }
@@ -196,10 +198,10 @@ def scene_text(name: str, lens: Lens) -> str:
     )
 
 
-def camera_text(lens: Lens) -> str:
-    """Returns the commented TOML of a camera."""
+def camera_text(lens: Lens, tip: float) -> str:
+    """Returns the commented TOML of a camera above what is poured from a height `tip` [m]."""
     shown = {
         key: getattr(lens, key)
         for key in ("width", "height", "fx", "fy", "cx", "cy", "unit", "threshold", "origin")
     }
-    return CAMERA.format(**shown)
+    return CAMERA.format(**shown, max_height=round(_BELOW_TIP * tip, 3))

@@ -99,7 +99,8 @@ high = 1.0
 CAMERA = """\
 # The lens of the depth camera, and how its images become heights. {origin}
 #   granulcal features couscous.png --camera camera.toml
-# A .bag or .mcap has a lens and a unit of its own: it needs this file for [segmentation] only.
+# A .bag or .mcap has a lens and a unit of its own: for one, leave the numbers above [segmentation] out, since they
+# replace its own (which is said where they differ).
 # cx and cy as OpenCV and the RealSense SDK give them: the first pixel's centre is (0, 0).
 width = {width}
 height = {height}
@@ -111,7 +112,7 @@ depth_unit = {unit:g}          # metres per count of the 16-bit PNG
 
 [segmentation]
 border_px = 0                 # ignore a frame of so many pixels
-max_height = 0.15             # above it is the funnel or a hand
+max_height = {max_height:g}             # no data above it: the funnel, a hand
 height_threshold = {{ absolute = {threshold:g} }}   # as in scene.toml
 """
 

@@ -76,11 +76,10 @@ fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
 
 /// The recording's own segmentation with what the command line changes.
 fn segmentation(args: &FeaturesArgs, own: &Segmentation) -> anyhow::Result<Segmentation> {
-    let mut changed = own.clone();
-    if let Some(name) = &args.scene {
-        changed.downsample = None;
-        changed.ground_resolution = Some(scene::named(name)?.camera.ground_resolution());
-    }
+    let mut changed = match &args.scene {
+        Some(name) => own.as_seen_by(&scene::named(name)?.camera),
+        None => own.clone(),
+    };
     if let Some(height) = args.threshold {
         changed.height_threshold = Threshold::Absolute(height);
     }

@@ -34,7 +34,8 @@ parameters. Needs neither Python nor torch; a robot runs it after every pour.
 
 RECORDING is what `features` reads. Several recordings are pours of one material and give one
 posterior. The images are down-sampled so that a pixel is as wide on the ground as in the scene
-that the model was trained on, unless --camera says otherwise.
+that the model was trained on, and where they show more of the ground than it does, its square about
+the formation is cut out.
 
 A model answers under its own assumptions, right or wrong. So the recording's height, extent and
 ground are compared with what the model's scene allows, and its statistics with what any parameters
@@ -110,7 +111,7 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
         Some(scene) => Limits::of(scene, &model.prior)?,
         None => None,
     };
-    let ground_resolution = trained.map(|scene| scene.camera.ground_resolution());
+    let camera = trained.map(|scene| scene.camera);
     require_different(&args.recordings)?;
     let (mut is_whole, mut impossible, mut doubts) = (true, Vec::new(), Vec::new());
     let mut observed = Vec::with_capacity(args.recordings.len());
@@ -125,8 +126,9 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
         }
         doubts
             .extend(recording.unlike.iter().map(|unlike| format!("{}: {unlike}", path.display())));
-        let mut segmentation = recording.segmentation.clone();
-        segmentation.ground_resolution = ground_resolution.or(segmentation.ground_resolution);
+        let own = &recording.segmentation;
+        let mut segmentation =
+            camera.as_ref().map_or_else(|| own.clone(), |camera| own.as_seen_by(camera));
         segmentation.border_px = args.border.unwrap_or(segmentation.border_px);
         let formation = recording.formation_with(&segmentation)?;
         if args.border.is_none() {

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::ops::{ControlFlow, Range};
 
 use granulcal_features::{ColourImage, DepthImage, Intrinsics, register_colour};
+use granulcal_numbers::short;
 
 use super::ReadOptions;
 use crate::fault::Fault;
@@ -28,7 +29,7 @@ pub(super) struct Averaged {
     pub(super) whole: u64,
     pub(super) lost: Option<Lost>,
     pub(super) damage: Vec<String>,
-    /// That the frames are not of one view, if they do not look so.
+    /// That the frames are not of one view, if they do not look so, and what the camera's file contradicts.
     pub(super) unlike: Option<String>,
 }
 
@@ -47,6 +48,7 @@ pub(super) fn read(
         Some(unit) => unit,
         None => survey.unit(depth)?.metres,
     };
+    let replaced = replaced(&survey, depth, options, camera);
     // An image beside the camera's TOML comes first; see the caller.
     let wants_colour =
         camera.is_some_and(|file| file.segmentation.colour.is_some() && file.colour.is_none());
@@ -71,9 +73,44 @@ pub(super) fn read(
         undecodable: 0,
         fault: None,
         colour_message: None,
+        replaced,
     };
     walk(survey.format, input, &mut |message| pass.take(message))?;
     pass.finish(intrinsics)
+}
+
+/// Share by which the numbers of a camera's file may differ from the recording's own.
+const SAME: f64 = 0.01;
+/// Metres to a number of an image of floating point.
+const METRES: f64 = 1.0;
+
+/// What the camera's file says otherwise than the recording of its own lens and unit, in which it is believed.
+fn replaced(
+    survey: &Survey,
+    depth: &Topic,
+    options: &ReadOptions,
+    camera: Option<&CameraFile>,
+) -> Option<String> {
+    let (file, path) = (camera?, options.camera.as_deref()?);
+    let own = || survey.lens(depth, options.camera_topic.as_deref()).ok().map(|(_, lens)| lens);
+    let lens = file.lens.and_then(|lens| Some((lens, own()?)));
+    let lens = lens.into_iter().flat_map(|(lens, own)| {
+        [
+            ("fx", lens.fx, own.fx),
+            ("fy", lens.fy, own.fy),
+            ("cx", lens.cx, own.cx),
+            ("cy", lens.cy, own.cy),
+        ]
+    });
+    // Floating point is in metres, whatever a file says of counts.
+    let own = || survey.unit(depth).ok().map(|unit| unit.metres).filter(|&metres| metres != METRES);
+    let unit = file.depth_unit.and_then(|unit| Some(("depth_unit", unit, own()?)));
+    let differs = |(_, told, own): &(&str, f64, f64)| (told - own).abs() > SAME * own.abs();
+    let told = lens.chain(unit).filter(differs);
+    let told: Vec<_> =
+        told.map(|(key, told, own)| format!("{key} {} for {}", short(told), short(own))).collect();
+    let what = "in place of the recording's own: is it of this camera, at this size?";
+    (!told.is_empty()).then(|| format!("{} gives {} {what}", path.display(), told.join(", ")))
 }
 
 /// The second pass.
@@ -99,6 +136,8 @@ struct Pass<'s> {
     fault: Option<Fault>,
     /// The last colour image before the end of the window, or the first behind it.
     colour_message: Option<(Channel, Vec<u8>)>,
+    /// What of the recording's lens and unit the camera's file contradicts.
+    replaced: Option<String>,
 }
 
 impl Pass<'_> {
@@ -172,7 +211,9 @@ impl Pass<'_> {
             let nothing = || Fault::new("the frames", "none", "whole");
             return Err(self.fault.unwrap_or_else(nothing).in_file(path));
         };
-        let (frames, unlike) = (mean.frames(), mean.doubt());
+        let frames = mean.frames();
+        let unlike: Vec<_> = self.replaced.into_iter().chain(mean.doubt()).collect();
+        let unlike = (!unlike.is_empty()).then(|| unlike.join("; "));
         let image = mean.finish().map_err(|fault| fault.in_file(path))?;
         let colour = match (self.colour, &self.colour_message) {
             (Some(topic), Some((channel, data))) => {

@@ -27,6 +27,10 @@ pub struct Formation {
     pub ground_sd: f64,
     /// Pixels that carry data, within the border.
     pub valid_count: usize,
+    /// Share of the square of ground that was asked for which the image shows `[-]`; none without one.
+    pub shown: Option<f64>,
+    /// Whether the image shows more, which was cut off.
+    pub is_cropped: bool,
     /// Pixels taken for grains.
     pub masked_count: usize,
     /// Height above the ground from which a pixel counts as grain `[m]`; not applied when a colour
@@ -55,8 +59,8 @@ impl Levelled {
         let mut points: Vec<_> = masked().map(|(_, i)| self.points[i]).collect();
         if points.is_empty() {
             let highest = self.points.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
-            let (valid, threshold) = (self.valid_count, self.threshold);
-            return Err(FeatureError::EmptyMask { valid, highest, threshold });
+            let Self { valid_count: valid, threshold, above_count: above, .. } = self;
+            return Err(FeatureError::EmptyMask { valid, highest, threshold, above });
         }
         let volume = masked().map(|(_, i): (_, usize)| self.volumes[i]).sum();
         let shape = shape::of(&self);
@@ -71,6 +75,8 @@ impl Levelled {
             plane: self.plane,
             ground_sd: self.ground_sd,
             valid_count: self.valid_count,
+            shown: self.shown,
+            is_cropped: self.is_cropped,
             threshold: self.threshold,
             centroid,
             volume,

@@ -1,5 +1,7 @@
 //! An image turned so that its ground is z = 0: what depth images and height maps share.
 
+use std::ops::RangeInclusive;
+
 use nalgebra::{Point3, Vector3};
 
 use super::component::{remove_low, remove_small};
@@ -27,6 +29,19 @@ const FIRST_REACH: f64 = 0.003;
 /// ground is rougher than the inlier distance. Gaussian noise whose sd is the distance has 0.4, whose
 /// sd is a third of it 0.003.
 const SHOULDER: f64 = 0.3;
+
+/// A ground of two levels, such as a mat on a table, draws the plane between them. A plane is on one of them if so many
+/// of the points lie on it, and scatter about it less than this share of what they did.
+const LEVEL_SHARE: f64 = 0.35;
+const LEVEL_SCATTER: f64 = 1.0 / 3.0;
+/// Standard deviation about the plane between two levels, at least `[m]`: below it nothing is to be gained.
+const BETWEEN_LEVELS: f64 = 1e-3;
+/// What scatters less about a plane is of one count of a camera and no level `[m]`.
+const LEAST_SCATTER: f64 = 1e-5;
+/// Points between three and six standard deviations of a level from it, over those on it, at most: two levels have a gap.
+const IN_GAP: f64 = 0.1;
+/// Inlier distance by which one of two levels is looked for, over the standard deviation about the plane between them.
+const LEVEL_REACH: f64 = 0.25;
 
 /// The inlier distance grows to at most this share of the extent of the points.
 const LARGEST_REACH: f64 = 0.05;
@@ -72,6 +87,12 @@ pub struct Levelled {
     pub threshold: f64,
     /// Pixels that carry data, within the border.
     pub valid_count: usize,
+    /// Pixels above the greatest height, which carry none.
+    pub above_count: usize,
+    /// Share of the square of ground that was asked for which the image shows `[-]`; none without one.
+    pub shown: Option<f64>,
+    /// Whether the image shows more, which was cut off.
+    pub is_cropped: bool,
     /// The factor by which the image was down-sampled.
     pub downsample: usize,
     /// Width of a pixel on the ground, along x and y `[m/px]`.
@@ -115,22 +136,25 @@ impl Cloud {
         let (plane, ground_sd) = self.ground(settings, grains, up)?;
         let threshold = settings.height_threshold.height(ground_sd);
         let ground_from_input = plane.plane.ground_from_world();
-        let levelled: Vec<_> =
-            self.points.iter().map(|p| (ground_from_input * Point3::from(*p)).coords).collect();
         let max_height = settings.max_height.unwrap_or(f64::INFINITY);
         let mut heights = vec![None; self.width * self.height];
         let mut mask = vec![false; self.width * self.height];
-        for (&pixel, point) in self.pixels.iter().zip(&levelled) {
+        let (mut pixels, mut points, mut volumes) = (Vec::new(), Vec::new(), Vec::new());
+        for (&pixel, seen) in self.pixels.iter().zip(&self.points) {
+            let point = (ground_from_input * Point3::from(*seen)).coords;
+            if point.z > max_height {
+                continue;
+            }
             heights[pixel] = Some(point.z);
-            let is_grain = grains.map_or(point.z > threshold, |grains| grains[pixel]);
-            mask[pixel] = is_grain && point.z <= max_height;
+            mask[pixel] = grains.map_or(point.z > threshold, |grains| grains[pixel]);
+            pixels.push(pixel);
+            volumes.push(self.volume(&plane, seen, point.z));
+            points.push(point);
         }
         if let (Some(peak), None) = (settings.height_threshold.peak(ground_sd), grains) {
             remove_low(&mut mask, self.width, |pixel| heights[pixel].is_some_and(|z| z > peak));
         }
         remove_small(&mut mask, self.width, settings.min_component_px);
-        let volumes = self.points.iter().zip(&levelled);
-        let volumes = volumes.map(|(seen, level)| self.volume(&plane, seen, level.z)).collect();
         Ok(Levelled {
             width: self.width,
             height: self.height,
@@ -138,13 +162,16 @@ impl Cloud {
             mask,
             ground_sd,
             threshold,
-            valid_count: levelled.len(),
+            valid_count: points.len(),
+            above_count: self.points.len() - points.len(),
+            shown: None,
+            is_cropped: false,
             downsample: self.downsample,
             resolution: self.resolution(&plane),
             plane,
             volumes,
-            points: levelled,
-            pixels: self.pixels,
+            points,
+            pixels,
         })
     }
 
@@ -180,18 +207,25 @@ impl Cloud {
             reach *= 2.0;
             plane = up(search(reach)?);
         }
-        let mut sd = sd_from_below(&ground, &plane, reach);
-        // The foot of a pile is within the inlier distance and lifts the plane: fit again to what
-        // the noise allows, until it allows no less. Only a distance that has grown may still grow.
-        for _ in 0..MAX_TIGHTENINGS {
-            let wanted = (3.0 * sd).max(FINEST_INLIER);
-            let grows = reach > first && wanted > reach / SETTLED && wanted <= largest;
-            if wanted >= SETTLED * reach && !grows {
-                break;
+        // Only a distance that has grown may still grow.
+        let (plane, sd) = tightened(&ground, plane, reach, first..=largest, &up)?;
+        if settings.inlier_distance.is_none() && sd > BETWEEN_LEVELS {
+            let near = LEVEL_REACH * sd;
+            let grown = 0.0..=3.0 * sd;
+            let (level, scatter) = tightened(&ground, up(search(near)?), near, grown, &up)?;
+            let within = |sds: f64| {
+                let on_it = |point: &&Vector3<f64>| {
+                    level.plane.signed_distance(point).abs() <= sds * scatter
+                };
+                ground.iter().filter(on_it).count() as f64
+            };
+            let (on_it, and_near) = (within(3.0), within(6.0));
+            let is_level = on_it >= LEVEL_SHARE * ground.len() as f64
+                && and_near - on_it <= IN_GAP * on_it
+                && scatter > LEAST_SCATTER;
+            if is_level && scatter < LEVEL_SCATTER * sd {
+                return Ok((level, scatter));
             }
-            reach = wanted;
-            plane = up(refine_plane(&ground, plane.plane, reach)?);
-            sd = sd_from_below(&ground, &plane, reach);
         }
         Ok((plane, sd))
     }
@@ -233,6 +267,30 @@ impl Levelled {
             .zip(&self.volumes)
             .map(|((point, &pixel), &volume)| (point, self.mask[pixel], volume))
     }
+}
+
+/// The plane fitted again to what the noise allows, until it allows no less, and the standard deviation about it `[m]`: the
+/// foot of a pile is within the first inlier distance and lifts the plane. A distance that is in `grown` may grow there.
+fn tightened(
+    ground: &[Vector3<f64>],
+    mut plane: PlaneFit,
+    mut reach: f64,
+    grown: RangeInclusive<f64>,
+    up: &impl Fn(PlaneFit) -> PlaneFit,
+) -> Result<(PlaneFit, f64), FeatureError> {
+    let mut sd = sd_from_below(ground, &plane, reach);
+    for _ in 0..MAX_TIGHTENINGS {
+        let wanted = (3.0 * sd).max(FINEST_INLIER);
+        let may_grow = reach > *grown.start() && wanted <= *grown.end();
+        let grows = may_grow && wanted > reach / SETTLED;
+        if wanted >= SETTLED * reach && !grows {
+            break;
+        }
+        reach = wanted;
+        plane = up(refine_plane(ground, plane.plane, reach)?);
+        sd = sd_from_below(ground, &plane, reach);
+    }
+    Ok((plane, sd))
 }
 
 /// Diagonal of the box around the points `[m]`.

@@ -1,5 +1,7 @@
 //! What of an image besides its points tells whether the formation was seen whole and alone.
 
+use std::collections::BTreeMap;
+
 use super::component::patches;
 use super::edge::depth_in;
 use super::formation::Formation;
@@ -7,6 +9,10 @@ use super::formation::Formation;
 /// A second heap: higher than so many grains, of the room of so many.
 const HEAP_HEIGHT: f64 = 2.5;
 const HEAP_GRAINS: f64 = 30.0;
+
+/// A pixel without data is in a hole if so many of the eight around it have none, or more; of a fifth that are missing at
+/// random one in a hundred is.
+const BLIND_AROUND: usize = 4;
 
 /// Grains that stand apart from the formation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,6 +38,34 @@ impl Formation {
         let Some(depth) = depth_in(self.mask.len(), self.width) else { return false };
         let largest = patches(&self.mask, self.width).into_iter().max_by_key(Vec::len);
         largest.is_some_and(|patch| patch.into_iter().any(|pixel| depth(pixel) == 0))
+    }
+
+    /// Share of the outline of the formation's largest patch beyond which nothing is seen: the edge of the image, a border
+    /// that is ignored, what is above the greatest height, and holes, but for single pixels `[-]`.
+    pub fn hidden_share(&self) -> f64 {
+        let largest = patches(&self.mask, self.width).into_iter().max_by_key(Vec::len);
+        let Some(patch) = largest else { return 0.0 };
+        let (width, height) = (self.width as isize, self.height as isize);
+        let at = |(u, v): (isize, isize)| {
+            let is_inside = u >= 0 && v >= 0 && u < width && v < height;
+            is_inside.then_some((v * width + u) as usize)
+        };
+        let is_blind = |place| at(place).is_none_or(|pixel| self.heights[pixel].is_none());
+        let is_hidden = |(u, v)| {
+            let around = (-1..=1).flat_map(|du| (-1..=1).map(move |dv| (u + du, v + dv)));
+            is_blind((u, v)) && around.filter(|&place| is_blind(place)).count() > BLIND_AROUND
+        };
+        let mut outline = BTreeMap::new();
+        for pixel in patch {
+            let (u, v) = ((pixel % self.width) as isize, (pixel / self.width) as isize);
+            for place in [(u - 1, v), (u + 1, v), (u, v - 1), (u, v + 1)] {
+                if at(place).is_none_or(|pixel| !self.mask[pixel]) {
+                    outline.entry(place).or_insert_with(|| is_hidden(place));
+                }
+            }
+        }
+        let hidden = outline.values().filter(|&&hidden| hidden).count();
+        hidden as f64 / outline.len().max(1) as f64
     }
 
     /// Share of the image that carries data, less a border all around that has none `[-]`.
@@ -102,6 +136,27 @@ mod tests {
         assert!((pile.margin() - 0.64).abs() < 0.05, "{}", pile.margin());
         assert!(!pile.is_cut_off() && pile.other_heaps(DIAMETER).is_empty());
         assert_eq!(pile.seen_share(), 1.0);
+    }
+
+    #[test]
+    fn what_hides_a_part_is_known() {
+        let (pile, height_threshold) = (([40.0, 40.0], 0.02, 0.03), Threshold::Absolute(1e-3));
+        assert_eq!(seen(&[pile], 0).hidden_share(), 0.0);
+        // No data up to a column through it, and a border as wide as that.
+        let blind = seen(&[pile], 36);
+        assert!(blind.hidden_share() > 0.2 && !blind.is_cut_off(), "{}", blind.hidden_share());
+        let aside = seen(&[([18.0, 40.0], 0.02, 0.03)], 0);
+        let z = aside.heights.iter().map(|seen| seen.unwrap()).collect();
+        let mut map = HeightMap::new(SIDE, SIDE, 2e-3, 2e-3, z).unwrap();
+        let own = Segmentation { height_threshold, ..Segmentation::default() };
+        let read = |settings| segment_height_map(&map, &settings).unwrap().hidden_share();
+        assert_eq!(read(own.clone()), 0.0);
+        assert!(read(Segmentation { border_px: 10, ..own.clone() }) > 0.1);
+        // A hand over it is no data, and hides.
+        assert!(read(Segmentation { max_height: Some(0.012), ..own.clone() }) > 0.1);
+        // Single pixels that are missing hide nothing.
+        map.z.iter_mut().step_by(3).for_each(|z| *z = f64::NAN);
+        assert_eq!(segment_height_map(&map, &own).unwrap().hidden_share(), 0.0);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::camera::sample_offset;
 use crate::colour::HsvRange;
 use crate::error::{FeatureError, require_in};
+use granulcal_scene::CameraSpec;
 
 /// Largest length `[m]` that a setting may have.
 const MAX_LENGTH: f64 = 1e3;
@@ -69,6 +70,9 @@ pub struct Segmentation {
     /// Width of a pixel on the ground that the down-sampled image should have `[m/px]`: that of the
     /// simulated images. Default none.
     pub ground_resolution: Option<f64>,
+    /// Side of the square of ground that is kept of an image that shows more `[m]`: that of the simulated images.
+    /// Default none.
+    pub field_width: Option<f64>,
     /// Distance from the plane within which a pixel can be ground `[m]`. Default automatic: from 3 mm
     /// on it is doubled until the ground does not go on below it, then brought to the noise found.
     pub inlier_distance: Option<f64>,
@@ -95,6 +99,7 @@ impl Default for Segmentation {
             border_px: 0,
             downsample: None,
             ground_resolution: None,
+            field_width: None,
             inlier_distance: None,
             max_tilt_deg: 45.0,
             flying_deg: 80.0,
@@ -106,6 +111,18 @@ impl Default for Segmentation {
 }
 
 impl Segmentation {
+    /// These settings for a recording that is held against the images of a scene's camera: pixels as wide on the ground,
+    /// and no more of the ground in view.
+    #[must_use]
+    pub fn as_seen_by(&self, camera: &CameraSpec) -> Self {
+        Self {
+            downsample: None,
+            ground_resolution: Some(camera.ground_resolution()),
+            field_width: Some(camera.field_width),
+            ..self.clone()
+        }
+    }
+
     /// Refuses lengths that mean nothing.
     pub(super) fn require_valid(&self) -> Result<(), FeatureError> {
         let threshold = match self.height_threshold {
@@ -118,6 +135,7 @@ impl Segmentation {
         };
         optional("inlier_distance [m]", self.inlier_distance, 1e-9)?;
         optional("ground_resolution [m/px]", self.ground_resolution, 1e-9)?;
+        optional("field_width [m]", self.field_width, 1e-9)?;
         optional("max_height [m]", self.max_height, 0.0)?;
         require_in("max_tilt_deg [deg]", self.max_tilt_deg, 0.0, 90.0)?;
         require_in("flying_deg [deg]", self.flying_deg, 0.0, 90.0)

@@ -295,6 +295,25 @@ fn a_rough_ground_is_found_without_being_told_how_rough() {
 }
 
 #[test]
+fn a_mat_on_a_table_is_the_ground_and_not_a_plane_between_them() {
+    let (positions, radii) = pile();
+    let map = height_map(&positions, &radii, 200, 2e-3, (0.0, 0.0)).unwrap();
+    for step in [2e-3, 4e-3, 6e-3] {
+        let mut map = map.clone();
+        let mut stream = Stream::new(5);
+        for (i, z) in map.z.iter_mut().enumerate() {
+            let (u, v) = (i % 200, i / 200);
+            // A mat that fills two thirds of the view, the heap on it.
+            let is_mat = (18..182).contains(&u) && (18..182).contains(&v);
+            *z += 1e-4 * stream.normal() - if is_mat { 0.0 } else { step };
+        }
+        let got = segment_height_map(&map, &Segmentation::default()).unwrap();
+        assert!(got.ground_sd < 1.5e-4, "{step}: {}", got.ground_sd);
+        assert!(got.plane.plane.offset.abs() < 1e-4, "{step}: {:?}", got.plane);
+    }
+}
+
+#[test]
 fn correlated_noise_is_no_grain_and_a_single_grain_is() {
     let camera = Camera::overhead(0.4, 0.4, 400).unwrap();
     let grain = [Vector3::new(0.1, 0.05, RADIUS)];

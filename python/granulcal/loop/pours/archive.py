@@ -125,7 +125,9 @@ class Archive:
         count = sum(images.missing for images in self._image_rows())
         for part in parts_of(self.plan):
             folder = self.folder / part.name
-            there = len(Dataset.load(folder)) if folder.exists() else 0
+            # A run that was killed at once may have left a folder without a data set.
+            is_begun = (folder / "manifest.toml").exists()
+            there = len(Dataset.load(folder)) if is_begun else 0
             count += max(part.count - there, 0)
         return count
 

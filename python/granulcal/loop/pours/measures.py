@@ -128,7 +128,7 @@ def formation_of(
 ) -> tuple[Recording, Formation]:
     """Returns a recording and its formation, its pixels as wide as those of the scene's images."""
     recording = Recording.open(path, camera=camera_used(path, camera))
-    settings = {"ground_resolution": scene.ground_resolution, **(reading or {})}
+    settings = {**scene.reading, **(reading or {})}
     return recording, recording.formation(**settings)
 
 

@@ -12,11 +12,11 @@ The interval of a prediction is that of one pour. Of simulated models it is the 
 draws of the fit; of `corrected` that of pours at the fit and of $\hat\delta(c)$ (`discrepancy.py`)
 together, on the scale z of the surrogate; of `line` and `nearest` the scatter of pours and, where
 three conditions or more were fitted, the error with which the row tells each from the others.
-`corrected` is refused farther from the tested conditions than its equation holds.
+`corrected`, `line` and `nearest` are refused farther from the tested conditions than the equation
+of the correction holds, and where a number is stated that no condition of the loop states.
 """
 
 import json
-import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -34,6 +34,7 @@ from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.check.trivial import line_weights, nearest_weights
 from granulcal.loop.effects.definitions import is_definition
 from granulcal.loop.pours.forward import Coarse, Forward
+from granulcal.loop.report.asked import condition_of, require_near, require_stated
 from granulcal.loop.report.interval import of_one_more, t_factor
 from granulcal.loop.report.models_schema import check_models
 from granulcal.loop.surrogate.transform import Transform
@@ -47,6 +48,7 @@ Array = NDArray[np.float64]
 
 MODELS = ("base", "named", "corrected", "line", "nearest")
 """What may predict."""
+_WITHOUT_PHYSICS = ("corrected", "line", "nearest")
 
 _NAME = "models.json"
 # Seeds of pours, apart from those of the archive and of the replicates.
@@ -91,12 +93,16 @@ class Prediction:
     level: float
 
     def to_dict(self) -> dict[str, Any]:
-        """Returns it for JSON."""
+        """Returns it for JSON: null where a statistic has no number."""
+
+        def number(value: float) -> float | None:
+            return float(value) if np.isfinite(value) else None
+
         return {
             "model": self.model,
             "level": self.level,
             "statistics": {
-                name: {"middle": float(m), "low": float(a), "high": float(b)}
+                name: {"middle": number(m), "low": number(a), "high": number(b)}
                 for name, m, a, b in zip(self.names, self.middle, self.low, self.high, strict=True)
             },
         }
@@ -233,9 +239,9 @@ class Models:
             pours: of a simulated model.
 
         Raises:
-            ObservationError: an unknown model, a condition that lacks an input of the archive, a
-                correction too far from the tested conditions, too few usable pours, or another
-                engine in use than that of the loop.
+            ObservationError: an unknown model, a condition that lacks an input of the archive, one
+                that a model without physics would ignore in part or that is too far from the tested
+                ones, too few pours or usable ones, or another engine in use than that of the loop.
         """
         if model not in MODELS:
             raise ObservationError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
@@ -253,9 +259,15 @@ class Models:
                 f"the condition must state {', '.join(inputs)}; it lacks "
                 f"{', '.join(missing)}{besides}"
             )
+        if model in _WITHOUT_PHYSICS:
+            known = list(dict.fromkeys((*self.paths, *inputs)))
+            require_stated(model, at, known)
         self.require_engine(model)
         if model in ("line", "nearest"):
+            require_near(model, self._unit(at), self.known)
             return self._row(model, self._unit(at), level)
+        if pours < _FEWEST:
+            raise ObservationError(f"{model}: pours must be at least {_FEWEST}, got {pours}")
         if model == "corrected":
             return self._corrected(at, forward, level, pours)
         makers = self.makers[model]
@@ -362,21 +374,3 @@ class Models:
             if weights is not None:
                 squares.append((self.means[h] - weights @ self.means[rest]) ** 2)
         return np.mean(squares, axis=0) if squares else np.zeros(self.means.shape[1])
-
-
-def condition_of(words: Sequence[str]) -> dict[str, float]:
-    """Returns numbers of a condition written `path=value`.
-
-    Raises:
-        ObservationError: a word that is not.
-    """
-    found = {}
-    for word in words:
-        path, _, value = word.partition("=")
-        try:
-            found[path] = float(tomllib.loads(f"x = {value}")["x"])
-        except (tomllib.TOMLDecodeError, TypeError, ValueError):
-            raise ObservationError(
-                f"a condition is written path=number, for example funnel.height=0.07; got {word!r}"
-            ) from None
-    return found

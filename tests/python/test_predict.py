@@ -1,0 +1,121 @@
+"""Which conditions `granulcal predict` takes."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from granulcal.cli import main
+from granulcal.errors import ObservationError
+from granulcal.loop.check import discrepancy
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.report.asked import REACH
+from granulcal.loop.report.models import Maker, Models, Prediction, condition_of
+from granulcal.loop.test.score import DISCREPANCY_LENGTH
+from granulcal.pours.scene import Scene
+
+NAME, OBSERVED = "radius[50]", "[observe.radius]\npercentiles = [50.0]\n"
+
+
+@pytest.fixture
+def models(tmp_path: Path) -> Models:
+    """Measured from two heights."""
+    scene = Scene.drop(0.02, count=12, preset="fast").to_toml()
+    made = Models(
+        scene=Scene.from_toml(f"{scene}\n[observe]\nrate = 100.0\n{OBSERVED}"),
+        verdict={"kind": "NONE", "named": []},
+        paths=("start.height", "material.restitution"),
+        inputs=(("start.height", 0.01, 0.02),),
+        names=(NAME,),
+        makers={name: (Maker({}, {}, {}),) * 2 for name in ("base", "named")},
+        columns=(),
+        transforms=(),
+        correction=None,
+        known=np.array([[0.0], [1.0]]),
+        means=np.array([[0.01], [0.02]]),
+        scatter=np.array([[0.001], [0.001]]),
+        pours=np.array([2.0, 2.0]),
+    )
+    made.write(tmp_path)
+    return made
+
+
+@pytest.mark.parametrize(
+    "word",
+    ["a=nan", "a=inf", "a=-inf", "a=true", 'a="0.5"', "a=1e200", f"a={'9' * 400}", "a", "=1",
+     "a=1\nb=2", "a=[1]"],
+)  # fmt: skip
+def test_a_condition_is_of_finite_numbers(word: str) -> None:
+    with pytest.raises(ObservationError, match="its number finite; got"):
+        condition_of([word])
+
+
+def test_a_condition_states_each_path_once() -> None:
+    with pytest.raises(ObservationError, match="each path once, got a twice"):
+        condition_of(["a=1", "b=2", "a=1"])
+    assert condition_of(["a=1e-3 # mine", "b=-2"]) == {"a": 1e-3, "b": -2.0}
+
+
+@pytest.mark.parametrize("model", ["line", "nearest", "corrected"])
+def test_what_a_model_without_physics_would_ignore_is_refused(
+    model: str, models: Models, tmp_path: Path
+) -> None:
+    at = {"start.height": 0.015, "grains.count": 500.0}
+    forward = Forward(tmp_path / "pours", 1)
+    with pytest.raises(ObservationError, match=f"{model} knows .* it would ignore grains.count"):
+        models.predict(model, at, forward)
+    # What the conditions share they state.
+    shared = {"start.height": 0.015, "material.restitution": 0.5}
+    if model != "corrected":
+        assert models.predict(model, shared, forward).middle == pytest.approx([0.015], abs=0.006)
+
+
+@pytest.mark.parametrize("model", ["line", "nearest"])
+def test_a_model_without_physics_is_not_asked_far_away(
+    model: str, models: Models, tmp_path: Path
+) -> None:
+    assert pytest.approx(discrepancy._REACH * DISCREPANCY_LENGTH) == REACH
+    forward = Forward(tmp_path / "pours", 1)
+    models.predict(model, {"start.height": 0.0224}, forward)
+    for height in (0.0226, 0.0074, 5.0):
+        with pytest.raises(ObservationError, match=f"{model} holds up to 0.25 .unit range."):
+            models.predict(model, {"start.height": height}, forward)
+
+
+@pytest.mark.parametrize("model", ["base", "named"])
+def test_a_model_that_pours_warns_outside_of_what_was_measured(
+    model: str, models: Models, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["predict", str(tmp_path), "--model", model, "--pours", "2", "--threads", "1", "--at"]
+    assert main([*words, "start.height=0.02"]) == 0
+    assert "warning" not in capsys.readouterr().err
+    assert main([*words, "start.height=0.025"]) == 0
+    told = capsys.readouterr().err
+    assert "warning: start.height = 0.025 is outside 0.01 to 0.02" in told
+
+
+def test_json_has_no_nan(
+    models: Models,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    row = np.array([np.nan])
+    monkeypatch.setattr(
+        Models, "predict", lambda *_, **__: Prediction("base", (NAME,), row, row, row + 1, 0.9)
+    )
+    assert main(["predict", str(tmp_path), "--at", "start.height=0.02", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert found["statistics"][NAME] == {"middle": None, "low": None, "high": None}
+
+
+def test_pours_are_as_many_as_an_interval_needs(
+    models: Models, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["predict", str(tmp_path), "--at", "start.height=0.02", "--pours"]
+    for count in ("-3", "0", "1"):
+        assert main([*words, count]) == 2
+        assert f"--pours: must be at least 2, got {count}" in capsys.readouterr().err
+    with pytest.raises(ObservationError, match="base: pours must be at least 2, got 1"):
+        models.predict("base", {"start.height": 0.02}, Forward(tmp_path, 1), pours=1)
