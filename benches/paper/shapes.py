@@ -18,6 +18,7 @@ import numpy as np
 
 from granulcal.bayessim import BayesSim
 from granulcal.experiments.paper.common import three
+from granulcal.experiments.paper.common.measure import bootstrap
 from granulcal.experiments.paper.common.sizes import FULL, MEDIUM, Size
 from granulcal.experiments.paper.common.workshop import Workshop
 from granulcal.experiments.paper.shapes import (
@@ -90,10 +91,11 @@ def itself(workshop: Workshop, name: str) -> None:
     assert by_itself is not None and errors is not None
     for what, each in (("spheres", found.by_spheres), (name, by_itself)):
         distance = usable(each)
-        error = distance.std(ddof=1) / np.sqrt(len(distance))
+        low, high = bootstrap(distance)
         print(
-            f"{name} by {what}: L2 {distance.mean():.2f} ± {distance.std(ddof=1):.2f} "
-            f"(n = {len(distance)}, standard error {error:.2f})"
+            f"{name} by {what}: L2 {distance.mean():.4f} ± {distance.std(ddof=1):.4f} "
+            f"(n = {len(distance)}, 95 % of the mean {low:.4f} to {high:.4f}), "
+            f"median {np.median(distance):.2f}"
         )
     told = ", ".join(beside(found.by_spheres, by_itself))
     print(f"both usable; L2 by spheres, by {name}; nearer by {name}, standard error: {told}")

@@ -1,14 +1,14 @@
 //! A batch whose parts are made elsewhere and brought here: which chunks lack rows, and what is brought.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::Path;
 
-use super::chunk::Progress;
+use super::chunk::{OpenChunk, Progress};
 use super::folder::Folder;
 use super::options::GenerateOptions;
 use super::{Remaining, check};
 use crate::header::Header;
-use crate::{DatasetError, Form, Room, files, manifest};
+use crate::{DatasetError, Form, Room, files, manifest, table};
 use granulcal_scene::Prior;
 
 /// An open folder that takes parts; nobody else writes into it while this lives.
@@ -19,6 +19,8 @@ pub struct GatheredBatch {
     folder: Folder,
     rows: u64,
     missing: BTreeSet<u64>,
+    /// The chunks that have some of their rows.
+    open: BTreeMap<u64, OpenChunk>,
     progress: Progress,
 }
 
@@ -37,11 +39,11 @@ impl GatheredBatch {
         let header = Header::new(scene, prior, options.seed)?;
         let room = |rows, chunk| Room::of_batch(scene, rows, 1, chunk);
         let (folder, remaining) = Folder::begin(out, header, options, &room)?;
-        let Remaining { missing: lacking, progress, .. } = remaining;
+        let Remaining { missing: lacking, open, progress } = remaining;
         let is_complete = |chunk: &u64| lacking.get(chunk).is_some_and(Vec::is_empty);
         let chunks = options.rows.div_ceil(folder.chunk);
         let missing = (0..chunks).filter(|chunk| !is_complete(chunk)).collect();
-        Ok(Self { folder, rows: options.rows, missing, progress })
+        Ok(Self { folder, rows: options.rows, missing, open, progress })
     }
 
     /// Chunks of the batch.
@@ -64,7 +66,8 @@ impl GatheredBatch {
         self.progress
     }
 
-    /// Takes the bytes of a chunk's part; returns whether it lacked it.
+    /// Takes the bytes of a chunk's part; returns whether it lacked it. Rows that are there stay, also those beyond what is
+    /// asked for.
     ///
     /// # Errors
     /// [`DatasetError`] of a part that is damaged, not whole, of another batch or chunk; the folder is as before.
@@ -79,12 +82,24 @@ impl GatheredBatch {
             let allowed = format!("{wanted}");
             return Err(DatasetError::content(&path, "the rows", rows.len().to_string(), allowed));
         }
-        files::write_file(&path, Form::Parquet, bytes)?;
-        self.missing.remove(&chunk);
-        for row in &rows {
-            self.progress.made += 1;
-            self.progress.count(row.status);
+        let mut all = self.open.get(&chunk).map_or_else(Vec::new, |open| open.rows.clone());
+        if all.is_empty() {
+            files::write_file(&path, Form::Parquet, bytes)?;
         }
+        let known: HashSet<_> = all.iter().map(|row| row.row).collect();
+        let (mut made, begun) = (Vec::new(), !all.is_empty());
+        for row in rows.into_iter().filter(|row| !known.contains(&row.row)) {
+            made.extend((row.row < self.rows).then_some(row.status));
+            all.push(row);
+        }
+        if begun {
+            all.sort_by_key(|row| row.row);
+            table::write(&path, &self.folder.header, &all)?;
+        }
+        self.missing.remove(&chunk);
+        self.open.remove(&chunk);
+        self.progress.made += made.len() as u64;
+        made.into_iter().for_each(|status| self.progress.count(status));
         Ok(true)
     }
 }

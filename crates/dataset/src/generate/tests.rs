@@ -139,6 +139,34 @@ fn parts_that_were_made_elsewhere_are_gathered() {
 }
 
 #[test]
+fn rows_that_are_there_stay_when_a_part_is_brought() {
+    let place = Place::new();
+    let chunk = 8;
+    let of = |rows| GenerateOptions { chunk, ..options(rows) };
+    place.make("whole", &of(8));
+    place.make("short", &of(5));
+    // As a batch of eight rows that was killed leaves it: some rows in the middle are missing.
+    let path = place.at("short/part-000000.parquet");
+    let header = Dataset::open(&place.at("whole")).unwrap().header;
+    let mut rows = Dataset::open(&place.at("whole")).unwrap().rows;
+    rows.retain(|row| ![2, 4, 6].contains(&row.row));
+    table::write(&path, &header, &rows).unwrap();
+    let five = fs::read({
+        place.make("worker", &of(5));
+        place.at("worker/part-000000.parquet")
+    });
+    let mut batch =
+        GatheredBatch::open(&small(), &Prior::default(), &of(5), &place.at("short")).unwrap();
+    assert_eq!((batch.progress().resumed, batch.progress().beyond), (3, 2));
+    assert!(batch.put(0, &five.unwrap()).unwrap());
+    assert_eq!((batch.progress().total, batch.progress().made), (5, 2));
+    drop(batch);
+    let kept: Vec<_> =
+        Dataset::open(&place.at("short")).unwrap().rows.iter().map(|row| row.row).collect();
+    assert_eq!(kept, [0, 1, 2, 3, 4, 5, 7]);
+}
+
+#[test]
 fn a_row_can_be_made_again_by_itself() {
     let place = Place::new();
     place.make("whole", &options(3));
