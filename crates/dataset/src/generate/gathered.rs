@@ -99,7 +99,9 @@ impl GatheredBatch {
         self.missing.remove(&chunk);
         self.open.remove(&chunk);
         self.progress.made += made.len() as u64;
-        made.into_iter().for_each(|status| self.progress.count(status));
+        for status in made {
+            self.progress.count(status);
+        }
         Ok(true)
     }
 }
