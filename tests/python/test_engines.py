@@ -93,10 +93,11 @@ def test_the_error_of_a_function_is_the_callers(
     def broken(scene: gc.Scene, seed: int) -> np.ndarray:
         raise RuntimeError("out of sand")
 
-    with pytest.raises(RuntimeError, match="out of sand"):
+    with pytest.raises(RuntimeError, match="out of sand") as raised:
         gc.generate(
             small_scene, small_prior, 2, out=tmp_path, progress=False, engine=CallableEngine(broken)
         )
+    assert any("for a pour with seed" in note for note in raised.value.__notes__)
     with pytest.raises(ValueError, match=r"shape \(n, 3\), got \(4,\)"):
         CallableEngine(lambda scene, seed: np.zeros(4), name="flat")(small_scene, 1)
     with pytest.raises(ValueError, match="points of a surface and no grains"):

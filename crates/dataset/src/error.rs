@@ -164,6 +164,14 @@ pub enum DatasetError {
         /// What the reader or writer said.
         source: parquet::errors::ParquetError,
     },
+    /// A part of a batch's folder cannot be used.
+    #[error("{} cannot be used; remove it, and its rows are made again", path.display())]
+    Part {
+        /// The part.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: Box<DatasetError>,
+    },
     /// A file is no readable PNG.
     #[error("{} is truncated, damaged or no PNG", path.display())]
     Png {
@@ -226,8 +234,8 @@ pub enum DatasetError {
         /// The folder.
         path: PathBuf,
     },
-    /// One row stands in two data sets that were to be merged.
-    #[error("row {row} stands in {} and in {}", first.display(), second.display())]
+    /// One row stands in two data sets that were to be merged, or twice in one, and is not the same.
+    #[error("row {row} is one in {} and another in {}", first.display(), second.display())]
     DuplicateRow {
         /// Index of the row.
         row: u64,
@@ -259,7 +267,7 @@ impl DatasetError {
             | Self::Locked { .. }
             | Self::NoThread(_)
             | Self::Engine { .. } => false,
-            Self::Row { source, .. } => source.is_bad_input(),
+            Self::Row { source, .. } | Self::Part { source, .. } => source.is_bad_input(),
             _ => true,
         }
     }

@@ -10,6 +10,7 @@ mod folder;
 mod gathered;
 mod options;
 mod queue;
+mod starts;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -85,15 +86,8 @@ pub fn generate_with(
     watch: &mut dyn FnMut(&Progress) -> bool,
 ) -> Result<Summary, DatasetError> {
     check(options)?;
-    let mut header = Header::new(scene, prior, options.seed)?;
-    // Before the first pour: a batch that ends at a draw cannot go on with another prior.
-    prior.check_draws(scene, options.seed, options.rows).map_err(DatasetError::Prior)?;
-    if let Some(engine) = &engine {
-        header.version = engine.version();
-        header.law = Some(FOREIGN_LAW);
-        // It is not ours to count.
-        header.arithmetic = FIRST_ARITHMETIC;
-    }
+    let header = header_of(engine.as_ref(), scene, prior, options)?;
+    check_draws(engine.is_none(), scene, prior, options)?;
     let threads = options.threads.min(most_threads());
     let room = |rows, chunk| Room::of_batch(scene, rows, threads, chunk);
     let (folder, remaining) = Folder::begin(out, header, options, &room)?;
@@ -101,6 +95,49 @@ pub fn generate_with(
     let queue = Mutex::new(Queue::new(missing, options, folder.chunk));
     let batch = Batch { rows: options.rows, folder: &folder, engine, chunks: open, progress };
     batch.run(options, &queue, threads, watch)
+}
+
+/// How far the folder `out` is with a batch of our simulator: what [`generate`] would find in it. Nothing is written.
+///
+/// # Errors
+/// As [`generate`], before anything is simulated.
+pub fn look(
+    scene: &granulcal_dem::Scene,
+    prior: &Prior,
+    options: &GenerateOptions,
+    out: &Path,
+) -> Result<Progress, DatasetError> {
+    check(options)?;
+    check_draws(true, scene, prior, options)?;
+    Folder::look(out, header_of(None, scene, prior, options)?, options)
+}
+
+/// Refuses draws of a batch that cannot be poured: one that ends at a draw cannot go on with another prior.
+fn check_draws(
+    is_ours: bool,
+    scene: &granulcal_dem::Scene,
+    prior: &Prior,
+    options: &GenerateOptions,
+) -> Result<(), DatasetError> {
+    prior.check_draws(scene, options.seed, options.rows).map_err(DatasetError::Prior)?;
+    if is_ours { starts::check(scene, prior, options) } else { Ok(()) }
+}
+
+/// What the rows of a batch are of.
+fn header_of(
+    engine: Option<&Engine>,
+    scene: &granulcal_dem::Scene,
+    prior: &Prior,
+    options: &GenerateOptions,
+) -> Result<Header, DatasetError> {
+    let mut header = Header::new(scene, prior, options.seed)?;
+    if let Some(engine) = engine {
+        header.version = engine.version();
+        header.law = Some(FOREIGN_LAW);
+        // It is not ours to count.
+        header.arithmetic = FIRST_ARITHMETIC;
+    }
+    Ok(header)
 }
 
 /// More pours at once than this gain nothing: the cores, or enough to test many.

@@ -80,6 +80,7 @@ pub use files::{is_writing, read_file, read_text, remove_temporaries, write_file
 pub use form::Form;
 pub use generate::{
     GatheredBatch, GenerateOptions, Progress, Shard, Summary, generate, generate_with,
+    look as look_at_batch,
 };
 /// Priors, from the crate of what is asked.
 pub use granulcal_scene::{Distribution, Parameter, Prior};

@@ -27,27 +27,31 @@ pub struct Merged {
     pub missing: u64,
     /// The first that are missing, at most as many as were to be named.
     pub gaps: Vec<u64>,
+    /// Rows that stand in several inputs, the same in all: of shards that were counted anew, for example.
+    pub repeated: u64,
     /// Files that do not say what their rows hash to: see [`crate::Dataset::unverified`].
     pub unverified: Vec<PathBuf>,
 }
 
 /// Joins data sets of one scene, prior, seed and version, for example the shards of several machines, into one Parquet
-/// file, in order of the rows; names at most `named_gaps` rows that are missing.
+/// file, in order of the rows; names at most `named_gaps` rows that are missing. A row that stands in several of them is
+/// written once.
 ///
 /// # Errors
-/// [`DatasetError::Differs`] names the first difference, [`DatasetError::DuplicateRow`] a row that stands in two of
+/// [`DatasetError::Differs`] names the first difference, [`DatasetError::DuplicateRow`] a row that is another in two of
 /// them, [`DatasetError::Argument`] for no input; else as [`crate::Dataset::open`] and [`crate::Dataset::write`]. The
 /// file is then as it was before.
 pub fn merge(inputs: &[PathBuf], out: &Path, named_gaps: usize) -> Result<Merged, DatasetError> {
     let Sources { header, asked, mut waiting } = sources(inputs)?;
     let mut file = GroupWriter::create(out, &header)?;
     let mut gaps = Gaps::new(named_gaps);
-    let (rows, missing) = (0, 0);
+    let (rows, missing, repeated) = (0, 0, 0);
+    let (gaps_named, unverified) = (Vec::new(), Vec::new());
     let mut merged =
-        Merged { header, rows, asked, missing, gaps: Vec::new(), unverified: Vec::new() };
+        Merged { header, rows, asked, missing, gaps: gaps_named, repeated, unverified };
     let mut open: Vec<OpenSource> = Vec::new();
     // The row that was written last, and where it stood.
-    let mut last: Option<(u64, PathBuf)> = None;
+    let mut last: Option<(Row, PathBuf)> = None;
     loop {
         // Open whoever may have the next row.
         let least = loop {
@@ -63,19 +67,25 @@ pub fn merge(inputs: &[PathBuf], out: &Path, named_gaps: usize) -> Result<Merged
         let Some(least) = least else { break };
         let source = &mut open[least];
         let Some(row) = source.rows.pop_front() else { break };
-        if let Some((last, first)) = &last
-            && row.row <= *last
-        {
-            let (first, second) = (first.clone(), source.input.clone());
-            return Err(DatasetError::DuplicateRow { row: row.row, first, second });
-        }
-        gaps.pass(row.row);
-        last = Some((row.row, source.input.clone()));
+        let input = source.input.clone();
         if source.rows.is_empty() {
             open.swap_remove(least);
         }
+        match &last {
+            Some((last, _)) if row.same_as(last) => {
+                merged.repeated += 1;
+                continue;
+            }
+            Some((last, first)) if row.row <= last.row => {
+                let (row, first, second) = (row.row, first.clone(), input);
+                return Err(DatasetError::DuplicateRow { row, first, second });
+            }
+            _ => {}
+        }
+        gaps.pass(row.row);
         merged.rows += 1;
-        file.push(row)?;
+        file.push(row.clone())?;
+        last = Some((row, input));
     }
     file.commit(asked)?;
     gaps.end(asked);

@@ -203,7 +203,7 @@ impl Limits {
                 short(self.field)
             ));
         }
-        if let Some(threshold) = self.threshold {
+        if let (Some(threshold), false) = (self.threshold, formation.is_by_colour) {
             let ratio = formation.threshold / threshold;
             if !(1.0 / THRESHOLD..=THRESHOLD).contains(&ratio) {
                 found.push(format!(
@@ -291,6 +291,8 @@ mod tests {
         assert_eq!(limits.violations(&cone(8e-3, 0.015)), Vec::<String>::new());
         let of_threshold = limits.doubts(&cone(0.03, 0.06));
         assert!(of_threshold.len() == 1 && of_threshold[0].contains("height_threshold"));
+        let by_colour = Formation { is_by_colour: true, ..cone(0.03, 0.06) };
+        assert_eq!(limits.doubts(&by_colour), Vec::<String>::new());
         let limits = Limits { threshold: None, ..limits };
         assert!(limits.doubts(&cone(0.03, 0.06)).is_empty());
         let doubt = |formation: &Formation| limits.doubts(formation).join("; ");

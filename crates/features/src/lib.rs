@@ -44,6 +44,7 @@ pub mod colour;
 pub mod depth;
 pub mod error;
 pub mod height_map;
+mod median;
 pub mod plane;
 pub mod raster;
 pub mod region;

@@ -50,6 +50,9 @@ pub(crate) fn generate(
             let call = pours.as_ref().expect("only an engine is asked");
             foreign(py, call, scene, seed).map_err(|error| {
                 let reason = error.to_string();
+                // Among thousands of pours: which one.
+                let note = format!("granulcal asked {name} for a pour with seed {seed}");
+                let _ = error.value(py).call_method1("add_note", (note,));
                 raised.lock().expect("no panic while it is held").get_or_insert(error);
                 DatasetError::Engine { name: name.clone(), reason }
             })

@@ -129,9 +129,7 @@ impl Prior {
         let unbounded: Vec<_> = (0..self.parameters.len())
             .filter(|&number| self.parameters[number].distribution.is_unbounded())
             .collect();
-        // A material's numbers bound each other nowhere.
-        let is_of_scene = |&n: &usize| !plain(&self.parameters[n].path).starts_with("material.");
-        let together = self.free().iter().filter(|number| is_of_scene(number)).count() > 1;
+        let together = self.free_beside_material().len() > 1;
         let together = if together { rows.min(MOST_CHECKED_TOGETHER) } else { 0 };
         let alone = if unbounded.is_empty() { 0 } else { rows.min(MOST_CHECKED) };
         for row in 0..alone.max(together) {
@@ -168,6 +166,12 @@ impl Prior {
     pub fn free(&self) -> Vec<usize> {
         let varies = |p: &Parameter| !matches!(p.distribution, Distribution::Fixed { .. });
         (0..self.parameters.len()).filter(|&i| varies(&self.parameters[i])).collect()
+    }
+
+    /// Indices of the parameters that vary and are of no material, whose numbers bound each other and the start nowhere.
+    pub fn free_beside_material(&self) -> Vec<usize> {
+        let is_beside = |&n: &usize| !plain(&self.parameters[n].path).starts_with("material.");
+        self.free().into_iter().filter(is_beside).collect()
     }
 
     /// The values of a row, one each parameter. They depend on the seed and the row only; fixing

@@ -154,7 +154,8 @@ fn as_json(recording: &Recording, formation: &Formation, statistics: &[Named]) -
             "how": lost.how(),
             "damage": recording.damage,
         })),
-        "threshold_m": formation.threshold,
+        // Null where a colour decides.
+        "threshold_m": (!formation.is_by_colour).then_some(formation.threshold),
         "centroid_m": formation.centroid.as_slice(),
     });
     if let Some(diagnostics) = statistics.get(1) {
@@ -183,11 +184,14 @@ fn print(recording: &Recording, formation: &Formation, statistics: &[Named]) -> 
         formation.volume * 1e6,
         formation.shape.half_volume_radius * 1e3
     ))?;
+    let rule = if formation.is_by_colour {
+        "by their colour".to_owned()
+    } else {
+        format!("above {:.2} mm", formation.threshold * 1e3)
+    };
     print_line(&format!(
-        "pixels             {} of {} valid are grain (above {:.2} mm)",
-        formation.masked_count,
-        formation.valid_count,
-        formation.threshold * 1e3,
+        "pixels             {} of {} valid are grain ({rule})",
+        formation.masked_count, formation.valid_count,
     ))?;
     print_line(&format!(
         "frames             {} of {} averaged{}",

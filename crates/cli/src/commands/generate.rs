@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use granulcal_dataset::{
-    Dataset, GenerateOptions, Prior, Product, Shard, Summary, generate, try_pour,
+    GenerateOptions, Prior, Product, Progress, Shard, Summary, generate, look_at_batch, try_pour,
 };
 use granulcal_scene::Scene;
 use serde_json::json;
@@ -126,7 +126,8 @@ fn dry_run(
     options: &GenerateOptions,
 ) -> anyhow::Result<Outcome> {
     prior.check(scene)?;
-    prior.check_draws(scene, options.seed, options.rows)?;
+    let Progress { total, resumed, .. } = look_at_batch(scene, prior, options, &args.out)?;
+    let missing = total.saturating_sub(resumed);
     let (begun, mut longest) = (Instant::now(), Duration::ZERO);
     let (mut cpu_s, mut tried, mut cut) = (0.0, 0, None);
     for row in 0..options.rows.min(TRIED) {
@@ -147,8 +148,6 @@ fn dry_run(
             tried += 1;
         }
     }
-    let there = Dataset::open(&args.out).map_or(0, |data| data.rows.len() as u64);
-    let missing = options.rows.saturating_sub(there);
     let pour_s = cpu_s / f64::from(tried);
     let seconds = pour_s * missing as f64 / options.threads as f64;
     if args.json {
@@ -204,6 +203,15 @@ fn report(args: &GenerateArgs, summary: &Summary) -> anyhow::Result<Outcome> {
             progress.jammed,
             progress.at_horizon
         ))?;
+    }
+    if progress.total == 0 {
+        let Shard { index, count } = args.shard;
+        tracing::warn!(
+            "shard {index}/{count} has no rows: {} rows are fewer parts of {} than there are shards; a smaller --chunk, the \
+             same in all shards, spreads them",
+            args.rows,
+            args.chunk
+        );
     }
     if 2 * progress.at_horizon > complete {
         tracing::warn!(

@@ -17,8 +17,9 @@ const NAMED_GAPS: usize = 5;
 #[derive(Debug, Args)]
 #[command(long_about = "\
 Joins folders and files of one data set (same scene, prior, seed and version) into one
-Parquet file, in order of the rows. A row that stands in two of them is an error. Of
-folders only some parts are in memory at a time, so that a million rows need no more.
+Parquet file, in order of the rows. A row that stands in several is written once; if it is
+not the same in all, that is an error. Of folders only some parts are in memory at a time, so
+that a million rows need no more.
 
 The file is written, too, where rows are missing of those that `generate` was asked for: how
 many is told, and the exit code is 3. Folders of earlier versions do not say how many were
@@ -48,11 +49,16 @@ impl Run for MergeArgs {
 fn run(args: &MergeArgs) -> anyhow::Result<Outcome> {
     let inputs: Vec<_> = args.inputs.iter().map(|input| input.to_path_buf()).collect();
     let merged = merge(&inputs, &args.out, NAMED_GAPS)?;
-    let Merged { header, rows, asked, missing, gaps, unverified } = merged;
+    let Merged { header, rows, asked, missing, gaps, repeated, unverified } = merged;
     warn_of(&header, &unverified);
     if missing > 0 {
         tracing::warn!(
             "{missing} rows are missing, the first are {gaps:?}; is a shard absent or unfinished?"
+        );
+    }
+    if repeated > 0 {
+        tracing::warn!(
+            "{repeated} rows stand in several of the inputs, the same in each: they are written once"
         );
     }
     if asked.is_none() {
@@ -67,6 +73,7 @@ fn run(args: &MergeArgs) -> anyhow::Result<Outcome> {
             "rows": rows,
             "asked": asked,
             "missing": missing,
+            "repeated": repeated,
             // Null where nobody knows.
             "complete": (missing > 0 || asked.is_some()).then_some(missing == 0),
         }))?;

@@ -2,6 +2,7 @@
 
 mod args;
 
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Context as _;
@@ -73,7 +74,7 @@ fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
     if let Keep::Film { path, fps } = keep {
         Room::of_pour(&scene, Some(fps)).require(Some(path))?;
     }
-    let simulation = scene::start(&scene, args.seed, args.threads, args.resume.as_deref())?;
+    let simulation = scene::start(&scene, args.seed, args.threads, resumed(args))?;
     let (mut observer, mut sides) = (Observer::new(&scene), SideFiles::default());
     let pour =
         scene::pour(context, &scene, args.seed, simulation, &keep, &mut observer, &mut sides)?;
@@ -110,6 +111,17 @@ fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
     }
     print(&report, &scene, args.json)?;
     Ok(sides.finish(Outcome::healthy_if(status.is_healthy())))
+}
+
+/// The checkpoint to go on from: none yet where it is the one that this pour writes, so that one line begins and goes on.
+fn resumed(args: &SimulateArgs) -> Option<&Path> {
+    let path = args.resume.as_deref()?;
+    let is_own = args.checkpoint.as_deref() == Some(path);
+    if is_own && !path.exists() {
+        tracing::info!("no {} yet: the pour begins", path.display());
+        return None;
+    }
+    Some(path)
 }
 
 /// Looks at the pour and fills in the statistics; writes the image if asked.

@@ -155,7 +155,18 @@ fn shards_merge_to_the_whole() {
     assert!(place.expect(0, &["inspect", "a"]).contains("rows missing: 3"));
     assert_eq!(merge(0, &["a", "b"]), (7.into(), 0.into(), true.into()));
     assert_same_rows(&place.at("whole"), &place.at("all.parquet"));
-    place.refused(&["merge", "a", "whole", "-o", "x.parquet"], &["row 0", "stands in"]);
+    // Rows that stand in both are the same, and are written once.
+    let told = json(&place.expect(0, &["merge", "a", "whole", "-o", "x.parquet", "--json"]));
+    assert_eq!((&told["rows"], &told["repeated"]), (&7.into(), &4.into()));
+    assert_same_rows(&place.at("whole"), &place.at("x.parquet"));
+    // What a dry run tells is of the shard, and of the folder that it is asked of.
+    let dry = |seed: &'static str| {
+        [&args("a", "0/2")[..], &["--dry-run", "--json", "--seed", seed]].concat()
+    };
+    assert_eq!(json(&place.expect(0, &dry("0")))["missing"], 0);
+    place.refused(&dry("1"), &["the seed is 0, but 1 is given"]);
+    let idle = place.run(&args("idle", "5/9"));
+    assert!(String::from_utf8_lossy(&idle.stderr).contains("shard 5/9 has no rows"), "{idle:?}");
     let facts = json(&place.expect(0, &["inspect", "all.parquet", "--json"]));
     assert_eq!((&facts["rows"], &facts["seed"]), (&7.into(), &0.into()));
 }

@@ -94,7 +94,10 @@ fn a_pour_does_not_begin_anew_over_its_checkpoint() {
     fs::write(place.at("a.ckpt"), damaged).unwrap();
     place.expect(0, &args("2", &[]));
     fs::remove_file(place.at("a.ckpt")).unwrap();
-    place.expect(0, &args("2", &[]));
+    // One line begins and goes on; another file must be there.
+    place.expect(0, &args("2", &["--resume", "a.ckpt"]));
+    place.expect(0, &args("2", &["--resume", "a.ckpt"]));
+    place.refused(&args("2", &["--resume", "b.ckpt"]), &["b.ckpt"]);
 }
 
 #[test]

@@ -21,8 +21,8 @@ pub(super) struct Folder {
     pub(super) chunk: u64,
     /// The rows that the folder says were asked for.
     asked: Option<u64>,
-    /// The system drops the lock with the file, also when the process is killed.
-    _lock: File,
+    /// The system drops the lock with the file, also when the process is killed. None for who only looks.
+    _lock: Option<File>,
 }
 
 /// What is left to do.
@@ -111,7 +111,22 @@ impl Folder {
                 return Err(DatasetError::content(path, manifest::NAME, found, "present"));
             }
         };
-        Ok(Self { path: path.to_owned(), header, chunk, asked, _lock: lock })
+        Ok(Self { path: path.to_owned(), header, chunk, asked, _lock: Some(lock) })
+    }
+
+    /// How far the batch of the folder is, which is left as it is, and may not be there yet.
+    pub(super) fn look(
+        path: &Path,
+        header: Header,
+        options: &GenerateOptions,
+    ) -> Result<Progress, DatasetError> {
+        let Some(Manifest { header: found, chunk, rows: asked }) = Manifest::read(path)? else {
+            let total = rows_of_shard(options, options.chunk);
+            return Ok(Progress { total, ..Progress::default() });
+        };
+        found.require_same(path, &header)?;
+        let folder = Self { path: path.to_owned(), header, chunk, asked, _lock: None };
+        Ok(folder.remaining(options)?.progress)
     }
 
     /// Reads and checks the parts that are there; what they lack is left to do. The rows of other chunks are not
@@ -146,7 +161,13 @@ impl Folder {
     /// The rows of a part, each checked against what it must have been made from, and whether the part has a hash.
     fn read_part(&self, chunk: u64) -> Result<(Vec<Row>, bool), DatasetError> {
         let path = manifest::part_path(&self.path, chunk);
-        self.check_part(&path, chunk, table::read(&path)?)
+        let read = table::read(&path).and_then(|table| self.check_part(&path, chunk, table));
+        read.map_err(|error| match error {
+            DatasetError::Parquet { .. } | DatasetError::Content { .. } => {
+                DatasetError::Part { path, source: Box::new(error) }
+            }
+            other => other,
+        })
     }
 
     /// The rows of a part that is not of this folder yet, checked as if it were.

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use granulcal_scene::Scene;
+use granulcal_scene::{Outflow, Scene};
 
 use super::*;
 use crate::{Dataset, merge};
@@ -77,12 +77,19 @@ fn threads_chunks_shards_and_growth_do_not_change_rows() {
     let joined = Dataset::open(&out).unwrap();
     assert!(joined.unverified.is_empty());
     assert_same(&whole, &joined);
-    let twice = merge(&[place.at("left"), place.at("left")], &out, 5).unwrap_err();
-    assert_same(&whole, &Dataset::open(&out).unwrap());
     // Files among folders, whose rows lie between those of the folders; and what is not there is named.
     whole.write(&place.at("whole.parquet")).unwrap();
-    let again = merge(&[place.at("left"), place.at("whole.parquet")], &out, 5).unwrap_err();
-    assert!(matches!(again, DatasetError::DuplicateRow { row: 0, .. }), "{again}");
+    // A row that is the same in all of them is written once, one that is not is refused.
+    let again = merge(&[place.at("left"), place.at("whole.parquet")], &out, 5).unwrap();
+    let left = Dataset::open(&place.at("left")).unwrap();
+    assert_eq!((again.rows, again.repeated), (10, left.rows.len() as u64));
+    assert_same(&whole, &Dataset::open(&out).unwrap());
+    let mut other = whole.clone();
+    other.rows[8].statistics[2] += 1e-12;
+    other.write(&place.at("other.parquet")).unwrap();
+    let refused = merge(&[place.at("left"), place.at("other.parquet")], &out, 5).unwrap_err();
+    assert!(matches!(refused, DatasetError::DuplicateRow { row: 8, .. }), "{refused}");
+    assert_same(&whole, &Dataset::open(&out).unwrap());
     let odd = Dataset::open(&place.at("right")).unwrap();
     odd.write(&place.at("odd.parquet")).unwrap();
     merge(&[place.at("odd.parquet"), place.at("left")], &out, 5).unwrap();
@@ -91,7 +98,51 @@ fn threads_chunks_shards_and_growth_do_not_change_rows() {
     assert_eq!(half.rows, odd.rows.len());
     assert_eq!(half.gaps, odd.gaps(2));
     assert_eq!(half.gaps.len(), 2);
-    assert!(matches!(twice, DatasetError::DuplicateRow { row: 0, .. }), "{twice}");
+}
+
+#[test]
+fn what_a_shard_lacks_is_known_before_a_pour() {
+    let place = Place::new();
+    let shard: Shard = "1/2".parse().unwrap();
+    let own = GenerateOptions { shard, ..options(10) };
+    let at = place.at("shard");
+    let look = |options: &GenerateOptions| look(&small(), &Prior::default(), options, &at);
+    // Ten rows are three parts, of which it has the middle one.
+    let before = look(&own).unwrap();
+    assert_eq!((before.total, before.resumed, at.exists()), (4, 0, false));
+    place.make("shard", &own);
+    let after = look(&GenerateOptions { rows: 24, ..own }).unwrap();
+    assert_eq!((after.total, after.resumed), (12, 4));
+    let other = look(&GenerateOptions { seed: 4, ..own }).unwrap_err();
+    assert!(matches!(other, DatasetError::Differs { .. }), "{other}");
+    // A part that is damaged: what helps is said.
+    let part = at.join("part-000001.parquet");
+    fs::write(&part, b"PAR1").unwrap();
+    let damaged = generate(&small(), &Prior::default(), &own, &at, &mut |_| true).unwrap_err();
+    assert!(damaged.to_string().contains("its rows are made again"), "{damaged}");
+    assert!(damaged.is_bad_input());
+}
+
+#[test]
+fn draws_that_cannot_begin_are_refused_before_the_first_pour() {
+    let place = Place::new();
+    let mut scene = Scene { outflow: Some(Outflow { below: 8e-3, until: None }), ..small() };
+    let parameter = "path = \"start.height\"\ndistribution = \"uniform\"\nlow = 0.004\nhigh = 0.02";
+    let prior = Prior::from_toml(&format!("[[parameter]]\n{parameter}\n")).unwrap();
+    let make = |scene: &Scene| {
+        generate(scene, &prior, &options(200), &place.at("new"), &mut |_| true).unwrap_err()
+    };
+    let refused = make(&scene);
+    // The lowest draw of all, wherever it comes.
+    let lowest = (0..200).min_by(|&a, &b| {
+        let draw = |row| prior.sample(options(200).seed, row)[0];
+        draw(a).total_cmp(&draw(b))
+    });
+    assert!(matches!(refused, DatasetError::Row { row, .. } if Some(row) == lowest), "{refused}");
+    assert!(!place.at("new").exists());
+    scene.outflow = None;
+    let summary = generate(&scene, &prior, &options(2), &place.at("new"), &mut |_| true);
+    assert_eq!(summary.unwrap().progress.made, 2);
 }
 
 #[test]
@@ -255,7 +306,8 @@ fn damaged_parts_are_named_and_leftovers_removed() {
     // A part of another place in the same data set.
     fs::write(&part, fs::read(path.join("part-000001.parquet")).unwrap()).unwrap();
     let error = generate(&small(), &Prior::default(), &options(5), &path, &mut |_| true);
-    assert!(error.unwrap_err().to_string().contains("column row"));
+    let DatasetError::Part { source, .. } = error.unwrap_err() else { panic!("of the part") };
+    assert!(source.to_string().contains("column row"));
 }
 
 #[test]

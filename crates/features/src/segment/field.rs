@@ -8,6 +8,7 @@ use std::ops::RangeInclusive;
 use nalgebra::Vector3;
 
 use super::levelled::Levelled;
+use crate::median::median;
 
 impl Levelled {
     /// Leaves the pixels of a square of ground of `field` `[m]`, its sides along those of the image, whose columns go
@@ -24,7 +25,8 @@ impl Levelled {
         for (axis, pixel) in axes {
             let at: Vec<f64> = self.points.iter().map(|point| axis.dot(point)).collect();
             let grains = at.iter().zip(&self.pixels).filter(|(_, pixel)| self.mask[**pixel]);
-            let Some(middle) = median(grains.map(|(at, _)| *at).collect()) else { return self };
+            let mut of_grains: Vec<f64> = grains.map(|(at, _)| *at).collect();
+            let Some(middle) = median(&mut of_grains) else { return self };
             let (low, high) = extent(&at);
             shown *= ((high - low + pixel) / field).min(1.0);
             // Half a pixel more or less is none.
@@ -84,11 +86,6 @@ fn span(values: impl Iterator<Item = usize>) -> RangeInclusive<usize> {
     });
     let (low, high) = ends.unwrap_or((1, 0));
     low..=high
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -36,6 +36,8 @@ pub struct Formation {
     /// Height above the ground from which a pixel counts as grain `[m]`; not applied when a colour
     /// decides.
     pub threshold: f64,
+    /// Whether a colour decides which pixels are grain.
+    pub is_by_colour: bool,
     /// Where the centroid was in the levelled frame, before it was moved to 0 `[m]`.
     pub centroid: Vector2<f64>,
     /// Volume between the ground and the surface of the grains' pixels `[m³]`; what is hidden under
@@ -78,6 +80,7 @@ impl Levelled {
             shown: self.shown,
             is_cropped: self.is_cropped,
             threshold: self.threshold,
+            is_by_colour: self.is_by_colour,
             centroid,
             volume,
             shape,

@@ -7,6 +7,7 @@ use nalgebra::{Point3, Vector3};
 use super::component::{remove_low, remove_small};
 use super::settings::Segmentation;
 use crate::error::FeatureError;
+use crate::median::median;
 use crate::plane::{PlaneFit, fit_plane_within, refine_plane};
 
 /// Standard deviation of a Gaussian over its median absolute deviation.
@@ -85,6 +86,8 @@ pub struct Levelled {
     /// Height above the ground from which a pixel counts as grain `[m]`; not applied when a colour
     /// decides.
     pub threshold: f64,
+    /// Whether a colour decides which pixels are grain.
+    pub is_by_colour: bool,
     /// Pixels that carry data, within the border.
     pub valid_count: usize,
     /// Pixels above the greatest height, which carry none.
@@ -162,6 +165,7 @@ impl Cloud {
             mask,
             ground_sd,
             threshold,
+            is_by_colour: grains.is_some(),
             valid_count: points.len(),
             above_count: self.points.len() - points.len(),
             shown: None,
@@ -321,12 +325,7 @@ fn sd_from_below(ground: &[Vector3<f64>], fit: &PlaneFit, reach: f64) -> f64 {
         .map(|point| -fit.plane.signed_distance(point))
         .filter(|depth| (0.0..=reach).contains(depth))
         .collect();
-    if below.is_empty() {
-        return 0.0;
-    }
-    let middle = below.len() / 2;
-    let (_, median, _) = below.select_nth_unstable_by(middle, f64::total_cmp);
-    SD_PER_MAD * *median
+    median(&mut below).map_or(0.0, |median| SD_PER_MAD * median)
 }
 
 /// The fit seen from the other side.

@@ -36,15 +36,13 @@ impl Formation {
     /// Whether the edge of the image cuts the formation off: its largest patch reaches it.
     pub fn is_cut_off(&self) -> bool {
         let Some(depth) = depth_in(self.mask.len(), self.width) else { return false };
-        let largest = patches(&self.mask, self.width).into_iter().max_by_key(Vec::len);
-        largest.is_some_and(|patch| patch.into_iter().any(|pixel| depth(pixel) == 0))
+        self.largest_patch().is_some_and(|patch| patch.into_iter().any(|pixel| depth(pixel) == 0))
     }
 
     /// Share of the outline of the formation's largest patch beyond which nothing is seen: the edge of the image, a border
     /// that is ignored, what is above the greatest height, and holes, but for single pixels `[-]`.
     pub fn hidden_share(&self) -> f64 {
-        let largest = patches(&self.mask, self.width).into_iter().max_by_key(Vec::len);
-        let Some(patch) = largest else { return 0.0 };
+        let Some(patch) = self.largest_patch() else { return 0.0 };
         let (width, height) = (self.width as isize, self.height as isize);
         let at = |(u, v): (isize, isize)| {
             let is_inside = u >= 0 && v >= 0 && u < width && v < height;
@@ -66,6 +64,11 @@ impl Formation {
         }
         let hidden = outline.values().filter(|&&hidden| hidden).count();
         hidden as f64 / outline.len().max(1) as f64
+    }
+
+    /// The pixels of the formation itself: what stands apart is left out.
+    fn largest_patch(&self) -> Option<Vec<usize>> {
+        patches(&self.mask, self.width).into_iter().max_by_key(Vec::len)
     }
 
     /// Share of the image that carries data, less a border all around that has none `[-]`.

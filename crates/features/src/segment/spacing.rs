@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Formation;
+use crate::median::median;
 
 impl Formation {
     /// Distance on the ground of points from neighbouring pixels `[m]`, `None` of a single point.
@@ -20,10 +21,6 @@ impl Formation {
             .windows(2)
             .map(|pair| (pair[1].0 - pair[0].0).norm() / (pair[1].1 - pair[0].1).norm())
             .collect();
-        let middle = steps.len() / 2;
-        if steps.is_empty() {
-            return None;
-        }
-        Some(*steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+        median(&mut steps)
     }
 }

@@ -71,7 +71,8 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "SECONDS", default_value = "60", requires = "checkpoint",
         value_parser = period)]
     pub checkpoint_every: Duration,
-    /// Go on from a checkpoint of the same scene, seed and preset, on any number of threads
+    /// Go on from a checkpoint of the same scene, seed and preset, on any number of threads; where it is the file of
+    /// --checkpoint and not there yet, begin
     #[arg(long, value_name = "FILE", conflicts_with = "mcap", value_parser = kept())]
     pub resume: Option<Reads>,
 }

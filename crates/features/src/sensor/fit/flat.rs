@@ -85,11 +85,7 @@ fn first_look(values: &[f64]) -> Vec<bool> {
 
 /// The median; 0 of nothing.
 pub(super) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    crate::median::median(values).unwrap_or(0.0)
 }
 
 /// Monomials in the pixel coordinates scaled to [-1, 1].

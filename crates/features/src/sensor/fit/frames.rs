@@ -4,6 +4,7 @@ use crate::camera::Camera;
 use crate::depth::{DepthImage, is_valid};
 use crate::error::{FeatureError, require_in};
 use crate::height_map::HeightMap;
+use crate::median::median;
 use crate::region::Region;
 
 /// Share of the distance that no camera resolves.
@@ -113,12 +114,8 @@ impl FlatFrames {
             .flat_map(|image| image.depth.iter().copied().filter(|&d| is_valid(d)))
             .map(f64::from)
             .collect();
-        if depths.is_empty() {
-            return Err(FeatureError::TooFewPoints { what: "sensor fit", got: 0, min: 1 });
-        }
-        let middle = depths.len() / 2;
-        let (_, median, _) = depths.select_nth_unstable_by(middle, f64::total_cmp);
-        let resolution = *median / camera.intrinsics.fx;
+        let few = FeatureError::TooFewPoints { what: "sensor fit", got: 0, min: 1 };
+        let resolution = median(&mut depths).ok_or(few)? / camera.intrinsics.fx;
         let optics = Optics::TimeOfFlight { resolution, depth_unit, inverse: true };
         Self::from_depth(images, camera, depth_unit, optics, |z| 1.0 / z)
     }
