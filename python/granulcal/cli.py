@@ -21,6 +21,7 @@ from granulcal.commands.exit_code import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from granulcal.commands.program import Parser, describe
 from granulcal.one_thread import one_thread
 from granulcal.progress import quieted
+from granulcal.warned import warn
 
 __all__ = ["main"]
 
@@ -171,7 +172,7 @@ def _tell(what: object) -> None:
 
 def _show(message: Warning | str, *_: object) -> None:
     """Shows a warning in the manner of a command line, without the line of code that gave it."""
-    print(f"warning: {_native.readable(str(message))}", file=sys.stderr)
+    warn([str(message)])
 
 
 def console() -> int:

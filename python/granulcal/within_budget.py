@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from granulcal.errors import PriorError
 from granulcal.measured.different import require_different
 from granulcal.measured.recording import Recording
 from granulcal.pours.cluster import Cluster, cluster_asked, spread_over
@@ -56,6 +57,7 @@ def calibrate_within(
             None for this machine's threads.
 
     Raises:
+        PriorError: a parameter that has no place in the scene over its whole range.
         ValueError: no recording, one that is given twice, or too small a budget.
     """
     from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
@@ -63,6 +65,7 @@ def calibrate_within(
     if not recordings:
         raise ValueError("calibrate_within needs at least one recording, got none")
     round_sizes(budget)
+    _require_fits(prior, scene)
     formations = [each.formation(**scene.reading) for each in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
     require_different(observed)
@@ -82,3 +85,18 @@ def calibrate_within(
             pours, prior, observed, budget=budget, seed=seed, x_names=NAMES, progress=progress
         )
     return replace(found, left_out=pours.left_out(len(found.x)))
+
+
+def _require_fits(prior: Prior, scene: Scene) -> None:
+    """Refuses before the first pour what `generate` refuses; a later one would draw it.
+
+    Raises:
+        PriorError: names the parameter and the value that does not fit.
+    """
+    for parameter in prior.parameters:
+        for value in filter(np.isfinite, parameter.bounds):
+            try:
+                scene.with_({parameter.path: value})
+            except ValueError as error:
+                told = f"prior of {parameter.path} does not fit the scene at the value {value:g}"
+                raise PriorError(f"{told}: {error}") from None

@@ -21,9 +21,11 @@ from granulcal.bayessim.network.trainer import Progress  # noqa: E402
 from granulcal.bayessim.posterior.posterior import OutOfRange, Posterior  # noqa: E402
 from granulcal.errors import ModelFormatError, ObservationError, TrainingDataError  # noqa: E402
 from granulcal.parameter import Parameter  # noqa: E402
+from granulcal.pours.scene import Scene  # noqa: E402
 from granulcal.prior import Prior  # noqa: E402
 
 QUICK = {"quiet": True, "method": "mdrff", "max_epochs": 3, "ensemble": 2, "features": 20}
+SCENE = Scene.drop(0.02, count=3).to_toml()
 KERNELS = {
     "matern12": lambda r: np.exp(-r),
     "matern32": lambda r: (1 + np.sqrt(3) * r) * np.exp(-np.sqrt(3) * r),
@@ -55,7 +57,7 @@ def trained(models):
 def quick(toy):
     theta, x = toy.simulate(120, seed=1)
     names = [f"s{i}" for i in range(16)]
-    return BayesSim.fit(theta, x, toy.prior, x_names=names, scene="count = 3\n", **QUICK)
+    return BayesSim.fit(theta, x, toy.prior, x_names=names, scene=SCENE, **QUICK)
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
@@ -237,7 +239,7 @@ def test_save_and_load_are_identical_to_the_bit(quick, toy, tmp_path):
     assert str(loaded.calibration) == str(quick.calibration)
     assert loaded.calibration is not None and quick.calibration is not None
     assert loaded.calibration.as_dict() == quick.calibration.as_dict()
-    assert (loaded.x_names, loaded.scene_toml) == (quick.x_names, "count = 3\n")
+    assert (loaded.x_names, loaded.scene_toml) == (quick.x_names, SCENE)
     assert loaded.scene_hash == quick.scene_hash
     loaded.save(tmp_path / "again")
     for name in ("model.json", "weights.safetensors"):
@@ -454,11 +456,18 @@ THETA, X = Prior.default().sample(80, seed=0), np.random.default_rng(0).random((
         ),
         ((THETA, X, Prior.default(), -1), {}, ValueError, "seed must be"),
         ((THETA, X, Prior.default()), {"scene": 3}, TypeError, "scene must be"),
+        (
+            (THETA, X, Prior.default()),
+            {"scene": "count = 3\n"},
+            TrainingDataError,
+            "scene: .* field `count`",
+        ),
+        ((THETA, X, Prior.default()), {"scene": "drop"}, TrainingDataError, "scene: .*not valid"),
         ((THETA, X, Prior.default()), {"epochs": 3}, ValueError, "unknown option epochs"),
     ],
 )
 def test_bad_training_data(arguments, options, error, message):
-    with pytest.raises(error, match=message):
+    with pytest.raises(error, match=f"(?s){message}"):
         BayesSim.fit(*arguments, quiet=True, **options)
 
 

@@ -348,6 +348,7 @@ def test_spill_command_resumes_and_writes(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "24 pours of 60 grains" in done.stdout
     assert "P(spilled >= 1)" in done.stdout
+    assert "spill.csv and spill.json (metres)" in done.stdout
     kept = (out / "pours.json").read_text()
     document = json.loads(kept)
     del document["pours"]["7"]

@@ -94,7 +94,9 @@ def test_a_model_that_fails_its_check_is_told(
     (tmp_path / "model").mkdir()
     out = tmp_path / "plan"
     words = ["design", "rings", str(tmp_path / "model"), "--pile", "0.08", "-o", str(out)]
-    code, told = main(words), capsys.readouterr().err
+    code, (said, told) = main(words), capsys.readouterr()
+    # The table above it is in centimetres.
+    assert "plan.csv and plan.json (metres)" in said
     notes = json.loads((out / "plan.json").read_text())["notes"]
     if is_calibrated is False:
         assert code == 3 and "fails its own check" in told and "fails its own check" in notes[0]

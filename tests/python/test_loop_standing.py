@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from two_heights import two_heights
 
 from granulcal.cli import main
 from granulcal.errors import ObservationError
@@ -16,7 +17,6 @@ from granulcal.loop.check.recentre import Recentred
 from granulcal.loop.check.standing import Moved, overturned, stand
 from granulcal.loop.check.trivial import LINE, NEAREST, RESIDUAL, Group, line_weights, trivial_rows
 from granulcal.loop.effects.definitions import Definition, check_definitions, definition_inputs
-from granulcal.loop.report.models import Maker, Models
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.test.distance import compare
 from granulcal.loop.test.thresholds import Thresholds
@@ -275,21 +275,7 @@ def test_a_wrong_surrogate_stands_beside_every_word_and_in_the_exit_code(
     assert main(["close-loop", str(task), "-o", str(tmp_path / "loop")]) == 3
     monkeypatch.setattr("granulcal.experiments.loop_column.reproduce", lambda *_: found.stands)
     assert main(["reproduce", "loop_column", "--out", str(tmp_path), "--data", str(tmp_path)]) == 3
-    models = Models(
-        scene=Scene.drop(0.02, count=12),
-        verdict={"kind": found.verdict.kind, "named": []},
-        paths=("start.height",),
-        inputs=(("start.height", 0.01, 0.02),),
-        names=("max_z",),
-        makers={name: (Maker({}, {}, {}),) * 2 for name in ("base", "named")},
-        columns=(),
-        transforms=(),
-        correction=None,
-        known=np.array([[0.0], [1.0]]),
-        means=np.array([[0.01], [0.02]]),
-        scatter=np.array([[0.001], [0.001]]),
-        pours=np.array([2.0, 2.0]),
-    )
+    models = two_heights(Scene.drop(0.02, count=12), "max_z", verdict=found.verdict.kind)
     models.write(tmp_path)
     words = ["predict", str(tmp_path), "--at", "start.height=0.015", "--model", "line"]
     assert main(words) == 3

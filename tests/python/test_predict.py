@@ -5,13 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from two_heights import two_heights
 
 from granulcal.cli import main
 from granulcal.errors import ObservationError
 from granulcal.loop.check import discrepancy
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.asked import REACH
-from granulcal.loop.report.models import Maker, Models, Prediction, condition_of
+from granulcal.loop.report.models import Models, Prediction, condition_of
 from granulcal.loop.test.score import DISCREPANCY_LENGTH
 from granulcal.pours.scene import Scene
 
@@ -22,21 +23,8 @@ NAME, OBSERVED = "radius[50]", "[observe.radius]\npercentiles = [50.0]\n"
 def models(tmp_path: Path) -> Models:
     """Measured from two heights."""
     scene = Scene.drop(0.02, count=12, preset="fast").to_toml()
-    made = Models(
-        scene=Scene.from_toml(f"{scene}\n[observe]\nrate = 100.0\n{OBSERVED}"),
-        verdict={"kind": "NONE", "named": []},
-        paths=("start.height", "material.restitution"),
-        inputs=(("start.height", 0.01, 0.02),),
-        names=(NAME,),
-        makers={name: (Maker({}, {}, {}),) * 2 for name in ("base", "named")},
-        columns=(),
-        transforms=(),
-        correction=None,
-        known=np.array([[0.0], [1.0]]),
-        means=np.array([[0.01], [0.02]]),
-        scatter=np.array([[0.001], [0.001]]),
-        pours=np.array([2.0, 2.0]),
-    )
+    observing = Scene.from_toml(f"{scene}\n[observe]\nrate = 100.0\n{OBSERVED}")
+    made = two_heights(observing, NAME)
     made.write(tmp_path)
     return made
 

@@ -16,6 +16,7 @@ import granulcal as gc
 from granulcal.cli import _guarded, _parser, _subparsers, main
 from granulcal.commands.counts import pour_count
 from granulcal.pours.pour_time import PourKind, in_the_middle
+from granulcal.warned import warn
 
 ALL = """
 scene simulate generate render features infer fit-sensor pick-colour inspect merge completions
@@ -69,6 +70,67 @@ def test_an_option_of_another_command_is_not_what_was_meant() -> None:
     done = _told("sample", "couscous", "-o", "scene.toml")
     assert done.returncode == 2 and "unrecognized arguments: -o" in done.stderr
     assert "did you mean" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["infer", "m", "x.bag", "--json", "a.json"], "--json takes no value, got 'a.json'"),
+        (["infer", "m", "x.bag", "--json=a.json"], "--json takes no value, got 'a.json'"),
+        (["design", "rings", "drop", "-o", "x", "--extrapolate", "yes"], "--extrapolate takes no"),
+    ],
+)
+def test_a_value_that_an_option_does_not_take_is_told_with_the_option(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert told in said and "did you mean" not in said
+    # What is printed may go to a file all the same.
+    assert ("--json > a.json" in said) == (told.startswith("--json"))
+    # How the command itself is used, not the program.
+    assert said.startswith(f"usage: granulcal {' '.join(words[: 1 + (words[0] == 'design')])} [-h]")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["init", "folder"],
+        ["sample", "folder"],
+        ["film", "drop", "-o", "x.gif"],
+        ["simulate", "drop", "--engine", "mujoco"],
+        ["export", "scene", "drop", "--to", "yade", "-o", "x"],
+    ],
+)
+def test_a_number_of_the_scene_is_refused_alike_by_every_command(
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for word, told in (
+        ("grains.count", "must be PATH=NUMBER, got 'grains.count'"),
+        ("=1", "must be PATH=NUMBER, got '=1'"),
+        ("end.horizon=long", "end.horizon must be a number, as in end.horizon=0.5"),
+        ("end.horizon=nan", "end.horizon must be a number, as in end.horizon=0.5"),
+    ):
+        assert main([*words, "--set", word]) == 2
+        assert f"argument --set: {told}" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_fits_a_terminal_of_80_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    parser = _parser()
+    asked = [*_subparsers(parser).values(), *parsers(parser).values()]
+    wide = [line for each in asked for line in each.format_help().split("\n") if len(line) > 80]
+    assert wide == []
+
+
+def test_a_warning_steers_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    warn(["first", "a\x1b[2Jb"])
+    assert capsys.readouterr().err == "warning: first\nwarning: a\\u{1b}[2Jb\n"
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -1,5 +1,7 @@
 """Rounds of simulations for one observation."""
 
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
@@ -7,11 +9,12 @@ pytest.importorskip("torch")
 
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
-from granulcal.errors import ObservationError, TrainingDataError
+from granulcal.errors import ObservationError, PriorError, TrainingDataError
 from granulcal.parameter import Parameter
 from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
+from granulcal.within_budget import calibrate_within
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +56,23 @@ def test_budgets_and_observations_are_checked(toy):
         infer_within_budget(lambda at, first: at, toy.prior, x * np.nan)
     with pytest.raises(TrainingDataError, match="0 of 40"):
         infer_within_budget(lambda at, first: np.full((len(at), 16), np.nan), toy.prior, x)
+
+
+@pytest.mark.parametrize(
+    ("path", "low", "high", "told"),
+    [
+        ("material.sliding_friction", 0.0, 10.5, "at the value 10.5: .* in .0, 10., got 10.5"),
+        ("material.sliding", 0.0, 1.0, "at the value 0: .*does not name a number"),
+    ],
+)
+def test_a_prior_that_does_not_fit_the_scene_is_refused_before_any_pour(
+    path: str, low: float, high: float, told: str, tmp_path
+):
+    prior = Prior([Parameter(path=path, distribution="uniform", low=low, high=high)])
+    never_read = cast(Any, [None])
+    with pytest.raises(PriorError, match=f"prior of {path} does not fit the scene {told}"):
+        calibrate_within(Scene.drop(0.02, count=20), prior, never_read, out=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
 
 
 def test_pours_are_kept_and_never_made_twice(tmp_path):

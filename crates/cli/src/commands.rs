@@ -114,6 +114,19 @@ mod tests {
         }
     }
 
+    /// On a terminal of 80 columns lines that are longer break in the middle of a sentence, or of an example.
+    #[test]
+    fn descriptions_fit_80_columns() {
+        // A path that cannot be broken.
+        let is_path = |line: &str| line.contains("bash-completion/completions");
+        for command in Cli::command().get_subcommands() {
+            let text = command.get_long_about().map(ToString::to_string).unwrap_or_default();
+            let long: Vec<_> =
+                text.lines().filter(|line| line.chars().count() > 80 && !is_path(line)).collect();
+            assert!(long.is_empty(), "{}: {long:?}", command.get_name());
+        }
+    }
+
     /// A path that does not say whether it is read or written escapes the check of `args/paths.rs`.
     #[test]
     fn every_path_says_whether_it_is_read_or_written() {

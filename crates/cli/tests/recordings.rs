@@ -54,6 +54,8 @@ fn inspect_says_what_is_in_a_recording() {
     copied(&place, BAG);
     let facts = json(&place.expect(0, &["inspect", BAG, "--json"]));
     assert_eq!(facts["format"], "ROS 1 bag");
+    // Of the frames, not of the lens, which is of no time.
+    assert_eq!(facts["start_s"], 1e-8);
     let depth = &facts["topics"]["/device_0/sensor_0/Depth_0/image/data"];
     assert_eq!(
         (&depth["messages"], &depth["size"], &depth["pixels"]),

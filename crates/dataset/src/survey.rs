@@ -17,6 +17,9 @@ use crate::input::{Input, ReadSeek};
 use crate::message::{self, Kind, Lens, PictureFacts};
 use crate::message_file::{Channel, Damage, Message, MessageFormat, Walk, walk};
 
+/// Stamp of what a RealSense's software writes once and for all times, as its lens and depth unit: the least time of ROS 1.
+const STATIC_NS: u64 = 1;
+
 /// The topics of a recording, and what is wrong with the file.
 #[derive(Clone, Debug)]
 pub struct Survey {
@@ -26,7 +29,7 @@ pub struct Survey {
     pub format: MessageFormat,
     /// The topics, by name.
     pub topics: Vec<Topic>,
-    /// Time of the first message `[s]`.
+    /// Time of the first message `[s]`, but for those of no time.
     pub start_s: f64,
     /// Time of the last message `[s]`.
     pub end_s: f64,
@@ -146,8 +149,10 @@ impl Survey {
         let mut span: Option<(u64, u64)> = None;
         let walk = walk(format, input, &mut |message| {
             let now = message.time_ns;
-            let (first, last) = span.unwrap_or((now, now));
-            span = Some((first.min(now), last.max(now)));
+            if now != STATIC_NS {
+                let (first, last) = span.unwrap_or((now, now));
+                span = Some((first.min(now), last.max(now)));
+            }
             let Channel { topic, schema, encoding } = message.channel.clone();
             let topic = topics
                 .entry((topic, schema, encoding))
@@ -160,8 +165,8 @@ impl Survey {
             path: input.path().to_owned(),
             format,
             topics: topics.into_values().collect(),
-            start_s: first as f64 * 1e-9,
-            end_s: last as f64 * 1e-9,
+            start_s: seconds(first),
+            end_s: seconds(last),
             walk,
         })
     }
@@ -305,6 +310,11 @@ impl fmt::Display for Topic {
         }
         write!(f, ", {} messages)", self.messages)
     }
+}
+
+/// Nanoseconds in seconds, without the digits that a factor of 1e-9 adds.
+fn seconds(time_ns: u64) -> f64 {
+    time_ns as f64 / 1e9
 }
 
 #[cfg(test)]

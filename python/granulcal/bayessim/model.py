@@ -144,7 +144,7 @@ class BayesSim:
 
         Raises:
             TrainingDataError: pairs that cannot be trained on; the message says why.
-            TypeError: a seed that is no whole number.
+            TypeError: a seed that is no whole number, or a scene that is no text.
             ValueError: a setting that does not exist or has an impossible value.
         """
         settings = Config.from_options(**config)

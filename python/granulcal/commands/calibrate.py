@@ -18,6 +18,7 @@ from granulcal.commands.reading import (
 )
 from granulcal.files import write_beside
 from granulcal.paths import READS, writes
+from granulcal.warned import warn
 
 if TYPE_CHECKING:
     from granulcal.bayessim.training.sequential import SequentialFit
@@ -72,8 +73,7 @@ def _run(options: argparse.Namespace) -> int:
         print(json.dumps(document, indent=1) if options.json else outside(impossible))
         return UNHEALTHY
     doubtful = doubts(scene, prior, recordings, options.recording)
-    for doubt in doubtful:
-        print(f"warning: {doubt}", file=sys.stderr)
+    warn(doubtful)
     # Told when the recordings were opened.
     unlike = [f"{r.path}: {r.unlike}" for r in recordings if r.unlike is not None]
     first: list[int] = []

@@ -14,6 +14,7 @@ from granulcal.commands.counts import pour_count, seed_number, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.paths import KEPT, READS, writes
 from granulcal.progress import shown
+from granulcal.warned import warn
 
 if TYPE_CHECKING:
     from granulcal.loop.task import Task
@@ -24,8 +25,9 @@ _TEXT = "find what the model lacks, add it, and report the error before and afte
 _DESCRIPTION = """\
 Find what the model lacks, add it, and report the error before and after.
 
-TASK is a TOML file: a scene, a prior of the material, and recordings under at least one condition
-(pour heights, fluids, drum speeds), each condition to `fit` or `sealed`:
+TASK is a TOML file: a scene, a prior of the material, and recordings under at
+least one condition (pour heights, fluids, drum speeds), each condition to `fit`
+or `sealed`:
 
     scene = "scene.toml"
     prior = "prior.toml"
@@ -35,16 +37,22 @@ TASK is a TOML file: a scene, a prior of the material, and recordings under at l
     use = "fit"
     recordings = ["04cm/pour-0.png", "04cm/pour-1.png"]
 
-What may be wrong with the measurement is declared, and is never a finding: before the conditions
-nuisances = { "tilt.x" = 0.005, "height" = { sd = 0.001, shared = false } }, and in conditions that
-share what each has of its own session = "monday" (docs/theory/loop.md, "Own errors").
+What may be wrong with the measurement is declared, and is never a finding:
+before the conditions
 
-Written to the folder -o: preregistration.json (before any data is seen), verdict.json,
-report.html, and the tables conditions, candidates and residuals.parquet. The archive of pours may
-serve many tasks of one scene; all of it is resumed after an interruption. Verdicts: NONE, RESIDUAL
-(not sure enough for a name), EFFECT, SET (not distinguished), EFFECTS (two), UNEXPLAINED; and, with
-exit code 3, UNCONFIRMED (the surrogate is wrong at the fit) and OVERTURNED (by another definition
-of what is examined, [[definitions]] of the task).
+    nuisances = { "tilt.x" = 0.005, "height" = { sd = 0.001, shared = false } }
+
+and in conditions that share what each has of its own session = "monday"
+(docs/theory/loop.md, "Own errors").
+
+Written to the folder -o: preregistration.json (before any data is seen),
+verdict.json, report.html, and the tables conditions, candidates and
+residuals.parquet. The archive of pours may serve many tasks of one scene; all
+of it is resumed after an interruption. Verdicts: NONE, RESIDUAL (not sure
+enough for a name), EFFECT, SET (not distinguished), EFFECTS (two), UNEXPLAINED;
+and, with exit code 3, UNCONFIRMED (the surrogate is wrong at the fit) and
+OVERTURNED (by another definition of what is examined, [[definitions]] of the
+task).
 """
 # The exit code of what is done and does not stand.
 _FALLEN = 3
@@ -105,8 +113,7 @@ def _run(options: argparse.Namespace) -> int:
         from granulcal.loop.test.thresholds import Thresholds
 
         task = Task.load(_file(options))
-        for doubt in task.require_readable():
-            print(f"warning: {doubt}", file=sys.stderr)
+        warn(task.require_readable())
         planned(task, options.budget, options.seed, options.pairs, options.rounds, Thresholds())
         with pouring_with(engine):
             return say_how_long(options, task.at_first(), task.prior, options.budget)

@@ -22,40 +22,47 @@ __all__ = ["add"]
 
 _TEXT = "plan pours: the height of the funnel for a wanted ring, or the grains that a height spills"
 _RINGS = """\
-Find the height of the funnel for wanted rings and piles about one axis, and write a pour plan.
+Find the height of the funnel for wanted rings and piles about one axis, and
+write a pour plan.
 
-A ring is two radii in metres: within the inner one lie 5 % of a pour's grains, within the outer one
-half. A pile is its outer radius alone. SCENE holds the grains and their material:
+A ring is two radii in metres: within the inner one lie 5 % of a pour's grains,
+within the outer one half. A pile is its outer radius alone. SCENE holds the
+grains and their material:
 
-  granulcal design rings couscous.toml --ring 0.136 0.223 --ring 0.040 0.073 --pile 0.034 -o plan
-  granulcal design rings funnel --posterior couscous.json --ring 0.040 0.073 -o plan
+  granulcal design rings couscous.toml --ring 0.136 0.223 --pile 0.034 -o plan
+  granulcal design rings funnel --posterior couscous.json --pile 0.034 -o plan
 
---posterior takes the most probable material of that file, made by `infer -o` or `calibrate`.
-The first call simulates --pours pours from heights drawn between --heights and trains a model; it
-goes on after an interruption, and later calls with the same scene, heights, pours and seed use
-what is there. Or give the folder of `granulcal train`, of pours that vary funnel.height alone and
-observe radius[5] and radius[50].
+--posterior takes the most probable material of that file, made by `infer -o` or
+`calibrate`. The first call simulates --pours pours from heights drawn between
+--heights and trains a model; it goes on after an interruption, and later calls
+with the same scene, heights, pours and seed use what is there. Or give the
+folder of `granulcal train`, of pours that vary funnel.height alone and observe
+radius[5] and radius[50].
 
-Written to -o: plan.csv and plan.json (height with its 90 % interval, expected radii with the spread
-between pours), plan.png (all pours simulated one after another). A ring beyond the heights of the
-training is refused unless --extrapolate, radii that no height gives together always.
-Exit code 3: pours are unhealthy, jam the plan or do not come to rest in it, the model fails its own
-check, or the posterior is outside its model.
+Written to -o: plan.csv and plan.json (height with its 90 % interval, expected
+radii with the spread between pours, all in metres), plan.png (all pours
+simulated one after another). A ring beyond the heights of the training is
+refused unless --extrapolate, radii that no height gives together always. Exit
+code 3: pours are unhealthy, jam the plan or do not come to rest in it, the
+model fails its own check, or the posterior is outside its model.
 """
 _SPILL = """\
-Find the probability that a pour spills grains, against the height of the funnel.
+Find the probability that a pour spills grains, against the height of the
+funnel.
 
-SCENE has a funnel, something to pour into, and an [observe.spill] table (examples/bowl.toml).
-Pours from heights between --heights are simulated (it goes on after an interruption) and the number
-of spilled grains is modelled, so that each --grains k has its P(spilled >= k) with a 90 % band:
+SCENE has a funnel, something to pour into, and an [observe.spill] table
+(examples/bowl.toml). Pours from heights between --heights are simulated (it
+goes on after an interruption) and the number of spilled grains is modelled, so
+that each --grains k has its P(spilled >= k) with a 90 % band:
 
-  granulcal design spill examples/bowl.toml --grains 1 10 50 --heights 0.06 0.3 -o spill
-  granulcal design spill bowl.toml --posterior couscous.json --grains 10 -o spill
+  granulcal design spill examples/bowl.toml --grains 1 10 50 -o spill
+  granulcal design spill bowl.toml --posterior couscous.json -o spill
 
-With --posterior every pour has a material of its own from that file, and the band holds what is not
-known of the material; without it the scene's material is taken as known.
-Written to -o: pours.json, spill.csv, spill.json, spill.png. Exit code 3: pours are unhealthy, or the
-posterior is outside its model.
+With --posterior every pour has a material of its own from that file, and the
+band holds what is not known of the material; without it the scene's material is
+taken as known. Written to -o: pours.json, spill.csv and spill.json (heights in
+metres), spill.png. Exit code 3: pours are unhealthy, or the posterior is
+outside its model.
 """
 
 
@@ -257,7 +264,7 @@ def _rings(options: argparse.Namespace) -> int:
     else:
         print(plan)
         print(pattern)
-        print(f"written to {options.out}: plan.csv, plan.json, plan.png")
+        print(f"written to {options.out}: plan.csv and plan.json (metres), plan.png")
     for note in pattern.notes:
         print(f"note: {note}", file=sys.stderr)
     return code if pattern.is_whole else UNHEALTHY
@@ -333,7 +340,7 @@ def _spill(options: argparse.Namespace) -> int:
     print(forecast)
     for k in forecast.grains:
         print(forecast.advice(k, options.at_most))
-    print(f"written to {options.out}: spill.csv, spill.json, spill.png")
+    print(f"written to {options.out}: spill.csv and spill.json (metres), spill.png")
     return code
 
 

@@ -12,8 +12,8 @@ from granulcal import paths
 from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import DONE, UNHEALTHY
-from granulcal.commands.init import assignment
 from granulcal.commands.program import Parser
+from granulcal.commands.setting import setting
 from granulcal.files import beside
 from granulcal.paths import READS, writes
 from granulcal.pours.status import NO_GRAINS, UNUSABLE
@@ -96,7 +96,7 @@ def parser() -> argparse.ArgumentParser:
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=READS)
-    parser.add_argument("--set", action="append", default=[], type=assignment)
+    parser.add_argument("--set", action="append", default=[], type=setting, metavar="PATH=NUMBER")
     parser.add_argument("--preset")
     parser.add_argument("--sensor", type=READS)
     parser.add_argument("--seed", type=int, default=0)

@@ -18,16 +18,19 @@ __all__ = ["add"]
 
 _TEXT = "write a material, a posterior, a scene or a bed of grains for another simulator"
 _DESCRIPTION = """\
-Write what was found in the words of another simulator, with each engine's conventions: rolling friction as
-a ratio or as a length, restitution as a dashpot, what has no counterpart said in the file (docs/export.md).
+Write what was found in the words of another simulator, with each engine's
+conventions: rolling friction as a ratio or as a length, restitution as a
+dashpot, what has no counterpart said in the file (docs/export.md).
 
   granulcal export material scene.toml --to mujoco -o material.xml
-  granulcal export posterior posterior.json scene.toml --to lammps --draws 20 -o materials
-  granulcal export scene scene.toml --to liggghts -o pour        a whole pour; README.txt says how to run it
-  granulcal export bed scene.toml --to vtk -o pile.vtk           the grains at rest
+  granulcal export posterior posterior.json scene.toml --to lammps -o materials
+  granulcal export scene scene.toml --to liggghts -o pour
+  granulcal export bed scene.toml --to vtk -o pile.vtk
 
-posterior.json is what `infer -o` or `calibrate` wrote. A file that granulcal did not export is not
-replaced. Exit code 3: the posterior is outside its model, or the pour of a bed did not come to rest.
+posterior.json is what `infer -o` or `calibrate` wrote. `scene` writes a whole
+pour, whose README.txt says how to run it, `bed` the grains at rest. A file that
+granulcal did not export is not replaced. Exit code 3: the posterior is outside
+its model, or the pour of a bed did not come to rest.
 """
 _ENGINES = ("lammps", "liggghts", "yade", "mujoco", "chrono", "isaac", "gazebo", "newton")
 # What is wrong with pours whose grains are not at rest on the ground, by status.
@@ -69,7 +72,9 @@ def _add_common(parser: argparse.ArgumentParser, out: str) -> None:
 
 
 def _add_engine(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--to", required=True, choices=_ENGINES, help="the engine")
+    parser.add_argument(
+        "--to", required=True, choices=_ENGINES, metavar="ENGINE", help=", ".join(_ENGINES)
+    )
     parser.add_argument(
         "--young",
         type=float,

@@ -6,19 +6,22 @@ import sys
 from typing import Any
 
 from granulcal.commands.counts import seed_number
-from granulcal.commands.init import assignment
+from granulcal.commands.setting import setting
 from granulcal.paths import READS, writes
 
 __all__ = ["add"]
 
 _TEXT = "pour a scene and write an animated GIF or an MP4 of it"
 _DESCRIPTION = """\
-Pour a scene and write an animated GIF or an MP4: grains as balls, walls at rest as lines, half as fast as it was.
+Pour a scene and write an animated GIF or an MP4: grains as balls, walls at rest
+as lines, half as fast as it was.
 
   granulcal film funnel -o pour.gif
-  granulcal film scene.toml --set funnel.height=0.06 --slow 4 -o pour.mp4      pip install 'granulcal[film]'
+  granulcal film scene.toml --set funnel.height=0.06 --slow 4 -o pour.mp4
 
-`simulate --mcap` writes a film for Foxglove, with depth images and walls; examples/foxglove.json is a layout for it.
+An MP4 needs the extra granulcal[film]. `simulate --mcap` writes a film for
+Foxglove, with depth images and walls; examples/foxglove.json is a layout for
+it.
 """
 
 
@@ -45,7 +48,7 @@ def add(commands: Any) -> None:
     )  # fmt: skip
     parser.add_argument("--width", type=int, default=480, help="pixels (default: 480)")
     parser.add_argument(
-        "--set", action="append", default=[], type=assignment, metavar="PATH=VALUE",
+        "--set", action="append", default=[], type=setting, metavar="PATH=NUMBER",
         help="another number of the scene; may be repeated",
     )  # fmt: skip
     parser.add_argument("--preset", help="settings of the solver, in place of the scene's")

@@ -8,29 +8,35 @@ from shlex import quote
 from typing import Any
 
 from granulcal.commands.counts import seed_number
+from granulcal.commands.setting import setting
 from granulcal.paths import READS, RECORDING, writes
 
-__all__ = ["add", "assignment"]
+__all__ = ["add"]
 
 _INIT = """\
-Write a folder to begin with: scene.toml, prior.toml, camera.toml and loop.toml, each with comments.
+Write a folder to begin with: scene.toml, prior.toml, camera.toml and
+loop.toml, each with comments.
 
-  granulcal init couscous                                    the funnel under a RealSense D435
-  granulcal init couscous --recording my.bag                 the lens, its height and noise from my.bag
+  granulcal init couscous                      the funnel under a RealSense D435
+  granulcal init couscous --recording my.bag   lens, height and noise of my.bag
   granulcal init couscous --scene drop --set grains.count=300 --preset fast
 
---recording reads the lens, its distance from the ground and the noise of the ground, so that simulated
-images are as the recorded ones. What stands in the files is checked when it is used: change it.
+--recording reads the lens, its distance from the ground and the noise of the
+ground, so that simulated images are as the recorded ones. What stands in the
+files is checked when it is used: change it.
 """
 _SAMPLE = """\
-Pour a material whose truth is known in the scene of a folder, and record it with the folder's camera.
+Pour a material whose truth is known in the scene of a folder, and record it
+with the folder's camera.
 
   granulcal init couscous
-  granulcal sample couscous            couscous.bag, .mcap and .png, wall.bag, pours/*.png, truth.json
+  granulcal sample couscous
 
-The .bag is laid out as the RealSense viewer saves it, the .mcap as ros2 bag does; both need the extra
-granulcal[ros]. The camera is tilted and noisy as a stereo camera is. pours/ has the recordings that
-loop.toml asks for. truth.json says what was poured; hide it from yourself as you like.
+Written to the folder: couscous.bag, .mcap and .png, wall.bag, pours/*.png and
+truth.json. The .bag is laid out as the RealSense viewer saves it, the .mcap as
+ros2 bag does; both need the extra granulcal[ros]. The camera is tilted and
+noisy as a stereo camera is. pours/ has the recordings that loop.toml asks for.
+truth.json says what was poured; hide it from yourself as you like.
 """
 
 
@@ -58,8 +64,8 @@ def _add_init(commands: Any) -> None:
         "--set",
         action="append",
         default=[],
-        type=assignment,
-        metavar="PATH=VALUE",
+        type=setting,
+        metavar="PATH=NUMBER",
         help="another number in scene.toml, as grains.count=300; may be repeated",
     )
     parser.add_argument("--force", action="store_true", help="overwrite files that are there")
@@ -86,8 +92,8 @@ def _add_sample(commands: Any) -> None:
         "--set",
         action="append",
         default=[],
-        type=assignment,
-        metavar="PATH=VALUE",
+        type=setting,
+        metavar="PATH=NUMBER",
         help="another hidden material, as material.restitution=0.6; may be repeated",
     )
     parser.add_argument("--json", action="store_true", help="print JSON instead of a list")
@@ -146,11 +152,3 @@ def _sample(options: argparse.Namespace) -> int:
         names = ", ".join(path.name for path in found.missing)
         print(f"note: {names} left out: pip install 'granulcal[ros]'", file=sys.stderr)
     return 0
-
-
-def assignment(text: str) -> tuple[str, float]:
-    """Returns path and value of PATH=VALUE."""
-    path, mark, value = text.partition("=")
-    if not mark:
-        raise argparse.ArgumentTypeError(f"must be PATH=VALUE, got {text!r}")
-    return path, float(value)

@@ -14,16 +14,20 @@ __all__ = ["add"]
 
 _TEXT = "make a model of a built-in scene once, for `infer funnel RECORDING`"
 _DESCRIPTION = """\
-Simulate a built-in scene, train a model on it and keep it where `infer` finds it by the scene's name:
+Simulate a built-in scene, train a model on it and keep it where `infer` finds
+it by the scene's name:
 
-  granulcal model funnel                      1000 pours, 20 to 25 minutes on 2 cores; it goes on after a stop
+  granulcal model funnel                 1000 pours, 20 to 25 minutes on 2 cores
   granulcal infer funnel couscous.bag
 
-  granulcal generate funnel default -n 1000 -o pours     the same pours, made elsewhere or long ago
-  granulcal model funnel --data pours                    trained on them
+It goes on after a stop. Or the same pours, made elsewhere or long ago:
 
-It is kept in the user's cache ($GRANULCAL_CACHE sets another place) with its training data. A model that was made
-by another version of the simulator is not taken, whatever its name.
+  granulcal generate funnel default -n 1000 -o pours
+  granulcal model funnel --data pours
+
+It is kept in the user's cache ($GRANULCAL_CACHE sets another place) with its
+training data. A model that was made by another version of the simulator is not
+taken, whatever its name.
 """
 
 

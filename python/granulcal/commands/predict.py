@@ -11,6 +11,7 @@ from granulcal.commands.dry_run import add_dry_run, say_seconds
 from granulcal.commands.numbers import at_least, probability
 from granulcal.paths import READS
 from granulcal.progress import shown
+from granulcal.warned import warn
 
 if TYPE_CHECKING:
     from granulcal.pours.scene import Scene
@@ -19,22 +20,24 @@ __all__ = ["add"]
 
 # The exit code of what is done and does not stand.
 _FALLEN = 3
+_MODELS = ("base", "named", "corrected", "line", "nearest")
 
 _TEXT = "what the models of a closed loop say of a condition that was not measured"
 _DESCRIPTION = """\
-What the models of a closed loop say of a condition that was not measured, with intervals.
+What the models of a closed loop say of a condition that was not measured, with
+intervals.
 
-LOOP is the folder -o of close-loop. The condition states the numbers in which the measured ones
-differ:
+LOOP is the folder -o of close-loop. The condition states the numbers in which
+the measured ones differ:
 
-    granulcal predict loop --at funnel.height=0.07               the verdict's model
-    granulcal predict loop --at funnel.height=0.07 --corrected   base model + its own residual
-    granulcal predict loop --at funnel.height=0.07 --model line  straight line through the means
+  granulcal predict loop --at funnel.height=0.07               of the verdict
+  granulcal predict loop --at funnel.height=0.07 --corrected   base and residual
+  granulcal predict loop --at funnel.height=0.07 --model line  through the means
 
-The correction, the line and the nearest condition know no physics and hold between and near the
-measured conditions alone; farther away they are refused, and the other models warn. A loop closed
-with --engine pours with the same. Intervals are those of one pour. Exit code 3: the loop's verdict
-does not stand.
+The correction, the line and the nearest condition know no physics and hold
+between and near the measured conditions alone; farther away they are refused,
+and the other models warn. A loop closed with --engine pours with the same.
+Intervals are those of one pour. Exit code 3: the loop's verdict does not stand.
 """
 
 
@@ -64,8 +67,9 @@ def add(commands: Any) -> None:
     )
     kinds.add_argument(
         "--model",
-        choices=("base", "named", "corrected", "line", "nearest"),
-        help="which model predicts (default: named, the verdict's)",
+        choices=_MODELS,
+        metavar="MODEL",
+        help=f"which predicts: {', '.join(_MODELS)} (default: named, the verdict's)",
     )
     parser.add_argument(
         "--level", type=probability, default=0.9, help="of the interval (default: 0.9)"
@@ -91,11 +95,8 @@ def _run(options: argparse.Namespace) -> int:
     models, threads = Models.load(options.loop), options.threads or os.cpu_count() or 1
     at, engine = condition_of(options.at), None
     if options.model in (None, "base", "named"):
-        for told in shown_outside(at, models.inputs):
-            print(
-                f"warning: {told}, the conditions of the loop: nothing was measured there",
-                file=sys.stderr,
-            )
+        outside = shown_outside(at, models.inputs)
+        warn(f"{told}, the conditions of the loop: nothing was measured there" for told in outside)
     if options.engine is not None:
         engine = engine_named(options.engine)
     if options.dry_run:

@@ -2,8 +2,9 @@
 
 import argparse
 import json
+import re
 import sys
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
 
 from granulcal.words import did_you_mean
 
@@ -21,13 +22,16 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
-        """Ends with the message, and the option that is nearest to what was not known."""
+        """Ends with the message, and what was meant by a word that was not known."""
         _, mark, unknown = message.partition("unrecognized arguments: ")
         if mark:
-            actions = self._of_words()._actions
-            known = [word for action in actions for word in action.option_strings]
+            # Only the command's own parser knows how it is used.
+            parser = self._of_words()
             for word in unknown.split():
-                message += did_you_mean(word.split("=")[0], known)
+                message += parser._meant(word, before=self._before(word))
+            argparse.ArgumentParser.error(parser, message)
+        if given := re.fullmatch(r"argument (\S+): ignored explicit argument '(.*)'", message):
+            message = _takes_no_value(given[1], given[2])
         super().error(message)
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
@@ -38,15 +42,34 @@ class Parser(argparse.ArgumentParser):
             error.message += did_you_mean(str(value), map(str, action.choices or ()))
             raise
 
-    def _of_words(self) -> argparse.ArgumentParser:
+    def _before(self, word: str) -> str:
+        """The word before another on the command line; empty if it is the first."""
+        at = self._words.index(word) if word in self._words else 0
+        return self._words[at - 1] if at else ""
+
+    def _meant(self, word: str, *, before: str) -> str:
+        """What is said of a word that was not known: which is near, or that the one before takes none."""
+        known = {each: action for action in self._actions for each in action.option_strings}
+        if word.startswith("-"):
+            return did_you_mean(word.split("=")[0], known)
+        takes_none = before in known and known[before].nargs == 0
+        return f"; {_takes_no_value(before, word)}" if takes_none else ""
+
+    def _of_words(self) -> "Parser":
         """The parser of the command, and of the command in it, that the words name."""
-        parser: argparse.ArgumentParser = self
+        parser = self
         for word in self._words:
             for action in parser._actions:
                 if isinstance(action, argparse._SubParsersAction) and word in action.choices:
-                    parser = action.choices[word]
+                    parser = cast(Parser, action.choices[word])
                     break
         return parser
+
+
+def _takes_no_value(option: str, value: str) -> str:
+    """What is said of an option that was given a value and takes none; what --json prints may go to a file."""
+    told = f"{option} takes no value, got {value!r}"
+    return f"{told}; to a file: {option} > {value}" if option == "--json" else told
 
 
 def describe(parser: argparse.ArgumentParser, *, after_help: str) -> str:

@@ -1,13 +1,13 @@
 """Arguments and opening of recordings and models, which several words share."""
 
 import argparse
-import sys
 import warnings
 from collections.abc import Sequence
 from typing import Any
 
 from granulcal.commands.exit_code import DONE, UNHEALTHY
 from granulcal.paths import READS, RECORDING
+from granulcal.warned import warn
 
 __all__ = [
     "TRAINING",
@@ -105,12 +105,9 @@ def open_recordings(options: argparse.Namespace) -> list[Any]:
                 frames=options.frames,
                 first_frame=options.first_frame,
             )
-        for line in recording.damage:
-            print(f"warning: {line}", file=sys.stderr)
-        if recording.unlike is not None:
-            print(f"warning: {path}: {recording.unlike}", file=sys.stderr)
-        if recording.lost is not None:
-            print(f"warning: {path}: {recording.lost}", file=sys.stderr)
+        warn(recording.damage)
+        own = (recording.unlike, recording.lost)
+        warn(f"{path}: {told}" for told in own if told is not None)
         opened.append(recording)
     return opened
 

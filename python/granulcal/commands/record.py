@@ -12,10 +12,11 @@ _TEXT = "record depth frames of a RealSense, or of a topic of ROS 2"
 _DESCRIPTION = """\
 Record depth frames, with their lens, of grains at rest or of the empty table.
 
-  granulcal record couscous.bag                                   a RealSense at this computer
-  granulcal record couscous.mcap --topic /camera/depth/image_rect_raw     a running node of ROS 2
+  granulcal record couscous.bag                a RealSense at this computer
+  granulcal record couscous.mcap --topic /camera/depth/image_rect_raw
 
-The RealSense needs pyrealsense2 (pip install 'granulcal[realsense]'), ROS 2 a sourced installation of it.
+--topic is of a running node of ROS 2, of which a sourced installation is
+needed. The RealSense needs pyrealsense2 (pip install 'granulcal[realsense]').
 """
 
 

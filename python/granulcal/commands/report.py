@@ -20,6 +20,7 @@ from granulcal.commands.reading import (
 )
 from granulcal.paths import READS, writes
 from granulcal.progress import shown
+from granulcal.warned import warn
 
 __all__ = ["add"]
 
@@ -75,8 +76,7 @@ def _run(options: argparse.Namespace) -> int:
         print(outside(impossible))
         return UNHEALTHY
     doubtful = doubts(data.scene, model.prior, recordings, options.recording)
-    for doubt in doubtful:
-        print(f"warning: {doubt}", file=sys.stderr)
+    warn(doubtful)
     names = " ".join(str(path) for path in options.recording)
     words = ["granulcal", "report", str(options.model), *map(str, options.recording)]
     words += reading_words(options)

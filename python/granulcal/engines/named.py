@@ -15,8 +15,8 @@ def engine_named(text: str) -> Engine:
     """Returns the engine that a command line names.
 
     Args:
-        text: one of the engines that ship (`lammps`, `liggghts`, `yade`, `mujoco`);
-            `module:function` of a Python function; else a command.
+        text: one of the engines that ship (`lammps`, `liggghts`, `yade`, `mujoco`, `newton`,
+            `chrono`); `module:function` of a Python function; else a command.
 
     Raises:
         ValueError: an engine that is not installed, or a function or command that is not there.

@@ -9,7 +9,6 @@ the placebo; write the report.
 
 import json
 import os
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -59,6 +58,7 @@ from granulcal.loop.task import FIT, SEALED, Task
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Power, power, trace
 from granulcal.one_thread import one_thread
+from granulcal.warned import warn
 
 __all__ = ["PAIRS", "Closed", "close_loop", "fit_surrogate", "planned"]
 
@@ -134,8 +134,7 @@ def close_loop(
     say(time_needed(task, store, budget - plan.pours, workers))
     # Before hours of pours; what the recordings say is not looked at yet.
     doubts = task.require_readable()
-    for doubt in doubts:
-        print(f"warning: {doubt}", file=sys.stderr)
+    warn(doubts)
     if store.missing:
         # Told before the first pour; whoever goes on has been told.
         for sentence in drifts(task):

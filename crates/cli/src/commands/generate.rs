@@ -26,16 +26,17 @@ const PATIENCE: Duration = Duration::from_secs(45);
 /// Simulate many pours with parameters drawn from a prior, to Parquet
 #[derive(Debug, Args)]
 #[command(long_about = "\
-Draws parameters from a prior, simulates a pour for each draw and writes one row a pour:
-parameters, seed, status, health and the 16 statistics, as Parquet.
+Draws parameters from a prior, simulates a pour for each draw and writes one
+row a pour: parameters, seed, status, health and the 16 statistics, as Parquet.
 
-Row i depends on the scene, the prior, the seed and i only. Stop it at any moment, also by
-pulling the plug, and start it again with the same arguments: the rows are the same as
-without the stop. A larger -n continues the same data set. Shards of several machines, each
-in a folder of its own, are joined by `merge`.
+Row i depends on the scene, the prior, the seed and i only. Stop it at any
+moment, also by pulling the plug, and start it again with the same arguments:
+the rows are the same as without the stop. A larger -n continues the same data
+set. Shards of several machines, each in a folder of its own, are joined by
+`merge`.
 
 Example:
-  granulcal-cli generate examples/funnel.toml examples/prior.toml -n 1000 --seed 1 -o data/
+  granulcal-cli generate scene.toml prior.toml -n 1000 --seed 1 -o data/
   granulcal-cli generate funnel default -n 1000 --shard 0/4 -o shard-0/")]
 pub struct GenerateArgs {
     #[command(flatten)]

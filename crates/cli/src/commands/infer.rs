@@ -29,18 +29,21 @@ const KEPT_DRAWS: usize = 1000;
 /// Infer the parameters from recordings with a trained model
 #[derive(Debug, Args)]
 #[command(long_about = "\
-Evaluates a model that `granulcal train` made: recordings to statistics to the posterior of the
-parameters. Needs neither Python nor torch; a robot runs it after every pour.
+Evaluates a model that `granulcal train` made: recordings to statistics to the
+posterior of the parameters. Needs neither Python nor torch; a robot runs it
+after every pour.
 
-RECORDING is what `features` reads. Several recordings are pours of one material and give one
-posterior. The images are down-sampled so that a pixel is as wide on the ground as in the scene
-that the model was trained on, and where they show more of the ground than it does, its square about
-the formation is cut out.
+RECORDING is what `features` reads. Several recordings are pours of one
+material and give one posterior. The images are down-sampled so that a pixel is
+as wide on the ground as in the scene that the model was trained on, and where
+they show more of the ground than it does, its square about the formation is
+cut out.
 
-A model answers under its own assumptions, right or wrong. So the recording's height, extent and
-ground are compared with what the model's scene allows, and its statistics with what any parameters
-can explain; if either fails, OUTSIDE THE MODEL is said, inside_model in the JSON is false, and the
-exit code is 3. A model whose own check failed is told on stderr.
+A model answers under its own assumptions, right or wrong. So the recording's
+height, extent and ground are compared with what the model's scene allows, and
+its statistics with what any parameters can explain; if either fails, OUTSIDE
+THE MODEL is said, inside_model in the JSON is false, and the exit code is 3. A
+model whose own check failed is told on stderr.
 
 Example:
   granulcal-cli infer model/ pile.bag

@@ -16,14 +16,15 @@ const NAMED_GAPS: usize = 5;
 /// Join shards of a data set into one Parquet file
 #[derive(Debug, Args)]
 #[command(long_about = "\
-Joins folders and files of one data set (same scene, prior, seed and version) into one
-Parquet file, in order of the rows. A row that stands in several is written once; if it is
-not the same in all, that is an error. Of folders only some parts are in memory at a time, so
-that a million rows need no more.
+Joins folders and files of one data set (same scene, prior, seed and version)
+into one Parquet file, in order of the rows. A row that stands in several is
+written once; if it is not the same in all, that is an error. Of folders only
+some parts are in memory at a time, so that a million rows need no more.
 
-The file is written, too, where rows are missing of those that `generate` was asked for: how
-many is told, and the exit code is 3. Folders of earlier versions do not say how many were
-asked for; there only what is missing before the last row is known.
+The file is written, too, where rows are missing of those that `generate` was
+asked for: how many is told, and the exit code is 3. Folders of earlier
+versions do not say how many were asked for; there only what is missing before
+the last row is known.
 
 Example:
   granulcal-cli merge shard-0/ shard-1/ -o data.parquet")]

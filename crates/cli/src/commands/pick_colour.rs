@@ -18,19 +18,21 @@ const MUCH_GROUND: f64 = 0.05;
 /// Pick the range of colours that marks grains from an image
 #[derive(Debug, Args)]
 #[command(long_about = "\
-Finds the range of hue, saturation and value that marks the grains of a colour image, for the
-table [segmentation.colour] of a camera's TOML.
+Finds the range of hue, saturation and value that marks the grains of a colour
+image, for the table [segmentation.colour] of a camera's TOML.
 
-Point at some grains with --grains and, if you can, at some ground with --ground: rectangles of
-the image. The range is that of the grains, its bounds half way to the ground's where the two
-do not overlap. Without a rectangle the image is cut in two by brightness or saturation, and
-the smaller part is taken for grains.
+Point at some grains with --grains and, if you can, at some ground with
+--ground: rectangles of the image. The range is that of the grains, its bounds
+half way to the ground's where the two do not overlap. Without a rectangle the
+image is cut in two by brightness or saturation, and the smaller part is taken
+for grains.
 
 Look at the result: --mask writes the image with the grains outlined.
 
 Example:
   granulcal-cli pick-colour pile.png --mask mask.png
-  granulcal-cli pick-colour pile.png --grains 300,220,40,40 --ground 20,20,80,80 --mask mask.png")]
+  granulcal-cli pick-colour pile.png --grains 300,220,40,40 \\
+      --ground 20,20,80,80 --mask mask.png")]
 pub struct PickColourArgs {
     /// 8-bit colour PNG
     pub image: Reads,

@@ -22,12 +22,14 @@ use crate::sides::SideFiles;
 /// Simulate or take grains and write the depth image that the scene's camera sees
 #[derive(Debug, Args)]
 #[command(long_about = "\
-Writes the image that the scene's camera delivers, down-sampled and with the scene's noise:
-a 16-bit PNG of depth with the camera's TOML beside it, or an .npz height map for an
-orthographic camera. Both can be read back by `features`.
+Writes the image that the scene's camera delivers, down-sampled and with the
+scene's noise: a 16-bit PNG of depth with the camera's TOML beside it, or an
+.npz height map for an orthographic camera. Both can be read back by
+`features`.
 
 Example:
-  granulcal-cli render funnel --seed 1 -o pile.png && granulcal-cli features pile.png --camera pile.toml
+  granulcal-cli render funnel --seed 1 -o pile.png
+  granulcal-cli features pile.png --camera pile.toml
   granulcal-cli render funnel --positions grains.npy -o pile.png")]
 pub struct RenderArgs {
     #[command(flatten)]

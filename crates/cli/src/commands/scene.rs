@@ -11,8 +11,8 @@ use crate::scene;
 /// Print a scene as TOML, every number of it: a built-in one, or a file with changes
 #[derive(Debug, Args)]
 #[command(long_about = "\
-Prints a scene as TOML with every number that it has, those that its file leaves out too. The
-result is a scene file.
+Prints a scene as TOML with every number that it has, those that its file
+leaves out too. The result is a scene file.
 
 Example:
   granulcal-cli scene funnel > scene.toml

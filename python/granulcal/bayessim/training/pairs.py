@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from granulcal.bayessim.arrays import as_matrix
 from granulcal.errors import TrainingDataError
+from granulcal.pours.scene import Scene
 from granulcal.pours.status import NO_GRAINS, UNUSABLE, USABLE
 from granulcal.prior import Prior
 
@@ -64,10 +65,11 @@ class TrainingPairs:
 
         Raises:
             TrainingDataError: shapes that do not fit, a status that does not exist, NaN among the
-                parameters, parameters outside the prior, no prior, or too few usable pairs.
-            TypeError: an array that does not hold real numbers.
+                parameters, parameters outside the prior, no prior, a text that is no scene, or too
+                few usable pairs.
+            TypeError: an array that does not hold real numbers, or a scene that is no text.
         """
-        theta_names, law = None, None
+        theta_names, law, scene_toml = None, None, _scene_toml(scene)
         if x is None:
             data = data_or_theta
             for attribute in ("theta", "x"):
@@ -81,7 +83,8 @@ class TrainingPairs:
             prior = prior if prior is not None else getattr(data, "prior", None)
             status = status if status is not None else getattr(data, "status", None)
             x_names = x_names if x_names is not None else getattr(data, "x_names", None)
-            scene = scene if scene is not None else getattr(data, "scene_toml", None)
+            if scene_toml is None:
+                scene_toml = getattr(data, "scene_toml", None)
             law = getattr(data, "law", None)
         else:
             theta_values = data_or_theta
@@ -122,7 +125,7 @@ class TrainingPairs:
             pair_count=len(theta),
             excluded=excluded,
             horizon_count=int(np.sum(statuses[keep] == "horizon")),
-            scene_toml=_scene_toml(scene),
+            scene_toml=scene_toml,
             law=law,
         )
 
@@ -233,8 +236,14 @@ def _check_inside(theta: Array, prior: Prior) -> None:
 
 
 def _scene_toml(scene: Any) -> str | None:
-    if scene is None or isinstance(scene, str):
-        return scene
-    if hasattr(scene, "to_toml"):
-        return str(scene.to_toml())
-    raise TypeError(f"scene must be TOML text or have to_toml(), got {type(scene).__name__}")
+    """The text of a scene that was given; what asks the model later reads it as one."""
+    if scene is None:
+        return None
+    if not isinstance(scene, str) and not hasattr(scene, "to_toml"):
+        raise TypeError(f"scene must be TOML text or have to_toml(), got {type(scene).__name__}")
+    text = scene if isinstance(scene, str) else str(scene.to_toml())
+    try:
+        Scene.from_toml(text)
+    except ValueError as error:
+        raise TrainingDataError(f"scene: {error}") from None
+    return text

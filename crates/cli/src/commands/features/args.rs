@@ -9,26 +9,30 @@ use crate::args::paths::{Reads, Writes, recording, writes};
 /// Segment and describe a measured recording
 #[derive(Debug, Args)]
 #[command(long_about = "\
-Finds the ground plane of a measured recording, levels it, takes the points above it and
-prints the same 16 statistics that simulated pours have.
+Finds the ground plane of a measured recording, levels it, takes the points
+above it and prints the same 16 statistics that simulated pours have.
 
 RECORDING is one of, as its content says:
-  .bag    ROS 1, as the RealSense viewer saves it: depth, lens and depth unit are in the file
-  .mcap   sensor_msgs/Image (16UC1, 32FC1), CompressedImage (PNG) and CameraInfo of ROS 2,
-          or RawImage, CompressedImage and CameraCalibration of Foxglove
-  .png    16-bit depth, or a folder of such frames; needs --camera, the TOML of lens and unit
+  .bag    ROS 1, as the RealSense viewer saves it: depth, lens and depth unit
+          are in the file
+  .mcap   sensor_msgs/Image (16UC1, 32FC1), CompressedImage (PNG) and
+          CameraInfo of ROS 2, or RawImage, CompressedImage and
+          CameraCalibration of Foxglove
+  .png    16-bit depth, or a folder of such frames; needs --camera, the TOML of
+          lens and unit
   .npz    height map: arrays depthmap, xres, yres, zres, scale
 
-Topics are found by type. Where several fit, the message lists them, and --topic, --camera-topic
-or --colour-topic picks one; `inspect` shows them all. Of the last ten frames (--frames,
---first-frame) the mean of each pixel is taken over those that have data there. A file that is
-cut off or damaged gives the frames that are whole; the others are counted, exit code 3.
+Topics are found by type. Where several fit, the message lists them, and
+--topic, --camera-topic or --colour-topic picks one; `inspect` shows them all.
+Of the last ten frames (--frames, --first-frame) the mean of each pixel is
+taken over those that have data there. A file that is cut off or damaged gives
+the frames that are whole; the others are counted, exit code 3.
 
 Example:
   granulcal-cli features pile.bag
   granulcal-cli features pile.bag --debug-images steps/
-  granulcal-cli features pile.mcap --topic /camera/depth/image_rect_raw --frames 30 --json
-  granulcal-cli features frames/ --camera examples/camera.toml --threshold 0.002
+  granulcal-cli features pile.mcap --topic /camera/depth/image_rect_raw --json
+  granulcal-cli features frames/ --camera camera.toml --threshold 0.002
   granulcal-cli features pile.npz --diagnostics --grain-diameter 0.002
   granulcal-cli features --list")]
 pub struct FeaturesArgs {

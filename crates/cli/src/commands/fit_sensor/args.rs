@@ -10,30 +10,34 @@ use crate::args::paths::{Reads, Writes, recording, writes};
 /// Fit a depth camera's noise, fixed pattern, rounding and holes to frames of a flat surface
 #[derive(Debug, Args)]
 #[command(long_about = "\
-Fits the sensor of a scene's camera to frames of something flat: a wall, a board, the empty bed.
+Fits the sensor of a scene's camera to frames of something flat: a wall, a
+board, the empty bed.
 
-Record some ten frames of it without moving anything, from the distance at which you pour. One
-camera stands still: what the frames share is its fixed pattern, what differs is its noise.
+Record some ten frames of it without moving anything, from the distance at
+which you pour. One camera stands still: what the frames share is its fixed
+pattern, what differs is its noise.
 
-RECORDING is what `features` reads: a .bag or .mcap of one or more frames, 16-bit depth PNGs or a
-folder of them, with --camera, or .npz height maps. Each frame is taken by itself. With
---baseline the camera is stereo: errors are px of disparity, and depth errors grow with the
-square of the depth. Without, errors are metres, whatever the depth.
+RECORDING is what `features` reads: a .bag or .mcap of one or more frames,
+16-bit depth PNGs or a folder of them, with --camera, or .npz height maps. Each
+frame is taken by itself. With --baseline the camera is stereo: errors are px
+of disparity, and depth errors grow with the square of the depth. Without,
+errors are metres, whatever the depth.
 
-Where the frames show more than the flat surface, --region says where it is; repeat it for
-several. --check are recordings that the fit does not see, to compare it with; --check-region is
-another part of the surface.
+Where the frames show more than the flat surface, --region says where it is;
+repeat it for several. --check are recordings that the fit does not see, to
+compare it with; --check-region is another part of the surface.
 
-What is printed: the parameters; then standard deviation and autocorrelation of the measured
-frames beside those of frames simulated with the fit, after the same trend removal. -o writes
-the TOML that stands in a scene, [camera.sensor], or goes to `render --sensor`.
+What is printed: the parameters; then standard deviation and autocorrelation of
+the measured frames beside those of frames simulated with the fit, after the
+same trend removal. -o writes the TOML that stands in a scene, [camera.sensor],
+or goes to `render --sensor`.
 
 Example:
   granulcal-cli fit-sensor wall.bag --baseline 0.05 -o sensor.toml
-  granulcal-cli fit-sensor wall/ --camera d435.toml --baseline 0.05 -o sensor.toml
+  granulcal-cli fit-sensor wall/ --camera d435.toml --baseline 0.05 -o s.toml
   granulcal-cli fit-sensor d0.png d1.png --camera d435.toml --baseline 0.05 \\
       --region 30,10,100,290 --check-region 130,10,100,290
-  granulcal-cli fit-sensor bed_1.npz bed_2.npz bed_3.npz --check bed_4.npz bed_5.npz")]
+  granulcal-cli fit-sensor bed_1.npz bed_2.npz --check bed_3.npz bed_4.npz")]
 // Frames are averaged by the other commands that read recordings, not here.
 #[command(mut_arg("frames", |frames| frames.help("Read so many frames, or `all`")))]
 #[command(mut_arg("first_frame", |first| {

@@ -9,21 +9,23 @@ use crate::args::paths::{Reads, Writes, writes};
 /// Say what is in a scene, prior, data set, recording or MCAP file, or in one substep of a scene
 #[derive(Debug, Args)]
 #[command(long_about = "\
-Says what is in a file or folder: a scene, prior or camera (.toml), a data set (folder or
-.parquet), an array or height map (.npy, .npz), an image (.png), a folder of frames, a checkpoint
-(.ckpt), or a recording over time (.bag, .mcap): its topics with types, counts and sizes, which of
-them `features` reads, with which lens and depth unit. The whole file is read, so a damaged one is
-found: it is said where, and how many frames are lost (exit code 3).
+Says what is in a file or folder: a scene, prior or camera (.toml), a data set
+(folder or .parquet), an array or height map (.npy, .npz), an image (.png), a
+folder of frames, a checkpoint (.ckpt), or a recording over time (.bag, .mcap):
+its topics with types, counts and sizes, which of them `features` reads, with
+which lens and depth unit. The whole file is read, so a damaged one is found:
+it is said where, and how many frames are lost (exit code 3).
 
-With --contact-problem PATH is a scene, or one of the words `funnel` and `drop`: it is simulated
-until --time, and the contact problem of the next substep is written with its solution, as arrays
-that docs/theory/contact-problem.md describes.
+With --contact-problem PATH is a scene, or one of the words `funnel` and
+`drop`: it is simulated until --time, and the contact problem of the next
+substep is written with its solution, as arrays that
+docs/theory/contact-problem.md describes.
 
 Example:
   granulcal-cli inspect data/
   granulcal-cli inspect pile.bag
   granulcal-cli inspect drop.mcap --json
-  granulcal-cli inspect drop --set grains.count=60 --contact-problem frozen.npz --time 0.2")]
+  granulcal-cli inspect drop --contact-problem frozen.npz --time 0.2")]
 pub struct InspectArgs {
     /// File or folder
     pub path: Reads,

@@ -12,22 +12,22 @@ use crate::args::paths::{Reads, Writes, kept, writes};
 /// Simulate one pour: status, health and statistics
 #[derive(Debug, Args)]
 #[command(long_about = "\
-Simulates one pour to its end and prints how it ended, whether it can be trusted and the 16
-statistics of its depth image.
+Simulates one pour to its end and prints how it ended, whether it can be
+trusted and the 16 statistics of its depth image.
 
-The same scene, numbers and seed give the same result on any machine. The row of a data set
-is made again by setting its parameters and its seed.
+The same scene, numbers and seed give the same result on any machine. The row
+of a data set is made again by setting its parameters and its seed.
 
-A long pour survives whatever stops it: with --checkpoint its whole state is kept in a file,
-at the start, every minute, when you stop it (Ctrl-C or SIGTERM) and at the end. The same
-command with --resume goes on from there, and every bit of the result is that of a pour that
-was never stopped. A checkpoint of another scene, seed, preset or version is refused.
+A long pour survives whatever stops it: with --checkpoint its whole state is
+kept in a file, at the start, every minute, when you stop it (Ctrl-C or
+SIGTERM) and at the end. The same command with --resume goes on from there, and
+every bit of the result is that of a pour that was never stopped. A checkpoint
+of another scene, seed, preset or version is refused.
 
 Example:
-  granulcal-cli simulate funnel --set material.sliding_friction=0.5 --seed 1 --json
-  granulcal-cli simulate examples/drop.toml --mcap drop.mcap --positions grains.npy
-  granulcal-cli simulate large.toml --checkpoint large.ckpt
-  granulcal-cli simulate large.toml --checkpoint large.ckpt --resume large.ckpt")]
+  granulcal-cli simulate funnel --set material.sliding_friction=0.5 --json
+  granulcal-cli simulate drop --mcap drop.mcap --positions grains.npy
+  granulcal-cli simulate large.toml --checkpoint l.ckpt --resume l.ckpt")]
 pub struct SimulateArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
