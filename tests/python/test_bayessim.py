@@ -1,6 +1,7 @@
 """BayesSim: features, training against exact posteriors, reproducibility, files, bad input."""
 
 import json
+import pickle
 import shutil
 from types import SimpleNamespace
 
@@ -229,10 +230,13 @@ def test_save_and_load_are_identical_to_the_bit(quick, toy, tmp_path):
     quick.save(tmp_path / "model")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["model"]
     loaded = BayesSim.load(tmp_path / "model")
+    sent = pickle.loads(pickle.dumps(quick))
+    assert repr(sent) == repr(quick) and repr(sent).endswith(f"{quick.summary.pair_count} pours)")
     x = toy.simulate(3, seed=8)[1]
     for observed in (x[0], x):
         ours, theirs = quick.posterior(observed), loaded.posterior(observed)
         np.testing.assert_array_equal(ours.sample(50), theirs.sample(50))
+        np.testing.assert_array_equal(ours.sample(50), sent.posterior(observed).sample(50))
         np.testing.assert_array_equal(
             ours.log_prob(ours.sample(5)), theirs.log_prob(ours.sample(5))
         )

@@ -33,6 +33,7 @@ from granulcal.experiments.paper.heights import SHIPPED as RECORDINGS
 from granulcal.experiments.paper.heights import Recordings
 from granulcal.experiments.paper.observation_error import _peaks
 from granulcal.experiments.paper.propagation import _least
+from granulcal.pours.kept_pours import KeptPours
 
 pytest.importorskip("torch")
 pytest.importorskip("matplotlib")
@@ -50,6 +51,22 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
         reproduce_paper(out, name, size=TINY, quiet=True)
     folder = out / "paper-tiny"
     return folder, write_page(folder, experiments(), TINY)
+
+
+def test_pours_at_other_parameters_are_poured_again_and_counted(tmp_path: Path) -> None:
+    scene, prior = gc.Scene.drop(0.02, count=12), gc.Prior.default()
+    theta, told = prior.sample(3, seed=1), []
+    path = tmp_path / "pours.json"
+    kept = KeptPours(scene, prior, path, threads=1)
+    before = kept(theta, 0)
+    other = theta.copy()
+    other[1, 0] *= 0.5
+    kept = KeptPours(scene, prior, path, threads=1, progress=told.append)
+    assert (kept.kept_of(theta), kept.kept_of(other)) == (3, 2)
+    after = kept(other, 0)
+    # Two of three were there.
+    assert told == [3] and kept.kept_of(other) == 3
+    np.testing.assert_array_equal(after[[0, 2]], before[[0, 2]])
 
 
 def test_every_experiment_is_there_once():

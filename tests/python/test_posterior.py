@@ -1,5 +1,6 @@
 """Posterior: densities that integrate to one, draws inside the prior, regions, several pours."""
 
+import pickle
 import subprocess
 import sys
 
@@ -198,6 +199,16 @@ def test_pair_plot_is_written(tmp_path):
     assert figure.axes[2].get_yscale() == "log"
     with pytest.raises(ValueError, match="truth must have shape"):
         posterior.pair_plot(truth=[0.0])
+
+
+def test_a_posterior_says_what_it_is_and_stays_in_its_process():
+    posterior = Posterior.from_mixture(BOX, random_mixture(9))
+    low, high = posterior.credible_region(0.9)["a.flat"]
+    assert repr(posterior).startswith("Posterior(a.flat ") and f"({low:.3g} to {high:.3g})" in repr(
+        posterior
+    )
+    with pytest.raises(TypeError, match="stays in its process: hand over sample"):
+        pickle.dumps(posterior)
 
 
 def test_bad_arguments():

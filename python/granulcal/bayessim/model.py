@@ -4,6 +4,8 @@ import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os import PathLike
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -286,6 +288,18 @@ class BayesSim:
         """
         return cls(**load_parts(path))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # What the extension holds is made again from the files: a model goes to another process so.
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / "model"
+            self.save(path)
+            files = {each.name: each.read_bytes() for each in path.iterdir()}
+        return _of_files, (files,)
+
+    def __repr__(self) -> str:
+        names, statistics = ", ".join(self.prior.names), len(self.x_names)
+        return f"BayesSim({names} of {statistics} statistics, {self.summary.pair_count} pours)"
+
     def _checked(self, x_obs: ArrayLike) -> Array:
         observed = as_real("x_obs", x_obs)
         count = len(self.x_names)
@@ -299,3 +313,11 @@ class BayesSim:
             names = [self.x_names[i] for i in np.flatnonzero(bad.any(axis=0))]
             raise ObservationError(f"x_obs must be finite, it is not in {', '.join(names)}")
         return rows
+
+
+def _of_files(files: dict[str, bytes]) -> BayesSim:
+    """Returns the model of a folder's files."""
+    with TemporaryDirectory() as folder:
+        for name, content in files.items():
+            (Path(folder) / name).write_bytes(content)
+        return BayesSim.load(folder)

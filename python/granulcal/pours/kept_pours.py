@@ -109,6 +109,9 @@ class KeptPours:
     def __call__(self, theta: Array, first: int) -> Array:
         """Returns the statistics of pours at `theta` (b, p), NaN where there are none, (b, s)."""
         missing = [i for i in range(len(theta)) if not self._is_kept(first + i, theta[i])]
+        for i in missing:
+            # One at other parameters: it is not counted among those that are kept.
+            self.rows.pop(str(first + i), None)
         asked = [(theta[i], _FIRST_SEED + 100_000 * self.seed + first + i) for i in missing]
         if missing and cluster_in_use() is not None:
             refuse_engine(self.engine)
@@ -128,6 +131,10 @@ class KeptPours:
                 self._write()
         kept = [self.rows[str(first + i)]["x"] for i in range(len(theta))]
         return np.array([[np.nan] * len(self.x_names) if x is None else x for x in kept], float)
+
+    def kept_of(self, theta: Array) -> int:
+        """Returns how many of the pours at `theta` (b, p), from the first on, are kept already."""
+        return sum(self._is_kept(i, row) for i, row in enumerate(theta))
 
     def left_out(self, count: int) -> LeftOut:
         """Returns how many of the first `count` pours that are kept cannot be used, by why."""

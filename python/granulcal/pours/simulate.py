@@ -1,7 +1,7 @@
 """One pour: from a scene to grains at rest, and what the camera sees of them."""
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -193,6 +193,12 @@ class Pour:
         image = view.heights if view.depth is None else view.depth
         drawn = "" if image is None else picture(seen_from_above(image, label))
         return page(f"Pour of {self.scene.name}", rows, drawn)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "a Pour stays in its process: hand over its arrays and statistics(), or the "
+            "scene and the seed, which make it again"
+        )
 
     def __repr__(self) -> str:
         return f"Pour({len(self.radii)} grains, {self.status}, {self.simulated_s:.2f} s)"

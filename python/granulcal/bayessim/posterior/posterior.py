@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -272,6 +272,19 @@ class Posterior:
         if int(arviz.__version__.split(".")[0]) < 1:
             return arviz.from_dict(**groups)
         return arviz.from_dict(groups)
+
+    def __repr__(self) -> str:
+        region, mode = self.credible_region(0.9), self.mode()
+        told = (
+            f"{name} {mode[i]:.3g} ({region[name][0]:.3g} to {region[name][1]:.3g})"
+            for i, name in enumerate(self.names)
+        )
+        return f"Posterior({', '.join(told)}; mode and 90 % interval)"
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "a Posterior stays in its process: hand over sample(n), or the model and the statistics"
+        )
 
     def _repr_html_(self) -> str:
         from granulcal.html import page, picture

@@ -181,7 +181,7 @@ class Workshop:
         kept = KeptPours(
             scene, prior, path, seed=seed, threads=self.threads, look=look, observed=observed
         )
-        resumed, total = min(len(kept.rows), len(theta)), len(theta)
+        resumed, total = kept.kept_of(theta), len(theta)
         self.say(f"{name}: {total} pours")
         line = None if self.quiet else ProgressLine()
         if line is not None:
