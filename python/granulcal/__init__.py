@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
     from granulcal.bayessim.posterior.posterior import Posterior
     from granulcal.loop.close import close_loop
+    from granulcal.loop.condition import Condition
     from granulcal.loop.task import Task
     from granulcal.within_budget import calibrate_within
 
@@ -43,6 +44,7 @@ __all__ = [
     "BayesSim",
     "Camera",
     "Cluster",
+    "Condition",
     "Dataset",
     "DiagnosticStatistics",
     "Formation",
@@ -74,6 +76,7 @@ __all__ = [
 
 _LAZY = {
     "BayesSim": "granulcal.bayessim",
+    "Condition": "granulcal.loop.condition",
     "Posterior": "granulcal.bayessim.posterior.posterior",
     "Task": "granulcal.loop.task",
     "calibrate_within": "granulcal.within_budget",

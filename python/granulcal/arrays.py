@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from granulcal.documents import read_bytes
 
-__all__ = ["read_array", "read_arrays", "unmasked"]
+__all__ = ["read_array", "read_arrays", "read_only", "unmasked"]
 
 
 def read_array(path: Path) -> NDArray[np.float64]:
@@ -50,6 +50,12 @@ def read_arrays(path: Path, *names: str) -> dict[str, NDArray[Any]]:
     if missing := [name for name in names if name not in found]:
         raise ValueError(f"{path} must have the arrays {', '.join(names)}; it lacks {missing}")
     return found
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Returns the array, into which nobody writes any more: it belongs to what handed it out."""
+    array.flags.writeable = False
+    return array
 
 
 def unmasked(name: str, value: Any) -> NDArray[Any]:

@@ -2,8 +2,10 @@
 
 __all__ = [
     "DamagedPartWarning",
+    "DoubtfulRecordingWarning",
     "ExtrapolationError",
     "ModelFormatError",
+    "NotOfPriorWarning",
     "ObservationError",
     "OtherLawWarning",
     "PriorError",
@@ -40,6 +42,14 @@ class UnverifiedDataWarning(UserWarning):
 
 class DamagedPartWarning(UserWarning):
     """A part in the store of a cluster that cannot be read; its rows are poured again."""
+
+
+class DoubtfulRecordingWarning(UserWarning):
+    """A recording that can hardly be one of the scene, or of which a part is hidden."""
+
+
+class NotOfPriorWarning(UserWarning):
+    """Parameters of training pairs that do not look drawn from the prior that is stated."""
 
 
 class OtherLawWarning(UserWarning):

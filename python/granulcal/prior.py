@@ -4,6 +4,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,8 @@ Array = NDArray[np.float64]
 
 # The paper states its rolling friction as a length [m]; section 'Simulation'.
 _PAPER_ROLLING_LENGTH = (1e-7, 1e-1)
+
+_STANDARD_NORMAL = NormalDist()
 
 
 class Prior:
@@ -200,6 +203,14 @@ class Prior:
         density[inside] = self.coordinate_log_prob(coordinates) + self.log_slope(values[inside])
         return density
 
+    def cdf(self, theta: ArrayLike) -> Array:
+        """Returns the share of each parameter's prior below `theta` (n, p) or (p,), shape (n, p).
+
+        Of draws from the prior each column is uniform on [0, 1].
+        """
+        values = as_matrix("theta", theta, columns=len(self.free))
+        return np.column_stack([_share_below(p, values[:, i]) for i, p in enumerate(self.free)])
+
     def mean(self) -> Array:
         """Returns the prior means, own units, shape (p,)."""
         return np.array([parameter.prior_mean for parameter in self.free])
@@ -236,6 +247,17 @@ class Prior:
         """The parameters and their distributions, one line."""
         shown = ", ".join(f"{p.path} ~ {p.distribution}" for p in self.parameters)
         return f"Prior({shown})"
+
+
+def _share_below(parameter: Parameter, values: Array) -> Array:
+    low, high = parameter.coordinate_bounds
+    # Below the bounds a logarithmic coordinate need not exist.
+    coordinates = parameter.to_coordinate(np.clip(values, *parameter.bounds))
+    if parameter.distribution != "normal":
+        return coordinates
+    first, last = _STANDARD_NORMAL.cdf(low), _STANDARD_NORMAL.cdf(high)
+    shares = np.array([_STANDARD_NORMAL.cdf(each) for each in coordinates.tolist()])
+    return (shares - first) / (last - first)
 
 
 def _parameter_from_table(table: Mapping[str, Any], number: int) -> Parameter:

@@ -1,5 +1,6 @@
 """A material from recordings with a given number of pours, made for these recordings alone."""
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os import PathLike
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from granulcal.errors import PriorError
+from granulcal.errors import DoubtfulRecordingWarning, PriorError
 from granulcal.measured.different import require_different
 from granulcal.measured.recording import Recording
 from granulcal.pours.cluster import Cluster, cluster_asked, spread_over
@@ -58,7 +59,11 @@ def calibrate_within(
 
     Raises:
         PriorError: a parameter that has no place in the scene over its whole range.
+        TypeError: something that is no recording.
         ValueError: no recording, one that is given twice, or too small a budget.
+
+    Warns:
+        DoubtfulRecordingWarning: what `Recording.doubts` says.
     """
     from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
 
@@ -66,6 +71,13 @@ def calibrate_within(
         raise ValueError("calibrate_within needs at least one recording, got none")
     round_sizes(budget)
     _require_fits(prior, scene)
+    if not isinstance(recordings, Sequence) or not all(
+        isinstance(each, Recording) for each in recordings
+    ):
+        raise TypeError("recordings must be a list of what Recording.open returns")
+    for each in recordings:
+        for doubt in each.doubts(scene, prior):
+            warnings.warn(f"{each.path}: {doubt}", DoubtfulRecordingWarning, stacklevel=2)
     formations = [each.formation(**scene.reading) for each in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
     require_different(observed)

@@ -188,9 +188,9 @@ def test_pixels_at_the_edge_are_told_before_a_map_is_refused(model, tmp_path, ca
 
 
 def _statistics(model: BayesSim, recording: list[str]) -> np.ndarray:
-    resolution = gc.Scene.from_toml(model.scene_toml or "").ground_resolution
+    reading = gc.Scene.from_toml(model.scene_toml or "").reading
     opened = gc.Recording.open(recording[0], camera=recording[2])
-    return np.asarray(opened.formation(ground_resolution=resolution).statistics())
+    return np.asarray(opened.formation(**reading).statistics())
 
 
 def _is_inside(model: BayesSim, recording: list[str], *more: str) -> bool:

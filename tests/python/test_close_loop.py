@@ -1,6 +1,8 @@
 """The loop as a user calls it: a task file, an archive, a verdict; small pours, but real ones."""
 
+import hashlib
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal import loop
 from granulcal.cli import main
 from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.analysis import Analysis
@@ -20,6 +23,8 @@ from granulcal.loop.pours.measures import Measures
 from granulcal.loop.pours.parts import parts_of
 from granulcal.loop.pours.refine import further
 from granulcal.loop.pours.time_needed import time_needed
+from granulcal.loop.preregistration import register
+from granulcal.loop.report import folder
 from granulcal.loop.task import Task
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.pours.camera import Camera
@@ -148,15 +153,18 @@ def test_a_tilted_table_is_found_named_and_removed(
 def test_a_declared_tilt_is_not_found(tmp_path: Path) -> None:
     plain = make(tmp_path / "tilted", {"effects.tilt.y": 0.02})
     declared = plain.with_name("declared.toml")
-    declared.write_text('nuisances = { "tilt.y" = 0.02 }\n' + plain.read_text())
+    asked = plain.read_text().replace('"tilt.y", "ground', '"ground')
+    declared.write_text('nuisances = { "tilt.y" = 0.02 }\n' + asked)
     found = gc.close_loop(Task.load(plain), tmp_path / "plain", budget=1100)
     assert found.trace.verdict.named == ("tilt.y",)
     closed = gc.close_loop(Task.load(declared), tmp_path / "declared", budget=1100)
     assert closed.trace.verdict.kind == "NONE"
+    page = (tmp_path / "declared" / "report.html").read_text()
+    assert f"Closing the loop on {declared}" in page and "granulcal.close_loop(task, " in page
 
 
 def test_a_declared_tolerance_is_no_candidate(tilted: Path, tmp_path: Path) -> None:
-    text = tilted.read_text()
+    text = tilted.read_text().replace('"tilt.y", "ground', '"ground')
 
     def load(nuisances: str) -> Task:
         file = tilted.parent / f"{tmp_path.name}.toml"
@@ -220,8 +228,9 @@ def test_a_budget_that_is_too_small_says_what_is_enough(
     # Twenty simulated pairs, as many pours each as were measured to fit.
     assert main(words) == 2
     assert f"{562 + 20 * 6} would be enough" in capsys.readouterr().err
-    assert main([*words, "--pairs", "7"]) == 2
-    assert "pairs must be 0, or at least 19 to read 95 % from, got 7" in capsys.readouterr().err
+    for more in ([], ["--dry-run"]):
+        assert main([*words, "--pairs", "7", *more]) == 2
+        assert "pairs must be 0, or at least 19 to read 95 % from, got 7" in capsys.readouterr().err
 
 
 def test_what_a_task_file_lacks_is_named(tilted: Path, tmp_path: Path) -> None:
@@ -255,6 +264,94 @@ def test_what_a_task_file_lacks_is_named(tilted: Path, tmp_path: Path) -> None:
         load('tolerances = "off.json"\n' + text)
     with pytest.raises(TrainingDataError, match="no effect magnetism; there are cohesion"):
         load(text.replace("tilt.y", "magnetism"))
+    # Before anything is registered or poured.
+    with pytest.raises(
+        ObservationError, match="condition 'low': path \"start.bsae\" does not name"
+    ):
+        load(text.replace("start.base", "start.bsae"))
+    with pytest.raises(ObservationError, match="condition 'high': start.spacing less the grains"):
+        load(text.replace("start.base", "start.spacing").replace("0.06", "-6.0"))
+    definitions = "".join(
+        f'[[definitions]]\nname = "{value}"\nat = {{ "camera.height_threshold" = {value} }}\n'
+        for value in ("1e-3", "-1.0")
+    )
+    with pytest.raises(ObservationError, match="condition 'low': .*height_threshold"):
+        load(text + definitions)
+
+
+@pytest.mark.parametrize(
+    ("asked", "error", "told"),
+    [
+        ({"budget": 1e3}, TypeError, "budget must be a whole number, got 1000.0"),
+        ({"budget": 0}, ValueError, "budget must be at least 1, got 0"),
+        ({"threads": 1.5}, TypeError, "threads must be a whole number, got 1.5"),
+        ({"threads": 0}, ValueError, "threads must be at least 1, got 0"),
+        ({"seed": -1}, ValueError, "seed must be at least 0, got -1"),
+        ({"seed": 2**64 - 1}, ValueError, "seed must be at most"),
+        ({"pairs": 20.0}, TypeError, "pairs must be a whole number, got 20.0"),
+        (
+            {"pairs": 7},
+            ObservationError,
+            "pairs must be 0, or at least 19 to read 95 % from, got 7",
+        ),
+        ({"rounds": -1}, ValueError, "rounds must be at least 0, got -1"),
+        ({"rounds": None}, TypeError, "rounds must be a whole number, got None"),
+    ],
+)
+def test_what_no_loop_can_be_asked_for_leaves_nothing(
+    asked: dict[str, Any], error: type[Exception], told: str, tilted: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(error, match=told):
+        gc.close_loop(Task.load(tilted), tmp_path / "out", **{"budget": 1250, "pairs": 0, **asked})
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("kind", [str, Path])
+def test_a_file_is_no_task(kind: Any, tilted: Path, tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match=r"must be a Task, got .*: granulcal.Task.load reads"):
+        gc.close_loop(kind(tilted), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_task_is_built_of_conditions(tilted: Path) -> None:
+    loaded = Task.load(tilted)
+    built = tuple(
+        loop.Condition(c.name, c.at, c.use, c.recordings, camera=c.camera)
+        for c in loaded.conditions
+    )
+    task = loop.Task(loaded.scene, loaded.prior, built, loaded.library)
+    assert task.conditions == loaded.conditions
+    assert gc.Condition is loop.Condition and gc.Task is loop.Task
+
+
+def test_what_differs_from_a_registration_is_named(tilted: Path, tmp_path: Path) -> None:
+    task, rules = Task.load(tilted), Thresholds()
+
+    def registered(pairs: int) -> str:
+        return register(tmp_path, task, planned(task, 1250, 0), rules, 0, ("max_z",), pairs)
+
+    first = registered(20)
+    # Pairs are written where they are asked for alone.
+    with pytest.raises(ObservationError, match=r"for another analysis \(pairs differ\)"):
+        registered(0)
+    # The same in other bytes, as one that was registered with numbers that are not whole.
+    file = tmp_path / "preregistration.json"
+    file.write_text(re.sub(r'"pairs": 20\b', '"pairs": 20.0', file.read_text()))
+    assert registered(20) == hashlib.sha256(file.read_bytes()).hexdigest() != first
+
+
+def test_a_report_without_its_packages_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(*_: Any, **__: Any) -> None:
+        raise ModuleNotFoundError("No module named 'jinja2'")
+
+    written, told = [], []
+    monkeypatch.setattr(folder, "write_page", missing)
+    monkeypatch.setattr(folder, "write_tables", lambda _, place: written.append(place))
+    closed: Any = None
+    folder.write_report(closed, tmp_path, command="", title="", say=told.append)
+    assert told == ["report.html left out: No module named 'jinja2'"] and written == [tmp_path]
 
 
 def test_how_long_it_takes_is_told_before_it_pours(tilted: Path, tmp_path: Path) -> None:

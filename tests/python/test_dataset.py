@@ -1,4 +1,5 @@
 import os
+import pickle
 import stat
 
 import numpy as np
@@ -38,6 +39,18 @@ def test_load_returns_what_generate_returned(small_data, tmp_path):
     one = gc.Dataset.load(tmp_path / "one.parquet")
     assert np.array_equal(one.x, small_data.x)
     assert one.prior == small_data.prior
+
+
+def test_a_data_set_goes_to_other_processes_and_a_pour_keeps_its_numbers(
+    small_data: gc.Dataset, small_pour: gc.Pour
+) -> None:
+    sent = pickle.loads(pickle.dumps(small_data))
+    np.testing.assert_array_equal(sent.x, small_data.x)
+    assert sent.theta_names == small_data.theta_names
+    with pytest.raises(ValueError, match="read-only"):
+        small_pour.positions[0, 0] = 1.0
+    with pytest.raises(TypeError, match="stays in its process"):
+        pickle.dumps(small_pour)
 
 
 def test_a_batch_can_be_extended_and_cut(small_scene, tmp_path):

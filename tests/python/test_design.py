@@ -4,6 +4,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy import stats
 
 import granulcal as gc
 from granulcal import _native
+from granulcal.bayessim.network.mixture import Mixture
 from granulcal.design.count_model import CountModel, beta_binomial_tail, log_gamma
 from granulcal.design.pattern import Pattern, simulate_plan
 from granulcal.design.posterior_file import PosteriorDraws
@@ -19,6 +21,7 @@ from granulcal.design.ring import STATISTICS
 from granulcal.design.ring_model import HEIGHT, RingModel, height_prior, observing_radii
 from granulcal.design.spill import forecast_of
 from granulcal.errors import ExtrapolationError, TrainingDataError, UnreachableRingError
+from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.left_out import LeftOut
 
 pytest.importorskip("torch")
@@ -400,3 +403,47 @@ def test_spill_refuses_what_it_cannot_answer(tmp_path):
     (tmp_path / "none.json").write_text("{}")
     with pytest.raises(ValueError, match="parameters must be there"):
         PosteriorDraws.load(tmp_path / "none.json")
+
+
+def _posterior() -> gc.Posterior:
+    """Of one parameter, whose prior fixed another."""
+    prior = gc.Prior(
+        [
+            gc.Parameter(
+                path="material.sliding_friction", distribution="uniform", low=0.3, high=0.6
+            ),
+            gc.Parameter(path="material.restitution", distribution="fixed", value=0.35),
+        ]
+    )
+    return gc.Posterior.from_mixture(
+        prior, Mixture(np.ones(1), np.zeros((1, 1)), np.ones((1, 1, 1)))
+    )
+
+
+def test_draws_are_taken_from_a_posterior() -> None:
+    posterior = _posterior()
+    draws = PosteriorDraws.of(posterior)
+    assert draws.names == ("material.sliding_friction",)
+    assert draws.samples.shape == (1000, 1) and draws.mode == pytest.approx(posterior.mode())
+    assert draws.fixed == {"material.restitution": 0.35}
+    assert PosteriorDraws.of(draws) is draws
+    with pytest.raises(TypeError, match=r"got str: PosteriorDraws\.load reads the one in a file"):
+        PosteriorDraws.of("posterior.json")  # pyright: ignore[reportArgumentType]
+
+
+def test_spill_takes_a_posterior_and_what_its_prior_fixed(tmp_path, monkeypatch):
+    bowl = gc.Scene.load(_small_bowl(tmp_path / "bowl.toml"))
+    poured = []
+
+    class Kept(KeptPours):
+        def __init__(self, scene: gc.Scene, *args: Any, **more: Any) -> None:
+            poured.append(scene)
+            super().__init__(scene, *args, **more)
+
+    monkeypatch.setattr("granulcal.design.spill.KeptPours", Kept)
+    forecast = gc.design_spill(
+        bowl, heights=(0.1, 0.4), grains=(1,), pours=24, posterior=_posterior(), out=tmp_path,
+        progress=False,
+    )  # fmt: skip
+    assert forecast.names == ("material.sliding_friction",)
+    assert poured[0].get("material.restitution") == 0.35

@@ -11,6 +11,7 @@ from granulcal.arrays import read_array
 from granulcal.cli import main
 from granulcal.engines import CallableEngine, CommandEngine, ExportedEngine, engine_named, installed
 from granulcal.engines.files import read_grains
+from granulcal.engines.protocol import UnlikeGrainsWarning
 from granulcal.pours.statistics import DIAGNOSTIC_NAMES
 from granulcal.starter.samples import SENSOR
 
@@ -85,6 +86,34 @@ def test_rows_of_an_engine_are_a_data_set_and_are_not_mixed_with_ours(
     assert np.array_equal(more.x[:6], data.x)
     with pytest.raises(ValueError, match="law of the solver is another simulator's"):
         gc.generate(small_scene, small_prior, 8, out=tmp_path, progress=False)
+
+
+def test_grains_in_another_unit_or_under_the_ground_are_told(small_scene: gc.Scene) -> None:
+    def asked(factor: float, lowered: float) -> None:
+        def pour(scene: gc.Scene, seed: int) -> tuple[np.ndarray, np.ndarray]:
+            centres, radii = scene.start(seed)
+            return factor * (centres - [0.0, 0.0, lowered]), factor * radii
+
+        gc.simulate(small_scene, engine=CallableEngine(pour, name="mine"))
+
+    with pytest.warns(
+        UnlikeGrainsWarning, match=r"'mine' left grains with a radius of 2 m.*metres"
+    ):
+        asked(1e3, 0.0)
+    with pytest.warns(UnlikeGrainsWarning, match="60 of 60 grains under the ground"):
+        asked(1.0, 1.0)
+    asked(1.0, 0.0)
+
+
+def test_what_is_no_engine_is_refused(small_scene: gc.Scene) -> None:
+    with pytest.raises(TypeError, match=r"engine_named\('lammps'\)"):
+        gc.simulate(small_scene, engine="lammps")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(TypeError, match=r"CallableEngine\(function\) makes one"):
+        gc.simulate(small_scene, engine=cone)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(TypeError, match="material must be a Material, got 3; a seed is seed="):
+        gc.simulate(small_scene, 3)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(TypeError, match="restitution must be a number, got '0.5'"):
+        gc.Material(sliding_friction=0.5, rolling_friction=0.1, restitution="0.5")  # pyright: ignore[reportArgumentType]
 
 
 def test_the_error_of_a_function_is_the_callers(

@@ -307,3 +307,36 @@ def test_a_head_says_where_numbers_are_from(scene: gc.Scene, tmp_path: Path) -> 
     readme = export_scene(scene, "yade", tmp_path, source=["of a posterior"])[-1].read_text()
     assert "\nof a posterior\n" in readme
     assert json.loads((tmp_path / "pour.json").read_text())["file"].endswith("for yade")
+
+
+def test_what_a_prior_fixed_is_part_of_every_file(scene: gc.Scene, tmp_path: Path) -> None:
+    name, fixed = "material.sliding_friction", {"material.rolling_friction": 0.77}
+    files = export_posterior([name], [0.3], [[0.2]], scene, "lammps", tmp_path, fixed=fixed)
+    for file, value in zip(files, (0.3, 0.2), strict=False):
+        at = scene.with_({name: value, **fixed})
+        told = file.read_text()
+        assert ENGINES["lammps"].material(Setup.of(at)) in told
+        assert "fixed by its prior: material.rolling_friction" in told
+    with pytest.raises(ValueError, match="sliding_friction must be a parameter or fixed, got both"):
+        export_posterior([name], [0.3], [], scene, "lammps", tmp_path, fixed={name: 0.4})
+
+
+@pytest.mark.parametrize(
+    ("mode", "draws", "told"),
+    [
+        ([0.3, 0.4], np.full((2, 3), 0.5), r"draws must have shape \(n, 2\), .*; got \(2, 3\)"),
+        ([0.3, 0.4], [0.3, 0.4], r"draws must have shape \(n, 2\), .*; got \(2,\)"),
+        ([0.3, 0.4], np.zeros((0, 3)), r"draws must have shape \(n, 2\), .*; got \(0, 3\)"),
+        ([[0.3, 0.4]], [], r"mode must have shape \(2,\), .*restitution; got \(1, 2\)"),
+        ([0.3], [], r"mode must have shape \(2,\), .*restitution; got \(1,\)"),
+    ],
+)
+def test_draws_of_another_shape_are_refused(
+    mode: object, draws: object, told: str, scene: gc.Scene, tmp_path: Path
+) -> None:
+    names = ["material.sliding_friction", "material.restitution"]
+    with pytest.raises(ValueError, match=told):
+        export_posterior(names, mode, draws, scene, "lammps", tmp_path / "out")  # pyright: ignore[reportArgumentType]
+    assert not (tmp_path / "out").exists()
+    # An empty list is no draws.
+    assert len(export_posterior(names, [0.3, 0.4], [], scene, "lammps", tmp_path)) == 1

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.check.alarms import of_error, of_placebo
+from granulcal.loop.check.alarms import of_error, of_left, of_placebo
 from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.verdict import Verdict
@@ -32,6 +32,16 @@ def test_a_name_with_which_the_error_grows_is_said_to() -> None:
     assert "at the fitted conditions from" in told and "and at the sealed conditions" in told
     # Where nothing is named both models are one.
     assert of_error(NONE, worse, worse) == ()
+
+
+def test_an_error_that_is_left_of_an_explanation_is_said() -> None:
+    left, gone = error(1.0, 0.5), error(1.0, 0.0)
+    assert of_left(NAMED, gone, None) == ()
+    for verdict in (NAMED, NONE):
+        (told,) = of_left(verdict, left, gone)
+        assert "is left at there (fitted): 0.9" in told and "sealed" not in told
+        assert "there (sealed)" in of_left(verdict, gone, left)[0]
+    assert of_left(Verdict("UNEXPLAINED", (), (), 1e-3, ""), left, left) == ()
 
 
 def test_an_alarm_of_the_placebo_is_said_with_its_own_word() -> None:

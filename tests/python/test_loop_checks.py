@@ -2,7 +2,7 @@
 
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -213,6 +213,19 @@ def test_the_tables_say_what_the_report_says(linear: Linear, surrogate: Surrogat
     assert len(left) == 3 * SIZE
     before, after = (sum(r[k] ** 2 for r in left) for k in ("before", "after"))
     assert after < 0.5 * before
+    # Of an effect whose direction is not known no strength is told, though one was computed.
+    unknown = replace(told.power, kappa=np.array([np.nan]))
+    assert np.isfinite(unknown.detectable[0])
+    assert unknown.to_dict()["detectable_strength"] == [None]
+    told.power = unknown
+    assert np.isnan(candidates(told)[0]["detectable_before"])
+    # What the model's own pours give is beside the fit's.
+    assert row["value_of_pours"] is None
+    own = SimpleNamespace(strengths=np.array([0.7]), intervals=np.array([[0.5, 0.9]]))
+    told.standing = SimpleNamespace(own=own)
+    of_pours = candidates(told)[0]
+    assert of_pours["value_of_pours"] == pytest.approx(0.7 * 0.09)
+    assert of_pours["value_of_pours_high"] == pytest.approx(0.8 * 0.09)
     # A residual test that did not reject has no refits, and the model before is the one after.
     none = closed(linear, surrogate, 0.0)
     assert candidates(none)[0]["psi"] is None

@@ -451,5 +451,5 @@ def test_an_archive_takes_further_effects_and_keeps_its_pours(tmp_path: Path) ->
     assert np.array_equal(after.x[: len(before.x)], before.x)
     # The first still has its own; another order has other seeds, and is refused.
     assert np.array_equal(archive(tilt).pours().x, before.x)
-    with pytest.raises(TrainingDataError, match="is of another library"):
+    with pytest.raises(TrainingDataError, match="of other effects: it has tilt.y, count; this"):
         archive(count, tilt)

@@ -192,6 +192,7 @@ def page(**values: Any) -> str:
         ("title", "headline", "sentence", "reason", "made", "version", "residuals", "pictures"), ""
     )
     words |= dict.fromkeys(("picture_of", "command"), "")
+    filled |= {"is_named": True, "word": "EFFECT"}
     lists = dict.fromkeys(("nearest", "beyond", "doubts", "held"), ())
     standing = SimpleNamespace(trivial=(), moved=(), draws=0, anchors=0, confirmed=0.5)
     placebo = SimpleNamespace(kind="NONE", p=0.5)
@@ -211,6 +212,25 @@ def test_the_page_says_what_is_beyond_doubtful_and_which_p_decided() -> None:
     assert "<li>max_z at low: 4</li>" in found and "<li>a.png: a heap</li>" in found
     row = SimpleNamespace(label="low", before=2.0, after=1.0, refused="")
     assert "may repeat what the\nparameters could have done" in page(corrections=(row,))
+
+
+def test_a_candidate_that_is_not_named_is_not_the_effect() -> None:
+    row = dict(name="tilt.x", path="effects.tilt.x", unit="rad", doc="", is_mimicked=False)
+    strengths = [row | dict(low=0.01, middle=0.02, high=0.03)]
+    named = page(strengths=strengths, held=(54, 63))
+    assert "<h2>The effect</h2>" in named and "not named" not in named
+    faint = page(strengths=strengths, held=(54, 63), is_named=False, word="RESIDUAL")
+    assert "<h2>The effect</h2>" not in faint and "candidate, not named" in faint
+    assert "The verdict is RESIDUAL and names nothing" in faint and "Consistent with" not in faint
+
+
+def test_both_floors_and_whose_interval_it_is_are_on_the_page() -> None:
+    one, two = (
+        SimpleNamespace(error=3.0, floor=floor, square=1.0, interval=(0.5, 1.5))
+        for floor in (1.25, 2.75)
+    )
+    shown = page(errors=[dict(label="low", use="fit", before=one, after=two)])
+    assert "<td>1.25</td><td>2.75</td>" in shown and "95 % of D² after" in shown
 
 
 def test_a_zero_is_in_the_command_of_the_page() -> None:

@@ -176,7 +176,7 @@ def test_a_session_that_says_nothing_is_refused() -> None:
     scene = Scene.drop(0.02, count=40)
     one = Parameter(path="material.restitution", distribution="uniform", low=0.2, high=0.6)
     recordings = tuple(Path(name) for name in "abc")
-    conditions = (Condition("all", {"start.base": 0.03}, FIT, recordings, session="monday"),)
+    conditions = (Condition("all", {"start.height": 0.03}, FIT, recordings, session="monday"),)
 
     def task(table: dict[str, object]) -> Task:
         library = (*by_name(["drag"]), *declared_nuisances(table, scene))
@@ -200,13 +200,13 @@ effects = ["drag"]
 nuisances = { "tilt.x" = { sd = 0.005, shared = false } }
 [[conditions]]
 name = "low"
-at = { "start.base" = 0.03 }
+at = { "start.height" = 0.03 }
 use = "fit"
 recordings = ["a", "b", "c"]
 session = "monday"
 [[conditions]]
 name = "high"
-at = { "start.base" = 0.05 }
+at = { "start.height" = 0.05 }
 use = "sealed"
 recordings = ["d"]
 """)

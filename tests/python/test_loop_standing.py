@@ -12,15 +12,21 @@ from two_heights import two_heights
 from granulcal.cli import main
 from granulcal.errors import ObservationError
 from granulcal.loop import Design, Effect
+from granulcal.loop.check import unseen
+from granulcal.loop.check.alarms import of_rows
 from granulcal.loop.check.prior_pours import PriorPours, hypercube
 from granulcal.loop.check.recentre import Recentred
 from granulcal.loop.check.standing import Moved, overturned, stand
 from granulcal.loop.check.trivial import LINE, NEAREST, RESIDUAL, Group, line_weights, trivial_rows
+from granulcal.loop.check.unseen import Seen, told_unseen
 from granulcal.loop.effects.definitions import Definition, check_definitions, definition_inputs
+from granulcal.loop.effects.library import by_name
+from granulcal.loop.report.page import sentence_of
 from granulcal.loop.task import FIT, SEALED, Condition, Task
 from granulcal.loop.test.distance import compare
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.verdict import Verdict
+from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 
@@ -83,7 +89,22 @@ def test_rows_without_physics_have_their_known_distance() -> None:
 def test_a_name_that_beats_nothing_says_so() -> None:
     made = groups(1, offset=1.0)
     rows = trivial_rows(made[:3], made[3:], np.ones(2))
+    # That other rows are nearer is more than that they are not beaten.
     found = stand(EFFECT, RULES, confirmed=0.5, trivial=rows)
+    assert all(row.is_nearer and row.to_dict()["is_nearer"] for row in rows)
+    assert "nearest condition and straight line and base +" in found.verdict.reason
+    assert "are nearer than it" in found.verdict.reason
+    told = of_rows(found)
+    assert len(told) == 3 and "straight line is nearer to the measurement than" in told[1]
+    assert of_rows(stand(NONE, RULES, confirmed=0.5, trivial=rows)) == ()
+    first = replace(rows[1], gain_interval=(-1.0, 0.5))
+    found = stand(EFFECT, RULES, confirmed=0.5, trivial=[rows[0], first])
+    assert found.verdict.reason.endswith(
+        "nearest condition is nearer than it; it does not beat straight line"
+    )
+    rows = [replace(row, gain_interval=(-1.0, 0.5)) for row in rows]
+    found = stand(EFFECT, RULES, confirmed=0.5, trivial=rows)
+    assert of_rows(found) == ()
     assert found.stands and found.verdict.named == ("drag",)
     assert found.unbeaten == (NEAREST, LINE, RESIDUAL)
     assert "does not beat nearest condition nor straight line nor base +" in found.verdict.reason
@@ -193,6 +214,52 @@ def test_a_verdict_that_a_definition_overturns_is_none() -> None:
     found = stand(EFFECT, RULES, confirmed=0.5, moved=[Moved("half cover", NONE)])
     assert found.verdict.kind == "OVERTURNED" and not found.stands
     assert found.verdict.reason == "the fits say EFFECT drag, but NONE under half cover"
+
+
+def test_what_no_pour_shows_is_beside_what_nothing_explains() -> None:
+    seen = Seen("polydispersity", 43, LeftOut(unhealthy=20), 0.002, 0.137, "above 0.137")
+    whole = replace(seen, effect="tilt.x", left_out=LeftOut(), lacks="")
+    before = Verdict("UNEXPLAINED", (), (), 0.001, "no one or two effects explain it")
+    found = stand(before, RULES, confirmed=0.5, seen=[whole, seen])
+    assert found.verdict.kind == "UNEXPLAINED"
+    assert "none usable of polydispersity above 0.137, which may still" in found.verdict.reason
+    assert "as far as the archive has usable pours" in sentence_of(found, [seen])
+    assert "as far as" not in sentence_of(found, [whole])
+    assert stand(before, RULES, confirmed=0.5, seen=[whole]).verdict is before
+    assert stand(EFFECT, RULES, confirmed=0.5, seen=[seen]).verdict is EFFECT
+    (told,) = told_unseen([whole, seen])
+    assert "polydispersity: 20 of its 43 pours are left out (20 unhealthy)" in told
+    assert seen.to_dict()["left_out"]["unhealthy"] == 20
+
+
+def test_the_part_of_a_range_without_a_usable_pour_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numbers = np.linspace(0.0, 0.3, 31)
+    usable = numbers < 0.14
+
+    class Part(SimpleNamespace):
+        def strengths(self, data: Any, which: Any, effect: Any) -> Any:
+            return effect.strength(numbers[which])
+
+    (effect,) = by_name(["polydispersity"])
+    numbers *= effect.full / 0.3
+    status = np.where(usable, "at_rest", "unhealthy")
+    part = Part(name="p", effect=effect.name, count=31, scene=column())
+    data = type("Data", (SimpleNamespace,), {"__len__": lambda _: 31})(status=status)
+    measures = SimpleNamespace(of_dataset=lambda _: (None, usable))
+    monkeypatch.setattr(unseen, "parts_of", lambda _: [part])
+    monkeypatch.setattr(unseen.Dataset, "load", lambda _: data)
+    monkeypatch.setattr(unseen.Measures, "of", lambda _: measures)
+    plan = SimpleNamespace(scene=column(), library=(effect,))
+    (seen,) = unseen.seen_of(cast(Any, SimpleNamespace(plan=plan, folder=tmp_path)))
+    assert (seen.pours, seen.left_out.unhealthy) == (31, 17)
+    assert seen.high == pytest.approx(0.13 * effect.full / 0.3)
+    assert seen.lacks == f"above {seen.high:.3g}"
+    # What is left out among usable ones leaves no part of the range without.
+    usable[:] = np.arange(31) % 2 == 0
+    (seen,) = unseen.seen_of(cast(Any, SimpleNamespace(plan=plan, folder=tmp_path)))
+    assert seen.lacks == "" and seen.left_out.total == 15
 
 
 def column() -> Scene:

@@ -2,10 +2,14 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+
+import granulcal as gc
+from granulcal.export import export_material
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SMALL = {
@@ -48,6 +52,23 @@ def test_no_notebook_is_forgotten_and_none_keeps_its_output() -> None:
     for path in paths:
         for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
             assert not cell.get("outputs"), path
+
+
+def test_the_guide_exports_what_the_prior_fixed(tmp_path: Path) -> None:
+    document = json.loads((EXAMPLES / "own_couscous.ipynb").read_text(encoding="utf-8"))
+    cells = ["".join(c["source"]) for c in document["cells"] if c["cell_type"] == "code"]
+    name, fixed = "material.sliding_friction", {"material.rolling_friction": 0.77}
+    posterior = SimpleNamespace(
+        names=[name],
+        mode=lambda: np.array([0.3]),
+        sample=lambda n: np.full((n, 1), 0.4),
+        prior=SimpleNamespace(fixed=fixed),
+    )
+    scene = gc.Scene.funnel(0.06, count=20, preset="fast")
+    exec(cells[-1], {"posterior": posterior, "scene": scene, "folder": tmp_path})
+    right = export_material(scene.with_({name: 0.3, **fixed}), "mujoco", tmp_path / "right.xml")
+    found = tmp_path / "materials-nb" / "mode.xml"
+    assert found.read_text().split("-->")[-1] == right.read_text().split("-->")[-1]
 
 
 @pytest.mark.slow

@@ -1,6 +1,8 @@
 """Posterior: densities that integrate to one, draws inside the prior, regions, several pours."""
 
+import inspect
 import pickle
+import re
 import subprocess
 import sys
 
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+import granulcal
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.posterior.average import NETWORK_ALONE
@@ -209,6 +212,25 @@ def test_a_posterior_says_what_it_is_and_stays_in_its_process():
     )
     with pytest.raises(TypeError, match="stays in its process: hand over sample"):
         pickle.dumps(posterior)
+
+
+def test_a_posterior_counts_its_doubts():
+    apart = [
+        Mixture.from_covariances(np.ones(1), np.array([[m, m]]), 1e-6 * np.eye(2)[None])
+        for m in (0.01, 0.99)
+    ]
+    found = Posterior.from_mixtures(BOX, apart)
+    kinds = ", ".join(dict.fromkeys(type(each).__name__ for each in found.warnings))
+    plural = "s" if len(found.warnings) > 1 else ""
+    told = f"; {len(found.warnings)} note{plural} in `warnings`: {kinds})"
+    assert "PoursDisagree" in kinds and repr(found).endswith(told)
+
+
+def test_what_the_docstrings_name_is_there():
+    documented = inspect.getmembers(Posterior, lambda each: inspect.getdoc(each) is not None)
+    for method, each in documented:
+        for name in re.findall(r"`granulcal\.(\w+)`", inspect.getdoc(each) or ""):
+            assert hasattr(granulcal, name), f"{method} refers to granulcal.{name}"
 
 
 def test_bad_arguments():

@@ -1,6 +1,7 @@
 """Which conditions `granulcal predict` takes."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from granulcal.errors import ObservationError
 from granulcal.loop.check import discrepancy
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.asked import REACH
-from granulcal.loop.report.models import Models, Prediction, condition_of
+from granulcal.loop.report.models import Maker, Models, Prediction, condition_of
 from granulcal.loop.test.score import DISCREPANCY_LENGTH
 from granulcal.pours.scene import Scene
 
@@ -75,7 +76,8 @@ def test_a_model_without_physics_is_not_asked_far_away(
 def test_a_model_that_pours_warns_outside_of_what_was_measured(
     model: str, models: Models, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["predict", str(tmp_path), "--model", model, "--pours", "2", "--threads", "1", "--at"]
+    words = ["predict", str(tmp_path), "--model", model, "--pours", "2", "--threads", "1"]
+    words += ["--level", "0.3", "--at"]
     assert main([*words, "start.height=0.02"]) == 0
     assert "warning" not in capsys.readouterr().err
     assert main([*words, "start.height=0.025"]) == 0
@@ -107,3 +109,68 @@ def test_pours_are_as_many_as_an_interval_needs(
         assert f"--pours: must be at least 2, got {count}" in capsys.readouterr().err
     with pytest.raises(ObservationError, match="base: pours must be at least 2, got 1"):
         models.predict("base", {"start.height": 0.02}, Forward(tmp_path, 1), pours=1)
+
+
+def test_a_folder_may_be_named_by_a_word(models: Models, tmp_path: Path) -> None:
+    assert Models.load(str(tmp_path)).names == models.names
+    with pytest.raises(FileNotFoundError, match="is nowhere the -o of close-loop"):
+        Models.load("nowhere")
+
+
+def test_a_number_that_all_conditions_share_is_not_ignored(
+    models: Models, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was taken, and the values of the shared number came back."""
+    own = models.scene.get("material.restitution")
+    shared = replace(models, shared={"material.restitution": own})
+    forward = Forward(tmp_path / "pours", 1)
+    for model in ("line", "nearest", "corrected"):
+        at = {"start.height": 0.015, "material.restitution": own + 0.2}
+        with pytest.raises(ObservationError, match=f"{model} knows no physics .*restitution = "):
+            shared.predict(model, at, forward)
+    shared.write(tmp_path)
+    assert Models.load(tmp_path).shared == shared.shared
+    words = ["predict", str(tmp_path), "--at", "start.height=0.015", "--pours", "2"]
+    assert main([*words, "--at", f"material.restitution={own + 0.2}"]) == 0
+    told = capsys.readouterr().err
+    assert "outside the conditions of the loop: nothing was measured there" in told
+    # A file of before does not say what is shared: its scene has it.
+    document = json.loads((tmp_path / "models.json").read_text())
+    del document["shared"], document["strengths"]
+    (tmp_path / "models.json").write_text(json.dumps(document))
+    assert Models.load(tmp_path).shared == shared.shared
+
+
+def test_what_a_model_has_is_said_and_what_is_asked_for_in_its_place(
+    models: Models, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fitted = {"material.sliding_friction": 0.3}
+    maker = Maker({**fitted, "effects.tilt.x": 0.05}, {}, {})
+    faint = replace(
+        models,
+        verdict={"kind": "RESIDUAL", "named": []},
+        makers={"base": (Maker(fitted, {}, {}),) * 2, "named": (maker,) * 2},
+        strengths={"tilt.x": 0.55},
+    )
+    faint.write(tmp_path)
+    words = ["predict", str(tmp_path), "--at", "start.height=0.015", "--pours", "2"]
+    assert main(words) == 0
+    told = capsys.readouterr()
+    assert "with tilt.x, the most probable candidate, which the verdict does not name: " in told.out
+    assert "effects.tilt.x = 0.05 at its fit" in told.out
+    # Two pours have no ranks at 90 %.
+    assert "2 usable pours are too few for ranks at 90 %" in told.err
+    words += ["--at", "effects.tilt.x=0", "--at", "material.sliding_friction=0.5"]
+    assert main([*words, "--json"]) == 0
+    told = capsys.readouterr()
+    assert "effects.tilt.x = 0 is not the 0.05 of the fit" in told.err
+    found = json.loads(told.out)
+    assert found["pours"] == 2 and len(found["warnings"]) == 3
+    assert found["has"] == {
+        "numbers": {"material.sliding_friction": 0.5, "effects.tilt.x": 0.0},
+        "effects": {"effects.tilt.x": 0.05},
+        "strengths": {"tilt.x": 0.55},
+        "is_named": False,
+    }
+    assert main([*words[:6], "--model", "base"]) == 0
+    assert "without any effect" in capsys.readouterr().out

@@ -82,6 +82,28 @@ def test_log_prob_matches_scipy():
     np.testing.assert_allclose(prior.mean(), [0.5, 0.999 / math.log(1000), cut.mean()], rtol=1e-9)
 
 
+def test_shares_below_match_scipy():
+    prior = Prior.from_toml(EVERY_KIND)
+    theta = prior.sample(50, seed=3)
+    cut = stats.truncnorm((0.1 - 0.12) / 0.02, (0.2 - 0.12) / 0.02, loc=0.12, scale=0.02)
+    laws = [stats.uniform(), stats.loguniform(1e-3, 1), cut]
+    expected = [law.cdf(column) for column, law in zip(theta.T, laws, strict=True)]
+    np.testing.assert_allclose(prior.cdf(theta), np.transpose(expected), rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(prior.cdf(theta - 1e3), 0.0)
+    np.testing.assert_array_equal(prior.cdf(theta + 1e3), 1.0)
+    assert np.all(np.isnan(prior.cdf(np.full((1, 3), np.nan))))
+
+
+@pytest.mark.parametrize(("low", "high"), [(4.5, None), (None, -4.5), (None, None)])
+def test_shares_below_of_tails_match_scipy(low, high):
+    prior = Prior(
+        [Parameter(path="a.b", distribution="normal", mean=0.0, sd=1.0, low=low, high=high)]
+    )
+    law = stats.truncnorm(-np.inf if low is None else low, np.inf if high is None else high)
+    values = law.ppf([0.1, 0.5, 0.9])
+    np.testing.assert_allclose(prior.cdf(values[:, None])[:, 0], law.cdf(values), rtol=1e-8)
+
+
 def test_samples_follow_the_distributions():
     theta = Prior.from_toml(EVERY_KIND).sample(4000, seed=7)
     cut = stats.truncnorm((0.1 - 0.12) / 0.02, (0.2 - 0.12) / 0.02, loc=0.12, scale=0.02)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal.errors import DoubtfulRecordingWarning
 from granulcal.measured.recording import DamagedRecordingWarning, Lost
 from granulcal.pours.compare import Scale, comparison_table, nearest_row, standardised_distance
 
@@ -67,6 +68,48 @@ def test_what_the_scenes_images_do_not_show_is_cut_off(pour, tmp_path):
         assert wide[name] == pytest.approx(own[name], rel=0.03), name
     with pytest.raises(ValueError, match="field_width"):
         seen["wide"].formation(field_width=-1.0)
+
+
+def test_frames_in_memory_are_what_their_files_are(pour, camera, tmp_path):
+    image, toml = camera.record(pour.positions, pour.radii, tmp_path, depth_unit=1e-4)
+    stored = gc.Recording.open(image, camera=toml)
+    assert stored.depth is not None and stored.lens is not None
+    lens = {name: stored.lens[name] for name in ("fx", "fy", "cx", "cy")}
+    counts = np.rint(stored.depth / 1e-4).astype(np.uint16)
+    for depth, unit in ((stored.depth, None), (counts, 1e-4), ([counts, counts], 1e-4)):
+        read = gc.Recording.from_depth(depth, **lens, unit=unit)
+        np.testing.assert_allclose(read.depth, stored.depth, atol=1e-7)
+        assert read.frames == np.ndim(depth) - 1
+        found, expected = read.statistics(), stored.statistics()
+        np.testing.assert_allclose(np.asarray(found), np.asarray(expected), rtol=1e-4, atol=1e-6)
+    nothing = np.where(stored.depth > 0.37, np.nan, stored.depth)
+    assert (gc.Recording.from_depth(nothing, **lens).depth == 0).sum() == (~(nothing > 0)).sum()
+    with pytest.raises(ValueError, match=r"shape \(h, w\) or \(k, h, w\), got \(5,\)"):
+        gc.Recording.from_depth(np.ones(5), **lens)
+    with pytest.raises(ValueError, match="fx"):
+        gc.Recording.from_depth(stored.depth, **{**lens, "fx": -1.0})
+
+
+def test_a_recording_of_which_half_is_hidden_is_doubtful_in_python_too(pour, tmp_path):
+    scene, prior = pour.scene, gc.Prior.default()
+    camera = gc.Camera.overhead(height=0.29, field_width=0.58, pixels=960)
+    image, toml = camera.record(pour.positions, pour.radii, tmp_path)
+    whole = gc.Recording.open(image, camera=toml)
+    depth = np.array(whole.depth)
+    depth[:, : depth.shape[1] // 2] = 0
+    camera.save(depth, tmp_path / "half.png", toml)
+    half = gc.Recording.open(tmp_path / "half.png", camera=toml)
+    own = {**scene.reading, "height_threshold": scene.get("camera.height_threshold")}
+    assert whole.doubts(scene, prior, **own) == []
+    assert any("outline nothing is seen" in told for told in half.doubts(scene, prior, **own))
+    with (
+        pytest.warns(DoubtfulRecordingWarning) as warned,
+        pytest.raises(ValueError, match="show one formation"),
+    ):
+        gc.calibrate_within(scene, prior, [half, half], out=tmp_path / "out")
+    assert any("half.png: at" in str(each.message) for each in warned)
+    with pytest.raises(TypeError, match=r"what Recording.open returns"):
+        gc.calibrate_within(scene, prior, ["half.png"], out=tmp_path / "out")
 
 
 def test_segmentation_options_are_honoured(pour, camera, tmp_path):

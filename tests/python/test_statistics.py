@@ -276,6 +276,15 @@ def test_the_registry_lists_both_families_in_order():
     assert all("turns with the axes" in s.doc for s in REGISTRY if s.rotation == "axis")
 
 
+def test_statistics_are_a_mapping_of_names_that_iterates_over_values():
+    found = gc.statistics([[0.05, 0, 0.004], [0, 0.05, 0.004], [-0.05, 0, 0.005]])
+    assert "max_z" in found and "max_y" not in found
+    # Values and what is no name are not in it.
+    assert found["max_z"] not in found and np.zeros(3) not in found and None not in found
+    assert dict(found) == found.to_dict() and list(found.keys()) == list(NAMES)
+    assert list(found) == list(found.to_dict().values())
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_every_statistic_behaves_as_its_registry_entry_says(seed):
     rng = np.random.default_rng(seed)

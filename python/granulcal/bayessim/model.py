@@ -1,7 +1,10 @@
 """BayesSim: train once on simulated pairs, then a posterior for any observation."""
 
 import hashlib
+import sys
+import warnings
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -9,13 +12,14 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from granulcal.bayessim.arrays import as_real
 from granulcal.bayessim.check.calibration import Calibration
 from granulcal.bayessim.check.identifiability import Identifiability
 from granulcal.bayessim.check.misfit import Misfit, MisfitReference
 from granulcal.bayessim.emulator.likelihood import Likelihood
+from granulcal.bayessim.named import by_name
 from granulcal.bayessim.network.amortised import Amortised
 from granulcal.bayessim.network.standardise import Standardiser
 from granulcal.bayessim.network.trainer import Progress
@@ -24,13 +28,13 @@ from granulcal.bayessim.posterior.doubts import out_of_range
 from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.bayessim.storage.model_folder import load_parts, save_model
 from granulcal.bayessim.training.config import Config
-from granulcal.bayessim.training.fit import train_model
+from granulcal.bayessim.training.fit import told_not_of_prior, train_model
 from granulcal.bayessim.training.pairs import TrainingPairs, require_same_prior
 from granulcal.bayessim.training.summary import TrainingSummary
-from granulcal.errors import ObservationError
+from granulcal.errors import NotOfPriorWarning, ObservationError, TrainingDataError
 from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
-from granulcal.progress import steps
+from granulcal.progress import shown, steps
 from granulcal.whole import check_seed, check_whole
 
 __all__ = ["BayesSim"]
@@ -113,7 +117,7 @@ class BayesSim:
     def fit(
         cls,
         data_or_theta: Any,
-        x: ArrayLike | None = None,
+        x: Any = None,
         prior: Prior | None = None,
         seed: int = 0,
         *,
@@ -127,19 +131,22 @@ class BayesSim:
     ) -> "BayesSim":
         """Returns a model trained on pairs; prints a summary and a calibration check.
 
-        The same pairs, seed and settings give the same model, whatever the number of threads.
+        The same pairs, seed and settings give the same model, whatever the number of threads. In a
+        terminal a line on stderr shows how far it is, unless `quiet`.
 
         Args:
             data_or_theta: a data set with attributes theta (n, p), theta_names, x (n, s), status
-                and prior; or parameters in own units, shape (n, p).
+                and prior; or parameters in own units, shape (n, p). The columns of a data frame
+                are matched with the prior's names.
             x: statistics, own units, shape (n, s), if the first argument is an array.
             prior: the prior that the parameters were drawn from, unless the data set has it;
                 another than the data set's needs `proposal`.
             seed: seed of every random choice.
             status: status of each pour; `unhealthy`, `jammed` and `no_grains_in_view` are excluded.
-            x_names: names of the statistics.
+            x_names: names of the statistics; those of the columns if `x` is a data frame.
             scene: scene of the pours, saved with the model: TOML text, or has `to_toml()`.
-            proposal: what the parameters were drawn from, if it was not the prior.
+            proposal: what the parameters were drawn from, if it was not the prior; the pairs are
+                weighted then, and those outside of the prior are left out.
             quiet: print nothing.
             progress: called after each pass over the pairs.
             **config: settings of `Config`, for example `method="plain"` or `components=10`.
@@ -148,21 +155,54 @@ class BayesSim:
             TrainingDataError: pairs that cannot be trained on; the message says why.
             TypeError: a seed that is no whole number, or a scene that is no text.
             ValueError: a setting that does not exist or has an impossible value.
+
+        Warns:
+            NotOfPriorWarning: the parameters do not look drawn from the prior, and no proposal is
+                stated.
         """
         settings = Config.from_options(**config)
         check_seed(seed)
         if x is None and proposal is None:
             require_same_prior(getattr(data_or_theta, "prior", None), prior)
         pairs = TrainingPairs.gather(
-            data_or_theta, x, prior=prior, status=status, x_names=x_names, scene=scene
+            data_or_theta,
+            x,
+            prior=prior,
+            status=status,
+            x_names=x_names,
+            scene=scene,
+            proposal=proposal,
         )
         pairs.require_varied()
-        made = train_model(pairs, settings, int(seed), proposal=proposal, progress=progress)
+        if proposal is None and pairs.not_of_prior:
+            # Past the two frames of the decorator.
+            warnings.warn(told_not_of_prior(pairs), NotOfPriorWarning, stacklevel=3)
+        with nullcontext() if quiet or not _is_watched() else shown():
+            model = cls._of_pairs(pairs, settings, int(seed), proposal, progress)
+        if not quiet:
+            print(model.summary)
+            unchecked = "  calibration not checked: too few pours to keep some aside"
+            print(unchecked if model.calibration is None else model.calibration)
+            if model.identifiability is not None:
+                print(model.identifiability)
+        return model
+
+    @classmethod
+    def _of_pairs(
+        cls,
+        pairs: TrainingPairs,
+        settings: Config,
+        seed: int,
+        proposal: Prior | None,
+        progress: Callable[[Progress], None] | None,
+    ) -> "BayesSim":
+        """Trains and checks."""
+        made = train_model(pairs, settings, seed, proposal=proposal, progress=progress)
         kept = settings.component_counts[0]
         if made.amortised is not None:
             kept = made.amortised.network.layout.components
         enough = len(made.posteriors) >= FEWEST_TO_CHECK
-        model = cls(
+        return cls(
             prior=pairs.prior,
             config=replace(settings, components=kept),
             standardiser=made.standardiser,
@@ -187,13 +227,6 @@ class BayesSim:
             scene_toml=pairs.scene_toml,
             law=pairs.law,
         )
-        if not quiet:
-            print(model.summary)
-            unchecked = "  calibration not checked: too few pours to keep some aside"
-            print(unchecked if model.calibration is None else model.calibration)
-            if model.identifiability is not None:
-                print(model.identifiability)
-        return model
 
     @property
     def scene_hash(self) -> str | None:
@@ -203,8 +236,11 @@ class BayesSim:
         return hashlib.sha256(self.scene_toml.encode()).hexdigest()
 
     @one_thread()
-    def posterior(self, x_obs: ArrayLike) -> Posterior:
+    def posterior(self, x_obs: Any) -> Posterior:
         """Returns the posterior given one observation, or several of one material.
+
+        What carries names is matched with `x_names`: statistics, a dict, a series, a data frame, or
+        a list of such. Plain numbers are taken in the order of `x_names`.
 
         Ask `misfit` first: a posterior comes out whether or not any parameters explain the
         observation, and is of no use if none do.
@@ -219,7 +255,7 @@ class BayesSim:
             x_obs: statistics, own units, shape (s,) for one pour or (k, s) for k pours.
 
         Raises:
-            ObservationError: another shape, or a statistic that is not finite.
+            ObservationError: another shape, other names, or a statistic that is not finite.
         """
         observed = self._checked(x_obs)
         warnings = out_of_range(self.standardiser, observed, self.x_names)
@@ -233,22 +269,23 @@ class BayesSim:
         )
 
     @one_thread()
-    def misfit(self, x_obs: ArrayLike) -> Misfit:
+    def misfit(self, x_obs: Any) -> Misfit:
         """Returns whether any parameters explain one observation, or several of one material.
 
-        Ask this before the posterior: it answers under the model, right or wrong.
+        Ask this before the posterior: it answers under the model, right or wrong. Names are matched
+        as there.
 
         Args:
             x_obs: statistics, own units, shape (s,) for one pour or (k, s) for k pours.
 
         Raises:
-            ObservationError: another shape, or a statistic that is not finite.
+            ObservationError: another shape, other names, or a statistic that is not finite.
         """
         z = self.standardiser.apply(self._checked(x_obs), clip=False)
         return self.misfit_reference.test(self.likelihood, z, self.x_names)
 
     @one_thread()
-    def check(self, theta: ArrayLike, x: ArrayLike, *, draw_count: int = 1000) -> Calibration:
+    def check(self, theta: Any, x: Any, *, draw_count: int = 1000) -> Calibration:
         """Returns the calibration on pairs, which must not have been trained on.
 
         Args:
@@ -262,6 +299,7 @@ class BayesSim:
             ValueError: it is less than 1.
         """
         check_whole("draw_count", draw_count, at_least=1)
+        x = by_name("x", x, self.x_names, whose="the model", error=TrainingDataError)
         pairs = TrainingPairs.gather(
             theta, x, prior=self.prior, x_names=self.x_names, fewest=FEWEST_TO_CHECK
         )
@@ -300,8 +338,9 @@ class BayesSim:
         names, statistics = ", ".join(self.prior.names), len(self.x_names)
         return f"BayesSim({names} of {statistics} statistics, {self.summary.pair_count} pours)"
 
-    def _checked(self, x_obs: ArrayLike) -> Array:
-        observed = as_real("x_obs", x_obs)
+    def _checked(self, x_obs: Any) -> Array:
+        named = by_name("x_obs", x_obs, self.x_names, whose="the model", error=ObservationError)
+        observed = as_real("x_obs", named)
         count = len(self.x_names)
         rows = observed[None] if observed.ndim == 1 else observed
         if rows.ndim != 2 or rows.shape[1] != count or len(rows) == 0:
@@ -313,6 +352,11 @@ class BayesSim:
             names = [self.x_names[i] for i in np.flatnonzero(bad.any(axis=0))]
             raise ObservationError(f"x_obs must be finite, it is not in {', '.join(names)}")
         return rows
+
+
+def _is_watched() -> bool:
+    # There is none in a program without a console.
+    return sys.stderr is not None and sys.stderr.isatty()
 
 
 def _of_files(files: dict[str, bytes]) -> BayesSim:

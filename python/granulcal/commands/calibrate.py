@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+import warnings
 from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.cluster import add_cluster, cluster_of
@@ -16,6 +17,7 @@ from granulcal.commands.reading import (
     outside,
     told_outside,
 )
+from granulcal.errors import DoubtfulRecordingWarning
 from granulcal.files import write_beside
 from granulcal.paths import READS, writes
 from granulcal.warned import warn
@@ -83,7 +85,9 @@ def _run(options: argparse.Namespace) -> int:
         first.append(kept - 1)
         line(options.budget, first[0], kept - first[0], 0)
 
-    with shown() as line:
+    with shown() as line, warnings.catch_warnings():
+        # They have been told.
+        warnings.simplefilter("ignore", DoubtfulRecordingWarning)
         found = calibrate_within(
             scene,
             prior,

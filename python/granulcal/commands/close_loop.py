@@ -47,12 +47,12 @@ and in conditions that share what each has of its own session = "monday"
 
 Written to the folder -o: preregistration.json (before any data is seen),
 verdict.json, report.html, and the tables conditions, candidates and
-residuals.parquet. The archive of pours may serve many tasks of one scene; all
-of it is resumed after an interruption. Verdicts: NONE, RESIDUAL (not sure
-enough for a name), EFFECT, SET (not distinguished), EFFECTS (two), UNEXPLAINED;
-and, with exit code 3, UNCONFIRMED (the surrogate is wrong at the fit) and
-OVERTURNED (by another definition of what is examined, [[definitions]] of the
-task).
+residuals.parquet. The archive of pours may serve tasks of one scene, prior and
+seed whose lists of effects begin alike; all of it is resumed after an
+interruption. Verdicts: NONE, RESIDUAL (not sure enough for a name), EFFECT, SET
+(not distinguished), EFFECTS (two), UNEXPLAINED; and, with exit code 3,
+UNCONFIRMED (the surrogate is wrong at the fit) and OVERTURNED (by another
+definition of what is examined, [[definitions]] of the task).
 """
 # The exit code of what is done and does not stand.
 _FALLEN = 3
@@ -108,14 +108,21 @@ def _run(options: argparse.Namespace) -> int:
 
     engine = None if options.engine is None else engine_named(options.engine)
     if options.dry_run:
+        from granulcal.loop.call import check_call
         from granulcal.loop.close import planned
+        from granulcal.loop.pours.archive import require_same
         from granulcal.loop.task import Task
         from granulcal.loop.test.thresholds import Thresholds
 
         task = Task.load(_file(options))
+        names = ("budget", "threads", "seed", "pairs", "rounds")
+        check_call(task, **{name: getattr(options, name) for name in names})
         warn(task.require_readable())
-        planned(task, options.budget, options.seed, options.pairs, options.rounds, Thresholds())
+        asked = (options.budget, options.seed, options.pairs, options.rounds, Thresholds())
+        planned(task, *asked)
         with pouring_with(engine):
+            if options.archive is not None:
+                require_same(options.archive, planned(_told(task), *asked))
             return say_how_long(options, task.at_first(), task.prior, options.budget)
     aside = contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext()
     with aside, pouring_with(engine), spread_over(cluster_of(options)):
@@ -133,7 +140,6 @@ def _file(options: argparse.Namespace) -> Path:
 def _close(options: argparse.Namespace) -> int:
     from granulcal.loop.close import close_loop
     from granulcal.loop.effects.tolerance import Tolerances
-    from granulcal.loop.report.folder import write_report
     from granulcal.loop.task import Task
     from granulcal.measured.recording import UnlikeFramesWarning
 
@@ -154,13 +160,8 @@ def _close(options: argparse.Namespace) -> int:
             seed=options.seed,
             pairs=options.pairs,
             rounds=options.rounds,
+            command=_command(options, path),
         )
-    write_report(
-        closed,
-        options.out,
-        command=_command(options, path),
-        title=f"Closing the loop on {path}",
-    )
     return 0 if closed.standing.stands else _FALLEN
 
 

@@ -36,7 +36,11 @@ the measured ones differ:
 
 The correction, the line and the nearest condition know no physics and hold
 between and near the measured conditions alone; farther away they are refused,
-and the other models warn. A loop closed with --engine pours with the same.
+and so is a number that all conditions share and that is asked for otherwise.
+The other models pour there and warn, also of a number asked for in place of a
+fitted one. `named` has the most probable candidate where the verdict names
+none: what a model has is printed, and stands in the JSON. A loop closed with
+--engine pours with the same.
 Intervals are those of one pour. Exit code 3: the loop's verdict does not stand.
 """
 
@@ -89,39 +93,37 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named, pouring_with
     from granulcal.loop.pours.forward import Forward
-    from granulcal.loop.report.asked import condition_of, shown_outside
+    from granulcal.loop.report.asked import condition_of
     from granulcal.loop.report.models import Models
 
     models, threads = Models.load(options.loop), options.threads or os.cpu_count() or 1
-    at, engine = condition_of(options.at), None
-    if options.model in (None, "base", "named"):
-        outside = shown_outside(at, models.inputs)
-        warn(f"{told}, the conditions of the loop: nothing was measured there" for told in outside)
+    at, engine, model = condition_of(options.at), None, options.model or "named"
+    doubts = models.doubts(model, at)
+    warn(doubts)
     if options.engine is not None:
         engine = engine_named(options.engine)
     if options.dry_run:
         with pouring_with(engine):
-            models.require_engine(options.model or "named")
-            return _say_how_long(options, models.scenes(options.model or "named", at), threads)
+            models.require_engine(model)
+            return _say_how_long(options, models.scenes(model, at), threads)
     with shown(), pouring_with(engine):
         found = models.predict(
-            options.model or "named",
+            model,
             at,
             Forward(options.loop / "pours", threads),
             level=options.level,
             pours=options.pours,
         )
+    warn(found.doubts)
     if options.json:
-        print(
-            json.dumps(
-                {"at": at, "verdict": models.verdict, "units": models.units, **found.to_dict()},
-                indent=1,
-                allow_nan=False,
-            )
-        )
+        told = found.to_dict()
+        told |= {"at": at, "verdict": models.verdict, "units": models.units}
+        told |= {"has": models.described(model, at), "warnings": [*doubts, *found.doubts]}
+        print(json.dumps(told, indent=1, allow_nan=False))
         return _outcome(models.verdict["kind"])
     word = " ".join([models.verdict["kind"], *models.verdict["named"]])
     print(f"{found.model} at {', '.join(options.at)}; the loop's verdict: {word}")
+    print(f"{found.model} is {models.said(model, at)}")
     share = f"{100 * found.level:g} % from"
     print(f"{'statistic':<24}{'middle':>12}{share:>14}{'to':>12}  unit")
     for name, middle, low, high in zip(

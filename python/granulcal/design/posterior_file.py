@@ -1,14 +1,18 @@
-"""Materials from the JSON that `granulcal infer -o` and `granulcal calibrate` write."""
+"""Materials from a Posterior, or from the JSON that `infer -o` and `granulcal calibrate` write."""
 
 import warnings
 from dataclasses import dataclass, field, replace
 from os import PathLike
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.documents import Flag, ListOf, Mapping, Maybe, Number, Table, Text, read_json
 from granulcal.pours.scene import Scene
+
+if TYPE_CHECKING:
+    from granulcal.bayessim.posterior.posterior import Posterior
 
 __all__ = ["OutsideModelWarning", "PosteriorDraws", "UncheckedModelWarning"]
 
@@ -27,6 +31,8 @@ _SCHEMA = Table(
     },
     open=True,
 )
+# As many as `granulcal infer -o` writes.
+_SAMPLES = 1000
 
 
 class OutsideModelWarning(UserWarning):
@@ -96,6 +102,25 @@ class PosteriorDraws:
                 stacklevel=2,
             )
         return cls(names, samples, mode, is_inside, document.get("fixed", {}))
+
+    @classmethod
+    def of(cls, posterior: "Posterior | PosteriorDraws") -> "PosteriorDraws":
+        """Returns the draws of a posterior; draws are their own.
+
+        Raises:
+            TypeError: neither.
+        """
+        from granulcal.bayessim.posterior.posterior import Posterior
+
+        if isinstance(posterior, PosteriorDraws):
+            return posterior
+        if not isinstance(posterior, Posterior):
+            raise TypeError(
+                f"posterior must be a Posterior or PosteriorDraws, got {type(posterior).__name__}: "
+                "PosteriorDraws.load reads the one in a file"
+            )
+        names, fixed = tuple(posterior.names), posterior.prior.fixed
+        return cls(names, posterior.sample(_SAMPLES), posterior.mode(), fixed=fixed)
 
     def without(self, name: str) -> "PosteriorDraws":
         """Returns the draws of all other parameters, fixed ones too."""

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ from granulcal.pours.left_out import LeftOut
 from granulcal.pours.scene import Scene
 from granulcal.prior import Parameter, Prior
 from granulcal.progress import ProgressLine
+
+if TYPE_CHECKING:
+    from granulcal.bayessim.posterior.posterior import Posterior
 
 __all__ = ["design_spill", "forecast_of"]
 
@@ -37,7 +41,7 @@ def design_spill(
     heights: tuple[float, float] = (0.06, 0.3),
     grains: Sequence[int] = (1, 10, 50),
     pours: int = 200,
-    posterior: PosteriorDraws | None = None,
+    posterior: "Posterior | PosteriorDraws | None" = None,
     out: str | PathLike[str],
     seed: int = 0,
     threads: int | None = None,
@@ -52,7 +56,8 @@ def design_spill(
         heights: lowest and highest height of the funnel's tip [m].
         grains: numbers k.
         pours: how many; their heights are evenly spread, and more can be added later.
-        posterior: draws of the material, one for each pour; None: the scene's is known.
+        posterior: of the material, a draw for each pour, and what its prior fixed for all; None:
+            the scene's is known.
         out: folder of pours.json.
         seed: seed of every random choice.
         threads: pours at once; the default is one for each core.
@@ -62,8 +67,9 @@ def design_spill(
         ValueError: a scene that counts no spilled grains, heights that are no range, a k below 1.
         TrainingDataError: fewer than twenty usable pours.
     """
+    draws = None if posterior is None else PosteriorDraws.of(posterior).without(HEIGHT)
+    scene = scene if draws is None else draws.on(scene)
     _check(scene, heights, grains, pours)
-    draws = None if posterior is None else posterior.without(HEIGHT)
     # Evenly spread however many there are, so that more pours can be added to those on disk.
     where = heights[0] + (heights[1] - heights[0]) * (_GOLDEN * np.arange(1, pours + 1) % 1)
     chosen = np.empty((pours, 0))

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from granulcal.engines.protocol import Engine
     from granulcal.pours.scene import Scene
 
-__all__ = ["engine_in_use", "law_of_pours", "pouring_with", "version_of_pours"]
+__all__ = ["engine_in_use", "law_of_pours", "pouring_with", "required", "version_of_pours"]
 
 # Not a context variable: the pours of a job run in threads of their own.
 _in_use: "Engine | None" = None
@@ -34,6 +34,21 @@ def pouring_with(engine: "Engine | None") -> Iterator[None]:
         yield
     finally:
         _in_use = None
+
+
+def required(engine: "Engine | None") -> "Engine | None":
+    """Returns what was given for an engine, if it can be one.
+
+    Raises:
+        TypeError: a name, or a function by itself; says what makes an engine of it.
+    """
+    if isinstance(engine, str):
+        told = f"granulcal.engines.engine_named({engine!r})"
+        raise TypeError(f"engine must be an Engine, got the name {engine!r}: {told} is the one")
+    if engine is not None and not hasattr(engine, "name"):
+        told = "granulcal.engines.CallableEngine(function) makes one of a function"
+        raise TypeError(f"engine must be an Engine, got {engine!r}: {told}")
+    return engine
 
 
 def engine_in_use() -> "Engine | None":

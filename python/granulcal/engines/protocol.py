@@ -10,9 +10,20 @@ from numpy.typing import NDArray
 from granulcal.arrays import unmasked
 from granulcal.pours.scene import Scene
 
-__all__ = ["CallableEngine", "Engine", "Fewer", "FewerGrainsWarning", "Left", "left"]
+__all__ = [
+    "CallableEngine",
+    "Engine",
+    "Fewer",
+    "FewerGrainsWarning",
+    "Left",
+    "UnlikeGrainsWarning",
+    "left",
+]
 
 Array = NDArray[np.float64]
+
+# Coarse grains stand for finer ones, but not a hundred times; single grains may be pressed into it.
+_OTHER_UNIT, _UNDER = 100.0, 0.1
 Left = tuple[Array, Array] | Array
 
 
@@ -69,14 +80,19 @@ class CallableEngine:
         return found
 
 
+class UnlikeGrainsWarning(UserWarning):
+    """An engine of one's own left grains in another unit, or under another ground."""
+
+
 class FewerGrainsWarning(UserWarning):
     """An engine of one's own left fewer grains than the scene has."""
 
 
 class Fewer:
-    """Warns once of an engine that leaves fewer grains than the scene has.
+    """Warns once of an engine that leaves fewer grains than the scene has, or other ones.
 
-    It may: coarser grains stand for more. One that loses grains makes formations that are too small.
+    It may: coarser grains stand for more. One that loses grains makes formations that are too small,
+    one with another unit or another ground none at all.
 
     Args:
         name: of the engine.
@@ -88,6 +104,10 @@ class Fewer:
     def __call__(self, found: Left, scene: Scene) -> None:
         """Looks at what was left of a scene."""
         if self._told or not isinstance(found, tuple):
+            return
+        if unlike := _unlike(scene, *found):
+            self._told = True
+            warnings.warn(f"engine {self.name!r} {unlike}", UnlikeGrainsWarning, stacklevel=3)
             return
         table = scene.to_dict()
         if "outflow" in table or table["end"].get("rolled_away") == "leave":
@@ -101,6 +121,21 @@ class Fewer:
                 FewerGrainsWarning,
                 stacklevel=3,
             )
+
+
+def _unlike(scene: Scene, centres: Array, radii: Array) -> str | None:
+    """What grains show that are in another unit than metres, or over another ground than z = 0."""
+    if not len(centres):
+        return None
+    radius, own = float(np.median(radii)), 0.5 * scene.get("grains.diameter")
+    if not own / _OTHER_UNIT < radius < own * _OTHER_UNIT:
+        return f"left grains with a radius of {radius:g} m, the scene's have {own:g} m: in metres?"
+    under = int(np.sum(centres[:, 2] < 0))
+    if scene.to_dict().get("outflow") is None and under > _UNDER * len(centres):
+        return (
+            f"left {under} of {len(centres)} grains under the ground, z = 0: is its own elsewhere?"
+        )
+    return None
 
 
 def left(name: str, found: Any) -> Left:

@@ -2,11 +2,11 @@
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from granulcal.arrays import unmasked
 from granulcal.documents import ListOf, Table, Text, read_json
@@ -16,6 +16,8 @@ from granulcal.files import write_beside
 from granulcal.pours.scene import Scene
 
 __all__ = ["export_posterior"]
+
+Array = NDArray[np.float64]
 
 _TABLE = "draws.json"
 _DRAWS = ListOf(Table({"file": Text()}, open=True))
@@ -30,10 +32,13 @@ def export_posterior(
     to: str,
     folder: str | Path,
     *,
+    fixed: Mapping[str, float] | None = None,
     young: float | None = None,
     source: Sequence[str] = (),
 ) -> list[Path]:
     """Writes a posterior for an engine: the material at its mode, and one for each draw.
+
+    Of a `Posterior` p the arguments are p.names, p.mode(), p.sample(n) and fixed=p.prior.fixed.
 
     draws.json has every draw in our own coefficients beside the name of its file. What an earlier
     call left in the folder is removed, of other engines too; nothing changes before all is made.
@@ -45,23 +50,27 @@ def export_posterior(
         scene: what is poured.
         to: the engine.
         folder: made if it does not exist.
+        fixed: numbers that the prior fixed, by path: part of the material, too; where they are left
+            out they are the scene's.
         young: as for `export_material`.
         source: further lines for the heads that say where the posterior comes from.
 
     Raises:
-        ValueError: as `export_material`, or the folder has files of these names that granulcal did
-            not export.
+        ValueError: as `export_material`, mode or draws of another shape, a number that is both fixed
+            and a parameter, or the folder has files of these names that granulcal did not export.
     """
     place, ending = Path(folder), MATERIAL_ENDINGS.get(to, "")
-    listed = ", ".join(names)
+    listed, held = ", ".join(names), dict(fixed or {})
+    if both := [name for name in names if name in held]:
+        raise ValueError(f"{', '.join(both)} must be a parameter or fixed, got both")
+    by_prior = [f"fixed by its prior: {', '.join(held)}"] if held else []
 
-    def text_of(values: np.ndarray, what: str) -> str:
-        there = scene.with_(dict(zip(names, values.tolist(), strict=True)))
-        lines = [f"{what} of a posterior: {listed}", *source]
+    def text_of(values: Array, what: str) -> str:
+        there = scene.with_({**held, **dict(zip(names, values.tolist(), strict=True))})
+        lines = [f"{what} of a posterior: {listed}", *by_prior, *source]
         return material_text(there, to, young=young, source=lines)
 
-    most = np.asarray(unmasked("mode", mode), float)
-    rows = np.asarray(unmasked("draws", draws), float).reshape(-1, len(names))
+    most, rows = _mode(mode, names), _rows(draws, names)
     texts = {f"mode{ending}": text_of(most, "the mode")}
     table = []
     for i, row in enumerate(rows):
@@ -77,6 +86,29 @@ def export_posterior(
     for file, text in texts.items():
         write_beside(place / file, text)
     return [*(place / file for file in texts), *([place / _TABLE] if table else [])]
+
+
+def _mode(mode: ArrayLike, names: Sequence[str]) -> Array:
+    found = np.asarray(unmasked("mode", mode), float)
+    if found.shape != (len(names),):
+        raise ValueError(
+            f"mode must have shape ({len(names)},), a number for each of {', '.join(names)}; got "
+            f"{found.shape}"
+        )
+    return found
+
+
+def _rows(draws: ArrayLike, names: Sequence[str]) -> Array:
+    found = np.asarray(unmasked("draws", draws), float)
+    if found.shape == (0,):
+        # An empty list has no columns.
+        return found.reshape(0, len(names))
+    if found.ndim != 2 or found.shape[1] != len(names):
+        raise ValueError(
+            f"draws must have shape (n, {len(names)}), a column for each of {', '.join(names)}; got "
+            f"{found.shape}"
+        )
+    return found
 
 
 def _remove_earlier(place: Path) -> None:

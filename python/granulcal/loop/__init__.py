@@ -4,16 +4,19 @@
 """
 
 from granulcal.loop.check.discrepancy import Discrepancy
+from granulcal.loop.condition import Condition
 from granulcal.loop.effects.design import Design, Effect
 from granulcal.loop.experiment import Experiment, next_experiment
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.surrogate import Surrogate
+from granulcal.loop.task import Task
 from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Power, Trace, power, trace
 from granulcal.loop.test.verdict import Verdict
 
 __all__ = [
+    "Condition",
     "ConditionPours",
     "Design",
     "Discrepancy",
@@ -22,6 +25,7 @@ __all__ = [
     "Improvement",
     "Power",
     "Surrogate",
+    "Task",
     "Thresholds",
     "Trace",
     "Verdict",

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.analysis import Analysis
-from granulcal.loop.check.alarms import of_error, of_placebo
+from granulcal.loop.call import check_call
+from granulcal.loop.check.alarms import of_error, of_left, of_placebo, of_rows
 from granulcal.loop.check.checks import (
     calibrated,
     corrected,
@@ -27,16 +28,16 @@ from granulcal.loop.check.checks import (
     nearer,
     trivial,
 )
-from granulcal.loop.check.coverage import FEWEST_PAIRS
 from granulcal.loop.check.look_again import look_again
 from granulcal.loop.check.own_errors import as_recorded
 from granulcal.loop.check.prior_rounds import ROUNDS, drawn, prior_rounds
 from granulcal.loop.check.standing import stand
 from granulcal.loop.check.steady import drifts
+from granulcal.loop.check.unseen import seen_of, told_unseen
 from granulcal.loop.closed import Closed
 from granulcal.loop.effects.definitions import is_definition
 from granulcal.loop.experiment import next_experiment
-from granulcal.loop.pours.archive import Archive, ArchivePlan
+from granulcal.loop.pours.archive import Archive, ArchivePlan, require_same
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
 from granulcal.loop.pours.refine import ROUND, further
@@ -49,6 +50,7 @@ from granulcal.loop.pours.replicates import (
 from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.time_needed import time_needed
 from granulcal.loop.preregistration import register
+from granulcal.loop.report.folder import write_report
 from granulcal.loop.report.models_of import models_of
 from granulcal.loop.surrogate.condition_pours import session_numbers
 from granulcal.loop.surrogate.conditioned import conditioned
@@ -88,8 +90,12 @@ def close_loop(
     pairs: int = PAIRS,
     rounds: int = 0,
     say: Callable[[str], None] = print,
+    command: str | None = None,
 ) -> Closed:
     """Finds what a model lacks, adds it, and tells the error before and after.
+
+    Written to `out`: preregistration.json, verdict.json, models.json and, where `granulcal[report]`
+    is installed, report.html and the tables conditions, candidates and residuals.parquet.
 
     Args:
         task: scene, prior, recordings.
@@ -107,20 +113,24 @@ def close_loop(
         rounds: of further pours where the fits are, once the residual test has rejected; each
             takes up to `refine.ROUND` pours, and everything is asked again afterwards.
         say: is told each step.
+        command: what makes the report again, as its page says; this call if None.
 
     Raises:
+        TypeError: `task` is no Task, or a number is not whole.
+        ValueError: a number is negative, or too large.
         ObservationError: recordings that do not fit the scene, a budget that is too small, or too
             few pairs.
         TrainingDataError: an archive of something else.
     """
-    if pairs and pairs < FEWEST_PAIRS:
-        raise ObservationError(
-            f"pairs must be 0, or at least {FEWEST_PAIRS} to read 95 % from, got {pairs}"
-        )
+    check_call(task, budget=budget, threads=threads, seed=seed, pairs=pairs, rounds=rounds)
+    # Those of NumPy cannot be registered.
+    budget, seed, pairs, rounds = int(budget), int(seed), int(pairs), int(rounds)
     folder, rules = Path(out), thresholds or Thresholds()
     workers = threads or os.cpu_count() or 1
     plan = planned(task, budget, seed, pairs, rounds, rules)
     names = Measures.of(plan.scene).names
+    if archive is not None:
+        require_same(Path(archive), plan)
     registration = register(folder, task, plan, rules, seed, names, pairs, rounds)
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
 
@@ -140,6 +150,7 @@ def close_loop(
         for sentence in drifts(task):
             say(sentence)
     store.fill(threads=threads, say=say)
+    poured = seen_of(store)
     if surrogate is None:
         surrogate = fit_surrogate(store, seed=seed, say=say)
     else:
@@ -210,6 +221,7 @@ def close_loop(
         error=fit,
         moved=elsewhere,
         trivial=trivial(analysis, surrogate, measured, recorded),
+        seen=poured,
     )
     say(f"verdict {standing.verdict.kind}: {standing.verdict.reason}")
 
@@ -218,6 +230,7 @@ def close_loop(
     placebo = trace(surrogate, blank, rules, seed=seed + 1)
     say(f"placebo {placebo.verdict.kind}: {placebo.verdict.reason}")
     alarms = of_error(standing.verdict, fit, sealed) + of_placebo(placebo.verdict, rules)
+    alarms += of_left(standing.verdict, fit, sealed) + of_rows(standing) + told_unseen(poured)
     for alarm in alarms:
         say(f"warning: {alarm}")
     experiments = next_experiment(surrogate, found, _candidates(analysis.plan))
@@ -242,10 +255,20 @@ def close_loop(
         corrections=corrected(analysis, surrogate, found, measured, recorded),
         calibrated=wide,
         doubts=(*doubts, *alarms),
+        seen=poured,
     )
     said = {"kind": standing.verdict.kind, "named": list(standing.verdict.named)}
     models_of(task, analysis.plan, surrogate, found, said, measured, simulated).write(folder)
     write_beside(folder / "verdict.json", json.dumps(closed.to_dict(), indent=1) + "\n")
+    write_report(
+        closed,
+        folder,
+        command=command
+        or f"granulcal.close_loop(task, {str(folder)!r}, budget={budget}, seed={seed}, "
+        f"pairs={pairs}, rounds={rounds})",
+        title=f"Closing the loop on {task.path or task.scene.name}",
+        say=say,
+    )
     return closed
 
 
@@ -329,8 +352,8 @@ def _candidates(plan: ArchivePlan) -> list[tuple[str, Array]]:
 def _power_table(sights: Power) -> str:
     lines = ["what these pours could show (kappa: share that the parameters cannot mimic):"]
     lines.append(f"  {'effect':<24}{'kappa':>8}{'smallest strength seen in 80 %':>34}")
-    for name, kappa, least in zip(sights.effects, sights.kappa, sights.detectable, strict=True):
+    for name, kappa, least in zip(sights.effects, sights.kappa, sights.shown, strict=True):
         shown = "-" if np.isnan(kappa) else f"{kappa:.2f}"
-        size = f"{least:.2f}" if least <= 1 else "none of its range"
+        size = f"{least:.2f}" if least <= 1 else "-" if np.isnan(least) else "none of its range"
         lines.append(f"  {name:<24}{shown:>8}{size:>34}")
     return "\n".join(lines)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from granulcal.loop.check.correction import Correction
 from granulcal.loop.check.coverage import Coverage
 from granulcal.loop.check.standing import Standing
+from granulcal.loop.check.unseen import Seen
 from granulcal.loop.experiment import Experiment
 from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.pours.replicates import ModelPours, model_faults, model_scene
@@ -43,6 +44,7 @@ class Closed:
         corrections: what the correction without physics leaves; none where nothing was detected.
         calibrated: the interval of the named effect's strength by simulated pairs; None without.
         doubts: what makes recordings or the verdict doubtful, a sentence each.
+        seen: what the archive has of each effect.
     """
 
     task: Task
@@ -60,6 +62,7 @@ class Closed:
     corrections: tuple[Correction, ...] = ()
     calibrated: Coverage | None = None
     doubts: tuple[str, ...] = ()
+    seen: tuple[Seen, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -132,6 +135,7 @@ class Closed:
             "calibrated": None if self.calibrated is None else self.calibrated.to_dict(),
             "correction": [one.to_dict() for one in self.corrections],
             "pours": self.pours,
+            "archive": [one.to_dict() for one in self.seen],
             "placebo": {"verdict": self.placebo.verdict.kind, "p": self.placebo.verdict.p},
             "registration_sha256": self.registration,
             "fit": self.fit.to_dict(),

@@ -36,7 +36,8 @@ def register(
 ) -> str:
     """Writes the file, or finds it as it is; returns its SHA-256.
 
-    One of before, which does not say by which camera recordings are read, is taken as it stands.
+    One that says the same in other bytes is taken as it stands, and so is one of before, which does
+    not say by which camera recordings are read.
 
     Raises:
         ObservationError: the folder holds the registration of another analysis.
@@ -76,9 +77,10 @@ def register(
             theirs = parse_json(found, path, error=ObservationError)
             check(theirs, Table({}, open=True), path, error=ObservationError)
             mine = parse_json(text.encode(), path)
-            if theirs == _as_before(mine):
+            if theirs in (mine, _as_before(mine)):
                 return hashlib.sha256(found).hexdigest()
-            differing = [k for k, v in mine.items() if theirs.get(k) != v]
+            # Some keys are there only where they say something.
+            differing = [k for k in (mine | theirs) if mine.get(k) != theirs.get(k)]
             raise ObservationError(
                 f"{path} was registered for another analysis ({', '.join(differing)} differ); "
                 "what was fixed stays fixed: give another folder with -o"

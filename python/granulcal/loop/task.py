@@ -65,6 +65,15 @@ from granulcal.documents import (
 )
 from granulcal.errors import ObservationError
 from granulcal.loop.condition import Condition, condition_of, require_different
+from granulcal.loop.effects.askable import (
+    of_heights,
+    refuse_both,
+    refuse_drawn,
+    refuse_stated,
+    refuse_unpourable,
+    refuse_unread,
+    refuse_whole,
+)
 from granulcal.loop.effects.definitions import Definition, check_definitions, definition_inputs
 from granulcal.loop.effects.image_faults import require_image
 from granulcal.loop.effects.law import law_numbers
@@ -144,9 +153,11 @@ class Task:
         """Checks that the conditions can be asked about.
 
         Raises:
-            ObservationError: too few pours, conditions without the same paths, a name twice,
-                tolerances over a number that does not differ between conditions, effects of the
-                image for a scene that observes statistics of its own.
+            ObservationError: too few pours, conditions without the same paths or with a number that
+                the scene refuses, a name twice, tolerances over a number that does not differ
+                between conditions, effects of the image for a scene that observes statistics of its
+                own, effects on numbers that the conditions state or that the scene does not take,
+                conditions that state what the prior draws.
         """
         check_definitions(self.definitions)
         if self.definitions and not self.stated:
@@ -163,10 +174,8 @@ class Task:
         require_series(self.scene, ((e.name, e.series) for e in self.library if e.series))
         self._refuse_fitted()
         self._refuse_unlike()
-        given = set(self.conditions[0].at) if self.conditions else set()
-        meant = tuple(e for e in self.library if not e.shift or e.path in given)
-        # An effect on a condition that this task does not have.
-        object.__setattr__(self, "library", meant)
+        given = tuple(self.conditions[0].at) if self.conditions else ()
+        object.__setattr__(self, "library", of_heights(self.library, given))
         names = [condition.name for condition in self.conditions]
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
@@ -187,6 +196,8 @@ class Task:
                     f"{condition.name}: conditions must state the same numbers, "
                     f"{sorted(self.paths)}; got {sorted(condition.at)}"
                 )
+        self._refuse_impossible()
+        self._refuse_unaskable()
         known = [path for path, _, _ in self.inputs]
         if self.tolerances is not None and self.tolerances.path not in known:
             raise ObservationError(
@@ -209,10 +220,18 @@ class Task:
         folder = file.parent
         shared = {key: document[key] for key in ("camera", "reading") if key in document}
         scene = Scene.load(folder / document["scene"])
-        library = by_name(document["effects"]) if "effects" in document else _default(scene)
-        declared = declared_nuisances(document.get("nuisances", {}), scene)
+        conditions = tuple(
+            condition_of(file, {**shared, **table}) for table in document["conditions"]
+        )
+        definitions = tuple(Definition.of(table) for table in document.get("definitions", []))
+        named = document.get("effects", [])
+        library = by_name(named) if named else _default(scene, conditions[0].at)
+        ats = [one.at for one in _by_each(conditions, definitions)]
+        declared = declared_nuisances(document.get("nuisances", {}), scene, ats)
         names = {effect.name for effect in declared}
-        library = (*(effect for effect in library if effect.name not in names), *declared)
+        candidates = tuple(effect for effect in library if effect.name not in names)
+        refuse_both(candidates, declared, named)
+        library = (*candidates, *declared)
         if "resolution" in document:
             library = (*library, Resolution.of(document["resolution"]).effect(scene))
         known = Prior.load(folder / document["prior"])
@@ -224,9 +243,7 @@ class Task:
             prior=Prior(
                 [*known.parameters, *law_numbers(document.get("law", False), scene), *unknown]
             ),
-            conditions=tuple(
-                condition_of(file, {**shared, **table}) for table in document["conditions"]
-            ),
+            conditions=conditions,
             library=library,
             path=file,
             tolerances=Tolerances.load(folder / document["tolerances"])
@@ -234,7 +251,7 @@ class Task:
             else None,
             between=document.get("between", True),
             sealed_in_archive=document.get("sealed_in_archive", True),
-            definitions=tuple(Definition.of(table) for table in document.get("definitions", [])),
+            definitions=definitions,
         )
 
     def under(self, definition: Definition, use: str) -> tuple[Condition, ...]:
@@ -250,6 +267,29 @@ class Task:
                 f"the session of {named[0]} says nothing: no nuisance of the task is each "
                 "condition's own; declare one with shared = false, or leave session out"
             )
+
+    def _refuse_impossible(self) -> None:
+        """Refuses numbers of a condition, by whatever definition, that the scene does not take.
+
+        Raises:
+            ObservationError: the condition, the number, and what the scene allows.
+        """
+        for condition in self._by_each_definition:
+            try:
+                self.scene.with_(condition.at)
+            except (TypeError, ValueError) as error:
+                raise ObservationError(f"condition {condition.name!r}: {error}") from None
+
+    def _refuse_unaskable(self) -> None:
+        """Refuses what `askable.py` does, once every condition is one of the scene."""
+        everywhere = self._by_each_definition
+        ats = [condition.at for condition in everywhere]
+        for condition in everywhere:
+            refuse_drawn(self.prior, condition.name, condition.at)
+        refuse_stated((effect.at(self.scene) for effect in self.library), ats)
+        refuse_whole(self.scene, self.inputs, self.between)
+        refuse_unread(self.library, self.inputs, self.between)
+        refuse_unpourable(self.scene, self.prior, self.library, ats)
 
     def _refuse_fitted(self) -> None:
         """Refuses candidates whose number every fit has free.
@@ -319,6 +359,11 @@ class Task:
         return tuple(found)
 
     @property
+    def _by_each_definition(self) -> tuple[Condition, ...]:
+        """The conditions by every definition."""
+        return _by_each(self.stated or self.conditions, self.definitions)
+
+    @property
     def _differing(self) -> list[str]:
         """Paths whose numbers are not the same under all conditions."""
         return [p for p in self.paths if len({c.at[p] for c in self.conditions}) > 1]
@@ -360,10 +405,21 @@ class Task:
         return self.scene.with_(shared) if shared else self.scene
 
 
-def _default(scene: Scene) -> tuple[LibraryEffect, ...]:
-    """The library where a task names no effects: without those that its scene cannot show."""
+def _by_each(
+    conditions: tuple[Condition, ...], definitions: tuple[Definition, ...]
+) -> tuple[Condition, ...]:
+    """Conditions by every definition; themselves where there is none."""
+    return tuple(c.under(one) for one in definitions for c in conditions) or conditions
+
+
+def _default(scene: Scene, at: dict[str, float]) -> tuple[LibraryEffect, ...]:
+    """The library where a task names no effects: without those that its scene cannot show.
+
+    Nor those on a number that its conditions, the first of which states `at`, do not have.
+    """
+    library = tuple(effect for effect in FUNNEL if not effect.shift or effect.path in at)
     try:
         require_image(scene, ("camera",))
     except ObservationError:
-        return tuple(effect for effect in FUNNEL if not effect.image)
-    return FUNNEL
+        return tuple(effect for effect in library if not effect.image)
+    return library

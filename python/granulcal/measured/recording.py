@@ -5,12 +5,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Unpack
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
+from granulcal.arrays import unmasked
 from granulcal.measured import DischargeCurve, DrumImage, RunOut
 from granulcal.measured.formation import EdgePixelsWarning, Formation, Levelled, Plane, plane_of
 from granulcal.measured.segmentation import SegmentationSettings
@@ -20,6 +22,9 @@ from granulcal.pours.statistics import (
     ObservedStatistics,
     Statistics,
 )
+
+if TYPE_CHECKING:
+    from granulcal.prior import Prior
 
 __all__ = [
     "Camera",
@@ -149,6 +154,47 @@ class Recording:
         if recording.unlike is not None:
             warnings.warn(f"{path}: {recording.unlike}", UnlikeFramesWarning, stacklevel=2)
         return recording
+
+    @classmethod
+    def from_depth(
+        cls,
+        depth: ArrayLike,
+        *,
+        fx: float,
+        fy: float,
+        cx: float,
+        cy: float,
+        unit: float | None = None,
+    ) -> "Recording":
+        """Returns the recording of depth images in memory, as a camera's software hands them out.
+
+        Args:
+            depth: one image or frames of one, 0 or NaN where there is no data, shape (h, w) or
+                (k, h, w): metres, or counts with their `unit`.
+            fx: focal length along the rows [px].
+            fy: the same along the columns [px].
+            cx: column of the principal point [px], the centre of the first pixel at (0, 0).
+            cy: its row [px].
+            unit: metres per count; None for depths in metres, which are kept to 0.1 mm.
+
+        Raises:
+            ValueError: another shape, masked entries, a lens that none is, or depths too large.
+        """
+        images = np.nan_to_num(np.asarray(unmasked("depth", depth), np.float32))
+        images = images * np.float32(1.0 if unit is None else unit)
+        images = images[None] if images.ndim == 2 else images
+        if images.ndim != 3 or images.size == 0:
+            raise ValueError(f"depth must have shape (h, w) or (k, h, w), got {np.shape(depth)}")
+        count, rows, columns = images.shape
+        # The height stands in no file.
+        camera = Camera(_native.Camera.above(1.0, (columns, rows, fx, fy, cx, cy)))
+        with TemporaryDirectory() as place:
+            folder, toml = Path(place) / "frames", Path(place) / "camera.toml"
+            folder.mkdir()
+            kept = {} if unit is None else {"depth_unit": unit}
+            for i, image in enumerate(images):
+                camera.save(image, folder / f"{i:06}.png", toml, **kept)
+            return cls(_native.Recording.open(folder, toml, frames=count), Path("depth array"))
 
     @property
     def frames(self) -> int:
@@ -287,6 +333,23 @@ class Recording:
     def points(self) -> Array:
         """Returns the points under the recording's own segmentation [m], shape (n, 3)."""
         return self._formation.points
+
+    def doubts(
+        self, scene: Scene, prior: "Prior", **settings: Unpack[SegmentationSettings]
+    ) -> list[str]:
+        """Returns why this can be no recording of the scene, and what makes it doubtful.
+
+        A sentence each, as `granulcal infer` says them; none where nothing is known against it. The
+        bounds are wide and hold over the whole prior.
+
+        Args:
+            scene: what was poured, with the camera that looked.
+            prior: of its parameters.
+            **settings: arguments of `formation`; `scene.reading` unless any is given.
+        """
+        text, reading = prior.to_toml(), settings or scene.reading
+        judges = (scene.native.violations, scene.native.doubts)
+        return [told for judge in judges for told in judge(text, self.native, **reading)]
 
     @property
     def plane(self) -> Plane:

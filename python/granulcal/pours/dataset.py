@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
-from granulcal.engines.in_use import engine_in_use
+from granulcal.engines.in_use import engine_in_use, required
 from granulcal.errors import OtherLawWarning, UnverifiedDataWarning
 from granulcal.pours.cluster import Cluster, cluster_asked, gather, refuse_engine
 from granulcal.pours.left_out import LeftOut
@@ -161,6 +161,10 @@ class Dataset:
     def __len__(self) -> int:
         return len(self.theta)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # To another process goes where it lies.
+        return Dataset.load, (self.path,)
+
     def _repr_html_(self) -> str:
         from granulcal.html import page
 
@@ -231,7 +235,7 @@ def generate(
         ((4, 3), (4, 16))
     """
     require_scene(scene)
-    engine = engine or engine_in_use()
+    engine = required(engine) or engine_in_use()
     if not isinstance(prior, Prior):
         raise TypeError(f"prior must be a Prior, as Prior.load reads it, got {prior!r}")
     check_whole("n", n, at_least=1)

@@ -56,6 +56,12 @@ class Material:
     impact_friction: float = 1.0
     rolling_dashpot: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Checks the types; which numbers may be is the scene's to say."""
+        for name, value in asdict(self).items():
+            if isinstance(value, bool | str) or not hasattr(value, "__float__"):
+                raise TypeError(f"{name} must be a number, got {value!r}")
+
     def values(self) -> dict[str, float]:
         """Returns the coefficients by their path in a scene."""
         return {f"material.{name}": float(value) for name, value in asdict(self).items()}

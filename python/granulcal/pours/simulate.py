@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
-from granulcal.engines.in_use import engine_in_use
+from granulcal.arrays import read_only
+from granulcal.engines.in_use import engine_in_use, required
 from granulcal.pours.scene import Material, Scene
 from granulcal.pours.statistics import DiagnosticStatistics, ObservedStatistics, Statistics
 from granulcal.whole import check_seed, check_whole
@@ -22,6 +23,8 @@ Array = NDArray[np.float64]
 
 class Pour:
     """Grains at the end of a pour, how it ended and how far it can be trusted.
+
+    Its arrays are read-only: copy one to change it.
 
     Examples:
         >>> pour = simulate(Scene.drop(0.02, count=20), seed=1)
@@ -39,32 +42,32 @@ class Pour:
     @cached_property
     def positions(self) -> Array:
         """Centres of the grains [m], ground at z = 0, shape (n, 3): of those in the scene."""
-        return self._native.positions
+        return read_only(self._native.positions)
 
     @cached_property
     def velocities(self) -> Array:
         """Velocities of the grains [m/s], shape (n, 3)."""
-        return self._native.velocities
+        return read_only(self._native.velocities)
 
     @cached_property
     def angular_velocities(self) -> Array:
         """Angular velocities of the grains [rad/s], shape (n, 3)."""
-        return self._native.angular_velocities
+        return read_only(self._native.angular_velocities)
 
     @cached_property
     def orientations(self) -> Array:
         """Turns of grains that are not round, quaternions i, j, k, w, shape (n, 4); else (0, 4)."""
-        return self._native.orientations
+        return read_only(self._native.orientations)
 
     @cached_property
     def radii(self) -> Array:
         """Radii of the grains [m], shape (n,); half the diameter if they are not round."""
-        return self._native.radii
+        return read_only(self._native.radii)
 
     @cached_property
     def radii_out(self) -> Array:
         """Radii of the grains that have left through the scene's outflow [m], shape (m,)."""
-        return self._native.radii_out
+        return read_only(self._native.radii_out)
 
     @property
     def status(self) -> str:
@@ -236,10 +239,12 @@ def simulate(
     check_seed(seed)
     check_whole("threads", threads, at_least=1)
     if material is not None:
+        if not isinstance(material, Material):
+            raise TypeError(f"material must be a Material, got {material!r}; a seed is seed=...")
         scene = scene.with_material(material)
     if preset is not None:
         scene = scene.with_(preset=preset)
-    engine = engine or engine_in_use()
+    engine = required(engine) or engine_in_use()
     if engine is not None:
         return Pour(_left_by(engine, scene, seed), scene, seed)
     return Pour(_native.simulate(scene.native, seed, threads), scene, seed)

@@ -90,6 +90,14 @@ class _Named:
             raise KeyError(f"no statistic {name!r}; there are {', '.join(self._names)}")
         return float(self._values[self._names.index(name)])
 
+    def keys(self) -> list[str]:
+        """Returns the names: with them `dict(...)` has the values by name."""
+        return self.names
+
+    def __contains__(self, name: object) -> bool:
+        """Whether a statistic has this name; a value is not looked for."""
+        return isinstance(name, str) and name in self._names
+
     def __iter__(self) -> Iterator[float]:
         return iter(self._values.tolist())
 

@@ -54,7 +54,8 @@ class Posterior:
     Attributes:
         prior: the prior.
         density: the density over the prior's coordinates, evaluated by the extension.
-        warnings: what a reader must know before trusting the numbers; empty if nothing.
+        warnings: what a reader must know before trusting the numbers; empty if nothing. Nothing is
+            raised of it: `repr` counts and names them, `str` of each says it in a line.
 
     Examples:
         >>> from granulcal.bayessim.check.toys import LinearGaussian
@@ -279,7 +280,10 @@ class Posterior:
             f"{name} {mode[i]:.3g} ({region[name][0]:.3g} to {region[name][1]:.3g})"
             for i, name in enumerate(self.names)
         )
-        return f"Posterior({', '.join(told)}; mode and 90 % interval)"
+        kinds = dict.fromkeys(type(each).__name__ for each in self.warnings)
+        count, plural = len(self.warnings), "s" * (len(self.warnings) > 1)
+        noted = f"; {count} note{plural} in `warnings`: {', '.join(kinds)}" if count else ""
+        return f"Posterior({', '.join(told)}; mode and 90 % interval{noted})"
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
@@ -330,7 +334,7 @@ class Posterior:
         extra: "Posterior | None" = None,
         title: str = "",
     ) -> "Figure":
-        """Returns a figure of all marginals and pairs; see `granulcal.pair_plot`.
+        """Returns a figure of all marginals, and of each pair the regions of 50 % and 90 %.
 
         Args:
             path: where to save the figure, or None.

@@ -21,7 +21,7 @@ from granulcal.bayessim.training.summary import TrainingSummary
 from granulcal.errors import TrainingDataError
 from granulcal.prior import Prior
 
-__all__ = ["Trained", "train_model"]
+__all__ = ["Trained", "told_not_of_prior", "train_model"]
 
 Array = NDArray[np.float64]
 
@@ -272,6 +272,8 @@ class _Work:
             notes.append(
                 f"one pair has nearly all of the spread of {', '.join(far)}: is it a pour at all?"
             )
+        if self.weights is None and self.pairs.not_of_prior:
+            notes.append(told_not_of_prior(self.pairs))
         return tuple(notes)
 
     def _summary(
@@ -301,6 +303,15 @@ class _Work:
             validation_losses=result.validation_losses,
             curve=result.curve,
         )
+
+
+def told_not_of_prior(pairs: TrainingPairs) -> str:
+    """Returns in words which parameters do not look drawn from the prior, and what helps."""
+    found = ", ".join(f"{name} (p = {p:.1g})" for name, p in pairs.not_of_prior.items())
+    return (
+        f"not drawn from the prior, it seems: {found}; no check against this prior holds then. Say "
+        "proposal= what they were drawn from, and give rows that were left out with their status"
+    )
 
 
 def importance_weights(pairs: TrainingPairs, proposal: Prior | None) -> Array | None:

@@ -1,13 +1,15 @@
 """Pairs of parameters and statistics, checked once and freed of unusable rows."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.bayessim.arrays import as_matrix
+from granulcal.bayessim.check.diagnostics import uniform_p_value
+from granulcal.bayessim.named import by_name, names_of, placeholders
 from granulcal.errors import TrainingDataError
 from granulcal.pours.scene import Scene
 from granulcal.pours.status import NO_GRAINS, UNUSABLE, USABLE
@@ -21,6 +23,8 @@ Array = NDArray[np.float64]
 EXCLUDED_STATUSES = (*UNUSABLE, NO_GRAINS)
 # Fewer pairs than this cannot be split into training, validation and test.
 FEWEST_PAIRS = 50
+# Chance that draws of the prior are taken for others, for each parameter.
+_UNLIKELY = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +41,8 @@ class TrainingPairs:
         horizon_count: kept pairs whose simulation ended at its time limit.
         scene_toml: the scene that the pairs come from, or None.
         law: number of the solver's law that the pours follow, 0 for another simulator, or None.
+        not_of_prior: parameters that do not look drawn from the prior in all pairs given, the
+            excluded ones too, each with its Kolmogorov-Smirnov p-value.
     """
 
     prior: Prior
@@ -48,6 +54,7 @@ class TrainingPairs:
     horizon_count: int
     scene_toml: str | None
     law: int | None = None
+    not_of_prior: dict[str, float] = field(default_factory=dict)
 
     @classmethod
     def gather(
@@ -59,9 +66,14 @@ class TrainingPairs:
         status: Sequence[str] | None = None,
         x_names: Sequence[str] | None = None,
         scene: Any = None,
+        proposal: Prior | None = None,
         fewest: int = FEWEST_PAIRS,
     ) -> "TrainingPairs":
-        """Returns the usable pairs of a data set, or of two arrays.
+        """Returns the usable pairs of a data set, or of two arrays or frames.
+
+        The columns of frames are matched by name: those of the parameters are the prior's free
+        ones in any order, those of the statistics are `x_names`, unless others are given. Where
+        there is a `proposal`, rows outside of the prior count nothing and are left out.
 
         Raises:
             TrainingDataError: shapes that do not fit, a status that does not exist, NaN among the
@@ -92,8 +104,13 @@ class TrainingPairs:
             raise TrainingDataError("no prior: neither fit(prior=...) nor the data set has one")
         if not isinstance(prior, Prior):
             raise TypeError(f"prior must be a Prior, got {type(prior).__name__}")
+        if theta_names is None:
+            theta_values = by_name(
+                "theta", theta_values, prior.names, whose="the prior", error=TrainingDataError
+            )
         theta = _matrix("theta", theta_values)
         theta = theta[:, _columns(theta.shape[1], theta_names, prior)]
+        x, x_names = _named(x, x_names)
         statistics = _matrix("x", x)
         if len(theta) != len(statistics):
             raise TrainingDataError(
@@ -109,7 +126,13 @@ class TrainingPairs:
         # A pair that is there again would be on both sides of a split.
         is_first = _is_first(np.column_stack([theta, statistics]))
         excluded["repeated"] = int(np.sum(keep & ~is_first))
+        # Rows whose pours cannot be used were drawn, too: the others are no draws of the prior.
+        not_of_prior = _not_of_prior(theta[is_first], prior)
         keep &= is_first
+        if proposal is not None:
+            is_outside = _is_outside(theta, prior).any(axis=1)
+            excluded["outside_prior"] = int(np.sum(keep & is_outside))
+            keep &= ~is_outside
         _check_inside(theta[keep], prior)
         if keep.sum() < fewest:
             dropped = [f"{count} {reason}" for reason, count in excluded.items() if count]
@@ -127,6 +150,7 @@ class TrainingPairs:
             horizon_count=int(np.sum(statuses[keep] == "horizon")),
             scene_toml=scene_toml,
             law=law,
+            not_of_prior=not_of_prior,
         )
 
     def require_varied(self) -> None:
@@ -168,6 +192,28 @@ def _is_first(rows: Array) -> NDArray[np.bool_]:
     return found
 
 
+def _not_of_prior(theta: Array, prior: Prior) -> dict[str, float]:
+    """What does not look drawn from the prior, with p-values; NaN is not looked at."""
+    found = {}
+    for name, shares in zip(prior.names, prior.cdf(theta).T, strict=True):
+        known = shares[np.isfinite(shares)]
+        p_value = uniform_p_value(known) if len(known) else 1.0
+        if p_value < _UNLIKELY:
+            found[name] = p_value
+    return found
+
+
+def _named(x: Any, x_names: Sequence[str] | None) -> tuple[Any, Sequence[str] | None]:
+    """The statistics and their names; a frame's own where none are given."""
+    found = names_of(x)
+    if found is None:
+        return x, x_names
+    names = found if x_names is None else x_names
+    if set(found) != set(names):
+        return x, names
+    return by_name("x", x, names, whose="x_names", error=TrainingDataError), names
+
+
 def _matrix(name: str, value: Any) -> Array:
     try:
         array = as_matrix(name, value)
@@ -199,7 +245,7 @@ def _columns(count: int, theta_names: Sequence[str] | None, prior: Prior) -> lis
 
 def _statistic_names(x_names: Sequence[str] | None, count: int) -> tuple[str, ...]:
     if x_names is None:
-        return tuple(f"statistic_{i}" for i in range(count))
+        return placeholders(count)
     if len(x_names) != count:
         raise TrainingDataError(f"x has {count} columns but {len(x_names)} x_names")
     names = tuple(str(name) for name in x_names)
@@ -221,13 +267,19 @@ def _statuses(status: Sequence[str] | None, count: int) -> NDArray[np.str_]:
     return statuses
 
 
+def _is_outside(theta: Array, prior: Prior) -> NDArray[np.bool_]:
+    low, high = prior.bounds.T
+    return (theta < low) | (theta > high)
+
+
 def _check_inside(theta: Array, prior: Prior) -> None:
+    is_outside = _is_outside(theta, prior)
     for i, name in enumerate(prior.names):
         bad_count = int(np.sum(~np.isfinite(theta[:, i])))
         if bad_count:
             raise TrainingDataError(f"theta: {name} is NaN or infinite in {bad_count} rows")
         low, high = prior.bounds[i]
-        outside = theta[(theta[:, i] < low) | (theta[:, i] > high), i]
+        outside = theta[is_outside[:, i], i]
         if len(outside):
             raise TrainingDataError(
                 f"theta: {name} must lie in the prior's bounds [{low:g}, {high:g}], "

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 from granulcal.bayessim.arrays import as_matrix
 from granulcal.bayessim.check.misfit import Misfit
 from granulcal.bayessim.emulator.likelihood import EmulatorChoice
+from granulcal.bayessim.named import by_name
 from granulcal.bayessim.posterior.posterior import Posterior
 from granulcal.bayessim.training.round_fit import RoundFit, first_design
 from granulcal.errors import ObservationError, TrainingDataError
@@ -137,14 +138,15 @@ def infer_within_budget(
         simulate: takes parameters in own units, shape (b, p), and the index of the first of them
             among all; returns their statistics, shape (b, s), a row of NaN for a pour without.
         prior: the prior.
-        x_obs: one pour, shape (s,), or k of one material, shape (k, s).
+        x_obs: one pour, shape (s,), or k of one material, shape (k, s); what carries names, as
+            `BayesSim.posterior` takes it, is matched with `x_names` if they are given.
         budget: simulations in all.
         seed: seed of every random choice.
         x_names: names of the statistics.
         progress: called after each round.
 
     Raises:
-        ObservationError: an observation that is not finite.
+        ObservationError: an observation that is not finite, or has other names.
         TrainingDataError: fewer than 20 pours of the first round can be used.
         TypeError: not a whole number.
         ValueError: a budget below 60.
@@ -183,6 +185,8 @@ def rounds_of(
         progress: called after each round.
     """
     sizes = round_sizes(budget)
+    if x_names is not None:
+        x_obs = by_name("x_obs", x_obs, x_names, whose="x_names", error=ObservationError)
     observed = np.atleast_2d(np.asarray(x_obs, dtype=float))
     if observed.ndim != 2 or not np.all(np.isfinite(observed)):
         raise ObservationError(f"x_obs must be finite, shape (s,) or (k, s), got {observed.shape}")

@@ -25,7 +25,8 @@ class TrainingSummary:
         train_count: pairs that the emulator, or each member of the network, was trained on.
         test_count: pairs of the calibration check.
         excluded: number of pairs left out by reason: `unhealthy`, `jammed`,
-            `no_grains_in_view`, `non_finite`.
+            `no_grains_in_view`, `non_finite`, `repeated` and, where the pairs were drawn from
+            another proposal, `outside_prior`.
         horizon_count: pairs kept although their simulation ended at its time limit.
         status: of the network: `diverged` if a member never had a finite validation loss,
             `stopped_early` if every member ran out of patience, `epoch_limit`, or `none`.

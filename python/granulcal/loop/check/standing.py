@@ -21,6 +21,7 @@ from typing import Any
 
 from granulcal.loop.check.recentre import Recentred
 from granulcal.loop.check.trivial import TrivialRow
+from granulcal.loop.check.unseen import Seen
 from granulcal.loop.test.distance import Improvement
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.verdict import NAMING, Verdict
@@ -102,6 +103,15 @@ class Standing:
             return ()
         return tuple(row.name for row in self.trivial if not row.is_beaten)
 
+    def beside(self, model: str) -> str:
+        """Returns in words which rows without physics the model does not beat, or is beaten by."""
+        nearer = [row.name for row in self.trivial if row.is_nearer and row.name in self.unbeaten]
+        others = [name for name in self.unbeaten if name not in nearer]
+        words = [f"{' and '.join(nearer)} {'are' if len(nearer) > 1 else 'is'} nearer than {model}"]
+        return "; ".join(
+            words * bool(nearer) + [f"{model} does not beat {' nor '.join(others)}"] * bool(others)
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Returns it for JSON."""
         return {
@@ -150,6 +160,7 @@ def stand(
     error: Improvement | None = None,
     moved: Sequence[Moved] = (),
     trivial: Sequence[TrivialRow] = (),
+    seen: Sequence[Seen] = (),
 ) -> Standing:
     """Returns the final verdict.
 
@@ -166,6 +177,7 @@ def stand(
         error: from the base model (before) to the verdict's (after), conditions to fit.
         moved: verdicts under other definitions.
         trivial: rows of the sealed conditions.
+        seen: pours of each effect.
     """
     verdict = word = _left_by_base(before, of_base, rules)
     against = [one for one in moved if overturned(word, one.verdict, rules.name)]
@@ -203,6 +215,13 @@ def stand(
             else f"the surrogate is wrong at its fit (p = {confirmed:.3g} of fresh pours)"
         )
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
+    lacking = ", ".join(f"{one.effect} {one.lacks}" for one in seen if one.lacks)
+    if verdict.kind == "UNEXPLAINED" and lacking:
+        verdict = replace(
+            verdict,
+            reason=f"{verdict.reason}, as far as it has pours: none usable of {lacking}, which may "
+            "still explain it",
+        )
     found = Standing(
         verdict=verdict,
         before=before,
@@ -217,13 +236,12 @@ def stand(
         looked=looked,
     )
     if verdict.kind in NAMING and found.unbeaten:
-        rows = " nor ".join(found.unbeaten)
         said = Verdict(
             verdict.kind,
             verdict.named,
             verdict.families,
             verdict.p,
-            f"{verdict.reason}; at the sealed conditions it does not beat {rows}",
+            f"{verdict.reason}; at the sealed conditions {found.beside('it')}",
         )
         return replace(found, verdict=said)
     return found

@@ -78,6 +78,11 @@ class TrivialRow:
         """Whether the verdict's model is nearer to the measurement, at 97.5 %."""
         return self.gain_interval[0] > 0
 
+    @property
+    def is_nearer(self) -> bool:
+        """Whether the row is nearer to the measurement than the verdict's model, at 97.5 %."""
+        return self.gain_interval[1] < 0
+
     def to_dict(self) -> dict[str, Any]:
         """Returns it for JSON."""
         return {
@@ -88,6 +93,7 @@ class TrivialRow:
             "gain": self.gain,
             "gain_interval": list(self.gain_interval),
             "is_beaten": self.is_beaten,
+            "is_nearer": self.is_nearer,
         }
 
 

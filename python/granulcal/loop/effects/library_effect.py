@@ -109,7 +109,7 @@ class LibraryEffect:
             scene: whose own number a relative effect starts from.
 
         Raises:
-            TrainingDataError: `sd` is not positive.
+            TrainingDataError: `sd` is not positive, or beyond the effect's whole range.
         """
         if not (sd > 0 and math.isfinite(sd)):
             raise TrainingDataError(f"tolerance of {self.name} must be positive, got {sd}")
@@ -118,6 +118,13 @@ class LibraryEffect:
             psi = math.log1p(sd / own.off) / abs(math.log(own.full / own.off))
         else:
             psi = sd / abs(own.full - own.off)
+        if psi > 1 + 1e-9:
+            ratio = max(own.full / own.off, own.off / own.full) if own.is_ratio else 0.0
+            most = own.off * (ratio - 1) if own.is_ratio else abs(own.full - own.off)
+            raise TrainingDataError(
+                f"tolerance of {self.name} must be at most {most:g} {self.unit}, the whole range "
+                f"that the library has of it, got {sd:g}"
+            )
         return replace(own, nuisance_sd=psi, is_shared=not own.shift)
 
     @property

@@ -37,7 +37,7 @@ from granulcal.loop.pours.rows import Rows
 from granulcal.pours.dataset import Dataset, generate
 from granulcal.pours.left_out import LeftOut
 
-__all__ = ["Archive", "ArchivePlan", "Pours"]
+__all__ = ["Archive", "ArchivePlan", "Pours", "require_same"]
 
 # A list of lists holds a path and two numbers; the rest is compared and not read.
 _SCHEMA = Table(
@@ -57,13 +57,14 @@ class Archive:
     Args:
         folder: where it is, or will be.
         plan: what it is of.
+        begin: whether its record is written, where there is none or a shorter one.
 
     Raises:
         ObservationError: effects of the image for a scene that has none.
         TrainingDataError: the folder holds the archive of something else, or of another version.
     """
 
-    def __init__(self, folder: Path, plan: ArchivePlan) -> None:
+    def __init__(self, folder: Path, plan: ArchivePlan, *, begin: bool = True) -> None:
         """Opens or begins it."""
         require_image(plan.scene, (effect.name for effect in plan.library if effect.image))
         require_series(plan.scene, ((e.name, e.series) for e in plan.library if e.series))
@@ -81,8 +82,10 @@ class Archive:
                 self.plan = replace(plan, conditions=wider)
                 mine = self.plan.record()
             longer = _continued(theirs, mine)
-            if longer is mine:
+            if longer is mine and begin:
                 write_beside(path, json.dumps(mine, indent=1))
+            if theirs.get("effects") != mine["effects"] and longer is None:
+                _refuse_effects(path, theirs, mine)
             for key, value in mine.items():
                 if longer is not None and key in _OF_LIBRARY:
                     continue
@@ -94,7 +97,8 @@ class Archive:
             return
         if folder.exists() and any(folder.iterdir()):
             raise TrainingDataError(f"{folder} is not empty and has no {_RECORD}")
-        write_beside(path, json.dumps(mine, indent=1))
+        if begin:
+            write_beside(path, json.dumps(mine, indent=1))
 
     def fill(
         self,
@@ -229,6 +233,33 @@ def _continued(theirs: dict[str, Any], mine: dict[str, Any]) -> dict[str, Any] |
     if b[: len(a)] == a:
         return mine
     return theirs if a[: len(b)] == b else None
+
+
+def _refuse_effects(path: Path, theirs: dict[str, Any], mine: dict[str, Any]) -> None:
+    """Refuses an archive that differs in its effects alone, by their names.
+
+    Raises:
+        TrainingDataError: what it has, and what is asked for.
+    """
+    others = (k for k in mine if k not in _OF_LIBRARY)
+    if "effects" not in theirs or any(theirs.get(k) != mine[k] for k in others):
+        return
+    has, asked = (", ".join(one["effects"]) or "none" for one in (theirs, mine))
+    raise TrainingDataError(
+        f"{path} is of other effects: it has {has}; this run asks for {asked}. The shorter list "
+        "must begin the longer, in order and with the same numbers: give another folder with "
+        "--archive"
+    )
+
+
+def require_same(folder: Path, plan: ArchivePlan) -> None:
+    """Refuses a folder whose archive is of something else, and writes nothing.
+
+    Raises:
+        TrainingDataError: as `Archive`.
+    """
+    if folder.exists() and any(folder.iterdir()):
+        Archive(folder, plan, begin=False)
 
 
 def _covers(theirs: Any, mine: Any) -> bool:

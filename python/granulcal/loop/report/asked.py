@@ -9,7 +9,15 @@ from numpy.typing import NDArray
 from granulcal.errors import ObservationError
 from granulcal.loop.test.score import DISCREPANCY_LENGTH
 
-__all__ = ["REACH", "condition_of", "require_near", "require_stated", "shown_outside"]
+__all__ = [
+    "REACH",
+    "condition_of",
+    "require_near",
+    "require_shared",
+    "require_stated",
+    "shown_outside",
+    "shown_unlike",
+]
 
 Array = NDArray[np.float64]
 
@@ -63,6 +71,36 @@ def require_stated(model: str, at: Iterable[str], known: Sequence[str]) -> None:
             f"{model} knows the numbers that the loop's conditions state alone, "
             f"{', '.join(known)}; it would ignore {', '.join(others)}"
         )
+
+
+def require_shared(model: str, at: Mapping[str, float], shared: Mapping[str, float]) -> None:
+    """Refuses another number than the one that all conditions share: nothing tells what it does.
+
+    Args:
+        model: that knows no physics.
+        at: numbers of the condition.
+        shared: what every condition of the loop states, by path.
+
+    Raises:
+        ObservationError: the number, and what the conditions state.
+    """
+    unlike = shown_unlike(at, shared)
+    if unlike:
+        raise ObservationError(
+            f"{model} knows no physics and holds where the loop's conditions are alone: "
+            f"{'; '.join(unlike)}"
+        )
+
+
+def shown_unlike(
+    at: Mapping[str, float], known: Mapping[str, float], whose: str = "all its conditions"
+) -> list[str]:
+    """Returns a phrase for each number of a condition that is another than the known one."""
+    return [
+        f"{path} = {at[path]:g} is not the {value:g} of {whose}"
+        for path, value in known.items()
+        if path in at and abs(at[path] - value) > _SAME * max(abs(value), abs(at[path]))
+    ]
 
 
 def require_near(model: str, at: Array, conditions: Array) -> None:

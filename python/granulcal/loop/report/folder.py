@@ -17,16 +17,19 @@ def write_report(
     command: str,
     title: str,
     say: Callable[[str], None] = print,
-) -> Path:
-    """Writes `report.html` and the Parquet tables; returns the page.
+) -> None:
+    """Writes `report.html` and the Parquet tables.
 
-    The tables are left out, and that is said, where pyarrow is not installed.
+    The page is left out, and that is said, where jinja2 or matplotlib is not installed, and the
+    tables where pyarrow is not: the verdict is written by then, and stands without them.
     """
     page = folder / "report.html"
-    write_page(closed, page, command=command, title=title)
+    try:
+        write_page(closed, page, command=command, title=title)
+        say(str(page))
+    except ModuleNotFoundError as error:
+        say(f"report.html left out: {error}")
     try:
         write_tables(closed, folder)
     except ModuleNotFoundError as error:
         say(f"tables left out: {error}")
-    say(str(page))
-    return page

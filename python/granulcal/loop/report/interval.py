@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["of_one_more", "t_factor"]
+__all__ = ["fewest_of_ranks", "of_one_more", "t_factor"]
 
 Array = NDArray[np.float64]
 
@@ -13,6 +13,14 @@ def t_factor(level: float, freedom: float) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, (1 + level) / 2))
+
+
+def fewest_of_ranks(level: float) -> int:
+    """Returns how many pours have a rank at either end of the interval."""
+    q, count = (1 - level) / 2, max(int(2 / (1 - level)) - 2, 0)
+    while q * (count + 1) < 1:
+        count += 1
+    return count
 
 
 def of_one_more(rows: Array, level: float, pours: int) -> tuple[Array, Array]:
@@ -28,7 +36,7 @@ def of_one_more(rows: Array, level: float, pours: int) -> tuple[Array, Array]:
         pours: that the draws are of.
     """
     q = (1 - level) / 2
-    if q * (pours + 1) >= 1:
+    if pours >= fewest_of_ranks(level):
         # Hazen's positions, in which the rank of a pour is that of the middle of its draws.
         end = (q * (pours + 1) - 0.5) / pours
         low, high = np.quantile(rows, [end, 1 - end], axis=0, method="hazen")

@@ -3,7 +3,7 @@ r"""What a closed loop predicts where nothing was measured, from one file: `mode
 | model | prediction under a condition c |
 |---|---|
 | `base` | pours of the base model at draws of its fit |
-| `named` | pours of the verdict's model at draws of its fit; the base model where none is named |
+| `named` | pours of the model that the fits name, at draws of its fit; else the base model |
 | `corrected` | pours of the base model at its fit, moved by the correction without physics |
 | `line` | the straight line through the measured means of the conditions to fit |
 | `nearest` | the mean of the nearest of these |
@@ -13,13 +13,19 @@ draws of the fit; of `corrected` that of pours at the fit and of $\hat\delta(c)$
 together, on the scale z of the surrogate; of `line` and `nearest` the scatter of pours and, where
 three conditions or more were fitted, the error with which the row tells each from the others.
 `corrected`, `line` and `nearest` are refused farther from the tested conditions than the equation
-of the correction holds, and where a number is stated that no condition of the loop states.
+of the correction holds, and where a number is stated that no condition of the loop states or that
+is not the one that all of them share; `base` and `named` pour there, and warn.
+
+`named` is the most probable candidate also where the checks have left no name (RESIDUAL, NONE):
+what a model has stands beside each of its predictions.
 """
 
+import contextlib
 import json
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +40,15 @@ from granulcal.loop.check.discrepancy import Discrepancy
 from granulcal.loop.check.trivial import line_weights, nearest_weights
 from granulcal.loop.effects.definitions import is_definition
 from granulcal.loop.pours.forward import Coarse, Forward
-from granulcal.loop.report.asked import condition_of, require_near, require_stated
-from granulcal.loop.report.interval import of_one_more, t_factor
+from granulcal.loop.report.asked import (
+    condition_of,
+    require_near,
+    require_shared,
+    require_stated,
+    shown_outside,
+    shown_unlike,
+)
+from granulcal.loop.report.interval import fewest_of_ranks, of_one_more, t_factor
 from granulcal.loop.report.models_schema import check_models
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.pours.scene import Scene
@@ -83,6 +96,8 @@ class Prediction:
         middle: mean, shape (s,).
         low, high: ends of the interval, shape (s,).
         level: of the interval.
+        pours: usable ones that it is of; None of a model that pours nothing.
+        doubts: what is to be said of it, a sentence each.
     """
 
     model: str
@@ -91,6 +106,8 @@ class Prediction:
     low: Array
     high: Array
     level: float
+    pours: int | None = None
+    doubts: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Returns it for JSON: null where a statistic has no number."""
@@ -101,6 +118,8 @@ class Prediction:
         return {
             "model": self.model,
             "level": self.level,
+            "pours": self.pours,
+            "warnings": list(self.doubts),
             "statistics": {
                 name: {"middle": number(m), "low": number(a), "high": number(b)}
                 for name, m, a, b in zip(self.names, self.middle, self.low, self.high, strict=True)
@@ -129,6 +148,8 @@ class Models:
         coarse: the second size of grains; None without.
         engine: name of the simulator that poured for the loop; None is ours, and empty another one
             that an older file does not name.
+        shared: numbers that all conditions state, and each the same.
+        strengths: psi of the effects of `named` at its fit, by name; an older file tells none.
     """
 
     scene: Scene
@@ -146,6 +167,8 @@ class Models:
     pours: Array
     coarse: Coarse | None = None
     engine: str | None = None
+    shared: dict[str, float] = field(default_factory=dict)
+    strengths: dict[str, float] = field(default_factory=dict)
 
     @property
     def units(self) -> dict[str, str]:
@@ -172,20 +195,22 @@ class Models:
             "scatter": self.scatter.tolist(),
             "pours": self.pours.tolist(),
             "coarse": None if self.coarse is None else asdict(self.coarse),
+            "shared": self.shared,
+            "strengths": self.strengths,
         }
         path = folder / _NAME
         write_beside(path, json.dumps(document) + "\n")
         return path
 
     @classmethod
-    def load(cls, folder: Path) -> "Models":
+    def load(cls, folder: str | PathLike[str]) -> "Models":
         """Returns the models in the folder of a report.
 
         Raises:
             FileNotFoundError: there is no `models.json`.
             ObservationError: it is damaged; the message says where.
         """
-        path = folder / _NAME
+        path = Path(folder) / _NAME
         if not path.exists():
             raise FileNotFoundError(f"{path} is not there: is {folder} the -o of close-loop?")
         data = read_bytes(path, most=LARGEST_DOCUMENT)
@@ -200,9 +225,12 @@ class Models:
                 stacklevel=2,
             )
         inputs = tuple((str(p), float(a), float(b)) for p, a, b in d["inputs"])
+        scene = Scene.from_toml(d["scene"])
+        # What the conditions share is the scene's, and older files do not say it again.
+        beside = [path for path in d["paths"] if path not in [p for p, _, _ in inputs]]
         known = np.array(d["known"], dtype=float).reshape(len(d["means"]), len(inputs))
         return cls(
-            scene=Scene.from_toml(d["scene"]),
+            scene=scene,
             verdict=d["verdict"],
             paths=tuple(d["paths"]),
             inputs=inputs,
@@ -218,6 +246,8 @@ class Models:
             coarse=Coarse(**d["coarse"]) if d["coarse"] else None,
             # Older files name none; their law tells ours from others.
             engine=d.get("engine", "" if d.get("law") == 0 else None),
+            shared=d["shared"] if "shared" in d else _known(scene, beside),
+            strengths=d.get("strengths", {}),
         )
 
     def predict(
@@ -240,8 +270,9 @@ class Models:
 
         Raises:
             ObservationError: an unknown model, a condition that lacks an input of the archive, one
-                that a model without physics would ignore in part or that is too far from the tested
-                ones, too few pours or usable ones, or another engine in use than that of the loop.
+                that a model without physics would ignore in part, that is too far from the tested
+                ones or not like all of them, too few pours or usable ones, or another engine in use
+                than that of the loop.
         """
         if model not in MODELS:
             raise ObservationError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
@@ -262,6 +293,7 @@ class Models:
         if model in _WITHOUT_PHYSICS:
             known = list(dict.fromkeys((*self.paths, *inputs)))
             require_stated(model, at, known)
+            require_shared(model, at, self.shared)
         self.require_engine(model)
         if model in ("line", "nearest"):
             require_near(model, self._unit(at), self.known)
@@ -295,6 +327,81 @@ class Models:
             f"{model}: the loop was closed with pours by {was}, and what it fitted is of that "
             f"alone; got {now}: pour with the same (`predict --engine`), or ask for line or nearest"
         )
+
+    def added(self) -> dict[str, float]:
+        """Returns what `named` has at its fit and `base` has not, by path or kind of fault.
+
+        Of an effect on a condition's own number it is what is added to that number.
+        """
+        plain, own = self.makers["base"][0], self.makers["named"][0]
+        numbers = {path: v for path, v in own.numbers.items() if path not in plain.numbers}
+        return {**numbers, **own.shifts, **own.faults}
+
+    def _moved(self) -> set[str]:
+        """Numbers of a condition that the effect of `named` adds to: stated, and not fitted."""
+        return set(self.makers["named"][0].shifts)
+
+    def described(self, model: str, at: Mapping[str, float]) -> dict[str, Any]:
+        """Returns what a model has at its fit, for JSON.
+
+        Args:
+            model: one of `MODELS`.
+            at: numbers that are asked for in place of the fit's.
+        """
+        if model in ("line", "nearest"):
+            return {"numbers": {}, "effects": {}, "strengths": {}, "is_named": False}
+        has = self.added() if model == "named" else {}
+        numbers = self.makers["named" if model == "named" else "base"][0].numbers
+        return {
+            "numbers": {path: at.get(path, value) for path, value in numbers.items()},
+            "effects": has,
+            "strengths": self.strengths if has else {},
+            "is_named": bool(has and self.verdict["named"]),
+        }
+
+    def said(self, model: str, at: Mapping[str, float]) -> str:
+        """Returns what a model has, in a line.
+
+        Args:
+            model: one of `MODELS`.
+            at: numbers that are asked for in place of the fit's.
+        """
+        if model in ("line", "nearest"):
+            return "no physics: the measured means of the conditions to fit"
+        has = self.added() if model == "named" else {}
+        if not has:
+            beside = ", moved by its own interpolated residual" if model == "corrected" else ""
+            return f"the base model at its fit, without any effect{beside}"
+        asked = {p: f" ({at[p]:g} asked for)" for p in has if p in at and p not in self._moved()}
+        numbers = ", ".join(f"{p} = {value:.4g}{asked.get(p, '')}" for p, value in has.items())
+        names = " + ".join(self.strengths or self.verdict["named"]) or "one effect more"
+        if self.verdict["named"]:
+            return f"the base model with {names}: {numbers} at its fit"
+        return (
+            f"the base model with {names}, the most probable candidate, which the verdict does not "
+            f"name: {numbers} at its fit"
+        )
+
+    def doubts(self, model: str, at: Mapping[str, float]) -> list[str]:
+        """Returns what is to be said of a condition before anything is poured under it.
+
+        Args:
+            model: one of `MODELS`.
+            at: numbers that the condition states.
+        """
+        if model not in ("base", "named"):
+            return []
+        inputs = [path for path, _, _ in self.inputs]
+        maker = self.makers[model][0]
+        own = _known(self.scene, [p for p in at if p not in {*self.paths, *inputs, *maker.numbers}])
+        outside = shown_outside(at, self.inputs)
+        told = [f"{one}, the conditions of the loop: nothing was measured there" for one in outside]
+        for one in shown_unlike(at, {**own, **self.shared}):
+            told.append(f"{one}, outside the conditions of the loop: nothing was measured there")
+        fitted = {p: v for p, v in maker.numbers.items() if p not in (*inputs, *self.shared)}
+        for one in shown_unlike(at, fitted, "the fit"):
+            told.append(f"{one}: it is what was asked for, no longer what was fitted")
+        return told
 
     def scenes(self, model: str, at: Mapping[str, float]) -> list[Scene]:
         """Returns the scenes that one pour of a prediction needs: none, one, or one of each size.
@@ -332,7 +439,14 @@ class Models:
                 "needed: grains jam, leave the view or are unhealthy"
             )
         low, high = of_one_more(rows, level, pours)
-        return Prediction(model, self.names, rows.mean(axis=0), low, high, level)
+        few = []
+        if pours < fewest_of_ranks(level):
+            few = [
+                f"{pours} usable pours are too few for ranks at {100 * level:g} %, "
+                f"{fewest_of_ranks(level)} are needed: the intervals are Student's t's of normal "
+                "statistics, which may reach beyond what a statistic can be"
+            ]
+        return Prediction(model, self.names, rows.mean(axis=0), low, high, level, pours, (*few,))
 
     def _corrected(
         self, at: Mapping[str, float], forward: Forward, level: float, pours: int
@@ -374,3 +488,12 @@ class Models:
             if weights is not None:
                 squares.append((self.means[h] - weights @ self.means[rest]) ** 2)
         return np.mean(squares, axis=0) if squares else np.zeros(self.means.shape[1])
+
+
+def _known(scene: Scene, paths: Sequence[str]) -> dict[str, float]:
+    """Numbers of a scene by path, without those that it has none of."""
+    found = {}
+    for path in paths:
+        with contextlib.suppress(ValueError):
+            found[path] = scene.get(path)
+    return found

@@ -68,7 +68,15 @@ def models_of(
         pours=np.array([float(len(measured[c.name])) for c in fitted]),
         coarse=task.coarse,
         engine=None if (engine := engine_in_use()) is None else engine.name,
+        shared=_shared(task),
+        strengths=dict(zip(found.best.effects, found.best.best_strengths.tolist(), strict=True)),
     )
+
+
+def _shared(task: Task) -> dict[str, float]:
+    """Numbers that every condition states, and each the same."""
+    first, *others = (condition.at for condition in task.conditions)
+    return {p: v for p, v in first.items() if all(at[p] == v for at in others)}
 
 
 def _makers(task: Task, plan: ArchivePlan, found: Trace, one: Explanation) -> tuple[Maker, ...]:

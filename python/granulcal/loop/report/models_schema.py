@@ -56,7 +56,12 @@ _SCHEMA: Schema = Table(
         "pours": ListOf(Number(1), least=1),
         "coarse": Maybe(Table({"numbers": Mapping(Number()), "held": Number(high=0)})),
     },
-    {"law": Whole(0, 2**32 - 1), "engine": Maybe(Text())},
+    {
+        "law": Whole(0, 2**32 - 1),
+        "engine": Maybe(Text()),
+        "shared": Mapping(Number()),
+        "strengths": Mapping(Number()),
+    },
 )
 
 

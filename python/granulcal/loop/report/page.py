@@ -1,5 +1,6 @@
 """The loop's report: one self-contained HTML page."""
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
@@ -11,6 +12,7 @@ from granulcal.engines.in_use import version_of_pours
 from granulcal.files import write_beside
 from granulcal.loop.check.own_errors import in_told_sessions
 from granulcal.loop.check.standing import Standing
+from granulcal.loop.check.unseen import Seen
 from granulcal.loop.closed import Closed
 from granulcal.loop.effects.image_faults import Frame
 from granulcal.loop.pours.measures import Measures, formation_of
@@ -47,7 +49,7 @@ def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
     page = template("loop.html.j2").render(
         title=title,
         headline=f"{verdict.kind}: {named}" if named else verdict.kind,
-        sentence=sentence_of(closed.standing),
+        sentence=sentence_of(closed.standing, closed.seen),
         reason=verdict.reason[:1].upper() + verdict.reason[1:],
         made=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         version=version_of_pours(),
@@ -68,6 +70,8 @@ def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
         residuals=_residuals(closed),
         nearest=closed.trace.nearest,
         strengths=_strengths(closed),
+        is_named=bool(verdict.named),
+        word=verdict.kind,
         parameters=closed.parameters(),
         pictures=_pictures(closed),
         picture_of=f"A pour at {closed.task.conditions[0].name}",
@@ -81,8 +85,13 @@ def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
     write_beside(path, page)
 
 
-def sentence_of(standing: Standing) -> str:
+def sentence_of(standing: Standing, seen: Sequence[Seen] = ()) -> str:
     """Returns what the verdict says, in a sentence."""
+    if standing.verdict.kind == "UNEXPLAINED" and any(one.lacks for one in seen):
+        return (
+            "The grains do something that neither this model nor any known effect does as far as "
+            "the archive has usable pours of it."
+        )
     if standing.verdict.kind == "NONE" and standing.surrogate_p is not None:
         return "The model explains these pours: pours of it leave no more than chance does."
     return _SENTENCES[standing.verdict.kind]
@@ -133,16 +142,24 @@ def _strengths(closed: Closed) -> list[dict[str, Any]]:
 
 def _hidden(closed: Closed) -> list[dict[str, str]]:
     rows, sights = [], closed.power
-    for name, kappa, least in zip(sights.effects, sights.kappa, sights.detectable, strict=True):
+    of = {one.effect: one for one in closed.seen}
+    for name, kappa, least in zip(sights.effects, sights.kappa, sights.shown, strict=True):
         effect = closed.task.effect(name)
         is_seen = least <= 1
-        value = f"{_number(effect.value(float(least)))} {effect.unit}".removesuffix(" -")
+        value = f"{_number(effect.value(float(least)))} {effect.unit}" if is_seen else "-"
+        value, has = value.removesuffix(" -"), of.get(name)
         rows.append(
             {
                 "name": name,
                 "path": effect.path,
                 "kappa": "-" if np.isnan(kappa) else _number(float(kappa)),
-                "strength": _number(float(least)) if is_seen else "not seen",
+                "strength": "-"
+                if np.isnan(least)
+                else _number(float(least))
+                if is_seen
+                else "not seen",
+                "pours": f"{has.pours - has.left_out.total} of {has.pours}" if has else "-",
+                "lacks": f"{has.lacks} ({has.left_out})" if has and has.lacks else "",
                 "value": value if is_seen and not effect.camera else "-",
             }
         )

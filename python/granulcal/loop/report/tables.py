@@ -103,9 +103,9 @@ def candidates(closed: Closed) -> list[Row]:
             "unit": effect.unit if effect else "-",
             "is_named": name in closed.verdict.named,
             "kappa_before": float(sights.kappa[i]),
-            "detectable_before": float(sights.detectable[i]),
+            "detectable_before": float(sights.shown[i]),
             "kappa": float(trace.power.kappa[i]),
-            "detectable": float(trace.power.detectable[i]),
+            "detectable": float(trace.power.shown[i]),
             "score_square": float(trace.residual_test.squares[i]),
             "one_step_strength": float(trace.residual_test.strengths[i]),
             "adjusted_p": float(trace.residual_test.adjusted[i]),
@@ -133,8 +133,10 @@ def residuals(closed: Closed) -> list[Row]:
 def _refit(closed: Closed, name: str, one: Explanation | None) -> Row:
     """What a refit found; nulls where the residual test did not reject."""
     keys = ("log_probability", "p_after", "psi", "psi_low", "psi_high", "psi_best")
+    of_pours = _of_pours(closed, name, one)
     if one is None:
-        return dict.fromkeys((*keys, "is_calibrated", "value", "value_low", "value_high"))
+        none = dict.fromkeys((*keys, "is_calibrated", "value", "value_low", "value_high"))
+        return none | of_pours
     low, high = one.intervals[0]
     is_calibrated = one is closed.trace.best and closed.calibrated is not None
     if is_calibrated and closed.calibrated is not None:
@@ -145,7 +147,20 @@ def _refit(closed: Closed, name: str, one: Explanation | None) -> Row:
     row["is_calibrated"] = is_calibrated
     effect = closed.task.effect(name)
     ends = sorted((effect.value(float(low)), effect.value(float(high))))
-    return row | {"value": effect.value(psi), "value_low": ends[0], "value_high": ends[1]}
+    row |= {"value": effect.value(psi), "value_low": ends[0], "value_high": ends[1]}
+    return row | of_pours
+
+
+def _of_pours(closed: Closed, name: str, one: Explanation | None) -> Row:
+    """The number by the model's own pours, as the page and verdict.json have it; else nulls."""
+    keys = ("value_of_pours", "value_of_pours_low", "value_of_pours_high")
+    own = closed.standing.own
+    if one is None or one is not closed.trace.best or own is None:
+        return dict.fromkeys(keys)
+    ends = own.intervals[0] if closed.calibrated is None else closed.calibrated.interval
+    effect = closed.task.effect(name)
+    low, high = sorted(effect.value(float(end)) for end in ends)
+    return dict(zip(keys, (effect.value(float(own.strengths[0])), low, high), strict=True))
 
 
 def _library(closed: Closed) -> set[str]:

@@ -59,12 +59,17 @@ class Power:
         )
         return cls(names, scores.kappa, scores.detectable, scores.cosines, groups)
 
+    @property
+    def shown(self) -> Array:
+        """The strengths that may be told: NaN where the effect's direction is not known, (K,)."""
+        return np.where(np.isnan(self.kappa), np.nan, self.detectable)
+
     def to_dict(self) -> dict[str, Any]:
         """Returns the table for JSON; what is not known is None."""
         return {
             "effects": list(self.effects),
             "kappa": [None if np.isnan(k) else float(k) for k in self.kappa],
-            "detectable_strength": self.detectable.tolist(),
+            "detectable_strength": [None if np.isnan(d) else float(d) for d in self.shown],
             "cosines": self.cosines.tolist(),
             "families": [list(group) for group in self.families],
         }

@@ -3,6 +3,7 @@
 import hashlib
 import os
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal.arrays import read_array
 from granulcal.engines.in_use import law_of_pours
+from granulcal.errors import NotOfPriorWarning
 from granulcal.experiments.paper.common.outcome import Outcome
 from granulcal.experiments.paper.common.sizes import Size
 from granulcal.files import write_beside
@@ -222,15 +224,18 @@ class Workshop:
         if mark.exists() and mark.read_text(encoding="utf-8") == key:
             return BayesSim.load(folder)
         began = time.monotonic()
-        model = BayesSim.fit(
-            pairs.theta,
-            pairs.x,
-            pairs.prior,
-            seed,
-            x_names=pairs.names,
-            quiet=True,
-            **settings,
-        )
+        with warnings.catch_warnings():
+            # Pours that cannot be used have been left out, and their materials are not any.
+            warnings.simplefilter("ignore", NotOfPriorWarning)
+            model = BayesSim.fit(
+                pairs.theta,
+                pairs.x,
+                pairs.prior,
+                seed,
+                x_names=pairs.names,
+                quiet=True,
+                **settings,
+            )
         model.save(folder)
         write_beside(mark, key)
         self.say(f"model {name}: {len(pairs)} pours, {time.monotonic() - began:.0f} s")
