@@ -2,8 +2,7 @@
 
     python benches/paper/shapes.py again    # another 50 tests of each shape, by spheres
     python benches/paper/shapes.py few      # models of the right shape from fewer training pours
-    python benches/paper/shapes.py itself --shape cylinders --tests 25 --training 55 --scale 300
-                                            # of 2,000 grains: one shape by itself, fewer pours
+    python benches/paper/shapes.py itself   # of 2,000 grains: cylinders by cylinders, 50 tests
 
 The first two are of 400 grains (`--medium`). All go on with the pours below `--out` (default:
 out/paper-medium and out/paper, where the experiment keeps them), and can be stopped and started

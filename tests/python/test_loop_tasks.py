@@ -34,6 +34,16 @@ def load(folder: Path, head: str, first: str, second: str) -> Task:
     return Task.load(folder / "loop.toml")
 
 
+def test_what_the_conditions_state_is_left_out_of_the_effects_that_nobody_names(
+    tmp_path: Path,
+) -> None:
+    known = ', "grains.count" = 100, "effects.tilt.x" = 0.01'
+    found = load(tmp_path, "", LOW + known, HIGH + known).library
+    others = load(tmp_path, "", LOW, HIGH).library
+    missing = [effect.name for effect in others if effect not in found]
+    assert missing == ["tilt.x", "count"]
+
+
 LOW, HIGH = '"start.height" = 0.03', '"start.height" = 0.1'
 
 

@@ -1,5 +1,5 @@
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -78,6 +78,7 @@ def test_frames_in_memory_are_what_their_files_are(pour, camera, tmp_path):
     counts = np.rint(stored.depth / 1e-4).astype(np.uint16)
     for depth, unit in ((stored.depth, None), (counts, 1e-4), ([counts, counts], 1e-4)):
         read = gc.Recording.from_depth(depth, **lens, unit=unit)
+        assert read.depth is not None
         np.testing.assert_allclose(read.depth, stored.depth, atol=1e-7)
         assert read.frames == np.ndim(depth) - 1
         found, expected = read.statistics(), stored.statistics()
@@ -109,7 +110,7 @@ def test_a_recording_of_which_half_is_hidden_is_doubtful_in_python_too(pour, tmp
         gc.calibrate_within(scene, prior, [half, half], out=tmp_path / "out")
     assert any("half.png: at" in str(each.message) for each in warned)
     with pytest.raises(TypeError, match=r"what Recording.open returns"):
-        gc.calibrate_within(scene, prior, ["half.png"], out=tmp_path / "out")
+        gc.calibrate_within(scene, prior, cast(Any, ["half.png"]), out=tmp_path / "out")
 
 
 def test_segmentation_options_are_honoured(pour, camera, tmp_path):

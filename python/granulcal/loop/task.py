@@ -415,9 +415,10 @@ def _by_each(
 def _default(scene: Scene, at: dict[str, float]) -> tuple[LibraryEffect, ...]:
     """The library where a task names no effects: without those that its scene cannot show.
 
-    Nor those on a number that its conditions, the first of which states `at`, do not have.
+    Nor those on a number that its conditions, the first of which states `at`, do not have, or those
+    that are a number which they state: what is known can be no finding.
     """
-    library = tuple(effect for effect in FUNNEL if not effect.shift or effect.path in at)
+    library = tuple(effect for effect in FUNNEL if effect.shift == (effect.path in at))
     try:
         require_image(scene, ("camera",))
     except ObservationError:
