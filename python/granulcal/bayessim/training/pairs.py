@@ -186,7 +186,7 @@ def require_same_prior(stated: Prior | None, given: Prior | None) -> None:
 
 def _is_first(rows: Array) -> NDArray[np.bool_]:
     """Returns which rows are the first of their numbers; NaN is like NaN."""
-    # Stable, so that of equal rows the first stays first; np.unique loses a signal in its comparison.
+    # Stable: of equal rows the first stays first. np.unique loses a signal in its comparison.
     order = np.lexsort(rows.T[::-1])
     before, after = rows[order[:-1]], rows[order[1:]]
     is_same = (before == after) | (np.isnan(before) & np.isnan(after))
