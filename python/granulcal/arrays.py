@@ -54,7 +54,7 @@ def read_arrays(path: Path, *names: str) -> dict[str, NDArray[Any]]:
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
     """Returns the array, into which nobody writes any more: it belongs to what handed it out."""
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array
 
 
