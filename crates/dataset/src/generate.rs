@@ -85,9 +85,7 @@ pub fn generate_with(
     out: &Path,
     watch: &mut dyn FnMut(&Progress) -> bool,
 ) -> Result<Summary, DatasetError> {
-    check(options)?;
-    let header = header_of(engine.as_ref(), scene, prior, options)?;
-    check_draws(engine.is_none(), scene, prior, options)?;
+    let header = accepted(engine.as_ref(), scene, prior, options)?;
     let threads = options.threads.min(most_threads());
     let room = |rows, chunk| Room::of_batch(scene, rows, threads, chunk);
     let (folder, remaining) = Folder::begin(out, header, options, &room)?;
@@ -107,35 +105,27 @@ pub fn look(
     options: &GenerateOptions,
     out: &Path,
 ) -> Result<Progress, DatasetError> {
-    check(options)?;
-    check_draws(true, scene, prior, options)?;
-    Folder::look(out, header_of(None, scene, prior, options)?, options)
+    Folder::look(out, accepted(None, scene, prior, options)?, options)
 }
 
-/// Refuses draws of a batch that cannot be poured: one that ends at a draw cannot go on with another prior.
-fn check_draws(
-    is_ours: bool,
-    scene: &granulcal_dem::Scene,
-    prior: &Prior,
-    options: &GenerateOptions,
-) -> Result<(), DatasetError> {
-    prior.check_draws(scene, options.seed, options.rows).map_err(DatasetError::Prior)?;
-    if is_ours { starts::check(scene, prior, options) } else { Ok(()) }
-}
-
-/// What the rows of a batch are of.
-fn header_of(
+/// What the rows of a batch are of, once it is known that all of them can be begun: a batch that ends at a draw cannot go
+/// on with another prior.
+fn accepted(
     engine: Option<&Engine>,
     scene: &granulcal_dem::Scene,
     prior: &Prior,
     options: &GenerateOptions,
 ) -> Result<Header, DatasetError> {
+    check(options)?;
     let mut header = Header::new(scene, prior, options.seed)?;
+    prior.check_draws(scene, options.seed, options.rows).map_err(DatasetError::Prior)?;
     if let Some(engine) = engine {
         header.version = engine.version();
         header.law = Some(FOREIGN_LAW);
         // It is not ours to count.
         header.arithmetic = FIRST_ARITHMETIC;
+    } else {
+        starts::check(scene, prior, options)?;
     }
     Ok(header)
 }

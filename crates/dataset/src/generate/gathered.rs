@@ -6,8 +6,7 @@ use std::path::Path;
 use super::chunk::{OpenChunk, Progress};
 use super::folder::Folder;
 use super::options::GenerateOptions;
-use super::{Remaining, check, check_draws};
-use crate::header::Header;
+use super::{Remaining, accepted};
 use crate::{DatasetError, Form, Room, files, manifest, table};
 use granulcal_scene::Prior;
 
@@ -35,9 +34,7 @@ impl GatheredBatch {
         options: &GenerateOptions,
         out: &Path,
     ) -> Result<Self, DatasetError> {
-        check(options)?;
-        let header = Header::new(scene, prior, options.seed)?;
-        check_draws(true, scene, prior, options)?;
+        let header = accepted(None, scene, prior, options)?;
         let room = |rows, chunk| Room::of_batch(scene, rows, 1, chunk);
         let (folder, remaining) = Folder::begin(out, header, options, &room)?;
         let Remaining { missing: lacking, open, progress } = remaining;
