@@ -88,7 +88,7 @@ pub fn generate_with(
     let header = accepted(engine.as_ref(), scene, prior, options)?;
     let threads = options.threads.min(most_threads());
     let room = |rows, chunk| Room::of_batch(scene, rows, threads, chunk);
-    let (folder, remaining) = Folder::begin(out, header, options, &room)?;
+    let (folder, remaining) = Folder::begin(out, &header, options, &room)?;
     let Remaining { missing, open, progress } = remaining;
     let queue = Mutex::new(Queue::new(missing, options, folder.chunk));
     let batch = Batch { rows: options.rows, folder: &folder, engine, chunks: open, progress };
@@ -105,7 +105,7 @@ pub fn look(
     options: &GenerateOptions,
     out: &Path,
 ) -> Result<Progress, DatasetError> {
-    Folder::look(out, accepted(None, scene, prior, options)?, options)
+    Folder::look(out, &accepted(None, scene, prior, options)?, options)
 }
 
 /// What the rows of a batch are of, once it is known that all of them can be begun: a batch that ends at a draw cannot go

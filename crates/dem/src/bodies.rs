@@ -207,7 +207,9 @@ impl Bodies {
         }
         let corners = self.corners.as_ref();
         let small = self.small;
-        let around = Around { solid: &solid, corners, walls, material, dt, small: &small };
+        let may_close = sweeps.closing * dt;
+        let around =
+            Around { solid: &solid, corners, walls, material, dt, may_close, small: &small };
         let (points, neighbours) = (std::mem::take(&mut self.points), &mut self.neighbours);
         let mut contacts = collide::contacts(&around, &moving, neighbours, points);
         let mut step = Step::default();
@@ -227,9 +229,10 @@ impl Bodies {
         self.recall(&mut contacts.points, &mut moving);
         let sorted = contacts.points.len();
         let mut known = 0;
+        contacts.corrected.clear();
         for round in 1..=ROUNDS {
-            let points = &mut contacts.points;
-            let settled = self.batches.solve(points, known, &mut moving, &around, sweeps);
+            let again = (known, &contacts.corrected[..]);
+            let settled = self.batches.solve(&contacts.points, again, &mut moving, &around, sweeps);
             step.sweeps += settled.sweeps;
             (step.residual, step.unconverged) = (settled.residual, settled.unconverged);
             known = contacts.points.len();
@@ -238,6 +241,7 @@ impl Bodies {
                 break;
             }
         }
+        self.batches.put_back(&mut contacts.points);
         let points = contacts.points;
         step.points = points.len();
         let at_walls = points[..sorted].iter().take_while(|point| point.j().is_none());

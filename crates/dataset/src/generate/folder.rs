@@ -21,6 +21,8 @@ pub(super) struct Folder {
     pub(super) chunk: u64,
     /// The rows that the folder says were asked for.
     asked: Option<u64>,
+    /// What is said if rows are missing of a batch of another arithmetic.
+    other_arithmetic: Option<DatasetError>,
     /// The system drops the lock with the file, also when the process is killed. None for who only looks.
     _lock: Option<File>,
 }
@@ -53,7 +55,7 @@ impl Folder {
     /// rows that are missing and the rows in a part.
     pub(super) fn begin(
         path: &Path,
-        header: Header,
+        header: &Header,
         options: &GenerateOptions,
         room: &dyn Fn(u64, u64) -> Room,
     ) -> Result<(Self, Remaining), DatasetError> {
@@ -62,8 +64,8 @@ impl Folder {
             let rows = rows_of_shard(options, options.chunk);
             room(rows, options.chunk).require(Some(path))?;
         }
-        let folder = Self::open(path, header, options)?;
-        let remaining = folder.remaining(options)?;
+        let mut folder = Self::open(path, header, options)?;
+        let remaining = folder.left(options)?;
         let Progress { total, resumed, .. } = remaining.progress;
         let left = total.saturating_sub(resumed);
         // What is complete needs none.
@@ -84,7 +86,7 @@ impl Folder {
     }
 
     /// Opens or creates the folder, refuses one that was made from something else.
-    fn open(path: &Path, header: Header, options: &GenerateOptions) -> Result<Self, DatasetError> {
+    fn open(path: &Path, header: &Header, options: &GenerateOptions) -> Result<Self, DatasetError> {
         if path.exists() && !path.is_dir() {
             return Err(DatasetError::content(path, "the output", "a file", "a folder"));
         }
@@ -96,37 +98,57 @@ impl Folder {
             let found = format!("{} parts of a data set", parts.len());
             return Err(DatasetError::content(path, "the output", found, "empty unless resumed"));
         }
-        let (chunk, asked) = match Manifest::read(path)? {
-            Some(manifest) => {
-                manifest.header.require_same(path, &header)?;
-                (manifest.chunk, manifest.rows)
-            }
+        let folder = match Manifest::read(path)? {
+            Some(manifest) => Self::there(path, manifest, header)?,
             None if parts.is_empty() => {
-                let (chunk, rows) = (options.chunk, Some(options.rows));
-                Manifest { header: header.clone(), chunk, rows }.write(path)?;
-                (chunk, rows)
+                let manifest = Manifest {
+                    header: header.clone(),
+                    chunk: options.chunk,
+                    rows: Some(options.rows),
+                };
+                manifest.write(path)?;
+                Self::there(path, manifest, header)?
             }
             None => {
                 let found = format!("{} parts without one", parts.len());
                 return Err(DatasetError::content(path, manifest::NAME, found, "present"));
             }
         };
-        Ok(Self { path: path.to_owned(), header, chunk, asked, _lock: Some(lock) })
+        Ok(Self { _lock: Some(lock), ..folder })
+    }
+
+    /// The folder of a manifest, refused if that was made from something else; another arithmetic does not matter to who
+    /// adds no row.
+    fn there(path: &Path, manifest: Manifest, header: &Header) -> Result<Self, DatasetError> {
+        let Manifest { header: found, chunk, rows: asked } = manifest;
+        let of_found = Header { arithmetic: found.arithmetic, ..header.clone() };
+        found.require_same(path, &of_found)?;
+        let other_arithmetic = found.require_same(path, header).err();
+        let path = path.to_owned();
+        Ok(Self { path, header: of_found, chunk, asked, other_arithmetic, _lock: None })
     }
 
     /// How far the batch of the folder is, which is left as it is, and may not be there yet.
     pub(super) fn look(
         path: &Path,
-        header: Header,
+        header: &Header,
         options: &GenerateOptions,
     ) -> Result<Progress, DatasetError> {
-        let Some(Manifest { header: found, chunk, rows: asked }) = Manifest::read(path)? else {
+        let Some(manifest) = Manifest::read(path)? else {
             let total = rows_of_shard(options, options.chunk);
             return Ok(Progress { total, ..Progress::default() });
         };
-        found.require_same(path, &header)?;
-        let folder = Self { path: path.to_owned(), header, chunk, asked, _lock: None };
-        Ok(folder.remaining(options)?.progress)
+        Ok(Self::there(path, manifest, header)?.left(options)?.progress)
+    }
+
+    /// What is left to do; refused if that is something and rows are there of another arithmetic.
+    fn left(&mut self, options: &GenerateOptions) -> Result<Remaining, DatasetError> {
+        let remaining = self.remaining(options)?;
+        let is_complete = remaining.progress.resumed >= remaining.progress.total;
+        match self.other_arithmetic.take() {
+            Some(error) if !is_complete => Err(error),
+            _ => Ok(remaining),
+        }
     }
 
     /// Reads and checks the parts that are there; what they lack is left to do. The rows of other chunks are not
@@ -230,5 +252,38 @@ fn lock(folder: &Path) -> Result<File, DatasetError> {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(DatasetError::Locked { path: folder.to_owned() }),
         Err(TryLockError::Error(source)) => Err(DatasetError::Io { action: "lock", path, source }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use granulcal_scene::{Prior, Scene};
+
+    use super::*;
+    use crate::{Dataset, generate};
+
+    #[test]
+    fn a_complete_batch_of_another_arithmetic_is_taken_as_it_is() {
+        let place = tempfile::tempdir().unwrap();
+        let (scene, prior) =
+            (Scene::funnel(0.12).with("grains.count", 8.0).unwrap(), Prior::default());
+        let options = GenerateOptions { rows: 3, threads: 1, ..GenerateOptions::default() };
+        generate(&scene, &prior, &options, place.path(), &mut |_| true).unwrap();
+        let made = Dataset::open(place.path()).unwrap();
+        // The same rows as those of a program with another arithmetic.
+        let mut other = made.header.clone();
+        other.arithmetic = 99;
+        let manifest = Manifest::read(place.path()).unwrap().unwrap();
+        Manifest { header: other.clone(), ..manifest }.write(place.path()).unwrap();
+        table::write(&manifest::part_path(place.path(), 0), &other, &made.rows).unwrap();
+
+        let taken = generate(&scene, &prior, &options, place.path(), &mut |_| true).unwrap();
+        assert_eq!((taken.progress.resumed, taken.progress.total), (3, 3));
+        assert_eq!(Dataset::open(place.path()).unwrap().header.arithmetic, 99);
+        let more = GenerateOptions { rows: 4, ..options };
+        let error = generate(&scene, &prior, &more, place.path(), &mut |_| true).unwrap_err();
+        let said = error.to_string();
+        assert!(said.contains("the arithmetic of the solver is 99, but 1 is given"), "{said}");
+        assert_eq!(Dataset::open(place.path()).unwrap().rows.len(), 3);
     }
 }

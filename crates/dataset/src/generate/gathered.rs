@@ -36,7 +36,7 @@ impl GatheredBatch {
     ) -> Result<Self, DatasetError> {
         let header = accepted(None, scene, prior, options)?;
         let room = |rows, chunk| Room::of_batch(scene, rows, 1, chunk);
-        let (folder, remaining) = Folder::begin(out, header, options, &room)?;
+        let (folder, remaining) = Folder::begin(out, &header, options, &room)?;
         let Remaining { missing: lacking, open, progress } = remaining;
         let is_complete = |chunk: &u64| lacking.get(chunk).is_some_and(Vec::is_empty);
         let chunks = options.rows.div_ceil(folder.chunk);

@@ -18,6 +18,8 @@ pub(super) struct Around<'a> {
     pub walls: &'a Walls,
     pub material: &'a Material,
     pub dt: f64,
+    /// By how much a point may close beyond its gap in a substep, as far as sweeps see to it `[m]`.
+    pub may_close: f64,
     pub small: &'a Small,
 }
 

@@ -15,27 +15,27 @@
 use nalgebra::Vector3;
 
 use super::meeting::{Asked, Meeting, Spot};
-use super::polygon::Polygon;
+use super::polygon::Corners;
 use super::pose::Pose;
 use crate::lanes::{LANES, Lanes, Reg, Reg3, Row, Width, each, widest};
 
 /// Gives, for each pair that may be nearer than its range, its number and where it meets.
-pub(super) fn meet(
+pub(super) fn meet<'p>(
     half: &Vector3<f64>,
-    poses: &[Pose],
+    pose: impl Fn(usize) -> &'p Pose,
     asked: &[Asked],
     mut found: impl FnMut(usize, &Meeting),
 ) {
-    let rows: Vec<_> = poses.iter().map(rows).collect();
     let mut meeting = Meeting::default();
     for (first, some) in (0..).step_by(LANES).zip(asked.chunks(LANES)) {
         // Lanes that are not in use repeat the first.
         let of = |lane: usize| some[if lane < some.len() { lane } else { 0 }];
-        let i = std::array::from_fn(|lane| of(lane).i as u32);
-        let j = std::array::from_fn(|lane| of(lane).j as u32);
-        let gaps = gaps(&rows, &i, &j, half);
-        for (lane, asked) in some.iter().enumerate() {
-            let boxes = Boxes::new(half, &poses[asked.i], &poses[asked.j]);
+        let a: [_; LANES] = std::array::from_fn(|lane| pose(of(lane).i));
+        let b: [_; LANES] = std::array::from_fn(|lane| pose(of(lane).j));
+        let gaps = gaps(&a.map(rows), &b.map(rows), half);
+        for lane in 0..some.len() {
+            let asked = &some[lane];
+            let boxes = Boxes::new(half, a[lane], b[lane]);
             if let Some(normal) = boxes.across(&gaps, lane, asked.range) {
                 meeting.normal = normal;
                 boxes.share(&normal, &mut meeting.spots);
@@ -59,9 +59,9 @@ struct Gaps {
 }
 
 widest! {
-    fn gaps<W>(rows: &[[Row; 3]], i: &[u32; LANES], j: &[u32; LANES], half: &Vector3<f64>) -> Gaps {
+    fn gaps<W>(a: &[[Row; 3]; LANES], b: &[[Row; 3]; LANES], half: &Vector3<f64>) -> Gaps {
         let h = [Reg::<W>::splat(half.x), Reg::splat(half.y), Reg::splat(half.z)];
-        let (a, b) = (gather::<W>(rows, i), gather::<W>(rows, j));
+        let (a, b) = (eight::<W>(a), eight::<W>(b));
         let offset = b.centre - a.centre;
         let mut gaps = Gaps {
             faces: [[Lanes::ZERO; 3]; 2],
@@ -115,6 +115,9 @@ widest! {
 /// The square of the sine between two edges that are parallel, at most.
 const PARALLEL: f64 = f64::EPSILON * f64::EPSILON;
 
+/// The numbers of the lanes.
+const LANE: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7];
+
 /// Eight poses in registers.
 struct Eight<W: Width> {
     axes: [Reg3<W>; 3],
@@ -122,8 +125,8 @@ struct Eight<W: Width> {
 }
 
 #[inline(always)]
-fn gather<W: Width>(rows: &[[Row; 3]], index: &[u32; LANES]) -> Eight<W> {
-    let column = |k: usize| W::columns(each(index, |body| W::load_row(&rows[body as usize][k])));
+fn eight<W: Width>(rows: &[[Row; 3]; LANES]) -> Eight<W> {
+    let column = |k: usize| W::columns(each(&LANE, |lane| W::load_row(&rows[lane as usize][k])));
     let ([ax, ay, az, x], [bx, by, bz, y], [cx, cy, cz, z]) = (column(0), column(1), column(2));
     let vector = |x, y, z| Reg3 { x: Reg(x), y: Reg(y), z: Reg(z) };
     Eight {
@@ -160,33 +163,41 @@ impl<'a> Boxes<'a> {
             return None;
         }
         let (of_a, of_b) = (self.by_faces(self.a, faces(0)), self.by_faces(self.b, faces(1)));
-        if of_a.0 > range || of_b.0 > range {
+        if of_a.gap() > range || of_b.gap() > range {
             return None;
         }
-        Some(if of_b.0 > of_a.0 && of_b.0 > edges {
-            of_b.1
-        } else if edges > of_a.0 {
+        Some(if of_b.gap() > of_a.gap() && of_b.gap() > edges {
+            self.along(self.b, &of_b)
+        } else if edges > of_a.gap() {
             let number = gaps.of_edges.0[lane] as usize;
             let along = self.a.axes.column(number % 3).cross(&self.b.axes.column(number / 3));
             self.towards(along.normalize())
         } else {
-            of_a.1
+            self.along(self.a, &of_a)
         })
     }
 
     /// The largest gap along the axes of a box, and its direction; across a corner or an edge if there are gaps along
     /// more than one.
-    fn by_faces(&self, of: &Pose, gaps: [f64; 3]) -> (f64, Vector3<f64>) {
-        let along = |k: usize| self.towards(of.axes.column(k).into_owned());
+    fn by_faces(&self, of: &Pose, gaps: [f64; 3]) -> ByFaces {
         let positive = gaps.iter().filter(|gap| **gap >= 0.0).count();
         if positive < 2 {
             let best = (1..3).fold(0, |best, k| if gaps[k] > gaps[best] { k } else { best });
-            return (gaps[best], along(best));
+            return ByFaces::Axis(gaps[best], best);
         }
+        let along = |k: usize| self.towards(of.axes.column(k).into_owned());
         let part = |k: usize| if gaps[k] >= 0.0 { gaps[k].max(f64::EPSILON) } else { 0.0 };
         let sum = part(0) * along(0) + part(1) * along(1) + part(2) * along(2);
         let along = sum.normalize();
-        (self.gap(&along), along)
+        ByFaces::Between(self.gap(&along), along)
+    }
+
+    /// The direction of what [`Self::by_faces`] has found of a box.
+    fn along(&self, of: &Pose, found: &ByFaces) -> Vector3<f64> {
+        match found {
+            ByFaces::Axis(_, k) => self.towards(of.axes.column(*k).into_owned()),
+            ByFaces::Between(_, along) => *along,
+        }
     }
 
     /// The gap along a unit direction.
@@ -219,18 +230,30 @@ impl<'a> Boxes<'a> {
         let middle = over(in_first(self.offset + out), self.half[near.axis]);
         let edge = |k: usize| over(in_first(self.half[k] * self.b.axes.column(k)), 0.0);
         let [p, q] = far.across.map(edge);
-        let corner = |s: f64, t: f64| -> [f64; 3] {
-            std::array::from_fn(|c| middle[c] + s * p[c] + t * q[c])
-        };
-        let corners = [corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)];
-        let shared = Polygon::of(corners).within(near.across.map(|k| self.half[k]));
-        for &[s, t, gap] in shared.corners() {
+        let shared = Corners::shared(middle, [p, q], near.across.map(|k| self.half[k]));
+        for &[s, t, gap] in shared.all() {
             let mut mark = Vector3::zeros();
             mark[near.axis] = near.side * self.half[near.axis];
             (mark[near.across[0]], mark[near.across[1]]) = (s, t);
             let on_a = self.a.axes * mark;
             let on_b = on_a + gap * normal - self.offset;
             spots.push(Spot { mark, on_a, on_b, gap });
+        }
+    }
+}
+
+/// The largest gap along the axes of a box.
+enum ByFaces {
+    /// Along one of them.
+    Axis(f64, usize),
+    /// Along a direction between those with a gap.
+    Between(f64, Vector3<f64>),
+}
+
+impl ByFaces {
+    fn gap(&self) -> f64 {
+        match self {
+            Self::Axis(gap, _) | Self::Between(gap, _) => *gap,
         }
     }
 }
@@ -305,7 +328,7 @@ mod tests {
             let [a, b] = &poses;
             let (their_normal, their_points) = theirs(half, a, b);
             let mut ours = None;
-            meet(&half, &poses, &[Asked { i: 0, j: 1, range: RANGE }], |_, found| {
+            meet(&half, |body| &poses[body], &[Asked { i: 0, j: 1, range: RANGE }], |_, found| {
                 ours = Some(found.clone());
             });
             let Some(ours) = ours else {
@@ -353,10 +376,10 @@ mod tests {
             let pairs = (0..12).flat_map(|i| (i + 1..12).map(move |j| (i, j)));
             let asked: Vec<_> = pairs.map(|(i, j)| Asked { i, j, range: RANGE }).collect();
             let mut together = Vec::new();
-            meet(&half, &poses, &asked, |number, found| together.push((number, found.clone())));
+            meet(&half, |body| &poses[body], &asked, |number, found| together.push((number, found.clone())));
             let mut alone = Vec::new();
             for (number, one) in asked.iter().enumerate() {
-                meet(&half, &poses, &[*one], |_, found| alone.push((number, found.clone())));
+                meet(&half, |body| &poses[body], &[*one], |_, found| alone.push((number, found.clone())));
             }
             prop_assert_eq!(format!("{together:?}"), format!("{alone:?}"));
         }

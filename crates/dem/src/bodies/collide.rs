@@ -25,6 +25,8 @@ pub(super) struct Contacts {
     pub clear_of_walls: Vec<f64>,
     /// The ways of the bodies of which the ends have been looked at; none at first.
     pub examined: Vec<Way>,
+    /// The numbers of points whose gaps were corrected by what was foreseen last.
+    pub corrected: Vec<usize>,
     /// In the order of their names, which depends on the places alone.
     pub points: Vec<Point>,
 }
@@ -38,10 +40,9 @@ pub(super) fn contacts(
     mut points: Vec<Point>,
 ) -> Contacts {
     points.clear();
-    let poses: Vec<_> = bodies.iter().map(|body| body.pose).collect();
     let motions: Vec<_> = bodies.iter().map(|body| Motion::of(body, around.solid.reach)).collect();
     let mut clear_of_walls = Vec::with_capacity(bodies.len());
-    for (i, pose) in poses.iter().enumerate() {
+    for (i, Moving { pose, .. }) in bodies.iter().enumerate() {
         let first = points.len();
         let range = around.range(&motions[i], None) + around.way_of_walls(&pose.centre);
         let is_near = at_walls(around, pose, i, (0.0, range), &mut points)
@@ -54,34 +55,39 @@ pub(super) fn contacts(
     for (number, pair) in pairs.iter_mut().enumerate() {
         let Pair { i, j, .. } = *pair;
         let range = around.range(&motions[i], Some(&motions[j]));
-        pair.clear = clearance(around.solid, &poses[i], &poses[j]);
+        pair.clear = clearance(around.solid, &bodies[i].pose, &bodies[j].pose);
         if pair.clear <= range {
             pair.clear = range;
             near.push((Asked { i, j, range }, number));
         }
     }
-    near.sort_unstable_by_key(|(asked, _)| (asked.i, asked.j));
     let (asked, numbers): (Vec<_>, Vec<_>) = near.into_iter().unzip();
-    meet(around, &poses, &asked, |number, meeting| {
-        pairs[numbers[number]].clear = f64::NEG_INFINITY;
-        meeting.points(around, &asked[number], |point| points.push(point));
-    });
-    Contacts { pairs, motions, clear_of_walls, examined: Vec::new(), points }
+    meet(
+        around,
+        |body| &bodies[body].pose,
+        &asked,
+        |number, meeting| {
+            pairs[numbers[number]].clear = f64::NEG_INFINITY;
+            meeting.points(around, &asked[number], |point| points.push(point));
+        },
+    );
+    let (examined, corrected) = (Vec::new(), Vec::new());
+    Contacts { pairs, motions, clear_of_walls, examined, corrected, points }
 }
 
 /// Gives, for each pair that may be as near as asked, its number and where it meets.
-pub(super) fn meet(
+pub(super) fn meet<'p>(
     around: &Around<'_>,
-    poses: &[Pose],
+    pose: impl Fn(usize) -> &'p Pose,
     asked: &[Asked],
     mut found: impl FnMut(usize, &Meeting),
 ) {
     if around.solid.is_box() {
-        return boxes::meet(&around.solid.half_extents, poses, asked, found);
+        return boxes::meet(&around.solid.half_extents, pose, asked, found);
     }
     let mut meeting = Meeting::default();
     for (number, &Asked { i, j, range }) in asked.iter().enumerate() {
-        if manifold(around, [&poses[i], &poses[j]], range, &mut meeting) {
+        if manifold(around, [pose(i), pose(j)], range, &mut meeting) {
             found(number, &meeting);
         }
     }

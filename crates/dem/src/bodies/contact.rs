@@ -126,9 +126,14 @@ impl Point {
 
     /// This point, found where its bodies will be at the end of the substep, as it is now: with the gap from which their
     /// velocities lead to the one that is foreseen.
-    pub fn foreseen(mut self, bodies: &[Moving], later: &[Pose], dt: f64) -> Self {
+    pub fn foreseen<'p>(
+        mut self,
+        bodies: &[Moving],
+        later: impl Fn(usize) -> &'p Pose,
+        dt: f64,
+    ) -> Self {
         let turned_back =
-            |body: usize, arm: &Vector3<f64>| bodies[body].pose.axes * later[body].seen(arm);
+            |body: usize, arm: &Vector3<f64>| bodies[body].pose.axes * later(body).seen(arm);
         self.arm = turned_back(self.i(), &self.arm);
         if let Other::Body { j, arm } = &mut self.other {
             *arm = turned_back(*j as usize, arm);

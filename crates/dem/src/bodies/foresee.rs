@@ -29,6 +29,7 @@ impl Contacts {
         sorted: usize,
     ) -> bool {
         let known = self.points.len();
+        self.corrected.clear();
         self.seek_farther(around, bodies, neighbours);
         let (reach, dt) = (around.solid.reach, around.dt);
         let ways: Vec<_> = bodies.iter().map(|body| Way::of(body, reach, dt)).collect();
@@ -39,26 +40,38 @@ impl Contacts {
         for (i, way) in ways.iter().enumerate() {
             let goes = way.length() + around.way_of_walls(&bodies[i].pose.centre);
             if is_other[i] && goes > least.max(self.clear_of_walls[i]) {
-                let pose = later.pose(i);
+                let pose = later.find(i);
                 at_walls(around, pose, i, (dt, 0.0), &mut new);
                 at_rims(around, pose, i, (dt, 0.0), &mut new);
             }
         }
         let mut asked = Vec::new();
         for &Pair { i, j, clear } in &self.pairs {
-            if (is_other[i] || is_other[j]) && ways[i].beside(&ways[j]) > least.max(clear) {
-                let (a, b) = (*later.pose(i), *later.pose(j));
-                if clearance(around.solid, &a, &b) <= 0.0 {
-                    asked.push(Asked { i, j, range: 0.0 });
+            let far = least.max(clear);
+            if (is_other[i] || is_other[j])
+                && ways[i].length() + ways[j].length() > far
+                && ways[i].beside(&ways[j]) > far
+            {
+                later.find(i);
+                later.find(j);
+                if clearance(around.solid, later.pose(i), later.pose(j)) <= -around.may_close {
+                    asked.push(Asked { i, j, range: -around.may_close });
                 }
             }
         }
-        meet(around, &later.poses, &asked, |number, meeting| {
-            meeting.points(around, &asked[number], |point| new.push(point));
-        });
+        meet(
+            around,
+            |body| later.pose(body),
+            &asked,
+            |number, meeting| {
+                meeting.points(around, &asked[number], |point| new.push(point));
+            },
+        );
+        // What is no deeper than sweeps leave a point is none yet.
+        new.retain(|point| point.gap <= -around.may_close);
         let (least, mut is_news) = (CORRECTED * around.solid.reach, false);
         for point in new {
-            let point = point.foreseen(bodies, &later.poses, around.dt);
+            let point = point.foreseen(bodies, |body| later.pose(body), around.dt);
             let first = self.points[..sorted].partition_point(|of| of.name() < point.name());
             let of_manifold = |number: &usize| self.points[*number].name() == point.name();
             let same = (first..sorted)
@@ -69,6 +82,7 @@ impl Contacts {
                 // Its bodies turn so far that it gets there sooner than its velocity says.
                 Some(number) if point.gap < self.points[number].gap - least => {
                     self.points[number].gap = point.gap;
+                    self.corrected.push(number);
                 }
                 Some(_) => continue,
                 None => self.points.push(point),
@@ -136,21 +150,29 @@ impl Contacts {
 struct Later<'a> {
     around: &'a Around<'a>,
     bodies: &'a [Moving],
-    /// Of those not asked for yet where they are now.
     poses: Vec<Pose>,
-    is_known: Vec<bool>,
+    /// The number of each body's pose among them.
+    places: Vec<u32>,
 }
+
+/// No pose is known.
+const UNKNOWN: u32 = u32::MAX;
 
 impl<'a> Later<'a> {
     fn new(around: &'a Around<'a>, bodies: &'a [Moving]) -> Self {
-        let poses = bodies.iter().map(|body| body.pose).collect();
-        Self { around, bodies, poses, is_known: vec![false; bodies.len()] }
+        Self { around, bodies, poses: Vec::new(), places: vec![UNKNOWN; bodies.len()] }
     }
 
-    fn pose(&mut self, body: usize) -> &Pose {
-        if !std::mem::replace(&mut self.is_known[body], true) {
-            self.poses[body] = self.bodies[body].foreseen(self.around.dt);
+    fn find(&mut self, body: usize) -> &Pose {
+        if self.places[body] == UNKNOWN {
+            self.places[body] = self.poses.len() as u32;
+            self.poses.push(self.bodies[body].foreseen(self.around.dt));
         }
-        &self.poses[body]
+        self.pose(body)
+    }
+
+    /// That of a body for which it has been found.
+    fn pose(&self, body: usize) -> &Pose {
+        &self.poses[self.places[body] as usize]
     }
 }

@@ -82,12 +82,10 @@ pub(super) fn resolve(
 
 /// Consecutive points of one pair, or of one body and one surface.
 fn manifolds(points: &[Point]) -> Vec<Range<usize>> {
-    let mut all: Vec<Range<usize>> = Vec::new();
-    for (number, point) in points.iter().enumerate() {
-        match all.last_mut() {
-            Some(last) if points[last.start].name() == point.name() => last.end = number + 1,
-            _ => all.push(number..number + 1),
-        }
+    let starts = (0..points.len()).filter(|&k| k == 0 || points[k - 1].name() != points[k].name());
+    let mut all: Vec<_> = starts.map(|start| start..points.len()).collect();
+    for number in 1..all.len() {
+        all[number - 1].end = all[number].start;
     }
     all
 }
@@ -98,8 +96,11 @@ fn first_touch(group: &[Point], bodies: &[Moving], dt: f64, small: &Small) -> Op
     let since = group[0].last_hit(bodies);
     let of = |point: &Point| {
         let closing = -point.normal.dot(&point.velocity(bodies));
+        if point.restitution <= 0.0 || closing <= small.impact_speed {
+            return None;
+        }
         let time = (point.gap_of_last_motion(bodies) / closing).max(since);
-        (point.restitution > 0.0 && closing > small.impact_speed && time < dt).then_some(time)
+        (time < dt).then_some(time)
     };
     group.iter().filter_map(of).min_by(f64::total_cmp)
 }

@@ -9,11 +9,15 @@ use super::motion::Motion;
 /// Pairs are sought so much farther than a body goes, for the impacts that make it faster, in its reach `[-]`.
 pub(super) const SLACK: f64 = 0.1;
 
-/// They are known for so much farther, and found anew when bodies may have gone as far, in their reach `[-]`.
-const SKIN: f64 = 0.5;
+/// They are known for as much farther as lets every body go so far, in its reach `[-]`, and for so many substeps as fast as
+/// it was when they were found.
+const SKIN: f64 = 0.125;
+const AHEAD: f64 = 6.0;
 
-/// Cells along an axis at most.
+/// Cells along an axis at most, and how many of them are left free at its ends: what would look for pairs farther than
+/// these looks at all bodies.
 const MOST_CELLS: u64 = 1 << 21;
+const MARGIN: u64 = 8;
 
 /// Two bodies whose balls may meet in a substep.
 #[derive(Clone, Copy, Debug)]
@@ -29,15 +33,16 @@ pub(super) struct Pair {
 pub(super) struct Neighbours {
     /// Where the bodies were when they were sought `[m]`.
     centres: Vec<Vector3<f64>>,
-    /// All whose centres were nearer than this are known `[m]`.
-    within: f64,
+    /// How far each may go from there, to the end of a substep, for its pairs to be known `[m]`.
+    allowed: Vec<f64>,
+    /// In order, the lower number first.
     pairs: Vec<(u32, u32)>,
     /// Which of them were given in this substep.
     is_given: Vec<bool>,
 }
 
 impl Neighbours {
-    /// Pairs whose balls may meet, each once: which depends on the places and motions alone, their order does not.
+    /// Pairs whose balls may meet, each once and in order: they depend on the places and motions alone.
     pub fn near(
         &mut self,
         around: &Around<'_>,
@@ -61,10 +66,9 @@ impl Neighbours {
     ) {
         let reach = around.solid.reach;
         let balls: Vec<_> = bodies.iter().zip(motions).map(Ball::of).collect();
-        let fastest = balls.iter().map(|ball| ball.fastest).fold(0.0, f64::max);
         let apart = 2.0 * (1.0 + SLACK) * reach;
         let base = apart + around.least();
-        if self.seek(&balls, base + 2.0 * around.dt * fastest, SKIN * reach) {
+        if self.seek(&balls, base, SKIN * reach, around.dt) {
             self.mark(given);
         }
         for (&(i, j), is_given) in self.pairs.iter().zip(&mut self.is_given) {
@@ -95,18 +99,25 @@ impl Neighbours {
         self.is_given = is_given.collect();
     }
 
-    /// Finds the pairs anew unless all that are nearer than `width` are known; returns whether it has.
-    fn seek(&mut self, balls: &[Ball], width: f64, skin: f64) -> bool {
-        let gone = |(ball, centre): (&Ball, &Vector3<f64>)| (ball.centre - centre).norm_squared();
-        let farthest = balls.iter().zip(&self.centres).map(gone).fold(0.0, f64::max).sqrt();
-        if self.centres.len() == balls.len() && width + 2.0 * farthest <= self.within {
+    /// Finds the pairs anew unless all are known that are nearer than `base` and the ways of their bodies in a substep;
+    /// returns whether it has.
+    fn seek(&mut self, balls: &[Ball], base: f64, skin: f64, dt: f64) -> bool {
+        let is_within = |((ball, centre), allowed): ((&Ball, &Vector3<f64>), &f64)| {
+            (ball.centre - centre).norm() + dt * ball.fastest <= *allowed
+        };
+        if self.centres.len() == balls.len()
+            && balls.iter().zip(&self.centres).zip(&self.allowed).all(is_within)
+        {
             return false;
         }
-        self.within = width + skin;
         self.centres.clear();
         self.centres.extend(balls.iter().map(|ball| ball.centre));
+        self.allowed.clear();
+        self.allowed.extend(balls.iter().map(|ball| skin + AHEAD * dt * ball.fastest));
         self.pairs.clear();
-        pairs_within(&self.centres, self.within, |i, j| self.pairs.push((i, j)));
+        let slow = base + 4.0 * skin;
+        pairs_within(&self.centres, &self.allowed, base, slow, |i, j| self.pairs.push((i, j)));
+        self.pairs.sort_unstable();
         true
     }
 }
@@ -125,35 +136,67 @@ impl Ball {
     }
 }
 
-/// Gives each pair of places, the lower number first, that are no farther than `width` from each other. Cells are as wide,
-/// and are sorted: a row of them along z is one range.
-fn pairs_within(centres: &[Vector3<f64>], width: f64, mut found: impl FnMut(u32, u32)) {
+/// Gives each pair of places, the lower number first, that are no farther from each other than `base` and what both are
+/// allowed. Cells are as wide as `slow`, in which all are found of those that are allowed little; and are sorted: a row of
+/// them along z is one range.
+fn pairs_within(
+    centres: &[Vector3<f64>],
+    allowed: &[f64],
+    base: f64,
+    slow: f64,
+    mut found: impl FnMut(u32, u32),
+) {
     let low = centres.iter().fold(Vector3::repeat(f64::MAX), |low, centre| low.inf(centre));
     // Far beyond any scene all are of one cell, whose neighbours still have numbers.
+    let place_of = |centre: &Vector3<f64>| {
+        <[f64; 3]>::from((centre - low) / slow)
+            .map(|c| (c as u64).min(MOST_CELLS - 2 * MARGIN) + MARGIN)
+    };
     let cell_of = |centre: &Vector3<f64>| {
-        let [x, y, z] =
-            <[f64; 3]>::from((centre - low) / width).map(|c| (c as u64).min(MOST_CELLS - 3) + 1);
+        let [x, y, z] = place_of(centre);
         cell(x, y, z)
     };
     let mut cells: Vec<_> = centres.iter().map(cell_of).zip(0_u32..).collect();
     cells.sort_unstable();
-    let sorted: Vec<_> = cells.iter().map(|&(_, i)| centres[i as usize]).collect();
+    let sorted: Vec<_> =
+        cells.iter().map(|&(_, i)| (centres[i as usize], allowed[i as usize])).collect();
+    let is_slow = |allowed: f64| base + 2.0 * allowed <= slow;
     for (at, &(of_i, i)) in cells.iter().enumerate() {
-        let mut look = |from: usize, last: u64| {
+        let (centre, mine) = sorted[at];
+        let mut look = |from: usize, last: u64, is_mine: &dyn Fn(u32, f64) -> bool| {
             let ahead = cells[from..].iter().zip(&sorted[from..]);
-            for (&(_, j), centre) in ahead.take_while(|(slot, _)| slot.0 <= last) {
-                if (centre - sorted[at]).norm_squared() <= width * width {
+            for (&(_, j), (other, theirs)) in ahead.take_while(|(slot, _)| slot.0 <= last) {
+                let within = base + mine + theirs;
+                if (other - centre).norm_squared() <= within * within && is_mine(j, *theirs) {
                     found(i.min(j), i.max(j));
                 }
             }
         };
-        // What comes after it in the order: its own row, and those ahead.
-        look(at + 1, of_i + 1);
-        let (along_y, along_x) = (cell(0, 1, 0), cell(1, 0, 0));
-        for row in
-            [of_i + along_y, of_i + along_x - along_y, of_i + along_x, of_i + along_x + along_y]
-        {
-            look(cells.partition_point(|slot| slot.0 < row - 1), row + 1);
+        if is_slow(mine) {
+            let both = |_, theirs| is_slow(theirs);
+            // What comes after it in the order: its own row, and those ahead.
+            look(at + 1, of_i + 1, &both);
+            let (along_y, along_x) = (cell(0, 1, 0), cell(1, 0, 0));
+            for row in
+                [of_i + along_y, of_i + along_x - along_y, of_i + along_x, of_i + along_x + along_y]
+            {
+                look(cells.partition_point(|slot| slot.0 < row - 1), row + 1, &both);
+            }
+        } else {
+            // Of two that are not slow the one that is allowed more finds the other.
+            let more = |j: u32, theirs: f64| (theirs, j) < (mine, i);
+            let cells_away = (base + 2.0 * mine) / slow;
+            if cells_away >= MARGIN as f64 {
+                look(0, u64::MAX, &more);
+                continue;
+            }
+            let (away, [x, y, z]) = (cells_away as u64 + 1, place_of(&centre));
+            for x in x - away..=x + away {
+                for y in y - away..=y + away {
+                    let (first, last) = (cell(x, y, z - away), cell(x, y, z + away));
+                    look(cells.partition_point(|slot| slot.0 < first), last, &more);
+                }
+            }
         }
     }
 }

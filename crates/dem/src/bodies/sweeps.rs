@@ -65,19 +65,27 @@ impl Batches {
     }
 
     /// Solves points that know their impulse, with the bias of each, and gives the bodies the velocities that they come
-    /// to. If those before `known` were solved last, and their bodies have not been touched since, they are taken up
-    /// again as they were but for their bias.
+    /// to. If those before a number are known, as they were solved last, and their bodies have not been touched since,
+    /// they are taken up again as they were but for the bias of those that are corrected.
     pub fn solve(
         &mut self,
-        points: &mut [Point],
-        known: usize,
+        points: &[Point],
+        again: (usize, &[usize]),
         moving: &mut [Moving],
         around: &Around<'_>,
         rule: Sweeps,
     ) -> Settled {
         match self {
-            Self::Round(batches) => batches.solve(points, known, moving, around, rule),
-            Self::Other(batches) => batches.solve(points, known, moving, around, rule),
+            Self::Round(batches) => batches.solve(points, again, moving, around, rule),
+            Self::Other(batches) => batches.solve(points, again, moving, around, rule),
+        }
+    }
+
+    /// Gives the points the impulses that they have come to.
+    pub fn put_back(&self, points: &mut [Point]) {
+        match self {
+            Self::Round(batches) => batches.put_back(points),
+            Self::Other(batches) => batches.put_back(points),
         }
     }
 }
@@ -114,8 +122,8 @@ impl<L> Default for BatchesOf<L> {
 impl<L: Lever> BatchesOf<L> {
     fn solve(
         &mut self,
-        points: &mut [Point],
-        known: usize,
+        points: &[Point],
+        (known, corrected): (usize, &[usize]),
         moving: &mut [Moving],
         around: &Around<'_>,
         rule: Sweeps,
@@ -123,13 +131,14 @@ impl<L: Lever> BatchesOf<L> {
         if known == 0 {
             self.begin(moving, around.solid);
         }
-        for (&(batch, lane), point) in self.places.iter().zip(points.iter()) {
-            self.all[batch as usize]
-                .aim(lane as usize, point.bias(moving, around.dt, around.small));
+        for &number in corrected {
+            let (batch, lane) = self.places[number];
+            let bias = points[number].bias(moving, around.dt, around.small);
+            self.all[batch as usize].aim(lane as usize, bias);
         }
         self.add(&points[known..], moving, around);
         let settled = self.settle(rule);
-        self.put_back(points, moving);
+        self.give_back(moving);
         settled
     }
 
@@ -202,11 +211,15 @@ impl<L: Lever> BatchesOf<L> {
         settled
     }
 
-    /// Hands impulses and velocities back.
-    fn put_back(&self, points: &mut [Point], moving: &mut [Moving]) {
+    /// Hands the impulses to the points.
+    fn put_back(&self, points: &mut [Point]) {
         for (&(batch, lane), point) in self.places.iter().zip(points) {
             point.impulse = self.all[batch as usize].impulse(lane as usize);
         }
+    }
+
+    /// Hands the velocities to the bodies.
+    fn give_back(&self, moving: &mut [Moving]) {
         for ((body, solved), frame) in moving.iter_mut().zip(&self.bodies).zip(&self.frames) {
             body.velocity = solved.velocity.vector();
             body.omega = frame * solved.spin.vector();

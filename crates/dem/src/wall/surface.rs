@@ -145,6 +145,12 @@ impl Frustum {
     }
 
     fn leads_round(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
+        // A way that is shorter than it is to either end crosses the shell between them.
+        let (way, length) = ((to - from).norm(), self.generator.norm());
+        let along = self.seen(from).0.dot(&self.generator) / length;
+        if way <= along && along <= length - way {
+            return None;
+        }
         let is_outside = |x: &Vector3<f64>| self.generator.perp(&self.seen(x).0) > 0.0;
         let begin = is_outside(from);
         if is_outside(to) == begin {
