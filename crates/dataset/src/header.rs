@@ -48,7 +48,7 @@ impl Header {
             scene: scene.clone(),
             prior: prior.clone(),
             version: VERSION.to_owned(),
-            law: Some(law_of(scene)),
+            law: Some(law_of_draws(scene, prior)),
             arithmetic: arithmetic(scene),
             seed,
             scene_toml: scene.to_toml().map_err(DatasetError::refused)?,
@@ -63,7 +63,7 @@ impl Header {
 
     /// What a user of the rows must know of the law that they follow, unless it is today's or another simulator's.
     pub fn other_law(&self) -> Option<String> {
-        let today = law_of(&self.scene);
+        let today = law_of_draws(&self.scene, &self.prior);
         match self.law {
             Some(law) if law == today || law == FOREIGN_LAW => None,
             law => Some(format!(
@@ -142,6 +142,14 @@ impl Header {
     }
 }
 
+/// The number of the law that pours of a scene follow with the effects that a prior draws.
+fn law_of_draws(scene: &Scene, prior: &Prior) -> u32 {
+    let draws = prior.names().into_iter().zip(prior.sample(0, 0));
+    let effects = draws.filter(|(path, _)| path.starts_with("effects."));
+    let with = |scene: Scene, (path, value): (&str, f64)| scene.with(path, value).unwrap_or(scene);
+    law_of(&effects.fold(scene.clone(), with))
+}
+
 fn law_text(law: Option<u32>) -> String {
     match law {
         None => "one of before laws had numbers".to_owned(),
@@ -160,6 +168,23 @@ mod tests {
     use granulcal_dem::LAW;
 
     use super::*;
+
+    #[test]
+    fn the_law_is_that_of_the_drawn_effects() {
+        let scene = Scene::drop(0.1);
+        let law = |prior: &str| {
+            let prior = Prior::from_toml(prior).unwrap();
+            Header::new(&scene, &prior, 1).unwrap().law
+        };
+        let parameter = |path: &str, high: f64| {
+            let numbers = format!("distribution = \"uniform\"\nlow = 0.0\nhigh = {high}\n");
+            format!("[[parameter]]\npath = \"{path}\"\n{numbers}")
+        };
+        let friction = parameter("material.sliding_friction", 1.0);
+        assert_eq!(law(&friction), Some(LAW));
+        let sizes = parameter("effects.polydispersity.cv", 0.2);
+        assert_eq!(law(&format!("{friction}{sizes}")), Some(5));
+    }
 
     #[test]
     fn the_first_difference_is_named() {

@@ -1,11 +1,14 @@
 //! The grains of a scene at time zero.
 
-use granulcal_scene::Scene;
+use granulcal_scene::{Scene, Start};
 
 use crate::clumps::Clumps;
 use crate::lanes::Row;
+use crate::law::is_parted;
 use crate::particles::Particles;
+use crate::parting::part;
 use crate::period::Period;
+use crate::wall::Walls;
 
 /// The grains where they start, as large and as heavy as the scene says: the spheres of `clumps` if they are not round.
 /// A bed's come after them, an intruder is the last.
@@ -22,6 +25,9 @@ pub(crate) fn particles(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Pa
         for ((sphere, inverse), own) in spheres.iter_mut().zip(&mut inverse_mass).zip(radii) {
             sphere.0[3] = own;
             *inverse = (radius / own).powi(3);
+        }
+        if is_parted(scene) {
+            part(&mut spheres, &Walls::of(scene), matches!(scene.start, Start::Ball { .. }));
         }
     }
     if let Some(bed) = &scene.bed {

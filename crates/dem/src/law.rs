@@ -22,8 +22,20 @@ const LAW_OF_SMALL: u32 = 3;
 /// with the grains of every start.
 const LAW_ACROSS_GAPS: u32 = 4;
 
+/// The number of the law of unequal grains that start where equal ones would just fit, of whatever size and effects: they
+/// are parted first.
+const LAW_OF_PARTED: u32 = 5;
+
+/// Whether grains that overlap where a scene starts them are parted before they are let go.
+pub(crate) fn is_parted(scene: &Scene) -> bool {
+    scene.starts_crowded() && !scene.effects.clump.is_on()
+}
+
 /// Number of the law that pours of a scene follow.
 pub fn law_of(scene: &Scene) -> u32 {
+    if is_parted(scene) {
+        return LAW_OF_PARTED;
+    }
     let Effects { adhesion, capillary, lubrication, fluid, funnel, .. } = &scene.effects;
     let is_between = fluid.is_on() && fluid.crowding > 0.0 && fluid.crowding < 1.0;
     let is_moved = funnel.is_on() && !matches!(scene.start, Start::Grid { .. });
@@ -208,6 +220,14 @@ mod tests {
         sand.effects.adhesion.bond = 1.0;
         assert_eq!(law_of(&sand), LAW_ACROSS_GAPS);
         // At the substep of large grains nothing below 12 mm/s is an impact.
+        let mut unequal = Scene::drop(0.1);
+        assert_eq!(law_of(&unequal), LAW);
+        unequal.effects.polydispersity.cv = 0.1;
+        assert_eq!(law_of(&unequal), LAW_OF_PARTED);
+        // The lattice of the funnel is two diameters wide.
+        let mut poured = Scene::funnel(0.12);
+        poured.effects.polydispersity.cv = 0.3;
+        assert_eq!(law_of(&poured), LAW);
         sand.grains.diameter = 1e-5;
         assert!((Small::of(&sand).impact_speed - 2.5 * 9.81 / 2000.0).abs() < 1e-12);
     }

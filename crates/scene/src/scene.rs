@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::bed::Bed;
 use crate::camera::CameraSpec;
 use crate::check::{finite, positive};
-use crate::effects::Effects;
+use crate::effects::{Effect as _, Effects};
 use crate::end::EndRule;
 use crate::error::SceneError;
 use crate::grains::Grains;
@@ -197,6 +197,12 @@ impl Scene {
     /// Diameter of the widest grain that the scene can have `[m]`.
     fn widest_grain(&self) -> f64 {
         self.effects.polydispersity.widest(self.held_grains().diameter)
+    }
+
+    /// Whether grains of different size may overlap where they start: on a lattice that is not as wide as the widest.
+    pub fn starts_crowded(&self) -> bool {
+        let closest = self.start.closest(&self.held_grains());
+        self.effects.polydispersity.is_on() && closest.is_some_and(|d| d < self.widest_grain())
     }
 
     /// Centres of the grains at time zero `[m]`, one each.

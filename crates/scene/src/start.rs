@@ -122,6 +122,20 @@ impl Start {
         Ok(())
     }
 
+    /// How near two centres of a lattice may be `[m]`; none of listed ones.
+    pub(crate) fn closest(&self, grains: &Grains) -> Option<f64> {
+        let (spacing, jitter) = match self {
+            &Self::Grid { spacing, jitter, .. } | &Self::Cylinder { spacing, jitter, .. } => {
+                (spacing, jitter)
+            }
+            &Self::Ball { solid_fraction, jitter, .. } => {
+                (lattice_spacing(grains.diameter, solid_fraction), jitter)
+            }
+            Self::Positions { .. } => return None,
+        };
+        Some(spacing - 2.0 * jitter * 3f64.sqrt())
+    }
+
     /// Centres of the grains `[m]`, one each. `grains` are the balls that hold them, `pose` is where the funnel hangs
     /// beside its place.
     pub(crate) fn positions(

@@ -67,7 +67,7 @@ EFFECTS: tuple[LibraryEffect, ...] = tuple(
 )
 """What sand may have that a ball of dry grains on their own material has not.
 
-Not polydispersity: the ball begins as a lattice in which unequal grains overlap.
+Not polydispersity: when this was registered unequal grains began in each other (law 5 parts them).
 """
 
 

@@ -27,7 +27,7 @@ GROUPS = {
 EFFECTS: tuple[LibraryEffect, ...] = by_name(["cohesion.dry", "drag", "tilt.x", "camera.scale"])
 """What sand may have that dry balls in a level tray have not; few, for a pour takes ten seconds.
 
-Not polydispersity: bed and ball begin as lattices in which unequal grains overlap.
+Not polydispersity: a bed is of equal grains, and unequal ones of a ball began in each other.
 """
 
 
