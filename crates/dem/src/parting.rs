@@ -2,7 +2,7 @@
 //!
 //! While any two overlap, each pair that does is moved apart along the line between its centres, either grain by half of
 //! it, in the order of their numbers (Gauss and Seidel's rounds of position-based dynamics; Müller et al. 2007), and what
-//! is in a wall is moved out of it: docs/theory/contact.md, starts.
+//! is in a wall is moved out of it: docs/theory/effects.md, polydispersity.
 
 use nalgebra::Vector3;
 
@@ -16,7 +16,7 @@ const FARTHER: f64 = 1e-3;
 /// Pairs are known so much farther than they touch, in the largest radius, and found anew when grains may have gone so
 /// far `[-]`.
 const SKIN: f64 = 0.4;
-/// Rounds at most; some hundred part what a lattice of the share .6 holds at the largest spread that is taken.
+/// Rounds at most: what a closed container has no room for is left to the pour.
 const ROUNDS: usize = 10_000;
 
 /// Parts spheres that overlap each other or a wall. Those that hang in the air keep the height of their lowest point.
