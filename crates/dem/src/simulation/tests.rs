@@ -223,3 +223,15 @@ fn a_state_that_nobody_has_written_is_refused() {
         assert!(error.to_string().contains(what), "{number}: {error}");
     }
 }
+
+/// Pressed into each other they would fly apart: of a ball of these .5 radii and 8 % of energy.
+#[test]
+fn unequal_grains_start_apart_and_gain_nothing() {
+    let mut scene = Scene::drop(0.02);
+    scene.grains.count = 200;
+    scene.effects.polydispersity.cv = 0.2;
+    let pour = Simulation::new(&scene, 1).unwrap().run();
+    let health = pour.health;
+    assert!(health.worst_penetration < 0.1, "{health:?}");
+    assert!(health.energy_created < 1e-6, "{health:?}");
+}
