@@ -76,3 +76,32 @@ pub(crate) fn pairs_within(
 fn cell(x: u64, y: u64, z: u64) -> u64 {
     (x * MOST_CELLS + y) * MOST_CELLS + z
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Each pair once that is as near as it must be, whether its bodies are allowed little, much or very much.
+        #[test]
+        fn all_pairs_are_found_once(
+            centres in prop::collection::vec(prop::array::uniform3(-4.0..4.0_f64), 1..60),
+            allowed in prop::collection::vec(prop_oneof![0.0..0.2_f64, 0.2..2.0_f64, Just(0.5), Just(30.0)], 60),
+            base in 0.1..1.0_f64,
+        ) {
+            let centres: Vec<Vector3<f64>> = centres.into_iter().map(Vector3::from).collect();
+            let mut found = Vec::new();
+            pairs_within(&centres, &allowed[..centres.len()], base, base + 0.4, |i, j| found.push((i, j)));
+            found.sort_unstable();
+            let is_near = |i: usize, j: usize| {
+                let within = base + allowed[i] + allowed[j];
+                (centres[i] - centres[j]).norm_squared() <= within * within
+            };
+            let pairs = (0..centres.len()).flat_map(|i| (i + 1..centres.len()).map(move |j| (i, j)));
+            let near = pairs.filter(|&(i, j)| is_near(i, j)).map(|(i, j)| (i as u32, j as u32));
+            // Sums in another order may round otherwise at the very edge, which no drawn pair is at.
+            prop_assert_eq!(found, near.collect::<Vec<_>>());
+        }
+    }
+}
