@@ -29,8 +29,10 @@ use super::near::{self, Meeting, Near};
 use crate::law::INVERSE_INERTIA;
 use crate::particles::Particles;
 
-/// Halvings of the interval in which a speed is looked for: to its last bits.
-const HALVINGS: usize = 50;
+/// Newton's steps to a speed at most; a few do.
+const STEPS: usize = 50;
+/// Part of a speed by which the last of Newton's steps may change it: its square is what is left `[-]`.
+const CLOSE: f64 = 1e-9;
 
 /// The film of a scene.
 #[derive(Clone, Debug)]
@@ -117,21 +119,45 @@ impl Film {
         meeting.push(particles, near, &impulse)
     }
 
-    /// The speed v' that is left of an opening speed `v`, of C `c` `[m/s]`.
+    /// The speed v' that is left of an opening speed `v`, of C `c` `[m/s]`: the root of
+    ///
+    /// ```text
+    /// f(v') = v' - v + C (Phi(h + v' dt) - Phi(h))
+    /// ```
+    ///
+    /// which grows with v' and bends downwards as long as the way ends at a gap, so that Newton's steps come to the root
+    /// from below, once they are there, and do not pass it.
     fn slowed(&self, c: f64, gap: f64, v: f64, dt: f64) -> f64 {
-        let from = gap.max(0.0);
-        let left = |to: f64| v - c * (self.phi(to.clamp(0.0, self.range)) - self.phi(from));
-        // The root of v' = left(gap + v' dt), between a standstill and v; what is left falls as the way grows.
-        let (mut still, mut moving) = (0.0, v);
-        let lacks = |speed: f64| (left(gap + speed * dt) - speed) * v.signum();
-        if lacks(moving) >= 0.0 {
-            return moving;
+        let start = self.phi(gap.max(0.0));
+        // The way ends in the contact, out of the film's reach, or where the force is no longer larger.
+        let touching = v + c * (start - self.phi(0.0));
+        if gap + touching * dt <= 0.0 {
+            return touching;
         }
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (still + moving);
-            if lacks(middle) >= 0.0 { still = middle } else { moving = middle }
+        let free = v + c * (start - self.phi(self.range));
+        if gap + free * dt >= self.range {
+            return free;
         }
-        still
+        let steepest = c * dt / self.roughness;
+        let near = (v + c * (start + 1.0 - gap / self.roughness)) / (1.0 + steepest);
+        if gap + near * dt < self.roughness {
+            return near;
+        }
+        let least = (self.roughness - gap) / dt;
+        let grown = |way: f64| {
+            if gap < self.roughness { self.phi(gap + way) - start } else { (way / gap).ln_1p() }
+        };
+        let mut speed = least.max(0.0);
+        for _ in 0..STEPS {
+            let off = speed - v + c * grown(speed * dt);
+            let next = (speed - off / (1.0 + c * dt / (gap + speed * dt))).max(least);
+            let is_there = (next - speed).abs() <= CLOSE * next.abs();
+            speed = next;
+            if is_there {
+                break;
+            }
+        }
+        speed
     }
 
     /// The integral of 1 / max(h, h_0) from h_0 to a gap `[-]`.
@@ -183,7 +209,28 @@ fn shear_over_viscosity(radius: f64, other: Option<f64>, gap: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        /// Whatever the film, the gap and the way: what is left of the speed is what the way took from it.
+        #[test]
+        fn the_speed_that_is_left_is_that_of_its_way(
+            strength in -9f64..3.0, gap in -1e-4f64..6e-4, v in -2f64..2.0, dt in 1e-5f64..1e-3,
+        ) {
+            let film = Film { strength: 0.0, shear: 0.0, roughness: 1e-6, range: 6e-4 };
+            let c = 10f64.powf(strength);
+            let left = film.slowed(c, gap, v, dt);
+            let end = |speed: f64| film.phi((gap + speed * dt).clamp(0.0, film.range));
+            let of_way = |speed: f64| v - c * (end(speed) - film.phi(gap.max(0.0)));
+            prop_assert!(left * v >= 0.0 && left.abs() <= v.abs(), "{left} of {v}");
+            // A little slower, more would be left; a little faster, less.
+            let (slower, faster) = (left * (1.0 - 1e-7), left * (1.0 + 1e-7));
+            prop_assert!((of_way(slower) - slower) * v.signum() >= -1e-15 * v.abs());
+            prop_assert!((of_way(faster) - faster) * v.signum() <= 1e-15 * v.abs());
+        }
+    }
 
     #[test]
     fn the_force_is_that_of_both_spheres_and_of_a_wall() {
