@@ -53,6 +53,10 @@ impl Rigid {
 pub(crate) struct Clumps {
     shape: ClumpShape,
     bodies: Vec<Rigid>,
+    /// Of each sphere, from its clump's centre `[m]`.
+    arms: Vec<Vector3<f64>>,
+    /// Inverse of each clump's tensor of inertia in the scene's axes `[1/m^2]`.
+    inverse_inertia: Vec<Matrix3<f64>>,
 }
 
 /// What of the clumps changes.
@@ -73,7 +77,20 @@ impl Clumps {
             momentum: [0.0; 3],
         };
         let bodies = scene.starting_positions(seed).into_iter().map(still).collect();
-        Some(Self { shape: clump.shape(&scene.grains), bodies })
+        let (shape, arms, inverse_inertia) = (clump.shape(&scene.grains), Vec::new(), Vec::new());
+        let mut clumps = Self { shape, bodies, arms, inverse_inertia };
+        clumps.place();
+        Some(clumps)
+    }
+
+    /// Works out what hangs on how the clumps are turned.
+    fn place(&mut self) {
+        let Self { shape, bodies, arms, inverse_inertia: inverse } = self;
+        (arms.clear(), inverse.clear());
+        for turned in bodies.iter().map(Rigid::turned) {
+            arms.extend(shape.offsets.iter().map(|offset| turned * offset));
+            inverse.push(inverse_inertia(turned.to_rotation_matrix().matrix(), &shape.inertia));
+        }
     }
 
     /// Spheres of a clump.
@@ -83,18 +100,12 @@ impl Clumps {
 
     /// Centre and radius of every sphere.
     pub fn spheres(&self) -> Vec<Row> {
-        let mut spheres = Vec::with_capacity(self.bodies.len() * self.members());
-        for body in &self.bodies {
-            let (centre, turned) = (Vector3::from(body.centre), body.turned());
-            let sphere = |offset| Row::new(&(centre + turned * offset), self.shape.radius);
-            spheres.extend(self.shape.offsets.iter().map(sphere));
+        let mut spheres = Vec::with_capacity(self.arms.len());
+        for (body, arms) in self.bodies.iter().zip(self.arms.chunks(self.members())) {
+            let centre = Vector3::from(body.centre);
+            spheres.extend(arms.iter().map(|arm| Row::new(&(centre + arm), self.shape.radius)));
         }
         spheres
-    }
-
-    /// Inverse of the tensor of inertia in the scene's axes `[1/m^2]`.
-    fn inverse_inertia(&self, turned: &UnitQuaternion<f64>) -> Matrix3<f64> {
-        inverse_inertia(turned.to_rotation_matrix().matrix(), &self.shape.inertia)
     }
 
     /// Takes what the spheres have got since they moved as one, and lets them move as one again.
@@ -103,24 +114,21 @@ impl Clumps {
         let share = 1.0 / members as f64;
         let spin_share = share * radius / INVERSE_INERTIA;
         for number in 0..self.bodies.len() {
-            let rigid = self.bodies[number];
-            let turned = rigid.turned();
-            let inverse = self.inverse_inertia(&turned);
+            let (rigid, inverse) = (self.bodies[number], &self.inverse_inertia[number]);
             let (mut velocity, mut momentum) =
                 (Vector3::from(rigid.velocity), Vector3::from(rigid.momentum));
             let (before, omega) = (velocity, inverse * momentum);
-            let spheres = &mut bodies[number * members..(number + 1) * members];
-            for (body, offset) in spheres.iter().zip(&self.shape.offsets) {
-                let arm = turned * offset;
-                let got = share * (body.velocity.vector() - before - omega.cross(&arm));
+            let own = number * members..(number + 1) * members;
+            let (spheres, arms) = (&mut bodies[own.clone()], &self.arms[own]);
+            for (body, arm) in spheres.iter().zip(arms) {
+                let got = share * (body.velocity.vector() - before - omega.cross(arm));
                 velocity += got;
                 momentum += arm.cross(&got);
                 momentum += spin_share * (body.spin.vector() - radius * omega);
             }
             let omega = inverse * momentum;
-            for (body, offset) in spheres.iter_mut().zip(&self.shape.offsets) {
-                let arm = turned * offset;
-                body.velocity = Row::new(&(velocity + omega.cross(&arm)), 0.0);
+            for (body, arm) in spheres.iter_mut().zip(arms) {
+                body.velocity = Row::new(&(velocity + omega.cross(arm)), 0.0);
                 body.spin = Row::new(&(radius * omega), 0.0);
             }
             let rigid = &mut self.bodies[number];
@@ -128,49 +136,63 @@ impl Clumps {
         }
     }
 
+    /// Where a clump's centre is, and how it is turned, once it has moved for `dt`.
+    fn moved(&self, clump: usize, dt: f64) -> (Vector3<f64>, UnitQuaternion<f64>) {
+        let rigid = &self.bodies[clump];
+        let momentum = Vector3::from(rigid.momentum);
+        let omega = self.inverse_inertia[clump] * momentum;
+        let (moments, unhit) = (&self.shape.inertia, Vector3::zeros());
+        let turned = turned_on(&rigid.turned(), moments, [&momentum, &omega], &unhit, dt);
+        (Vector3::from(rigid.centre) + dt * Vector3::from(rigid.velocity), turned)
+    }
+
+    /// Where the centre of every sphere will be once the clumps have moved for `dt` `[m]`.
+    pub fn ends(&self, dt: f64) -> Vec<Vector3<f64>> {
+        let mut ends = Vec::with_capacity(self.arms.len());
+        for clump in 0..self.bodies.len() {
+            let (centre, turned) = self.moved(clump, dt);
+            ends.extend(self.shape.offsets.iter().map(|offset| centre + turned * offset));
+        }
+        ends
+    }
+
     /// Moves and turns the clumps, once they are joined, and puts their spheres where they belong.
     pub fn move_on(&mut self, particles: &mut Particles, dt: f64) {
-        let members = self.members();
-        for number in 0..self.bodies.len() {
-            let rigid = self.bodies[number];
-            let turned = rigid.turned();
-            let momentum = Vector3::from(rigid.momentum);
-            let omega = self.inverse_inertia(&turned) * momentum;
-            let (moments, unhit) = (&self.shape.inertia, Vector3::zeros());
-            let turned = turned_on(&turned, moments, [&momentum, &omega], &unhit, dt);
-            let centre = Vector3::from(rigid.centre) + dt * Vector3::from(rigid.velocity);
-            let rigid = &mut self.bodies[number];
-            rigid.centre = centre.into();
-            rigid.turned = turned.coords.into();
+        for clump in 0..self.bodies.len() {
+            let (centre, turned) = self.moved(clump, dt);
+            let rigid = &mut self.bodies[clump];
+            (rigid.centre, rigid.turned) = (centre.into(), turned.coords.into());
+        }
+        self.place();
+        let (members, radius) = (self.members(), self.shape.radius);
+        for (number, arm) in self.arms.iter().enumerate() {
+            let (rigid, inverse) = (&self.bodies[number / members], &self.inverse_inertia);
             // With the turned axes another angular velocity belongs to the same angular momentum.
-            let velocity = Vector3::from(rigid.velocity);
-            let omega = self.inverse_inertia(&turned) * momentum;
-            for (member, offset) in self.shape.offsets.iter().enumerate() {
-                let (sphere, arm) = (number * members + member, turned * offset);
-                particles.spheres[sphere] = Row::new(&(centre + arm), self.shape.radius);
-                particles.bodies[sphere] = Body {
-                    velocity: Row::new(&(velocity + omega.cross(&arm)), 0.0),
-                    spin: Row::new(&(self.shape.radius * omega), 0.0),
-                };
-            }
+            let omega = inverse[number / members] * Vector3::from(rigid.momentum);
+            let velocity = Vector3::from(rigid.velocity) + omega.cross(arm);
+            particles.spheres[number] = Row::new(&(Vector3::from(rigid.centre) + arm), radius);
+            particles.bodies[number] =
+                Body { velocity: Row::new(&velocity, 0.0), spin: Row::new(&(radius * omega), 0.0) };
         }
     }
 
     /// Energy per typical mass.
     pub fn energy(&self, falling: &Falling) -> Energy {
-        let of = |rigid: &Rigid| {
+        let of = |clump: usize| {
+            let rigid = &self.bodies[clump];
             let (velocity, half) = (Vector3::from(rigid.velocity), falling.half());
             Energy {
-                kinetic: self.kinetic_energy(rigid) + half.dot(&(velocity + 0.5 * half)),
+                kinetic: self.kinetic_energy(clump) + half.dot(&(velocity + 0.5 * half)),
                 potential: falling.potential(&rigid.centre.into()),
             }
         };
-        self.bodies.iter().map(of).sum()
+        (0..self.bodies.len()).map(of).sum()
     }
 
-    fn kinetic_energy(&self, rigid: &Rigid) -> f64 {
+    fn kinetic_energy(&self, clump: usize) -> f64 {
+        let rigid = &self.bodies[clump];
         let momentum = Vector3::from(rigid.momentum);
-        let turning = momentum.dot(&(self.inverse_inertia(&rigid.turned()) * momentum));
+        let turning = momentum.dot(&(self.inverse_inertia[clump] * momentum));
         0.5 * (Vector3::from(rigid.velocity).norm_squared() + turning)
     }
 
@@ -182,14 +204,14 @@ impl Clumps {
         velocity: &Vector3<f64>,
         angular: &Vector3<f64>,
     ) -> f64 {
-        let before = self.kinetic_energy(&self.bodies[clump]);
+        let before = self.kinetic_energy(clump);
         let turned = self.bodies[clump].turned();
         let local = turned.inverse() * angular;
         let momentum = turned * local.component_mul(&self.shape.inertia);
         let rigid = &mut self.bodies[clump];
         (rigid.velocity, rigid.momentum) = ((*velocity).into(), momentum.into());
         self.move_on(particles, 0.0);
-        self.kinetic_energy(&self.bodies[clump]) - before
+        self.kinetic_energy(clump) - before
     }
 
     /// Velocity of a clump's centre `[m/s]`.
@@ -219,6 +241,7 @@ impl Clumps {
         for (rigid, &(centre, velocity, turned, momentum)) in self.bodies.iter_mut().zip(state) {
             *rigid = Rigid { centre, velocity, turned, momentum };
         }
+        self.place();
         Ok(())
     }
 }

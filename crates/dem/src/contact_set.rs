@@ -243,6 +243,8 @@ impl ContactSet {
         let batch = &mut self.batches[number];
         batch.used += 1;
         (batch.i[lane], batch.j[lane]) = (i, j);
+        // Until it is assembled it is open.
+        batch.bias.0[lane] = f64::INFINITY;
         if at_wall {
             self.at_walls[number].wall[lane] = contact.partner;
         }

@@ -5,6 +5,7 @@
 //! and the contacts that lie on it; when many do, the list is made afresh.
 
 mod check;
+mod foresee;
 
 use std::ops::Range;
 

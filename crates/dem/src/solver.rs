@@ -22,6 +22,17 @@ pub(crate) mod residual;
 pub(crate) mod solve_info;
 mod velocities;
 
+/// [`solve`], or a method that goes on with it.
+pub(crate) type Solve = fn(
+    &mut [&mut ContactSet],
+    &mut [Body],
+    &SolverSettings,
+    Option<f64>,
+    f64,
+    Option<&mut Clumps>,
+    &Threads,
+) -> SolveInfo;
+
 /// Solves the contacts of `sets` together, from the impulses that they carry and velocities without them;
 /// `quiet_tolerance` is the change of an impulse that counts as none in a quiet state, if this is one `[m/s]`, `radius`
 /// that of a typical grain `[m]`. The spheres of `clumps` move as one.

@@ -7,7 +7,7 @@ use crate::contacts::Contacts;
 use crate::lanes::Row;
 use crate::pour::Status;
 use crate::rebound::rebound;
-use crate::solver;
+use crate::solver::{self, Solve, nsgs};
 use crate::solver::residual::ResidualSums;
 use crate::solver::solve_info::SolveInfo;
 
@@ -21,6 +21,9 @@ const RESIDUAL_PERIOD: usize = 4;
 /// How much deeper than a sphere a convex body may be: a corner that no manifold had before enters by the way of a
 /// substep.
 const CORNER_SLACK: f64 = 2.0;
+
+/// How often contacts that bodies come to within a substep are looked for and solved, at most.
+const FORESEEN: usize = 3;
 
 /// How much of a substep is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -194,8 +197,20 @@ impl Simulation {
         around.effects.assemble(&mut self.on_layer, particles, around.settings.dt, &ground);
     }
 
-    /// Solves the lasting contacts.
+    /// Solves the lasting contacts, and again what bodies come to besides.
     fn solve(&mut self) {
+        self.solve_contacts(solver::solve);
+        for _ in 0..FORESEEN {
+            if !self.foresee() {
+                break;
+            }
+            self.solve_contacts(nsgs::solve);
+        }
+        self.count_work_of_walls();
+    }
+
+    /// Lets `by` solve what is listed.
+    fn solve_contacts(&mut self, by: Solve) {
         let Contacts { pairs, at_walls, .. } = &mut self.contacts;
         let (bodies, around) = (&mut self.particles.bodies, &self.around);
         let sets = &mut [pairs, at_walls, &mut self.on_layer];
@@ -203,10 +218,17 @@ impl Simulation {
         let settings = &around.settings;
         let still = self.is_quiet.then(|| QUIET_SETTLED * around.gravity.norm() * settings.dt);
         let clumps = self.clumps.as_mut();
-        let (radius, threads) = (around.radius, &around.threads);
-        let work = solver::solve(sets, bodies, settings, still, radius, clumps, threads);
+        let work = by(sets, bodies, settings, still, around.radius, clumps, &around.threads);
         self.watch.see_solve(&work);
-        self.count_work_of_walls();
+    }
+
+    /// Looks where what is not round will be at the end of the substep; whether the contacts do not yet know of it.
+    fn foresee(&mut self) -> bool {
+        let Some(clumps) = &self.clumps else { return false };
+        let ends = clumps.ends(self.around.settings.dt);
+        self.contacts.follow_ends(&ends, &self.particles, &self.around);
+        self.contacts.move_walls(&mut self.particles, &self.around);
+        self.contacts.foresee(&ends, &self.particles, &self.around)
     }
 
     /// What moving walls put into the grains is not created.

@@ -43,7 +43,7 @@ impl Progress {
 /// Sweeps over all contacts: at least `settings.sweeps` times unless the impulses have settled, and until none closes
 /// too fast, but no more than `settings.max_sweeps` times. In a quiet state at least `settings.quiet_sweeps` times
 /// unless the impulses change by less than `quiet_tolerance` `[m/s]`.
-pub(super) fn solve(
+pub(crate) fn solve(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],
     settings: &SolverSettings,
