@@ -176,8 +176,10 @@ fn insert(tree: &mut Table, path: &str, value: f64) -> Result<(), SceneError> {
             .as_table_mut()
             .ok_or_else(|| path_error(path, &format!("{key:?} is a {kind}, not a table")))?;
     }
-    let number = table.entry((*last).to_owned()).or_insert(Value::Float(value));
-    set_number(path, number, value)
+    // A scene takes a whole number for either kind; which one belongs here its tree does not say.
+    let is_whole = value.fract() == 0.0 && value.abs() < LARGEST_WHOLE;
+    let new = if is_whole { Value::Integer(value as i64) } else { Value::Float(value) };
+    set_number(path, table.entry((*last).to_owned()).or_insert(new), value)
 }
 
 /// From here on not every whole number is a number of double precision.
@@ -319,6 +321,18 @@ mod tests {
             assert!(matches!(error, SceneError::Path { .. }), "{path}: {error}");
         }
         assert!(scene.with("grains.count", 1.5).is_err());
+    }
+
+    #[test]
+    fn a_whole_number_of_an_effect_that_is_not_there_yet_is_one() {
+        let mut scene = Scene::drop(0.1);
+        let aspect = ("effects.clump.aspect", 2.5);
+        scene.set(&[aspect, ("effects.clump.spheres", 4.0)]).unwrap();
+        assert_eq!(scene.effects.clump.spheres, 4);
+        assert!(scene.set(&[("effects.clump.spheres", 2.5)]).is_err());
+        let mut round = Scene::drop(0.1);
+        assert!(round.set(&[aspect, ("effects.clump.spheres", 2.5)]).is_err());
+        assert_eq!(round.with("effects.tilt.x", 0.0).unwrap(), round);
         assert!(scene.with("material.restitution", 1.5).is_err());
         assert!(scene.get("material.friction").is_err());
         assert!(scene.get("material").is_err());
