@@ -56,14 +56,15 @@ pub fn law_of(scene: &Scene) -> u32 {
 /// was looked at where a way leads elsewhere, and boxes met eight pairs at a time; to 6 and 5 when a corner that has gone
 /// round the end of a shell was no longer taken for one that has come through it. Cylinders came to 6 when their nearest
 /// points were those of their features. Boxes and cylinders came to 7 and the others to 6 when an overlap that is
-/// foreseen, no deeper than sweeps may leave a point, was no point of contact yet. Bodies and clumps that nutate came one
+/// foreseen, no deeper than sweeps may leave a point, was no point of contact yet; to 8 and 7 when corners that go through
+/// a shell were foreseen as those that go through a plane. Bodies and clumps that nutate came one
 /// farther when they turned in parts of a substep, and bodies where walls move when those were looked at where they go.
 /// Balls with a film between them came to 2 when Newton's steps told what it leaves of a speed, and clumps to 3 when the
 /// ends of their ways were looked at.
 pub fn arithmetic(scene: &Scene) -> u32 {
     let of_shape = match scene.grains.shape {
-        Some(GrainShape::Box { .. } | GrainShape::Cylinder { .. }) => 7,
-        Some(_) => 6,
+        Some(GrainShape::Box { .. } | GrainShape::Cylinder { .. }) => 8,
+        Some(_) => 7,
         None => 1,
     };
     let solid = scene.grains.solid();
@@ -208,11 +209,11 @@ mod tests {
             arithmetic(&bodies)
         };
         assert_eq!(arithmetic(&balls), 1);
-        assert_eq!(of(GrainShape::Box { aspect: [1.0; 3] }), 7);
-        assert_eq!(of(GrainShape::Cylinder { aspect: 1.0 }), 7);
+        assert_eq!(of(GrainShape::Box { aspect: [1.0; 3] }), 8);
+        assert_eq!(of(GrainShape::Cylinder { aspect: 1.0 }), 8);
         let superquadric = GrainShape::Superquadric { aspect: [1.0; 3], exponents: [2.0; 2] };
-        assert_eq!(of(superquadric), 6);
-        assert_eq!(of(GrainShape::Box { aspect: [1.0, 1.0, 2.0] }), 8);
+        assert_eq!(of(superquadric), 7);
+        assert_eq!(of(GrainShape::Box { aspect: [1.0, 1.0, 2.0] }), 9);
         let mut clumps = balls.clone();
         clumps.effects.clump.aspect = 1.5;
         assert_eq!(arithmetic(&clumps), 3);

@@ -129,7 +129,7 @@ pub(super) fn at_walls(
             let near = walls.nearest(surface, &(body.centre + arm), now);
             // Beyond the end of a shell or a disc it is its rim that touches.
             let is_at_rim = near.side == 0 && near.distance > 0.0 && !wall.has_facets();
-            if near.distance > range || is_at_rim {
+            if near.distance.is_infinite() || is_at_rim {
                 return;
             }
             // A corner that has come through a shell, and not round its end, is on the other side of it than the centre.
@@ -143,7 +143,9 @@ pub(super) fn at_walls(
             } else {
                 (near.distance, near.normal)
             };
-            found.push(Point::at_wall(i, surface, wall, body, mark, normal, gap));
+            if gap <= range {
+                found.push(Point::at_wall(i, surface, wall, body, mark, normal, gap));
+            }
         };
         let seen = walls.nearest(surface, &body.centre, now);
         let towards = body.seen(&-seen.normal);

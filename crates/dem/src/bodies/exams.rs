@@ -325,3 +325,24 @@ fn what_is_struck_enters_nothing() {
     struck(&ball, [(9.0, 0.0), (10.15, 0.0), (11.3, 6.0)]);
     struck(&ball, [(0.6, 6.0), (1.75, 6.0), (9.0, 0.0)]);
 }
+
+/// A cube that another throws against a shell within a substep does not go through it, as it does not through a plane.
+#[test]
+fn what_is_struck_goes_through_no_shell() {
+    let radius = 0.2;
+    let shape =
+        Shape::Cylinder { from: [0.0, 0.0, -0.1], to: [0.0, 0.0, 0.1], radius, closed: Ends::None };
+    let mut exam = Exam::new(cube(), 0.3, 0.5);
+    let wall = Wall::fixed(shape, WallMaterial::default());
+    exam.walls = Walls::of(&Scene { walls: vec![wall], ..Scene::drop(0.1) });
+    exam.gravity = Vector3::zeros();
+    for (number, (from_wall, speed)) in [(0.6, 0.0), (1.8, 6.0)].into_iter().enumerate() {
+        exam.put([radius - from_wall * SIZE, 0.0, 0.05], UnitQuaternion::identity());
+        exam.bodies.set_motion(number, &(speed * Vector3::x()), &Vector3::zeros());
+    }
+    for _ in 0..10 {
+        exam.step();
+        let at = exam.body(0).0.xy().norm();
+        assert!(radius - at > 0.49 * SIZE, "{} of a cube from the wall", (radius - at) / SIZE);
+    }
+}

@@ -35,14 +35,16 @@ impl Contacts {
         let ways: Vec<_> = bodies.iter().map(|body| Way::of(body, reach, dt)).collect();
         let is_other = self.examine(around, &ways);
         let least = FORESEEN * around.least();
+        // What is no deeper than sweeps leave a point is none yet.
+        let range = -around.may_close;
         let mut later = Later::new(around, bodies);
         let mut new = Vec::new();
         for (i, way) in ways.iter().enumerate() {
             let goes = way.length() + around.way_of_walls(&bodies[i].pose.centre);
             if is_other[i] && goes > least.max(self.clear_of_walls[i]) {
                 let pose = later.find(i);
-                at_walls(around, pose, i, (dt, 0.0), &mut new);
-                at_rims(around, pose, i, (dt, 0.0), &mut new);
+                at_walls(around, pose, i, (dt, range), &mut new);
+                at_rims(around, pose, i, (dt, range), &mut new);
             }
         }
         let mut asked = Vec::new();
@@ -54,8 +56,8 @@ impl Contacts {
             {
                 later.find(i);
                 later.find(j);
-                if clearance(around.solid, later.pose(i), later.pose(j)) <= -around.may_close {
-                    asked.push(Asked { i, j, range: -around.may_close });
+                if clearance(around.solid, later.pose(i), later.pose(j)) <= range {
+                    asked.push(Asked { i, j, range });
                 }
             }
         }
@@ -67,8 +69,6 @@ impl Contacts {
                 meeting.points(around, &asked[number], |point| new.push(point));
             },
         );
-        // What is no deeper than sweeps leave a point is none yet.
-        new.retain(|point| point.gap <= -around.may_close);
         let (least, mut is_news) = (CORRECTED * around.solid.reach, false);
         for point in new {
             let point = point.foreseen(bodies, |body| later.pose(body), around.dt);

@@ -7,9 +7,9 @@ use crate::contacts::Contacts;
 use crate::lanes::Row;
 use crate::pour::Status;
 use crate::rebound::rebound;
-use crate::solver::{self, Solve, nsgs};
 use crate::solver::residual::ResidualSums;
 use crate::solver::solve_info::SolveInfo;
+use crate::solver::{self, Solve, nsgs};
 
 /// Mean energy of a grain's translation over that of a fall by its radius below which grains hardly move `[-]`.
 const QUIET: f64 = 0.0025;
