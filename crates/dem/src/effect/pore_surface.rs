@@ -62,9 +62,9 @@ impl PoreSurface {
                 }
             }
         }
+        let mut spare = Vec::new();
         for _ in 0..FILTERS {
-            surface.filter(1, 0);
-            surface.filter(0, 1);
+            surface.filter(&mut spare);
         }
         surface
     }
@@ -81,15 +81,15 @@ impl PoreSurface {
         if is_inside { self.heights[(a * columns + b) as usize] } else { 0.0 }
     }
 
-    /// Replaces every height by a quarter of either neighbour's along an axis and half of its own.
-    fn filter(&mut self, da: isize, db: isize) {
-        let [rows, columns] = self.counts.map(|count| count as isize);
-        let cells = (0..rows).flat_map(|a| (0..columns).map(move |b| (a, b)));
-        let filtered = cells.map(|(a, b)| {
-            let beside = self.height(a - da, b - db) + self.height(a + da, b + db);
-            0.5 * self.height(a, b) + 0.25 * beside
-        });
-        self.heights = filtered.collect();
+    /// Replaces every height by half of its own and a quarter of either neighbour's, along both axes.
+    fn filter(&mut self, spare: &mut Vec<f64>) {
+        let columns = self.counts[1];
+        spare.clone_from(&self.heights);
+        blend(spare, columns, &mut self.heights);
+        spare.clone_from(&self.heights);
+        for (row, filtered) in spare.chunks(columns).zip(self.heights.chunks_mut(columns)) {
+            blend(row, 1, filtered);
+        }
     }
 
     /// Slope of the surface along x and y above a point `[-]`.
@@ -107,6 +107,21 @@ impl PoreSurface {
             }
         }
         slope.map(|difference| difference / (2.0 * self.cell))
+    }
+}
+
+/// Half of each height and a quarter of those `step` before and after it, of which there are none beyond the ends.
+fn blend(own: &[f64], step: usize, filtered: &mut [f64]) {
+    let last = own.len() - step;
+    let of = |own: f64, before: f64, after: f64| 0.5 * own + 0.25 * (before + after);
+    for at in 0..step {
+        filtered[at] = of(own[at], 0.0, own[at + step]);
+        filtered[last + at] = of(own[last + at], own[last + at - step], 0.0);
+    }
+    let beside = own[..last - step].iter().zip(&own[2 * step..]);
+    let inner = filtered[step..last].iter_mut().zip(&own[step..last]);
+    for ((filtered, &own), (&before, &after)) in inner.zip(beside) {
+        *filtered = of(own, before, after);
     }
 }
 
