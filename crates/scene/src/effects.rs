@@ -54,6 +54,16 @@ macro_rules! effects {
                 vec![$(&self.$table),*]
             }
 
+            /// The numbers of every effect, on or off, by its name.
+            ///
+            /// # Errors
+            /// [`SceneError::TomlWrite`] if a number cannot be written.
+            pub(crate) fn tables(&self) -> Result<toml::Table, SceneError> {
+                let mut tables = toml::Table::new();
+                $(tables.insert(stringify!($table).to_owned(), table_of(&self.$table)?.into());)*
+                Ok(tables)
+            }
+
             /// The path of every number of every effect, for example `effects.capillary.bond`; lists have none.
             ///
             /// # Errors
@@ -102,9 +112,12 @@ effects! {
     vibration: vibration::Vibration,
 }
 
+fn table_of<T: Serialize>(effect: &T) -> Result<toml::Table, SceneError> {
+    toml::Table::try_from(effect).map_err(|e| SceneError::TomlWrite(Box::new(e)))
+}
+
 fn paths_of<T: Effect + Serialize>(effect: &T) -> Result<Vec<String>, SceneError> {
-    let table = toml::Table::try_from(effect).map_err(|e| SceneError::TomlWrite(Box::new(e)))?;
-    Ok(table.keys().map(|number| format!("{}.{number}", effect.path())).collect())
+    Ok(table_of(effect)?.keys().map(|number| format!("{}.{number}", effect.path())).collect())
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {

@@ -52,7 +52,12 @@ impl Scene {
         if keys(path).eq(["substep"]) {
             return Ok(self.settings().dt);
         }
-        let mut found = &Value::Table(self.tree()?);
+        let mut tree = self.tree()?;
+        if keys(path).next() == Some(EFFECTS) {
+            // Those that are off are left out of a scene, and their numbers are known all the same.
+            tree.insert(EFFECTS.to_owned(), self.effects.tables()?.into());
+        }
+        let mut found = &Value::Table(tree);
         for key in keys(path) {
             found = match found {
                 Value::Table(table) => table.get(key).ok_or_else(|| {
@@ -329,6 +334,9 @@ mod tests {
         let aspect = ("effects.clump.aspect", 2.5);
         scene.set(&[aspect, ("effects.clump.spheres", 4.0)]).unwrap();
         assert_eq!(scene.effects.clump.spheres, 4);
+        assert_eq!(scene.get("effects.clump.spheres").unwrap(), 4.0);
+        assert_eq!(scene.get("effects.tilt.x").unwrap(), 0.0);
+        assert!(scene.get("effects.tilt").is_err() && scene.get("effects.tilted.x").is_err());
         assert!(scene.set(&[("effects.clump.spheres", 2.5)]).is_err());
         let mut round = Scene::drop(0.1);
         assert!(round.set(&[aspect, ("effects.clump.spheres", 2.5)]).is_err());
