@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from granulcal.bayessim.posterior.posterior import Posterior
     from granulcal.loop.close import close_loop
     from granulcal.loop.condition import Condition
+    from granulcal.loop.predict import predict
     from granulcal.loop.task import Task
     from granulcal.within_budget import calibrate_within
 
@@ -70,6 +71,7 @@ __all__ = [
     "design_spill",
     "diagnostic_statistics",
     "generate",
+    "predict",
     "simulate",
     "statistics",
 ]
@@ -81,6 +83,7 @@ _LAZY = {
     "Task": "granulcal.loop.task",
     "calibrate_within": "granulcal.within_budget",
     "close_loop": "granulcal.loop.close",
+    "predict": "granulcal.loop.predict",
 }
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from two_heights import two_heights
 
+import granulcal as gc
 from granulcal.cli import main
 from granulcal.errors import ObservationError
 from granulcal.loop.check import discrepancy
@@ -58,6 +59,20 @@ def test_what_a_model_without_physics_would_ignore_is_refused(
     shared = {"start.height": 0.015, "material.restitution": 0.5}
     if model != "corrected":
         assert models.predict(model, shared, forward).middle == pytest.approx([0.015], abs=0.006)
+
+
+def test_python_is_told_what_the_command_line_is(
+    models: Models, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = gc.predict(tmp_path, {"start.height": 0.03}, "base", pours=2, threads=1)
+    words = ["predict", str(tmp_path), "--model", "base", "--pours", "2", "--threads", "1"]
+    main([*words, "--at", "start.height=0.03", "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert told["statistics"] == found.to_dict()["statistics"]
+    assert tuple(told["warnings"]) == found.doubts != ()
+    with pytest.raises(FileNotFoundError, match=r"models.json is not there"):
+        gc.predict(tmp_path / "nothing", {})
+    assert models.names == found.names
 
 
 @pytest.mark.parametrize("model", ["line", "nearest"])
