@@ -34,6 +34,8 @@ pub(crate) struct ContactContext {
     pub threads: Threads,
     /// Radius of a typical grain `[m]`, the length that the settings are relative to.
     pub radius: f64,
+    /// Radius of the least grain `[m]`, in which overlaps are told and to which contacts are solved.
+    pub least: f64,
     /// Spheres that a grain is made of: those of one grain do not touch each other.
     pub members: usize,
     /// Gap below which a pair is listed in any case `[m]`.
@@ -41,7 +43,8 @@ pub(crate) struct ContactContext {
 }
 
 impl ContactContext {
-    pub fn new(scene: &Scene) -> Self {
+    /// Of a scene with grains of these radii `[m]`.
+    pub fn new(scene: &Scene, radii: impl Iterator<Item = f64>) -> Self {
         let settings = scene.settings();
         let walls = Walls::of(scene);
         let (effects, radius) = (Acting::of(scene), scene.grains.radius());
@@ -58,6 +61,7 @@ impl ContactContext {
             settings,
             threads: Threads::default(),
             radius,
+            least: radii.fold(radius, f64::min),
             margin: effects.reach().max(settings.margin * radius),
             effects,
         }

@@ -60,7 +60,7 @@ pub fn law_of(scene: &Scene) -> u32 {
 /// a shell were foreseen as those that go through a plane. Bodies and clumps that nutate came one
 /// farther when they turned in parts of a substep, and bodies where walls move when those were looked at where they go.
 /// Balls with a film between them came to 2 when Newton's steps told what it leaves of a speed, and clumps to 3 when the
-/// ends of their ways were looked at.
+/// ends of their ways were looked at. Unequal balls came to 2 when contacts were solved to the least of them.
 pub fn arithmetic(scene: &Scene) -> u32 {
     let of_shape = match scene.grains.shape {
         Some(GrainShape::Box { .. } | GrainShape::Cylinder { .. }) => 8,
@@ -73,8 +73,9 @@ pub fn arithmetic(scene: &Scene) -> u32 {
     let motions = scene.walls.iter().map(|wall| &wall.motion);
     let mut motions = motions.chain(scene.funnel.iter().map(|funnel| &funnel.motion));
     let meets_moving = solid.is_some() && motions.any(|motion| !motion.is_still());
-    let Effects { clump, lubrication, .. } = &scene.effects;
-    let of_effects = u32::from(clump.is_on()) + u32::from(lubrication.is_on());
+    let Effects { clump, lubrication, polydispersity, .. } = &scene.effects;
+    let solved_anew = [clump.is_on(), lubrication.is_on(), polydispersity.is_on()];
+    let of_effects: u32 = solved_anew.map(u32::from).iter().sum();
     of_shape + u32::from(nutates || meets_moving) + of_effects
 }
 
@@ -220,6 +221,9 @@ mod tests {
         let mut wet = balls.clone();
         wet.effects.lubrication.viscosity = 1e-3;
         assert_eq!(arithmetic(&wet), 2);
+        let mut unlike = balls.clone();
+        unlike.effects.polydispersity.cv = 0.3;
+        assert_eq!(arithmetic(&unlike), 2);
         let mut sand = balls.clone();
         assert_eq!((law_of(&sand), Small::of(&sand)), (LAW, Small::OF_LARGE));
         sand.grains.diameter = 1e-3;

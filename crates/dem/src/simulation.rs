@@ -84,7 +84,8 @@ impl Simulation {
         scene.check()?;
         let clumps = Clumps::of(scene, seed);
         let particles = initial::particles(scene, clumps.as_ref(), seed);
-        let around = ContactContext::new(scene);
+        let radii = (0..particles.count()).map(|grain| particles.radius(grain));
+        let around = ContactContext::new(scene, radii);
         let gravity = around.gravity;
         let lift = gravity.norm() * scene.grains.radius();
         let heights = particles.heights(&around.effects.gravity);

@@ -78,14 +78,15 @@ pub struct SolverSettings {
     pub sweeps: usize,
     /// Over-relaxation of all sweeps but the last of these `[-]`, in [1, 2).
     pub relaxation: f64,
-    /// Change of a contact's impulses in a sweep below which they have settled, in radii a substep `[-]`.
+    /// Change of a contact's impulses in a sweep below which they have settled, in radii of the least grain
+    /// a substep `[-]`.
     pub settled: f64,
     /// Sweeps in a substep, at least, while the grains hardly move, unless the impulses settle before: a heap whose
     /// weight has not reached its foot creeps.
     pub quiet_sweeps: usize,
     /// Sweeps in a substep, at most: hard impacts on dense packings need more than quiet flow.
     pub max_sweeps: usize,
-    /// Way by which a contact may still close against its constraint in a substep, in radii `[-]`;
+    /// Way by which a contact may still close against its constraint in a substep, in radii of the least grain `[-]`;
     /// as long as one closes further the sweeps go on.
     pub closing: f64,
     /// Substeps between two searches for pairs.

@@ -86,7 +86,7 @@ fn foresee(
     meeting: impl Fn(usize, usize, (usize, usize)) -> Meeting,
 ) -> bool {
     let (dt, settings) = (around.settings.dt, &around.settings);
-    let closing = settings.closing * around.radius / dt;
+    let closing = settings.closing * around.least / dt;
     let mut is_any = false;
     for number in 0..set.batches.len() {
         let batch = &mut set.batches[number];

@@ -42,7 +42,7 @@ impl Simulation {
         let mut copy = self.clone();
         copy.substep(Until::Assembled);
         let Contacts { pairs, at_walls, .. } = copy.contacts;
-        FrozenSolve::new([pairs, at_walls], copy.particles, self.around.radius)
+        FrozenSolve::new([pairs, at_walls], copy.particles, self.around.least)
     }
 
     /// The search for pairs of the present state, for studies of its cost; the simulation stays as it is.

@@ -218,7 +218,7 @@ impl Simulation {
         let settings = &around.settings;
         let still = self.is_quiet.then(|| QUIET_SETTLED * around.gravity.norm() * settings.dt);
         let clumps = self.clumps.as_mut();
-        let work = by(sets, bodies, settings, still, around.radius, clumps, &around.threads);
+        let work = by(sets, bodies, settings, still, around.least, clumps, &around.threads);
         self.watch.see_solve(&work);
     }
 

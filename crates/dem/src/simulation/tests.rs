@@ -237,6 +237,17 @@ fn unequal_grains_start_apart_and_gain_nothing() {
 }
 
 #[test]
+fn the_small_among_unequal_grains_are_solved_as_well() {
+    // 0.13 radii of the smaller grain when contacts were solved to a typical one.
+    let mut scene = Scene::drop(0.1);
+    scene.grains.count = 1000;
+    scene.effects.polydispersity.cv = 0.35;
+    let mut pour = Simulation::new(&scene, 1).expect("a valid scene");
+    pour.advance(0.3);
+    assert!(pour.health().worst_penetration < 0.05, "{:?}", pour.health());
+}
+
+#[test]
 fn clumps_that_fall_fast_enter_nothing() {
     // Struck in the contact solve they leave their ways in the same substep: 0.14 radii when nothing looked where to.
     let mut scene = Scene::drop(0.1);
