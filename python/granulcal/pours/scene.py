@@ -244,13 +244,15 @@ class Scene:
     def get(self, path: str) -> float:
         """Returns the number at `path`, for example `scene.get("funnel.height")`.
 
+        Those of an effect that is off are known, too.
+
         Raises:
             ValueError: no number stands there.
         """
         return self.native.get(path)
 
     def has(self, path: str) -> bool:
-        """Returns whether a number stands at `path`."""
+        """Returns whether a number stands at `path`, of an effect that is off, too."""
         try:
             self.native.get(path)
         except ValueError:
