@@ -86,7 +86,8 @@ impl Clumps {
     /// Works out what hangs on how the clumps are turned.
     fn place(&mut self) {
         let Self { shape, bodies, arms, inverse_inertia: inverse } = self;
-        (arms.clear(), inverse.clear());
+        arms.clear();
+        inverse.clear();
         for turned in bodies.iter().map(Rigid::turned) {
             arms.extend(shape.offsets.iter().map(|offset| turned * offset));
             inverse.push(inverse_inertia(turned.to_rotation_matrix().matrix(), &shape.inertia));
