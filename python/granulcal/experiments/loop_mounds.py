@@ -63,8 +63,10 @@ DEFINITIONS = (
 
 EFFECTS: tuple[LibraryEffect, ...] = tuple(
     replace(effect, full=_FULL.get(effect.name, effect.full))
-    for effect in by_name(
-        [*_FULL, "bonds", "drag", "count", "tilt.x", "camera.scale", "polydispersity"]
+    for effect in (
+        *by_name([*_FULL, "bonds", "drag", "count", "tilt.x", "camera.scale"]),
+        # Registered later: at the end, for an archive of the others to go on.
+        *by_name(["polydispersity"]),
     )
 )
 """What sand may have that a ball of dry grains on their own material has not."""
