@@ -57,10 +57,10 @@ pub fn law_of(scene: &Scene) -> u32 {
 /// round the end of a shell was no longer taken for one that has come through it. Cylinders came to 6 when their nearest
 /// points were those of their features. Boxes and cylinders came to 7 and the others to 6 when an overlap that is
 /// foreseen, no deeper than sweeps may leave a point, was no point of contact yet; to 8 and 7 when corners that go through
-/// a shell were foreseen as those that go through a plane. Bodies and clumps that nutate came one
-/// farther when they turned in parts of a substep, and bodies where walls move when those were looked at where they go.
-/// Balls with a film between them came to 2 when Newton's steps told what it leaves of a speed, and clumps to 3 when the
-/// ends of their ways were looked at. Unequal balls came to 2 when contacts were solved to the least of them.
+/// a shell were foreseen as those that go through a plane. Bodies and clumps that nutate came one farther when they turned
+/// in parts of a substep, and bodies where walls move when those were looked at where they go. Balls with a film between
+/// them came to 2 when Newton's steps told what it leaves of a speed, and clumps to 3 when the ends of their ways were
+/// looked at. Unequal balls came to 2 when contacts were solved to the least of them.
 pub fn arithmetic(scene: &Scene) -> u32 {
     let of_shape = match scene.grains.shape {
         Some(GrainShape::Box { .. } | GrainShape::Cylinder { .. }) => 8,

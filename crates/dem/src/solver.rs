@@ -35,7 +35,7 @@ pub(crate) type Solve = fn(
 
 /// Solves the contacts of `sets` together, from the impulses that they carry and velocities without them;
 /// `quiet_tolerance` is the change of an impulse that counts as none in a quiet state, if this is one `[m/s]`, `radius`
-/// that of a typical grain `[m]`. The spheres of `clumps` move as one.
+/// that of the least grain `[m]`. The spheres of `clumps` move as one.
 pub(crate) fn solve(
     sets: &mut [&mut ContactSet],
     bodies: &mut [Body],

@@ -69,21 +69,21 @@ impl Contacts {
             let gap_at_end = side * end.distance - radius;
             Meeting { normal: near.normal, gap: near.distance - radius, gap_at_end }
         };
-        let walls = self.at_walls.at_walls.clone();
-        let pairs = foresee(&mut self.pairs, particles, around, |i, j, _| of_pair(i, j));
-        let at_walls = foresee(&mut self.at_walls, particles, around, |i, _, (number, lane)| {
-            of_wall(i, walls[number].wall[lane] as usize)
-        });
+        let meeting = |i: usize, j: usize, surface: Option<usize>| {
+            surface.map_or_else(|| of_pair(i, j), |surface| of_wall(i, surface))
+        };
+        let pairs = foresee(&mut self.pairs, particles, around, meeting);
+        let at_walls = foresee(&mut self.at_walls, particles, around, meeting);
         pairs | at_walls
     }
 }
 
-/// [`Contacts::foresee`] of one set; `meeting` is of both bodies and of a lane.
+/// [`Contacts::foresee`] of one set; `meeting` is of both bodies, and of the wall if the second stands for one.
 fn foresee(
     set: &mut ContactSet,
     particles: &Particles,
     around: &ContactContext,
-    meeting: impl Fn(usize, usize, (usize, usize)) -> Meeting,
+    meeting: impl Fn(usize, usize, Option<usize>) -> Meeting,
 ) -> bool {
     let (dt, settings) = (around.settings.dt, &around.settings);
     let closing = settings.closing * around.least / dt;
@@ -92,7 +92,8 @@ fn foresee(
         let batch = &mut set.batches[number];
         for lane in batch.lanes() {
             let (i, j) = (batch.i[lane] as usize, batch.j[lane] as usize);
-            let Meeting { normal, gap, gap_at_end } = meeting(i, j, (number, lane));
+            let surface = set.at_walls.get(number).map(|at| at.wall[lane] as usize);
+            let Meeting { normal, gap, gap_at_end } = meeting(i, j, surface);
             if !gap.is_finite() || !gap_at_end.is_finite() {
                 continue;
             }

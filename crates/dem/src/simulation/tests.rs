@@ -236,24 +236,26 @@ fn unequal_grains_start_apart_and_gain_nothing() {
     assert!(health.energy_created < 1e-6, "{health:?}");
 }
 
+/// The deepest overlap of a ball of grains that has fallen fast, with the effects that `change` puts in `[radii]`.
+fn deepest_of_fallen(count: usize, seed: u64, seconds: f64, change: fn(&mut Scene)) -> f64 {
+    let mut scene = Scene::drop(0.1);
+    scene.grains.count = count;
+    change(&mut scene);
+    let mut pour = Simulation::new(&scene, seed).expect("a valid scene");
+    pour.advance(seconds);
+    pour.health().worst_penetration
+}
+
 #[test]
 fn the_small_among_unequal_grains_are_solved_as_well() {
     // 0.13 radii of the smaller grain when contacts were solved to a typical one.
-    let mut scene = Scene::drop(0.1);
-    scene.grains.count = 1000;
-    scene.effects.polydispersity.cv = 0.35;
-    let mut pour = Simulation::new(&scene, 1).expect("a valid scene");
-    pour.advance(0.3);
-    assert!(pour.health().worst_penetration < 0.05, "{:?}", pour.health());
+    let deepest = deepest_of_fallen(1000, 1, 0.3, |scene| scene.effects.polydispersity.cv = 0.35);
+    assert!(deepest < 0.05, "{deepest}");
 }
 
 #[test]
 fn clumps_that_fall_fast_enter_nothing() {
     // Struck in the contact solve they leave their ways in the same substep: 0.14 radii when nothing looked where to.
-    let mut scene = Scene::drop(0.1);
-    scene.grains.count = 400;
-    scene.effects.clump.aspect = 1.5;
-    let mut pour = Simulation::new(&scene, 0).expect("a valid scene");
-    pour.advance(0.16);
-    assert!(pour.health().worst_penetration < 0.04, "{:?}", pour.health());
+    let deepest = deepest_of_fallen(400, 0, 0.16, |scene| scene.effects.clump.aspect = 1.5);
+    assert!(deepest < 0.04, "{deepest}");
 }
