@@ -1,6 +1,7 @@
 """Emulator and network as one: the geometric average, its weights, and what is saved of it."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from granulcal.bayessim import BayesSim
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.bayessim.emulator.basis import Basis
 from granulcal.bayessim.emulator.emulator import Emulator
-from granulcal.bayessim.emulator.likelihood import Fold, Likelihood
+from granulcal.bayessim.emulator.likelihood import EmulatorChoice, Fold, Likelihood
 from granulcal.bayessim.emulator.noise import Noise
 from granulcal.bayessim.emulator.signal import SignalAxes
 from granulcal.bayessim.network.mixture import Mixture
@@ -271,3 +272,31 @@ def _edit(folder, **changes):
     }
     path.write_text(json.dumps(kept))
     sign(folder)
+
+
+def test_where_the_emulator_is_impossible_the_scores_are_numbers():
+    """One draw of a network at which the likelihood is 0 had made every score of it NaN."""
+    prior = TOY.prior
+    fine, pour = _normal_likelihood(prior, np.zeros(3), 0.1 * np.eye(3))
+
+    class Cut(Likelihood):
+        def log_prob(self, z, u):
+            return np.where(u[:, 0] > 0.5, -np.inf, super().log_prob(z, u))
+
+    likelihood = Cut(prior, fine.axes, fine.emulator, fine.leading, 1.0)
+    wide = [_normal(np.zeros(3), np.eye(3))]
+    truth = np.full((1, 3), 0.1)
+    held_out = HeldOut.of(Fold(likelihood, np.array([0])), wide, truth, pour)
+    for average in (EMULATOR_ALONE, Average(0.5, 0.5), NETWORK_ALONE):
+        assert np.isfinite(held_out.scores(average)).all()
+    # The network's posterior is the prior.
+    assert abs(held_out.gain(NETWORK_ALONE)) < 0.1
+    assert held_out.gain(EMULATOR_ALONE) > 1.0
+
+
+def test_what_says_all_that_the_cells_can_is_undecided_under_any_prior():
+    """A normal prior of three parameters takes 4.3 nat off every score."""
+    for prior_score in (0.0, -4.3):
+        most = EmulatorChoice(3, 1.0, False, 8.2 + prior_score, prior_score, prior_score)
+        assert not most.is_decided
+        assert replace(most, score=6.0 + prior_score).is_decided

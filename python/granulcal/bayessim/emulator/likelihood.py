@@ -77,6 +77,8 @@ class EmulatorChoice:
         varying_scale: whether the scale of the noise changes over the parameters.
         score: mean log posterior density at held-out parameters, coordinates [nat].
         linear_score: the same by a linear regression of the parameters on the statistics.
+        prior_score: the same by the prior; 0 where all parameters are bounded and uniform or
+            log-uniform.
     """
 
     axis_count: int
@@ -84,6 +86,7 @@ class EmulatorChoice:
     varying_scale: bool
     score: float
     linear_score: float
+    prior_score: float
 
     def __str__(self) -> str:
         """One line."""
@@ -104,11 +107,11 @@ class EmulatorChoice:
     def is_decided(self) -> bool:
         """Whether held-out pairs could choose.
 
-        A truth that alone of the prior's cells has weight has a score of the logarithm of their
-        number, in whatever form of the emulator.
+        A truth that alone of the prior's cells has weight is more probable than by the prior by
+        the logarithm of their number, in whatever form of the emulator.
         """
         most = math.log(_CELLS + 1) - _AT_MOST
-        return self.score < most and self.linear_score < self.score + _AT_MOST
+        return self.score - self.prior_score < most and self.linear_score < self.score + _AT_MOST
 
 
 class Scalars(TypedDict):
@@ -191,6 +194,7 @@ class Likelihood:
                     scores[key] = np.column_stack([scores[key], score]) if key in scores else score
                     levels[key] = np.column_stack([levels[key], level]) if key in levels else level
                     fits.setdefault(key, []).append(found)
+        held_out = np.concatenate([part[: _HELD_OUT // _FOLDS] for part in parts])
         best, chosen = _most_probable_of_the_honest(scores, levels)
         widening = WIDENINGS[chosen]
         linear = [
@@ -203,6 +207,7 @@ class Likelihood:
             best.varying_scale,
             float(scores[best][chosen].mean()),
             float(np.concatenate(linear).mean()),
+            float(prior.coordinate_log_prob(u[held_out]).mean()),
         )
         folds = [
             Fold(fit.widened(widening), part[: _HELD_OUT // _FOLDS])

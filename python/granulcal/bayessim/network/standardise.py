@@ -47,8 +47,9 @@ class Standardiser:
 
     @property
     def is_constant(self) -> NDArray[np.bool_]:
-        """Whether a statistic never changed in training, shape (s,)."""
-        return self.low == self.high
+        """Whether a statistic never changed in training but for round-off, shape (s,)."""
+        largest = np.maximum(np.abs(self.low), np.abs(self.high))
+        return self.high - self.low <= _CONSTANT_SPREAD * largest
 
     def apply(self, x: Array, *, clip: bool = True) -> Array:
         """Returns standardised statistics (n, s).

@@ -54,6 +54,8 @@ _NEWTON_ROUNDS = 30
 _SMALLEST_GAIN = 1e-6
 # Draws of the network's posterior beside the cells of the prior.
 _DRAWS = 1024
+# Log likelihood of what is impossible: less is -inf, of which no share is a number.
+_LOWEST = -1e6
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,8 @@ class HeldOut:
             learnt = cut.log_prob(points) - prior.coordinate_log_prob(points)
             share = _DRAWS / (_DRAWS + len(cells))
             log_weights = -np.logaddexp(math.log(1 - share), math.log(share) + learnt)
-            ratios = np.column_stack([emulated, learnt])
+            # Far out in an unbounded prior the likelihood is 0.
+            ratios = np.maximum(np.column_stack([emulated, learnt]), _LOWEST)
             found.append((ratios[-1], ratios, log_weights))
         at_truth, at_points, log_weights = (np.stack(part) for part in zip(*found, strict=True))
         return cls(at_truth, at_points, log_weights, log_prior)
@@ -149,6 +152,10 @@ class HeldOut:
     def scores(self, average: Average) -> Array:
         """Returns log densities of the truths under the geometric average, shape (n,)."""
         return self._scores(np.array([average.emulator, average.network]))
+
+    def gain(self, average: Average) -> float:
+        """Returns by how much the truths are more probable than by the prior, their mean [nat]."""
+        return float((self.scores(average) - self.log_prior).mean())
 
     def choose(self) -> Average:
         """Returns the average that says most, one alone where more is not worth it."""

@@ -140,11 +140,12 @@ class _Work:
         mixtures = amortised.mixtures(self.z[rows])
         held_out = self._held_out(unseen, mixtures)
         average = held_out.choose()
-        alone = [float(held_out.scores(one).mean()) for one in (EMULATOR_ALONE, NETWORK_ALONE)]
+        alone = [held_out.gain(one) for one in (EMULATOR_ALONE, NETWORK_ALONE)]
         told = f"on {len(rows)} pairs unseen by both: emulator {alone[0]:.2f}"
         told += f", network {alone[1]:.2f} nat above the prior"
         if average == NETWORK_ALONE:
-            made = self._by_network(likelihood, amortised, result, f"network alone; {told}")
+            told = f"network alone\n  emulator: {choice}\n  {told}"
+            made = self._by_network(likelihood, amortised, result, told)
             return replace(made, chose_form=True)
         if average == EMULATOR_ALONE:
             made = self._by_emulator(likelihood, folds, choice)
@@ -157,7 +158,7 @@ class _Work:
             )
             for i in chosen
         ]
-        told += f", {average} {float(held_out.scores(average).mean()):.2f}"
+        told += f", {average} {held_out.gain(average):.2f}"
         choice_text = f"average of an emulator and a network\n  emulator: {choice}\n  {told}"
         summary = self._summary("averaged", choice_text, result, len(self.rest), len(rows))
         return Trained(
