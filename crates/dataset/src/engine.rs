@@ -83,9 +83,7 @@ pub fn foreign_pour(
         return refuse("a radius", bad.to_string(), "positive and finite");
     }
     let is_finite = positions.iter().all(|centre| centre.iter().all(|value| value.is_finite()));
-    let held = |centre: &&Vector3<f64>| {
-        scene.funnel.as_ref().is_some_and(|funnel| funnel.holds(centre, scene.end.horizon))
-    };
+    let held = |centre: &&Vector3<f64>| scene.is_in_funnel(centre, scene.end.horizon);
     let grains_in_funnel = positions.iter().filter(held).count();
     let status = match (is_finite, grains_in_funnel) {
         (false, _) => Status::Unhealthy,

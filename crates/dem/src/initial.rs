@@ -27,7 +27,8 @@ pub(crate) fn particles(scene: &Scene, clumps: Option<&Clumps>, seed: u64) -> Pa
             *inverse = (radius / own).powi(3);
         }
         if is_parted(scene) {
-            part(&mut spheres, &Walls::of(scene), matches!(scene.start, Start::Ball { .. }));
+            let (walls, period) = (Walls::of(scene), scene.periodic.as_ref().map(Period::of));
+            part(&mut spheres, &walls, period, matches!(scene.start, Start::Ball { .. }));
         }
     }
     if let Some(bed) = &scene.bed {

@@ -58,9 +58,11 @@ pub fn law_of(scene: &Scene) -> u32 {
 /// points were those of their features. Boxes and cylinders came to 7 and the others to 6 when an overlap that is
 /// foreseen, no deeper than sweeps may leave a point, was no point of contact yet; to 8 and 7 when corners that go through
 /// a shell were foreseen as those that go through a plane. Bodies and clumps that nutate came one farther when they turned
-/// in parts of a substep, and bodies where walls move when those were looked at where they go. Balls with a film between
+/// in parts of a substep, and bodies where walls move when those were looked at where they go; bodies in scenes with walls of
+/// their own when corners that go through the edge where two sides meet were found. Balls with a film between
 /// them came to 2 when Newton's steps told what it leaves of a speed, and clumps to 3 when the ends of their ways were
-/// looked at. Unequal balls came to 2 when contacts were solved to the least of them.
+/// looked at. Unequal balls came to 2 when contacts were solved to the least of them, and
+/// those that are parted to 3 when none went through a wall for it, and they were parted across the ends of a period.
 pub fn arithmetic(scene: &Scene) -> u32 {
     let of_shape = match scene.grains.shape {
         Some(GrainShape::Box { .. } | GrainShape::Cylinder { .. }) => 8,
@@ -73,10 +75,12 @@ pub fn arithmetic(scene: &Scene) -> u32 {
     let motions = scene.walls.iter().map(|wall| &wall.motion);
     let mut motions = motions.chain(scene.funnel.iter().map(|funnel| &funnel.motion));
     let meets_moving = solid.is_some() && motions.any(|motion| !motion.is_still());
+    let meets_edges = solid.is_some() && !scene.walls.is_empty();
     let Effects { clump, lubrication, polydispersity, .. } = &scene.effects;
     let solved_anew = [clump.is_on(), lubrication.is_on(), polydispersity.is_on()];
     let of_effects: u32 = solved_anew.map(u32::from).iter().sum();
-    of_shape + u32::from(nutates || meets_moving) + of_effects
+    let of_shape = of_shape + u32::from(nutates || meets_moving) + u32::from(meets_edges);
+    of_shape + of_effects + u32::from(is_parted(scene))
 }
 
 /// Share of a penetration that is corrected in one substep (Baumgarte).
@@ -186,6 +190,7 @@ pub(crate) fn project_ball<W: Width>(impulse: Reg3<W>, limit: Reg<W>) -> Reg3<W>
 
 #[cfg(test)]
 mod tests {
+    use granulcal_scene::{Shape, Wall, WallMaterial};
     use proptest::prelude::*;
 
     use super::*;
@@ -215,6 +220,11 @@ mod tests {
         let superquadric = GrainShape::Superquadric { aspect: [1.0; 3], exponents: [2.0; 2] };
         assert_eq!(of(superquadric), 7);
         assert_eq!(of(GrainShape::Box { aspect: [1.0, 1.0, 2.0] }), 9);
+        let mut boxed = Scene::funnel(0.12);
+        boxed.grains.shape = Some(GrainShape::Box { aspect: [1.0; 3] });
+        let shape = Shape::Box { min: [-0.1; 3], max: [0.1; 3], open: Vec::new() };
+        boxed.walls.push(Wall::fixed(shape, WallMaterial::default()));
+        assert_eq!(arithmetic(&boxed), 9);
         let mut clumps = balls.clone();
         clumps.effects.clump.aspect = 1.5;
         assert_eq!(arithmetic(&clumps), 3);
@@ -235,7 +245,7 @@ mod tests {
         let mut unequal = Scene::drop(0.1);
         assert_eq!(law_of(&unequal), LAW);
         unequal.effects.polydispersity.cv = 0.1;
-        assert_eq!(law_of(&unequal), LAW_OF_PARTED);
+        assert_eq!((law_of(&unequal), arithmetic(&unequal)), (LAW_OF_PARTED, 3));
         // The lattice of the funnel is two diameters wide.
         let mut poured = Scene::funnel(0.12);
         poured.effects.polydispersity.cv = 0.3;

@@ -66,6 +66,11 @@ impl Period {
         apart[self.axis] > 0.0
     }
 
+    /// Whether a place is no farther than `width` from the begin of where places are kept.
+    pub fn is_near_begin(&self, place: &Vector3<f64>, width: f64) -> bool {
+        place[self.axis] - self.from < width
+    }
+
     /// By how much a place must be shifted to lie where places are kept, if it does not.
     pub fn shift(&self, place: &Vector3<f64>) -> Option<Vector3<f64>> {
         let lengths = ((place[self.axis] - self.from) / self.length).floor();

@@ -14,7 +14,7 @@ use crate::placement::Placement;
 use facets::Facets;
 use granulcal_scene::{BoxSide, Material, Motion, Scene, Shape, WallMaterial};
 pub(crate) use rim::Rim;
-pub(crate) use surface::{Nearest, any_normal};
+pub(crate) use surface::{Nearest, Passage, any_normal};
 use surface::{Surface, is_same_circle, surfaces};
 
 /// A wall with its resolved material, and where it is if it moves.
@@ -200,12 +200,64 @@ impl Walls {
             return false;
         };
         let [from, to] = [from, to].map(|x| wall.stated_place(x, now));
+        let end = of_wall.leads_round(&from, &to);
+        end.is_some_and(|end| self.rims_at(owner, &end).any(Rim::is_free))
+    }
+
+    /// The rims on the circle at which a surface of a wall ends.
+    fn rims_at(&self, owner: usize, end: &(Vector3<f64>, f64)) -> impl Iterator<Item = &Rim> {
         // Walls that rest share their rims, one that moves has its own.
-        let is_of_it = |of: usize| of == owner || !(self.all[of].is_moving() || wall.is_moving());
-        of_wall.leads_round(&from, &to).is_some_and(|end| {
-            let mut rims = self.rims.iter().filter(|(of, _)| is_of_it(*of)).map(|(_, rim)| rim);
-            rims.any(|rim| rim.is_free() && is_same_circle(&(rim.centre, rim.radius), &end))
-        })
+        let is_moving = self.all[owner].is_moving();
+        let is_of_it = move |of: usize| of == owner || !(self.all[of].is_moving() || is_moving);
+        let rims = self.rims.iter().filter(move |(of, _)| is_of_it(*of)).map(|(_, rim)| rim);
+        rims.filter(move |rim| is_same_circle(&(rim.centre, rim.radius), end))
+    }
+
+    /// The way from one place to another, at `now` `[s]` into a substep, if it goes through a surface and ends behind the
+    /// edge where that meets another, beyond the ends of both.
+    pub fn passed_at_end(
+        &self,
+        surface: usize,
+        from: &Vector3<f64>,
+        to: &Vector3<f64>,
+        now: f64,
+    ) -> Option<Passage> {
+        let owner = self.owner(surface);
+        let (wall, number) = (&self.all[owner], surface - self.first[owner] as usize);
+        let [from, to] = [from, to].map(|x| wall.stated_place(x, now));
+        let passage = match (wall.surfaces.get(number), &wall.facets) {
+            (None, Some(facets)) => facets.passed_at_edge(number - wall.surfaces.len(), &from, &to),
+            _ => wall.surfaces[number].passed(&from, &to).filter(|passage| {
+                let is_behind = |end| {
+                    self.rims_at(owner, end).any(|rim| !rim.is_free() && rim.ends_before(&to))
+                };
+                passage.beyond.as_ref().is_some_and(is_behind)
+            }),
+        }?;
+        let turned = |normal| match &wall.placement {
+            Some(placement) => placement.turned(&normal),
+            None => normal,
+        };
+        Some(Passage { normal: turned(passage.normal), ..passage })
+    }
+
+    /// Whether the way from one place at the begin of a substep to another at its end `[s]` goes through a thin surface.
+    pub fn is_passed(
+        &self,
+        surface: usize,
+        from: &Vector3<f64>,
+        to: &Vector3<f64>,
+        end: f64,
+    ) -> bool {
+        let owner = self.owner(surface);
+        let (wall, number) = (&self.all[owner], surface - self.first[owner] as usize);
+        let (from, to) = (wall.stated_place(from, 0.0), wall.stated_place(to, end));
+        match (wall.surfaces.get(number), &wall.facets) {
+            (None, Some(facets)) => {
+                facets.passed(number - wall.surfaces.len(), &from, &to).is_some()
+            }
+            _ => wall.surfaces[number].passed(&from, &to).is_some(),
+        }
     }
 
     /// Whether any may move.
@@ -328,5 +380,64 @@ mod tests {
         assert_eq!(walls.wall(0).material, Material { restitution: 0.1, ..scene.material });
         assert_eq!(walls.wall(1).material, scene.material);
         assert_eq!((walls.owner(2), walls.owner(3), walls.owner(14)), (2, 3, 3));
+    }
+
+    fn of_shapes(shapes: &[Shape]) -> Walls {
+        let wall =
+            |shape: &Shape| granulcal_scene::Wall::fixed(shape.clone(), WallMaterial::default());
+        Walls::of(&Scene { walls: shapes.iter().map(wall).collect(), ..Scene::drop(0.1) })
+    }
+
+    /// The ways that end behind an edge, of all surfaces but the ground's.
+    fn behind_edges(walls: &Walls, from: [f64; 3], to: [f64; 3]) -> Vec<(f64, Vector3<f64>)> {
+        let found = |surface| walls.passed_at_end(surface, &from.into(), &to.into(), 0.0);
+        (1..walls.surfaces()).filter_map(found).map(|p| (p.depth, p.normal)).collect()
+    }
+
+    #[test]
+    fn a_corner_behind_the_edge_of_a_closed_wall_has_come_through_one_side_of_it() {
+        let (min, max) = ([-0.05, -0.05, 0.04], [0.05, 0.05, 0.3]);
+        let closed = Shape::Box { min, max, open: Vec::new() };
+        let tube = Shape::Cylinder {
+            from: [0.0, 0.0, 0.04],
+            to: [0.0, 0.0, 0.3],
+            radius: 0.05,
+            closed: granulcal_scene::Ends::From,
+        };
+        for shape in [closed, tube] {
+            let walls = of_shapes(&[shape]);
+            let (inside, behind) = ([0.047, 0.0005, 0.0425], [0.0505, 0.0, 0.039]);
+            let [(depth, normal)] = behind_edges(&walls, inside, behind)[..] else { panic!() };
+            assert!((depth - 0.001).abs() < 1e-6 && (normal - Vector3::z()).norm() < 1e-12);
+            // Behind one of them alone it is nearest to that one, and needs no edge.
+            for to in [[0.0505, 0.0, 0.041], [0.049, 0.0, 0.039], [0.049, 0.0, 0.041]] {
+                assert_eq!(behind_edges(&walls, inside, to), []);
+            }
+            let is_passed = |from: [f64; 3], to: [f64; 3]| {
+                let through = |at| walls.is_passed(at, &from.into(), &to.into(), 0.0);
+                (1..walls.surfaces()).any(through)
+            };
+            assert!(is_passed(inside, behind) && is_passed(behind, inside));
+            assert!(
+                !is_passed(inside, [0.049, 0.0, 0.041]) && !is_passed(behind, [0.06, 0.0, 0.03])
+            );
+        }
+    }
+
+    #[test]
+    fn round_an_open_end_and_behind_a_bend_towards_the_grains_no_corner_has_come_through() {
+        let open = Shape::Box {
+            min: [-0.05, -0.05, 0.0],
+            max: [0.05, 0.05, 0.03],
+            open: vec![BoxSide::ZMax],
+        };
+        let over_the_edge = ([0.045, 0.0005, 0.028], [0.051, 0.0, 0.031]);
+        assert_eq!(behind_edges(&of_shapes(&[open]), over_the_edge.0, over_the_edge.1), []);
+        let walls = Walls::of(&Scene::funnel(0.12));
+        let funnel = Scene::funnel(0.12).funnel.unwrap();
+        let edge = Vector3::new(funnel.stem_radius, 0.0, funnel.height + funnel.stem_length);
+        let (above, behind) =
+            (edge + Vector3::new(-1e-3, 0.0, 3e-3), edge + Vector3::new(1e-3, 0.0, -1e-3));
+        assert_eq!(behind_edges(&walls, above.into(), behind.into()), []);
     }
 }

@@ -6,6 +6,12 @@ use serde::{Deserialize, Serialize};
 use crate::check::{finite, non_negative, positive};
 use crate::error::SceneError;
 
+/// How far a wall may turn in a substep `[rad]`.
+const LARGEST_TURN: f64 = 0.1;
+/// Fewest substeps in a period of a wall that swings `[-]`.
+const FEWEST_STEPS: f64 = 10.0;
+const ROUNDING: f64 = 1e-9;
+
 /// The motion of a wall from its stated place. Times are simulated times `[s]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
@@ -127,13 +133,42 @@ impl Motion {
         }
     }
 
-    /// Refuses a wall that jumps over grains: in a substep of `dt` `[s]` it may go as far as a grain is thick.
-    pub(crate) fn check_jumps(&self, name: &str, dt: f64, diameter: f64) -> Result<(), SceneError> {
-        if self.fastest() * dt <= diameter {
-            return Ok(());
+    /// The fastest that it turns `[rad/s]`.
+    fn fastest_turn(&self) -> f64 {
+        match self {
+            Self::Still {} | Self::Lift { .. } | Self::Shake { .. } => 0.0,
+            Self::Spin { rate, .. } => rate.abs(),
+            Self::Trajectory { knots, .. } => {
+                let rate = |pair: &[[f64; 8]]| {
+                    let turn = pose_of(&pair[0]).rotation.angle_to(&pose_of(&pair[1]).rotation);
+                    turn / (pair[1][0] - pair[0][0])
+                };
+                knots.windows(2).map(rate).fold(0.0, f64::max)
+            }
         }
-        let allowed = "at most a grain's diameter in a substep";
-        Err(SceneError::range(format!("{name}.motion (speed) [m/s]"), self.fastest(), allowed))
+    }
+
+    /// Refuses a wall that jumps over grains: in a substep of `dt` `[s]` it may go as far as a grain is thick, turn by
+    /// [`LARGEST_TURN`] and swing by a part of a period, so that the steps show how it moves.
+    pub(crate) fn check_jumps(&self, name: &str, dt: f64, diameter: f64) -> Result<(), SceneError> {
+        let refuse = |what: &str, got: f64, allowed: &'static str| {
+            Err(SceneError::range(format!("{name}.motion{what}"), got, allowed))
+        };
+        if self.fastest() * dt > diameter {
+            let allowed = "at most a grain's diameter in a substep";
+            return refuse(" (speed) [m/s]", self.fastest(), allowed);
+        }
+        if self.fastest_turn() * dt > LARGEST_TURN {
+            let allowed = "at most 0.1 rad in a substep, 200 rad/s with preset default";
+            return refuse(" (rate) [rad/s]", self.fastest_turn(), allowed);
+        }
+        match self {
+            &Self::Shake { frequency, .. } if frequency * dt * FEWEST_STEPS > 1.0 + ROUNDING => {
+                let allowed = "at most one period in ten substeps, 200 Hz with preset default";
+                refuse(".frequency", frequency, allowed)
+            }
+            _ => Ok(()),
+        }
     }
 
     pub(crate) fn check(&self, name: &str) -> Result<(), SceneError> {
@@ -277,6 +312,29 @@ mod tests {
         there[0] = 0.1;
         let slow = Motion::Trajectory { file: None, knots: vec![still, there] };
         slow.check_jumps("walls.2", dt, diameter).unwrap();
+    }
+
+    #[test]
+    fn a_wall_that_turns_or_swings_between_two_substeps_is_refused() {
+        let (dt, diameter) = (5e-4, 4e-3);
+        let (point, axis) = ([0.0; 3], [0.0, 0.0, 1.0]);
+        let spin = |rate| Motion::Spin { point, axis, rate, begin: 0.0, end: None };
+        let shake = |frequency| {
+            let amplitude = [1e-4, 0.0, 0.0];
+            Motion::Shake { amplitude, frequency, begin: 0.0, end: None }
+        };
+        // One turn a substep would look like none.
+        let whole = spin(std::f64::consts::TAU / dt);
+        let message = whole.check_jumps("walls.2", dt, diameter).unwrap_err().to_string();
+        assert!(
+            message.contains("walls.2.motion (rate)") && message.contains("12566"),
+            "{message}"
+        );
+        let message = shake(2000.0).check_jumps("walls.2", dt, diameter).unwrap_err().to_string();
+        assert!(message.contains("walls.2.motion.frequency"), "{message}");
+        for motion in [spin(-199.0), shake(200.0)] {
+            motion.check_jumps("walls.2", dt, diameter).unwrap();
+        }
     }
 
     #[test]

@@ -185,6 +185,16 @@ impl Scene {
         last.min(self.end.horizon)
     }
 
+    /// Whether a place `[m]` is at `time` `[s]` in the funnel where it hangs then, if there is one.
+    pub fn is_in_funnel(&self, place: &Vector3<f64>, time: f64) -> bool {
+        self.funnel.as_ref().is_some_and(|funnel| {
+            // It is hung aside and leant first, and moves from there.
+            let hung = funnel.motion.pose(time).inverse_transform_point(&(*place).into());
+            let pose = self.effects.funnel.of(funnel);
+            funnel.holds(&pose.map_or(hung, |pose| pose.inverse_transform_point(&hung)).coords)
+        })
+    }
+
     /// The balls that hold the grains, whichever way they are turned: the grains themselves if they are round.
     pub fn held_grains(&self) -> Grains {
         let diameter = match self.grains.solid() {
@@ -305,5 +315,24 @@ mod tests {
             change(&mut scene);
             assert!(scene.check().unwrap_err().to_string().contains(name), "{name}");
         }
+    }
+
+    #[test]
+    fn a_funnel_that_hangs_aside_and_turns_holds_what_is_in_it_there() {
+        let mut scene = Scene::funnel(0.12);
+        let funnel = scene.funnel.as_mut().unwrap();
+        let half_a_turn = 1.0;
+        funnel.motion = Motion::Spin {
+            point: [0.0; 3],
+            axis: [0.0, 0.0, 1.0],
+            rate: std::f64::consts::PI,
+            begin: 0.0,
+            end: Some(half_a_turn),
+        };
+        let above_tip = funnel.height + 0.5 * funnel.stem_length;
+        scene.effects.funnel.x = 0.05;
+        let is_in = |x: f64, time| scene.is_in_funnel(&Vector3::new(x, 0.0, above_tip), time);
+        assert!(is_in(0.05, 0.0) && !is_in(-0.05, 0.0));
+        assert!(is_in(-0.05, half_a_turn) && !is_in(0.05, half_a_turn));
     }
 }

@@ -103,10 +103,9 @@ impl Funnel {
         ]
     }
 
-    /// Whether a grain's centre `[m]` is at `time` `[s]` in the funnel: above its tip and within the stem, the cone or,
+    /// Whether a grain's centre `[m]` is in the funnel as it is stated: above its tip and within the stem, the cone or,
     /// above the rim, the rim's circle.
-    pub fn holds(&self, centre: &Vector3<f64>, time: f64) -> bool {
-        let centre = self.motion.pose(time).inverse_transform_point(&(*centre).into());
+    pub(crate) fn holds(&self, centre: &Vector3<f64>) -> bool {
         let rise = centre.z - self.height;
         let share = ((rise - self.stem_length) / self.cone_length).clamp(0.0, 1.0);
         let radius = self.stem_radius + share * (self.rim_radius - self.stem_radius);

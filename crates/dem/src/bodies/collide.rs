@@ -129,6 +129,15 @@ pub(super) fn at_walls(
             let near = walls.nearest(surface, &(body.centre + arm), now);
             // Beyond the end of a shell or a disc it is its rim that touches.
             let is_at_rim = near.side == 0 && near.distance > 0.0 && !wall.has_facets();
+            // Behind two surfaces that meet there it has come through one of them.
+            if near.side == 0 && near.distance > 0.0 {
+                let corner = body.centre + arm;
+                if let Some(passed) = walls.passed_at_end(surface, &body.centre, &corner, now) {
+                    let (normal, gap) = (passed.normal, -passed.depth);
+                    found.push(Point::at_wall(i, surface, wall, body, mark, normal, gap));
+                    return;
+                }
+            }
             if near.distance.is_infinite() || is_at_rim {
                 return;
             }

@@ -276,6 +276,38 @@ fn a_cube_over_a_rim_is_not_in_the_wall() {
     assert!((into_wall - wanted).abs() < 1e-7, "{into_wall}");
 }
 
+/// Tetrahedra that are thrown into the edges and corners of closed boxes and tubes stay in them.
+#[test]
+fn sharp_grains_stay_in_what_is_closed() {
+    let points = vec![[1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0]];
+    let half = 0.02;
+    let closed =
+        Shape::Box { min: [-half, -half, 0.04], max: [half, half, 0.08], open: Vec::new() };
+    let tube = Shape::Cylinder {
+        from: [0.0, 0.0, 0.04],
+        to: [0.0, 0.0, 0.08],
+        radius: half,
+        closed: Ends::Both,
+    };
+    for (shape, seed) in
+        [closed, tube].into_iter().flat_map(|s| (0..6).map(move |k| (s.clone(), k)))
+    {
+        let mut exam = Exam::new(GrainShape::Hull { points: points.clone() }, 0.3, 0.5);
+        let wall = Wall::fixed(shape, WallMaterial::default());
+        exam.walls = Walls::of(&Scene { walls: vec![wall], ..Scene::drop(0.1) });
+        exam.gravity = Vector3::new(6.0, 4.0, -GRAVITY);
+        let angle = |f: f64| 3.0 * (f * (f64::from(seed) + 1.0)).sin();
+        let turned = UnitQuaternion::from_euler_angles(angle(1.3), angle(2.1), angle(0.7));
+        let body = exam.put([0.0, 0.0, 0.06], turned);
+        for _ in 0..1000 {
+            exam.step();
+            let centre = exam.body(body).0;
+            let across = centre.x.abs().max(centre.y.abs());
+            assert!(across < half && (0.04..0.08).contains(&centre.z), "{seed}: {centre}");
+        }
+    }
+}
+
 /// Cubes that are thrown into a corner of each other, spinning: what an impact turns must not be turned through others.
 #[test]
 fn spinning_cubes_do_not_enter_each_other() {

@@ -112,14 +112,8 @@ impl Simulation {
     /// The grains that are in the funnel, if the scene has one.
     pub(super) fn in_funnel(&self) -> impl Iterator<Item = usize> {
         let scene = &self.origin.scene;
-        let (funnel, time) = (scene.funnel.as_ref(), self.time());
-        let pose = funnel.and_then(|funnel| scene.effects.funnel.of(funnel));
-        let seen = move |place: Vector3<f64>| {
-            pose.map_or(place, |pose| pose.inverse_transform_point(&place.into()).coords)
-        };
-        let is_held = move |grain| {
-            funnel.is_some_and(|f| f.holds(&seen(self.particles.position(grain)), time))
-        };
+        let time = self.time();
+        let is_held = move |grain| scene.is_in_funnel(&self.particles.position(grain), time);
         self.particles.present().filter(move |&grain| is_held(grain))
     }
 }

@@ -98,11 +98,13 @@ impl Simulation {
         let (sweeps, unconverged) = (step.sweeps, step.unconverged);
         watch.see_solve(&SolveInfo { sweeps, unconverged, ..SolveInfo::default() });
         for (grain, [centre, velocity, omega]) in bodies.motions().enumerate() {
+            let before = self.particles.position(grain);
             self.particles.spheres[grain] = Row::new(&centre, self.particles.radius(grain));
             self.particles.set_motion(grain, &velocity, &omega);
             let mut is_lost = false;
             around.walls.reached(&centre, radius, |surface| {
-                is_lost |= around.walls.nearest(surface, &centre, 0.0).distance < 0.0;
+                is_lost |= around.walls.nearest(surface, &centre, 0.0).distance < 0.0
+                    || around.walls.is_passed(surface, &before, &centre, dt);
             });
             watch.lost_mut()[grain] |= is_lost;
         }

@@ -17,7 +17,7 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation};
 use parry3d_f64::shape::{Triangle, TrianglePointLocation};
 
-use super::Nearest;
+use super::{Nearest, Passage};
 
 /// Shares of a triangle and sines of angles that are zero but for rounding `[-]`.
 const ROUNDING: f64 = 1e-9;
@@ -156,6 +156,50 @@ impl Facets {
         let height = offset.dot(&facet.normal);
         let side = if is_inside && height != 0.0 { height.signum() as i8 } else { 0 };
         Nearest { distance, normal, side, bends: !is_inside }
+    }
+
+    /// The way from one place to another, if it goes through one triangle and ends behind an edge or a corner that the
+    /// triangle shares with others, beyond them all.
+    pub fn passed_at_edge(
+        &self,
+        number: usize,
+        from: &Vector3<f64>,
+        to: &Vector3<f64>,
+    ) -> Option<Passage> {
+        let facet = &self.all[number];
+        let passage = self.passed(number, from, to)?;
+        let (point, location) =
+            facet.triangle.project_local_point_and_get_location(parry(to), false);
+        let offset = to - plain(point.point);
+        let is_behind = match location {
+            TrianglePointLocation::OnEdge(edge, _) => {
+                let Range { start, end } = facet.edges[edge as usize];
+                let across = &self.across[start as usize..end as usize];
+                !across.is_empty() && across.iter().all(|other| !falls(&offset, &other.inwards))
+            }
+            TrianglePointLocation::OnVertex(corner) => {
+                let leaving = &self.corners[facet.corners[corner as usize] as usize].leaving;
+                let leaving = &self.leaving[leaving.start as usize..leaving.end as usize];
+                let is_closed = facet.edges.iter().all(|edge| !edge.is_empty());
+                is_closed && leaving.iter().all(|edge| !falls(&offset, edge))
+            }
+            TrianglePointLocation::OnFace(..) | TrianglePointLocation::OnSolid => false,
+        };
+        is_behind.then_some(passage)
+    }
+
+    /// The way from one place to another, if it goes through one triangle.
+    pub fn passed(&self, number: usize, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<Passage> {
+        let Facet { triangle, normal, .. } = &self.all[number];
+        let [begin, end] = [from, to].map(|x| (x - plain(triangle.a)).dot(normal));
+        if begin * end >= 0.0 {
+            return None;
+        }
+        let crossing = parry(&(from + (to - from) * (begin / (begin - end))));
+        let size = (triangle.b - triangle.a).length() + (triangle.c - triangle.a).length();
+        let is_through = triangle.distance_to_local_point(crossing, false) <= ROUNDING * size;
+        let passage = Passage { depth: end.abs(), normal: begin.signum() * normal, beyond: None };
+        is_through.then_some(passage)
     }
 
     /// Whether the distance at this edge falls into no triangle across, and none of them comes first.

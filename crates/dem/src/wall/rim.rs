@@ -60,6 +60,14 @@ impl Rim {
         self.into.len() == 1
     }
 
+    /// Whether a place is beyond the ends of all surfaces that meet here.
+    pub fn ends_before(&self, place: &Vector3<f64>) -> bool {
+        let offset = place - self.centre;
+        let along = offset.dot(&self.axis);
+        let away = (offset - along * self.axis).norm() - self.radius;
+        self.into.iter().all(|into| into.x * along + into.y * away <= 0.0)
+    }
+
     /// Its point at an angle about the axis, and the unit direction away from the axis there.
     pub fn at(&self, [first, second]: &[Vector3<f64>; 2], angle: f64) -> [Vector3<f64>; 2] {
         let outward = angle.cos() * first + angle.sin() * second;

@@ -48,7 +48,38 @@ pub(crate) struct Nearest {
     pub bends: bool,
 }
 
+/// A straight way through a wall.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Passage {
+    /// How far its end is behind the surface, or what would go on beyond it there `[m]`.
+    pub depth: f64,
+    /// Unit, away from the surface on the side on which the way begins.
+    pub normal: Vector3<f64>,
+    /// The circle beyond which its end is, if it is beyond an end of the surface: centre and radius `[m]`.
+    pub beyond: Option<(Vector3<f64>, f64)>,
+}
+
 impl Surface {
+    /// The way from one place to another, if it goes through a shell or a disc.
+    pub fn passed(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<Passage> {
+        match self {
+            Self::Plane { .. } => None,
+            Self::Frustum(shell) => shell.passed(from, to),
+            Self::Disc { centre, normal, radius } => {
+                let [begin, end] = [from, to].map(|x| (x - centre).dot(normal));
+                let crossing = from + (to - from) * (begin / (begin - end));
+                let is_through = begin * end < 0.0 && (crossing - centre).norm() <= *radius;
+                let foot = to - end * normal;
+                let beyond = ((foot - centre).norm() > *radius).then_some((*centre, *radius));
+                is_through.then(|| Passage {
+                    depth: end.abs(),
+                    normal: begin.signum() * normal,
+                    beyond,
+                })
+            }
+        }
+    }
+
     /// The nearest point to `centre`.
     pub fn nearest(&self, centre: &Vector3<f64>) -> Nearest {
         match self {
@@ -151,6 +182,35 @@ impl Frustum {
         if way <= along && along <= length - way {
             return None;
         }
+        self.beyond(self.crossing(from, to)?)
+    }
+
+    fn passed(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<Passage> {
+        if self.beyond(self.crossing(from, to)?).is_some() {
+            return None;
+        }
+        let (end, outward) = self.seen(to);
+        let length = self.generator.norm();
+        let height = self.generator.perp(&end) / length;
+        // Towards the side where the way begins, across the generator.
+        let back = Vector2::new(self.generator.y, -self.generator.x) * (height.signum() / length);
+        let normal = back.x * self.axis + back.y * outward;
+        let share = end.dot(&self.generator) / self.generator.norm_squared();
+        Some(Passage { depth: height.abs(), normal, beyond: self.beyond(share) })
+    }
+
+    /// The circle at the end beyond which a share of the generator is, if it is beyond one.
+    fn beyond(&self, share: f64) -> Option<(Vector3<f64>, f64)> {
+        let [at_begin, at_end] = self.ends();
+        match share {
+            share if share < 0.0 => Some(at_begin),
+            share if share > 1.0 => Some(at_end),
+            _ => None,
+        }
+    }
+
+    /// Where a way goes through the shell or what would go on beyond its ends, as a share of the generator.
+    fn crossing(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<f64> {
         let is_outside = |x: &Vector3<f64>| self.generator.perp(&self.seen(x).0) > 0.0;
         let begin = is_outside(from);
         if is_outside(to) == begin {
@@ -161,13 +221,7 @@ impl Frustum {
             let middle = 0.5 * (before + after);
             *(if is_outside(&middle) == begin { &mut before } else { &mut after }) = middle;
         }
-        let share = self.seen(&after).0.dot(&self.generator) / self.generator.norm_squared();
-        let [at_begin, at_end] = self.ends();
-        match share {
-            share if share < 0.0 => Some(at_begin),
-            share if share > 1.0 => Some(at_end),
-            _ => None,
-        }
+        Some(self.seen(&after).0.dot(&self.generator) / self.generator.norm_squared())
     }
 
     /// The nearest point whoever owns it, and where along the generator it would be.

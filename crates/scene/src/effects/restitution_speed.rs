@@ -45,7 +45,9 @@ impl Effect for RestitutionSpeed {
 impl RestitutionSpeed {
     /// The restitution of an impact at `speed` `[m/s]`.
     pub fn at(&self, restitution: f64, speed: f64) -> f64 {
-        (restitution * (speed / self.reference).powf(-self.exponent)).min(1.0)
+        // None stays none, whatever the power.
+        let scaled = restitution * (speed / self.reference).powf(-self.exponent);
+        if restitution > 0.0 { scaled.min(1.0) } else { 0.0 }
     }
 }
 
@@ -59,5 +61,6 @@ mod tests {
         assert_eq!(plastic.at(0.6, 1.0), 0.6);
         assert!((plastic.at(0.6, 16.0) - 0.3).abs() < 1e-15);
         assert_eq!(plastic.at(0.6, 1e-4), 1.0);
+        assert_eq!(RestitutionSpeed { exponent: 1e4, reference: 1.0 }.at(0.0, 0.1), 0.0);
     }
 }
