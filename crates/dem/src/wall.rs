@@ -431,6 +431,12 @@ mod tests {
             max: [0.05, 0.05, 0.03],
             open: vec![BoxSide::ZMax],
         };
+        // Its lower edges and corners are shared.
+        let (inside, behind) = ([0.048, 0.047, 0.003], [0.0505, 0.0506, -0.0007]);
+        let [(depth, _)] = behind_edges(&of_shapes(&[open.clone()]), inside, behind)[..] else {
+            panic!()
+        };
+        assert!(depth > 4e-4);
         let over_the_edge = ([0.045, 0.0005, 0.028], [0.051, 0.0, 0.031]);
         assert_eq!(behind_edges(&of_shapes(&[open]), over_the_edge.0, over_the_edge.1), []);
         let walls = Walls::of(&Scene::funnel(0.12));

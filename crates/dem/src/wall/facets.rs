@@ -180,7 +180,9 @@ impl Facets {
             TrianglePointLocation::OnVertex(corner) => {
                 let leaving = &self.corners[facet.corners[corner as usize] as usize].leaving;
                 let leaving = &self.leaving[leaving.start as usize..leaving.end as usize];
-                let is_closed = facet.edges.iter().all(|edge| !edge.is_empty());
+                // The edges AB, BC and CA that end there.
+                let ends = [corner, (corner + 2) % 3];
+                let is_closed = ends.into_iter().all(|edge| !facet.edges[edge as usize].is_empty());
                 is_closed && leaving.iter().all(|edge| !falls(&offset, edge))
             }
             TrianglePointLocation::OnFace(..) | TrianglePointLocation::OnSolid => false,
