@@ -433,7 +433,9 @@ mod tests {
         };
         // Its lower edges and corners are shared.
         let (inside, behind) = ([0.048, 0.047, 0.003], [0.0505, 0.0506, -0.0007]);
-        let [(depth, _)] = behind_edges(&of_shapes(&[open.clone()]), inside, behind)[..] else {
+        let [(depth, _)] =
+            behind_edges(&of_shapes(std::slice::from_ref(&open)), inside, behind)[..]
+        else {
             panic!()
         };
         assert!(depth > 4e-4);
