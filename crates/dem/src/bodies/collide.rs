@@ -128,9 +128,10 @@ pub(super) fn at_walls(
             let arm = body.axes * mark;
             let near = walls.nearest(surface, &(body.centre + arm), now);
             // Beyond the end of a shell or a disc it is its rim that touches.
-            let is_at_rim = near.side == 0 && near.distance > 0.0 && !wall.has_facets();
+            let is_beyond = near.side == 0 && near.distance > 0.0;
+            let is_at_rim = is_beyond && !wall.has_facets();
             // Behind two surfaces that meet there it has come through one of them.
-            if near.side == 0 && near.distance > 0.0 {
+            if is_beyond {
                 let corner = body.centre + arm;
                 if let Some(passed) = walls.passed_at_end(surface, &body.centre, &corner, now) {
                     let (normal, gap) = (passed.normal, -passed.depth);

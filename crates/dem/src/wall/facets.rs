@@ -17,6 +17,7 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation};
 use parry3d_f64::shape::{Triangle, TrianglePointLocation};
 
+use super::surface::crossing_of_plane;
 use super::{Nearest, Passage};
 
 /// Shares of a triangle and sines of angles that are zero but for rounding `[-]`.
@@ -173,17 +174,14 @@ impl Facets {
         let offset = to - plain(point.point);
         let is_behind = match location {
             TrianglePointLocation::OnEdge(edge, _) => {
-                let Range { start, end } = facet.edges[edge as usize];
-                let across = &self.across[start as usize..end as usize];
+                let across = self.across(number, edge);
                 !across.is_empty() && across.iter().all(|other| !falls(&offset, &other.inwards))
             }
             TrianglePointLocation::OnVertex(corner) => {
-                let leaving = &self.corners[facet.corners[corner as usize] as usize].leaving;
-                let leaving = &self.leaving[leaving.start as usize..leaving.end as usize];
                 // The edges AB, BC and CA that end there.
-                let ends = [corner, (corner + 2) % 3];
-                let is_closed = ends.into_iter().all(|edge| !facet.edges[edge as usize].is_empty());
-                is_closed && leaving.iter().all(|edge| !falls(&offset, edge))
+                let mut ends = [corner, (corner + 2) % 3].into_iter();
+                ends.all(|edge| !self.across(number, edge).is_empty())
+                    && self.leaving(number, corner).iter().all(|edge| !falls(&offset, edge))
             }
             TrianglePointLocation::OnFace(..) | TrianglePointLocation::OnSolid => false,
         };
@@ -193,11 +191,8 @@ impl Facets {
     /// The way from one place to another, if it goes through one triangle.
     pub fn passed(&self, number: usize, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<Passage> {
         let Facet { triangle, normal, .. } = &self.all[number];
+        let crossing = parry(&crossing_of_plane(&plain(triangle.a), normal, from, to)?);
         let [begin, end] = [from, to].map(|x| (x - plain(triangle.a)).dot(normal));
-        if begin * end >= 0.0 {
-            return None;
-        }
-        let crossing = parry(&(from + (to - from) * (begin / (begin - end))));
         let size = (triangle.b - triangle.a).length() + (triangle.c - triangle.a).length();
         let is_through = triangle.distance_to_local_point(crossing, false) <= ROUNDING * size;
         let passage = Passage { depth: end.abs(), normal: begin.signum() * normal, beyond: None };
@@ -206,8 +201,7 @@ impl Facets {
 
     /// Whether the distance at this edge falls into no triangle across, and none of them comes first.
     fn owns_edge(&self, number: usize, edge: u32, offset: &Vector3<f64>) -> bool {
-        let Range { start, end } = self.all[number].edges[edge as usize];
-        self.across[start as usize..end as usize]
+        self.across(number, edge)
             .iter()
             .all(|across| across.facet as usize > number && !falls(offset, &across.inwards))
     }
@@ -231,10 +225,21 @@ impl Facets {
 
     /// Whether the distance at this corner falls along no edge, and no other triangle with it comes first.
     fn owns_corner(&self, number: usize, corner: u32, offset: &Vector3<f64>) -> bool {
-        let Corner { owner, leaving } =
-            &self.corners[self.all[number].corners[corner as usize] as usize];
-        let leaving = &self.leaving[leaving.start as usize..leaving.end as usize];
-        *owner as usize == number && leaving.iter().all(|edge| !falls(offset, edge))
+        let owner = self.corners[self.all[number].corners[corner as usize] as usize].owner;
+        owner as usize == number
+            && self.leaving(number, corner).iter().all(|edge| !falls(offset, edge))
+    }
+
+    /// What lies across an edge of a triangle.
+    fn across(&self, number: usize, edge: u32) -> &[Across] {
+        let Range { start, end } = self.all[number].edges[edge as usize];
+        &self.across[start as usize..end as usize]
+    }
+
+    /// Directions in which edges leave a corner of a triangle.
+    fn leaving(&self, number: usize, corner: u32) -> &[Vector3<f64>] {
+        let corner = &self.corners[self.all[number].corners[corner as usize] as usize];
+        &self.leaving[corner.leaving.start as usize..corner.leaving.end as usize]
     }
 
     /// Whether a triangle is nearer than `range` `[m]`.

@@ -64,7 +64,11 @@ impl Rim {
     pub fn ends_before(&self, place: &Vector3<f64>) -> bool {
         let offset = place - self.centre;
         let along = offset.dot(&self.axis);
-        let away = (offset - along * self.axis).norm() - self.radius;
+        self.leads_off(along, (offset - along * self.axis).norm() - self.radius)
+    }
+
+    /// Whether a way along the axis and away from it leads into none of the surfaces.
+    fn leads_off(&self, along: f64, away: f64) -> bool {
         self.into.iter().all(|into| into.x * along + into.y * away <= 0.0)
     }
 
@@ -77,8 +81,7 @@ impl Rim {
     /// Whether a thing that lies towards `normal` of the rim's point touches the rim and not a surface beside it: into
     /// each of them the way leads off it.
     pub fn holds(&self, outward: &Vector3<f64>, normal: &Vector3<f64>) -> bool {
-        let (along, away) = (normal.dot(&self.axis), normal.dot(outward));
-        self.into.iter().all(|into| into.x * along + into.y * away <= 0.0)
+        self.leads_off(normal.dot(&self.axis), normal.dot(outward))
     }
 }
 

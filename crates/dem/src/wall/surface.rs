@@ -66,12 +66,11 @@ impl Surface {
             Self::Plane { .. } => None,
             Self::Frustum(shell) => shell.passed(from, to),
             Self::Disc { centre, normal, radius } => {
+                let crossing = crossing_of_plane(centre, normal, from, to)?;
+                let is_beyond = |x: &Vector3<f64>| (x - centre).norm() > *radius;
                 let [begin, end] = [from, to].map(|x| (x - centre).dot(normal));
-                let crossing = from + (to - from) * (begin / (begin - end));
-                let is_through = begin * end < 0.0 && (crossing - centre).norm() <= *radius;
-                let foot = to - end * normal;
-                let beyond = ((foot - centre).norm() > *radius).then_some((*centre, *radius));
-                is_through.then(|| Passage {
+                let beyond = is_beyond(&(to - end * normal)).then_some((*centre, *radius));
+                (!is_beyond(&crossing)).then(|| Passage {
                     depth: end.abs(),
                     normal: begin.signum() * normal,
                     beyond,
@@ -106,10 +105,8 @@ impl Surface {
             Self::Plane { .. } => None,
             Self::Frustum(shell) => shell.leads_round(from, to),
             Self::Disc { centre, normal, radius } => {
-                let [begin, end] = [from, to].map(|x| (x - centre).dot(normal));
-                let crossing = from + (to - from) * (begin / (begin - end));
-                let is_beyond = (crossing - centre).norm() > *radius;
-                (begin * end < 0.0 && is_beyond).then_some((*centre, *radius))
+                let crossing = crossing_of_plane(centre, normal, from, to)?;
+                ((crossing - centre).norm() > *radius).then_some((*centre, *radius))
             }
         }
     }
@@ -239,6 +236,17 @@ impl Frustum {
         let normal = direction.x * self.axis + direction.y * outward;
         (Nearest { distance, normal, side, bends: true }, share)
     }
+}
+
+/// Where the way from one place to another crosses a plane, if it does.
+pub(super) fn crossing_of_plane(
+    point: &Vector3<f64>,
+    normal: &Vector3<f64>,
+    from: &Vector3<f64>,
+    to: &Vector3<f64>,
+) -> Option<Vector3<f64>> {
+    let [begin, end] = [from, to].map(|x| (x - point).dot(normal));
+    (begin * end < 0.0).then(|| from + (to - from) * (begin / (begin - end)))
 }
 
 fn nearest_of_disc(
