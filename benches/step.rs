@@ -109,7 +109,7 @@ fn set_p_to_rest(criterion: &mut Criterion) {
 fn sweeps(criterion: &mut Criterion) {
     let mut flow = simulation(&set_p());
     flow.advance(FULL);
-    let problem = flow.frozen_solve();
+    let problem = flow.frozen_solve().expect("balls");
     let settings = SolverSettings {
         sweeps: SWEEPS,
         max_sweeps: SWEEPS,
@@ -133,7 +133,7 @@ fn pair_list(criterion: &mut Criterion) {
     for (name, seconds) in [("flow", FULL), ("rest", scene.end.horizon)] {
         let mut pour = simulation(&scene);
         pour.advance(seconds);
-        let mut search = pour.frozen_search();
+        let mut search = pour.frozen_search().expect("balls");
         group.bench_function(name, |b| b.iter(|| search.pairs()));
     }
     group.finish();

@@ -82,7 +82,7 @@ fn table(dt: f64) -> Result<(), DemError> {
     let mut problems = Vec::new();
     for time in TIMES {
         pour.advance(time - pour.time());
-        problems.push(pour.frozen_solve());
+        problems.push(pour.frozen_solve()?);
     }
     let counts: Vec<String> = problems.iter().map(|p| p.contact_count().to_string()).collect();
     println!("\ndt = 1/{:.0} s; {} contacts\n", 1.0 / dt, counts.join(" and "));

@@ -56,7 +56,7 @@ use crate::turns::turns;
 use crate::wall::Walls;
 use around::Around;
 use body::{Moving, RigidBody};
-use contact::{Name, Point};
+use contact::{Name, Other, Point};
 use corners::Corners;
 use granulcal_scene::Material;
 use granulcal_scene::Scene;
@@ -83,6 +83,14 @@ type Mark = (Name, [f64; 3], [f64; 3]);
 pub(crate) struct BodiesState {
     all: Vec<RigidBody>,
     known: Vec<Mark>,
+}
+
+/// What a body is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Within {
+    /// A surface of the walls.
+    Wall(usize),
+    Body(usize),
 }
 
 /// What a substep has done.
@@ -189,6 +197,25 @@ impl Bodies {
         }
         (self.all, self.known) = (state.all, state.known);
         Ok(())
+    }
+
+    /// How deep bodies are in walls and in each other as they are: body, what it is in, depth `[m]`.
+    pub fn overlaps(&self, walls: &Walls, material: &Material) -> Vec<(usize, Within, f64)> {
+        let (solid, corners, small) = (&*self.solid, self.corners.as_ref(), &self.small);
+        // At rest: only what is now.
+        let around = Around { solid, corners, walls, material, dt: 0.0, may_close: 0.0, small };
+        let still = |body: &RigidBody| Moving::of(body, solid);
+        let bodies: Vec<_> = self.all.iter().map(still).collect();
+        let mut neighbours = Neighbours::default();
+        let points = collide::contacts(&around, &bodies, &mut neighbours, Vec::new()).points;
+        let of = |point: &Point| {
+            let within = match point.other {
+                Other::Wall { surface, .. } => Within::Wall(surface as usize),
+                Other::Body { j, .. } => Within::Body(j as usize),
+            };
+            (point.i(), within, -point.gap)
+        };
+        points.iter().filter(|point| point.gap < 0.0).map(of).collect()
     }
 
     /// One substep: gravity, points of contact, impacts, sweeps, motion.

@@ -27,6 +27,24 @@ pub enum DemError {
         /// How deep one may be.
         allowed: f64,
     },
+    /// Grains start inside each other.
+    #[error(
+        "{pairs} pair(s) of grains start in each other, grains {} and {} (from 0) the deepest by {} of a radius; at most \
+         {} is allowed",
+        deepest.0, deepest.1,
+        General((depth * 1e3).round() / 1e3),
+        General(*allowed)
+    )]
+    StartInEachOther {
+        /// How many pairs.
+        pairs: usize,
+        /// Numbers of the grains of the deepest.
+        deepest: (usize, usize),
+        /// How deep the deepest is, in radii of the smaller.
+        depth: f64,
+        /// How deep one may be.
+        allowed: f64,
+    },
     /// Grains would leave the scene before they have moved.
     #[error(
         "{grains} grain(s) start below outflow.below = {} m, where they would leave at once; at most 0 is allowed",
@@ -116,6 +134,14 @@ pub enum DemError {
     CheckpointState {
         /// What is wrong.
         what: &'static str,
+    },
+    /// What cannot be told of a scene with an effect, or with grains of a shape.
+    #[error("{what} cannot be told of a scene with {effect}")]
+    Untold {
+        /// What was asked for.
+        what: &'static str,
+        /// The table of it in the scene.
+        effect: &'static str,
     },
     /// An effect that a contact problem cannot say when it is written by itself.
     #[error("a contact problem cannot be written of a scene with {effect}")]

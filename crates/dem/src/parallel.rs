@@ -36,7 +36,7 @@ impl Threads {
     /// Runs `work` as one of the threads: loops inside it start without waking another first.
     pub fn run<V: Send>(&self, work: impl FnOnce() -> V + Send) -> V {
         match self.0.as_deref() {
-            Some(pool) => pool.install(work),
+            Some(pool) => install(pool, work),
             None => work(),
         }
     }
@@ -57,7 +57,7 @@ impl Threads {
         match self.pool_for(items.len(), share) {
             None => work(items),
             Some(pool) => {
-                pool.install(|| items.par_chunks_mut(share).map(&work).reduce(V::default, &join))
+                install(pool, || items.par_chunks_mut(share).map(&work).reduce(V::default, &join))
             }
         }
     }
@@ -85,7 +85,7 @@ impl Threads {
             slices.push(slice);
             rest = after;
         }
-        pool.install(|| slices.into_par_iter().map(&work).reduce(V::default, &join))
+        install(pool, || slices.into_par_iter().map(&work).reduce(V::default, &join))
     }
 
     /// Calls `work` for shares of `items` and appends what it finds to `found`; returns what `join` makes of the
@@ -106,7 +106,7 @@ impl Threads {
             let value = work(items, &mut found);
             (found, value)
         };
-        let shares: Vec<_> = pool.install(|| items.par_chunks_mut(share).map(of_share).collect());
+        let shares: Vec<_> = install(pool, || items.par_chunks_mut(share).map(of_share).collect());
         shares.into_iter().fold(V::default(), |all, (mut of_share, value)| {
             found.append(&mut of_share);
             join(all, value)
@@ -130,16 +130,56 @@ impl Threads {
             found
         };
         let shares = 0..count.div_ceil(share);
-        let shares: Vec<_> = pool.install(|| shares.into_par_iter().map(of_share).collect());
+        let shares: Vec<_> = install(pool, || shares.into_par_iter().map(of_share).collect());
         for mut of_share in shares {
             found.append(&mut of_share);
         }
     }
 }
 
+/// Lets the pool do `work` while the calling thread sleeps.
+///
+/// A thread of another pool, the caller's, would not sleep: it would take up the next task of its own, another
+/// simulation, which waits in its turn, one on the stack of the other. A thread between the two waits in its place.
+fn install<V: Send>(pool: &ThreadPool, work: impl FnOnce() -> V + Send) -> V {
+    let is_of_another =
+        rayon::current_thread_index().is_some() && pool.current_thread_index().is_none();
+    if !is_of_another {
+        return pool.install(work);
+    }
+    let done = std::thread::scope(|scope| scope.spawn(|| pool.install(work)).join());
+    done.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pool_that_waits_takes_up_no_other_simulation() {
+        let threads = Threads::new(2).unwrap();
+        let outer = ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        let deepest = outer.install(|| {
+            (0..64_usize)
+                .into_par_iter()
+                .map(|_| {
+                    let depth = DEPTH.get() + 1;
+                    DEPTH.set(depth);
+                    for _ in 0..10 {
+                        threads.run(|| std::thread::sleep(std::time::Duration::from_micros(200)));
+                    }
+                    DEPTH.set(depth - 1);
+                    depth
+                })
+                .max()
+        });
+        assert_eq!(deepest, Some(1));
+    }
+
+    thread_local! {
+        /// How many simulations are at work on the stack of a thread.
+        static DEPTH: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+    }
 
     #[test]
     fn shares_are_put_together_in_their_order() {

@@ -119,9 +119,14 @@ impl Simulation {
     /// Settings other than the preset's, for convergence studies.
     ///
     /// # Errors
-    /// [`DemError::Scene`] for a step, margin or bound that is not positive, or a count of 0.
+    /// [`DemError::Scene`] for a step, margin or bound that is not positive, or a count of 0; for another substep than
+    /// that of the substeps that have been taken, which tell the time.
     pub fn with_settings(mut self, settings: SolverSettings) -> Result<Self, DemError> {
         settings.check()?;
+        if self.substep > 0 && settings.dt.to_bits() != self.around.settings.dt.to_bits() {
+            let allowed = "as before once a substep has been taken";
+            return Err(DemError::range("settings.dt", settings.dt, allowed));
+        }
         self.origin.scene.effects.check_method(settings.method)?;
         self.around.set_settings(settings);
         Ok(self)
@@ -137,6 +142,16 @@ impl Simulation {
         Ok(self)
     }
 
+    /// What is simulated.
+    pub fn scene(&self) -> &Scene {
+        &self.origin.scene
+    }
+
+    /// What the start was drawn by.
+    pub fn seed(&self) -> u64 {
+        self.origin.seed
+    }
+
     /// The solver's settings: the preset's, unless they were replaced.
     pub fn settings(&self) -> &SolverSettings {
         &self.around.settings
@@ -147,7 +162,15 @@ impl Simulation {
         self.substep as f64 * self.around.settings.dt
     }
 
-    /// Centres of the grains `[m]`; as velocities and radii, of those that have not left the scene.
+    /// The number that each grain had at the start, from 0, of those that have not left the scene: what stands at one place
+    /// of [`Simulation::positions`], velocities and radii is of this grain, however many have left before it. Of grains
+    /// that are several spheres these are all spheres, of one grain after the other.
+    pub fn numbers(&self) -> Vec<usize> {
+        self.particles.present().collect()
+    }
+
+    /// Centres of the grains `[m]`, of their spheres where they are several; as velocities and radii, of those that have
+    /// not left the scene. [`Simulation::numbers`] tells which they are.
     pub fn positions(&self) -> Vec<Vector3<f64>> {
         self.particles.present().map(|grain| self.particles.position(grain)).collect()
     }
@@ -236,7 +259,11 @@ impl Simulation {
 
     /// What the grains press on every wall with in the last substep: the ground first, then the funnel's cone
     /// and stem if there is one, then the scene's walls in their order. See [`WallLoad`].
-    pub fn wall_loads(&self) -> Vec<WallLoad> {
+    ///
+    /// # Errors
+    /// [`DemError::Untold`] for grains with a shape, whose impulses are not kept.
+    pub fn wall_loads(&self) -> Result<Vec<WallLoad>, DemError> {
+        self.require_balls("the load of a wall")?;
         let dt = self.around.settings.dt;
         let walls = &self.around.walls;
         let mut loads = wall_load::of(&self.contacts.at_walls, walls, dt);
@@ -245,7 +272,13 @@ impl Simulation {
             load.force += through_layer.force;
             load.normal_force += through_layer.normal_force;
         }
-        loads
+        Ok(loads)
+    }
+
+    /// Refuses to tell `what` of grains with a shape, which have a substep of their own.
+    fn require_balls(&self, what: &'static str) -> Result<(), DemError> {
+        let effect = "grains.shape";
+        if self.bodies.is_some() { Err(DemError::Untold { what, effect }) } else { Ok(()) }
     }
 
     /// How the pour ended, once it has.
@@ -263,9 +296,11 @@ impl Simulation {
         self.impacts.work
     }
 
-    /// Simulates `seconds`, or less if the pour ends before.
+    /// Simulates `seconds`, rounded to whole substeps, or less if the pour ends before; to its end for infinity. Nothing
+    /// is simulated for less than half a substep, nor for a negative number or NaN.
     pub fn advance(&mut self, seconds: f64) {
-        let last = self.substep + (seconds / self.around.settings.dt).round() as usize;
+        let substeps = (seconds / self.around.settings.dt).round() as usize;
+        let last = self.substep.saturating_add(substeps);
         while self.ended.is_none() && self.substep < last {
             self.step();
         }

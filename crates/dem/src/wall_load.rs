@@ -34,6 +34,8 @@ pub(crate) fn of(at_walls: &ContactSet, walls: &Walls, dt: f64) -> Vec<WallLoad>
 
 #[cfg(test)]
 mod tests {
+    use granulcal_scene::GrainShape;
+
     use super::*;
     use crate::{GRAVITY, Material, Scene, Shape, Simulation, Start, Wall, WallMaterial};
 
@@ -44,7 +46,7 @@ mod tests {
         scene.start = Start::Positions { positions: vec![position] };
         let mut simulation = Simulation::new(scene, 1).unwrap();
         simulation.advance(0.5);
-        simulation.wall_loads()
+        simulation.wall_loads().unwrap()
     }
 
     #[test]
@@ -56,6 +58,22 @@ mod tests {
         assert_eq!(loads.len(), 1);
         assert!((loads[0].force - Vector3::from(scene.gravity)).norm() < 1e-9, "{loads:?}");
         assert!((loads[0].normal_force - 9.0).abs() < 1e-9, "{loads:?}");
+    }
+
+    #[test]
+    fn a_grain_of_two_spheres_weighs_as_one_and_of_a_shape_nothing_is_told() {
+        let mut scene = Scene::drop(0.1);
+        scene.material = Material::new(0.5, 1.0, 0.0).unwrap();
+        scene.effects.clump.aspect = 1.5;
+        let loads = loads(&mut scene, [0.0, 0.0, 0.003]);
+        assert!((loads[0].normal_force / GRAVITY - 1.0).abs() < 1e-3, "{loads:?}");
+        scene.effects.clump.aspect = 1.0;
+        scene.grains.shape = Some(GrainShape::Cylinder { aspect: 1.0 });
+        let error = Simulation::new(&scene, 1).unwrap().wall_loads().unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the load of a wall cannot be told of a scene with grains.shape"
+        );
     }
 
     #[test]

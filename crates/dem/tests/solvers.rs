@@ -69,7 +69,7 @@ fn column() -> FrozenSolve {
     scene.preset = Preset::Paper;
     scene.start =
         Start::Grid { counts, spacing: 2.0 * radius + apart, jitter: 0.0, base: radius + apart };
-    Simulation::new(&scene, 1).expect("a valid scene").frozen_solve()
+    Simulation::new(&scene, 1).expect("a valid scene").frozen_solve().expect("balls")
 }
 
 /// A heap of 80 grains as it falls apart, with the impulses of the substep before.
@@ -85,7 +85,7 @@ fn heap_of(grains: Material) -> FrozenSolve {
     let pour = Simulation::new(&scene, 1).expect("a valid scene");
     let mut pour = pour.with_settings(gauss_seidel(40)).expect("valid settings");
     pour.advance(0.1);
-    pour.frozen_solve()
+    pour.frozen_solve().expect("balls")
 }
 
 #[test]

@@ -130,6 +130,14 @@ pub enum SceneError {
     /// The prior could not be written as TOML.
     #[error("the prior cannot be written as TOML")]
     PriorTomlWrite(#[source] Box<toml::ser::Error>),
+    /// Another number of values than a prior has parameters, fixed ones included.
+    #[error("a prior of {expected} parameters needs a value for each, got {got}")]
+    Values {
+        /// How many are given.
+        got: usize,
+        /// How many it needs.
+        expected: usize,
+    },
     /// A parameter of a prior is wrong.
     #[error("prior of {parameter:?}: {what} must be {allowed}, got {got}")]
     Prior {

@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use crate::check::positive;
+use crate::error::SceneError;
 use crate::grain_shape::{GrainShape, Solid};
 
 /// Grains that a volume may stand for; no machine holds as many.
@@ -93,6 +95,27 @@ impl Grains {
         Self { count, volume: None, diameter, density, shape: None }
     }
 
+    /// Whether there can be such grains, and as many as their volume says where one is stated.
+    ///
+    /// # Errors
+    /// [`SceneError::OutOfRange`]; [`SceneError::Exclude`] for a volume of grains that have a shape.
+    pub(crate) fn check(&self) -> Result<(), SceneError> {
+        positive("grains.diameter", self.diameter)?;
+        positive("grains.density", self.density)?;
+        let Some(volume) = self.volume else { return Ok(()) };
+        if self.shape.is_some() {
+            return Err(SceneError::Exclude { one: "grains.volume", other: "grains.shape" });
+        }
+        let Ok(count) = count_of(volume, self.diameter) else {
+            return Err(SceneError::range("grains.volume", volume, "that of 1 to 1e12 grains"));
+        };
+        if count == self.count {
+            return Ok(());
+        }
+        let allowed = "the number of grains whose volume is grains.volume, where that is stated";
+        Err(SceneError::range("grains.count", self.count as f64, allowed))
+    }
+
     /// Radius of a grain `[m]`.
     pub fn radius(&self) -> f64 {
         0.5 * self.diameter
@@ -135,6 +158,32 @@ mod tests {
         let more = scene.with("grains.volume", 1500.0 * each).unwrap();
         assert_eq!(more.grains.count, 1500);
         assert!(!more.to_toml().unwrap().contains("count"));
+    }
+
+    #[test]
+    fn a_count_that_is_not_its_volumes_is_refused() {
+        let each = PI / 6.0 * 4e-3_f64.powi(3);
+        let good = of_volume(&format!("volume = {:e}", 1000.0 * each)).unwrap();
+        for (change, reason) in [
+            (
+                (|g: &mut Grains| g.count = 999) as fn(&mut Grains),
+                "grains.count must be the number",
+            ),
+            (|g| g.diameter = 3e-3, "got 1000"),
+            (|g| g.volume = Some(f64::NAN), "grains.volume must be"),
+            (
+                |g| {
+                    let aspect = [1.0, 1.0, 2.0];
+                    g.shape = Some(GrainShape::Box { aspect });
+                },
+                "grains.volume and grains.shape",
+            ),
+        ] {
+            let mut scene = good.clone();
+            change(&mut scene.grains);
+            let error = scene.check().unwrap_err().to_string();
+            assert!(error.contains(reason), "{error}");
+        }
     }
 
     #[test]

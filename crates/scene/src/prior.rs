@@ -184,8 +184,12 @@ impl Prior {
     /// The scene with these values of the parameters.
     ///
     /// # Errors
-    /// [`SceneError`] if the scene refuses them.
+    /// [`SceneError`] if the scene refuses them; [`SceneError::Values`] for another number of them than of parameters.
     pub fn apply(&self, scene: &Scene, values: &[f64]) -> Result<Scene, SceneError> {
+        let (got, expected) = (values.len(), self.parameters.len());
+        if got != expected {
+            return Err(SceneError::Values { got, expected });
+        }
         let changes: Vec<_> = self.names().into_iter().zip(values.iter().copied()).collect();
         let mut scene = scene.clone();
         scene.set(&changes)?;
@@ -270,6 +274,10 @@ mod tests {
         assert_eq!(prior.free(), [0, 1, 2]);
         let values = prior.sample(5, 9);
         let scene = prior.apply(&Scene::funnel(0.12), &values).unwrap();
+        for wrong in [&values[1..], &[&values[..], &[0.5]].concat()] {
+            let error = prior.apply(&Scene::funnel(0.12), wrong).unwrap_err();
+            assert!(error.to_string().contains("of 4 parameters needs"), "{error}");
+        }
         assert_eq!(scene.material.sliding_friction, values[0]);
         assert_eq!(scene.funnel.unwrap().height, values[1]);
         assert_eq!(scene.material.restitution, 0.4);

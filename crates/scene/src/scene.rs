@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::bed::Bed;
 use crate::camera::CameraSpec;
-use crate::check::{finite, positive};
+use crate::check::finite;
 use crate::effects::{Effect as _, Effects};
 use crate::end::EndRule;
 use crate::error::SceneError;
@@ -244,8 +244,7 @@ impl Scene {
     /// [`SceneError::OutOfRange`] or [`SceneError::StartTooSmall`].
     pub fn check(&self) -> Result<(), SceneError> {
         self.material.check("material")?;
-        positive("grains.diameter", self.grains.diameter)?;
-        positive("grains.density", self.grains.density)?;
+        self.grains.check()?;
         self.end.check()?;
         self.check_substep()?;
         for (axis, value) in ["x", "y", "z"].iter().zip(self.gravity) {

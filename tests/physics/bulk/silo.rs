@@ -101,7 +101,7 @@ pub fn measure(shape: Shape, material: Material, seed: u64) -> Silo {
             *above += higher as f64;
         }
         // After the ground, the walls in the order of the scene: the rings first.
-        for (force, load) in forces.iter_mut().zip(&simulation.wall_loads()[1..]) {
+        for (force, load) in forces.iter_mut().zip(&simulation.wall_loads().unwrap()[1..]) {
             force.0 -= load.force.z / GRAVITY;
             force.1 += load.normal_force / GRAVITY;
         }

@@ -38,15 +38,27 @@ impl Simulation {
 
     /// The contact problem that the coming substep has to solve, for studies of solvers; the simulation stays as
     /// it is.
-    pub fn frozen_solve(&self) -> FrozenSolve {
+    ///
+    /// # Errors
+    /// [`DemError::Untold`] for grains with a shape, and for an effect that changes what a contact is.
+    pub fn frozen_solve(&self) -> Result<FrozenSolve, DemError> {
+        let what = "a frozen solve";
+        self.require_balls(what)?;
+        if let Some(effect) = self.origin.scene.effects.of_contacts() {
+            return Err(DemError::Untold { what, effect });
+        }
         let mut copy = self.clone();
         copy.substep(Until::Assembled);
         let Contacts { pairs, at_walls, .. } = copy.contacts;
-        FrozenSolve::new([pairs, at_walls], copy.particles, self.around.least)
+        Ok(FrozenSolve::new([pairs, at_walls], copy.particles, self.around.least))
     }
 
     /// The search for pairs of the present state, for studies of its cost; the simulation stays as it is.
-    pub fn frozen_search(&self) -> FrozenSearch {
-        FrozenSearch::new(self.particles.clone(), &self.around)
+    ///
+    /// # Errors
+    /// [`DemError::Untold`] for grains with a shape, which have a search of their own.
+    pub fn frozen_search(&self) -> Result<FrozenSearch, DemError> {
+        self.require_balls("a frozen search")?;
+        Ok(FrozenSearch::new(self.particles.clone(), &self.around))
     }
 }

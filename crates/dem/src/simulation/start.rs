@@ -1,19 +1,62 @@
-//! Whether the grains of a start are clear of the walls and of the outflow.
+//! Whether the grains of a start are clear of the walls, of each other and of the outflow.
+
+use std::collections::BTreeMap;
+
+use granulcal_scene::Start;
 
 use super::Simulation;
+use crate::bodies::Within;
+use crate::clumps::Clumps;
 use crate::error::DemError;
+use crate::neighbor::PairSearch;
+use crate::parallel::Threads;
+use crate::path::{Path, Reach};
 
-/// How deep in a wall a grain may start, in its radii: as deep as the hastiest preset lets grains at rest be.
+/// How deep in a wall or in another a grain may start, in its radii: as deep as the hastiest preset lets grains at rest be.
 const MAX_DEPTH: f64 = 0.25;
 
+/// What the grains of a start are too deep in.
+#[derive(Default)]
+struct TooDeep {
+    /// Of each wall: how many grains, the number of the last, and how deep the deepest is.
+    in_walls: BTreeMap<usize, (usize, usize, f64)>,
+    /// How many pairs of grains.
+    pairs: usize,
+    /// The deepest pair, and how deep.
+    deepest: Option<((usize, usize), f64)>,
+}
+
+impl TooDeep {
+    /// Sees a grain in a wall, in its radii; the walls of one grain come one after the other.
+    fn in_wall(&mut self, wall: usize, grain: usize, depth: f64) {
+        if depth <= MAX_DEPTH {
+            return;
+        }
+        let (grains, last, deepest) = self.in_walls.entry(wall).or_insert((0, usize::MAX, 0.0));
+        *grains += usize::from(*last != grain);
+        (*last, *deepest) = (grain, deepest.max(depth));
+    }
+
+    /// Sees two grains in each other, in radii of the smaller.
+    fn in_each_other(&mut self, pair: (usize, usize), depth: f64) {
+        if depth <= MAX_DEPTH {
+            return;
+        }
+        self.pairs += 1;
+        if self.deepest.is_none_or(|(_, deepest)| depth > deepest) {
+            self.deepest = Some((pair, depth));
+        }
+    }
+}
+
 impl Simulation {
-    /// Refuses grains that would leave the scene before they move, and those that are deep in a wall now, which a pour
-    /// could only answer by throwing them out of it. To ask before the first substep, of a start that somebody has
-    /// written.
+    /// Refuses grains that would leave the scene before they move, and those that are deep in a wall now or, where the
+    /// start states every place, in each other, which a pour could only answer by throwing them apart. To ask before the
+    /// first substep, of a start that somebody has written.
     ///
     /// # Errors
     /// [`DemError::StartBelowOutflow`]; [`DemError::StartInWall`] names the wall that most grains are in, how many they
-    /// are and how deep the deepest is.
+    /// are and how deep the deepest is; [`DemError::StartInEachOther`] names the grains that are deepest in each other.
     pub fn check_start(&self) -> Result<(), DemError> {
         if let Some(outflow) = &self.origin.scene.outflow {
             let below = outflow.below;
@@ -23,33 +66,69 @@ impl Simulation {
                 return Err(DemError::StartBelowOutflow { grains, below });
             }
         }
-        let mut around = self.around.clone();
-        around.move_walls(self.time());
-        let walls = &around.walls;
-        let mut found: Vec<(usize, f64)> = vec![(0, 0.0); walls.count()];
-        for grain in 0..self.particles.count() {
-            let (centre, radius) = (self.particles.position(grain), self.particles.radius(grain));
-            let mut last = None;
-            walls.reached(&centre, radius, |surface| {
-                let (wall, near) = (walls.owner(surface), walls.nearest(surface, &centre, 0.0));
-                let depth = 1.0 - near.distance / radius;
-                if depth <= MAX_DEPTH {
-                    return;
-                }
-                let (grains, deepest) = &mut found[wall];
-                // The surfaces of a wall come one after the other: a grain counts once.
-                *grains += usize::from(last.replace(wall) != Some(wall));
-                *deepest = deepest.max(depth);
-            });
+        let found =
+            if self.bodies.is_some() { self.bodies_too_deep() } else { self.balls_too_deep() };
+        let worst = found.in_walls.into_iter().max_by_key(|(_, (grains, ..))| *grains);
+        if let Some((wall, (grains, _, depth))) = worst {
+            let wall = self.wall_name(wall);
+            return Err(DemError::StartInWall { wall, grains, depth, allowed: MAX_DEPTH });
         }
-        let worst = found.into_iter().enumerate().max_by_key(|(_, (grains, _))| *grains);
-        match worst {
-            Some((wall, (grains, depth))) if grains > 0 => {
-                let wall = self.wall_name(wall);
-                Err(DemError::StartInWall { wall, grains, depth, allowed: MAX_DEPTH })
+        match found.deepest {
+            Some((deepest, depth))
+                if matches!(self.origin.scene.start, Start::Positions { .. }) =>
+            {
+                let (pairs, allowed) = (found.pairs, MAX_DEPTH);
+                Err(DemError::StartInEachOther { pairs, deepest, depth, allowed })
             }
             _ => Ok(()),
         }
+    }
+
+    /// Of grains that are balls, or of several.
+    fn balls_too_deep(&self) -> TooDeep {
+        let (particles, mut found) = (&self.particles, TooDeep::default());
+        let mut around = self.around.clone();
+        around.move_walls(self.time());
+        let walls = &around.walls;
+        let members = self.clumps.as_ref().map_or(1, Clumps::members);
+        for grain in 0..particles.count() {
+            let (centre, radius) = (particles.position(grain), particles.radius(grain));
+            walls.reached(&centre, radius, |surface| {
+                let near = walls.nearest(surface, &centre, 0.0);
+                let depth = 1.0 - near.distance / radius;
+                found.in_wall(walls.owner(surface), grain / members, depth);
+            });
+        }
+        let (paths, mut near) = (Path::all_of(particles), Vec::new());
+        let reach = Reach { interval: 0.0, near: 0.0, far: 0.0 };
+        PairSearch::default().pairs(particles, &paths, reach, &Threads::default(), &mut near);
+        for pair in near {
+            let (i, j) = (pair.i as usize, pair.j as usize);
+            if i / members == j / members {
+                continue;
+            }
+            let [r_i, r_j] = [i, j].map(|grain| particles.radius(grain));
+            let apart = particles.nearest(particles.position(i) - particles.position(j)).norm();
+            let numbers = (i.min(j) / members, i.max(j) / members);
+            found.in_each_other(numbers, (r_i + r_j - apart) / r_i.min(r_j));
+        }
+        found
+    }
+
+    /// Of convex bodies, as they are turned.
+    fn bodies_too_deep(&self) -> TooDeep {
+        let mut found = TooDeep::default();
+        let Some(bodies) = &self.bodies else { return found };
+        let mut around = self.around.clone();
+        around.move_walls(self.time());
+        for (body, within, depth) in bodies.overlaps(&around.walls, &around.material) {
+            let depth = depth / around.radius;
+            match within {
+                Within::Wall(surface) => found.in_wall(around.walls.owner(surface), body, depth),
+                Within::Body(other) => found.in_each_other((body, other), depth),
+            }
+        }
+        found
     }
 
     /// The scene's word for a wall of the solver, the ground first.
@@ -66,10 +145,14 @@ impl Simulation {
 #[cfg(test)]
 mod tests {
     use crate::{DemError, Motion, Scene, Simulation, WallMaterial};
-    use granulcal_scene::{Ends, Outflow, Shape, Start, Wall};
+    use granulcal_scene::{Ends, GrainShape, Outflow, Shape, Start, Wall};
 
     fn check(scene: &Scene) -> Result<(), DemError> {
-        Simulation::new(scene, 1).unwrap().check_start()
+        check_of(scene, 1)
+    }
+
+    fn check_of(scene: &Scene, seed: u64) -> Result<(), DemError> {
+        Simulation::new(scene, seed).unwrap().check_start()
     }
 
     #[test]
@@ -114,5 +197,46 @@ mod tests {
         scene.start = Start::Positions { positions: at(-1e-3) };
         let text = check(&scene).unwrap_err().to_string();
         assert!(text.contains("1 grain") && text.contains("the ground"), "{text}");
+    }
+
+    #[test]
+    fn grains_in_each_other_are_named() {
+        let mut scene = Scene::drop(0.1);
+        scene.grains.count = 3;
+        let at = |x: f64| Start::Positions {
+            positions: vec![[0.0, 0.0, 0.05], [x, 0.0, 0.05], [0.01, 0.0, 0.05]],
+        };
+        scene.start = at(3.6e-3);
+        check(&scene).unwrap();
+        scene.start = at(0.01);
+        let text = check(&scene).unwrap_err().to_string();
+        assert!(text.starts_with("1 pair(s)") && text.contains("grains 1 and 2"), "{text}");
+        assert!(text.contains("the deepest by 2 of a radius"), "{text}");
+        // Spheres of one clump are in each other as they are meant to be.
+        scene.effects.clump.aspect = 1.5;
+        scene.start = at(0.05);
+        check(&scene).unwrap();
+    }
+
+    #[test]
+    fn bodies_start_as_they_are_turned_and_not_as_balls() {
+        let mut scene = Scene::drop(0.1);
+        scene.grains.count = 1;
+        let height = |z: f64| Start::Positions { positions: vec![[0.0, 0.0, z]] };
+        // Thinner than a ball whichever way it is turned.
+        scene.grains.shape = Some(GrainShape::Box { aspect: [1.0, 0.1, 0.1] });
+        let depth = |scene: &Scene, seed| match check_of(scene, seed) {
+            Ok(()) => 0.0,
+            Err(DemError::StartInWall { depth, .. }) => depth,
+            Err(error) => panic!("{error}"),
+        };
+        for seed in 0..8 {
+            scene.start = height(0.0);
+            let deepest = depth(&scene, seed);
+            assert!(deepest < 1.01, "{deepest}");
+            // Now its lowest corner is on the ground, where a ball would be deep in it.
+            scene.start = height(scene.grains.radius() * deepest);
+            check_of(&scene, seed).unwrap();
+        }
     }
 }

@@ -259,3 +259,59 @@ fn clumps_that_fall_fast_enter_nothing() {
     let deepest = deepest_of_fallen(400, 0, 0.16, |scene| scene.effects.clump.aspect = 1.5);
     assert!(deepest < 0.04, "{deepest}");
 }
+
+#[test]
+fn to_advance_by_infinity_is_to_the_end_and_by_less_than_half_a_substep_nothing() {
+    let mut scene = scene();
+    scene.grains.count = 3;
+    let whole = start(&scene).run();
+    let mut pour = start(&scene);
+    for seconds in [0.01, f64::NAN, -1.0, 0.49 * scene.settings().dt] {
+        pour.advance(seconds);
+        assert!((pour.time() - 0.01).abs() < 1e-9, "{seconds}");
+    }
+    pour.advance(f64::INFINITY);
+    assert_eq!(pour.into_pour().state_hash, whole.state_hash);
+}
+
+#[test]
+fn the_substep_stays_once_one_has_been_taken() {
+    let mut pour = start(&scene());
+    assert_eq!((pour.scene(), pour.seed()), (&scene(), 2));
+    let finer = SolverSettings { dt: 1e-4, ..*pour.settings() };
+    pour = pour.with_settings(finer).unwrap();
+    pour.advance(1e-3);
+    pour = pour.with_settings(SolverSettings { sweeps: 7, ..finer }).unwrap();
+    let error = pour.with_settings(SolverSettings { dt: 2e-4, ..finer }).unwrap_err();
+    assert!(error.to_string().starts_with("settings.dt must be as before"), "{error}");
+}
+
+#[test]
+fn grains_keep_their_numbers_when_others_leave() {
+    let mut scene = Scene::drop(0.1);
+    scene.grains.count = 3;
+    let positions = vec![[0.0, 0.0, 0.3], [0.02, 0.0, 0.25], [0.04, 0.0, 0.35]];
+    scene.start = Start::Positions { positions };
+    scene.outflow = Some(granulcal_scene::Outflow { below: 0.2, until: None });
+    let mut pour = start(&scene);
+    assert_eq!(pour.numbers(), [0, 1, 2]);
+    while pour.numbers().len() == 3 {
+        pour.advance(1e-3);
+    }
+    assert_eq!(pour.numbers(), [0, 2]);
+    assert!((pour.positions()[1].x - 0.04).abs() < 1e-9);
+}
+
+#[test]
+fn what_a_frozen_substep_does_not_know_is_refused() {
+    let mut scene = scene();
+    scene.grains.count = 3;
+    scene.start = Start::Grid { counts: [8, 8, 8], spacing: 8e-3, jitter: 1e-4, base: 2e-3 };
+    scene.effects.clump.aspect = 1.5;
+    let error = start(&scene).frozen_solve().unwrap_err().to_string();
+    assert_eq!(error, "a frozen solve cannot be told of a scene with effects.clump");
+    scene.effects.clump.aspect = 1.0;
+    scene.grains.shape = Some(GrainShape::Box { aspect: [1.0; 3] });
+    assert!(start(&scene).frozen_solve().is_err());
+    assert!(start(&scene).frozen_search().is_err());
+}

@@ -199,7 +199,7 @@ fn newton_never_ends_worse_than_it_began() {
         scene.material = Material::new(0.5, 0.2, restitution).expect("a valid material");
         let mut pour = Simulation::new(&scene, 1).expect("a valid scene");
         pour.advance(seconds);
-        let problem = pour.frozen_solve();
+        let problem = pour.frozen_solve().unwrap();
         for complementarity in [Complementarity::FischerBurmeister, Complementarity::MinMap] {
             for outer in [1, 2, 4, 16, 64] {
                 let newton = NewtonSettings { outer, complementarity, ..NewtonSettings::default() };
