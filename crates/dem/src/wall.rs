@@ -1,8 +1,10 @@
 //! Walls as the solver sees them: distance and normal of the nearest point to a grain's centre. A wall has one or more
 //! surfaces, and a grain may touch each of them once.
-//! Planes, shells and discs are in `wall/surface.rs`, triangles in `wall/facets.rs`.
+//! Planes and discs are in `wall/surface.rs`, shells in `wall/frustum.rs`, triangles in `wall/facets.rs`.
 
 mod facets;
+mod frustum;
+mod nearest;
 mod rim;
 mod surface;
 
@@ -13,8 +15,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::placement::Placement;
 use facets::Facets;
 use granulcal_scene::{BoxSide, Material, Motion, Scene, Shape, WallMaterial};
+pub(crate) use nearest::{Nearest, Passage, any_normal};
 pub(crate) use rim::Rim;
-pub(crate) use surface::{Nearest, Passage, any_normal};
 use surface::{Surface, is_same_circle, surfaces};
 
 /// A wall with its resolved material, and where it is if it moves.
@@ -27,16 +29,30 @@ pub(crate) struct Wall {
     pub placement: Option<Placement>,
 }
 
+/// One of a wall's surfaces, which a grain may touch once.
+enum Part<'a> {
+    Surface(&'a Surface),
+    /// A triangle, by its number.
+    Triangle(&'a Facets, usize),
+}
+
 impl Wall {
     /// Surfaces and facets, each of which a grain may touch once.
     fn count(&self) -> usize {
         self.surfaces.len() + self.facets.as_ref().map_or(0, |facets| facets.count())
     }
 
-    fn nearest_there(&self, number: usize, centre: &Vector3<f64>) -> Nearest {
+    fn part(&self, number: usize) -> Part<'_> {
         match (self.surfaces.get(number), &self.facets) {
-            (None, Some(facets)) => facets.nearest(number - self.surfaces.len(), centre),
-            _ => self.surfaces[number].nearest(centre),
+            (None, Some(facets)) => Part::Triangle(facets, number - self.surfaces.len()),
+            _ => Part::Surface(&self.surfaces[number]),
+        }
+    }
+
+    fn nearest_there(&self, number: usize, centre: &Vector3<f64>) -> Nearest {
+        match self.part(number) {
+            Part::Triangle(facets, number) => facets.nearest(number, centre),
+            Part::Surface(surface) => surface.nearest(centre),
         }
     }
 
@@ -59,9 +75,9 @@ impl Wall {
     /// Whether a surface may come nearer than `range` `[m]` until the next list; false only when it surely does not.
     fn may_reach(&self, number: usize, centre: &Vector3<f64>, range: f64) -> bool {
         let (centre, range) = self.seen(centre, range);
-        match (self.surfaces.get(number), &self.facets) {
-            (None, Some(facets)) => facets.may_reach(number - self.surfaces.len(), &centre, range),
-            _ => self.surfaces[number].may_reach(&centre, range),
+        match self.part(number) {
+            Part::Triangle(facets, number) => facets.may_reach(number, &centre, range),
+            Part::Surface(surface) => surface.may_reach(&centre, range),
         }
     }
 
@@ -194,13 +210,10 @@ impl Walls {
         to: &Vector3<f64>,
         now: f64,
     ) -> bool {
-        let owner = self.owner(surface);
-        let wall = &self.all[owner];
-        let Some(of_wall) = wall.surfaces.get(surface - self.first[owner] as usize) else {
-            return false;
-        };
+        let (owner, wall, number) = self.found(surface);
+        let Part::Surface(surface) = wall.part(number) else { return false };
         let [from, to] = [from, to].map(|x| wall.stated_place(x, now));
-        let end = of_wall.leads_round(&from, &to);
+        let end = surface.leads_round(&from, &to);
         end.is_some_and(|end| self.rims_at(owner, &end).any(Rim::is_free))
     }
 
@@ -222,12 +235,11 @@ impl Walls {
         to: &Vector3<f64>,
         now: f64,
     ) -> Option<Passage> {
-        let owner = self.owner(surface);
-        let (wall, number) = (&self.all[owner], surface - self.first[owner] as usize);
+        let (owner, wall, number) = self.found(surface);
         let [from, to] = [from, to].map(|x| wall.stated_place(x, now));
-        let passage = match (wall.surfaces.get(number), &wall.facets) {
-            (None, Some(facets)) => facets.passed_at_edge(number - wall.surfaces.len(), &from, &to),
-            _ => wall.surfaces[number].passed(&from, &to).filter(|passage| {
+        let passage = match wall.part(number) {
+            Part::Triangle(facets, number) => facets.passed_at_edge(number, &from, &to),
+            Part::Surface(surface) => surface.passed(&from, &to).filter(|passage| {
                 let is_behind = |end| {
                     self.rims_at(owner, end).any(|rim| !rim.is_free() && rim.ends_before(&to))
                 };
@@ -249,15 +261,13 @@ impl Walls {
         to: &Vector3<f64>,
         end: f64,
     ) -> bool {
-        let owner = self.owner(surface);
-        let (wall, number) = (&self.all[owner], surface - self.first[owner] as usize);
+        let (_, wall, number) = self.found(surface);
         let (from, to) = (wall.stated_place(from, 0.0), wall.stated_place(to, end));
-        match (wall.surfaces.get(number), &wall.facets) {
-            (None, Some(facets)) => {
-                facets.passed(number - wall.surfaces.len(), &from, &to).is_some()
-            }
-            _ => wall.surfaces[number].passed(&from, &to).is_some(),
-        }
+        let passage = match wall.part(number) {
+            Part::Triangle(facets, number) => facets.passed(number, &from, &to),
+            Part::Surface(surface) => surface.passed(&from, &to),
+        };
+        passage.is_some()
     }
 
     /// Whether any may move.
@@ -280,6 +290,12 @@ impl Walls {
         self.owner[surface] as usize
     }
 
+    /// The number of a surface's wall, that wall, and the number of the surface on it.
+    fn found(&self, surface: usize) -> (usize, &Wall, usize) {
+        let owner = self.owner(surface);
+        (owner, &self.all[owner], surface - self.first[owner] as usize)
+    }
+
     /// A surface's wall.
     pub fn wall(&self, surface: usize) -> &Wall {
         &self.all[self.owner(surface)]
@@ -287,14 +303,14 @@ impl Walls {
 
     /// The nearest point of a surface to a centre at `now` `[s]` into the substep.
     pub fn nearest(&self, surface: usize, centre: &Vector3<f64>, now: f64) -> Nearest {
-        let owner = self.owner(surface);
-        self.all[owner].nearest(surface - self.first[owner] as usize, centre, now)
+        let (_, wall, number) = self.found(surface);
+        wall.nearest(number, centre, now)
     }
 
     /// Whether a surface may come nearer than `range` `[m]` until the next list.
     pub fn may_reach(&self, surface: usize, centre: &Vector3<f64>, range: f64) -> bool {
-        let owner = self.owner(surface);
-        self.all[owner].may_reach(surface - self.first[owner] as usize, centre, range)
+        let (_, wall, number) = self.found(surface);
+        wall.may_reach(number, centre, range)
     }
 
     /// Calls `found` for every surface that may come nearer than `range` `[m]` until the next list, in their order.

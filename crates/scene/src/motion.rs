@@ -3,14 +3,11 @@
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::check::{finite, non_negative, positive};
+use crate::check::{finite, non_negative, positive, seen_to_swing};
 use crate::error::SceneError;
 
 /// How far a wall may turn in a substep `[rad]`.
 const LARGEST_TURN: f64 = 0.1;
-/// Fewest substeps in a period of a wall that swings `[-]`.
-const FEWEST_STEPS: f64 = 10.0;
-const ROUNDING: f64 = 1e-9;
 
 /// The motion of a wall from its stated place. Times are simulated times `[s]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -163,9 +160,8 @@ impl Motion {
             return refuse(" (rate) [rad/s]", self.fastest_turn(), allowed);
         }
         match self {
-            &Self::Shake { frequency, .. } if frequency * dt * FEWEST_STEPS > 1.0 + ROUNDING => {
-                let allowed = "at most one period in ten substeps, 200 Hz with preset default";
-                refuse(".frequency", frequency, allowed)
+            &Self::Shake { frequency, .. } => {
+                seen_to_swing(&format!("{name}.motion.frequency"), frequency, dt)
             }
             _ => Ok(()),
         }

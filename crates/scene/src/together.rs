@@ -1,6 +1,7 @@
 //! What cannot be with what in one scene.
 
 use crate::camera::{Mask, Projection};
+use crate::check::seen_to_swing;
 use crate::effects::{Effect, Effects};
 use crate::end::RolledAway;
 use crate::error::SceneError;
@@ -9,9 +10,6 @@ use crate::observe::Observe;
 use crate::preset::Preset;
 use crate::scene::Scene;
 use crate::start::Start;
-
-/// Fewest substeps in a period of a table that shakes `[-]`.
-const LEAST_OF_PERIOD: f64 = 10.0;
 
 impl Scene {
     /// Refuses what cannot be with something else that is there.
@@ -214,17 +212,10 @@ impl Scene {
     /// Refuses a table that shakes too fast for the substeps.
     fn check_vibration(&self) -> Result<(), SceneError> {
         let vibration = &self.effects.vibration;
-        let in_period = 1.0 / (vibration.frequency * self.settings().dt);
-        // A period of exactly so many is not refused for its rounding.
-        if vibration.is_on() && in_period < (1.0 - 1e-9) * LEAST_OF_PERIOD {
-            let allowed = "at most one period in ten substeps, 200 Hz with preset default";
-            return Err(SceneError::range(
-                "effects.vibration.frequency",
-                vibration.frequency,
-                allowed,
-            ));
+        if !vibration.is_on() {
+            return Ok(());
         }
-        Ok(())
+        seen_to_swing("effects.vibration.frequency", vibration.frequency, self.settings().dt)
     }
 
     /// Refuses what says how the funnel is where there is none.
