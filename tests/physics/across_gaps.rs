@@ -240,3 +240,27 @@ fn a_film_takes_speed_from_surfaces_that_slide_and_none_from_what_turns_as_gears
     let thick = slides(sheared([[slow, still], [-slow, still]], 1e-3 * RADIUS, 0.1)) / slow.z;
     assert!(thick.abs() < 1e-2, "{thick}");
 }
+
+#[test]
+fn what_a_pull_that_reaches_radii_gives_is_not_created() {
+    let mut scene = one_grain(0.1, material(0.5, 0.1, 0.7));
+    scene.grains.count = 2;
+    scene.start = Start::Positions { positions: vec![[0.0, 0.0, 0.1], [2.9 * RADIUS, 0.0, 0.1]] };
+    scene.effects.adhesion = Adhesion { bond: 20.0, range: 1.0, ..Adhesion::default() };
+    let mut simulation = start(&scene);
+    let mut fastest = 0.0_f64;
+    for _ in 0..80 {
+        simulation.advance(DT);
+        fastest = fastest.max(simulation.velocities()[0].x);
+    }
+    // All the work of the way to the contact, half of it in each grain.
+    let work = 20.0 * GRAVITY * 0.9 * RADIUS;
+    // A substep is a sixth of the fall's time.
+    assert!((fastest / work.sqrt() - 1.0).abs() < 0.2, "{fastest} {}", work.sqrt());
+    // Of 0.1 m of height the pull has 0.18 in store.
+    assert!(simulation.health().energy_created < 1e-3, "{:?}", simulation.health());
+    let grains = Grains { count: 200, ..Scene::drop(0.02).grains };
+    let crowd = Scene { effects: scene.effects.clone(), grains, ..Scene::drop(0.02) };
+    let pour = start(&crowd).run();
+    assert!(pour.health.energy_created < 1e-2, "{:?}", pour.health);
+}

@@ -107,7 +107,7 @@ impl Acting {
     }
 
     /// Lets act what does so across gaps, after the impacts: what a pull adds in a substep to a closed contact is not
-    /// an impact. Returns the work of moving walls, per typical mass `[m^2/s^2]`.
+    /// an impact. Returns the energy that they give and the work of moving walls, per typical mass `[m^2/s^2]`.
     pub fn act_across_gaps(
         &self,
         particles: &mut Particles,

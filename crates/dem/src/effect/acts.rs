@@ -55,7 +55,7 @@ pub(crate) trait Acts: Debug + Send + Sync {
     }
 
     /// Changes velocities after the impacts; `bridges` is what is remembered of pairs that have touched. Returns the
-    /// work of moving walls, per typical mass `[m^2/s^2]`.
+    /// energy that it gives and the work of moving walls, per typical mass `[m^2/s^2]`.
     fn act_across_gaps(
         &self,
         _particles: &mut Particles,

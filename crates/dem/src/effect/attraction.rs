@@ -58,6 +58,8 @@ impl Acts for Attraction {
     }
 
     /// Pulls all that is near: pairs of grains and grains at walls; bridges form at a touch and go at their rupture.
+    /// What grains gain that come nearer, and lose that part, is no energy created; where they touch their contact
+    /// answers in the same substep, and nothing is gained.
     fn act_across_gaps(
         &self,
         particles: &mut Particles,
@@ -65,18 +67,19 @@ impl Acts for Attraction {
         bridges: &mut Bridges,
     ) -> f64 {
         bridges.next.clear();
-        let of_walls = near::each(particles, context, |particles, near| {
+        let work = near::each(particles, context, |particles, near| {
             let forces = self.forces(near, bridges);
             if !forces.iter().any(Force::is_on) {
                 return 0.0;
             }
             let meeting = Meeting::of(near, particles, context.walls);
             let impulse = meeting.pull(&forces, near.gap / self.radius, self.radius, context.dt);
-            meeting.push(particles, near, &(-impulse * near.normal))
+            let of_pull = if near.gap > TOUCH * self.radius { meeting.work(impulse) } else { 0.0 };
+            of_pull + meeting.push(particles, near, &(-impulse * near.normal))
         });
         bridges.next.sort_unstable();
         std::mem::swap(&mut bridges.joined, &mut bridges.next);
-        of_walls
+        work
     }
 }
 
@@ -123,6 +126,11 @@ impl Force<'_> {
 }
 
 impl Meeting {
+    /// Work of a pull's impulse against the opening of the gap, per typical mass `[m^2/s^2]`: what the pair gains.
+    fn work(&self, impulse: f64) -> f64 {
+        -impulse * (self.opening - 0.5 * impulse * self.inverse_mass)
+    }
+
     /// The impulse of forces in a substep, over a typical mass `[m/s]`: what they take of the opening speed.
     fn pull(&self, forces: &[Force<'_>; 2], gap: f64, radius: f64, dt: f64) -> f64 {
         // From the contact on, where grains rest a little in each other or come from an impact.

@@ -171,9 +171,8 @@ impl Simulation {
     fn act_across_gaps(&mut self) {
         let around = &self.around;
         let context = around.for_effects([&self.contacts.pairs, &self.contacts.at_walls]);
-        let of_walls =
-            around.effects.act_across_gaps(&mut self.particles, &context, &mut self.bridges);
-        self.watch.see_work(of_walls);
+        let work = around.effects.act_across_gaps(&mut self.particles, &context, &mut self.bridges);
+        self.watch.see_work(work);
     }
 
     /// Joins the grains of the start, where bonds do: those of a ball above a bed when it is let go.
