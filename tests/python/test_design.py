@@ -298,23 +298,51 @@ def test_pours_that_never_spill_or_always_leave_little_doubt(all_spill, drawn):
 
 
 def test_draws_are_those_of_the_posterior():
-    """By quadrature over the two coefficients, with one pour of ten that spills a grain."""
+    """By quadrature over both coefficients and rho, with one pour of ten that spills a grain."""
     heights = np.linspace(0.1, 0.2, 10)
     counts = np.zeros(10)
     counts[7] = 1
     model = CountModel.fit(heights, np.empty((10, 0)), counts, 50, degrees=(1,))
-    drawn = model.draw(2000, np.random.default_rng(0))
-    level, slope = np.meshgrid(np.linspace(-25, 0, 400), np.linspace(-15, 15, 400), indexing="ij")
+    drawn, rho = model.draw(1000, np.random.default_rng(0))
+    axes = np.linspace(-25, 0, 80), np.linspace(-15, 15, 80), np.linspace(1e-3, 0.5**0.5, 60)
+    level, slope, root = np.meshgrid(*axes, indexing="ij")
     share = 1 / (1 + np.exp(-(level[..., None] + slope[..., None] * model.rows[:, 1])))
-    size = 1 / model.rho - 1
+    size = 1 / root[..., None] ** 2 - 1
     log = stats.betabinom.logpmf(counts, 50, share * size, (1 - share) * size).sum(axis=-1)
     log -= 0.5 * (level / 20) ** 2 + 0.5 * (slope / 5) ** 2
     weight = np.exp(log - log.max())
-    for values, found in ((level, drawn[:, 0]), (slope, drawn[:, 1])):
+    found_of = ((level, drawn[:, 0]), (slope, drawn[:, 1]), (root, np.sqrt(rho)))
+    for values, found in found_of:
         mean = np.average(values, weights=weight)
         sd = np.average((values - mean) ** 2, weights=weight) ** 0.5
         assert found.mean() == pytest.approx(mean, abs=0.1 * sd)
         assert found.std() == pytest.approx(sd, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("pours", "rho"), [(40, 0.05), (100, 0.05), (25, 0.1)])
+def test_bands_hold_the_truth(pours, rho):
+    """Of known curves; with rho at its largest likelihood k = 10 was held in .6 to .7 of cases."""
+    total, size, sets = 100, 1 / rho - 1, 60
+    held, unsafe, advised = [], 0, 0
+    for seed in range(sets):
+        generator = np.random.default_rng(seed)
+        heights = np.linspace(0.06, 0.3, pours)
+        share = 1 / (1 + np.exp(4 - 2 * (2 * (heights - 0.06) / 0.24 - 1)))
+        counts = generator.binomial(total, generator.beta(share * size, (1 - share) * size))
+        known = np.empty((pours, 0))
+        forecast = forecast_of(heights, known, counts * 1.0, total, grains=(1, 10), seed=seed)
+        share = 1 / (1 + np.exp(4 - 2 * (2 * (forecast.heights - 0.06) / 0.24 - 1)))
+        for i, k in enumerate(forecast.grains):
+            truth = stats.betabinom.sf(k - 1, total, share * size, (1 - share) * size)
+            held.append(np.mean((forecast.low[i] <= truth) & (truth <= forecast.high[i])))
+            top = forecast.highest(k, 0.1)
+            if top is not None:
+                advised += 1
+                unsafe += truth[np.argmin(np.abs(forecast.heights - top))] > 0.1
+    print(f"{pours} pours, rho {rho}: held {np.mean(held):.3f}, unsafe {unsafe} of {advised}")
+    assert np.mean(held) > 0.8
+    assert unsafe < 0.25 * advised
 
 
 def test_unknown_material_widens_the_band():

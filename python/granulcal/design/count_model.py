@@ -7,15 +7,19 @@ $$ y \sim \mathrm{BetaBinomial}(n, p, \rho), \qquad
 
 with Chebyshev polynomials T_j and rho the correlation of two grains of one pour: the variance is
 $n p (1 - p) (1 + (n - 1) \rho)$, so that rho = 0 is a binomial. The coefficients are those of
-iterated weighted least squares under a weak normal prior, and rho has the largest likelihood. The
-coefficients' uncertainty is their posterior at that rho: draws of a multivariate t about their
-place, weighted by posterior over t, and drawn again by their weights. A normal in its place is far
-off where no pour spills: the likelihood is flat on one side, and half of the normal lies on the
-other. The polynomial has the degree, 1 to 3, of the least BIC: a bend that few grains hint at would
-turn the curve up where none are spilled.
+iterated weighted least squares under a weak normal prior, and rho has the largest likelihood. What
+is uncertain is told by their posterior together, with sqrt(rho), a standard deviation of the
+pours, uniform before them: draws of a multivariate t of the coefficients and log rho, weighted by
+posterior over t, and drawn again by their weights. How probable many grains are hangs on rho more
+than on the coefficients, and tens of pours do not settle it. A normal in place of the t is far off
+where no pour spills: the likelihood is flat on one side, and half of the normal lies on the other.
+The polynomial has the degree, 1 to 3, of the least BIC: a bend that few grains hint at would turn
+the curve up where none are spilled.
 
-Reference:
+References:
     Williams, Extra-binomial variation in logistic linear models, Applied Statistics 31, 1982.
+    Gelman, Prior distributions for variance parameters, Bayesian Analysis 1, 2006: the uniform
+        standard deviation.
 """
 
 import warnings
@@ -34,11 +38,13 @@ _DEGREES = (1, 2, 3)
 _LEVEL_SD, _HEIGHT_SD, _MATERIAL_SD = 20.0, 5.0, 1.0
 _ROUNDS = 60
 # Draws to weight, the share of them that must count, and how often the t is moved for that.
-_DRAWN, _ENOUGH, _ADAPTATIONS = 4000, 0.2, 10
+_DRAWN, _ENOUGH, _ADAPTATIONS = 10_000, 0.2, 10
 # Degrees of freedom of the t, and how much wider it is than what it stands for.
 _FREEDOM, _WIDER = 5.0, 1.5
 _RHO = (1e-7, 0.5)
 _RHO_ROUNDS = 40
+# Values of log rho that the t's place and width are made of.
+_RHO_GRID = 41
 _GOLDEN = (np.sqrt(5) - 1) / 2
 # Logits beyond this are no different from 0 or n grains.
 _LARGEST_LOGIT = 30.0
@@ -132,10 +138,10 @@ class CountModel:
             found[i] = _logistic(np.sum(rows * coefficients, axis=1))
         return found
 
-    def draw(self, count: int, generator: np.random.Generator) -> Array:
-        """Returns draws of the coefficients' posterior at rho, shape (count, d)."""
-        middle, scale = self.coefficients, _WIDER * self.covariance
-        drawn, weight = self._weighted_draws(middle, scale, generator)
+    def draw(self, count: int, generator: np.random.Generator) -> tuple[Array, Array]:
+        """Returns draws of the posterior of the coefficients, shape (count, d), and rho (count,)."""
+        middle, scale = self._moments()
+        drawn, weight = self._weighted_draws(middle, _WIDER * scale, generator)
         for _ in range(_ADAPTATIONS):
             if _effective(weight) >= _ENOUGH * _DRAWN:
                 break
@@ -145,8 +151,8 @@ class CountModel:
                 power /= 1.5
             mild = weight**power / np.sum(weight**power)
             middle = mild @ drawn
-            scale = _WIDER * np.cov(drawn.T, aweights=mild, bias=True).reshape(2 * [len(middle)])
-            drawn, weight = self._weighted_draws(middle, scale, generator)
+            scale = np.cov(drawn.T, aweights=mild, bias=True)
+            drawn, weight = self._weighted_draws(middle, _WIDER * scale, generator)
         if _effective(weight) < count:
             warnings.warn(
                 f"the forecast's band is of {_effective(weight):.0f} draws that count, where "
@@ -157,7 +163,31 @@ class CountModel:
         share = np.cumsum(weight) / weight.sum()
         at = (generator.random() + np.arange(count)) / count
         chosen = np.minimum(np.searchsorted(share, at), len(share) - 1)
-        return generator.permutation(drawn[chosen])
+        chosen = generator.permutation(chosen)
+        return drawn[chosen, :-1], np.exp(drawn[chosen, -1])
+
+    def _moments(self) -> tuple[Array, Array]:
+        """Mean (d + 1,) and covariance of coefficients and log rho, the former as if normal."""
+        grid = np.linspace(*np.log(_RHO), _RHO_GRID)
+        places, within, log_weight = [], [], []
+        for log_rho in grid:
+            rho = float(np.exp(log_rho))
+            place, covariance = _weighted(
+                self.rows, self.counts, self.total, rho, self.precision
+            )
+            log = _log_likelihood(self.counts, self.total, _logistic(self.rows @ place), rho)
+            log += 0.5 * log_rho - 0.5 * place @ self.precision @ place
+            log_weight.append(log + 0.5 * np.linalg.slogdet(covariance)[1])
+            places.append(np.append(place, log_rho))
+            within.append(covariance)
+        weight = np.exp(np.array(log_weight) - max(log_weight))
+        weight /= weight.sum()
+        middle = weight @ np.array(places)
+        scale = np.cov(np.array(places).T, aweights=weight, bias=True)
+        scale[:-1, :-1] += np.tensordot(weight, np.array(within), axes=1)
+        # A rho that lies between two values of the grid is known no better than those.
+        scale[-1, -1] += np.square(grid[1] - grid[0]) / 12
+        return middle, scale
 
     def _weighted_draws(
         self, middle: Array, scale: Array, generator: np.random.Generator
@@ -170,14 +200,20 @@ class CountModel:
         unit = normal * stretch[:, None]
         drawn = middle + unit @ root.T
         log_t = -0.5 * (_FREEDOM + dimension) * np.log1p(np.sum(unit**2, axis=1) / _FREEDOM)
-        shares = _logistic(drawn @ self.rows.T)
-        log_prior = -0.5 * np.einsum("ij,jk,ik->i", drawn, self.precision, drawn)
-        log_likelihood = _log_likelihoods(self.counts, self.total, shares, self.rho)
-        log_weight = log_likelihood + log_prior - log_t
+        coefficients, log_rho = drawn[:, :-1], drawn[:, -1]
+        least, most = np.log(_RHO)
+        is_possible = (log_rho >= least) & (log_rho <= most)
+        rho = np.exp(np.clip(log_rho, least, most))[:, None]
+        shares = _logistic(coefficients @ self.rows.T)
+        quadratic = np.einsum("ij,jk,ik->i", coefficients, self.precision, coefficients)
+        # sqrt(rho) uniform is a density of sqrt(rho) over log rho.
+        log_prior = -0.5 * quadratic + 0.5 * log_rho
+        log_likelihood = _log_likelihoods(self.counts, self.total, shares, rho)
+        log_weight = np.where(is_possible, log_likelihood + log_prior - log_t, -np.inf)
         return drawn, np.exp(log_weight - log_weight.max())
 
 
-def beta_binomial_tail(least: int, total: int, share: Array, rho: float) -> Array:
+def beta_binomial_tail(least: int, total: int, share: Array, rho: float | Array) -> Array:
     r"""Returns P(y >= least) of a beta-binomial, shape of `share`.
 
     With $s = 1/\rho - 1$, $\alpha = p s$, $\beta = (1 - p) s$ the probabilities of 0, 1, ... follow
@@ -186,8 +222,8 @@ def beta_binomial_tail(least: int, total: int, share: Array, rho: float) -> Arra
     Args:
         least: number of grains.
         total: n.
-        share: p.
-        rho: correlation of two grains of one pour.
+        share: p, shape (..., m).
+        rho: correlation of two grains of one pour, one or of each draw, shape (m,).
     """
     if least <= 0:
         return np.ones_like(share)
@@ -256,8 +292,8 @@ def _log_likelihood(counts: Array, total: int, share: Array, rho: float) -> floa
     return float(_log_likelihoods(counts, total, share, rho))
 
 
-def _log_likelihoods(counts: Array, total: int, share: Array, rho: float) -> Array:
-    """Of shares (..., m) of counts (m,), shape (...)."""
+def _log_likelihoods(counts: Array, total: int, share: Array, rho: float | Array) -> Array:
+    """Of shares (..., m) of counts (m,) at one rho or at each of shape (..., 1), shape (...)."""
     size = 1 / rho - 1
     alpha, beta = share * size, (1 - share) * size
     terms = log_gamma(counts + alpha) - log_gamma(alpha)

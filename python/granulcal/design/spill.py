@@ -30,7 +30,7 @@ SPILLED = "spilled"
 _FEWEST_POURS = 20
 _GRID = 61
 _GOLDEN = (np.sqrt(5) - 1) / 2
-_DRAWS = 400
+_DRAWS = 1000
 # Positive parameters that span more than this are standardised by their logarithm.
 _WIDE = 10.0
 
@@ -143,11 +143,11 @@ def forecast_of(
     heights, counts, z = heights[usable], counts[usable], _standardised(material[usable])
     model = CountModel.fit(heights, z, counts, total)
     generator = np.random.default_rng((seed, 1))
-    coefficients = model.draw(_DRAWS, generator)
+    coefficients, rho = model.draw(_DRAWS, generator)
     believed = z[generator.integers(len(z), size=_DRAWS)]
     grid = np.linspace(heights.min(), heights.max(), _GRID)
     shares = model.shares(grid, believed, coefficients)
-    tails = [beta_binomial_tail(k, total, shares, model.rho) for k in grains]
+    tails = [beta_binomial_tail(k, total, shares, rho) for k in grains]
     return SpillForecast(
         heights=grid,
         grains=tuple(int(k) for k in grains),
