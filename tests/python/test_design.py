@@ -71,6 +71,28 @@ def _run(*words: str) -> subprocess.CompletedProcess:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
+class _Bow(_Line):
+    """Radii that two heights give alike."""
+
+    @staticmethod
+    def radii(heights):
+        outer = 0.05 + 0.03 * np.sin(np.pi * (heights - 0.01) / 0.12)
+        return np.column_stack([0.4 * outer, outer])
+
+
+def test_a_ring_that_two_heights_give_has_one_of_them():
+    """The mean of both had been said to be the nearest, and that no height gives the ring."""
+    data = _Bow()
+    model = RingModel(gc.BayesSim.fit(data, quiet=True, method="emulated"), data)  # pyright: ignore
+    for height in (0.03, 0.05, 0.1):
+        inner, outer = _Bow.radii(np.array([height]))[0]
+        plan = gc.design_rings(model, [gc.Ring(outer=outer, inner=inner)])
+        (pour,), (note,) = plan.pours, plan.notes
+        assert min(abs(pour.height - h) for h in (height, 0.14 - height)) < 3e-3
+        assert pour.expected_outer == pytest.approx(outer, abs=5e-4)
+        assert "more than one height" in note
+
+
 def test_height_of_a_closed_form_is_returned(line):
     for height in (0.02, 0.07, 0.12):
         (pour,) = gc.design_rings(line, [_at(height)]).pours

@@ -68,6 +68,9 @@ def test_what_a_mask_hides_is_not_taken_for_data(points, tmp_path):
     image[0, 0] = np.ma.masked
     with pytest.raises(ValueError, match="image must have no masked entries"):
         camera.save(image, tmp_path / "a.png", tmp_path / "a.toml")  # pyright: ignore
+    narrow = camera.render(points, radii)[:, :-1]
+    with pytest.raises(ValueError, match=r"the image of this camera must be \d+x\d+ pixels, got"):
+        camera.save(narrow, tmp_path / "a.png", tmp_path / "a.toml")
     engine = gc.engines.CallableEngine(lambda scene, seed: (hidden, 0.002), name="masked")
     with pytest.raises(ValueError, match="positions must have no masked entries, got 1"):
         gc.simulate(gc.Scene.drop(0.1, count=400), engine=engine)

@@ -7,6 +7,7 @@ use granulcal_numbers::normal_cdf;
 use granulcal_scene::{Distribution, Prior};
 use nalgebra::DMatrix;
 
+use crate::ModelError;
 use crate::quasi::{QuasiUniform, quasi_normal};
 
 /// Points of `normal_points`: enough for the mass of a mixture's component inside the bounds.
@@ -58,12 +59,30 @@ impl Coordinates {
         self.each.iter().all(|c| c.low == f64::NEG_INFINITY && c.high == f64::INFINITY)
     }
 
-    /// Whether a point lies within the bounds.
+    /// Whether a point lies within the bounds; one of another dimension does not, nor one that is not finite.
     pub fn is_inside(&self, u: &[f64]) -> bool {
-        self.each.iter().zip(u).all(|(c, &u)| c.low <= u && u <= c.high)
+        let is_within = |(c, &u): (&Coordinate, &f64)| c.low <= u && u <= c.high && u.is_finite();
+        u.len() == self.each.len() && self.each.iter().zip(u).all(is_within)
     }
 
-    /// Log prior density of coordinates, minus infinity outside the bounds.
+    /// Refuses another number of values than there are parameters, and a NaN: a point is nowhere then, and not outside.
+    pub(crate) fn require_point(
+        &self,
+        what: &'static str,
+        point: &[f64],
+    ) -> Result<(), ModelError> {
+        let wrong = |allowed: String, found| Err(ModelError::Argument { what, allowed, found });
+        let count = self.dimension();
+        if point.len() != count {
+            return wrong(format!("{count} numbers, one a parameter"), point.len().to_string());
+        }
+        match self.names.iter().zip(point).find(|(_, value)| value.is_nan()) {
+            Some((name, _)) => wrong("numbers".to_owned(), format!("{name} = NaN")),
+            None => Ok(()),
+        }
+    }
+
+    /// Log prior density of coordinates, minus infinity where they are not inside.
     pub fn log_density(&self, u: &[f64]) -> f64 {
         if !self.is_inside(u) {
             return f64::NEG_INFINITY;
@@ -85,14 +104,14 @@ impl Coordinates {
         self.each.iter().zip(theta).map(|(c, &value)| c.of_value(value)).collect()
     }
 
-    /// log |du / dtheta|.
+    /// log |du / dtheta|; NaN or infinite where theta has no coordinates: at 0 and below, under a logarithm.
     pub fn log_slope(&self, theta: &[f64]) -> f64 {
         let slope =
             |c: &Coordinate, value: f64| -c.scale.ln() - if c.is_log { value.ln() } else { 0.0 };
         self.each.iter().zip(theta).map(|(c, &value)| slope(c, value)).sum()
     }
 
-    /// Variance of the prior along each coordinate, over evenly spread draws.
+    /// Means and variances of the prior along each coordinate, over evenly spread draws of it.
     pub fn moments(&self) -> (Vec<f64>, Vec<f64>) {
         let draws = self.quasi_prior(1000);
         let mean: Vec<_> = (0..self.dimension())
@@ -177,6 +196,25 @@ fn coordinate(distribution: Distribution) -> Coordinate {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_no_point_is_not_inside() {
+        let normal =
+            "[[parameter]]\npath = \"a\"\ndistribution = \"normal\"\nmean = 1.0\nsd = 0.5\n";
+        let coordinates = Coordinates::of(&Prior::from_toml(normal).unwrap());
+        assert!(coordinates.is_unbounded() && coordinates.is_inside(&[9.0]));
+        for u in [&[f64::NAN][..], &[f64::INFINITY], &[], &[0.0, 0.0]] {
+            assert_eq!(coordinates.log_density(u), f64::NEG_INFINITY, "{u:?}");
+        }
+    }
+
+    #[test]
+    fn moments_are_means_and_variances() {
+        let uniform = Coordinates::of(&Prior::default());
+        let (means, variances) = uniform.moments();
+        assert!(means.iter().all(|mean| (mean - 0.5).abs() < 5e-3), "{means:?}");
+        assert!(variances.iter().all(|v| (v - 1.0 / 12.0).abs() < 1e-3), "{variances:?}");
+    }
 
     #[test]
     fn values_come_back_and_densities_integrate_to_one() {

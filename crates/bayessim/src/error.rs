@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use granulcal_dataset::DatasetError;
 use granulcal_scene::SceneError;
 
-/// Why a model or an observation was refused.
+/// Why a model, an observation or a question was refused.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModelError {
@@ -73,6 +73,16 @@ pub enum ModelError {
         path: PathBuf,
         /// Why.
         source: Box<SceneError>,
+    },
+    /// What was asked of a posterior has no answer.
+    #[error("{what} must be {allowed}, got {found}")]
+    Argument {
+        /// The argument.
+        what: &'static str,
+        /// What is allowed.
+        allowed: String,
+        /// What was found.
+        found: String,
     },
     /// An observation that the model cannot take.
     #[error("the observation must be {allowed}, got {found}")]

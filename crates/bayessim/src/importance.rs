@@ -4,11 +4,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DMatrixView, DVector};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::component::Component;
 use crate::coordinates::Coordinates;
+use crate::kernels::Kernels;
 use crate::likelihood::{FEWEST_EFFECTIVE, Scratch};
 use crate::matrix::Matrix;
 use crate::mixture::Mixture;
@@ -221,47 +222,26 @@ impl ProposalDraws {
     }
 }
 
-/// Equal normals around some of the weighted draws with their total covariance, and the wide one.
+/// Normals around some of the weighted draws, and the wide one.
 fn kernel_estimate(
     draws: &Matrix,
     weights: &[f64],
     wide: &Component,
     random: &mut Random,
 ) -> Mixture {
-    let p = wide.mean.len();
-    let total: f64 = weights.iter().sum();
-    let points = DMatrixView::from_slice(&draws.data, p, draws.rows());
-    let mut mean = DVector::zeros(p);
-    for (u, weight) in points.column_iter().zip(weights) {
-        mean.axpy(weight / total, &u, 1.0);
-    }
-    let mut covariance = DMatrix::zeros(p, p);
-    let mut off = DVector::zeros(p);
-    for (u, weight) in points.column_iter().zip(weights) {
-        off.copy_from(&u);
-        off -= &mean;
-        covariance.ger(weight / total, &off, &off, 1.0);
-    }
-    // Silverman's rule for a normal of this dimension.
-    let dimension = p as f64;
-    let width = (4.0 / ((dimension + 2.0) * CENTRES as f64)).powf(1.0 / (dimension + 4.0));
-    covariance *= width * width;
-    let trace = covariance.trace();
-    for i in 0..p {
-        covariance[(i, i)] += 1e-12 * trace + 1e-18;
-    }
-    let factor = covariance
-        .try_inverse()
-        .and_then(DMatrix::cholesky)
-        .map_or_else(|| wide.factor.clone(), nalgebra::Cholesky::unpack);
+    let kernels = Kernels::of(draws, weights, CENTRES);
     let sums = cumulative(weights.iter().copied());
+    let centres: Vec<usize> = (0..CENTRES).map(|_| random.index(&sums)).collect();
     let log_weight = ((1.0 - DEFENSIVE_SHARE) / CENTRES as f64).ln();
-    let centre = |random: &mut Random| Component {
-        log_weight,
-        mean: DVector::from_column_slice(draws.row(random.index(&sums))),
-        factor: factor.clone(),
+    let component = |&centre: &usize| {
+        let factor = kernels.as_ref().and_then(|kernels| kernels.factor(centre));
+        Component {
+            log_weight,
+            mean: DVector::from_column_slice(draws.row(centre)),
+            factor: factor.unwrap_or_else(|| wide.factor.clone()),
+        }
     };
-    let mut components: Vec<_> = (0..CENTRES).map(|_| centre(random)).collect();
+    let mut components: Vec<_> = centres.par_iter().map(component).collect();
     components.push(wide.clone());
     Mixture::of(components)
 }
@@ -333,6 +313,34 @@ mod tests {
         };
         assert!(different(&sample) > 3700, "{} of 4000", different(&sample));
         assert!(different(&found.resample(4000, &mut Random::new(1))) < 2000);
+    }
+
+    /// Two narrow peaks, of which one has three times the other's mass.
+    #[test]
+    fn each_of_two_peaks_has_its_mass() {
+        let coordinates = Coordinates::of(&Prior::default());
+        let (places, sd) = ([[0.2, 0.3, 0.6], [0.8, 0.3, 0.4]], 0.02);
+        let peak = |u: &[f64], place: [f64; 3]| {
+            -0.5 * u.iter().zip(place).map(|(u, m)| ((u - m) / sd).powi(2)).sum::<f64>()
+        };
+        let log_target = |u: &[f64], _: &mut Scratch| {
+            let [one, other] = places.map(|place| peak(u, place));
+            let (one, other) = (one + 0.75f64.ln(), other + 0.25f64.ln());
+            one.max(other) + (-(one - other).abs()).exp().ln_1p()
+        };
+        let draws = coordinates.quasi_prior(16_384);
+        let of_prior: Vec<_> =
+            draws.iter().map(|u| log_target(u, &mut Scratch::default())).collect();
+        let draws = Matrix { data: draws.concat(), columns: 3 };
+        let start = Importance::of_prior_draws(Arc::new(draws), &of_prior, &coordinates);
+        let found = start.adapted(&coordinates, &log_target, None, &Effort::OF_A_LIKELIHOOD);
+        // Kernels of the total covariance leave 282.
+        assert!(found.effective_sample_size() > 400.0, "{}", found.effective_sample_size());
+        let exact = 1.5 * (std::f64::consts::TAU * sd * sd).ln();
+        assert!((found.log_normaliser - exact).abs() < 0.1, "{} {exact}", found.log_normaliser);
+        let sample = found.sample(4000, &mut Random::new(1), &coordinates, &log_target);
+        let right = sample.iter().filter(|u| u[0] > 0.5).count() as f64 / 4000.0;
+        assert!((right - 0.25).abs() < 0.06, "{right}");
     }
 
     /// Six normals that hang together, from a proposal as wide as the prior and too few rounds.

@@ -20,6 +20,7 @@
 //! | [`Model`], [`Posterior`] | the file, and what it says |
 //! | [`Tensors`], [`Emulated`], [`Evidence`] | the same of parts that are in memory, which is how training asks |
 
+#![warn(missing_debug_implementations)] // whoever holds one of these in a struct derives it
 #![allow(clippy::inline_always)] // what is compiled for wider registers must be inlined to reach them
 
 mod average;
@@ -33,6 +34,7 @@ mod emulator;
 mod error;
 mod identifiability;
 mod importance;
+mod kernels;
 mod lanes;
 mod likelihood;
 mod log_ratio;

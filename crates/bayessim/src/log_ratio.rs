@@ -103,7 +103,10 @@ impl LogRatio {
         let network = self.network.as_ref().map(|(mixtures, _)| Mixture::pooled(mixtures));
         // Its normaliser is the evidence that the pours are of one material: worth more draws.
         let effort = if is_product { Effort::OF_A_PRODUCT } else { Effort::OF_A_LIKELIHOOD };
-        found.adapted(&self.coordinates, &log_target, network.as_ref(), &effort)
+        let adapted = found.adapted(&self.coordinates, &log_target, network.as_ref(), &effort);
+        // Of several narrow peaks the prior's draws may be worth more.
+        let is_better = adapted.effective_sample_size() >= found.effective_sample_size();
+        if is_product || is_better { adapted } else { found }
     }
 
     fn with(&self, u: &[f64], emulated: f64) -> f64 {

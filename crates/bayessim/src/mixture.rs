@@ -66,6 +66,7 @@ impl Mixture {
 }
 
 /// Draws of a mixture.
+#[derive(Debug)]
 pub struct Sampler<'a> {
     mixture: &'a Mixture,
     spreads: Vec<DMatrix<f64>>,

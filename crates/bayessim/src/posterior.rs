@@ -6,6 +6,7 @@ use std::sync::Arc;
 use granulcal_numbers::short;
 use rayon::prelude::*;
 
+use crate::ModelError;
 use crate::average::{Average, Form};
 use crate::coordinates::Coordinates;
 use crate::emulated::Emulated;
@@ -78,8 +79,8 @@ impl fmt::Display for Warning {
             }
             Self::FewEffectiveDraws { effective, needed } => write!(
                 f,
-                "the posterior is worth {effective:.0} draws only, at least {needed:.0} are wanted; of several pours: do \
-                 they share one material?"
+                "the posterior is worth {effective:.0} draws only, at least {needed:.0} are wanted: it is a small part of the \
+                 prior, or pours that were given together are of different materials"
             ),
             Self::PoursDisagree { log_evidence_ratio, needed } => write!(
                 f,
@@ -168,6 +169,33 @@ pub struct Posterior {
     pub warnings: Vec<Warning>,
 }
 
+// Derived, these would print thousands of draws.
+impl fmt::Debug for Evidence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let pours: Vec<_> = self.conditions.iter().map(|(_, pours)| pours.len()).collect();
+        f.debug_struct("Evidence")
+            .field("pours", &pours)
+            .field("mixtures", &self.mixtures.len())
+            .field("average", &self.average)
+            .finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for Posterior {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let source = match self.source {
+            Source::Weighted(_) => "Weighted",
+            Source::Learnt(_) => "Learnt",
+            Source::Sum(..) => "Sum",
+        };
+        f.debug_struct("Posterior")
+            .field("names", &self.names())
+            .field("source", &source)
+            .field("warnings", &self.warnings)
+            .finish_non_exhaustive()
+    }
+}
+
 impl Posterior {
     /// The posterior of one material.
     ///
@@ -227,14 +255,29 @@ impl Posterior {
         self.coordinates.names()
     }
 
-    /// Log density at parameters in own units.
-    pub fn log_prob(&self, theta: &[f64]) -> f64 {
-        let u = self.coordinates.of_values(theta);
-        self.coordinate_log_prob(&u) + self.coordinates.log_slope(theta)
+    /// Log density at parameters in own units; minus infinity outside the prior's bounds.
+    ///
+    /// # Errors
+    /// [`ModelError::Argument`] for another number of parameters, or a NaN.
+    pub fn log_prob(&self, theta: &[f64]) -> Result<f64, ModelError> {
+        self.coordinates.require_point("the parameters", theta)?;
+        let density = self.log_density(&self.coordinates.of_values(theta));
+        // Where there is none, the slope of a logarithm may be no number.
+        let is_none = density == f64::NEG_INFINITY;
+        Ok(if is_none { density } else { density + self.coordinates.log_slope(theta) })
     }
 
-    /// Log density of the prior's coordinates.
-    pub fn coordinate_log_prob(&self, u: &[f64]) -> f64 {
+    /// Log density of the prior's coordinates; minus infinity outside the bounds.
+    ///
+    /// # Errors
+    /// As [`Posterior::log_prob`].
+    pub fn coordinate_log_prob(&self, u: &[f64]) -> Result<f64, ModelError> {
+        self.coordinates.require_point("the coordinates", u)?;
+        Ok(self.log_density(u))
+    }
+
+    /// The same of a point of the right dimension.
+    fn log_density(&self, u: &[f64]) -> f64 {
         let coordinates = &self.coordinates;
         match &self.source {
             Source::Weighted(weighted) => weighted.log_prob(coordinates, u),
@@ -250,8 +293,12 @@ impl Posterior {
     }
 
     /// The same at each of many.
-    pub fn coordinate_log_probs(&self, u: &[Vec<f64>]) -> Vec<f64> {
-        u.par_iter().map(|u| self.coordinate_log_prob(u)).collect()
+    ///
+    /// # Errors
+    /// As [`Posterior::log_prob`], of the first that is refused.
+    pub fn coordinate_log_probs(&self, u: &[Vec<f64>]) -> Result<Vec<f64>, ModelError> {
+        u.iter().try_for_each(|u| self.coordinates.require_point("the coordinates", u))?;
+        Ok(u.par_iter().map(|u| self.log_density(u)).collect())
     }
 
     /// Number of independent draws that the weighted ones are worth; `None` where no draw is weighted.
@@ -277,7 +324,7 @@ impl Posterior {
     /// The coordinates of highest density; always the same.
     pub fn coordinate_mode(&self) -> Vec<f64> {
         let draws = self.draws(MODE_DRAWS, 0, Draws::Resampled);
-        mode::climb(&self.coordinates, |u| self.coordinate_log_prob(u), &draws)
+        mode::climb(&self.coordinates, |u| self.log_density(u), &draws)
     }
 
     /// `n` draws of the coordinates.
@@ -317,7 +364,14 @@ impl Posterior {
     }
 
     /// Mean, median and central interval of each parameter.
-    pub fn marginals(&self, draws: usize, seed: u64) -> Vec<Marginal> {
+    ///
+    /// # Errors
+    /// [`ModelError::Argument`] for no draws.
+    pub fn marginals(&self, draws: usize, seed: u64) -> Result<Vec<Marginal>, ModelError> {
+        if draws == 0 {
+            let (what, allowed) = ("the number of draws", "at least 1".to_owned());
+            return Err(ModelError::Argument { what, allowed, found: "0".to_owned() });
+        }
         // The draws that `sample` gives, so that an interval is one of them.
         let values = self.sample(draws, seed);
         let marginal = |(i, name): (usize, &String)| {
@@ -331,6 +385,6 @@ impl Posterior {
                 interval90: (at(0.05), at(0.95)),
             }
         };
-        self.names().iter().enumerate().map(marginal).collect()
+        Ok(self.names().iter().enumerate().map(marginal).collect())
     }
 }

@@ -3,6 +3,7 @@
 use granulcal_numbers::box_muller;
 
 /// Point `index` of the additive recurrence on powers of the generalised golden ratio, in (0, 1)^p.
+#[derive(Clone, Debug)]
 pub struct QuasiUniform(Vec<f64>);
 
 impl QuasiUniform {

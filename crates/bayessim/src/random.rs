@@ -5,6 +5,7 @@ use rand_core::Rng;
 use rand_pcg::Pcg64;
 
 /// Uniform and normal numbers.
+#[derive(Debug)]
 pub struct Random(Pcg64);
 
 impl Random {

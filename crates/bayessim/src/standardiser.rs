@@ -3,6 +3,9 @@
 use crate::ModelError;
 use crate::tensors::Tensors;
 
+/// Below this share of its own size a spread is round-off, not signal `[-]`.
+const CONSTANT_SPREAD: f64 = 1e-9;
+
 /// Per statistic an optional logarithm, then a shift and a scale.
 #[derive(Clone, Debug)]
 pub struct Standardiser {
@@ -37,12 +40,22 @@ impl Standardiser {
         Ok(found)
     }
 
+    /// What never changed in training but for round-off, as it was there if round-off is all that it is off by.
+    fn as_in_training(&self, i: usize, x: f64) -> f64 {
+        let (low, high) = (self.low[i], self.high[i]);
+        let middle = 0.5 * (low + high);
+        let is_constant = high - low <= CONSTANT_SPREAD * low.abs().max(high.abs());
+        let is_still = is_constant && (x - middle).abs() <= CONSTANT_SPREAD * middle.abs();
+        if is_still { middle } else { x }
+    }
+
     /// Standardised statistics where they are, also beyond the training range; a logarithm is taken of a value no
     /// lower than a thousandth of the lowest.
     pub fn apply_unclipped(&self, x: &[f64]) -> Vec<f64> {
         (0..x.len())
             .map(|i| {
-                let warped = if self.is_log[i] { x[i].max(1e-3 * self.low[i]).ln() } else { x[i] };
+                let x = self.as_in_training(i, x[i]);
+                let warped = if self.is_log[i] { x.max(1e-3 * self.low[i]).ln() } else { x };
                 (warped - self.shift[i]) / self.scale[i]
             })
             .collect()
@@ -52,7 +65,7 @@ impl Standardiser {
     pub fn apply(&self, x: &[f64]) -> Vec<f64> {
         (0..x.len())
             .map(|i| {
-                let inside = x[i].clamp(self.low[i], self.high[i]);
+                let inside = self.as_in_training(i, x[i]).clamp(self.low[i], self.high[i]);
                 let warped = if self.is_log[i] { inside.ln() } else { inside };
                 (warped - self.shift[i]) / self.scale[i]
             })

@@ -1,6 +1,7 @@
 //! The arrays of a model by name, every shape checked.
 
 use std::collections::HashMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use safetensors::tensor::TensorView;
@@ -28,6 +29,13 @@ enum Source<'a> {
 pub struct Tensors<'a> {
     source: Source<'a>,
     path: PathBuf,
+}
+
+// Derived, it would print every number.
+impl fmt::Debug for Tensors<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Tensors").field("path", &self.path).finish_non_exhaustive()
+    }
 }
 
 impl Tensors<'static> {

@@ -30,7 +30,7 @@ fn densities_are_those_of_python() {
         for (pour, expected) in x.iter().zip(rows(&reference[method]["log_prob"])) {
             let posterior = model.posterior(std::slice::from_ref(pour)).unwrap();
             for (at, expected) in theta.iter().zip(expected) {
-                let found = posterior.log_prob(at);
+                let found = posterior.log_prob(at).unwrap();
                 assert!((found - expected).abs() < TOLERANCE, "{method}: {found} {expected}");
             }
         }
@@ -45,7 +45,8 @@ fn draws_have_the_mean_of_python() {
         let model = Model::load(&data().join(method)).unwrap();
         for (pour, expected) in x.iter().zip(rows(&reference[method]["mean"])) {
             let posterior = model.posterior(std::slice::from_ref(pour)).unwrap();
-            for (marginal, expected) in posterior.marginals(20_000, 1).iter().zip(expected) {
+            for (marginal, expected) in posterior.marginals(20_000, 1).unwrap().iter().zip(expected)
+            {
                 let (low, high) = marginal.interval90;
                 let close = 0.05 * (high - low);
                 let found = marginal.mean;
@@ -64,16 +65,17 @@ fn several_pours_are_one_posterior() {
     let posterior = model.posterior(&x).unwrap();
     let expected: Vec<f64> =
         serde_json::from_value(reference["repeated_log_prob"].clone()).unwrap();
-    let offset = posterior.log_prob(&theta[0]) - expected[0];
+    let offset = posterior.log_prob(&theta[0]).unwrap() - expected[0];
     // The normaliser of so narrow a density is by random draws on both sides.
     assert!(offset.abs() < 0.1, "{offset}");
     for (at, expected) in theta.iter().zip(expected) {
-        assert!((posterior.log_prob(at) - expected - offset).abs() < TOLERANCE);
+        assert!((posterior.log_prob(at).unwrap() - expected - offset).abs() < TOLERANCE);
     }
     // A network's posteriors are multiplied over the prior: more is known than from each.
     let network = Model::load(&data().join("mdrff")).unwrap();
     let spread = |x: &[Vec<f64>]| {
-        let (low, high) = network.posterior(x).unwrap().marginals(10_000, 1)[0].interval90;
+        let marginals = network.posterior(x).unwrap().marginals(10_000, 1).unwrap();
+        let (low, high) = marginals[0].interval90;
         high - low
     };
     let singles: Vec<f64> = x.iter().map(|row| spread(std::slice::from_ref(row))).collect();
@@ -92,7 +94,36 @@ fn draws_stay_inside_the_prior_and_repeat_with_their_seed() {
     let inside =
         |d: &Vec<f64>| (-1.0..=3.0).contains(&d[0]) && (0.001..=1.0).contains(&d[1]) && d[2] >= 0.0;
     assert!(draws.iter().all(inside));
-    assert_eq!(posterior.log_prob(&[5.0, 0.1, 1.0]), f64::NEG_INFINITY);
+}
+
+#[test]
+fn a_density_is_zero_outside_the_prior_and_refused_where_nothing_is() {
+    let x = rows(&reference()["x"]);
+    for method in ["mdrff", "auto", "arithmetic"] {
+        let model = Model::load(&data().join(method)).unwrap();
+        let posterior = model.posterior(&x[..1]).unwrap();
+        let inf = f64::INFINITY;
+        // The second is positive: neither 0 nor a negative number has a logarithm.
+        for theta in
+            [[5.0, 0.1, 1.0], [0.5, 0.0, 1.0], [0.5, -0.1, 1.0], [0.5, 0.1, inf], [-inf, 0.1, 1.0]]
+        {
+            let found = posterior.log_prob(&theta).unwrap();
+            assert_eq!(found, f64::NEG_INFINITY, "{method}: {theta:?}");
+        }
+        let refuse = |theta: &[f64]| posterior.log_prob(theta).unwrap_err().to_string();
+        assert!(refuse(&[0.5, 0.1]).contains("the parameters must be 3 numbers"));
+        assert!(refuse(&[0.5, 0.1, 1.0, 1.0]).ends_with("got 4"));
+        let nan = refuse(&[0.5, f64::NAN, 1.0]);
+        assert!(nan.ends_with(&format!("got {} = NaN", posterior.names()[1])), "{nan}");
+        assert!(posterior.coordinate_log_prob(&[0.5, 0.5]).is_err());
+        assert!(posterior.coordinate_log_prob(&[0.5, 0.5, f64::NAN]).is_err());
+        let many = posterior.coordinate_log_probs(&[vec![0.5; 3], vec![0.5; 2]]);
+        assert!(many.unwrap_err().to_string().contains("the coordinates must be 3 numbers"));
+        let none = posterior.marginals(0, 1).unwrap_err().to_string();
+        assert_eq!(none, "the number of draws must be at least 1, got 0");
+        let shown = format!("{posterior:?}");
+        assert!(shown.contains("Posterior") && shown.len() < 500, "{shown}");
+    }
 }
 
 #[test]

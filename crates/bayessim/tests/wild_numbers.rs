@@ -37,7 +37,7 @@ fn ask(document: &[u8], tensors: &[u8]) -> Option<String> {
     let _ = model.misfit(&x).unwrap();
     let posterior = model.posterior(&x).unwrap();
     assert_eq!(posterior.sample(20, 1).len(), 20);
-    assert_eq!(posterior.marginals(20, 1).len(), posterior.names().len());
+    assert_eq!(posterior.marginals(20, 1).unwrap().len(), posterior.names().len());
     let _ = (posterior.mode(), posterior.identifiability());
     None
 }

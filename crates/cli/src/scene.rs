@@ -250,6 +250,6 @@ fn run(
         if !goes_on {
             return Ok(has_ended.then(|| simulation.into_pour()));
         }
-        observer.advance(&mut simulation, POLL_INTERVAL);
+        observer.advance(&mut simulation, POLL_INTERVAL)?;
     }
 }

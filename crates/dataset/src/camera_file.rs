@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use granulcal_features::{Camera, Intrinsics, Segmentation};
+use granulcal_features::{Camera, ColourImage, Intrinsics, Segmentation};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::form::marked;
 use crate::readable::toml_error;
-use crate::{DatasetError, Form, files};
+use crate::{DatasetError, Form, files, png};
 
 /// A depth camera as a file states it.
 ///
@@ -95,12 +95,7 @@ impl CameraFile {
     pub fn parse(path: &Path, text: &str) -> Result<Self, DatasetError> {
         let file: CameraToml = toml::from_str(text)
             .map_err(|source| toml_error(path, "camera", text, Box::new(source)))?;
-        if let Some(unit) = file.depth_unit
-            && !(unit > 0.0 && unit.is_finite())
-        {
-            let found = unit.to_string();
-            return Err(DatasetError::content(path, "depth_unit", found, "positive and finite"));
-        }
+        file.depth_unit.map_or(Ok(()), |unit| require_unit(path, unit))?;
         Ok(Self {
             lens: file.lens(path)?,
             depth_unit: file.depth_unit,
@@ -122,13 +117,32 @@ impl CameraFile {
     /// The lens and the metres per count of the file at `path`, which images as PNG need.
     pub(crate) fn lens_and_unit(&self, path: &Path) -> Result<(Intrinsics, f64), DatasetError> {
         match (self.lens, self.depth_unit) {
-            (Some(lens), Some(unit)) => Ok((lens, unit)),
+            // Both can be set by hand.
+            (Some(lens), Some(unit)) => require_unit(path, unit).map(|()| (lens, unit)),
             (lens, _) => {
                 let found = if lens.is_some() { "no depth_unit" } else { "no lens" };
                 let allowed = "width, height, fx, fy, cx, cy and depth_unit for an image as PNG";
                 Err(DatasetError::content(path, "the camera", found, allowed))
             }
         }
+    }
+
+    /// The colours of the image beside the camera, if it has one.
+    ///
+    /// # Errors
+    /// As [`png::read_colour`], and [`DatasetError::Content`] for another size than that of `lens`.
+    pub(crate) fn read_colour(
+        &self,
+        lens: &Intrinsics,
+    ) -> Result<Option<ColourImage>, DatasetError> {
+        let Some(path) = self.colour.as_deref() else { return Ok(None) };
+        let colour = png::read_colour(path)?;
+        if (colour.width, colour.height) != (lens.width, lens.height) {
+            let found = format!("{}x{}", colour.width, colour.height);
+            let allowed = format!("{}x{}, as the lens has it", lens.width, lens.height);
+            return Err(DatasetError::content(path, "the size of the colour", found, allowed));
+        }
+        Ok(Some(colour))
     }
 
     /// Writes the file, where there is none or one that was written here and nobody has changed.
@@ -164,6 +178,11 @@ impl CameraToml {
             .map(Some)
             .map_err(|source| DatasetError::Recording { path: path.to_owned(), source })
     }
+}
+
+fn require_unit(path: &Path, unit: f64) -> Result<(), DatasetError> {
+    let refuse = || DatasetError::content(path, "depth_unit", unit.to_string(), png::UNITS);
+    if png::is_unit(unit) { Ok(()) } else { Err(refuse()) }
 }
 
 /// The camera with a lens, at the origin of a world whose z axis points back at it.
@@ -216,5 +235,10 @@ mod tests {
         assert_eq!(parse(&toml::to_string(&file).unwrap()).unwrap(), file);
         let error = file.lens_and_unit(Path::new("c.toml")).unwrap_err().to_string();
         assert!(error.contains("no depth_unit"), "{error}");
+        for unit in [0.0, -1e-3, f64::NAN, f64::INFINITY] {
+            let by_hand = CameraFile { depth_unit: Some(unit), ..file.clone() };
+            let error = by_hand.lens_and_unit(Path::new("c.toml")).unwrap_err().to_string();
+            assert!(error.contains("depth_unit must be positive and finite"), "{error}");
+        }
     }
 }

@@ -58,23 +58,44 @@ impl Dataset {
 
     fn sort(&mut self, path: &Path) -> Result<(), DatasetError> {
         self.rows.sort_by_key(|row| row.row);
-        match self.rows.windows(2).find(|pair| pair[0].row == pair[1].row) {
-            None => Ok(()),
-            Some(pair) => {
-                let (first, second) = (path.to_owned(), path.to_owned());
-                Err(DatasetError::DuplicateRow { row: pair[0].row, first, second })
-            }
-        }
+        require_once(self.rows.iter().map(|row| row.row), path)
     }
 
     /// Writes the data set as one Parquet file, which says how many rows were asked for, too.
     ///
     /// # Errors
-    /// [`DatasetError::Io`].
+    /// [`DatasetError::Argument`] or [`DatasetError::DuplicateRow`] for a header or rows that were changed so that
+    /// nobody could read the file, [`DatasetError::Io`].
     pub fn write(&self, path: &Path) -> Result<(), DatasetError> {
+        self.check(path)?;
         let mut file = GroupWriter::create(path, &self.header)?;
         self.rows.iter().try_for_each(|row| file.push(row.clone()))?;
         file.commit(self.asked)
+    }
+
+    /// Refuses what no file can hold: the fields are public.
+    fn check(&self, path: &Path) -> Result<(), DatasetError> {
+        self.header.require_unchanged()?;
+        let refuse = |what, (found, needed): (usize, usize), row: &Row, allowed| {
+            let got = format!("{found} for {needed} in row {}", row.row);
+            Err(DatasetError::Argument { what, got, allowed })
+        };
+        let (parameters, observed) =
+            (self.header.prior.parameters().len(), self.header.observed().len());
+        for row in &self.rows {
+            let (given, seen) = (row.parameters.len(), row.observed.len());
+            if given != parameters {
+                let allowed = "one for each parameter of the prior";
+                return refuse("the parameters of a row", (given, parameters), row, allowed);
+            }
+            if seen != observed {
+                let allowed = "one for each statistic that the scene observes";
+                return refuse("the observed statistics of a row", (seen, observed), row, allowed);
+            }
+        }
+        let mut indices: Vec<u64> = self.rows.iter().map(|row| row.row).collect();
+        indices.sort_unstable();
+        require_once(indices.into_iter(), path)
     }
 
     /// Paths of the parameters that vary, the columns of [`Dataset::theta`].
@@ -130,7 +151,7 @@ impl Dataset {
     }
 
     /// The first rows that are missing of those asked for, or below the highest index where that was not written down,
-    /// at most `limit` of them.
+    /// at most `limit` of them, and a million.
     pub fn gaps(&self, limit: usize) -> Vec<u64> {
         self.all_gaps(limit).first
     }
@@ -145,5 +166,63 @@ impl Dataset {
         self.rows.iter().for_each(|row| gaps.pass(row.row));
         gaps.end(self.asked);
         gaps
+    }
+}
+
+/// Refuses a row that is there twice; the rows are in order.
+fn require_once(rows: impl Iterator<Item = u64> + Clone, path: &Path) -> Result<(), DatasetError> {
+    match rows.clone().zip(rows.skip(1)).find(|(row, next)| row == next) {
+        None => Ok(()),
+        Some((row, _)) => {
+            let (first, second) = (path.to_owned(), path.to_owned());
+            Err(DatasetError::DuplicateRow { row, first, second })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use granulcal_scene::{Prior, Scene};
+
+    use super::*;
+
+    #[test]
+    fn what_was_changed_so_that_nobody_could_read_it_is_not_written() {
+        let header = Header::new(&Scene::drop(0.1), &Prior::default(), 7).unwrap();
+        let row = table::blank(header.prior.parameters().len(), 0);
+        let rows: Vec<_> = [3, 1].map(|index| Row { row: index, ..row.clone() }).into();
+        let sound = Dataset { header, rows, unverified: Vec::new(), asked: Some(5) };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows.parquet");
+        let one = "[[parameter]]\npath = \"material.restitution\"\ndistribution = \"fixed\"\nvalue = 0.5\n";
+        let one = Prior::from_toml(one).unwrap();
+        for (change, named) in [
+            (
+                (&|d: &mut Dataset| d.header.scene.name = "mine".into()) as &dyn Fn(&mut Dataset),
+                "the scene of the data set must be as it was read",
+            ),
+            (&|d| d.header.prior = one.clone(), "the prior of the data set must be as it was"),
+            (
+                &|d| d.rows[0].parameters.clear(),
+                "the parameters of a row must be one for each parameter of the prior, got 0 for",
+            ),
+            (&|d| d.rows[1].observed.push(1.0), "got 1 for 0 in row 1"),
+            (&|d| d.rows[1].row = 3, "row 3 is one in"),
+        ] {
+            let mut changed = sound.clone();
+            change(&mut changed);
+            let error = changed.write(&path).unwrap_err().to_string();
+            assert!(error.contains(named), "{error}");
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+
+        // What says no more than who wrote it can be changed, and rows in any order are put in theirs.
+        let mut mine = sound;
+        (mine.header.version, mine.header.law, mine.header.seed) = ("mine".into(), None, u64::MAX);
+        mine.write(&path).unwrap();
+        let read = Dataset::open(&path).unwrap();
+        assert_eq!((&read.header, read.asked), (&mine.header, Some(5)));
+        assert_eq!(read.rows.iter().map(|row| row.row).collect::<Vec<_>>(), [1, 3]);
+        read.write(&path).unwrap();
     }
 }

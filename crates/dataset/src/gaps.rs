@@ -1,5 +1,8 @@
 //! Rows that a data set lacks.
 
+/// Rows that are named at most, whatever is asked for: a file may say that 2^64 were to be made.
+const MOST_NAMED: usize = 1 << 20;
+
 /// What is missing among rows that come in order.
 #[derive(Clone, Debug)]
 pub(crate) struct Gaps {
@@ -13,9 +16,9 @@ pub(crate) struct Gaps {
 }
 
 impl Gaps {
-    /// None yet; names at most `limit`.
+    /// None yet; names at most `limit`, and a million.
     pub(crate) fn new(limit: usize) -> Self {
-        Self { first: Vec::new(), count: 0, limit, next: 0 }
+        Self { first: Vec::new(), count: 0, limit: limit.min(MOST_NAMED), next: 0 }
     }
 
     /// Takes the next row that is there.
@@ -58,5 +61,12 @@ mod tests {
         // Fewer were asked for than are there.
         assert_eq!(lacks(&[0, 2], Some(1)), (1, vec![1]));
         assert_eq!(lacks(&[], None), (0, vec![]));
+    }
+
+    #[test]
+    fn not_all_are_named_where_no_memory_holds_them() {
+        let mut gaps = Gaps::new(usize::MAX);
+        gaps.end(Some(u64::MAX));
+        assert_eq!((gaps.count, gaps.first.len()), (u64::MAX, MOST_NAMED));
     }
 }

@@ -1,6 +1,7 @@
 //! What a data set was made from, kept with every file of it.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use granulcal_dem::{arithmetic, law_of};
 use granulcal_scene::{Prior, Scene, SceneError};
@@ -34,6 +35,8 @@ pub struct Header {
     pub seed: u64,
     pub(crate) scene_toml: String,
     pub(crate) prior_toml: String,
+    /// What the two texts say.
+    pub(crate) said: Arc<(Scene, Prior)>,
 }
 
 impl Header {
@@ -53,6 +56,7 @@ impl Header {
             seed,
             scene_toml: scene.to_toml().map_err(DatasetError::refused)?,
             prior_toml: prior.to_toml().map_err(DatasetError::Prior)?,
+            said: Arc::new((scene.clone(), prior.clone())),
         })
     }
 
@@ -88,16 +92,16 @@ impl Header {
         if scene_file::fill(&mut scene, Path::new("")).is_ok() {
             scene.check().map_err(wrong)?;
         }
+        let prior = Prior::from_toml(prior_toml).map_err(|error| match error {
+            SceneError::PriorToml(source) => {
+                DatasetError::Toml { path: path.to_owned(), what: "prior", source }
+            }
+            other => DatasetError::content(path, "the prior", other.to_string(), "one that can be"),
+        })?;
         Ok(Self {
+            said: Arc::new((scene.clone(), prior.clone())),
             scene,
-            prior: Prior::from_toml(prior_toml).map_err(|error| match error {
-                SceneError::PriorToml(source) => {
-                    DatasetError::Toml { path: path.to_owned(), what: "prior", source }
-                }
-                other => {
-                    DatasetError::content(path, "the prior", other.to_string(), "one that can be")
-                }
-            })?,
+            prior,
             version,
             law,
             arithmetic,
@@ -105,6 +109,27 @@ impl Header {
             scene_toml: scene_toml.to_owned(),
             prior_toml: prior_toml.to_owned(),
         })
+    }
+
+    /// Refuses a header whose scene or prior was changed since it was made: its file would say one thing, and the rows
+    /// have the columns of another.
+    ///
+    /// # Errors
+    /// [`DatasetError::Argument`].
+    pub(crate) fn require_unchanged(&self) -> Result<(), DatasetError> {
+        let refuse = |what, got| {
+            let allowed = "as it was read; Header::new makes a header of another";
+            Err(DatasetError::Argument { what, got, allowed })
+        };
+        let (scene, prior) = &*self.said;
+        let difference = scene.first_difference(&self.scene).map_err(DatasetError::refused)?;
+        if let Some((key, read, given)) = difference {
+            return refuse("the scene of the data set", format!("{key} {given} for {read}"));
+        }
+        if self.prior != *prior {
+            return refuse("the prior of the data set", describe(&self.prior));
+        }
+        Ok(())
     }
 
     /// Refuses another header than `self`, which stands at `path`, and names the first difference.

@@ -23,6 +23,7 @@
 //! | [`write_checkpoint`], [`resume_checkpoint`] | a pour that is stopped and goes on |
 //! | [`Claims`] | what a command reads and writes, checked before it runs |
 
+mod camera_check;
 mod camera_file;
 mod checkpoint_file;
 mod claims;
@@ -36,6 +37,7 @@ mod error;
 mod fault;
 mod files;
 mod form;
+mod frame_rate;
 mod gaps;
 mod generate;
 mod header;

@@ -35,6 +35,7 @@ use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 use stamp::{WORLD, nanoseconds, timestamp};
 
 use crate::files::PendingFile;
+use crate::frame_rate::check_frame_rate;
 use crate::{DatasetError, Drawn, Form, Observer, VERSION, View, capture, capture_from};
 
 const CAMERA: &str = "camera";
@@ -55,8 +56,8 @@ pub type Filmed = (Pour, Result<(), DatasetError>);
 /// stop the pour: it is returned with what was wrong, and no file is left.
 ///
 /// # Errors
-/// [`DatasetError::Argument`] for a rate that is not positive, [`DatasetError::Io`] or [`DatasetError::Mcap`] if the
-/// file cannot be begun.
+/// [`DatasetError::Argument`] for a scene or a seed that is not the simulation's, or a rate that is not positive or
+/// above one frame a substep; [`DatasetError::Io`] or [`DatasetError::Mcap`] if the file cannot be begun.
 pub fn record_pour(
     mut simulation: Simulation,
     scene: &Scene,
@@ -66,10 +67,8 @@ pub fn record_pour(
     observer: &mut Observer,
     watch: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Option<Filmed>, DatasetError> {
-    if !(rate > 0.0 && rate.is_finite()) {
-        let (what, got) = ("the frames per second", rate.to_string());
-        return Err(DatasetError::Argument { what, got, allowed: "positive and finite" });
-    }
+    require_its_own(&simulation, scene, seed)?;
+    check_frame_rate(rate, &simulation)?;
     let scene_toml = scene.to_toml().map_err(DatasetError::refused)?;
     let failed = |source| DatasetError::Mcap { path: path.to_owned(), source };
     let mut recorder = Recorder::create(path)?;
@@ -85,7 +84,7 @@ pub fn record_pour(
         }
         // From the frame's own time: rounding to substeps must not add up.
         let seconds = frame as f64 / rate - simulation.time();
-        observer.advance(&mut simulation, seconds);
+        observer.advance(&mut simulation, seconds)?;
     }
     let pour = simulation.into_pour();
     let outcome = [
@@ -96,6 +95,20 @@ pub fn record_pour(
         ("simulated_s", pour.simulated_s.to_string()),
     ];
     Ok(Some((pour, film.and_then(|recorder| recorder.finish(&outcome)))))
+}
+
+/// Refuses a scene or a seed that is not the simulation's: the film would be of another pour than it says.
+fn require_its_own(simulation: &Simulation, scene: &Scene, seed: u64) -> Result<(), DatasetError> {
+    let refuse =
+        |what, got| Err(DatasetError::Argument { what, got, allowed: "that of the simulation" });
+    let difference = simulation.scene().first_difference(scene).map_err(DatasetError::refused)?;
+    if let Some((key, own, given)) = difference {
+        return refuse("the scene of a film", format!("{key} {given} for {own}"));
+    }
+    if seed != simulation.seed() {
+        return refuse("the seed of a film", format!("{seed} for {}", simulation.seed()));
+    }
+    Ok(())
 }
 
 /// An MCAP file being written, with the sequence number of each topic.

@@ -106,6 +106,36 @@ mod tests {
             let message = read_as(name, bytes).unwrap_err().to_string();
             assert!(message.contains(named), "{message}");
         }
+        let many = [&[0; 80][..], &u32::MAX.to_le_bytes(), &binary()[84..]].concat();
+        for (number, (ending, bytes)) in [
+            ("stl", &b""[..]),
+            ("stl", b"solid a\nendsolid a\n"),
+            ("stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 NaN\nvertex 1 0 0\nvertex 0 1 0\n"),
+            ("stl", &[0; 84]),
+            ("stl", &many),
+            ("obj", b""),
+            ("obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"),
+            ("obj", b"v 0 0 NaN\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+            ("obj", b"v 0 0 inf\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+            ("obj", b"v 0 0 1e999\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+            ("obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"),
+            ("obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n"),
+            ("obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -4\n"),
+            ("obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999\n"),
+            ("obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf\n"),
+            ("obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n"),
+            ("obj", b"v 0 0 0\nv 1 0 0\nl 1 2\np 1\n"),
+            ("obj", b"v 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+            ("obj", b"\xff\xfe\n"),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let Err(error) = read_as(&format!("{number}.{ending}"), bytes) else {
+                panic!("{number}: {bytes:?}");
+            };
+            assert!(format!("{error:?}").contains(&format!("{number}.{ending}")), "{error:?}");
+        }
         let mut nan = binary();
         nan[96..100].copy_from_slice(&f32::NAN.to_le_bytes());
         let message = read_as("g.stl", &nan).unwrap_err();

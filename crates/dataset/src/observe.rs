@@ -12,6 +12,7 @@ use granulcal_scene::{CameraSpec, Mask, Projection, ViewSpec};
 use nalgebra::{Vector2, Vector3};
 
 use crate::DatasetError;
+use crate::camera_check::{check_camera, check_view};
 use crate::drawn::Drawn;
 use crate::random::{camera_seed, sensor_seed};
 
@@ -113,16 +114,17 @@ impl std::error::Error for TooFewGrains {}
 /// `pour_seed` is the seed of the pour; the camera's noise takes its own seed from it.
 ///
 /// # Errors
-/// [`DatasetError::Features`] if the camera cannot exist or grains are nowhere (NaN positions).
+/// [`DatasetError::Features`] if no scene can have the camera or grains are nowhere (NaN positions).
 pub fn observe(
     camera: &CameraSpec,
     pour: &Pour,
     pour_seed: u64,
 ) -> Result<Observation, DatasetError> {
+    check_camera(camera)?;
     observe_grains(camera, &Drawn::of(pour), pour_seed)
 }
 
-/// The image and the statistics of grains under a camera, as [`observe`].
+/// The image and the statistics of grains under the camera of a checked scene, as [`observe`].
 pub(crate) fn observe_grains(
     camera: &CameraSpec,
     grains: &Drawn<'_>,
@@ -167,6 +169,7 @@ pub fn capture(
     grains: &Drawn<'_>,
     pour_seed: u64,
 ) -> Result<View, DatasetError> {
+    check_camera(camera)?;
     views(camera, grains, pour_seed).map(|(_, view)| view)
 }
 
@@ -176,6 +179,7 @@ pub fn capture(
 /// # Errors
 /// [`DatasetError::Features`] as [`observe`].
 pub fn capture_from(view: &ViewSpec, grains: &Drawn<'_>) -> Result<View, DatasetError> {
+    check_view(view)?;
     let [width, height] = view.pixels;
     let farthest = FARTHEST * view.distance();
     Camera::looking_at(view.eye.into(), view.target.into(), view.field_width, (width, height))
@@ -199,7 +203,7 @@ fn views(
     let seed = camera_seed(pour_seed);
     let views = match camera.projection {
         Projection::Pinhole => {
-            let full = overhead(camera)?;
+            let full = above(camera)?;
             let small = full.downsampled(camera.downsample).map_err(DatasetError::Features)?;
             grains.render(&full, camera.downsample).and_then(|clean| {
                 let mut image = noise.apply(&clean, seed)?;
@@ -236,8 +240,13 @@ fn views(
 /// The scene's pinhole camera before down-sampling.
 ///
 /// # Errors
-/// [`DatasetError::Features`] if the camera cannot exist.
+/// [`DatasetError::Features`] if no scene can have the camera.
 pub fn overhead(camera: &CameraSpec) -> Result<Camera, DatasetError> {
+    check_camera(camera)?;
+    above(camera)
+}
+
+fn above(camera: &CameraSpec) -> Result<Camera, DatasetError> {
     Camera::overhead(camera.height, camera.field_width, camera.pixels)
         .map_err(DatasetError::Features)
 }
@@ -341,6 +350,43 @@ mod tests {
     }
 
     #[test]
+    fn a_camera_that_no_scene_has_is_refused() {
+        let (pour, plain) = (carpet(0.0), CameraSpec::default());
+        let orthographic = CameraSpec { projection: Projection::Orthographic, ..plain };
+        for (camera, named) in [
+            // Nothing would be higher than NaN: a pour without grains.
+            (CameraSpec { height_threshold: f64::NAN, ..plain }, "camera.height_threshold"),
+            (CameraSpec { height_threshold: -1.0, ..plain }, "camera.height_threshold"),
+            (CameraSpec { pixels: usize::MAX, ..orthographic }, "camera.pixels"),
+            (CameraSpec { pixels: 0, ..orthographic }, "camera.pixels"),
+            (CameraSpec { downsample: 0, ..plain }, "camera.downsample"),
+            (CameraSpec { height: f64::INFINITY, ..plain }, "camera.height"),
+            (CameraSpec { depth_noise: -1e-3, ..plain }, "camera.depth_noise"),
+        ] {
+            for error in [
+                observe(&camera, &pour, 1).unwrap_err(),
+                capture(&camera, &Drawn::of(&pour), 1).unwrap_err(),
+                overhead(&camera).unwrap_err(),
+            ] {
+                let reason = std::error::Error::source(&error).unwrap().to_string();
+                assert!(reason.contains(named), "{reason}");
+            }
+        }
+        let side = ViewSpec {
+            name: String::new(),
+            eye: [0.0, -0.4, 0.02],
+            target: [0.0; 3],
+            field_width: 0.1,
+            pixels: [4, 2],
+        };
+        capture_from(&side, &Drawn::of(&pour)).unwrap();
+        let large = ViewSpec { pixels: [usize::MAX, 2], ..side };
+        let error = capture_from(&large, &Drawn::of(&pour)).unwrap_err();
+        let reason = std::error::Error::source(&error).unwrap().to_string();
+        assert!(reason.contains("pixels must be in 1..=16384"), "{reason}");
+    }
+
+    #[test]
     fn noise_belongs_to_the_seed() {
         let camera = CameraSpec { depth_noise: 1e-3, ..CameraSpec::default() };
         let view = |seed| observe(&camera, &carpet(0.0), seed).unwrap().view;
@@ -428,6 +474,7 @@ mod tests {
             ..CameraSpec::default()
         };
         let error = observe(&camera, &carpet(0.0), 1).unwrap_err();
-        assert!(matches!(error, DatasetError::Features(FeatureError::NeedsPinhole)), "{error}");
+        let reason = std::error::Error::source(&error).unwrap().to_string();
+        assert!(reason.contains("pinhole"), "{reason}");
     }
 }

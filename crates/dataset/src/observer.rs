@@ -17,6 +17,7 @@ mod surface;
 use granulcal_dem::{Pour, Simulation, Status};
 use granulcal_scene::Scene;
 
+use crate::DatasetError;
 use crate::row::RowStatus;
 use observation::{Frame, Observation};
 pub use observation::{ObservedStatistic, Series};
@@ -33,8 +34,8 @@ pub struct Observed {
     pub series: Vec<Series>,
 }
 
-/// Looks at a simulation whenever the scene says.
-#[derive(Debug)]
+/// Looks at a simulation whenever the scene says. A copy has seen what it has, and looks on by itself.
+#[derive(Clone, Debug)]
 pub struct Observer {
     observations: Vec<Box<dyn Observation>>,
     begin: f64,
@@ -92,9 +93,26 @@ impl Observer {
         self.begin + self.next as f64 / self.rate
     }
 
-    /// Simulates `seconds`, or less if the pour ends before, and takes the samples that fall due. Samples before the
-    /// time at which the first call begins are missed, as after a restart from a checkpoint.
-    pub fn advance(&mut self, simulation: &mut Simulation, seconds: f64) {
+    /// Simulates `seconds`, or less if the pour ends before, and takes the samples that fall due; to the end for
+    /// infinity, nothing for a negative number. Samples before the time at which the first call begins are missed, as
+    /// after a restart from a checkpoint.
+    ///
+    /// # Errors
+    /// [`DatasetError::Argument`] for NaN; nothing is simulated then.
+    pub fn advance(
+        &mut self,
+        simulation: &mut Simulation,
+        seconds: f64,
+    ) -> Result<(), DatasetError> {
+        if seconds.is_nan() {
+            let (what, got) = ("the time to simulate [s]", seconds.to_string());
+            return Err(DatasetError::Argument { what, got, allowed: "a number" });
+        }
+        self.go_on(simulation, seconds);
+        Ok(())
+    }
+
+    fn go_on(&mut self, simulation: &mut Simulation, seconds: f64) {
         if self.is_idle() {
             simulation.advance(seconds);
             return;
@@ -127,7 +145,7 @@ impl Observer {
             if !keep_going() {
                 return None;
             }
-            self.advance(&mut simulation, POLL_INTERVAL);
+            self.go_on(&mut simulation, POLL_INTERVAL);
         }
         Some(simulation.into_pour())
     }

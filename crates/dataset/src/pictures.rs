@@ -10,6 +10,8 @@ use crate::{DatasetError, Form, files};
 
 /// Pixels that the shorter side of a picture has at least; small images are enlarged.
 const LEAST_SIDE: usize = 400;
+/// Pixels that the longer side of an enlarged one has at most.
+const MOST_SIDE: usize = 8192;
 /// Robust standard deviations of the ground at the ends of the scale of the residual.
 const RESIDUAL_SDS: f64 = 4.0;
 /// Colour of a pixel without data.
@@ -38,8 +40,12 @@ pub struct Pictures {
 /// Writes `residual.png`, `height.png` and `mask.png` into `folder`, which is made if it does not exist.
 ///
 /// # Errors
-/// [`DatasetError::Io`] or [`DatasetError::Png`].
+/// [`DatasetError::Content`] for heights, or a mask, that are not one for each pixel; [`DatasetError::Io`] or
+/// [`DatasetError::Png`].
 pub fn write_pictures(folder: &Path, levelled: &Levelled) -> Result<Pictures, DatasetError> {
+    let size = (levelled.width, levelled.height);
+    require_pixels(folder, "the heights", levelled.heights.len(), 1, size)?;
+    require_pixels(folder, "the mask", levelled.mask.len(), 1, size)?;
     std::fs::create_dir_all(folder).map_err(DatasetError::io("create", folder))?;
     let residual = RESIDUAL_SDS * levelled.ground_sd.max(1e-6);
     let masked = levelled.heights.iter().zip(&levelled.mask).filter(|(_, masked)| **masked);
@@ -64,12 +70,32 @@ pub fn write_pictures(folder: &Path, levelled: &Levelled) -> Result<Pictures, Da
 /// Writes a colour image with the outline of a mask over it.
 ///
 /// # Errors
-/// [`DatasetError::Io`] or [`DatasetError::Png`].
+/// [`DatasetError::Content`] for a mask, or colours, that are not one for each pixel; [`DatasetError::Io`] or
+/// [`DatasetError::Png`].
 pub fn write_mask(path: &Path, image: &ColourImage, mask: &[bool]) -> Result<(), DatasetError> {
+    let size = (image.width, image.height);
+    require_pixels(path, "the mask", mask.len(), 1, size)?;
+    require_pixels(path, "the colours", image.rgb.len(), 3, size)?;
     let mut pixels: Vec<[u8; 3]> =
         image.rgb.chunks_exact(3).map(|rgb| [rgb[0], rgb[1], rgb[2]]).collect();
     draw_outline(&mut pixels, mask, image.width);
     write(path, &pixels, image.width)
+}
+
+/// Refuses what is not so many for each pixel of a picture of this size, and a picture that has none.
+fn require_pixels(
+    path: &Path,
+    what: &str,
+    found: usize,
+    each: usize,
+    (width, height): (usize, usize),
+) -> Result<(), DatasetError> {
+    let expected = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(each));
+    if found > 0 && expected == Some(found) {
+        return Ok(());
+    }
+    let allowed = format!("{each} for each of at least one pixel, {width}x{height}");
+    Err(DatasetError::content(path, what, found.to_string(), allowed))
 }
 
 /// The colour at a place of a scale that runs from 0 to 1; beyond its ends it stays.
@@ -109,7 +135,8 @@ fn draw_outline(pixels: &mut [[u8; 3]], mask: &[bool], width: usize) {
 
 fn write(path: &Path, pixels: &[[u8; 3]], width: usize) -> Result<(), DatasetError> {
     let height = pixels.len() / width;
-    let factor = LEAST_SIDE.div_ceil(width.min(height).max(1));
+    let wanted = LEAST_SIDE.div_ceil(width.min(height).max(1));
+    let factor = wanted.min(MOST_SIDE / width.max(height).max(1)).max(1);
     let (wide, tall) = (width * factor, height * factor);
     let enlarged = ImageBuffer::from_fn(wide as u32, tall as u32, |x, y| {
         let (u, v) = (x as usize / factor, y as usize / factor);
@@ -157,6 +184,47 @@ mod tests {
         let outlined = mask.pixels().filter(|p| p.0 == OUTLINE).count() / 16;
         let expected = 2.0 * std::f64::consts::PI * 19.0;
         assert!((outlined as f64 / expected - 1.0).abs() < 0.25, "{outlined} {expected}");
+    }
+
+    #[test]
+    fn a_strip_is_not_enlarged_without_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("strip.png");
+        for (width, size) in [(2000, (8000, 4)), (10_000, (10_000, 1))] {
+            let strip = ColourImage::new(width, 1, vec![0; 3 * width]).unwrap();
+            write_mask(&path, &strip, &vec![false; width]).unwrap();
+            assert_eq!(read(&path).dimensions(), size);
+        }
+    }
+
+    #[test]
+    fn a_mask_of_another_size_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mask.png");
+        let image = ColourImage::new(3, 2, vec![0; 18]).unwrap();
+        write_mask(&path, &image, &[true; 6]).unwrap();
+        let refused = |image: &ColourImage, mask: &[bool]| {
+            write_mask(&path, image, mask).unwrap_err().to_string()
+        };
+        let error = refused(&image, &[true; 5]);
+        assert!(
+            error.contains("the mask must be 1 for each of") && error.contains("3x2"),
+            "{error}"
+        );
+        assert!(error.contains("found 5"), "{error}");
+        let error = refused(&ColourImage { rgb: vec![0; 17], ..image.clone() }, &[true; 6]);
+        assert!(
+            error.contains("the colours must be 3 for each") && error.contains("17"),
+            "{error}"
+        );
+        assert!(refused(&ColourImage { width: 0, rgb: Vec::new(), ..image }, &[]).contains("0x2"));
+
+        let map =
+            HeightMap::new(20, 20, 1e-3, 1e-3, (0..400).map(|i| f64::from(i % 7) * 1e-5).collect());
+        let mut half = level_height_map(&map.unwrap(), &Segmentation::default()).unwrap();
+        half.mask.truncate(200);
+        let error = write_pictures(folder.path(), &half).unwrap_err().to_string();
+        assert!(error.contains("the mask") && error.contains("20x20"), "{error}");
     }
 
     #[test]

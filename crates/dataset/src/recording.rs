@@ -18,7 +18,7 @@ pub use options::{FRAMES, ReadOptions};
 use crate::camera_file::camera_of;
 use crate::input::{Input, ReadSeek};
 use crate::message_file::MessageFormat;
-use crate::{CameraFile, DatasetError, Lost, Npz, files, png};
+use crate::{CameraFile, DatasetError, Lost, Npz, files};
 
 /// What was measured.
 #[derive(Clone, Debug)]
@@ -204,7 +204,7 @@ impl Recording {
     ) -> Result<Self, DatasetError> {
         let (lens, unit) = camera.lens_and_unit(camera_path)?;
         let mean = folder::average(path, frames, (lens, unit, camera_path))?;
-        let colour = camera.colour.as_deref().map(png::read_colour).transpose()?;
+        let colour = camera.read_colour(&lens)?;
         let source = Source::Depth { camera: camera_of(lens), image: mean.image, colour };
         let damaged = mean.damage.len() as u64;
         Ok(Self {
@@ -221,11 +221,8 @@ impl Recording {
     fn take_messages(mut input: Input<'_>, options: &ReadOptions) -> Result<Self, DatasetError> {
         let file = options.camera.as_deref().map(CameraFile::load).transpose()?;
         let read = messages::read(&mut input, options, file.as_ref())?;
-        let beside = file.as_ref().and_then(|file| file.colour.as_deref());
-        let colour = match beside.map(png::read_colour).transpose()? {
-            Some(colour) => Some(colour),
-            None => read.colour,
-        };
+        let beside = file.as_ref().map(|file| file.read_colour(&read.intrinsics)).transpose()?;
+        let colour = beside.flatten().or(read.colour);
         let source =
             Source::Depth { camera: camera_of(read.intrinsics), image: read.image, colour };
         let segmentation = file.map(|file| file.segmentation).unwrap_or_default();

@@ -20,6 +20,8 @@ const SAMPLED_PIXEL: f64 = 256.0;
 const BASE: f64 = 64e6;
 /// Bytes of a row of a data set on disk, and of one in memory.
 const ROW: f64 = 1024.0;
+/// Bytes of the number of a row.
+const NUMBER: f64 = 8.0;
 /// Bytes of a part of a data set on disk besides its rows: scene, prior and what the format says of its columns.
 const PART: f64 = 17e3;
 /// Bytes of a grain and of a pixel in one frame of a film.
@@ -67,6 +69,11 @@ impl Room {
             memory: BASE + (pour.memory - BASE) * threads + ROW * in_memory,
             disk: ROW * rows + PART * parts,
         }
+    }
+
+    /// The numbers of so many rows.
+    pub(crate) fn of_list(rows: u64) -> Self {
+        Self { memory: NUMBER * rows as f64, disk: 0.0 }
     }
 
     /// Refuses what needs more than there is; `folder` is where is written. The variable `GRANULCAL_NO_LIMITS=1`

@@ -321,7 +321,8 @@ fn metadata(file: &SerializedFileReader<bytes::Bytes>, key: &str) -> Option<Stri
     all.and_then(|all| all.iter().find(|entry| entry.key == key))?.value.clone()
 }
 
-fn blank(parameters: usize, observed: usize) -> Row {
+/// A row that says nothing.
+pub(crate) fn blank(parameters: usize, observed: usize) -> Row {
     Row {
         row: 0,
         parameters: vec![f64::NAN; parameters],

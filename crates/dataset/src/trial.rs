@@ -56,7 +56,7 @@ pub fn try_pour(
         if !is_late && begun.elapsed() >= patience / 2 {
             (is_late, middle) = (true, (cpu_s, reached_s));
         }
-        observer.advance(&mut simulation, stride);
+        observer.advance(&mut simulation, stride)?;
     }
 }
 

@@ -177,16 +177,33 @@ fn a_stopped_recording_leaves_no_file() {
     .unwrap();
     assert!(pour.is_none());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-    assert!(
-        record_pour(
-            simulation(),
-            &scene(),
+}
+
+#[test]
+fn a_film_is_of_its_own_pour_and_has_an_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pour.mcap");
+    let other = scene().with("material.restitution", 0.25).unwrap();
+    let a_frame_a_substep = 1.0 / simulation().settings().dt;
+    for (scene, seed, rate, named) in [
+        (other, 4, 60.0, "the scene of a film must be that of the simulation, got material.rest"),
+        (scene(), 5, 60.0, "the seed of a film must be that of the simulation, got 5 for 4"),
+        (
+            scene(),
             4,
             0.0,
-            &path,
-            &mut Observer::new(&scene()),
-            &mut |_| true
-        )
-        .is_err()
-    );
+            "the frames per second must be positive and at most one a substep, got 0",
+        ),
+        (scene(), 4, f64::NAN, "the frames per second"),
+        (scene(), 4, f64::INFINITY, "the frames per second"),
+        (scene(), 4, 1.01 * a_frame_a_substep, "the frames per second"),
+    ] {
+        let mut observer = Observer::new(&scene);
+        // What is not refused stops at once.
+        let watch = &mut |_| false;
+        let filmed = record_pour(simulation(), &scene, seed, rate, &path, &mut observer, watch);
+        let error = filmed.unwrap_err().to_string();
+        assert!(error.contains(named), "{error}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -68,6 +68,11 @@ fn height_maps_survive_the_disk() {
     for (a, b) in map.z.iter().zip(&back.z) {
         assert!(a == b || a.is_nan() && b.is_nan());
     }
+    // A map whose fields contradict each other is not written over it.
+    for wrong in [HeightMap { height: 3, ..map.clone() }, HeightMap { resolution_x: 0.0, ..map }] {
+        let error = write_height_map(&path, &wrong).unwrap_err();
+        assert!(matches!(error, DatasetError::Features(_)), "{error}");
+    }
     let bytes = std::fs::read(&path).unwrap();
     for length in [0, 10, bytes.len() / 2, bytes.len() - 1] {
         std::fs::write(&path, &bytes[..length]).unwrap();
@@ -136,6 +141,15 @@ fn colour_decides_where_it_is_given() {
         .unwrap();
     let grains = image.depth.iter().filter(|&&d| ground - d > 5e-4).count();
     assert_eq!(formation.masked_count, grains);
+
+    // A colour of another size is refused, with both sizes, whether or not it would decide.
+    image::RgbImage::new(60, 120).save(at("narrow.png")).unwrap();
+    let narrow = CameraFile { colour: Some("narrow.png".into()), ..file.clone() };
+    narrow.save(&at("narrow.toml")).unwrap();
+    let options = ReadOptions::with_camera(at("narrow.toml"));
+    let error = Recording::open(&at("d.png"), &options).unwrap_err().to_string();
+    assert!(error.contains("narrow.png") && error.contains("120x120"), "{error}");
+    assert!(error.contains("found 60x120"), "{error}");
 
     // Half of the pair is refused, not ignored.
     file.segmentation = Segmentation::default();

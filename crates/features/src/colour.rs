@@ -4,6 +4,7 @@ mod pick;
 
 use serde::{Deserialize, Serialize};
 
+use crate::camera::MAX_SIDE_PX;
 use crate::depth::decimate;
 use crate::error::{FeatureError, require_in, require_length};
 pub use pick::{Picked, pick_range};
@@ -23,11 +24,11 @@ impl ColourImage {
     /// An image of the given size.
     ///
     /// # Errors
-    /// `LengthMismatch` when `rgb` has not 3 · width · height values.
+    /// `OutOfRange` for an empty image, `LengthMismatch` when `rgb` has not 3 · width · height values.
     pub fn new(width: usize, height: usize, rgb: Vec<u8>) -> Result<Self, FeatureError> {
-        let expected = width.saturating_mul(height).saturating_mul(3);
-        require_length("rgb", rgb.len(), expected)?;
-        Ok(Self { width, height, rgb })
+        let image = Self { width, height, rgb };
+        image.require_valid()?;
+        Ok(image)
     }
 
     /// Colour of pixel (u, v), which must lie inside.
@@ -39,22 +40,25 @@ impl ColourImage {
     /// Which pixels lie in the range, row by row.
     ///
     /// # Errors
-    /// `OutOfRange` for a range whose bounds are out of order, `LengthMismatch` for a broken image.
+    /// `OutOfRange` for a range whose bounds are out of order or an empty image, `LengthMismatch` for a broken one.
     pub fn mask_of(&self, range: &HsvRange) -> Result<Vec<bool>, FeatureError> {
         self.mask(range, 1)
     }
 
     /// Which pixels of the image down-sampled by `n` lie in the range.
     pub(crate) fn mask(&self, range: &HsvRange, n: usize) -> Result<Vec<bool>, FeatureError> {
-        require_length(
-            "rgb",
-            self.rgb.len(),
-            self.width.saturating_mul(self.height).saturating_mul(3),
-        )?;
+        self.require_valid()?;
         range.require_valid()?;
         let (pixels, _) = self.rgb.as_chunks::<3>();
         let kept = decimate(pixels, self.width, self.height, n)?;
         Ok(kept.into_iter().map(|rgb| range.contains(rgb)).collect())
+    }
+
+    /// Refuses an image whose public fields contradict each other.
+    pub(crate) fn require_valid(&self) -> Result<(), FeatureError> {
+        require_in("colour image width [px]", self.width as f64, 1.0, MAX_SIDE_PX as f64)?;
+        require_in("colour image height [px]", self.height as f64, 1.0, MAX_SIDE_PX as f64)?;
+        require_length("rgb", self.rgb.len(), 3 * self.width * self.height)
     }
 }
 
@@ -167,6 +171,10 @@ mod tests {
     #[test]
     fn refuses_bad_ranges_and_buffers() {
         assert!(ColourImage::new(2, 2, vec![0; 11]).is_err());
+        for (width, height) in [(0, 0), (0, 2), (2, 0), (usize::MAX, usize::MAX)] {
+            let got = ColourImage::new(width, height, Vec::new());
+            assert!(matches!(got, Err(FeatureError::OutOfRange { .. })), "{got:?}");
+        }
         let image = ColourImage::new(1, 1, vec![0; 3]).unwrap();
         let crossed = HsvRange { value_min: 0.5, value_max: 0.4, ..HsvRange::default() };
         assert!(matches!(image.mask(&crossed, 1), Err(FeatureError::OutOfRange { .. })));

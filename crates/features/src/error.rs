@@ -151,6 +151,19 @@ pub enum FeatureError {
     /// A stereo sensor was asked for a height map.
     #[error("a stereo sensor needs a pinhole camera, got a height map without one")]
     NeedsPinhole,
+    /// The plane of the points is too steep to be the ground.
+    #[error(
+        "the ground must be tilted by at most {} deg (max_tilt_deg), got a plane of {} deg: is it a wall, or the \
+         camera's pose?",
+        General(*max_deg),
+        General(*got_deg)
+    )]
+    TooSteep {
+        /// Tilt of the plane that was found `[deg]`.
+        got_deg: f64,
+        /// Largest tilt of the ground `[deg]`.
+        max_deg: f64,
+    },
     /// The points do not span a plane.
     #[error(
         "points do not span a plane: their second largest spread is {} m, it must exceed {} m",

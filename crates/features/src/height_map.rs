@@ -6,6 +6,10 @@ use crate::camera::MAX_SIDE_PX;
 use crate::depth::decimate;
 use crate::error::{FeatureError, require_in, require_length};
 
+/// Pixels are equally wide where they differ by less than this share: by the digits in a file, not by the camera.
+/// Over a thousand pixels it is a tenth of one.
+const SAME_RESOLUTION: f64 = 1e-4;
+
 /// Height above a datum on a regular grid, seen without perspective.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeightMap {
@@ -69,10 +73,21 @@ impl HeightMap {
     /// These heights less those of another map of the same ground; NaN where either has no data.
     ///
     /// # Errors
-    /// `LengthMismatch` for a map of another size.
+    /// `SizeMismatch` for a map of another size, `OutOfRange` for one whose pixels are not as wide.
     pub fn less(&self, other: &Self) -> Result<Self, FeatureError> {
         self.require_valid()?;
-        require_length("the other map's heights", other.z.len(), self.z.len())?;
+        other.require_valid()?;
+        let (got, expected) = ((other.width, other.height), (self.width, self.height));
+        if got != expected {
+            return Err(FeatureError::SizeMismatch { what: "the other map", got, expected });
+        }
+        for (what, got, own) in [
+            ("resolution_x of the other map [m/px]", other.resolution_x, self.resolution_x),
+            ("resolution_y of the other map [m/px]", other.resolution_y, self.resolution_y),
+        ] {
+            let (min, max) = (own * (1.0 - SAME_RESOLUTION), own * (1.0 + SAME_RESOLUTION));
+            require_in(what, got, min, max)?;
+        }
         let z = self.z.iter().zip(&other.z).map(|(mine, theirs)| mine - theirs).collect();
         Self::new(self.width, self.height, self.resolution_x, self.resolution_y, z)
     }
@@ -121,6 +136,19 @@ mod tests {
     fn points_are_centred_and_skip_missing_data() {
         let map = HeightMap::new(2, 1, 0.01, 0.02, vec![0.5, f64::NAN]).unwrap();
         assert_eq!(map.to_points(), [Vector3::new(-0.005, 0.0, 0.5)]);
+    }
+
+    #[test]
+    fn maps_of_two_grids_are_not_taken_from_each_other() {
+        let map = |width, height, resolution| {
+            HeightMap::new(width, height, resolution, 0.01, vec![0.5; 6]).unwrap()
+        };
+        assert_eq!(map(3, 2, 0.01).less(&map(3, 2, 0.0100001)).unwrap().z, [0.0; 6]);
+        let (got, expected) = ((2, 3), (3, 2));
+        let refused = FeatureError::SizeMismatch { what: "the other map", got, expected };
+        assert_eq!(map(3, 2, 0.01).less(&map(2, 3, 0.01)), Err(refused));
+        let coarse = map(3, 2, 0.01).less(&map(3, 2, 0.02));
+        assert!(matches!(coarse, Err(FeatureError::OutOfRange { got: 0.02, .. })), "{coarse:?}");
     }
 
     #[test]

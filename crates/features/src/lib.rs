@@ -37,6 +37,7 @@
 //! # Ok::<(), granulcal_features::FeatureError>(())
 //! ```
 
+#![warn(missing_debug_implementations)] // whoever holds one of these in a struct derives it
 #![allow(clippy::inline_always)] // what is compiled for wider registers must be inlined to reach them
 
 pub mod camera;

@@ -17,6 +17,8 @@ const SCORED_POINTS: usize = 2048;
 const MAX_REFINEMENTS: usize = 50;
 /// Steps of the eigenvalue iteration at most; a finite 3 × 3 matrix takes fewer than ten.
 const MAX_ROTATIONS: usize = 100;
+/// Tilt beyond the largest that is rounding: a flat ground is found under a limit of 0 `[rad]`.
+const TILT_ROUNDING: f64 = 1e-9;
 /// Relative extent below which points count as a line or a point; far above f64 rounding.
 const FLATNESS: f64 = 1e-7;
 
@@ -104,7 +106,8 @@ pub fn fit_plane(
 /// wall is no ground, however much of it there is.
 ///
 /// # Errors
-/// As [`fit_plane`].
+/// As [`fit_plane`]; `TooSteep` when the plane of the points near the best one within the limit, or of all points
+/// where there is none, is beyond the limit.
 pub fn fit_plane_within(
     points: &[Vector3<f64>],
     inlier_distance: f64,
@@ -119,16 +122,19 @@ pub fn fit_plane_within(
     }
     let start = match search(points, inlier_distance, max_tilt_rad.cos(), seed) {
         Some(plane) => plane,
-        None => least_squares(points.iter())?.0,
+        // Asked here, as it may have no point near it.
+        None => upright(least_squares(points.iter())?.0, max_tilt_rad)?,
     };
-    refine_plane(points, start, inlier_distance)
+    refine_plane(points, start, inlier_distance, max_tilt_rad)
 }
 
-/// Total least squares on the points near `plane`, repeated until they stay the same.
+/// Total least squares on the points near `plane`, repeated until they stay the same. What is then beyond the largest
+/// tilt is refused: it is the plane that these points lie on, and another would not be theirs.
 pub(crate) fn refine_plane(
     points: &[Vector3<f64>],
     mut plane: Plane,
     inlier_distance: f64,
+    max_tilt_rad: f64,
 ) -> Result<PlaneFit, FeatureError> {
     let near = |plane: Plane| {
         points.iter().filter(move |p| plane.signed_distance(p).abs() <= inlier_distance)
@@ -143,7 +149,18 @@ pub(crate) fn refine_plane(
             break;
         }
     }
+    let plane = upright(plane, max_tilt_rad)?;
     Ok(PlaneFit { plane, inliers, rms, tilt_rad: plane.tilt_rad() })
+}
+
+/// Refuses a plane, its normal up, that is tilted by more than `max_tilt_rad`.
+fn upright(plane: Plane, max_tilt_rad: f64) -> Result<Plane, FeatureError> {
+    let tilt = plane.tilt_rad();
+    if tilt > max_tilt_rad + TILT_ROUNDING {
+        let (got_deg, max_deg) = (tilt.to_degrees(), max_tilt_rad.to_degrees());
+        return Err(FeatureError::TooSteep { got_deg, max_deg });
+    }
+    Ok(plane)
 }
 
 /// The best plane through three of the points whose normal is upright enough, `None` when every

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3};
 use crate::camera::Intrinsics;
 use crate::colour::ColourImage;
 use crate::depth::{DepthImage, is_valid};
-use crate::error::{FeatureError, require_length};
+use crate::error::FeatureError;
 
 /// The colour that a second camera saw at the point of each depth pixel; black where there is none.
 ///
@@ -28,8 +28,8 @@ pub fn register_colour(
     depth.require_valid()?;
     require_size("depth image", (depth.width, depth.height), depth_lens)?;
     require_size("colour image", (colour.width, colour.height), colour_lens)?;
+    colour.require_valid()?;
     let (pixels, _) = colour.rgb.as_chunks::<3>();
-    require_length("rgb", pixels.len(), colour.width.saturating_mul(colour.height))?;
     let mut rgb = Vec::with_capacity(3 * depth.depth.len());
     for v in 0..depth.height {
         for u in 0..depth.width {
@@ -110,5 +110,8 @@ mod tests {
         let other = Intrinsics::new(2, 1, 1.0, 1.0, 0.5, 0.5).unwrap();
         let error = register_colour(&depth, &lens, &white, &other, &here).unwrap_err();
         assert!(matches!(error, FeatureError::SizeMismatch { what: "colour image", .. }));
+        let odd = ColourImage { rgb: vec![255; 4], ..white };
+        let error = register_colour(&depth, &lens, &odd, &lens, &here).unwrap_err();
+        assert_eq!(error, FeatureError::LengthMismatch { what: "rgb", got: 4, expected: 3 });
     }
 }

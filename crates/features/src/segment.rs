@@ -43,8 +43,8 @@ const COARSE_SIDE_PX: usize = 160;
 ///
 /// # Errors
 /// `IncompleteColour` when only one of image and range is given, `SizeMismatch` when camera, depth
-/// and colour differ in size, `NoValidDepth`, `DegeneratePlane`, `EmptyMask`, `OutOfRange` for a
-/// setting.
+/// and colour differ in size, `NoValidDepth`, `DegeneratePlane`, `TooSteep` for a ground beyond
+/// `max_tilt_deg`, `EmptyMask`, `OutOfRange` for a setting.
 pub fn segment_depth(
     camera: &Camera,
     image: &DepthImage,

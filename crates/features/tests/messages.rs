@@ -28,6 +28,7 @@ fn every_kind_of_message_with_a_number_is_short() {
         },
         FeatureError::EmptyMask { valid: 1, highest: huge, threshold: tiny, above: 2 },
         FeatureError::DegeneratePlane { got: tiny, min: huge },
+        FeatureError::TooSteep { got_deg: huge, max_deg: tiny },
     ] {
         check(&error);
         // The structure has further numbers; those of the message are as %g has them.

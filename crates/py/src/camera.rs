@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use granulcal_dataset::{CameraFile, Claims, Form, Product, load_sensor, png};
-use granulcal_features::{DepthImage, Intrinsics, Observe, SensorNoise};
+use granulcal_features::{DepthImage, FeatureError, Intrinsics, Observe, SensorNoise};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
@@ -79,6 +79,12 @@ impl Camera {
         let image = Image::borrow("image", image)?;
         let (width, height, depth) = image.parts()?;
         let image = DepthImage::new(width, height, depth.to_vec()).map_err(error::features)?;
+        let lens = &self.inner.intrinsics;
+        let (got, expected) = ((width, height), (lens.width, lens.height));
+        if got != expected {
+            let what = "the image of this camera";
+            return Err(error::features(FeatureError::SizeMismatch { what, got, expected }));
+        }
         let mut claims = Claims::default();
         claims.write("the image", &png_path, Product::File(Form::Png));
         claims.write("the camera", &camera_path, Product::File(Form::CameraToml));

@@ -35,12 +35,13 @@ pub(crate) fn film(
             break;
         }
         let seconds = frame as f64 / rate - simulation.time();
-        let interrupted = py.detach(|| {
+        let (advanced, interrupted) = py.detach(|| {
             let watch = Watch::new();
-            observer.advance(&mut simulation, seconds);
+            let advanced = observer.advance(&mut simulation, seconds);
             watch.keep_going(|_| Ok(()));
-            watch.finish()
+            (advanced, watch.finish())
         });
+        advanced.map_err(error::dataset)?;
         interrupted?;
     }
     Ok(())

@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use crate::array::{self, Rows};
 use crate::coordinates::Coordinates;
 use crate::emulated::Emulated;
+use crate::error;
 
 /// Weights (k,), means (k, p) and factors of the precisions (k, p, p).
 type MixtureArrays<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
@@ -69,7 +70,8 @@ impl Posterior {
         u: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let u = Rows::read("u", u, Some(self.dimension))?.0;
-        Ok(PyArray1::from_vec(py, py.detach(|| self.inner.coordinate_log_probs(&u))))
+        let found = py.detach(|| self.inner.coordinate_log_probs(&u)).map_err(error::model)?;
+        Ok(PyArray1::from_vec(py, found))
     }
 
     /// Draws of the coordinates, shape (n, p).

@@ -181,7 +181,10 @@ class BayesSim:
             model = cls._of_pairs(pairs, settings, int(seed), proposal, progress)
         if not quiet:
             print(model.summary)
-            unchecked = "  calibration not checked: too few pours to keep some aside"
+            few = "too few pours to keep some aside"
+            if proposal is not None:
+                few = "too few of the pours kept aside count as draws of the prior"
+            unchecked = f"  calibration not checked: {few}"
             print(unchecked if model.calibration is None else model.calibration)
             if model.identifiability is not None:
                 print(model.identifiability)

@@ -139,7 +139,7 @@ class CountModel:
         return found
 
     def draw(self, count: int, generator: np.random.Generator) -> tuple[Array, Array]:
-        """Returns draws of the posterior of the coefficients, shape (count, d), and rho (count,)."""
+        """Returns draws of the posterior of coefficients, shape (count, d), and of rho (count,)."""
         middle, scale = self._moments()
         drawn, weight = self._weighted_draws(middle, _WIDER * scale, generator)
         for _ in range(_ADAPTATIONS):
@@ -168,13 +168,11 @@ class CountModel:
 
     def _moments(self) -> tuple[Array, Array]:
         """Mean (d + 1,) and covariance of coefficients and log rho, the former as if normal."""
-        grid = np.linspace(*np.log(_RHO), _RHO_GRID)
+        grid = np.linspace(np.log(_RHO[0]), np.log(_RHO[1]), _RHO_GRID)
         places, within, log_weight = [], [], []
         for log_rho in grid:
             rho = float(np.exp(log_rho))
-            place, covariance = _weighted(
-                self.rows, self.counts, self.total, rho, self.precision
-            )
+            place, covariance = _weighted(self.rows, self.counts, self.total, rho, self.precision)
             log = _log_likelihood(self.counts, self.total, _logistic(self.rows @ place), rho)
             log += 0.5 * log_rho - 0.5 * place @ self.precision @ place
             log_weight.append(log + 0.5 * np.linalg.slogdet(covariance)[1])

@@ -3,17 +3,23 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from granulcal.design.plan import Plan, PlannedPour
-from granulcal.design.reach import Reach
+from granulcal.design.reach import Expected, Reach
 from granulcal.design.ring import Ring
 from granulcal.design.ring_model import HEIGHT, RingModel
 from granulcal.errors import ExtrapolationError, UnreachableRingError
 
 __all__ = ["design_rings", "require_tolerance"]
 
+Array = NDArray[np.float64]
+
 # Pours of the height at an end of the range that are wider or narrower are still pours of it.
 _NOISE_SPREADS = 2.0
+# By so much farther in the squared distance, in standard deviations between pours, the posterior's
+# mean lies between heights that give the ring.
+_BETWEEN = 4.0
 # Half width of a central 90 % interval of a normal in standard deviations.
 _HALF_90 = 1.645
 _FAILED = (
@@ -67,7 +73,12 @@ def design_rings(
                 "interval leaves out that the trend may not go on"
             )
         else:
-            pour = _inferred(model, ring, order, tolerance)
+            pour, is_of_two = _inferred(model, ring, order, tolerance)
+            if is_of_two:
+                notes.append(
+                    f"pour {order}: more than one height gives this ring, of which "
+                    f"{100 * pour.height:.1f} cm comes nearest; its interval holds the others, too"
+                )
         pours.append(pour)
     return Plan(
         pours=tuple(pours),
@@ -89,10 +100,14 @@ def require_tolerance(tolerance: float) -> None:
         raise ValueError(f"tolerance must be positive, got {tolerance}")
 
 
-def _inferred(model: RingModel, ring: Ring, order: int, tolerance: float) -> PlannedPour:
+def _inferred(
+    model: RingModel, ring: Ring, order: int, tolerance: float
+) -> tuple[PlannedPour, bool]:
+    """The pour, and whether it is one of several heights that give the ring."""
     inner = model.reach.inner_with(ring.outer) if ring.inner is None else ring.inner
     posterior = model.bayes.posterior([inner, ring.outer])
-    height = float(np.clip(posterior.mean()[0], model.reach.low, model.reach.high))
+    mean = float(np.clip(posterior.mean()[0], model.reach.low, model.reach.high))
+    height, is_of_two = _nearest(model.reach, np.array([inner, ring.outer]), mean)
     pour = _planned(model.reach, ring, order, height, posterior.credible_region(0.9)[HEIGHT])
     missed = max(abs(pour.expected_inner - inner), abs(pour.expected_outer - ring.outer))
     if missed > tolerance * ring.outer:
@@ -105,7 +120,23 @@ def _inferred(model: RingModel, ring: Ring, order: int, tolerance: float) -> Pla
             f"{100 * low.radii[0]:.2f} / {100 * low.radii[1]:.2f} to "
             f"{100 * high.radii[0]:.2f} / {100 * high.radii[1]:.2f} cm"
         )
-    return pour
+    return pour, is_of_two
+
+
+def _nearest(reach: Reach, wanted: Array, mean: float) -> tuple[float, bool]:
+    """The posterior's mean, or the height whose radii come nearest where the mean's do not.
+
+    Radii that two heights give have a posterior of two peaks, and its mean lies between them.
+    """
+
+    def distance(expected: Expected) -> float:
+        off = wanted - expected.radii
+        return float(off @ np.linalg.solve(expected.covariance, off))
+
+    nearest = min(reach.curve(), key=distance)
+    if distance(reach.at(mean)) <= distance(nearest) + _BETWEEN:
+        return mean, False
+    return nearest.height, True
 
 
 def _extrapolated(reach: Reach, ring: Ring, order: int, allowed: bool) -> PlannedPour:

@@ -169,6 +169,8 @@ impl Folder {
             for row in &kept {
                 remaining.progress.count(row.status);
             }
+            // A folder may have parts of any size, and more rows are asked for than it began with.
+            Room::of_list((end - first).saturating_sub(kept.len() as u64)).require(None)?;
             let there: HashSet<_> = kept.iter().map(|row| row.row).collect();
             let missing: Vec<_> = (first..end).filter(|row| !there.contains(row)).collect();
             let left = missing.len() as u64;
@@ -261,6 +263,23 @@ mod tests {
 
     use super::*;
     use crate::{Dataset, generate};
+
+    #[test]
+    fn what_a_part_lacks_is_not_listed_beyond_the_memory() {
+        let place = tempfile::tempdir().unwrap();
+        let (scene, prior) =
+            (Scene::funnel(0.12).with("grains.count", 8.0).unwrap(), Prior::default());
+        let one =
+            GenerateOptions { rows: 1, chunk: 1 << 60, threads: 1, ..GenerateOptions::default() };
+        generate(&scene, &prior, &one, place.path(), &mut |_| true).unwrap();
+        let many = GenerateOptions { rows: 1 << 60, ..one };
+        let looked = crate::look_at_batch(&scene, &prior, &many, place.path()).unwrap_err();
+        let begun = generate(&scene, &prior, &many, place.path(), &mut |_| true).unwrap_err();
+        for error in [looked, begun] {
+            assert!(error.to_string().contains("of memory"), "{error}");
+        }
+        assert_eq!(Dataset::open(place.path()).unwrap().asked, Some(1));
+    }
 
     #[test]
     fn a_complete_batch_of_another_arithmetic_is_taken_as_it_is() {

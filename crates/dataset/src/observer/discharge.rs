@@ -10,7 +10,7 @@ use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 pub const RATE_RANGE: (f64, f64) = (5.0, 85.0);
 
 /// `discharged[t]` at the stated times, and `discharge_rate`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Discharge {
     spec: ObserveDischarge,
     series: Series,

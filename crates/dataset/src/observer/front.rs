@@ -9,7 +9,7 @@ use super::clock::Clock;
 use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 
 /// `front_radius[t]` at the stated times, and `front_radius[end]` unless it is left out.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Front {
     spec: ObserveFront,
     series: Series,
@@ -56,7 +56,8 @@ impl Observation for Front {
             front_radius(&frame.positions, &frame.radii, axis, level)
         };
         self.clock.see(frame);
-        self.series.push(frame.time, radius.unwrap_or(f64::NAN));
+        // A grain that is too far away for circles leaves no front, either.
+        self.series.push(frame.time, radius.ok().flatten().unwrap_or(f64::NAN));
     }
 
     fn values(&self, pour: &Pour) -> Vec<f64> {

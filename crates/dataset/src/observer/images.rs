@@ -12,7 +12,7 @@ use crate::observe::observe_grains;
 const COUNT: usize = PAPER16.len();
 
 /// The 16 statistics at the stated times: `max_z[0.4]` and so on, time by time.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Images {
     spec: ObserveImages,
     /// The scene's camera, without its noise.

@@ -7,7 +7,7 @@ use super::clock::Clock;
 use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 
 /// `liquid_radius[t]` at the stated times.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Liquid {
     spec: ObserveLiquid,
     series: Series,

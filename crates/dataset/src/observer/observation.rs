@@ -75,8 +75,27 @@ impl Frame {
     }
 }
 
+/// A copy behind a pointer, which every kind of observation that can be cloned has.
+pub(super) trait Copied {
+    /// The copy.
+    fn copied(&self) -> Box<dyn Observation>;
+}
+
+impl<T: Observation + Clone + 'static> Copied for T {
+    fn copied(&self) -> Box<dyn Observation> {
+        Box::new(self.clone())
+    }
+}
+
+impl Clone for Box<dyn Observation> {
+    fn clone(&self) -> Self {
+        // Of what is pointed to: the pointer would copy itself for ever.
+        (**self).copied()
+    }
+}
+
 /// One kind of observation.
-pub(super) trait Observation: Debug + Send {
+pub(super) trait Observation: Copied + Debug + Send {
     /// The statistics that it gives.
     fn statistics(&self) -> Vec<ObservedStatistic>;
     /// Takes a sample.

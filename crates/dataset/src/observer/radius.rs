@@ -8,7 +8,7 @@ use nalgebra::Vector2;
 use super::observation::{Observation, ObservedStatistic};
 
 /// `radius[p]` of the stated percentiles.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Radius {
     spec: ObserveRadius,
 }
@@ -34,5 +34,6 @@ impl Observation for Radius {
     fn values(&self, pour: &Pour) -> Vec<f64> {
         let axis = Vector2::from(self.spec.axis);
         mass_percentiles(&pour.positions, &pour.radii, axis, &self.spec.percentiles)
+            .unwrap_or_else(|_| vec![f64::NAN; self.spec.percentiles.len()])
     }
 }

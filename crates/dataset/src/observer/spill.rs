@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 use super::observation::{Observation, ObservedStatistic};
 
 /// `spilled`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Spill {
     spec: ObserveSpill,
 }

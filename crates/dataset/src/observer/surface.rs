@@ -12,7 +12,7 @@ use super::observation::{Frame, Observation, ObservedStatistic, Series};
 const SLOPE_COLUMNS: usize = 41;
 
 /// `surface_z[x]` at the stated x, and `surface_slope`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Surface {
     spec: ObserveSurface,
     radius: f64,
@@ -45,6 +45,7 @@ impl Surface {
     fn of(&self, [listed, slope]: &[Silhouette; 2]) -> Vec<f64> {
         let slope = slope.surface(self.spec.level);
         let slope = slope_deg(&self.slope_x, &slope, self.spec.slope_within);
+        let slope = slope.expect("a height in each column");
         listed.surface(self.spec.level).into_iter().chain([slope]).collect()
     }
 }
@@ -81,7 +82,7 @@ impl Observation for Surface {
         let mut pictures = seen.unwrap_or_else(|| self.blank());
         let mut now = self.blank();
         for picture in pictures.iter_mut().chain(&mut now) {
-            picture.add(&centred, &frame.radii);
+            picture.add(&centred, &frame.radii).expect("a radius for each grain");
         }
         self.pictures = Some(pictures);
         let values = self.of(&now);

@@ -112,6 +112,38 @@ fn to_be_observed_changes_no_bit() {
 }
 
 #[test]
+fn no_time_is_refused_and_simulates_nothing() {
+    let watched = scene();
+    let blind = Scene { observe: None, ..watched.clone() };
+    for scene in [watched, blind] {
+        let mut simulation = Simulation::new(&scene, 1).unwrap();
+        let mut observer = Observer::new(&scene);
+        let error = observer.advance(&mut simulation, f64::NAN).unwrap_err().to_string();
+        assert!(error.contains("the time to simulate [s]") && error.contains("NaN"), "{error}");
+        observer.advance(&mut simulation, -1.0).unwrap();
+        assert_eq!(simulation.time(), 0.0);
+        observer.advance(&mut simulation, f64::INFINITY).unwrap();
+        assert_eq!(simulation.ended(), Some(Status::AtRest));
+    }
+}
+
+#[test]
+fn a_copy_has_seen_the_same_and_looks_on_by_itself() {
+    let scene = scene();
+    let mut simulation = Simulation::new(&scene, 1).unwrap();
+    let mut observer = Observer::new(&scene);
+    observer.advance(&mut simulation, 0.06).unwrap();
+    let mut copy = observer.clone();
+    let pour = copy.run_while(simulation.clone(), &|| true).unwrap();
+    let begun = observer.observed(&pour).series[0].times.len();
+    assert_eq!(observer.run_while(simulation, &|| true).unwrap(), pour);
+    let [one, other] = [observer, copy].map(|observer| observer.observed(&pour).series);
+    // NaN is equal to no NaN.
+    assert_eq!(format!("{one:?}"), format!("{other:?}"));
+    assert!(one[0].times.len() > begun);
+}
+
+#[test]
 fn what_was_before_a_restart_is_not_made_up() {
     let scene = scene();
     let mut simulation = Simulation::new(&scene, 1).unwrap();

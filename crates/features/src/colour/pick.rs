@@ -36,7 +36,7 @@ pub struct Picked {
 /// The range that marks the grains of an image.
 ///
 /// # Errors
-/// `OutOfRange` for a region that is not inside the image, `LengthMismatch` for a broken image.
+/// `OutOfRange` for a region that is not inside the image or an empty image, `LengthMismatch` for a broken one.
 ///
 /// # Reference
 /// Otsu 1979, doi:10.1109/TSMC.1979.4310076.
@@ -45,6 +45,7 @@ pub fn pick_range(
     grains: &[Region],
     ground: &[Region],
 ) -> Result<Picked, FeatureError> {
+    image.require_valid()?;
     for region in grains.iter().chain(ground) {
         region.require_inside(image.width, image.height)?;
     }
@@ -252,6 +253,16 @@ mod tests {
         assert!((vivid.image_inside - 0.25).abs() < 0.01, "{vivid:?}");
         let flat = ColourImage::new(4, 4, vec![7; 48]).unwrap();
         assert!(pick_range(&flat, &[], &[]).is_ok());
+    }
+
+    #[test]
+    fn a_broken_image_is_refused() {
+        let whole = image([220, 200, 150], [14, 12, 12], 20);
+        let cut = ColourImage { rgb: whole.rgb[..2000].to_vec(), ..whole.clone() };
+        let got = pick_range(&cut, &[LEFT], &[]);
+        assert!(matches!(got, Err(FeatureError::LengthMismatch { got: 2000, expected: 2400, .. })));
+        let empty = ColourImage { width: 0, height: 0, rgb: Vec::new() };
+        assert!(matches!(pick_range(&empty, &[], &[]), Err(FeatureError::OutOfRange { .. })));
     }
 
     #[test]

@@ -122,3 +122,38 @@ fn a_wall_is_no_ground() {
     let ground = fit_plane_within(&points, 3e-3, 0.8, 0).unwrap();
     assert!(ground.tilt_rad < 0.01 && ground.inliers > 280, "{ground:?}");
 }
+
+/// A wall of the given tilt, square on its own face, with noise along z.
+fn wall(tilt_deg: f64, noise: f64) -> Vec<Vector3<f64>> {
+    let (sin, cos) = tilt_deg.to_radians().sin_cos();
+    let mut stream = Stream::new(7);
+    (0..600)
+        .map(|_| {
+            let (a, b) = (stream.uniform(), stream.uniform());
+            Vector3::new(cos * a, b, sin * a + noise * stream.normal())
+        })
+        .collect()
+}
+
+#[test]
+fn the_largest_tilt_holds_for_the_plane_that_is_returned() {
+    // Of an exact wall no sample is upright enough; of a noisy one some are, and least squares tips them over.
+    for (noise, tolerance) in [(0.0, 1e-9), (2e-3, 0.1)] {
+        let found = fit_plane_within(&wall(60.0, noise), 5e-3, 45_f64.to_radians(), 0);
+        let Err(FeatureError::TooSteep { got_deg, max_deg }) = found else { panic!("{found:?}") };
+        assert!((got_deg - 60.0).abs() < tolerance && (max_deg - 45.0).abs() < 1e-9, "{got_deg}");
+        assert!(fit_plane_within(&wall(60.0, noise), 5e-3, 1.06, 0).is_ok());
+    }
+}
+
+#[test]
+fn rounding_refuses_neither_a_flat_ground_nor_a_vertical_wall() {
+    let flat = fit_plane_within(&scene(0.0, 0.0, 2), 0.004, 0.0, 0).unwrap();
+    assert!(flat.tilt_rad < 1e-9, "{flat:?}");
+    let upright = [wall(90.0, 0.0), wall(90.0 - 1e-13, 0.0), wall(90.0 + 1e-13, 0.0)];
+    for points in upright {
+        let fit = fit_plane(&points, 1e-3, 0).unwrap();
+        assert!((fit.tilt_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-9, "{fit:?}");
+        assert_eq!(fit.inliers, 600);
+    }
+}

@@ -212,11 +212,16 @@ impl Cloud {
             plane = up(search(reach)?);
         }
         // Only a distance that has grown may still grow.
-        let (plane, sd) = tightened(&ground, plane, reach, first..=largest, &up)?;
+        let tighten = |plane, reach, grown| tightened(&ground, plane, reach, grown, steepest, &up);
+        let (plane, sd) = tighten(plane, reach, first..=largest)?;
         if settings.inlier_distance.is_none() && sd > BETWEEN_LEVELS {
             let near = LEVEL_REACH * sd;
-            let grown = 0.0..=3.0 * sd;
-            let (level, scatter) = tightened(&ground, up(search(near)?), near, grown, &up)?;
+            let found = search(near).and_then(|level| tighten(up(level), near, 0.0..=3.0 * sd));
+            let (level, scatter) = match found {
+                // What is too steep is none of two levels.
+                Err(FeatureError::TooSteep { .. }) => return Ok((plane, sd)),
+                found => found?,
+            };
             let within = |sds: f64| {
                 let on_it = |point: &&Vector3<f64>| {
                     level.plane.signed_distance(point).abs() <= sds * scatter
@@ -275,11 +280,13 @@ impl Levelled {
 
 /// The plane fitted again to what the noise allows, until it allows no less, and the standard deviation about it `[m]`: the
 /// foot of a pile is within the first inlier distance and lifts the plane. A distance that is in `grown` may grow there.
+/// `TooSteep` where it tips beyond the tilt `steepest` `[rad]`.
 fn tightened(
     ground: &[Vector3<f64>],
     mut plane: PlaneFit,
     mut reach: f64,
     grown: RangeInclusive<f64>,
+    steepest: f64,
     up: &impl Fn(PlaneFit) -> PlaneFit,
 ) -> Result<(PlaneFit, f64), FeatureError> {
     let mut sd = sd_from_below(ground, &plane, reach);
@@ -291,7 +298,7 @@ fn tightened(
             break;
         }
         reach = wanted;
-        plane = up(refine_plane(ground, plane.plane, reach)?);
+        plane = up(refine_plane(ground, plane.plane, reach, steepest)?);
         sd = sd_from_below(ground, &plane, reach);
     }
     Ok((plane, sd))

@@ -15,8 +15,13 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Vector2, Vector3};
 
+use super::require_frame;
+use crate::error::{FeatureError, require_in};
+
 /// Circles in a mean grain's radius.
 const CIRCLES: f64 = 4.0;
+/// Circles at most: each has its room.
+const MAX_CIRCLES: f64 = 1e7;
 /// Circles to each side of a ring's middle: a mean grain's radius.
 const HALF_RING: usize = 4;
 
@@ -25,15 +30,20 @@ const HALF_RING: usize = 4;
 ///
 /// Circles are a quarter of a mean grain's radius apart; the share is their mean over a ring one mean diameter wide,
 /// linear between two.
+///
+/// # Errors
+/// `LengthMismatch` when there is not one radius per position, `OutOfRange` for a radius or a level that is not
+/// positive, a level above 1, or a grain 2.5 million mean radii away, `NonFinite` for the axis.
 pub fn front_radius(
     positions: &[Vector3<f64>],
     radii: &[f64],
     axis: Vector2<f64>,
     level: f64,
-) -> Option<f64> {
-    debug_assert_eq!(positions.len(), radii.len());
+) -> Result<Option<f64>, FeatureError> {
+    require_frame(positions, radii, axis)?;
+    require_in("level of a front [-]", level, f64::MIN_POSITIVE, 1.0)?;
     if positions.is_empty() || positions.iter().any(|x| !(x.x.is_finite() && x.y.is_finite())) {
-        return None;
+        return Ok(None);
     }
     let step = radii.iter().sum::<f64>() / radii.len() as f64 / CIRCLES;
     let mut discs: Vec<Disc> = positions
@@ -50,7 +60,9 @@ pub fn front_radius(
     // From the outermost circle inwards: a disc is met once the circle is within its reach, and left for good once the
     // circle is nearer to the axis than any of it.
     let mut first = 0;
-    let circles = (discs[0].reach() / step).floor() as usize + 1;
+    let circles = (discs[0].reach() / step).floor();
+    require_in("reach of the grains, in quarters of their mean radius", circles, 0.0, MAX_CIRCLES)?;
+    let circles = circles as usize + 1;
     let mut covered = vec![0.0; circles];
     for (number, share) in covered.iter_mut().enumerate().rev() {
         let rho = number as f64 * step;
@@ -65,11 +77,11 @@ pub fn front_radius(
         let count = ring.clone().count() as f64;
         let mean = ring.map(|circle| covered.get(circle).unwrap_or(&0.0)).sum::<f64>() / count;
         if mean >= level {
-            return Some(step * (number as f64 + (mean - level) / (mean - outer)));
+            return Ok(Some(step * (number as f64 + (mean - level) / (mean - outer))));
         }
         outer = mean;
     }
-    None
+    Ok(None)
 }
 
 /// A grain's shadow.
@@ -142,7 +154,7 @@ mod tests {
     }
 
     fn front(grains: &[Vector3<f64>], axis: Vector2<f64>) -> f64 {
-        front_radius(grains, &vec![RADIUS; grains.len()], axis, 0.5).unwrap()
+        front_radius(grains, &vec![RADIUS; grains.len()], axis, 0.5).unwrap().unwrap()
     }
 
     #[test]
@@ -182,10 +194,30 @@ mod tests {
 
     #[test]
     fn grains_far_from_the_axis_or_none_have_no_front() {
-        assert_eq!(front_radius(&[Vector3::x()], &[RADIUS], Vector2::zeros(), 0.5), None);
-        assert_eq!(front_radius(&[], &[], Vector2::zeros(), 0.5), None);
+        assert_eq!(front_radius(&[Vector3::x()], &[RADIUS], Vector2::zeros(), 0.5), Ok(None));
+        assert_eq!(front_radius(&[], &[], Vector2::zeros(), 0.5), Ok(None));
         let nowhere = [Vector3::repeat(f64::NAN)];
-        assert_eq!(front_radius(&nowhere, &[RADIUS], Vector2::zeros(), 0.5), None);
+        assert_eq!(front_radius(&nowhere, &[RADIUS], Vector2::zeros(), 0.5), Ok(None));
+    }
+
+    #[test]
+    fn what_is_no_frame_is_refused() {
+        let (grain, axis) = ([Vector3::zeros()], Vector2::zeros());
+        let got = front_radius(&grain, &[], axis, 0.5);
+        assert_eq!(got, Err(FeatureError::LengthMismatch { what: "radii", got: 0, expected: 1 }));
+        let far = [Vector3::x() * 1e9];
+        for (grains, radius, level) in [
+            (grain, 0.0, 0.5),
+            (grain, f64::NAN, 0.5),
+            (grain, RADIUS, 0.0),
+            (grain, RADIUS, f64::NAN),
+            (far, RADIUS, 0.5),
+        ] {
+            let got = front_radius(&grains, &[radius], axis, level);
+            assert!(matches!(got, Err(FeatureError::OutOfRange { .. })), "{got:?}");
+        }
+        let got = front_radius(&grain, &[RADIUS], Vector2::repeat(f64::NAN), 0.5);
+        assert!(matches!(got, Err(FeatureError::NonFinite { .. })), "{got:?}");
     }
 
     #[test]

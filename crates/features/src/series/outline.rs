@@ -21,20 +21,28 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Vector2, Vector3};
 
+use super::require_frame;
+use crate::error::{FeatureError, require_in};
+
 /// Rays from the axis.
 const AZIMUTHS: usize = 36;
 
 /// The mean radius about `axis` `[m]` of the outline of the largest body, grains being linked where they are within
 /// `link` sums of their radii of each other; `None` without grains, or if one is nowhere (NaN).
+///
+/// # Errors
+/// `LengthMismatch` when there is not one radius per position, `OutOfRange` for a radius or a link that is not
+/// positive, `NonFinite` for the axis.
 pub fn outline_radius(
     positions: &[Vector3<f64>],
     radii: &[f64],
     axis: Vector2<f64>,
     link: f64,
-) -> Option<f64> {
-    debug_assert_eq!(positions.len(), radii.len());
+) -> Result<Option<f64>, FeatureError> {
+    require_frame(positions, radii, axis)?;
+    require_in("link [-]", link, f64::MIN_POSITIVE, 1e6)?;
     if positions.is_empty() || positions.iter().any(|x| !(x.x.is_finite() && x.y.is_finite())) {
-        return None;
+        return Ok(None);
     }
     let places: Vec<Vector2<f64>> = positions.iter().map(|x| x.xy() - axis).collect();
     let body = largest_body(&places, radii, link);
@@ -49,7 +57,7 @@ pub fn outline_radius(
             met += 1;
         }
     }
-    (met > 0).then(|| total / f64::from(met))
+    Ok((met > 0).then(|| total / f64::from(met)))
 }
 
 /// Where a ray along the unit vector `along` leaves a disc; `None` if it misses it.
@@ -84,7 +92,8 @@ fn largest_body(places: &[Vector2<f64>], radii: &[f64], link: f64) -> Vec<usize>
             next += 1;
             let (column, row) = at(&places[i]);
             for (dx, dy) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy))) {
-                for &j in cells.get(&(column + dx, row + dy)).into_iter().flatten() {
+                let cell = (column.saturating_add(dx), row.saturating_add(dy));
+                for &j in cells.get(&cell).into_iter().flatten() {
                     let far = link * (radii[i] + radii[j]);
                     if is_free[j] && (places[i] - places[j]).norm_squared() <= far * far {
                         is_free[j] = false;
@@ -121,7 +130,7 @@ mod tests {
     }
 
     fn outline(grains: &[Vector3<f64>], axis: Vector2<f64>, link: f64) -> f64 {
-        outline_radius(grains, &vec![RADIUS; grains.len()], axis, link).unwrap()
+        outline_radius(grains, &vec![RADIUS; grains.len()], axis, link).unwrap().unwrap()
     }
 
     #[test]
@@ -172,8 +181,22 @@ mod tests {
 
     #[test]
     fn nothing_has_no_outline() {
-        assert_eq!(outline_radius(&[], &[], Vector2::zeros(), 1.5), None);
+        assert_eq!(outline_radius(&[], &[], Vector2::zeros(), 1.5), Ok(None));
         let nowhere = [Vector3::repeat(f64::NAN)];
-        assert_eq!(outline_radius(&nowhere, &[RADIUS], Vector2::zeros(), 1.5), None);
+        assert_eq!(outline_radius(&nowhere, &[RADIUS], Vector2::zeros(), 1.5), Ok(None));
+    }
+
+    #[test]
+    fn what_is_no_frame_is_refused() {
+        let (grain, axis) = ([Vector3::zeros()], Vector2::zeros());
+        let got = outline_radius(&grain, &[RADIUS; 2], axis, 1.5);
+        assert_eq!(got, Err(FeatureError::LengthMismatch { what: "radii", got: 2, expected: 1 }));
+        for (radius, link) in [(0.0, 1.5), (f64::NAN, 1.5), (RADIUS, 0.0), (RADIUS, f64::NAN)] {
+            let got = outline_radius(&grain, &[radius], axis, link);
+            assert!(matches!(got, Err(FeatureError::OutOfRange { .. })), "{got:?}");
+        }
+        // Far beyond the last cell that has a number.
+        let far = [Vector3::x() * 1e20];
+        assert_eq!(outline_radius(&far, &[RADIUS], axis, 1.5), Ok(None));
     }
 }

@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use crate::error::{FeatureError, require_in};
+use crate::error::{FeatureError, require_in, require_length};
 
 /// Cells of a column in a grain's radius.
 const CELLS: f64 = 16.0;
@@ -48,7 +48,11 @@ impl Silhouette {
     }
 
     /// Adds a frame: centres and radii `[m]`.
-    pub fn add(&mut self, positions: &[Vector3<f64>], radii: &[f64]) {
+    ///
+    /// # Errors
+    /// `LengthMismatch` when there is not one radius per position; nothing is added then.
+    pub fn add(&mut self, positions: &[Vector3<f64>], radii: &[f64]) -> Result<(), FeatureError> {
+        require_length("radii", radii.len(), positions.len())?;
         self.frames += 1;
         for (centre, &radius) in positions.iter().zip(radii) {
             let first = self.x.partition_point(|&x| x <= centre.x - radius);
@@ -61,6 +65,7 @@ impl Silhouette {
                 self.hide(column, centre.z - half, centre.z + half);
             }
         }
+        Ok(())
     }
 
     /// Hides the cells of a column whose centres are between two heights.
@@ -96,14 +101,18 @@ impl Silhouette {
 
 /// The angle by which a surface falls towards +x `[deg]`, by the least-squares line through its points with |x| at most
 /// `within`; NaN with fewer than two, or where the surface is NaN.
-pub fn slope_deg(x: &[f64], z: &[f64], within: f64) -> f64 {
+///
+/// # Errors
+/// `LengthMismatch` when there is not one z per x.
+pub fn slope_deg(x: &[f64], z: &[f64], within: f64) -> Result<f64, FeatureError> {
+    require_length("z", z.len(), x.len())?;
     let points: Vec<_> = x.iter().zip(z).filter(|(x, _)| x.abs() <= within).collect();
     let mean = |of: &dyn Fn(&(&f64, &f64)) -> f64| {
         points.iter().map(of).sum::<f64>() / points.len() as f64
     };
     let (x0, z0) = (mean(&|p| *p.0), mean(&|p| *p.1));
     let covariance = mean(&|p| (p.0 - x0) * (p.1 - z0));
-    -(covariance / mean(&|p| (p.0 - x0).powi(2))).atan().to_degrees()
+    Ok(-(covariance / mean(&|p| (p.0 - x0).powi(2))).atan().to_degrees())
 }
 
 #[cfg(test)]
@@ -116,7 +125,7 @@ mod tests {
     fn the_top_of_a_grain_is_found_to_a_cell() {
         let mut side = Silhouette::new(&[-6e-4, 0.0, 8e-4, 2e-3], (0.0, 0.01), RADIUS).unwrap();
         assert!(side.surface(0.5).iter().all(|z| z.is_nan()));
-        side.add(&[Vector3::new(0.0, 0.5, 5e-3)], &[RADIUS]);
+        side.add(&[Vector3::new(0.0, 0.5, 5e-3)], &[RADIUS]).unwrap();
         let found = side.surface(0.5);
         for (z, expected) in found.iter().zip([5.8e-3, 6e-3, 5.6e-3]) {
             assert!((z - expected).abs() <= 0.5 * RADIUS / CELLS + 1e-12, "{found:?}");
@@ -131,7 +140,7 @@ mod tests {
         for frame in 0..400 {
             let top = 2e-3 + 4e-3 * (f64::from(frame) + 0.5) / 400.0;
             let grain = |top: f64| Vector3::new(0.0, 0.0, top - RADIUS);
-            side.add(&[grain(top), grain(top - 1.5e-3), grain(top - 3e-3)], &[RADIUS; 3]);
+            side.add(&[grain(top), grain(top - 1.5e-3), grain(top - 3e-3)], &[RADIUS; 3]).unwrap();
         }
         assert!((side.surface(0.5)[0] - 4e-3).abs() < 2e-5, "{:?}", side.surface(0.5));
         assert!((side.surface(0.25)[0] - 5e-3).abs() < 2e-5, "{:?}", side.surface(0.25));
@@ -142,9 +151,17 @@ mod tests {
         let mut side = Silhouette::new(&[0.0], (0.0, 0.02), RADIUS).unwrap();
         for frame in 0..10 {
             let flier = Vector3::new(0.0, 0.0, 5e-3 + 1e-3 * f64::from(frame));
-            side.add(&[Vector3::new(0.0, 0.0, 2e-3), flier], &[RADIUS; 2]);
+            side.add(&[Vector3::new(0.0, 0.0, 2e-3), flier], &[RADIUS; 2]).unwrap();
         }
         assert!((side.surface(0.5)[0] - 3e-3).abs() < 1e-4, "{:?}", side.surface(0.5));
+    }
+
+    #[test]
+    fn a_frame_has_a_radius_for_each_grain() {
+        let mut side = Silhouette::new(&[0.0], (0.0, 0.02), RADIUS).unwrap();
+        let got = side.add(&[Vector3::zeros()], &[RADIUS; 2]);
+        assert_eq!(got, Err(FeatureError::LengthMismatch { what: "radii", got: 2, expected: 1 }));
+        assert_eq!(side.frames(), 0);
     }
 
     #[test]
@@ -152,7 +169,8 @@ mod tests {
         let x: Vec<_> = (-20..=20).map(|i| 1e-3 * f64::from(i)).collect();
         let z: Vec<_> =
             x.iter().map(|x| if x.abs() <= 0.015 { 0.01 - 0.5 * x } else { 9.0 }).collect();
-        assert!((slope_deg(&x, &z, 0.015) - 0.5f64.atan().to_degrees()).abs() < 1e-9);
-        assert!(slope_deg(&x[..1], &z[..1], 0.05).is_nan());
+        assert!((slope_deg(&x, &z, 0.015).unwrap() - 0.5f64.atan().to_degrees()).abs() < 1e-9);
+        assert!(slope_deg(&x[..1], &z[..1], 0.05).unwrap().is_nan());
+        assert!(slope_deg(&x, &z[1..], 0.015).is_err());
     }
 }

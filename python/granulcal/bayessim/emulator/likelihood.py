@@ -45,6 +45,7 @@ from granulcal.bayessim.emulator.linear import linear_scores
 from granulcal.bayessim.emulator.noise import Noise
 from granulcal.bayessim.emulator.signal import SignalAxes
 from granulcal.bayessim.posterior.coordinates import coordinates_of, quasi_prior
+from granulcal.bayessim.replicates import dealt, material_of
 from granulcal.prior import Prior
 from granulcal.progress import steps
 
@@ -176,7 +177,7 @@ class Likelihood:
         )
         if order is None:
             order = np.random.default_rng((seed, 2)).permutation(len(u))
-        parts = [order[start::_FOLDS] for start in range(_FOLDS)]
+        parts = dealt(order, material_of(u), _FOLDS)
         counts = sorted({min(count, z.shape[1]) for count in AXIS_COUNTS})
         scores: dict[_Form, Array] = {}
         levels: dict[_Form, Array] = {}

@@ -40,23 +40,29 @@ class Standardiser:
         skewness = _skewness(x)
         log_skewness = _skewness(_warp(x, low > 0))
         is_log = (low > 0) & (skewness > _LARGEST_SKEWNESS) & (np.abs(log_skewness) < skewness)
+        is_log &= ~_is_constant(low, high)
         warped = _warp(x, is_log)
         shift, scale = warped.mean(axis=0), warped.std(axis=0)
         is_constant = scale <= _CONSTANT_SPREAD * np.maximum(np.abs(shift), 1e-300)
+        # Exactly, so that nothing is left of what never changed.
+        shift = np.where(_is_constant(low, high), 0.5 * (low + high), shift)
         return cls(is_log, shift, np.where(is_constant, 1.0, scale), low, high)
 
     @property
     def is_constant(self) -> NDArray[np.bool_]:
         """Whether a statistic never changed in training but for round-off, shape (s,)."""
-        largest = np.maximum(np.abs(self.low), np.abs(self.high))
-        return self.high - self.low <= _CONSTANT_SPREAD * largest
+        return _is_constant(self.low, self.high)
 
     def apply(self, x: Array, *, clip: bool = True) -> Array:
         """Returns standardised statistics (n, s).
 
         Values beyond the training range are moved to it, unless `clip` is false; a logarithm is
-        then still taken of a value no lower than a thousandth of the lowest.
+        then still taken of a value no lower than a thousandth of the lowest. What never changed in
+        training but for round-off is as it was there if round-off is all that it is off by.
         """
+        middle = 0.5 * (self.low + self.high)
+        is_still = self.is_constant & (np.abs(x - middle) <= _CONSTANT_SPREAD * np.abs(middle))
+        x = np.where(is_still, middle, x)
         low, high = (
             (self.low, self.high) if clip else (self._floor, np.full_like(self.high, np.inf))
         )
@@ -69,6 +75,10 @@ class Standardiser:
     def is_outside(self, x: Array) -> NDArray[np.bool_]:
         """Returns which statistics lie beyond the training range, shape (n, s)."""
         return (x < self.low) | (x > self.high)
+
+
+def _is_constant(low: Array, high: Array) -> NDArray[np.bool_]:
+    return high - low <= _CONSTANT_SPREAD * np.maximum(np.abs(low), np.abs(high))
 
 
 def _warp(x: Array, is_log: NDArray[np.bool_]) -> Array:

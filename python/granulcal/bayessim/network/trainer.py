@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from granulcal.bayessim.network.adam import Adam
 from granulcal.bayessim.network.features import draw_frequencies
 from granulcal.bayessim.network.network import HeadLayout, Network
+from granulcal.bayessim.replicates import gathered, material_of
 from granulcal.bayessim.training.config import Config
 from granulcal.one_thread import one_thread
 from granulcal.progress import steps
@@ -113,7 +114,9 @@ class _Training:
         self.weights = torch.from_numpy(weights).float()
         members = config.ensemble
         validation_count = max(1, round(config.validation_share * len(x)))
-        order = torch.stack([self._permutation(len(x)) for _ in range(members)])
+        material = material_of(u)
+        orders = [gathered(self._permutation(len(x)).numpy(), material) for _ in range(members)]
+        order = torch.from_numpy(np.stack(orders))
         self.validation = order[:, :validation_count]
         self.training = order[:, validation_count:]
         scale = torch.from_numpy(relevance / (config.length_scale * _median_distance(x, relevance)))

@@ -15,6 +15,7 @@ from granulcal.bayessim.network.standardise import Standardiser
 from granulcal.bayessim.network.trainer import Progress, TrainingResult
 from granulcal.bayessim.posterior.average import EMULATOR_ALONE, NETWORK_ALONE, Average, HeldOut
 from granulcal.bayessim.posterior.posterior import Posterior
+from granulcal.bayessim.replicates import in_turns, material_of, split
 from granulcal.bayessim.training.config import Config
 from granulcal.bayessim.training.pairs import TrainingPairs
 from granulcal.bayessim.training.summary import TrainingSummary
@@ -28,6 +29,8 @@ Array = NDArray[np.float64]
 # From 300 pairs on, at least 50 are spared to check a network.
 _WORTHWHILE_TEST_PAIRS = 50
 _PAIRS_FOR_A_WORTHWHILE_TEST = 300
+# Fewer equal draws of the prior than a proposal's weighted pairs are worth have been overconfident.
+_FEWEST_OF_PRIOR = 150
 # One of n values is at most sqrt(n) standard deviations out; there it has 4/5 of the variance.
 _FAR = 0.9
 
@@ -105,7 +108,9 @@ class _Work:
         self.z = self.standardiser.apply(pairs.x)
         self.weights = importance_weights(pairs, proposal)
         order = np.random.default_rng(seed).permutation(len(self.u))
-        self.test, self.rest = np.split(order, [_test_count(len(order), config.test_share)])
+        material = material_of(self.u)
+        sides = split(order, material, _test_count(len(order), config.test_share))
+        self.test, self.rest = (in_turns(rows, material) for rows in sides)
 
     def emulated(self) -> Trained:
         """The emulator's posterior; every pair is used, and checked by a fit without it."""
@@ -275,6 +280,14 @@ class _Work:
             )
         if self.weights is None and self.pairs.not_of_prior:
             notes.append(told_not_of_prior(self.pairs))
+        if self.weights is not None:
+            worth = float(np.sum(self.weights) ** 2 / np.sum(self.weights**2))
+            if worth < _FEWEST_OF_PRIOR:
+                notes.append(
+                    f"the {len(self.weights)} pairs of the proposal are worth {worth:.0f} of the "
+                    f"prior, at least {_FEWEST_OF_PRIOR} are wanted: posteriors may be too narrow; "
+                    "a prior or a proposal nearer to each other helps"
+                )
         return tuple(notes)
 
     def _summary(

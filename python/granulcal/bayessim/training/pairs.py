@@ -127,7 +127,8 @@ class TrainingPairs:
         is_first = _is_first(np.column_stack([theta, statistics]))
         excluded["repeated"] = int(np.sum(keep & ~is_first))
         # Rows whose pours cannot be used were drawn, too: the others are no draws of the prior.
-        not_of_prior = _not_of_prior(theta[is_first], prior)
+        # Of several pours of one material that was drawn once.
+        not_of_prior = _not_of_prior(theta[_is_first(theta)], prior)
         keep &= is_first
         if proposal is not None:
             is_outside = _is_outside(theta, prior).any(axis=1)

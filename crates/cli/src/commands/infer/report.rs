@@ -43,7 +43,7 @@ impl<'a> Report<'a> {
         let posterior = model.posterior(observed)?;
         let found = Found {
             misfit,
-            marginals: posterior.marginals(SUMMARY_DRAWS, seed),
+            marginals: posterior.marginals(SUMMARY_DRAWS, seed)?,
             mode: posterior.mode(),
             known: posterior.identifiability(),
             posterior,

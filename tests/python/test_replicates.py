@@ -1,0 +1,54 @@
+"""Several pours of one material among the training pairs."""
+
+import numpy as np
+
+from granulcal.bayessim.replicates import dealt, gathered, in_turns, material_of, split
+
+
+def _pours(materials=9, each=4, seed=0):
+    generator = np.random.default_rng(seed)
+    theta = np.repeat(generator.random((materials, 3)), each, axis=0)
+    return material_of(theta), generator.permutation(len(theta))
+
+
+def test_rows_of_one_material_are_known():
+    theta = np.array([[1.0, 2.0], [0.0, 5.0], [1.0, 2.0], [1.0, 3.0], [0.0, 5.0]])
+    first, other, again, third, last = material_of(theta)
+    assert first == again and other == last and len({first, other, third}) == 3
+    assert material_of(theta[:0]).tolist() == []
+
+
+def test_no_material_is_on_two_sides():
+    material, order = _pours()
+    for count in range(len(order) + 1):
+        test, rest = split(order, material, count)
+        assert count <= len(test) <= count + 3
+        assert not set(material[test]) & set(material[rest])
+        assert sorted([*test, *rest]) == list(range(len(order)))
+    hands = dealt(order, material, 4)
+    assert sorted(np.concatenate(hands)) == list(range(len(order)))
+    of_hands = [set(material[hand]) for hand in hands]
+    assert sum(map(len, of_hands)) == 9
+    assert [len(found) for found in of_hands] == [3, 2, 2, 2]
+
+
+def test_materials_take_turns():
+    material, order = _pours()
+    turns = material[in_turns(order, material)].reshape(4, 9)
+    assert (turns == turns[0]).all() and len(set(turns[0])) == 9
+    assert (np.diff(np.flatnonzero(np.diff(material[gathered(order, material)]))) == 4).all()
+
+
+def test_pours_of_a_material_each_are_split_as_ever():
+    material, order = _pours(materials=30, each=1)
+    assert (gathered(order, material) == order).all()
+    assert (in_turns(order, material) == order).all()
+    test, rest = split(order, material, 7)
+    assert (test == order[:7]).all() and (rest == order[7:]).all()
+    for start, hand in enumerate(dealt(order, material, 4)):
+        assert (hand == order[start::4]).all()
+
+
+def test_few_materials_are_dealt_by_their_pours():
+    material, order = _pours(materials=2)
+    assert [len(hand) for hand in dealt(order, material, 4)] == [2, 2, 2, 2]
