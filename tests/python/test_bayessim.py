@@ -583,6 +583,23 @@ def test_parameters_that_were_not_drawn_from_the_prior_are_told(capsys):
     assert model.summary.notes == ()
 
 
+def test_a_proposal_whose_pairs_are_worth_little_of_the_prior_is_told(capsys):
+    first = BOUNDED.prior.free[0]
+    low, high = first.bounds
+    sd = 0.07 * (high - low)
+    near = Parameter(
+        path=first.path, distribution="normal", mean=low + 4 * sd, sd=sd, low=low, high=high
+    )
+    proposal = Prior([near, *BOUNDED.prior.parameters[1:]])
+    theta = proposal.sample(300, seed=5)
+    x = BOUNDED.simulate_at(theta, seed=2)
+    quick = {**QUICK, "quiet": False, "method": "emulated"}
+    model = BayesSim.fit(theta, x, BOUNDED.prior, proposal=proposal, **quick)
+    (note,) = model.summary.notes
+    assert note.startswith("the 300 pairs of the proposal are worth "), note
+    assert f"note: {note}" in capsys.readouterr().out
+
+
 def test_pours_that_cannot_be_used_were_drawn_from_the_prior(toy):
     """Rows that are left out because of what they are make no other prior of the rest."""
     for drawn in (toy, BOUNDED):

@@ -23,7 +23,6 @@
 //! | [`write_checkpoint`], [`resume_checkpoint`] | a pour that is stopped and goes on |
 //! | [`Claims`] | what a command reads and writes, checked before it runs |
 
-mod camera_check;
 mod camera_file;
 mod checkpoint_file;
 mod claims;

@@ -8,11 +8,10 @@ use granulcal_features::{
     Camera, DepthImage, DiagnosticSettings, FeatureError, HeightMap, Observe, SensorNoise,
     diagnostics, height_map, paper16,
 };
-use granulcal_scene::{CameraSpec, Mask, Projection, ViewSpec};
+use granulcal_scene::{CameraSpec, Mask, Projection, SceneError, ViewSpec};
 use nalgebra::{Vector2, Vector3};
 
 use crate::DatasetError;
-use crate::camera_check::{check_camera, check_view};
 use crate::drawn::Drawn;
 use crate::random::{camera_seed, sensor_seed};
 
@@ -120,7 +119,7 @@ pub fn observe(
     pour: &Pour,
     pour_seed: u64,
 ) -> Result<Observation, DatasetError> {
-    check_camera(camera)?;
+    camera.check().map_err(no_camera)?;
     observe_grains(camera, &Drawn::of(pour), pour_seed)
 }
 
@@ -169,7 +168,7 @@ pub fn capture(
     grains: &Drawn<'_>,
     pour_seed: u64,
 ) -> Result<View, DatasetError> {
-    check_camera(camera)?;
+    camera.check().map_err(no_camera)?;
     views(camera, grains, pour_seed).map(|(_, view)| view)
 }
 
@@ -179,7 +178,7 @@ pub fn capture(
 /// # Errors
 /// [`DatasetError::Features`] as [`observe`].
 pub fn capture_from(view: &ViewSpec, grains: &Drawn<'_>) -> Result<View, DatasetError> {
-    check_view(view)?;
+    view.check("view").map_err(no_camera)?;
     let [width, height] = view.pixels;
     let farthest = FARTHEST * view.distance();
     Camera::looking_at(view.eye.into(), view.target.into(), view.field_width, (width, height))
@@ -242,8 +241,12 @@ fn views(
 /// # Errors
 /// [`DatasetError::Features`] if no scene can have the camera.
 pub fn overhead(camera: &CameraSpec) -> Result<Camera, DatasetError> {
-    check_camera(camera)?;
+    camera.check().map_err(no_camera)?;
     above(camera)
+}
+
+fn no_camera(error: SceneError) -> DatasetError {
+    DatasetError::Features(error.into())
 }
 
 fn above(camera: &CameraSpec) -> Result<Camera, DatasetError> {

@@ -105,7 +105,11 @@ impl CameraSpec {
         self.field_width / self.pixels as f64 * self.downsample as f64
     }
 
-    pub(crate) fn check(&self) -> Result<(), SceneError> {
+    /// Refuses a camera that no scene can have.
+    ///
+    /// # Errors
+    /// [`SceneError::OutOfRange`] and [`SceneError::SensorNeedsPinhole`] name the number.
+    pub fn check(&self) -> Result<(), SceneError> {
         within("camera.height", self.height, LENGTHS, IN_LENGTHS)?;
         within("camera.field_width", self.field_width, LENGTHS, IN_LENGTHS)?;
         within("camera.blur", self.blur, (0.0, MAX_BLUR), "in [0, 1000]")?;

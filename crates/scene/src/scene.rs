@@ -196,6 +196,9 @@ impl Scene {
     }
 
     /// The balls that hold the grains, whichever way they are turned: the grains themselves if they are round.
+    ///
+    /// # Panics
+    /// For a shape that a checked scene cannot have.
     pub fn held_grains(&self) -> Grains {
         let diameter = match self.grains.solid() {
             Some(solid) => 2.0 * solid.reach,
@@ -215,7 +218,10 @@ impl Scene {
         self.effects.polydispersity.is_on() && closest.is_some_and(|d| d < self.widest_grain())
     }
 
-    /// Centres of the grains at time zero `[m]`, one each.
+    /// Centres of the grains at time zero `[m]`, one each; of a checked scene.
+    ///
+    /// # Panics
+    /// For a shape that a checked scene cannot have.
     pub fn starting_positions(&self, seed: u64) -> Vec<Vector3<f64>> {
         let pose = self.funnel.as_ref().and_then(|funnel| self.effects.funnel.of(funnel));
         self.start.positions(&self.held_grains(), self.funnel.as_ref(), pose.as_ref(), seed)

@@ -44,7 +44,11 @@ impl ViewSpec {
         self.eye.iter().zip(self.target).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
     }
 
-    fn check(&self, path: &str) -> Result<(), SceneError> {
+    /// Refuses a camera that no scene can have, whatever it is called; `path` is where it stands.
+    ///
+    /// # Errors
+    /// [`SceneError::OutOfRange`] names the number.
+    pub fn check(&self, path: &str) -> Result<(), SceneError> {
         for &value in self.eye.iter().chain(&self.target) {
             finite(&format!("{path}.eye, target"), value)?;
         }

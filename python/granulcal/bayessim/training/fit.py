@@ -282,7 +282,7 @@ class _Work:
             notes.append(told_not_of_prior(self.pairs))
         if self.weights is not None:
             worth = float(np.sum(self.weights) ** 2 / np.sum(self.weights**2))
-            if worth < _FEWEST_OF_PRIOR:
+            if worth < min(_FEWEST_OF_PRIOR, 0.5 * len(self.weights)):
                 notes.append(
                     f"the {len(self.weights)} pairs of the proposal are worth {worth:.0f} of the "
                     f"prior, at least {_FEWEST_OF_PRIOR} are wanted: posteriors may be too narrow; "
