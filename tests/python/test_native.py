@@ -68,7 +68,7 @@ def test_what_a_mask_hides_is_not_taken_for_data(points, tmp_path):
     image[0, 0] = np.ma.masked
     with pytest.raises(ValueError, match="image must have no masked entries"):
         camera.save(image, tmp_path / "a.png", tmp_path / "a.toml")  # pyright: ignore
-    narrow = camera.render(points, radii)[:, :-1]
+    narrow = camera.render(points, radii)[:, :-1].copy()
     with pytest.raises(ValueError, match=r"the image of this camera must be \d+x\d+ pixels, got"):
         camera.save(narrow, tmp_path / "a.png", tmp_path / "a.toml")
     engine = gc.engines.CallableEngine(lambda scene, seed: (hidden, 0.002), name="masked")
