@@ -83,8 +83,10 @@ impl fmt::Display for Misfit {
         if worst.is_empty() {
             worst.extend(self.statistics.first());
         }
+        // Beyond a million how many is no matter of digits.
+        let sds = |r: f64| if r.abs() < 1e6 { format!("{r:+.1}") } else { format!("{r:+.1e}") };
         let shown: Vec<_> =
-            worst.iter().map(|s| format!("{} {:+.1} sd", s.name, s.residual)).collect();
+            worst.iter().map(|s| format!("{} {} sd", s.name, sds(s.residual))).collect();
         write!(
             f,
             "OUTSIDE THE MODEL: no parameters explain {what} (p = {p}); largest residuals: {}. The posterior below is \
