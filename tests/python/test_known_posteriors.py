@@ -63,3 +63,23 @@ def test_several_pours_of_a_material_make_nobody_sure(seed):
     check = model.check(fresh, seen(fresh, 77))
     print(f"seed {seed}: {model.summary.choice.splitlines()[0]}; {check}")
     assert np.mean(check.coverage.truth_levels <= 0.9) > 0.85
+
+
+def test_round_off_of_what_never_changed_is_no_alarm():
+    """One unit in the last place had been outside of every model, and another statistic blamed."""
+    prior, noise, still = _prior(), 0.5, 3.7
+    slopes = np.random.default_rng(5).standard_normal((4, 2))
+
+    def poured(count, seed):
+        theta = prior.sample(count, seed)
+        chance = np.random.default_rng(seed + 1).standard_normal((count, 4))
+        x = theta @ slopes.T + noise * chance
+        return theta, np.column_stack([x, np.full(count, still)])
+
+    model = gc.BayesSim.fit(*poured(200, 1), prior, quiet=True, method="emulated")
+    for x in poured(20, 9)[1]:
+        found = model.misfit(x)
+        for off in (np.spacing(still), 1e-14, -1e-10):
+            assert model.misfit(x + np.array([0, 0, 0, 0, off])).p_value == found.p_value
+        other = model.misfit(x + np.array([0, 0, 0, 0, 0.1]))
+        assert not other.is_inside and other.statistics[0].name == "statistic_4"
