@@ -75,9 +75,11 @@ impl<'a> Kernels<'a> {
         let (mut sum, mut squares) = (0.0, 0.0);
         let (mut mean, mut covariance) = (DVector::zeros(p), DMatrix::zeros(p, p));
         let at = self.draws.column(centre);
+        let (mut off, mut unit) = (DVector::zeros(p), DVector::zeros(p));
         for (u, weight) in self.draws.column_iter().zip(self.weights) {
-            let off = u - at;
-            let mut unit = off.clone();
+            off.copy_from(&u);
+            off -= at;
+            unit.copy_from(&off);
             if !window.l_dirty().solve_lower_triangular_mut(&mut unit) {
                 return before.clone();
             }

@@ -146,8 +146,7 @@ fn claimed_entries(tail: &[u8]) -> usize {
 /// [`DatasetError::Features`] for a map whose heights are not those of its size, or of a resolution that no map has;
 /// [`DatasetError::Io`] or [`DatasetError::Npz`].
 pub fn write_height_map(path: &Path, map: &HeightMap) -> Result<(), DatasetError> {
-    // Its fields are public: whoever keeps every pixel of it asks whether it is whole.
-    map.downsample(1).map_err(DatasetError::Features)?;
+    map.require_valid().map_err(DatasetError::Features)?;
     let number = |value| npy::encode(&[], [value]);
     let arrays = [
         ("depthmap", npy::encode(&[map.height, map.width], map.z.iter().copied())),

@@ -109,7 +109,10 @@ impl HeightMap {
     }
 
     /// Refuses a map whose public fields contradict each other.
-    pub(crate) fn require_valid(&self) -> Result<(), FeatureError> {
+    ///
+    /// # Errors
+    /// `OutOfRange` for a size or a resolution that no map has, `LengthMismatch` for heights that are not one a pixel.
+    pub fn require_valid(&self) -> Result<(), FeatureError> {
         Self::require_geometry(self.width, self.height, self.resolution_x, self.resolution_y)?;
         require_length("z", self.z.len(), self.width * self.height)
     }

@@ -111,10 +111,7 @@ class CountModel:
         precision = np.diag(1 / np.square(spreads))
 
         def at(log_rho: float) -> tuple[float, Array, Array]:
-            rho = float(np.exp(log_rho))
-            coefficients, covariance = _weighted(rows, counts, total, rho, precision)
-            share = _logistic(rows @ coefficients)
-            return _log_likelihood(counts, total, share, rho), coefficients, covariance
+            return _fitted(rows, counts, total, float(np.exp(log_rho)), precision)
 
         log_rho = _maximise(lambda x: at(x)[0], *np.log(_RHO))
         likelihood, coefficients, covariance = at(log_rho)
@@ -172,8 +169,9 @@ class CountModel:
         places, within, log_weight = [], [], []
         for log_rho in grid:
             rho = float(np.exp(log_rho))
-            place, covariance = _weighted(self.rows, self.counts, self.total, rho, self.precision)
-            log = _log_likelihood(self.counts, self.total, _logistic(self.rows @ place), rho)
+            log, place, covariance = _fitted(
+                self.rows, self.counts, self.total, rho, self.precision
+            )
             log += 0.5 * log_rho - 0.5 * place @ self.precision @ place
             log_weight.append(log + 0.5 * np.linalg.slogdet(covariance)[1])
             places.append(np.append(place, log_rho))
@@ -257,6 +255,15 @@ def _rows(heights: Array, material: Array, low: float, high: float, degree: int)
     t = 2 * (heights - low) / (high - low) - 1
     polynomials = np.asarray(np.polynomial.chebyshev.chebvander(t, degree), float)
     return np.column_stack([polynomials, material, t[:, None] * material])
+
+
+def _fitted(
+    rows: Array, counts: Array, total: int, rho: float, precision: Array
+) -> tuple[float, Array, Array]:
+    """Log likelihood at one rho, the coefficients that it is of, and their covariance."""
+    coefficients, covariance = _weighted(rows, counts, total, rho, precision)
+    share = _logistic(rows @ coefficients)
+    return _log_likelihood(counts, total, share, rho), coefficients, covariance
 
 
 def _weighted(

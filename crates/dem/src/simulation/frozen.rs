@@ -16,10 +16,7 @@ impl Simulation {
     /// # Errors
     /// [`DemError::NotInContactProblem`] for a scene with an effect that changes what a contact is.
     pub fn contact_problem(&self) -> Result<ContactProblem, DemError> {
-        if self.bodies.is_some() {
-            return Err(DemError::NotInContactProblem { effect: "grains.shape" });
-        }
-        if let Some(effect) = self.origin.scene.effects.of_contacts() {
+        if let Some(effect) = self.beyond_plain_contacts() {
             return Err(DemError::NotInContactProblem { effect });
         }
         let mut twin = self.clone();
@@ -42,15 +39,19 @@ impl Simulation {
     /// # Errors
     /// [`DemError::Untold`] for grains with a shape, and for an effect that changes what a contact is.
     pub fn frozen_solve(&self) -> Result<FrozenSolve, DemError> {
-        let what = "a frozen solve";
-        self.require_balls(what)?;
-        if let Some(effect) = self.origin.scene.effects.of_contacts() {
-            return Err(DemError::Untold { what, effect });
+        if let Some(effect) = self.beyond_plain_contacts() {
+            return Err(DemError::Untold { what: "a frozen solve", effect });
         }
         let mut copy = self.clone();
         copy.substep(Until::Assembled);
         let Contacts { pairs, at_walls, .. } = copy.contacts;
         Ok(FrozenSolve::new([pairs, at_walls], copy.particles, self.around.least))
+    }
+
+    /// What of the scene makes contacts other than those of balls: a shape, or an effect that changes what a contact is.
+    fn beyond_plain_contacts(&self) -> Option<&'static str> {
+        let shape = self.bodies.as_ref().map(|_| "grains.shape");
+        shape.or_else(|| self.origin.scene.effects.of_contacts())
     }
 
     /// The search for pairs of the present state, for studies of its cost; the simulation stays as it is.

@@ -5,12 +5,14 @@ use std::collections::BTreeMap;
 use granulcal_scene::Start;
 
 use super::Simulation;
-use crate::bodies::Within;
+use crate::bodies::{Bodies, Within};
 use crate::clumps::Clumps;
+use crate::contact_context::ContactContext;
 use crate::error::DemError;
 use crate::neighbor::PairSearch;
 use crate::parallel::Threads;
 use crate::path::{Path, Reach};
+use crate::wall::Walls;
 
 /// How deep in a wall or in another a grain may start, in its radii: as deep as the hastiest preset lets grains at rest be.
 const MAX_DEPTH: f64 = 0.25;
@@ -66,17 +68,26 @@ impl Simulation {
                 return Err(DemError::StartBelowOutflow { grains, below });
             }
         }
-        let found =
-            if self.bodies.is_some() { self.bodies_too_deep() } else { self.balls_too_deep() };
+        // Elsewhere grains stand on a lattice that keeps them apart, or are parted.
+        let are_stated = matches!(self.origin.scene.start, Start::Positions { .. });
+        let mut around = self.around.clone();
+        around.move_walls(self.time());
+        let mut found = TooDeep::default();
+        if let Some(bodies) = &self.bodies {
+            bodies_too_deep(bodies, &around, &mut found);
+        } else {
+            self.balls_in_walls(&around.walls, &mut found);
+            if are_stated {
+                self.balls_in_each_other(&mut found);
+            }
+        }
         let worst = found.in_walls.into_iter().max_by_key(|(_, (grains, ..))| *grains);
         if let Some((wall, (grains, _, depth))) = worst {
             let wall = self.wall_name(wall);
             return Err(DemError::StartInWall { wall, grains, depth, allowed: MAX_DEPTH });
         }
         match found.deepest {
-            Some((deepest, depth))
-                if matches!(self.origin.scene.start, Start::Positions { .. }) =>
-            {
+            Some((deepest, depth)) if are_stated => {
                 let (pairs, allowed) = (found.pairs, MAX_DEPTH);
                 Err(DemError::StartInEachOther { pairs, deepest, depth, allowed })
             }
@@ -84,13 +95,13 @@ impl Simulation {
         }
     }
 
-    /// Of grains that are balls, or of several.
-    fn balls_too_deep(&self) -> TooDeep {
-        let (particles, mut found) = (&self.particles, TooDeep::default());
-        let mut around = self.around.clone();
-        around.move_walls(self.time());
-        let walls = &around.walls;
-        let members = self.clumps.as_ref().map_or(1, Clumps::members);
+    /// Spheres of a grain: one, unless it is several.
+    fn members(&self) -> usize {
+        self.clumps.as_ref().map_or(1, Clumps::members)
+    }
+
+    fn balls_in_walls(&self, walls: &Walls, found: &mut TooDeep) {
+        let (particles, members) = (&self.particles, self.members());
         for grain in 0..particles.count() {
             let (centre, radius) = (particles.position(grain), particles.radius(grain));
             walls.reached(&centre, radius, |surface| {
@@ -99,6 +110,10 @@ impl Simulation {
                 found.in_wall(walls.owner(surface), grain / members, depth);
             });
         }
+    }
+
+    fn balls_in_each_other(&self, found: &mut TooDeep) {
+        let (particles, members) = (&self.particles, self.members());
         let (paths, mut near) = (Path::all_of(particles), Vec::new());
         let reach = Reach { interval: 0.0, near: 0.0, far: 0.0 };
         PairSearch::default().pairs(particles, &paths, reach, &Threads::default(), &mut near);
@@ -112,23 +127,6 @@ impl Simulation {
             let numbers = (i.min(j) / members, i.max(j) / members);
             found.in_each_other(numbers, (r_i + r_j - apart) / r_i.min(r_j));
         }
-        found
-    }
-
-    /// Of convex bodies, as they are turned.
-    fn bodies_too_deep(&self) -> TooDeep {
-        let mut found = TooDeep::default();
-        let Some(bodies) = &self.bodies else { return found };
-        let mut around = self.around.clone();
-        around.move_walls(self.time());
-        for (body, within, depth) in bodies.overlaps(&around.walls, &around.material) {
-            let depth = depth / around.radius;
-            match within {
-                Within::Wall(surface) => found.in_wall(around.walls.owner(surface), body, depth),
-                Within::Body(other) => found.in_each_other((body, other), depth),
-            }
-        }
-        found
     }
 
     /// The scene's word for a wall of the solver, the ground first.
@@ -138,6 +136,17 @@ impl Simulation {
             0 => "the ground".to_owned(),
             wall if wall <= shells => "funnel".to_owned(),
             wall => format!("walls.{}", wall - 1 - shells),
+        }
+    }
+}
+
+/// Of convex bodies, as they are turned.
+fn bodies_too_deep(bodies: &Bodies, around: &ContactContext, found: &mut TooDeep) {
+    for (body, within, depth) in bodies.overlaps(&around.walls, &around.material) {
+        let depth = depth / around.radius;
+        match within {
+            Within::Wall(surface) => found.in_wall(around.walls.owner(surface), body, depth),
+            Within::Body(other) => found.in_each_other((body, other), depth),
         }
     }
 }

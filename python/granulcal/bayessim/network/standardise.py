@@ -40,12 +40,13 @@ class Standardiser:
         skewness = _skewness(x)
         log_skewness = _skewness(_warp(x, low > 0))
         is_log = (low > 0) & (skewness > _LARGEST_SKEWNESS) & (np.abs(log_skewness) < skewness)
-        is_log &= ~_is_constant(low, high)
+        is_still = _is_constant(low, high)
+        is_log &= ~is_still
         warped = _warp(x, is_log)
         shift, scale = warped.mean(axis=0), warped.std(axis=0)
         is_constant = scale <= _CONSTANT_SPREAD * np.maximum(np.abs(shift), 1e-300)
         # Exactly, so that nothing is left of what never changed.
-        shift = np.where(_is_constant(low, high), 0.5 * (low + high), shift)
+        shift = np.where(is_still, 0.5 * (low + high), shift)
         return cls(is_log, shift, np.where(is_constant, 1.0, scale), low, high)
 
     @property
