@@ -203,6 +203,10 @@ class Recording:
         frames: int | None = None,
         first_frame: int | None = None,
     ) -> Recording: ...
+    @staticmethod
+    def of_depths(
+        depth: NDArray[np.float32], lens: tuple[float, float, float, float], unit: float | None
+    ) -> Recording: ...
     @property
     def topic(self) -> str | None: ...
     @property

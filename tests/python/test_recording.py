@@ -85,6 +85,23 @@ def test_frames_in_memory_are_what_their_files_are(pour, camera, tmp_path):
         np.testing.assert_allclose(np.asarray(found), np.asarray(expected), rtol=1e-4, atol=1e-6)
     nothing = np.where(stored.depth > 0.37, np.nan, stored.depth)
     assert (gc.Recording.from_depth(nothing, **lens).depth == 0).sum() == (~(nothing > 0)).sum()
+    # As readers hand them out: turned by a transposition, with one channel, of another pour.
+    turned = {**lens, "fx": lens["fy"], "fy": lens["fx"], "cx": lens["cy"], "cy": lens["cx"]}
+    across = gc.Recording.from_depth(stored.depth.T, **turned).statistics()
+    assert across["max_z"] == pytest.approx(stored.statistics()["max_z"], rel=1e-6)
+    channel = gc.Recording.from_depth(stored.depth[:, :, None], **lens)
+    np.testing.assert_array_equal(channel.depth, stored.depth)
+    camera.save(stored.depth.T[::-1].T, tmp_path / "mirrored.png", tmp_path / "mirrored.toml")
+    with pytest.warns(UserWarning, match="depth array: frame 1"):
+        gc.Recording.from_depth([stored.depth, stored.depth - 0.01], **lens)
+    for depth, unit, message in (
+        (counts, None, r"uint16.*unit=0\.001"),
+        (counts, -1e-4, "unit must be positive"),
+        (1e3 * stored.depth, None, "depth array: the depths must be at most 100 m"),
+        (0.0 * stored.depth, None, "depth array: .*must carry depth"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            gc.Recording.from_depth(depth, **lens, unit=unit).formation()
     with pytest.raises(ValueError, match=r"shape \(h, w\) or \(k, h, w\), got \(5,\)"):
         gc.Recording.from_depth(np.ones(5), **lens)
     with pytest.raises(ValueError, match="fx"):

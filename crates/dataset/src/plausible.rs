@@ -5,7 +5,7 @@
 //! than they are, lie where the camera looks, on a ground that is flat.
 
 use granulcal_dem::Simulation;
-use granulcal_features::{Formation, OtherHeap};
+use granulcal_features::{Formation, Part};
 use granulcal_numbers::short;
 use granulcal_scene::{Mask, Prior, Scene};
 
@@ -35,6 +35,12 @@ const HIDDEN: f64 = 0.1;
 pub const LEAST_SHOWN: f64 = 0.95;
 /// Factor between the scene's threshold of height and the recording's, above which that is said.
 const THRESHOLD: f64 = 1.25;
+/// Standard deviations of the ground that a threshold of height is above it, at least: one pixel in 740 of the ground is
+/// then taken for a grain.
+const ABOVE_NOISE: f64 = 3.0;
+/// Factor between the width of a recording's pixels on the ground and the scene's, above which that is said. Every n-th
+/// pixel of a finer image comes within 4/3.
+const COARSE: f64 = 1.5;
 /// Standard deviation of the ground about its plane, over a grain's diameter and in metres, above both of which it is
 /// said to be uneven.
 const UNEVEN: f64 = 0.5;
@@ -65,6 +71,8 @@ pub struct Limits {
     pub diameter: f64,
     /// Side of the square of ground that its images show `[m]`.
     pub field: f64,
+    /// Width of its images' pixels on the ground `[m]`.
+    pub resolution: f64,
     /// Height from which its images' pixels count as grain `[m]`; none where a colour decides.
     pub threshold: Option<f64>,
     /// Greatest distance of most points from their middle `[m]`.
@@ -97,6 +105,7 @@ impl Limits {
             least_volume: a.least_volume.min(b.least_volume),
             diameter: a.diameter.max(b.diameter),
             field: a.field.max(b.field),
+            resolution: a.resolution.max(b.resolution),
             threshold: a.threshold,
             extent: a.extent.max(b.extent),
             ground_sd: a.ground_sd.max(b.ground_sd),
@@ -118,6 +127,7 @@ impl Limits {
             least_volume: all_seen,
             diameter: scene.grains.diameter,
             field,
+            resolution: scene.camera.ground_resolution(),
             threshold: (scene.camera.mask == Mask::Height).then_some(scene.camera.height_threshold),
             extent: EXTENT_MARGIN * field * 0.5_f64.sqrt(),
             ground_sd: (GROUND_DIAMETERS * scene.grains.diameter).max(GROUND_FLOOR),
@@ -166,6 +176,12 @@ impl Limits {
             let hint = ": are there as many grains, as wide as the scene's?";
             require("the formation's volume, all of it in view,", "l", volume, least, hint);
         }
+        if formation.volume <= 0.0 {
+            found.push(format!(
+                "the formation's volume is {} l, in the scene more than 0: is it of the ground's colour?",
+                short(litres * formation.volume)
+            ));
+        }
         found
     }
 
@@ -203,16 +219,17 @@ impl Limits {
                 short(self.field)
             ));
         }
-        if let (Some(threshold), false) = (self.threshold, formation.is_by_colour) {
-            let ratio = formation.threshold / threshold;
-            if !(1.0 / THRESHOLD..=THRESHOLD).contains(&ratio) {
-                found.push(format!(
-                    "pixels count as grain from {} mm on, in the scene's images from {} mm on: the edge of a formation and \
-                     single layers differ by that; say height_threshold in both, or average more frames",
-                    short(1e3 * formation.threshold),
-                    short(1e3 * threshold)
-                ));
-            }
+        if !formation.is_by_colour {
+            found.extend(self.doubt_of_threshold(formation));
+        }
+        let pixel = (formation.resolution.0 * formation.resolution.1).sqrt();
+        if pixel > COARSE * self.resolution {
+            found.push(format!(
+                "a pixel is {} mm wide on the ground, in the scene's images {} mm: single grains and tops are missed; bring \
+                 the camera nearer, or make the scene's images as coarse (camera.downsample)",
+                short(1e3 * pixel),
+                short(1e3 * self.resolution)
+            ));
         }
         if formation.ground_sd > (UNEVEN * self.diameter).max(UNEVEN_FLOOR) {
             found.push(format!(
@@ -226,20 +243,73 @@ impl Limits {
         if seen < SEEN {
             found.push(format!("only {:.0} % of the image carries data", 100.0 * seen));
         }
-        let others = formation.other_heaps(self.diameter);
-        for OtherHeap { volume, height } in others.iter().take(MOST_ALIKE) {
-            found.push(format!(
-                "{} ml, {} mm high, stand apart from the formation and are taken for grains: if they are none, \
-                 take them away or out of the image",
-                short(1e6 * volume),
-                short(1e3 * height)
-            ));
-        }
-        if let more @ 1.. = others.len().saturating_sub(MOST_ALIKE) {
-            found.push(format!("{more} more stand apart from it like these"));
-        }
+        let mut tell = |parts: Vec<Part>, what: &str, more: &str| {
+            for Part { volume, height } in parts.iter().take(MOST_ALIKE) {
+                found.push(format!(
+                    "{} ml, {} mm high, {what}",
+                    short(1e6 * volume),
+                    short(1e3 * height)
+                ));
+            }
+            if let rest @ 1.. = parts.len().saturating_sub(MOST_ALIKE) {
+                found.push(format!("{rest} more {more}"));
+            }
+        };
+        tell(
+            formation.other_heaps(self.diameter),
+            "stand apart from the formation and are taken for grains: if they are none, take them away or out of the image",
+            "stand apart from it like these",
+        );
+        let field = short(self.field);
+        tell(
+            formation.left_out_heaps(self.diameter),
+            &format!(
+                "stand beyond the {field} m x {field} m about the formation that the scene's images show, and are left out: \
+                 if they are the formation, take the other away or out of the image"
+            ),
+            "stand beyond it like these",
+        );
+        tell(
+            formation.flat_parts(self.diameter),
+            "are taken for grains and flat, as grains are not: if they are a mat, a ruler or a marker, take it away or out \
+             of the image",
+            "are flat like these",
+        );
         found
     }
+
+    /// What makes the height doubtful from which a pixel counts as grain.
+    fn doubt_of_threshold(&self, formation: &Formation) -> Option<String> {
+        let Formation { threshold, ground_sd, .. } = *formation;
+        let at = |height: f64| short(1e3 * height);
+        if threshold < ABOVE_NOISE * ground_sd {
+            return Some(format!(
+                "pixels count as grain from {} mm on, and the ground scatters by {} mm (standard deviation): some of it is \
+                 taken for grains; average more frames, or say height_threshold = {} m here and in the scene",
+                at(threshold),
+                at(ground_sd),
+                rounded_up(ABOVE_NOISE * ground_sd)
+            ));
+        }
+        let of_scene = self.threshold?;
+        if (1.0 / THRESHOLD..=THRESHOLD).contains(&(threshold / of_scene)) {
+            return None;
+        }
+        let advice = if threshold > of_scene { ", or average more frames" } else { "" };
+        Some(format!(
+            "pixels count as grain from {} mm on, in the scene's images from {} mm on: the edge of a formation and single \
+             layers differ by that; say height_threshold = {} m in both{advice}",
+            at(threshold),
+            at(of_scene),
+            rounded_up(threshold.max(of_scene))
+        ))
+    }
+}
+
+/// A number of two digits, no less: what the next image asks for differs a little.
+fn rounded_up(value: f64) -> String {
+    let digit = 10_f64.powf(value.log10().floor() - 1.0);
+    short((value / digit * (1.0 - 1e-9)).ceil() * digit).to_string()
 }
 
 /// The ends of a normal are far out: its 2 % and 98 % stand for them.
@@ -291,7 +361,23 @@ mod tests {
         assert_eq!(limits.violations(&cone(8e-3, 0.015)), Vec::<String>::new());
         let of_threshold = limits.doubts(&cone(0.03, 0.06));
         assert!(of_threshold.len() == 1 && of_threshold[0].contains("height_threshold"));
+        assert!(of_threshold[0].contains("height_threshold = 0.001 m in both"), "{of_threshold:?}");
         let by_colour = Formation { is_by_colour: true, ..cone(0.03, 0.06) };
+        let hollow = Formation { volume: -1e-6, ..by_colour.clone() };
+        assert!(limits.violations(&hollow)[0].contains("of the ground's colour"));
+        // Below three standard deviations the ground's noise is taken for grains, whatever the scene says.
+        let noisy = Formation { threshold: 1e-3, ground_sd: 5e-4, ..cone(0.03, 0.06) };
+        let of_noise = limits.doubts(&noisy);
+        assert!(
+            of_noise.len() == 1 && of_noise[0].contains("height_threshold = 0.0015 m here"),
+            "{of_noise:?}"
+        );
+        assert_eq!([1.626e-3, 1e-3, 9.91e-3].map(rounded_up), ["0.0017", "0.001", "0.01"]);
+        let still = Formation { ground_sd: 3e-4, ..noisy };
+        assert_eq!(limits.doubts(&still), Vec::<String>::new());
+        let coarse = Formation { resolution: (1e-2, 1e-2), ..still };
+        let of_pixels = limits.doubts(&coarse);
+        assert!(of_pixels.len() == 1 && of_pixels[0].contains("a pixel is 10 mm wide"));
         assert_eq!(limits.doubts(&by_colour), Vec::<String>::new());
         let limits = Limits { threshold: None, ..limits };
         assert!(limits.doubts(&cone(0.03, 0.06)).is_empty());
@@ -306,6 +392,13 @@ mod tests {
         assert!(doubt(&half).contains("of the formation's outline nothing is seen"));
         let uneven = Formation { ground_sd: 3e-3, ..seen.clone() };
         assert!(doubt(&uneven).contains("of two levels?"), "{}", doubt(&uneven));
+        let beyond = vec![Part { volume: 4e-5, height: 0.02 }, Part { volume: 3e-8, height: 4e-3 }];
+        let chosen = Formation { left_out: beyond, ..seen.clone() };
+        assert!(
+            doubt(&chosen).starts_with("40 ml, 20 mm high, stand beyond the 0.58 m"),
+            "{}",
+            doubt(&chosen)
+        );
         // It shows less than the scene's images, which matters where grains come to its edge.
         let mut mask = seen.mask.clone();
         mask[0] = true;

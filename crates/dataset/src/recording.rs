@@ -8,17 +8,23 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use granulcal_features::{
-    Camera, ColourImage, DepthImage, Formation, HeightMap, Levelled, Segmentation, level_depth,
-    level_height_map, paper16,
+    Camera, ColourImage, DepthImage, Formation, HeightMap, Intrinsics, Levelled, Segmentation,
+    level_depth, level_height_map, paper16,
 };
 
 pub use folder::{Folder, Frame};
 pub use options::{FRAMES, ReadOptions};
 
 use crate::camera_file::camera_of;
+use crate::depth_frame::{DepthFrame, Values};
+use crate::fault::Fault;
 use crate::input::{Input, ReadSeek};
+use crate::mean::Mean;
 use crate::message_file::MessageFormat;
 use crate::{CameraFile, DatasetError, Lost, Npz, files};
+
+/// Largest depth that an image in memory may have `[m]`: beyond it are other units.
+const DEEPEST: f32 = 100.0;
 
 /// What was measured.
 #[derive(Clone, Debug)]
@@ -216,6 +222,47 @@ impl Recording {
             depth_unit: Some(unit),
             ..Self::of_one(path.to_owned(), source, camera.segmentation.clone())
         })
+    }
+
+    /// The mean of depth images in memory, row by row in metres, of a camera with this lens; `name` stands in messages.
+    ///
+    /// # Errors
+    /// [`DatasetError::Content`] for no image, one of another size than the lens, or a depth of more than 100 m.
+    pub fn of_depths(
+        name: &Path,
+        lens: Intrinsics,
+        frames: impl IntoIterator<Item = Vec<f32>>,
+    ) -> Result<Self, DatasetError> {
+        let refuse = |fault: Fault| fault.in_file(name);
+        let (width, height) = (lens.width, lens.height);
+        let mut mean: Option<Mean> = None;
+        for values in frames {
+            if values.len() != width * height {
+                let allowed = format!("{width} x {height}, as the lens has it");
+                return Err(refuse(Fault::new(
+                    "the number of depths",
+                    values.len().to_string(),
+                    allowed,
+                )));
+            }
+            let deepest = values.iter().copied().filter(|z| z.is_finite()).fold(0.0, f32::max);
+            if deepest > DEEPEST {
+                let allowed = format!("at most {DEEPEST} m: are they counts or millimetres?");
+                return Err(refuse(Fault::new("the depths", format!("{deepest} m"), allowed)));
+            }
+            let frame = DepthFrame { width, height, values: Values::Metres(values) };
+            match &mut mean {
+                Some(mean) => mean.add(&frame).map_err(refuse)?,
+                None => mean = Some(Mean::new(frame, 1.0)),
+            }
+        }
+        let none = || Fault::new("the number of images", "0", "at least 1");
+        let mean = mean.ok_or_else(none).map_err(refuse)?;
+        let (frames, unlike) = (mean.frames(), mean.doubt());
+        let image = mean.finish().map_err(refuse)?;
+        let source = Source::Depth { camera: camera_of(lens), image, colour: None };
+        let one = Self::of_one(name.to_owned(), source, Segmentation::default());
+        Ok(Self { frames, window: 0..frames as u64, whole_frames: frames as u64, unlike, ..one })
     }
 
     fn take_messages(mut input: Input<'_>, options: &ReadOptions) -> Result<Self, DatasetError> {

@@ -122,12 +122,7 @@ pub enum FeatureError {
         min: usize,
     },
     /// No pixel was taken for a grain.
-    #[error(
-        "none of {valid} valid pixels belongs to a grain (highest is {} m, threshold {} m){}",
-        General(*highest),
-        General(*threshold),
-        too_high(*above)
-    )]
+    #[error("{}", no_grain(*valid, *highest, *threshold, *above))]
     EmptyMask {
         /// Valid pixels.
         valid: usize,
@@ -178,14 +173,25 @@ pub enum FeatureError {
     },
 }
 
-/// What is said of pixels above the greatest height.
-fn too_high(count: usize) -> String {
-    match count {
-        0 => String::new(),
-        count => format!(
-            "; {count} more are above max_height: has another surface been taken for the ground?"
-        ),
+/// What is said of an image without a grain, and of its pixels above the greatest height.
+fn no_grain(valid: usize, highest: f64, threshold: f64, above: usize) -> String {
+    if valid == 0 {
+        return format!(
+            "all {above} pixels with data are above max_height: are the depths in metres?"
+        );
     }
+    let hidden = if above > 0 {
+        format!(
+            "; {above} more are above max_height: has another surface been taken for the ground?"
+        )
+    } else {
+        String::new()
+    };
+    format!(
+        "none of {valid} valid pixels belongs to a grain (highest is {} m, threshold {} m){hidden}",
+        General(highest),
+        General(threshold)
+    )
 }
 
 /// Refuses the first value of `values` that is not finite.

@@ -66,7 +66,7 @@ pub use raster::{ConvexShape, height_map, render, render_convex, render_grid};
 pub use region::Region;
 pub use register::register_colour;
 pub use segment::{
-    EdgePixels, Formation, Kind, Levelled, OtherHeap, Segmentation, Shape, Threshold, grain_points,
+    EdgePixels, Formation, Kind, Levelled, Part, Segmentation, Shape, Threshold, grain_points,
     level_depth, level_height_map, segment_depth, segment_height_map,
 };
 pub use sensor::{

@@ -7,20 +7,24 @@
 mod component;
 mod edge;
 mod field;
+mod flat;
 mod flying;
 mod formation;
+mod ground;
 mod levelled;
 mod outlook;
+mod part;
 mod settings;
 mod shape;
 mod spacing;
+mod step;
 
 use nalgebra::Vector3;
 
 pub use edge::EdgePixels;
 pub use formation::Formation;
 pub use levelled::Levelled;
-pub use outlook::OtherHeap;
+pub use part::Part;
 pub use settings::{Segmentation, Threshold};
 pub use shape::{Kind, Shape};
 
@@ -104,13 +108,18 @@ pub fn level_depth(
         let coarse = (side / COARSE_SIDE_PX).max(1);
         let glance = cloud(coarse)?;
         let (plane, _) = glance.ground(segmentation, grains(coarse)?.as_deref(), up)?;
-        segmentation.factor(glance.resolution(&plane).0 / coarse as f64, side)
+        segmentation.factor(of_area(glance.resolution(&plane)) / coarse as f64, side)
     } else {
         segmentation.factor(1.0, side)
     };
     let levelled = cloud(n)?.level(segmentation, grains(n)?.as_deref(), up)?;
     let along = camera.camera_from_world.inverse_transform_vector(&Vector3::x());
     Ok(in_field(levelled, segmentation, &along))
+}
+
+/// Side of the square that is as large as a pixel.
+fn of_area((x, y): (f64, f64)) -> f64 {
+    (x * y).sqrt()
 }
 
 /// What of it lies in the field of view that is asked for; columns of the image go `along`.
@@ -130,12 +139,14 @@ fn depth_cloud(
 ) -> Result<Cloud, FeatureError> {
     let (small_camera, small) = (camera.downsampled(n)?, image.downsample(n)?);
     let inside = segmentation.inside(image.width, image.height, n);
-    let axis = camera.camera_from_world.inverse_transform_vector(&Vector3::z());
+    let [across, axis] = [Vector3::x(), Vector3::z()]
+        .map(|axis| camera.camera_from_world.inverse_transform_vector(&axis));
     let footprint = Footprint::Pyramid {
         fx: small_camera.intrinsics.fx,
         fy: small_camera.intrinsics.fy,
         centre: camera.centre_in_world(),
         axis,
+        across,
     };
     let point = |u: usize, v: usize| unproject_pixel(&small_camera, &small, u, v);
     Ok(Cloud::new((small.width, small.height), n, footprint, |u, v| {
@@ -156,7 +167,8 @@ pub fn level_height_map(
     if segmentation.colour.is_some() {
         return Err(incomplete_colour(false, true));
     }
-    let n = segmentation.factor(map.resolution_x, map.width.min(map.height));
+    let resolution = of_area((map.resolution_x, map.resolution_y));
+    let n = segmentation.factor(resolution, map.width.min(map.height));
     let inside = segmentation.inside(map.width, map.height, n);
     let small = flying::removed_heights(map, segmentation.flying_deg).downsample(n)?;
     let footprint = Footprint::Column { x: small.resolution_x, y: small.resolution_y };

@@ -3,8 +3,9 @@
 use bytemuck::cast_slice;
 use nalgebra::Vector3;
 use numpy::{
-    Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArray1,
-    PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods, dtype,
+    Element, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods,
+    PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods,
+    dtype,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -63,6 +64,25 @@ impl<'py> Image<'py> {
     /// Width, height and the pixels row by row.
     pub(crate) fn parts(&self) -> PyResult<(usize, usize, &[f32])> {
         Ok((self.0.shape()[1], self.0.shape()[0], self.0.as_slice()?))
+    }
+}
+
+/// Borrowed images, shape (k, h, w), float32.
+pub(crate) struct Images<'py>(PyReadonlyArray3<'py, f32>);
+
+impl<'py> Images<'py> {
+    /// Borrows `value` without copying it.
+    pub(crate) fn borrow(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let array = untyped::<f32>(name, value)?;
+        if array.ndim() != 3 {
+            return Err(bad_shape(name, "(k, h, w)", array));
+        }
+        Ok(Self(value.cast::<PyArray3<f32>>()?.try_readonly()?))
+    }
+
+    /// Rows, columns and the pixels, image by image.
+    pub(crate) fn parts(&self) -> PyResult<(usize, usize, &[f32])> {
+        Ok((self.0.shape()[1], self.0.shape()[2], self.0.as_slice()?))
     }
 }
 

@@ -1,12 +1,14 @@
 //! Class `Recording`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use granulcal_dataset::{ReadOptions, Source};
+use granulcal_features::Intrinsics;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::array::Images;
 use crate::formation::Formation;
 use crate::levelled::Levelled;
 use crate::{array, error, segmentation};
@@ -46,6 +48,26 @@ impl Recording {
             ReadOptions { camera, topic, colour_topic, camera_topic, frames, first_frame };
         let inner = py.detach(|| granulcal_dataset::Recording::open(&path, &options));
         Ok(Self { inner: inner.map_err(error::dataset)? })
+    }
+
+    /// The mean of images in memory [m], shape (k, h, w), float32; `lens` is fx, fy, cx, cy.
+    #[staticmethod]
+    fn of_depths(
+        py: Python<'_>,
+        depth: &Bound<'_, PyAny>,
+        lens: (f64, f64, f64, f64),
+        unit: Option<f64>,
+    ) -> PyResult<Self> {
+        let images = Images::borrow("depth", depth)?;
+        let (rows, columns, values) = images.parts()?;
+        let (fx, fy, cx, cy) = lens;
+        let lens = Intrinsics::from_integer_centres(columns, rows, fx, fy, cx, cy)
+            .map_err(error::features)?;
+        let name = Path::new("depth array");
+        let frames = values.chunks_exact(rows * columns).map(<[f32]>::to_vec);
+        let inner = py.detach(|| granulcal_dataset::Recording::of_depths(name, lens, frames));
+        let inner = inner.map_err(error::dataset)?;
+        Ok(Self { inner: granulcal_dataset::Recording { depth_unit: unit, ..inner } })
     }
 
     #[getter]

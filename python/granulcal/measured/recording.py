@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
@@ -175,26 +174,35 @@ class Recording:
             fy: the same along the columns [px].
             cx: column of the principal point [px], the centre of the first pixel at (0, 0).
             cy: its row [px].
-            unit: metres per count; None for depths in metres, which are kept to 0.1 mm.
+            unit: metres per count; None for depths in metres.
 
         Raises:
-            ValueError: another shape, masked entries, a lens that none is, or depths too large.
+            ValueError: another shape, masked entries, whole numbers without a unit, a unit or a
+                lens that none is, or depths of more than 100 m.
+
+        Warns:
+            UnlikeFramesWarning: the frames do not look like images of one formation at rest.
         """
-        images = np.nan_to_num(np.asarray(unmasked("depth", depth), np.float32))
-        images = images * np.float32(1.0 if unit is None else unit)
-        images = images[None] if images.ndim == 2 else images
+        given = unmasked("depth", depth)
+        if unit is None and np.issubdtype(given.dtype, np.integer):
+            raise ValueError(
+                f"depth is of whole numbers ({given.dtype}): say what one is, unit=0.001 for "
+                "millimetres, or give metres as floats"
+            )
+        if unit is not None and not 0 < unit < np.inf:
+            raise ValueError(f"unit must be positive and finite, got {unit}")
+        if given.ndim == 3 and given.shape[2] == 1 and given.shape[1] > 1:
+            given = given[:, :, 0]  # As some readers keep their one channel.
+        images = given[None] if given.ndim == 2 else given
         if images.ndim != 3 or images.size == 0:
             raise ValueError(f"depth must have shape (h, w) or (k, h, w), got {np.shape(depth)}")
-        count, rows, columns = images.shape
-        # The height stands in no file.
-        camera = Camera(_native.Camera.above(1.0, (columns, rows, fx, fy, cx, cy)))
-        with TemporaryDirectory() as place:
-            folder, toml = Path(place) / "frames", Path(place) / "camera.toml"
-            folder.mkdir()
-            kept = {} if unit is None else {"depth_unit": unit}
-            for i, image in enumerate(images):
-                camera.save(image, folder / f"{i:06}.png", toml, **kept)
-            return cls(_native.Recording.open(folder, toml, frames=count), Path("depth array"))
+        metres = images.astype(np.float32) * np.float32(1.0 if unit is None else unit)
+        native = _native.Recording.of_depths(
+            np.ascontiguousarray(metres), (fx, fy, cx, cy), unit
+        )
+        if native.unlike is not None:
+            warnings.warn(f"depth array: {native.unlike}", UnlikeFramesWarning, stacklevel=2)
+        return cls(native, Path("depth array"))
 
     @property
     def frames(self) -> int:

@@ -147,4 +147,6 @@ class Camera:
         Raises:
             ValueError: another shape, or masked entries: 0 says that there is no data.
         """
-        self._native.save_image(unmasked("image", image), png, toml, depth_unit)
+        self._native.save_image(
+            np.ascontiguousarray(unmasked("image", image)), png, toml, depth_unit
+        )

@@ -113,7 +113,7 @@ depth_unit = {unit:g}          # metres per count of the 16-bit PNG
 [segmentation]
 border_px = 0                 # ignore a frame of so many pixels
 max_height = {max_height:g}             # no data above it: the funnel, a hand
-height_threshold = {{ absolute = {threshold:g} }}   # as in scene.toml
+height_threshold = {{ absolute = {threshold:g} }}   # as in scene.toml, and three times the ground's noise or more
 """
 
 LOOP = """\

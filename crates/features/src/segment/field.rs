@@ -7,7 +7,10 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Vector3;
 
+use super::component::patches;
 use super::levelled::Levelled;
+use super::outlook::HEAP_PIXELS;
+use super::part::Part;
 use crate::median::median;
 
 impl Levelled {
@@ -38,7 +41,28 @@ impl Levelled {
             }
         }
         self.shown = Some(shown);
-        if kept.iter().all(|&kept| kept) { self } else { self.cut_to(&kept) }
+        if kept.iter().all(|&kept| kept) {
+            return self;
+        }
+        self.left_out = self.beyond(&kept);
+        self.cut_to(&kept)
+    }
+
+    /// The patches of grains that are cut off whole, or more than half; a heap has some pixels.
+    fn beyond(&self, kept: &[bool]) -> Vec<Part> {
+        let mut of_pixel = vec![None; self.mask.len()];
+        self.pixels.iter().enumerate().for_each(|(point, &pixel)| of_pixel[pixel] = Some(point));
+        let part = |patch: Vec<usize>| {
+            let points = || patch.iter().filter_map(|&pixel| of_pixel[pixel]);
+            let volume = |cut: bool| -> f64 {
+                points().filter(|&point| kept[point] != cut).map(|point| self.volumes[point]).sum()
+            };
+            let height = points().map(|point| self.points[point].z).fold(0.0, f64::max);
+            let (beyond, inside) = (volume(true), volume(false));
+            (beyond > inside).then_some(Part { volume: beyond, height })
+        };
+        let all = patches(&self.mask, self.width).into_iter();
+        all.filter(|patch| patch.len() >= HEAP_PIXELS).filter_map(part).collect()
     }
 
     /// Leaves the points that are kept, and the rectangle of pixels that holds them.
@@ -102,6 +126,10 @@ mod tests {
             *z = (0.02 * (1.0 - STEP * (u - cone).hypot(v - 39.5) / 0.03)).max(0.0);
         }
         (z[40 * columns + 2], z[41 * columns - 3]) = (4e-3, 4e-3);
+        of(columns, z, field_width)
+    }
+
+    fn of(columns: usize, z: Vec<f64>, field_width: Option<f64>) -> Formation {
         let map = HeightMap::new(columns, 80, STEP, STEP, z).unwrap();
         let height_threshold = Threshold::Absolute(1e-3);
         let settings = Segmentation { height_threshold, field_width, ..Segmentation::default() };
@@ -123,6 +151,28 @@ mod tests {
             |seen: &Formation| seen.points.iter().map(|p| p.xy().norm()).fold(0.0, f64::max);
         assert_eq!(aside.width, 80);
         assert!(farthest(&aside) < 0.031 && farthest(&seen(140, 80.0, None)) > 0.1);
+    }
+
+    #[test]
+    fn a_heap_beyond_the_square_is_left_out_and_known() {
+        let heaps = |cones: &[(f64, f64)]| {
+            let height = |pixel: usize| {
+                let (u, v) = ((pixel % 300) as f64, (pixel / 300) as f64);
+                let of_cone =
+                    |(at, high): &(f64, f64)| high * (1.0 - STEP * (u - at).hypot(v - 39.5) / 0.03);
+                cones.iter().map(of_cone).fold(0.0, f64::max)
+            };
+            of(300, (0..300 * 80).map(height).collect(), Some(80.0 * STEP))
+        };
+        let diameter = 4e-3;
+        let both = heaps(&[(60.0, 0.03), (240.0, 0.02)]);
+        assert_eq!((both.width, both.other_heaps(diameter)), (80, Vec::new()));
+        let [heap] = both.left_out_heaps(diameter)[..] else { panic!("{:?}", both.left_out) };
+        let cone = std::f64::consts::PI / 3.0 * 0.03 * 0.03 * 0.02;
+        assert!((heap.volume / cone - 1.0).abs() < 0.05 && heap.height > 0.019, "{heap:?}");
+        assert!(heaps(&[(60.0, 0.03)]).left_out_heaps(diameter).is_empty());
+        // Lone grains are no heap.
+        assert!(seen(140, 39.5, Some(80.0 * STEP)).left_out_heaps(diameter).is_empty());
     }
 
     #[test]

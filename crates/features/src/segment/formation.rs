@@ -3,6 +3,7 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::levelled::Levelled;
+use super::part::Part;
 use super::shape::{self, Shape};
 use crate::error::FeatureError;
 use crate::plane::PlaneFit;
@@ -31,6 +32,8 @@ pub struct Formation {
     pub shown: Option<f64>,
     /// Whether the image shows more, which was cut off.
     pub is_cropped: bool,
+    /// Patches of grains beyond it, which were left out.
+    pub left_out: Vec<Part>,
     /// Pixels taken for grains.
     pub masked_count: usize,
     /// Height above the ground from which a pixel counts as grain `[m]`; not applied when a colour
@@ -79,6 +82,7 @@ impl Levelled {
             valid_count: self.valid_count,
             shown: self.shown,
             is_cropped: self.is_cropped,
+            left_out: self.left_out,
             threshold: self.threshold,
             is_by_colour: self.is_by_colour,
             centroid,

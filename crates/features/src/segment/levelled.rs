@@ -1,59 +1,24 @@
 //! An image turned so that its ground is z = 0: what depth images and height maps share.
 
-use std::ops::RangeInclusive;
-
 use nalgebra::{Point3, Vector3};
 
 use super::component::{remove_low, remove_small};
+use super::part::Part;
 use super::settings::Segmentation;
 use crate::error::FeatureError;
-use crate::median::median;
-use crate::plane::{PlaneFit, fit_plane_within, refine_plane};
+use crate::plane::PlaneFit;
 
-/// Standard deviation of a Gaussian over its median absolute deviation.
-const SD_PER_MAD: f64 = 1.482_602_218_505_602;
-
-/// Residual below which the refit does not tighten further `[m]`: the rounding of an f32 depth.
-const FINEST_INLIER: f64 = 1e-6;
-
-/// Rounds in which the inlier distance is brought to the noise of the ground.
-const MAX_TIGHTENINGS: usize = 20;
-
-/// Share of the inlier distance from which three standard deviations count as no less.
-const SETTLED: f64 = 0.99;
-
-/// Inlier distance at which the search for the ground begins unless told otherwise `[m]`: above the
-/// noise of a stereo camera at 0.3 m to 0.5 m.
-const FIRST_REACH: f64 = 0.003;
-
-/// Points between one and two inlier distances below the plane, for each within one, from which the
-/// ground is rougher than the inlier distance. Gaussian noise whose sd is the distance has 0.4, whose
-/// sd is a third of it 0.003.
-const SHOULDER: f64 = 0.3;
-
-/// A ground of two levels, such as a mat on a table, draws the plane between them. A plane is on one of them if so many
-/// of the points lie on it, and scatter about it less than this share of what they did.
-const LEVEL_SHARE: f64 = 0.35;
-const LEVEL_SCATTER: f64 = 1.0 / 3.0;
-/// Standard deviation about the plane between two levels, at least `[m]`: below it nothing is to be gained.
-const BETWEEN_LEVELS: f64 = 1e-3;
-/// What scatters less about a plane is of one count of a camera and no level `[m]`.
-const LEAST_SCATTER: f64 = 1e-5;
-/// Points between three and six standard deviations of a level from it, over those on it, at most: two levels have a gap.
-const IN_GAP: f64 = 0.1;
-/// Inlier distance by which one of two levels is looked for, over the standard deviation about the plane between them.
-const LEVEL_REACH: f64 = 0.25;
-
-/// The inlier distance grows to at most this share of the extent of the points.
-const LARGEST_REACH: f64 = 0.05;
+/// A camera that looks along the ground sees it under no angle whose cosine is less.
+const LEAST_FACING: f64 = 0.05;
 
 /// What a pixel's column of grains measures on the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Footprint {
     /// The same rectangle under every pixel, its sides along x and y `[m]`, seen along z.
     Column { x: f64, y: f64 },
-    /// A pyramid with its tip at the camera's `centre`, looking along `axis`; focal lengths `[px]`.
-    Pyramid { fx: f64, fy: f64, centre: Vector3<f64>, axis: Vector3<f64> },
+    /// A pyramid with its tip at the camera's `centre`, looking along `axis`, the columns of the image `across`; focal
+    /// lengths `[px]`.
+    Pyramid { fx: f64, fy: f64, centre: Vector3<f64>, axis: Vector3<f64>, across: Vector3<f64> },
 }
 
 /// The points of an image and the pixels that they belong to.
@@ -61,8 +26,8 @@ pub(super) struct Cloud {
     pub(super) width: usize,
     pub(super) height: usize,
     /// Index of the pixel of each point, rising.
-    pixels: Vec<usize>,
-    points: Vec<Vector3<f64>>,
+    pub(super) pixels: Vec<usize>,
+    pub(super) points: Vec<Vector3<f64>>,
     pub(super) footprint: Footprint,
     /// The factor by which the image was down-sampled.
     pub(super) downsample: usize,
@@ -96,6 +61,8 @@ pub struct Levelled {
     pub shown: Option<f64>,
     /// Whether the image shows more, which was cut off.
     pub is_cropped: bool,
+    /// Patches of grains beyond it, which were left out.
+    pub left_out: Vec<Part>,
     /// The factor by which the image was down-sampled.
     pub downsample: usize,
     /// Width of a pixel on the ground, along x and y `[m/px]`.
@@ -170,6 +137,7 @@ impl Cloud {
             above_count: self.points.len() - points.len(),
             shown: None,
             is_cropped: false,
+            left_out: Vec::new(),
             downsample: self.downsample,
             resolution: self.resolution(&plane),
             plane,
@@ -179,72 +147,12 @@ impl Cloud {
         })
     }
 
-    /// The ground plane and the standard deviation of the ground about it `[m]`.
-    pub(super) fn ground(
-        &self,
-        settings: &Segmentation,
-        grains: Option<&[bool]>,
-        up: impl Fn(PlaneFit) -> PlaneFit,
-    ) -> Result<(PlaneFit, f64), FeatureError> {
-        if self.points.len() < 3 {
-            let pixels = self.width * self.height;
-            return Err(FeatureError::NoValidDepth { pixels, got: self.points.len(), min: 3 });
-        }
-        let ground: Vec<_> = self
-            .pixels
-            .iter()
-            .zip(&self.points)
-            .filter(|(pixel, _)| grains.is_none_or(|grains| !grains[**pixel]))
-            .map(|(_, point)| *point)
-            .collect();
-        let first = settings.inlier_distance.unwrap_or(FIRST_REACH);
-        let largest = match settings.inlier_distance {
-            Some(fixed) => fixed,
-            None => LARGEST_REACH * extent(&ground),
-        };
-        let mut reach = first;
-        let steepest = settings.max_tilt_deg.to_radians();
-        let search = |reach| fit_plane_within(&ground, reach, steepest, settings.plane_seed);
-        let mut plane = up(search(reach)?);
-        // A ground rougher than the inlier distance goes on below it: search again with twice that.
-        while 2.0 * reach <= largest && shoulder(&ground, &plane, reach) > SHOULDER {
-            reach *= 2.0;
-            plane = up(search(reach)?);
-        }
-        // Only a distance that has grown may still grow.
-        let tighten = |plane, reach, grown| tightened(&ground, plane, reach, grown, steepest, &up);
-        let (plane, sd) = tighten(plane, reach, first..=largest)?;
-        if settings.inlier_distance.is_none() && sd > BETWEEN_LEVELS {
-            let near = LEVEL_REACH * sd;
-            let found = search(near).and_then(|level| tighten(up(level), near, 0.0..=3.0 * sd));
-            let (level, scatter) = match found {
-                // What is too steep is none of two levels.
-                Err(FeatureError::TooSteep { .. }) => return Ok((plane, sd)),
-                found => found?,
-            };
-            let within = |sds: f64| {
-                let on_it = |point: &&Vector3<f64>| {
-                    level.plane.signed_distance(point).abs() <= sds * scatter
-                };
-                ground.iter().filter(on_it).count() as f64
-            };
-            let (on_it, and_near) = (within(3.0), within(6.0));
-            let is_level = on_it >= LEVEL_SHARE * ground.len() as f64
-                && and_near - on_it <= IN_GAP * on_it
-                && scatter > LEAST_SCATTER;
-            if is_level && scatter < LEVEL_SCATTER * sd {
-                return Ok((level, scatter));
-            }
-        }
-        Ok((plane, sd))
-    }
-
     /// Volume under a pixel `[m³]` whose point was seen at `seen` and lies `height` above the ground.
     fn volume(&self, plane: &PlaneFit, seen: &Vector3<f64>, height: f64) -> f64 {
         match self.footprint {
             // Along z the column is longer than the distance from a tilted plane.
             Footprint::Column { x, y } => x * y * height / plane.plane.normal.z,
-            Footprint::Pyramid { fx, fy, centre, axis } => {
+            Footprint::Pyramid { fx, fy, centre, axis, .. } => {
                 // The pyramid of a pixel cut at depth z holds z³/(3 fx fy); the ray meets the ground
                 // at the depth z above/(above - height).
                 let above = plane.plane.signed_distance(&centre);
@@ -255,13 +163,17 @@ impl Cloud {
         }
     }
 
-    /// Width of a pixel on the ground `[m/px]`.
+    /// Width of a pixel on the ground, along the image's rows and columns `[m/px]`; a camera's where it looks straight ahead,
+    /// longer along its tilt.
     pub(super) fn resolution(&self, plane: &PlaneFit) -> (f64, f64) {
         match self.footprint {
             Footprint::Column { x, y } => (x, y),
-            Footprint::Pyramid { fx, fy, centre, .. } => {
-                let above = plane.plane.signed_distance(&centre);
-                (above / fx, above / fy)
+            Footprint::Pyramid { fx, fy, centre, axis, across } => {
+                let normal = plane.plane.normal;
+                let facing = (-normal.dot(&axis)).max(LEAST_FACING);
+                let depth = plane.plane.signed_distance(&centre) / facing;
+                let stretch = |side: &Vector3<f64>| 1.0_f64.hypot(normal.dot(side) / facing);
+                (depth / fx * stretch(&across), depth / fy * stretch(&axis.cross(&across)))
             }
         }
     }
@@ -278,65 +190,69 @@ impl Levelled {
     }
 }
 
-/// The plane fitted again to what the noise allows, until it allows no less, and the standard deviation about it `[m]`: the
-/// foot of a pile is within the first inlier distance and lifts the plane. A distance that is in `grown` may grow there.
-/// `TooSteep` where it tips beyond the tilt `steepest` `[rad]`.
-fn tightened(
-    ground: &[Vector3<f64>],
-    mut plane: PlaneFit,
-    mut reach: f64,
-    grown: RangeInclusive<f64>,
-    steepest: f64,
-    up: &impl Fn(PlaneFit) -> PlaneFit,
-) -> Result<(PlaneFit, f64), FeatureError> {
-    let mut sd = sd_from_below(ground, &plane, reach);
-    for _ in 0..MAX_TIGHTENINGS {
-        let wanted = (3.0 * sd).max(FINEST_INLIER);
-        let may_grow = reach > *grown.start() && wanted <= *grown.end();
-        let grows = may_grow && wanted > reach / SETTLED;
-        if wanted >= SETTLED * reach && !grows {
-            break;
-        }
-        reach = wanted;
-        plane = up(refine_plane(ground, plane.plane, reach, steepest)?);
-        sd = sd_from_below(ground, &plane, reach);
-    }
-    Ok((plane, sd))
-}
-
-/// Diagonal of the box around the points `[m]`.
-fn extent(points: &[Vector3<f64>]) -> f64 {
-    let far = Vector3::repeat(f64::INFINITY);
-    let (low, high) =
-        points.iter().fold((far, -far), |(low, high), point| (low.inf(point), high.sup(point)));
-    (high - low).norm()
-}
-
-/// Points between one and two reaches below the plane, for each within one.
-fn shoulder(ground: &[Vector3<f64>], fit: &PlaneFit, reach: f64) -> f64 {
-    let (mut near, mut far) = (0_u32, 0_u32);
-    for point in ground {
-        let below = -fit.plane.signed_distance(point) / reach;
-        near += u32::from((0.0..=1.0).contains(&below));
-        far += u32::from(below > 1.0 && below <= 2.0);
-    }
-    f64::from(far) / f64::from(near.max(1))
-}
-
-/// Robust standard deviation of the ground about its plane `[m]`: the median distance of the points
-/// within `reach` below the plane. Grains only ever add points above it, and dead pixels lie far
-/// beyond the reach.
-fn sd_from_below(ground: &[Vector3<f64>], fit: &PlaneFit, reach: f64) -> f64 {
-    let mut below: Vec<f64> = ground
-        .iter()
-        .map(|point| -fit.plane.signed_distance(point))
-        .filter(|depth| (0.0..=reach).contains(depth))
-        .collect();
-    median(&mut below).map_or(0.0, |median| SD_PER_MAD * median)
-}
-
 /// The fit seen from the other side.
 pub(super) fn flipped(fit: PlaneFit) -> PlaneFit {
     let plane = fit.plane.flipped();
     PlaneFit { plane, tilt_rad: plane.tilt_rad(), ..fit }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use crate::raster::render;
+    use crate::{Camera, Segmentation, segment_depth};
+
+    #[test]
+    fn a_pixel_is_longer_on_the_ground_where_the_camera_looks_aslant() {
+        let pile: Vec<Vector3<f64>> = (0..400)
+            .map(|i| {
+                Vector3::new(2e-3 * (i % 20) as f64 - 0.02, 2e-3 * (i / 20) as f64 - 0.02, 3e-3)
+            })
+            .collect();
+        let camera = Camera::overhead(0.4, 0.5, 400).unwrap();
+        let wanted = 5.0 * 1.25e-3;
+        let settings = Segmentation { ground_resolution: Some(wanted), ..Default::default() };
+        for (tilt_deg, factor) in
+            [((0.0_f64, 0.0_f64), 5), ((40.0, 0.0), 3), ((0.0, -40.0), 3), ((20.0, 20.0), 4)]
+        {
+            let tilted = camera.tilted(tilt_deg.0.to_radians(), tilt_deg.1.to_radians());
+            // Where the middle of the image and its neighbours to the right and below meet the ground.
+            let met = |u: f64, v: f64| {
+                let [near, far] =
+                    [1.0, 2.0].map(|depth| tilted.unproject(200.0 + u, 200.0 + v, depth));
+                near + (far - near) * (near.z / (near.z - far.z))
+            };
+            let there: Vec<_> = pile.iter().map(|at| at + met(0.0, 0.0)).collect();
+            let image = render(&tilted, &there, &vec![3e-3; 400]).unwrap();
+            let fine = segment_depth(&camera, &image, None, &Segmentation::default()).unwrap();
+            let widths = [(1.0, 0.0), (0.0, 1.0)].map(|(u, v)| (met(u, v) - met(0.0, 0.0)).norm());
+            for (got, width) in [fine.resolution.0, fine.resolution.1].into_iter().zip(widths) {
+                assert!((got / width - 1.0).abs() < 5e-3, "{tilt_deg:?}: {got} {width}");
+            }
+            // The volume of a part is by these widths, that of the formation by the pixels' pyramids.
+            let whole: Vec<usize> =
+                (0..fine.mask.len()).filter(|&pixel| fine.mask[pixel]).collect();
+            let ratio = fine.part(&whole).volume / fine.volume;
+            assert!((ratio - 1.0).abs() < 0.15, "{tilt_deg:?}: {ratio}");
+            let got = segment_depth(&camera, &image, None, &settings).unwrap();
+            assert_eq!(got.downsample, factor, "{tilt_deg:?}");
+        }
+    }
+
+    #[test]
+    fn pixels_of_a_map_that_are_no_squares_are_matched_by_their_area() {
+        let map = crate::HeightMap::new(200, 100, 1e-3, 4e-3, cone(200)).unwrap();
+        let settings = Segmentation { ground_resolution: Some(6e-3), ..Default::default() };
+        assert_eq!(crate::segment_height_map(&map, &settings).unwrap().downsample, 3);
+    }
+
+    /// A cone of 200 columns of 1 mm and 100 rows of 4 mm.
+    fn cone(columns: usize) -> Vec<f64> {
+        let at = |pixel: usize| {
+            let (x, y) = ((pixel % columns) as f64 - 100.0, 4.0 * (pixel / columns) as f64 - 200.0);
+            (0.02 * (1.0 - x.hypot(y) / 50.0)).max(0.0)
+        };
+        (0..columns * 100).map(at).collect()
+    }
 }

@@ -5,23 +5,17 @@ use std::collections::BTreeMap;
 use super::component::patches;
 use super::edge::depth_in;
 use super::formation::Formation;
+use super::part::Part;
 
-/// A second heap: higher than so many grains, of the room of so many.
-const HEAP_HEIGHT: f64 = 2.5;
-const HEAP_GRAINS: f64 = 30.0;
+/// A second heap is higher than so many grains, and three standard deviations of the ground. Of 60 pours of the default
+/// prior none had many grains apart that were higher than 1.7.
+const HEAP_HEIGHT: f64 = 2.0;
+/// Pixels of it, at least: a lone one may be a fault.
+pub(super) const HEAP_PIXELS: usize = 3;
 
 /// A pixel without data is in a hole if so many of the eight around it have none, or more; of a fifth that are missing at
 /// random one in a hundred is.
 const BLIND_AROUND: usize = 4;
-
-/// Grains that stand apart from the formation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OtherHeap {
-    /// Volume between the ground and its surface `[m³]`.
-    pub volume: f64,
-    /// Height of its highest pixel above the ground `[m]`.
-    pub height: f64,
-}
 
 impl Formation {
     /// How near the formation comes to the edge of the image, over half the image's shorter side: 0 where it reaches
@@ -66,9 +60,17 @@ impl Formation {
         hidden as f64 / outline.len().max(1) as f64
     }
 
-    /// The pixels of the formation itself: what stands apart is left out.
+    /// The pixels of the formation itself, the patch of most volume: what stands apart is left out.
     fn largest_patch(&self) -> Option<Vec<usize>> {
-        patches(&self.mask, self.width).into_iter().max_by_key(Vec::len)
+        self.patches_by_volume().into_iter().next()
+    }
+
+    /// The patches of grains, that of most volume first.
+    fn patches_by_volume(&self) -> Vec<Vec<usize>> {
+        let all = patches(&self.mask, self.width).into_iter();
+        let mut all: Vec<_> = all.map(|patch| (self.part(&patch).volume, patch)).collect();
+        all.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        all.into_iter().map(|(_, patch)| patch).collect()
     }
 
     /// Share of the image that carries data, less a border all around that has none `[-]`.
@@ -86,24 +88,27 @@ impl Formation {
     }
 
     /// What else stands as high and as wide as a heap of grains of `diameter` `[m]`, apart from the largest patch.
-    pub fn other_heaps(&self, diameter: f64) -> Vec<OtherHeap> {
-        let mut all = patches(&self.mask, self.width);
-        all.sort_by_key(|patch| std::cmp::Reverse(patch.len()));
-        let grain = std::f64::consts::PI / 6.0 * diameter.powi(3);
+    pub fn other_heaps(&self, diameter: f64) -> Vec<Part> {
+        let all = self.patches_by_volume();
+        let others = all.iter().skip(1).filter(|patch| patch.len() >= HEAP_PIXELS);
+        let others = others.map(|patch| self.part(patch));
+        others.filter(|part| self.is_heap(part, diameter)).collect()
+    }
+
+    /// Heaps of grains of `diameter` `[m]` beyond the square of ground that was asked for: they were left out.
+    pub fn left_out_heaps(&self, diameter: f64) -> Vec<Part> {
+        self.left_out.iter().filter(|part| self.is_heap(part, diameter)).copied().collect()
+    }
+
+    fn is_heap(&self, part: &Part, diameter: f64) -> bool {
+        part.height > HEAP_HEIGHT * diameter + 3.0 * self.ground_sd && part.is_many(diameter)
+    }
+
+    /// The part that a patch of pixels is.
+    pub(super) fn part(&self, patch: &[usize]) -> Part {
         let area = self.resolution.0 * self.resolution.1;
-        let heap = |patch: &Vec<usize>| {
-            let heights = || patch.iter().filter_map(|&pixel| self.heights[pixel]);
-            OtherHeap {
-                volume: area * heights().sum::<f64>(),
-                height: heights().fold(0.0, f64::max),
-            }
-        };
-        let others = all.iter().skip(1).map(heap);
-        others
-            .filter(|heap| {
-                heap.height > HEAP_HEIGHT * diameter && heap.volume > HEAP_GRAINS * grain
-            })
-            .collect()
+        let heights = || patch.iter().filter_map(|&pixel| self.heights[pixel]);
+        Part { volume: area * heights().sum::<f64>(), height: heights().fold(0.0, f64::max) }
     }
 }
 
