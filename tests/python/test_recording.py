@@ -262,3 +262,27 @@ def test_a_statistic_that_never_varied_counts_only_where_it_differs():
     scale = Scale(np.array([0.0, 1.0]))
     assert scale.difference([1.0, 2.0], [1.0, 1.0]).tolist() == [0.0, 1.0]
     assert np.isinf(scale.difference([2.0, 2.0], [1.0, 1.0])[0])
+
+
+@pytest.mark.slow
+def test_no_pour_of_the_prior_is_taken_for_a_ruler_or_two_heaps_at_any_width_of_pixels():
+    camera = gc.Camera.overhead(height=0.45, field_width=0.6, pixels=520)
+    prior = gc.Prior.default()
+    for seed, theta in enumerate(prior.sample(30, seed=8)):
+        scene = gc.Scene.funnel(height=(0.03, 0.06, 0.12, 0.2)[seed % 4])
+        scene = scene.with_(dict(zip(prior.names, map(float, theta), strict=True)))
+        pour = gc.simulate(scene, seed=seed)
+        middle = [*np.median(pour.positions[:, :2], axis=0), 0.0]
+        at = pour.positions - middle
+        depth = camera.render(at, pour.radii, depth_noise=2e-4, seed=seed)
+        lens = dict(fx=390.0, fy=390.0, cx=259.5, cy=259.5)
+        recording = gc.Recording.from_depth(depth, **lens)
+        for times in (4, 8, 14, 20):  # Pixels of 0.3 to 1.5 diameters.
+            try:
+                said = recording.doubts(scene.with_({"camera.downsample": times}), prior)
+            except ValueError as error:
+                # What has rolled out of view.
+                assert "none of" in str(error), error
+                continue
+            told = [text for text in said if "flat" in text or "apart" in text]
+            assert told == [], (scene.to_toml(), times)
