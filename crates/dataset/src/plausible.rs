@@ -292,7 +292,8 @@ impl Limits {
             ));
         }
         let of_scene = self.threshold?;
-        if (1.0 / THRESHOLD..=THRESHOLD).contains(&(threshold / of_scene)) {
+        let is_alike = (1.0 / THRESHOLD..=THRESHOLD).contains(&(threshold / of_scene));
+        if is_alike || threshold == of_scene {
             return None;
         }
         let advice = if threshold > of_scene { ", or average more frames" } else { "" };
@@ -375,6 +376,9 @@ mod tests {
         assert_eq!([1.626e-3, 1e-3, 9.91e-3].map(rounded_up), ["0.0017", "0.001", "0.01"]);
         let still = Formation { ground_sd: 3e-4, ..noisy };
         assert_eq!(limits.doubts(&still), Vec::<String>::new());
+        let from_nought = Limits { threshold: Some(0.0), ..limits };
+        let all = Formation { threshold: 0.0, ground_sd: 0.0, ..still.clone() };
+        assert_eq!(from_nought.doubts(&all), Vec::<String>::new());
         let coarse = Formation { resolution: (1e-2, 1e-2), ..still };
         let of_pixels = limits.doubts(&coarse);
         assert!(of_pixels.len() == 1 && of_pixels[0].contains("a pixel is 10 mm wide"));
