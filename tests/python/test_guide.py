@@ -39,7 +39,7 @@ def test_the_recordings_are_where_the_next_command_looks(tmp_path: Path) -> None
     recorded = [small("granulcal init couscous"), "granulcal sample couscous"]
     at_hand = [*recorded, "mv couscous/couscous.bag couscous/wall.bag .", "rm -r couscous"]
     lines = [small(line) for line in [*commands(3), *commands(4)]]
-    assert len(lines) == 7 and lines[-1].startswith("granulcal generate"), lines
+    assert len(lines) == 8 and lines[-1].startswith("granulcal generate"), lines
     script = "\n".join(["set -e", tool, *at_hand, *lines])
     done = subprocess.run(
         ["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False

@@ -226,8 +226,12 @@ fn the_steps_of_a_segmentation_can_be_looked_at() {
     assert!((volume / cone - 1.0).abs() < 0.02, "{volume} {cone}");
     assert_eq!(report["pixel"]["downsample"], 1);
     // As wide on the ground as the paper's simulated images: 6 mm.
-    let (out, _) = expect(&place, 0, &["features", "pile.npz", "--scene", "funnel", "--json"]);
+    assert_eq!(report["doubts"], serde_json::Value::Null);
+    let (out, err) = expect(&place, 0, &["features", "pile.npz", "--scene", "funnel", "--json"]);
     assert_eq!(json(&out)["pixel"]["downsample"], 3);
+    // A cone of 33 ml has not the room of 2000 grains of 4 mm.
+    assert!(err.contains("warning: the formation's volume, all of it in view, is 0.033"), "{err}");
+    assert!(json(&out)["doubts"][0].as_str().unwrap().contains("as many grains"));
     // Where there is no grain, the pictures say why.
     let (_, err) = expect(&place, 2, &["features", "bed_0.npz", "--debug-images", "bare"]);
     assert!(err.contains("none of 3600 valid pixels belongs to a grain"), "{err}");

@@ -3,11 +3,12 @@
 mod args;
 
 use anyhow::Context as _;
-use granulcal_dataset::{Recording, npy, write_pictures};
+use granulcal_dataset::{Limits, Recording, npy, write_pictures};
 use granulcal_features::{
     DIAGNOSTICS, DiagnosticSettings, Formation, PAPER16, Segmentation, Statistic, Threshold,
     diagnostics,
 };
+use granulcal_scene::{Prior, Scene};
 use serde_json::{Map, Value, json};
 
 use crate::context::{note, print_json, print_line};
@@ -39,7 +40,9 @@ fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     for line in recording.damage.iter().chain(&recording.unlike) {
         note(&format!("warning: {line}"));
     }
-    let levelled = recording.level_with(&segmentation(args, &recording.segmentation)?)?;
+    let scene = args.scene.as_ref().map(|name| scene::named(name)).transpose()?;
+    let levelled =
+        recording.level_with(&segmentation(args, scene.as_ref(), &recording.segmentation))?;
     let mut sides = SideFiles::default();
     if let Some(folder) = &args.debug_images {
         // Before the formation: where none is found, the pictures say why.
@@ -57,6 +60,10 @@ fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     if let (None, Some(edge)) = (args.border, pixels_at_edge(&formation)) {
         eprintln!("{edge}");
     }
+    let doubts = scene.as_ref().map(|scene| doubts(scene, &formation)).transpose()?;
+    for doubt in doubts.iter().flatten() {
+        note(&format!("warning: {doubt}"));
+    }
     let mut statistics = vec![named(&PAPER16, &recording.statistics_of(&formation)?)];
     if args.diagnostics {
         let values = diagnostics(&formation.points, &diagnostic_settings(args, &formation)?)
@@ -67,7 +74,7 @@ fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
         sides.keep(npy::write_points(path, &formation.points).context("writing --points"));
     }
     if args.json {
-        print_json(&as_json(&recording, &formation, &statistics))?;
+        print_json(&as_json(&recording, &formation, &statistics, doubts.as_deref()))?;
     } else {
         print(&recording, &formation, &statistics)?;
     }
@@ -75,11 +82,8 @@ fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
 }
 
 /// The recording's own segmentation with what the command line changes.
-fn segmentation(args: &FeaturesArgs, own: &Segmentation) -> anyhow::Result<Segmentation> {
-    let mut changed = match &args.scene {
-        Some(name) => own.as_seen_by(&scene::named(name)?.camera),
-        None => own.clone(),
-    };
+fn segmentation(args: &FeaturesArgs, scene: Option<&Scene>, own: &Segmentation) -> Segmentation {
+    let mut changed = scene.map_or_else(|| own.clone(), |scene| own.as_seen_by(&scene.camera));
     if let Some(height) = args.threshold {
         changed.height_threshold = Threshold::Absolute(height);
     }
@@ -87,7 +91,14 @@ fn segmentation(args: &FeaturesArgs, own: &Segmentation) -> anyhow::Result<Segme
     changed.downsample = args.downsample.or(changed.downsample);
     changed.max_height = args.max_height.or(changed.max_height);
     changed.min_component_px = args.min_component.unwrap_or(changed.min_component_px);
-    Ok(changed)
+    changed
+}
+
+/// Why it cannot be a formation of the scene, of whatever material, or is doubtful as one.
+fn doubts(scene: &Scene, formation: &Formation) -> anyhow::Result<Vec<String>> {
+    let limits = Limits::of(scene, &Prior::default())?;
+    let said = |limits: Limits| [limits.violations(formation), limits.doubts(formation)].concat();
+    Ok(limits.map(said).unwrap_or_default())
 }
 
 /// What the diagnostic statistics need besides the points.
@@ -117,7 +128,12 @@ fn named<P>(registry: &[Statistic<P>], values: &[f64]) -> Named {
     registry.iter().zip(values).map(|(s, &value)| (s.name, s.unit, value)).collect()
 }
 
-fn as_json(recording: &Recording, formation: &Formation, statistics: &[Named]) -> Value {
+fn as_json(
+    recording: &Recording,
+    formation: &Formation,
+    statistics: &[Named],
+    doubts: Option<&[String]>,
+) -> Value {
     let object = |family: &Named| -> Map<_, _> {
         family.iter().map(|(name, _, value)| ((*name).to_owned(), Value::from(*value))).collect()
     };
@@ -157,6 +173,8 @@ fn as_json(recording: &Recording, formation: &Formation, statistics: &[Named]) -
         // Null where a colour decides.
         "threshold_m": (!formation.is_by_colour).then_some(formation.threshold),
         "centroid_m": formation.centroid.as_slice(),
+        // Null without a scene.
+        "doubts": doubts,
     });
     if let Some(diagnostics) = statistics.get(1) {
         report["diagnostics"] = object(diagnostics).into();

@@ -50,8 +50,8 @@ pub struct FeaturesArgs {
     /// Keep the middle pixel of every n x n block
     #[arg(long, value_name = "N")]
     pub downsample: Option<usize>,
-    /// Down-sample so that a pixel is as wide on the ground as in this scene's images: a TOML, or `funnel`
-    /// or `drop`
+    /// See it as this scene's images are seen, a pixel as wide on the ground and no more ground in view, and say what
+    /// makes it doubtful as a formation of the scene: a TOML, or `funnel` or `drop`
     #[arg(long, value_name = "SCENE", conflicts_with = "downsample")]
     pub scene: Option<Reads>,
     /// Height above which a pixel is a fault and no data [m]
