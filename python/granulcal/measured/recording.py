@@ -197,9 +197,7 @@ class Recording:
         if images.ndim != 3 or images.size == 0:
             raise ValueError(f"depth must have shape (h, w) or (k, h, w), got {np.shape(depth)}")
         metres = images.astype(np.float32) * np.float32(1.0 if unit is None else unit)
-        native = _native.Recording.of_depths(
-            np.ascontiguousarray(metres), (fx, fy, cx, cy), unit
-        )
+        native = _native.Recording.of_depths(np.ascontiguousarray(metres), (fx, fy, cx, cy), unit)
         if native.unlike is not None:
             warnings.warn(f"depth array: {native.unlike}", UnlikeFramesWarning, stacklevel=2)
         return cls(native, Path("depth array"))
