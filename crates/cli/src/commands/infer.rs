@@ -145,12 +145,11 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
             impossible.extend(limits.violations(&formation).into_iter().map(of_it));
             doubts.extend(limits.doubts(&formation).into_iter().map(of_it));
         }
-        let statistics = recording.statistics_of(&formation);
-        observed.push(match statistics.with_context(|| format!("describing {}", path.display())) {
+        observed.push(match recording.statistics_of(&formation) {
             Ok(statistics) => statistics.to_vec(),
             // What cannot be of the scene need not be described.
             Err(_) if !impossible.is_empty() => Vec::new(),
-            Err(error) => return Err(error),
+            Err(error) => return Err(error.into()),
         });
     }
     require_no_copies(&observed)?;
