@@ -5,7 +5,7 @@
 //! than they are, lie where the camera looks, on a ground that is flat.
 
 use granulcal_dem::Simulation;
-use granulcal_features::{Formation, Part};
+use granulcal_features::{Formation, Part, Threshold};
 use granulcal_numbers::short;
 use granulcal_scene::{Mask, Prior, Scene};
 
@@ -35,9 +35,6 @@ const HIDDEN: f64 = 0.1;
 pub const LEAST_SHOWN: f64 = 0.95;
 /// Factor between the scene's threshold of height and the recording's, above which that is said.
 const THRESHOLD: f64 = 1.25;
-/// Standard deviations of the ground that a threshold of height is above it, at least: one pixel in 740 of the ground is
-/// then taken for a grain.
-const ABOVE_NOISE: f64 = 3.0;
 /// Factor between the width of a recording's pixels on the ground and the scene's, above which that is said. Every n-th
 /// pixel of a finer image comes within 4/3.
 const COARSE: f64 = 1.5;
@@ -282,13 +279,14 @@ impl Limits {
     fn doubt_of_threshold(&self, formation: &Formation) -> Option<String> {
         let Formation { threshold, ground_sd, .. } = *formation;
         let at = |height: f64| short(1e3 * height);
-        if threshold < ABOVE_NOISE * ground_sd {
+        let least = Threshold::ABOVE_NOISE * ground_sd;
+        if threshold < least {
             return Some(format!(
                 "pixels count as grain from {} mm on, and the ground scatters by {} mm (standard deviation): some of it is \
                  taken for grains; average more frames, or say height_threshold = {} m here and in the scene",
                 at(threshold),
                 at(ground_sd),
-                rounded_up(ABOVE_NOISE * ground_sd)
+                rounded_up(least)
             ));
         }
         let of_scene = self.threshold?;
@@ -328,7 +326,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use granulcal_features::{HeightMap, Segmentation, Threshold, segment_height_map};
+    use granulcal_features::{HeightMap, Segmentation, segment_height_map};
     use granulcal_scene::{Bed, Projection};
 
     use super::*;

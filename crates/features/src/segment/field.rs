@@ -50,16 +50,16 @@ impl Levelled {
 
     /// The patches of grains that are cut off whole, or more than half; a heap has some pixels.
     fn beyond(&self, kept: &[bool]) -> Vec<Part> {
-        let mut of_pixel = vec![None; self.mask.len()];
-        self.pixels.iter().enumerate().for_each(|(point, &pixel)| of_pixel[pixel] = Some(point));
         let part = |patch: Vec<usize>| {
-            let points = || patch.iter().filter_map(|&pixel| of_pixel[pixel]);
-            let volume = |cut: bool| -> f64 {
-                points().filter(|&point| kept[point] != cut).map(|point| self.volumes[point]).sum()
-            };
-            let height = points().map(|point| self.points[point].z).fold(0.0, f64::max);
-            let (beyond, inside) = (volume(true), volume(false));
-            (beyond > inside).then_some(Part { volume: beyond, height })
+            let mut part = Part { volume: 0.0, height: 0.0 };
+            let mut inside = 0.0;
+            // The pixels of the points rise, and grains are among them.
+            for point in patch.iter().filter_map(|pixel| self.pixels.binary_search(pixel).ok()) {
+                let volume = if kept[point] { &mut inside } else { &mut part.volume };
+                *volume += self.volumes[point];
+                part.height = part.height.max(self.points[point].z);
+            }
+            (part.volume > inside).then_some(part)
         };
         let all = patches(&self.mask, self.width).into_iter();
         all.filter(|patch| patch.len() >= HEAP_PIXELS).filter_map(part).collect()

@@ -62,15 +62,15 @@ impl Formation {
 
     /// The pixels of the formation itself, the patch of most volume: what stands apart is left out.
     fn largest_patch(&self) -> Option<Vec<usize>> {
-        self.patches_by_volume().into_iter().next()
+        self.patches_by_volume().into_iter().next().map(|(_, patch)| patch)
     }
 
-    /// The patches of grains, that of most volume first.
-    fn patches_by_volume(&self) -> Vec<Vec<usize>> {
+    /// The patches of grains, that of most volume first, and what parts they are.
+    fn patches_by_volume(&self) -> Vec<(Part, Vec<usize>)> {
         let all = patches(&self.mask, self.width).into_iter();
-        let mut all: Vec<_> = all.map(|patch| (self.part(&patch).volume, patch)).collect();
-        all.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-        all.into_iter().map(|(_, patch)| patch).collect()
+        let mut all: Vec<_> = all.map(|patch| (self.part(&patch), patch)).collect();
+        all.sort_by(|(a, _), (b, _)| b.volume.total_cmp(&a.volume));
+        all
     }
 
     /// Share of the image that carries data, less a border all around that has none `[-]`.
@@ -89,10 +89,10 @@ impl Formation {
 
     /// What else stands as high and as wide as a heap of grains of `diameter` `[m]`, apart from the largest patch.
     pub fn other_heaps(&self, diameter: f64) -> Vec<Part> {
-        let all = self.patches_by_volume();
-        let others = all.iter().skip(1).filter(|patch| patch.len() >= HEAP_PIXELS);
-        let others = others.map(|patch| self.part(patch));
-        others.filter(|part| self.is_heap(part, diameter)).collect()
+        let others = self.patches_by_volume().into_iter().skip(1);
+        let others = others
+            .filter(|(part, patch)| patch.len() >= HEAP_PIXELS && self.is_heap(part, diameter));
+        others.map(|(part, _)| part).collect()
     }
 
     /// Heaps of grains of `diameter` `[m]` beyond the square of ground that was asked for: they were left out.

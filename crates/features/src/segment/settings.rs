@@ -37,11 +37,15 @@ impl Default for Threshold {
 }
 
 impl Threshold {
+    /// Robust standard deviations of the ground that an automatic threshold is above it: one pixel in 740 of Gaussian
+    /// noise is taken for a grain by itself.
+    pub const ABOVE_NOISE: f64 = 3.0;
+
     /// The height `[m]` for a ground of the given roughness `[m]`.
     pub(super) fn height(self, ground_sd: f64) -> f64 {
         match self {
             Self::Absolute(height) => height,
-            Self::Automatic { floor } => floor.max(3.0 * ground_sd),
+            Self::Automatic { floor } => floor.max(Self::ABOVE_NOISE * ground_sd),
         }
     }
 
