@@ -5,6 +5,7 @@ mod bed;
 mod end;
 mod frozen;
 mod intruder;
+mod rest;
 mod start;
 mod state;
 mod substep;

@@ -4,6 +4,7 @@ use granulcal_scene::RolledAway;
 use nalgebra::Vector3;
 
 use super::Simulation;
+use super::rest::Rest;
 use crate::law::INVERSE_INERTIA;
 use crate::pour::Status;
 
@@ -15,8 +16,8 @@ const BEYOND: f64 = 20.0;
 const LIFTED: f64 = 1.1;
 
 impl Simulation {
-    /// How the pour has ended, if it has. It must have seemed so twice within [`REST_SAMPLES`]: a grain at the
-    /// top of its bounce is slow, too, but once, while a pile whose last grain trembles is slow now and then.
+    /// How the pour has ended, if it has. It must have seemed so twice within [`REST_SAMPLES`]: a pile whose last grain
+    /// trembles is slow now and then. Grains that fall are slow at most as long as [`Rest`] says.
     pub(super) fn end_reached(&mut self) -> Option<Status> {
         let until = self.origin.scene.outflow.and_then(|outflow| outflow.until);
         if until.is_some_and(|percent| 100.0 * self.particles.outflow_fraction() >= percent) {
@@ -27,22 +28,52 @@ impl Simulation {
         }
         let energies: Vec<f64> =
             (0..self.particles.count()).map(|i| self.particles.translation(i)).collect();
-        let Some(now) = self.at_rest(&energies) else {
+        let rest = self.rest();
+        let Some(now) = self.at_rest(&energies, rest.energy) else {
+            if self.mean_in_view(&energies) > rest.falling {
+                self.seemed_ended = None;
+            }
             if self.time() < self.origin.scene.end.horizon {
                 return None;
             }
             let has_stopped = self.flow_has_stopped(&energies);
             return Some(if has_stopped { Status::Jammed } else { Status::Horizon });
         };
-        let window = REST_SAMPLES * self.around.settings.list_period;
-        let seen = self.seemed_ended.replace((now, self.substep));
-        let again = seen.is_some_and(|(then, at)| then == now && self.substep - at <= window);
-        again.then_some(now)
+        let list_period = self.around.settings.list_period;
+        let window = REST_SAMPLES.max(rest.looks) * list_period;
+        let seen =
+            self.seemed_ended.filter(|&(then, at)| then == now && self.substep - at <= window);
+        let ends = seen.is_some_and(|(_, at)| self.substep - at >= rest.looks * list_period);
+        if ends || seen.is_none() {
+            self.seemed_ended = Some((now, self.substep));
+        }
+        ends.then_some(now)
+    }
+
+    /// What rest is in this scene.
+    fn rest(&self) -> Rest {
+        let (scene, settings) = (&self.origin.scene, &self.around.settings);
+        let look = settings.list_period as f64 * settings.dt;
+        Rest::of(scene, self.around.effects.gravity.norm(), look)
+    }
+
+    /// Mean |v|^2 / 2 of the grains that the camera sees `[m^2/s^2]`; 0 where it sees none.
+    fn mean_in_view(&self, energies: &[f64]) -> f64 {
+        let camera = &self.origin.scene.camera;
+        let (mut sum, mut count) = (0.0, 0);
+        for grain in self.particles.present() {
+            let at = self.particles.position(grain);
+            if camera.sees_ground(at.x, at.y) {
+                sum += energies[grain];
+                count += 1;
+            }
+        }
+        sum / f64::from(count.max(1))
     }
 
     /// How the pour would end if it stayed as it is now; a liquid must be as slow as the grains.
-    fn at_rest(&self, energies: &[f64]) -> Option<Status> {
-        let (scene, threshold) = (&self.origin.scene, self.origin.scene.end.kinetic_energy);
+    fn at_rest(&self, energies: &[f64], threshold: f64) -> Option<Status> {
+        let scene = &self.origin.scene;
         let flow = self.liquid.as_ref().and_then(|liquid| liquid.state());
         if flow.is_some_and(|flow| flow.kinetic_energy() > threshold) {
             return None;

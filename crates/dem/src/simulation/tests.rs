@@ -315,3 +315,40 @@ fn what_a_frozen_substep_does_not_know_is_refused() {
     assert!(start(&scene).frozen_solve().is_err());
     assert!(start(&scene).frozen_search().is_err());
 }
+
+/// One ball that falls 48 mm, `change` made to its scene.
+fn falls(change: impl Fn(&mut Scene)) -> Pour {
+    let mut scene = Scene::drop(0.05);
+    scene.grains.count = 1;
+    scene.start = Start::Positions { positions: vec![[0.0, 0.0, 0.05]] };
+    scene.end.horizon = 60.0;
+    change(&mut scene);
+    start(&scene).run()
+}
+
+#[test]
+fn a_grain_that_falls_slowly_is_not_at_rest() {
+    for gravity in [9.81, 0.28, 0.02, 1e-4] {
+        let pour = falls(|scene| scene.gravity = [0.0, 0.0, -gravity]);
+        let radius = 0.5 * pour.radii[0];
+        assert!(pour.positions[0].z < 2.2 * radius, "g = {gravity}: {:?}", pour.positions);
+    }
+    // The user's own threshold is crossed in mid-air.
+    let pour = falls(|scene| scene.end.kinetic_energy = 0.1);
+    assert!(pour.positions[0].z < 0.02, "{:?}", pour.positions);
+}
+
+#[test]
+fn a_grain_that_sinks_slower_than_the_threshold_ends_at_the_horizon() {
+    let honey = |density, viscosity| {
+        falls(|scene| {
+            scene.effects.fluid.density = density;
+            scene.effects.fluid.viscosity = viscosity;
+            scene.grains.density = 2650.0;
+            scene.end.horizon = 1.0;
+        })
+    };
+    assert_eq!(honey(1260.0, 3000.0).status, Status::Horizon);
+    // As dense as the grain: it stays where it is.
+    assert_eq!(honey(2650.0, 3000.0).status, Status::AtRest);
+}
