@@ -1,9 +1,13 @@
 """What speaks against a verdict without taking it away."""
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.check.alarms import of_error, of_left, of_placebo
+from granulcal.loop.check.alarms import of_ends, of_error, of_labels, of_left, of_placebo
+from granulcal.loop.effects.library import by_name
 from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.verdict import Verdict
@@ -49,3 +53,35 @@ def test_an_alarm_of_the_placebo_is_said_with_its_own_word() -> None:
     assert of_placebo(NONE, rules) == ()
     (told,) = of_placebo(NAMED, rules)
     assert "says SET (p = 0.0005; 70 nat)" in told
+
+
+def test_a_strength_at_the_end_of_its_range_is_said_to_lie_there() -> None:
+    task = cast(Any, SimpleNamespace(effect=lambda name: by_name([name])[0]))
+
+    def best(at_end: bool, strength: float) -> Any:
+        return SimpleNamespace(
+            effects=("polydispersity",), best_strengths=np.array([strength]), at_end=at_end
+        )
+
+    named = Verdict("EFFECT", ("polydispersity",), ("polydispersity",), 5e-4, "260 nat")
+    (told,) = of_ends(named, best(True, 0.999), task)
+    assert "polydispersity is found at 0.22, the end of what the library has of it" in told
+    assert of_ends(named, best(False, 0.5), task) == ()
+    # It leans on the end at which it is off.
+    assert of_ends(named, best(True, 0.01), task) == ()
+    assert of_ends(NONE, best(True, 0.999), task) == ()
+
+
+def test_recordings_of_other_conditions_are_told() -> None:
+    def pours(level: float, seed: int, count: int) -> NDArray[np.float64]:
+        return level + 0.1 * np.random.default_rng(seed).standard_normal((count, 3))
+
+    base = {name: pours(level, 9, 10) for name, level in (("2", 0.0), ("4", 1.0), ("6", 2.0))}
+    right = {name: pours(level, 5, 3) for name, level in (("2", 0.0), ("4", 1.0), ("6", 2.0))}
+    # An effect is no exchange.
+    off = {name: rows + 0.4 for name, rows in right.items()}
+    spread = np.ones(2)
+    assert of_labels(right, base, spread) == of_labels(off, base, spread) == ()
+    swapped = {"2": right["6"], "4": right["4"], "6": right["2"]}
+    (told,) = of_labels(swapped, base, spread)
+    assert "those of 2 like pours of 6, those of 6 like pours of 2" in told and "of 4" not in told

@@ -278,3 +278,24 @@ def test_scenes_without_an_image_refuse_by_name(tmp_path: Path) -> None:
         )
         library = Task.load(tmp_path / f"{name}.toml").library
         assert [effect.name for effect in library if effect.image] == expected
+
+
+def test_a_camera_beside_the_axis_moves_what_it_sees_and_nothing_else(pour: gc.Pour) -> None:
+    measures = Measures.of(pour.scene)
+    plain, aside = (
+        dict(zip(measures.names, measures.of_pour(pour, faults), strict=True))
+        for faults in ({}, {"aside_x": 4e-3})
+    )
+    frame = Frame.of(pour).with_({"aside_x": 4e-3, "aside_y": -2e-3}, 0)
+    moved = Frame.of(pour).points() - frame.points()
+    np.testing.assert_allclose(moved, np.broadcast_to([4e-3, -2e-3, 0.0], moved.shape), atol=1e-15)
+    # Mass beside the axis; the paper's statistics are about the centroid.
+    assert abs(aside["mass_cos_1"] - plain["mass_cos_1"]) > 0.05
+    for name in measures.names[: measures.head]:
+        assert aside[name] == pytest.approx(plain[name], rel=1e-9, abs=1e-12), name
+
+
+def test_height_maps_are_not_asked_where_the_axis_was() -> None:
+    seen, of_map = (Measures.of(scene(kind)).names for kind in ("pinhole", "orthographic"))
+    gone = {f"{what}_{wave}_1" for what in ("mass", "rim") for wave in ("cos", "sin")}
+    assert set(seen) - set(of_map) == gone and set(of_map) < set(seen)

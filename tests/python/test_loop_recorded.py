@@ -18,8 +18,9 @@ from granulcal.loop.check.standing import stand
 from granulcal.loop.condition import Condition
 from granulcal.loop.effects.library import by_name
 from granulcal.loop.pours.archive import ArchivePlan
+from granulcal.loop.pours.measures import Measures
 from granulcal.loop.preregistration import register
-from granulcal.loop.recorded import require_no_copies
+from granulcal.loop.recorded import doubt_of_funnel, require_no_copies
 from granulcal.loop.report.page import sentence_of
 from granulcal.loop.task import Task
 from granulcal.loop.test.thresholds import Thresholds
@@ -169,6 +170,37 @@ def test_recordings_are_asked_whether_they_can_be_of_the_scene(
     doubts = task_of(scene, [Path(image)], camera=Path(toml), averaged=True).require_readable()
     assert any("the others are out of view" in doubt for doubt in doubts)
     assert all(str(image) in doubt for doubt in doubts)
+
+
+def test_a_map_a_funnel_above_the_camera_and_pixels_without_data_are_told(
+    scene: gc.Scene, recorded: list[Path], tmp_path: Path
+) -> None:
+    image = pytest.importorskip("PIL.Image")
+    # Every fortieth pixel has no data.
+    shutil.copy(recorded[0].parent / "camera.toml", tmp_path)
+    for number, path in enumerate(recorded):
+        depth = np.asarray(image.open(path)).astype(np.uint16)
+        holes = np.random.default_rng(number).random(depth.shape) < 0.025
+        image.fromarray(np.where(holes, 0, depth).astype(np.uint16)).save(
+            tmp_path / f"{number}.png"
+        )
+    images = [tmp_path / f"{number}.png" for number in range(3)]
+    told = task_of(scene, images).require_readable()
+    assert len(told) == 3 and all("% of the pixels about the formation have no" in t for t in told)
+    # A map does not know where the axis was.
+    from_far = scene.to_toml().replace('"pinhole"', '"orthographic"')
+    pour = gc.simulate(gc.Scene.from_toml(from_far), seed=9)
+    heights, wide = 1e3 * pour.height_map(), 1e3 * scene.ground_resolution
+    np.savez(tmp_path / "map.npz", depthmap=heights, xres=wide, yres=wide, zres=1.0, scale="mm")
+    with pytest.raises(ObservationError, match="map.npz is a height map, which does not say where"):
+        Measures.of(scene).of_recording(tmp_path / "map.npz", scene, None)
+    # Two metres in place of two centimetres.
+    hung = gc.Scene.funnel(0.02).with_({"funnel.height": 2.0, "camera.height": 0.3})
+    assert (
+        "(funnel.height = 2 m) is above the camera (camera.height = 0.3 m)"
+        in (doubt_of_funnel("2 cm", hung)[0])
+    )
+    assert doubt_of_funnel("2 cm", hung.with_({"funnel.height": 0.02})) == []
 
 
 def test_a_none_by_the_base_models_own_pours_shows_the_p_that_decided() -> None:

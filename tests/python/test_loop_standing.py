@@ -23,7 +23,7 @@ from granulcal.loop.effects.definitions import Definition, check_definitions, de
 from granulcal.loop.effects.library import by_name
 from granulcal.loop.report.page import sentence_of
 from granulcal.loop.task import FIT, SEALED, Condition, Task
-from granulcal.loop.test.distance import compare
+from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.verdict import Verdict
 from granulcal.pours.left_out import LeftOut
@@ -84,6 +84,21 @@ def test_rows_without_physics_have_their_known_distance() -> None:
     assert mean[RESIDUAL] == pytest.approx([0.0, 0.0, 0.0], abs=0.02)
     share = np.mean(beaten, axis=0)
     assert share[1] > 0.6 and share[2] < 0.15
+
+
+def test_a_name_that_leaves_more_than_the_spread_of_all_pours_is_none() -> None:
+    def of(off: float) -> Improvement:
+        measured, base, after = (
+            level + 0.1 * np.random.default_rng(seed).standard_normal((10, 4))
+            for seed, level in enumerate((0.0, 3.0, off))
+        )
+        return compare(["there"], [measured], [base], [after], np.ones(4), seed=0)
+
+    near = stand(EFFECT, RULES, confirmed=0.5, error=of(0.5), size=4)
+    assert near.verdict == EFFECT
+    far = stand(EFFECT, RULES, confirmed=0.5, error=of(2.0), size=4)
+    assert far.verdict.kind == "UNEXPLAINED" and far.verdict.named == ()
+    assert "are the conditions' numbers in the scene's units?" in far.verdict.reason
 
 
 def test_a_name_that_beats_nothing_says_so() -> None:

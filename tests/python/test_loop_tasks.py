@@ -44,6 +44,17 @@ def test_what_the_conditions_state_is_left_out_of_the_effects_that_nobody_names(
     assert missing == ["tilt.x", "count"]
 
 
+def test_who_asks_for_a_tilt_asks_where_the_camera_stood(tmp_path: Path) -> None:
+    def names(head: str) -> list[str]:
+        return [effect.name for effect in load(tmp_path, head, LOW, HIGH).library]
+
+    assert names('effects = ["tilt.x", "drag"]') == ["drag", "tilt.x", "camera.x", "camera.y"]
+    assert names('effects = ["camera.y", "tilt.x"]') == ["tilt.x", "camera.y"]
+    assert names('effects = ["drag"]') == ["drag"]
+    assert names('effects = ["drag"]\nnuisances = { "tilt.x" = 0.01 }') == ["drag", "tilt.x"]
+    assert {"camera.x", "camera.y"} < set(names(""))
+
+
 LOW, HIGH = '"start.height" = 0.03', '"start.height" = 0.1'
 
 

@@ -20,7 +20,7 @@ from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.call import check_call
-from granulcal.loop.check.alarms import of_error, of_left, of_placebo, of_rows
+from granulcal.loop.check.alarms import of_ends, of_error, of_labels, of_left, of_placebo, of_rows
 from granulcal.loop.check.checks import (
     calibrated,
     corrected,
@@ -131,6 +131,8 @@ def close_loop(
     names = Measures.of(plan.scene).names
     if archive is not None:
         require_same(Path(archive), plan)
+    # Before hours of pours and before anything is fixed; what the recordings say is let go.
+    doubts = task.require_readable()
     registration = register(folder, task, plan, rules, seed, names, pairs, rounds)
     say(f"registered before any data: {folder / 'preregistration.json'} {registration[:12]}")
 
@@ -142,8 +144,6 @@ def close_loop(
         )
     store = Archive(folder / "archive" if archive is None else Path(archive), plan)
     say(time_needed(task, store, budget - plan.pours, workers))
-    # Before hours of pours; what the recordings say is not looked at yet.
-    doubts = task.require_readable()
     warn(doubts)
     if store.missing:
         # Told before the first pour; whoever goes on has been told.
@@ -202,7 +202,8 @@ def close_loop(
     wide = calibrated(analysis, surrogate, found, pairs)
     if wide is not None:
         held = f"{wide.held} of {wide.pairs} simulated pairs held by the plain interval"
-        say(f"{held}; stretched by {wide.stretch:.3g}")
+        of_it = "the whole range" if wide.is_whole_range else f"stretched by {wide.stretch:.3g}"
+        say(f"{held}; {of_it}")
     recorded = as_recorded(analysis, surrogate, found, measured, simulated)
     fit = error_of(task, analysis.fitted, measured, recorded, surrogate, seed)
     # Opened here, once, after everything that could be chosen has been.
@@ -219,6 +220,7 @@ def close_loop(
         draws=draws,
         nearer=nearer(analysis, surrogate, found, best, measured, simulated),
         error=fit,
+        size=Measures.of(task.scene).head,
         moved=elsewhere,
         trivial=trivial(analysis, surrogate, measured, recorded),
         seen=poured,
@@ -231,6 +233,11 @@ def close_loop(
     say(f"placebo {placebo.verdict.kind}: {placebo.verdict.reason}")
     alarms = of_error(standing.verdict, fit, sealed) + of_placebo(placebo.verdict, rules)
     alarms += of_left(standing.verdict, fit, sealed) + of_rows(standing) + told_unseen(poured)
+    alarms += of_ends(standing.verdict, found.best, task)
+    if fit.total_before.interval[0] > 0:
+        spread = surrogate.raw_spread[: Measures.of(task.scene).head]
+        fitted = {c.name: measured[c.name] for c in analysis.fitted}
+        alarms += of_labels(fitted, {n: simulated[n].base for n in fitted}, spread)
     for alarm in alarms:
         say(f"warning: {alarm}")
     experiments = next_experiment(surrogate, found, _candidates(analysis.plan))

@@ -7,6 +7,7 @@ task at full strength.
 
 import warnings
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +15,20 @@ from numpy.typing import NDArray
 from granulcal.errors import ObservationError
 from granulcal.loop.condition import Condition, digest_of
 from granulcal.loop.effects.library import LibraryEffect
-from granulcal.loop.pours.measures import camera_used
+from granulcal.loop.pours.measures import camera_used, formation_of
 from granulcal.measured.different import first_copy
 from granulcal.measured.plausible import doubts, violations
 from granulcal.measured.recording import Recording, UnlikeFramesWarning
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
-__all__ = ["doubts_of", "require_no_copies"]
+__all__ = ["doubt_of_funnel", "doubts_of", "require_no_copies"]
 
 Array = NDArray[np.float64]
+
+# Share of pixels without data from which the number of pixels shows it: that of a pour's scatters
+# by half a per cent.
+_MISSING = 0.005
 
 
 def require_no_copies(conditions: Sequence[Condition], rows: Sequence[Array]) -> None:
@@ -68,7 +73,7 @@ def doubts_of(
     there = scene.with_(condition.at)
     if there.observed_names:
         return []
-    found: list[str] = []
+    found = doubt_of_funnel(condition.name, there)
     for path in condition.recordings:
         with warnings.catch_warnings():
             # Told by the doubts.
@@ -83,8 +88,41 @@ def doubts_of(
             )
         if recording.unlike is not None:
             found.append(f"{path}: {recording.unlike}")
+        found += _doubt_of_missing(path, there, condition)
         found += doubts(there, prior, *of_it)
     return found
+
+
+def doubt_of_funnel(name: str, there: Scene) -> list[str]:
+    """Returns whether the funnel hangs above the camera, as with a height in another unit."""
+    tables = there.to_dict()
+    camera, funnel = tables["camera"], tables.get("funnel")
+    if camera["projection"] != "pinhole" or funnel is None:
+        return []
+    tip, eye = funnel["height"], camera["height"]
+    if tip < eye:
+        return []
+    return [
+        f"{name}: the funnel's tip (funnel.height = {tip:g} m) is above the camera "
+        f"(camera.height = {eye:g} m): is it in metres?"
+    ]
+
+
+def _doubt_of_missing(path: Path, there: Scene, condition: Condition) -> list[str]:
+    """Whether pixels have no data where those of the scene's images have."""
+    if "sensor" in there.to_dict()["camera"]:
+        return []
+    formation = formation_of(path, there, condition.camera, condition.reading)[1]
+    rows, columns = (np.flatnonzero(formation.mask.any(axis=axis)) for axis in (1, 0))
+    around = formation.heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    share = float(np.isnan(around).mean())
+    if share < _MISSING:
+        return []
+    return [
+        f"{path}: {100 * share:.2g} % of the pixels about the formation have no data, of the "
+        "scene's images none: what counts pixels falls short by as much, as if grains were fewer; "
+        "let the scene's camera have the sensor of this one (granulcal-cli fit-sensor)"
+    ]
 
 
 def _with_effects(there: Scene, library: Sequence[LibraryEffect]) -> Iterator[Scene]:

@@ -83,6 +83,7 @@ from granulcal.loop.effects.resolution import Resolution
 from granulcal.loop.effects.series_faults import require_series
 from granulcal.loop.effects.tolerance import Tolerances
 from granulcal.loop.pours.forward import Coarse
+from granulcal.loop.pours.measures import is_above_axis
 from granulcal.loop.recorded import doubts_of, require_no_copies
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
@@ -116,6 +117,7 @@ _SCHEMA = Table(
         "law": OneOf((Flag(), ListOf(Text()))),
     },
 )
+_ASIDE = "camera.aside"
 # Fewest pours over all fit conditions from which something may be said.
 _FEWEST_POURS = 3
 
@@ -234,6 +236,7 @@ class Task:
         library = (*candidates, *declared)
         if "resolution" in document:
             library = (*library, Resolution.of(document["resolution"]).effect(scene))
+        library = _beside_tilt(library, scene)
         known = Prior.load(folder / document["prior"])
         unknown = (
             Prior.from_tables(document["nuisance"]).parameters if "nuisance" in document else ()
@@ -419,8 +422,27 @@ def _default(scene: Scene, at: dict[str, float]) -> tuple[LibraryEffect, ...]:
     that are a number which they state: what is known can be no finding.
     """
     library = tuple(effect for effect in FUNNEL if effect.shift == (effect.path in at))
+    if not _has_image(scene):
+        return tuple(effect for effect in library if not effect.image)
+    if not is_above_axis(scene):
+        # A map has any origin.
+        return tuple(effect for effect in library if effect.family != _ASIDE)
+    return library
+
+
+def _beside_tilt(library: tuple[LibraryEffect, ...], scene: Scene) -> tuple[LibraryEffect, ...]:
+    """The library, with a camera beside the pour's axis where it has a tilt that looks alike."""
+    asked = {effect.family for effect in library if effect.nuisance_sd is None}
+    has = {effect.family for effect in library}
+    if "tilt" not in asked or _ASIDE in has or not (_has_image(scene) and is_above_axis(scene)):
+        return library
+    return (*library, *(effect for effect in FUNNEL if effect.family == _ASIDE))
+
+
+def _has_image(scene: Scene) -> bool:
+    """Whether effects of the image apply to a scene."""
     try:
         require_image(scene, ("camera",))
     except ObservationError:
-        return tuple(effect for effect in library if not effect.image)
-    return library
+        return False
+    return True

@@ -1,11 +1,28 @@
 """What speaks against a verdict without taking it away: said among its doubts."""
 
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
 from granulcal.loop.check.standing import Standing
-from granulcal.loop.test.distance import Improvement
+from granulcal.loop.pours.replicates import FEWEST
+from granulcal.loop.task import Task
+from granulcal.loop.test.distance import Improvement, noise_free_square
 from granulcal.loop.test.thresholds import Thresholds
+from granulcal.loop.test.trace import Explanation
 from granulcal.loop.test.verdict import NAMING, Verdict
 
-__all__ = ["of_error", "of_left", "of_placebo", "of_rows"]
+__all__ = ["of_ends", "of_error", "of_labels", "of_left", "of_placebo", "of_rows"]
+
+Array = NDArray[np.float64]
+
+
+# A strength whose best fit is so near to the end of its range leans on it.
+_AT_END = 0.02
+# Share of D² that must be left once conditions are exchanged for it to be said.
+_EXCHANGED = 0.5
 
 
 def of_placebo(placebo: Verdict, rules: Thresholds) -> tuple[str, ...]:
@@ -31,7 +48,7 @@ def of_error(verdict: Verdict, fit: Improvement, sealed: Improvement | None) -> 
         f"at the {use} conditions from {error.total_before.square:.3g} to "
         f"{error.total_after.square:.3g}"
         for use, error in (("fitted", fit), ("sealed", sealed))
-        if error is not None and error.gain < 0
+        if error is not None and error.is_worse
     ]
     if not grown:
         return ()
@@ -39,6 +56,56 @@ def of_error(verdict: Verdict, fit: Improvement, sealed: Improvement | None) -> 
     return (
         f"with {named} the error D² grows, {' and '.join(grown)}: what speaks for the name lies in "
         "directions that scatter little",
+    )
+
+
+def of_ends(verdict: Verdict, best: Explanation, task: Task) -> tuple[str, ...]:
+    """Returns which numbers of a named model lie at the end of what the library has of them."""
+    if verdict.kind not in NAMING or not best.at_end:
+        return ()
+    found = []
+    for name, strength in zip(best.effects, best.best_strengths.tolist(), strict=True):
+        if name not in verdict.named or 1.0 - abs(strength) > _AT_END:
+            continue
+        effect = task.effect(name)
+        end = effect.value(math.copysign(1.0, strength))
+        unit = "" if effect.unit == "-" else f" {effect.unit}"
+        found.append(
+            f"{name} is found at {end:.3g}{unit}, the end of what the library has of it: the true "
+            "one may lie beyond, and its interval cannot say so"
+        )
+    return tuple(found)
+
+
+def of_labels(
+    measured: Mapping[str, Array], base: Mapping[str, Array], spread: Array
+) -> tuple[str, ...]:
+    """Returns which conditions have recordings that are nearer to pours of other conditions.
+
+    Args:
+        measured: statistics of the pours of each condition to fit, shape (n, s).
+        base: of the base model's pours at its fit, by the same names, shape (k, s).
+        spread: of the archive, of the first statistics, which are compared, shape (m,).
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    names = [name for name in measured if len(base[name]) >= FEWEST]
+    head = len(spread)
+    squares = np.array(
+        [
+            [noise_free_square(measured[of][:, :head], base[at][:, :head], spread) for at in names]
+            for of in names
+        ]
+    ).reshape(len(names), len(names))
+    rows, columns = linear_sum_assignment(squares)
+    stated, best = float(np.trace(squares)), float(squares[rows, columns].sum())
+    others = [(names[i], names[j]) for i, j in zip(rows, columns, strict=True) if i != j]
+    if not others or best > _EXCHANGED * stated:
+        return ()
+    said = ", ".join(f"those of {of} like pours of {at}" for of, at in others)
+    return (
+        f"recordings look like pours of other conditions, {said} (D² {best:.3g} in all, as stated "
+        f"{stated:.3g}): were they exchanged?",
     )
 
 

@@ -66,6 +66,11 @@ class Coverage:
     pairs: int
     error: float
 
+    @property
+    def is_whole_range(self) -> bool:
+        """Whether no stretch held as many pairs as asked: the interval is the whole range."""
+        return not isfinite(self.stretch)
+
     def to_dict(self) -> dict[str, Any]:
         """Returns it for JSON."""
         return {

@@ -6,6 +6,7 @@
 | surrogate | it is right at the fit, p > `confirm`, after `settle.py` at the latest | UNCONFIRMED |
 | own pours | they leave nothing: p > `adequate`, for NONE > `name` | RESIDUAL; NONE: UNCONFIRMED |
 | prior | no random draw of the model is nearer to the data than its fit | UNCONFIRMED |
+| error | with a name D² is not above `LEFT` for each statistic, at 97.5 % | UNEXPLAINED |
 | definitions | the same verdict with every threshold and definition moved | OVERTURNED |
 | sealed rows | the named effect beats what needs no physics (`trivial.py`) | said beside the name |
 
@@ -30,6 +31,8 @@ __all__ = ["FALLEN", "Moved", "Standing", "overturned", "stand"]
 
 FALLEN = ("UNCONFIRMED", "OVERTURNED")
 """Words of a verdict that does not stand."""
+LEFT = 1.0
+"""Most D² for each statistic, in squared spreads of the archive, that a named model may leave."""
 
 
 @dataclass(frozen=True)
@@ -158,6 +161,7 @@ def stand(
     draws: int = 0,
     nearer: Improvement | None = None,
     error: Improvement | None = None,
+    size: int = 16,
     moved: Sequence[Moved] = (),
     trivial: Sequence[TrivialRow] = (),
     seen: Sequence[Seen] = (),
@@ -175,6 +179,7 @@ def stand(
         draws: random draws that were poured.
         nearer: from the best of them (before) to the fit (after), conditions to fit.
         error: from the base model (before) to the verdict's (after), conditions to fit.
+        size: statistics of that error.
         moved: verdicts under other definitions.
         trivial: rows of the sealed conditions.
         seen: pours of each effect.
@@ -196,6 +201,15 @@ def stand(
         off, base = error.total_after.square, error.total_before.square
         why = f"the base model is nearer to the data (D² {base:.3g}, {off:.3g})"
         verdict = _fallen("UNCONFIRMED", before, f"{_said(before)}, but {why}")
+    if word.kind in NAMING and error is not None and error.total_after.interval[0] > LEFT * size:
+        # Far from all pours they scatter so much that the residual test finds nothing.
+        left = error.total_after.square
+        why = (
+            f"the pours are far from those of every model: with it D² is still {left:.3g}, more "
+            f"than {LEFT:g} squared spread of the archive in each of {size} statistics; are the "
+            "conditions' numbers in the scene's units?"
+        )
+        verdict = Verdict("UNEXPLAINED", (), (), before.p, f"{_said(before)}, but {why}")
     least = {"NONE": rules.name, **dict.fromkeys(NAMING, rules.adequate)}.get(word.kind, 0.0)
     pours = own if word is before else of_base
     if pours is not None and pours.residual_test.p <= least:

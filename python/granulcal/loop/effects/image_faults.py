@@ -7,7 +7,8 @@ With the heights z over the ground of the pixels of an image, NaN where there is
   around it, $a \sim U(0, 1)$: pixels that see both sides of an edge, and that segmentation leaves;
 - lost: a body no larger than a grain that touches nothing is taken for ground with probability p;
 - offset: $z' = z + o$ of the pixels that are grain: their heights are told from another plane than
-  the ground on which they lie (the pile of velvet).
+  the ground on which they lie (the pile of velvet);
+- aside: $x' = x - o$, or y, of the pixels' points: the camera stands beside the pour's axis.
 
 They act in this order; a pixel of z above the scene's threshold is grain. What they stand for and
 their prior ranges: docs/theory/loop.md.
@@ -34,7 +35,7 @@ __all__ = ["KINDS", "Frame", "blurred", "flying", "lost", "require_image"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-KINDS = ("blur", "flying", "lost", "offset")
+KINDS = ("blur", "flying", "lost", "offset", "aside_x", "aside_y")
 """What an effect of the image may be, in the order in which they act."""
 
 # The kernel is cut where 6e-5 of its weight is left.
@@ -57,6 +58,7 @@ class Frame:
         threshold: height above which a pixel is grain [m].
         diameter: mean diameter of the grains [m].
         lift: what is added to the heights of grains [m].
+        aside: where the camera stands from the pour's axis, x and y [m].
     """
 
     z: Array
@@ -65,6 +67,7 @@ class Frame:
     threshold: float
     diameter: float
     lift: float = 0.0
+    aside: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
     def of(cls, pour: Pour) -> "Frame":
@@ -99,7 +102,9 @@ class Frame:
         """Returns the points of the pixels that are taken for grains [m], shape (n, 3)."""
         x, y = self.ground()
         kept = self.is_grain
-        return np.stack([x[kept], y[kept], self.z[kept] + self.lift], axis=1)
+        aside_x, aside_y = self.aside
+        lifted = self.z[kept] + self.lift
+        return np.stack([x[kept] - aside_x, y[kept] - aside_y, lifted], axis=1)
 
     def with_(self, faults: Mapping[str, float], seed: int) -> "Frame":
         """Returns the image with the faults of `faults`, by kind; `seed` is of what is random."""
@@ -111,6 +116,11 @@ class Frame:
             generator = np.random.default_rng([seed, number])
             if kind == "offset":
                 frame = replace(frame, lift=value)
+                continue
+            if kind in ("aside_x", "aside_y"):
+                x, y = frame.aside
+                aside = (value, y) if kind == "aside_x" else (x, value)
+                frame = replace(frame, aside=aside)
                 continue
             z = frame.z
             if kind == "blur":

@@ -174,6 +174,26 @@ FUNNEL: tuple[LibraryEffect, ...] = (
         image="lost",
         doc="share of the lone grains that the segmentation loses",
     ),
+    LibraryEffect(
+        name="camera.x",
+        family="camera.aside",
+        path="image.x",
+        image="aside_x",
+        full=0.01,
+        unit="m",
+        is_two_sided=True,
+        doc="the camera stands this far beside the pour's axis, along x",
+    ),
+    LibraryEffect(
+        name="camera.y",
+        family="camera.aside",
+        path="image.y",
+        image="aside_y",
+        full=0.01,
+        unit="m",
+        is_two_sided=True,
+        doc="the camera stands this far beside the pour's axis, along y",
+    ),
 )
 """What a pour through a funnel may lack."""
 

@@ -23,7 +23,7 @@ from granulcal.pours.statistics import (
     statistics,
 )
 
-__all__ = ["Measures", "camera_used", "formation_of"]
+__all__ = ["Measures", "camera_used", "formation_of", "is_above_axis"]
 
 Array = NDArray[np.float64]
 
@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 # sum (twenty more numbers to a pour blunt every test of the others), and patches, which repeat
 # isolated grains and clusters.
 _LEFT_OUT = ("tail_index", "height_ring", "patches")
+# Where the pour is beside its axis: a height map does not know where the axis was.
+_OF_AXIS = ("mass_cos_1", "mass_sin_1", "rim_cos_1", "rim_sin_1")
 # Volume under the measured surface over that of the scene's grains: beyond this a unit is wrong.
 _VOLUME_RANGE = (0.1, 10.0)
 
@@ -57,7 +59,8 @@ class Measures:
         if scene.observed_names:
             names = tuple(scene.observed_names)
             return cls(names, None, len(names), True)
-        kept = [name for name in DIAGNOSTIC_NAMES if not name.startswith(_LEFT_OUT)]
+        left_out = _LEFT_OUT if is_above_axis(scene) else (*_LEFT_OUT, *_OF_AXIS)
+        kept = [name for name in DIAGNOSTIC_NAMES if not name.startswith(left_out)]
         names = (*NAMES, *kept)
         power = {s.name: s.length_power for s in REGISTRY}
         return cls(names, np.array([power[name] for name in names]), len(NAMES), False)
@@ -116,11 +119,23 @@ class Measures:
                 f"{grains:.3g} m3; allowed are {_VOLUME_RANGE[0]:g} to {_VOLUME_RANGE[1]:g} "
                 "times that: is the recording of this scene, and in its units?"
             )
-        # Our cameras stand on the pour's axis; a height map has no camera.
-        axis = (0.0, 0.0) if recording.depth is not None else None
+        is_map = recording.depth is None
+        if is_map and is_above_axis(scene):
+            raise ObservationError(
+                f"{path} is a height map, which does not say where the pour's axis was; the "
+                "scene's pinhole camera stands on it: give depth images, or a scene with "
+                'camera.projection = "orthographic"'
+            )
+        # What of a camera beside the axis: the effects camera.x and camera.y.
+        axis = None if is_map else (0.0, 0.0)
         found = formation.diagnostic_statistics(grain_diameter=diameter, pour_axis=axis)
         both = {**formation.statistics().to_dict(), **found.to_dict()}
         return np.array([both[name] for name in self.names])
+
+
+def is_above_axis(scene: Scene) -> bool:
+    """Whether recordings are of a camera above the pour's axis, and not maps of any origin."""
+    return scene.to_dict()["camera"]["projection"] == "pinhole"
 
 
 def formation_of(

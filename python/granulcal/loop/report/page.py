@@ -25,7 +25,7 @@ __all__ = ["sentence_of", "write_page"]
 
 _SENTENCES = {
     "NONE": "The model explains these pours: no residual was found.",
-    "RESIDUAL": "The grains do something that this model does not, too faintly to be named.",
+    "RESIDUAL": "The grains do something that this model does not; what it is cannot be told.",
     "EFFECT": "The grains do something that this model lacks, and one effect accounts for it.",
     "SET": "The grains do something that this model lacks; several effects would account for it.",
     "EFFECTS": "The grains do something that this model lacks; it takes two effects.",
