@@ -10,7 +10,9 @@ import json
 import os
 import stat
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 from typing import Any, Protocol
@@ -28,6 +30,7 @@ __all__ = [
     "Text",
     "Whole",
     "check",
+    "meant",
     "parse_json",
     "parse_toml",
     "read_bytes",
@@ -153,16 +156,27 @@ class Table:
         listed = f"it has {', '.join(self.needed) or 'nothing'}"
         if self.optional:
             listed += f" and may have {', '.join(self.optional)}"
+        for key, item in value.items():
+            # Before what is missing: most often it is that, misspelt.
+            if key not in known and not self.open:
+                return (
+                    _below(at, key),
+                    item,
+                    f"absent, for it is unknown{meant(key, known)}: {listed}",
+                )
         for key in self.needed:
             if key not in value:
                 return _below(at, key), None, f"there: {listed}"
         for key, item in value.items():
-            if key not in known:
-                if not self.open:
-                    return _below(at, key), item, f"absent, for it is unknown: {listed}"
-            elif (fault := known[key].fault(item, _below(at, key))) is not None:
+            if key in known and (fault := known[key].fault(item, _below(at, key))) is not None:
                 return fault
         return None
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """Returns which of the `known` words an unknown one is most like, in brackets; "" if none."""
+    near = get_close_matches(word, list(known), n=1)
+    return f" (is it {near[0]}?)" if near else ""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from granulcal.documents import (
     Text,
     Whole,
     check,
+    meant,
     parse_json,
     read_bytes,
 )
@@ -174,3 +175,13 @@ def test_messages_steer_no_terminal_and_fill_none(tmp_path, capsys):
     assert main(["calibrate", str(name), "default", str(name), "-o", str(tmp_path / "o")]) == 2
     error = capsys.readouterr().err
     assert "\x1b" not in error and len(error) < 5000, error[:300]
+
+
+def test_what_is_misspelt_is_told_before_what_is_missing() -> None:
+    table = Table({"recordings": Text()}, {"use": Text()})
+    told = r"recording must be absent, for it is unknown \(is it recordings\?\): it has recordings"
+    with pytest.raises(ValueError, match=told):
+        check({"recording": "a.png"}, table, "task.toml")
+    with pytest.raises(ValueError, match="colour must be absent, for it is unknown: it has"):
+        check({"colour": "red"}, table, "task.toml")
+    assert meant("darg", ["drag", "tilt.x"]) == " (is it drag?)" and meant("darg", []) == ""

@@ -75,7 +75,10 @@ def add(commands: Any) -> None:
         "--tolerances", type=READS, help="JSON of directions in which the statistics may be off"
     )
     parser.add_argument(
-        "--budget", type=pour_count, default=4000, help="pours, all told (default: 4000)"
+        "--budget",
+        type=pour_count,
+        default=4000,
+        help="pours, but for those where a fit is looked at again (default: 4000)",
     )
     parser.add_argument(
         "--pairs",
@@ -123,7 +126,8 @@ def _run(options: argparse.Namespace) -> int:
         with pouring_with(engine):
             if options.archive is not None:
                 require_same(options.archive, planned(_told(task), *asked))
-            return say_how_long(options, task.at_first(), task.prior, options.budget)
+            poured = [task.scene.with_(condition.at) for condition in task.conditions]
+            return say_how_long(options, poured, task.prior, options.budget)
     aside = contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext()
     with aside, pouring_with(engine), spread_over(cluster_of(options)):
         code = _close(options)

@@ -37,26 +37,34 @@ def add_dry_run(
 
 
 def cost(
-    scene: "Scene", prior: "Prior", *, engine: "Engine | None" = None, share: int = 1
+    scene: "Scene | Sequence[Scene]",
+    prior: "Prior",
+    *,
+    engine: "Engine | None" = None,
+    share: int = 1,
 ) -> "PourTime":
     """Returns what a pour costs, from three draws of a prior or fewer, if they take long.
 
     Args:
-        scene: what is poured.
+        scene: what is poured; of several some that lie evenly between the first and the last.
         prior: what is drawn.
         engine: another simulator in place of ours, or of the one in use.
         share: one part in so many of the time that a dry run has.
     """
     from granulcal.pours.forward import scene_at
     from granulcal.pours.pour_time import PATIENCE_S, pour_time
+    from granulcal.pours.scene import Scene
 
-    scenes = [scene_at(scene, prior, theta) for theta in prior.sample(_TRIED, seed=_SEED)]
+    all_ = [scene] if isinstance(scene, Scene) else list(scene)
+    places = [round(i * (len(all_) - 1) / (_TRIED - 1)) for i in range(_TRIED)]
+    drawn = zip(places, prior.sample(_TRIED, seed=_SEED), strict=True)
+    scenes = [scene_at(all_[place], prior, theta) for place, theta in drawn]
     return pour_time(scenes, seed=_SEED, engine=engine, patience=PATIENCE_S / share)
 
 
 def say_how_long(
     options: argparse.Namespace,
-    scene: "Scene",
+    scene: "Scene | Sequence[Scene]",
     prior: "Prior",
     pours: int,
     *,
@@ -66,7 +74,7 @@ def say_how_long(
 
     Args:
         options: may have `threads` and, for JSON with the words of `generate --dry-run`, `json`.
-        scene: what would be poured.
+        scene: what would be poured, or several.
         prior: what would be drawn.
         pours: those that are missing, at most.
         engine: another simulator in place of ours, or of the one in use.

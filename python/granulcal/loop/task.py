@@ -63,7 +63,7 @@ from granulcal.documents import (
     parse_toml,
     read_bytes,
 )
-from granulcal.errors import ObservationError
+from granulcal.errors import ObservationError, TrainingDataError
 from granulcal.loop.condition import Condition, condition_of, require_different
 from granulcal.loop.effects.askable import (
     of_heights,
@@ -227,7 +227,7 @@ class Task:
         )
         definitions = tuple(Definition.of(table) for table in document.get("definitions", []))
         named = document.get("effects", [])
-        library = by_name(named) if named else _default(scene, conditions[0].at)
+        library = _named(named, file) if named else _default(scene, conditions[0].at)
         ats = [one.at for one in _by_each(conditions, definitions)]
         declared = declared_nuisances(document.get("nuisances", {}), scene, ats)
         names = {effect.name for effect in declared}
@@ -428,6 +428,14 @@ def _default(scene: Scene, at: dict[str, float]) -> tuple[LibraryEffect, ...]:
         # A map has any origin.
         return tuple(effect for effect in library if effect.family != _ASIDE)
     return library
+
+
+def _named(names: list[str], file: Path) -> tuple[LibraryEffect, ...]:
+    """The entries that a task's file names."""
+    try:
+        return by_name(names)
+    except TrainingDataError as error:
+        raise TrainingDataError(f"{file}: effects: {error}") from None
 
 
 def _beside_tilt(library: tuple[LibraryEffect, ...], scene: Scene) -> tuple[LibraryEffect, ...]:

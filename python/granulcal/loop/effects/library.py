@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.documents import meant
 from granulcal.errors import TrainingDataError
 from granulcal.loop.effects.library_effect import LibraryEffect, described, fingerprint
 
@@ -392,5 +393,6 @@ def by_name(
     known = [effect.name for effect in library]
     unknown = [name for name in wanted if name not in known]
     if unknown:
-        raise TrainingDataError(f"no effect {', '.join(unknown)}; there are {', '.join(known)}")
+        said = ", ".join(f"{name}{meant(name, known)}" for name in unknown)
+        raise TrainingDataError(f"no effect {said}; there are {', '.join(known)}")
     return tuple(effect for effect in library if effect.name in wanted)

@@ -31,6 +31,7 @@ def time_needed(task: Task, store: Archive, further: int, threads: int) -> str:
     each = pour_time([middle.with_(conditions[i].at) for i in chosen.tolist()]).seconds
     total = missing + further
     return (
-        f"{missing} pours of the archive are missing, {further} follow at most: at {each:.1f} s "
-        f"each, {threads} at once, about {duration(total * each / threads)}"
+        f"{missing} pours of the archive are missing, {further} follow, and more where a fit is "
+        f"looked at again: at {each:.2g} s each, {threads} at once, about "
+        f"{duration(total * each / threads)}"
     )
