@@ -51,6 +51,8 @@ def test_who_asks_for_a_tilt_asks_where_the_camera_stood(tmp_path: Path) -> None
     assert names('effects = ["tilt.x", "drag"]') == ["drag", "tilt.x", "camera.x", "camera.y"]
     assert names('effects = ["camera.y", "tilt.x"]') == ["tilt.x", "camera.y"]
     assert names('effects = ["drag"]') == ["drag"]
+    # Pixels without data look like fewer grains.
+    assert names('effects = ["count"]') == ["count", "camera.missing"]
     assert names('effects = ["drag"]\nnuisances = { "tilt.x" = 0.01 }') == ["drag", "tilt.x"]
     assert {"camera.x", "camera.y"} < set(names(""))
 

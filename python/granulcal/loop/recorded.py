@@ -7,7 +7,6 @@ task at full strength.
 
 import warnings
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +73,7 @@ def doubts_of(
     if there.observed_names:
         return []
     found = doubt_of_funnel(condition.name, there)
+    found += _doubt_of_missing(there, condition)
     for path in condition.recordings:
         with warnings.catch_warnings():
             # Told by the doubts.
@@ -88,7 +88,6 @@ def doubts_of(
             )
         if recording.unlike is not None:
             found.append(f"{path}: {recording.unlike}")
-        found += _doubt_of_missing(path, there, condition)
         found += doubts(there, prior, *of_it)
     return found
 
@@ -108,20 +107,24 @@ def doubt_of_funnel(name: str, there: Scene) -> list[str]:
     ]
 
 
-def _doubt_of_missing(path: Path, there: Scene, condition: Condition) -> list[str]:
+def _doubt_of_missing(there: Scene, condition: Condition) -> list[str]:
     """Whether pixels have no data where those of the scene's images have."""
     if "sensor" in there.to_dict()["camera"]:
         return []
-    formation = formation_of(path, there, condition.camera, condition.reading)[1]
-    rows, columns = (np.flatnonzero(formation.mask.any(axis=axis)) for axis in (1, 0))
-    around = formation.heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    share = float(np.isnan(around).mean())
-    if share < _MISSING:
+    shares = []
+    for path in condition.recordings:
+        formation = formation_of(path, there, condition.camera, condition.reading)[1]
+        rows, columns = (np.flatnonzero(formation.mask.any(axis=axis)) for axis in (1, 0))
+        around = formation.heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        shares.append(float(np.isnan(around).mean()))
+    most = int(np.argmax(shares))
+    if shares[most] < _MISSING:
         return []
     return [
-        f"{path}: {100 * share:.2g} % of the pixels about the formation have no data, of the "
-        "scene's images none: what counts pixels falls short by as much, as if grains were fewer; "
-        "let the scene's camera have the sensor of this one (granulcal-cli fit-sensor)"
+        f"{condition.name}: up to {100 * shares[most]:.2g} % of the pixels about the formation "
+        f"have no data ({condition.recordings[most]}), of the scene's images none: what counts "
+        "pixels falls short by as much, as if grains were fewer; let the scene's camera have the "
+        "sensor of this one (granulcal-cli fit-sensor)"
     ]
 
 

@@ -118,6 +118,8 @@ _SCHEMA = Table(
     },
 )
 _ASIDE = "camera.aside"
+# What of the camera looks like an effect is asked wherever that is: it costs no pour.
+_ALIKE = {"tilt": _ASIDE, "count": "camera.missing"}
 # Fewest pours over all fit conditions from which something may be said.
 _FEWEST_POURS = 3
 
@@ -236,7 +238,7 @@ class Task:
         library = (*candidates, *declared)
         if "resolution" in document:
             library = (*library, Resolution.of(document["resolution"]).effect(scene))
-        library = _beside_tilt(library, scene)
+        library = _with_alike(library, scene)
         known = Prior.load(folder / document["prior"])
         unknown = (
             Prior.from_tables(document["nuisance"]).parameters if "nuisance" in document else ()
@@ -438,13 +440,20 @@ def _named(names: list[str], file: Path) -> tuple[LibraryEffect, ...]:
         raise TrainingDataError(f"{file}: effects: {error}") from None
 
 
-def _beside_tilt(library: tuple[LibraryEffect, ...], scene: Scene) -> tuple[LibraryEffect, ...]:
-    """The library, with a camera beside the pour's axis where it has a tilt that looks alike."""
-    asked = {effect.family for effect in library if effect.nuisance_sd is None}
-    has = {effect.family for effect in library}
-    if "tilt" not in asked or _ASIDE in has or not (_has_image(scene) and is_above_axis(scene)):
+def _with_alike(library: tuple[LibraryEffect, ...], scene: Scene) -> tuple[LibraryEffect, ...]:
+    """The library, with what of the camera looks like one of its candidates."""
+    if not _has_image(scene):
         return library
-    return (*library, *(effect for effect in FUNNEL if effect.family == _ASIDE))
+    has = {_kin(effect) for effect in library}
+    asked = {_kin(effect) for effect in library if effect.nuisance_sd is None}
+    wanted = {alike for kin, alike in _ALIKE.items() if kin in asked and alike not in has}
+    if not is_above_axis(scene):
+        wanted -= {_ASIDE}
+    return (*library, *(effect for effect in FUNNEL if _kin(effect) in wanted))
+
+
+def _kin(effect: LibraryEffect) -> str:
+    return effect.family or effect.name
 
 
 def _has_image(scene: Scene) -> bool:

@@ -8,6 +8,7 @@ With the heights z over the ground of the pixels of an image, NaN where there is
 - lost: a body no larger than a grain that touches nothing is taken for ground with probability p;
 - offset: $z' = z + o$ of the pixels that are grain: their heights are told from another plane than
   the ground on which they lie (the pile of velvet);
+- missing: a share f of the pixels has no data, each by itself;
 - aside: $x' = x - o$, or y, of the pixels' points: the camera stands beside the pour's axis.
 
 They act in this order; a pixel of z above the scene's threshold is grain. What they stand for and
@@ -35,7 +36,7 @@ __all__ = ["KINDS", "Frame", "blurred", "flying", "lost", "require_image"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-KINDS = ("blur", "flying", "lost", "offset", "aside_x", "aside_y")
+KINDS = ("blur", "flying", "lost", "offset", "aside_x", "aside_y", "missing")
 """What an effect of the image may be, in the order in which they act."""
 
 # The kernel is cut where 6e-5 of its weight is left.
@@ -125,6 +126,8 @@ class Frame:
             z = frame.z
             if kind == "blur":
                 z = frame._blurred(value)
+            elif kind == "missing":
+                z = np.where(generator.random(z.shape) < value, np.nan, z)
             elif kind == "flying":
                 z = flying(z, value, _EDGE * frame.diameter, generator)
             else:

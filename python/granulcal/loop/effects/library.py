@@ -176,6 +176,13 @@ FUNNEL: tuple[LibraryEffect, ...] = (
         doc="share of the lone grains that the segmentation loses",
     ),
     LibraryEffect(
+        name="camera.missing",
+        path="image.missing",
+        image="missing",
+        full=0.1,
+        doc="share of the pixels that have no data, each by itself",
+    ),
+    LibraryEffect(
         name="camera.x",
         family="camera.aside",
         path="image.x",
