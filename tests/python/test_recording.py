@@ -70,6 +70,28 @@ def test_what_the_scenes_images_do_not_show_is_cut_off(pour, tmp_path):
         seen["wide"].formation(field_width=-1.0)
 
 
+def test_a_png_finds_the_camera_that_lies_beside_it(pour, camera, tmp_path):
+    image, toml = camera.record(pour.positions, pour.radii, tmp_path / "a" / "frames")
+    stored = gc.Recording.open(image, camera=toml)
+    folder = image.parent
+
+    def lens(path):
+        return gc.Recording.open(path).lens
+
+    assert lens(image) == lens(folder) == stored.lens
+    # One for several folders.
+    toml.rename(folder.parent / "camera.toml")
+    assert lens(image) == lens(folder) == stored.lens
+    # What bears the image's own name comes first.
+    text = (folder.parent / "camera.toml").read_text()
+    image.with_suffix(".toml").write_text(text.replace("cx = ", "cx = 1"))
+    assert lens(image)["cx"] != stored.lens["cx"]
+    image.with_suffix(".toml").unlink()
+    (folder.parent / "camera.toml").unlink()
+    with pytest.raises(ValueError, match="the camera must be given .* beside them as camera.toml"):
+        gc.Recording.open(image)
+
+
 def test_frames_in_memory_are_what_their_files_are(pour, camera, tmp_path):
     image, toml = camera.record(pour.positions, pour.radii, tmp_path, depth_unit=1e-4)
     stored = gc.Recording.open(image, camera=toml)

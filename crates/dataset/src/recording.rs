@@ -13,6 +13,7 @@ use granulcal_features::{
 };
 
 pub use folder::{Folder, Frame};
+use options::camera_beside;
 pub use options::{FRAMES, ReadOptions};
 
 use crate::camera_file::camera_of;
@@ -190,11 +191,12 @@ impl Recording {
         options: &ReadOptions,
     ) -> Result<Self, DatasetError> {
         options.refuse_topics(path)?;
-        let Some(camera) = &options.camera else {
-            let allowed = "given for depth images as PNG (--camera camera.toml)";
+        let Some(camera) = options.camera.clone().or_else(|| camera_beside(path)) else {
+            let allowed = "given for depth images as PNG (--camera camera.toml), or beside them as camera.toml or under an \
+                           image's own name";
             return Err(DatasetError::content(path, "the camera", "none", allowed));
         };
-        Self::of_frames(path, frames, &CameraFile::load(camera)?, camera)
+        Self::of_frames(path, frames, &CameraFile::load(&camera)?, &camera)
     }
 
     /// The mean of PNG frames, each with its name, that the camera of the file at `camera_path` took.

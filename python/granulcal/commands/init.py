@@ -57,7 +57,7 @@ def _add_init(commands: Any) -> None:
     parser.add_argument("--scene", choices=("funnel", "drop"), default="funnel", help="built-in")
     parser.add_argument("--recording", type=RECORDING, help="depth recording to take the lens from")
     parser.add_argument(
-        "--camera", type=READS, help="TOML of the camera, if the recording is a PNG"
+        "--camera", type=READS, help="TOML of the camera, if the recording is a PNG without it"
     )
     parser.add_argument("--preset", choices=("fast", "default", "accurate"), help="of the solver")
     parser.add_argument(

@@ -119,7 +119,8 @@ class Recording:
 
         Args:
             path: .bag, .mcap, .npz, .png, or a folder of .png.
-            camera: TOML of the camera, which PNGs need and height maps have not; of a .bag or .mcap
+            camera: TOML of the camera, which height maps have not; of PNGs that under the image's
+                own name, or camera.toml in its folder or the one above, if None; of a .bag or .mcap
                 it replaces lens, depth unit and segmentation, key by key.
             topic: topic of the depth images, where several fit.
             camera_topic: topic of the lens, where several fit.

@@ -11,7 +11,8 @@ pub const FRAMES: usize = 10;
 /// What of a recording is read, and what is known besides.
 #[derive(Clone, Debug)]
 pub struct ReadOptions {
-    /// TOML of the camera: images as PNG need it, for the others it replaces what they say.
+    /// TOML of the camera, for images as PNG that of [`camera_beside`] if there is none; for the others it replaces what
+    /// they say.
     pub camera: Option<PathBuf>,
     /// Topic of the depth images, where several fit.
     pub topic: Option<String>,
@@ -23,6 +24,16 @@ pub struct ReadOptions {
     pub frames: usize,
     /// Index of the first of them, counted from 0; else the last `frames` frames are taken.
     pub first_frame: Option<u64>,
+}
+
+/// The camera of an image as PNG, or of a folder of them: a TOML under the image's name, as images are written with, else
+/// `camera.toml` in its folder or the one above.
+pub(super) fn camera_beside(path: &Path) -> Option<PathBuf> {
+    let own = path.is_file().then(|| path.with_extension("toml"));
+    let folders = if path.is_dir() { path.ancestors().take(2) } else { path.ancestors().take(3) };
+    let skipped = usize::from(!path.is_dir());
+    let shared = folders.skip(skipped).map(|folder| folder.join("camera.toml"));
+    own.into_iter().chain(shared).find(|file| file.is_file())
 }
 
 impl Default for ReadOptions {

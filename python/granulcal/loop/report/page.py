@@ -141,7 +141,8 @@ def _strengths(closed: Closed) -> list[dict[str, Any]]:
 
 
 def _hidden(closed: Closed) -> list[dict[str, str]]:
-    rows, sights = [], closed.power
+    # At the fit: what is seen at the middle of the prior may not be at the material's own numbers.
+    rows, sights = [], closed.trace.power
     of = {one.effect: one for one in closed.seen}
     for name, kappa, least in zip(sights.effects, sights.kappa, sights.shown, strict=True):
         effect = closed.task.effect(name)
