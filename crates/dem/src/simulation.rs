@@ -191,6 +191,12 @@ impl Simulation {
         self.particles.present().map(|grain| self.particles.radius(grain)).collect()
     }
 
+    /// Radii of all grains of the scene by their number at the start `[m]`: also of those that have left it, or are still to
+    /// enter it, as an intruder, which is the last.
+    pub fn all_radii(&self) -> Vec<f64> {
+        (0..self.particles.count()).map(|grain| self.particles.radius(grain)).collect()
+    }
+
     /// Radii of the grains that have left through the scene's outflow `[m]`.
     pub fn radii_out(&self) -> Vec<f64> {
         // An intruder that is still to enter has left through nothing.

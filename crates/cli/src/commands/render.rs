@@ -4,9 +4,10 @@ use std::path::Path;
 
 use clap::Args;
 use granulcal_dataset::{
-    CameraFile, Drawn, Observer, Product, View, capture, capture_from, npy, png, write_height_map,
+    CameraFile, Drawn, Observer, Product, Room, View, capture, capture_from, npy, png,
+    write_height_map,
 };
-use granulcal_dem::Status;
+use granulcal_dem::{Simulation, Status};
 use granulcal_scene::{Projection, Scene, ViewSpec};
 use serde_json::{Value, json};
 
@@ -40,10 +41,10 @@ pub struct RenderArgs {
     /// What this one of the scene's views sees, a depth image without noise, instead of the scene's camera
     #[arg(long, value_name = "NAME")]
     pub view: Option<String>,
-    /// Render these centres [m], an array (n, 3), with the scene's grain diameter, instead of a pour
+    /// Render these centres [m], an array (n, 3), with the radii of the scene's grains at --seed, instead of a pour
     #[arg(long, value_name = "IN.npy")]
     pub positions: Option<Reads>,
-    /// Seed of the pour and of the camera's noise
+    /// Seed of the pour, of the radii of --positions and of the camera's noise
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
     /// Metres per count of the PNG
@@ -75,7 +76,7 @@ fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
             return Err(BadArgument(problem.to_owned()).into());
         }
         let positions = npy::read_points(path)?;
-        let radii = vec![scene.grains.radius(); positions.len()];
+        let radii = radii_of(&scene, args.seed, positions.len())?;
         (positions, radii, None)
     } else {
         let simulation = scene::start(&scene, args.seed, 1, None)?;
@@ -109,6 +110,31 @@ fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
         print_line(&in_words(&args.out, &view))?;
     }
     Ok(Outcome::Done)
+}
+
+/// Radii of so many centres of a pour, which keep their order `[m]`: those of all grains of the scene or of the grains
+/// at its start, or any number of one radius.
+fn radii_of(scene: &Scene, seed: u64, count: usize) -> anyhow::Result<Vec<f64>> {
+    Room::of_pour(scene, None).require(None)?;
+    let simulation = Simulation::new(scene, seed)?;
+    let (all, at_start) = (simulation.all_radii(), simulation.radii());
+    if let Some(known) = [&all, &at_start].into_iter().find(|known| known.len() == count) {
+        return Ok(known.clone());
+    }
+    match all.first() {
+        Some(&radius) if all.iter().all(|other| *other == radius) => Ok(vec![radius; count]),
+        _ => {
+            let mut allowed = all.len().to_string();
+            if at_start.len() != all.len() {
+                allowed = format!("{} or {allowed}", at_start.len());
+            }
+            let problem = format!(
+                "--positions must be {allowed} centres, as many as the scene has of grains that differ in size, got \
+                 {count}"
+            );
+            Err(BadArgument(problem).into())
+        }
+    }
 }
 
 fn in_words(path: &Path, view: &View) -> String {

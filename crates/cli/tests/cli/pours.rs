@@ -133,6 +133,36 @@ fn a_rendered_image_is_described_like_its_pour() {
 }
 
 #[test]
+fn positions_are_drawn_as_large_as_the_pour_left_them() {
+    let place = Place::new();
+    for (kind, table, n, other) in [
+        ("sizes", "[effects.polydispersity]\ncv = 0.3\n", "30", Some("must be 30")),
+        ("clumps", "[effects.clump]\nspheres = 3\naspect = 2.0\n", "90", None),
+        ("intruder", INTRUDER, "31", Some("30 or 31")),
+    ] {
+        let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+        let scene = fs::read_to_string(examples.join("drop.toml")).unwrap();
+        place.write("s.toml", format!("{scene}\n{table}"));
+        let pour = ["simulate", "s.toml", "--seed", "5", "--positions", "g.npy"];
+        place.run(&tiny(&pour, &["--depth", "simulated.png"]));
+        let draw = ["render", "s.toml", "--seed", "5", "--positions", "g.npy"];
+        place.expect(0, &tiny(&draw, &["-o", "drawn.png"]));
+        let bytes = |name| fs::read(place.at(name)).unwrap();
+        assert!(bytes("simulated.png") == bytes("drawn.png"), "{kind}");
+        let facts = json(&place.expect(0, &["inspect", "g.npy", "--json"]));
+        assert_eq!(facts["shape"][0].to_string(), n, "{kind}");
+        if let Some(allowed) = other {
+            granulcal_dataset::npy::write_points(&place.at("few.npy"), &[[0.0, 0.0, 0.1].into()])
+                .unwrap();
+            let few = tiny(&["render", "s.toml", "-o", "f.png", "--positions", "few.npy"], &[]);
+            place.refused(&few, &["--positions", allowed, "got 1"]);
+        }
+    }
+}
+
+const INTRUDER: &str = "[intruder]\ndiameter = 0.02\ndensity = 2500.0\nposition = [0.0, 0.0, 0.1]\n";
+
+#[test]
 fn a_view_shows_the_pour_from_where_it_stands() {
     let place = Place::new();
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
