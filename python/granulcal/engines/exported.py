@@ -120,11 +120,11 @@ class ExportedEngine:
         Raises:
             ValueError: the scene has effects, which no engine's file can be told; or it failed.
         """
-        from granulcal.export.engines import export_scene
+        from granulcal.export.engines import write_scene
 
         if left_out := self.refuses(scene):
             raise ValueError(f"engine {self.engine} cannot be told {left_out}")
-        export_scene(scene, self.engine, folder, seed=seed, young=self.young)
+        write_scene(scene, self.engine, folder, seed=seed, young=self.young)
         done = subprocess.run(
             self.words,
             cwd=folder,

@@ -93,7 +93,7 @@ system.SetSolverType(chrono.ChSolver.Type_APGD)
 system.SetMinBounceSpeed({_SLOWEST_BOUNCE:g})
 # Before the first body: what is made before has other skins.
 {chr(10).join(_skins(setup))}
-floor = chrono.ChBodyEasyBox(2, 2, 0.1, 1000, False, True, ground)
+floor = chrono.ChBodyEasyBox({2 * setup.half_width:.9g}, {2 * setup.half_width:.9g}, 0.1, 1000, False, True, ground)
 floor.SetPos(chrono.ChVector3d(0, 0, -0.05))
 floor.SetFixed(True)
 system.Add(floor)

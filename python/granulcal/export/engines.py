@@ -13,6 +13,8 @@ from granulcal.arrays import unmasked
 from granulcal.export import chrono, gazebo, isaac, lammps, liggghts, mujoco, newton, yade
 from granulcal.export.bed import bed_text
 from granulcal.export.head import commented, head
+from granulcal.export.landing import DeepContactWarning, Landing
+from granulcal.export.law import LARGEST_YOUNG, LEAST_YOUNG
 from granulcal.export.mark import require_replaceable
 from granulcal.export.setup import Setup, require_funnel_in_place
 from granulcal.files import write_beside
@@ -21,11 +23,13 @@ from granulcal.pours.scene import Scene
 __all__ = [
     "ENGINES",
     "MATERIAL_ENDINGS",
+    "DeepContactWarning",
     "SofterWarning",
     "export_bed",
     "export_material",
     "export_scene",
     "material_text",
+    "write_scene",
 ]
 
 ENGINES: dict[str, ModuleType] = {
@@ -39,8 +43,6 @@ MATERIAL_ENDINGS = {
 }  # fmt: skip
 """How the file of a material ends, by the engine's name."""
 _ELASTIC = ("lammps", "liggghts", "yade")
-# Softer than any gel, and stiffer than diamond [Pa].
-_LEAST_YOUNG, _LARGEST_YOUNG = 1e4, 1e12
 
 
 class SofterWarning(UserWarning):
@@ -62,9 +64,9 @@ def _check_young(to: str, young: float | None) -> None:
             f"young must be left out for {to}, whose grains are rigid: only {', '.join(_ELASTIC)} "
             f"take it; got {young:g}"
         )
-    if not _LEAST_YOUNG <= young <= _LARGEST_YOUNG:
+    if not LEAST_YOUNG <= young <= LARGEST_YOUNG:
         raise ValueError(
-            f"young must be from {_LEAST_YOUNG:g} to {_LARGEST_YOUNG:g} Pa, got {young:g}"
+            f"young must be from {LEAST_YOUNG:g} to {LARGEST_YOUNG:g} Pa, got {young:g}"
         )
     if to == "liggghts" and young < liggghts.LEAST_YOUNG:
         warnings.warn(
@@ -75,6 +77,19 @@ def _check_young(to: str, young: float | None) -> None:
         )
 
 
+def _landing(setup: Setup, to: str, young: float | None) -> Landing | None:
+    """Returns how elastic grains land; None where they are rigid."""
+    if to not in _ELASTIC:
+        return None
+    elastic = liggghts.stiffness(setup, young) if to == "liggghts" else setup.stiffness(young)
+    return Landing.of(setup, elastic.young)
+
+
+def _warn_of(landing: Landing | None) -> None:
+    if landing is not None and landing.is_deep:
+        warnings.warn(landing.told(), DeepContactWarning, stacklevel=3)
+
+
 def material_text(
     scene: Scene, to: str, *, young: float | None = None, source: Sequence[str] = ()
 ) -> str:
@@ -82,7 +97,9 @@ def material_text(
     module = _engine(to)
     _check_young(to, young)
     setup = Setup.of(scene)
-    lines = head(setup, module, source)
+    landing = _landing(setup, to, young)
+    _warn_of(landing)
+    lines = head(setup, module, source, landing)
     return commented(lines, module.material(setup, young), MATERIAL_ENDINGS[to])
 
 
@@ -109,6 +126,9 @@ def export_material(
     Raises:
         ValueError: no such engine, a scene that cannot be exported, a Young's modulus of rigid
             grains, or a file stands there that granulcal did not export.
+
+    Warns:
+        DeepContactWarning: the grains are so soft that they go deep into what they fall on.
     """
     text, file = material_text(scene, to, young=young, source=source), Path(path)
     if file.is_dir() or not file.suffix:
@@ -144,13 +164,33 @@ def export_scene(
         ValueError: no such engine, a scene that has what the engine cannot be told, a Young's
             modulus of rigid grains, or the folder has a file of these that granulcal did not export.
         ModuleNotFoundError: isaac without usd-core.
+
+    Warns:
+        DeepContactWarning: as `export_material`.
     """
-    module, place = _engine(to), Path(folder)
+    _engine(to)
     _check_young(to, young)
+    _warn_of(_landing(Setup.of(scene, seed), to, young))
+    return write_scene(scene, to, folder, seed=seed, young=young, source=source)
+
+
+def write_scene(
+    scene: Scene,
+    to: str,
+    folder: str | Path,
+    *,
+    seed: int = 0,
+    young: float | None = None,
+    source: Sequence[str] = (),
+) -> list[Path]:
+    """Writes a pour as `export_scene` does, without a word of what may be doubtful."""
+    module, place = _engine(to), Path(folder)
     require_funnel_in_place(scene)
     setup = Setup.of(scene, seed)
     texts = dict(module.scene(setup, young))
-    texts["README.txt"] = "\n".join([_RUN[to], "", *head(setup, module, source)]) + "\n"
+    texts["README.txt"] = (
+        "\n".join([_RUN[to], "", *head(setup, module, source, _landing(setup, to, young))]) + "\n"
+    )
     require_replaceable(place / name for name in texts)
     place.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():

@@ -68,7 +68,9 @@ def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
             f"<mass>{mass:.6g}</mass><inertia>{moments}</inertia></inertial>"
             f'<collision name="c">{ball}{surface}</collision><visual name="v">{ball}</visual></link></model>'
         )
-    plane = "<geometry><plane><normal>0 0 1</normal><size>2 2</size></plane></geometry>"
+    # As large as it is drawn; what collides has no end (SDFormat 1.9, plane).
+    side = f"{2 * setup.half_width:.9g}"
+    plane = f"<geometry><plane><normal>0 0 1</normal><size>{side} {side}</size></plane></geometry>"
     gravity = " ".join(f"{g:.9g}" for g in setup.gravity)
     ground = (
         '<model name="ground"><static>true</static><link name="link"><collision name="c">'

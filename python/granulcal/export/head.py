@@ -7,6 +7,7 @@ from types import ModuleType
 import numpy as np
 
 from granulcal.export import liggghts
+from granulcal.export.landing import Landing
 from granulcal.export.mark import signed
 from granulcal.export.setup import Setup
 
@@ -15,13 +16,19 @@ __all__ = ["commented", "head"]
 _COMMENTS = {".in": "# ", ".py": "# ", ".usda": "# "}
 
 
-def head(setup: Setup, module: ModuleType, source: Sequence[str] = ()) -> list[str]:
+def head(
+    setup: Setup,
+    module: ModuleType,
+    source: Sequence[str] = (),
+    landing: Landing | None = None,
+) -> list[str]:
     """Returns the lines of a head.
 
     Args:
         setup: the pour.
         module: writer of the engine.
         source: lines that say where numbers of the material come from.
+        landing: of elastic grains.
     """
     lines = [f"{signed(setup.name, module.ENGINE)}. In granulcal:"]
     lines += [f"  material.{name} = {value:.9g}" for name, value in vars(setup.grains).items()]
@@ -34,6 +41,8 @@ def head(setup: Setup, module: ModuleType, source: Sequence[str] = ()) -> list[s
         lines.append(
             f"grains of {1e3 * radius:.6g} to {1e3 * np.max(setup.radii):.6g} mm in radius: {module.UNEQUAL}"
         )
+    if landing is not None:
+        lines.append(landing.told())
     lines.append("No exact counterpart:")
     own = module.notes(setup) if hasattr(module, "notes") else []
     lines += [f"  {note}" for note in (*module.NOTES, *own)]

@@ -11,7 +11,9 @@ from typing import Any
 from granulcal.pours.scene import Material
 
 __all__ = [
+    "LARGEST_YOUNG",
     "LEAST_WITHOUT_TENSION",
+    "LEAST_YOUNG",
     "POISSON",
     "Contact",
     "Stiffness",
@@ -26,6 +28,8 @@ LEAST_WITHOUT_TENSION = math.exp(-2.0)
 """Restitution of the critically damped contact that lets go when its force would pull [-]."""
 POISSON = 0.25
 """Poisson's ratio of engines that ask for one [-]; ours has none."""
+LEAST_YOUNG, LARGEST_YOUNG = 1e4, 1e12
+"""Softer than any gel, and stiffer than diamond [Pa]."""
 _LEAST_RESTITUTION = 0.01
 # Least e that an engine is told, and -ln of it.
 _NOMINAL, _DECREMENT = 1e-100, 100.0 * math.log(10.0)
@@ -83,7 +87,8 @@ class Stiffness:
         """Returns the stiffness for grains of this radius [m] and density [kg/m^3].
 
         Without a Young's modulus it is 3 MPa at 1300 kg/m^3, in proportion to the density: at that
-        piles from 8 cm differ from those of 10 MPa by less than the spread of seeds.
+        piles from 8 cm differ from those of 10 MPa by less than the spread of seeds. From higher up it is
+        too soft; `landing.py` says how deep grains go into the ground.
         """
         modulus = _RIGID_YOUNG * density / _RIGID_DENSITY if young is None else young
         shear = modulus / (2.0 * (1.0 + POISSON))

@@ -10,7 +10,7 @@ from granulcal.export.mark import signed
 from granulcal.export.mesh import stl, triangles
 from granulcal.export.setup import Contact, Setup, Stiffness
 
-__all__ = ["ENGINE", "LEAST_YOUNG", "NOTES", "UNEQUAL", "material", "scene"]
+__all__ = ["ENGINE", "LEAST_YOUNG", "NOTES", "UNEQUAL", "material", "scene", "stiffness"]
 
 ENGINE = "liggghts"
 NOTES = (
@@ -32,7 +32,7 @@ _LOOK, _SLOW, _RESTING = 0.02, 0.01, 0.995
 
 def material(setup: Setup, young: float | None = None) -> str:
     """Returns the lines of a material: type 1 are grains, type 2 the ground, from 3 on the walls."""
-    stiffness = _stiffness(setup, young)
+    elastic = stiffness(setup, young)
     laws = [setup.grains, setup.ground, *(body.law for body in setup.walls)]
     n = len(laws)
 
@@ -40,7 +40,7 @@ def material(setup: Setup, young: float | None = None) -> str:
         # What grains do with wall i stands in row 1 and column i; walls never meet.
         return " ".join(f"{_value(laws[max(i, j)], name):.9g}" for i in range(n) for j in range(n))
 
-    kinds = " ".join([f"{stiffness.young:.6g}"] * n)
+    kinds = " ".join([f"{elastic.young:.6g}"] * n)
     ratios = " ".join([f"{law.POISSON}"] * n)
     rolling = _rolling(setup)
     dashpot = ""
@@ -56,7 +56,7 @@ fix           m4 all property/global coefficientFriction {table} {pairs("sliding
 fix           m5 all property/global coefficientRollingFriction {table} {pairs("rolling_friction")}
 {dashpot}pair_style    gran {_WORDS} {rolling}
 pair_coeff    * *
-timestep      {stiffness.dt:.6g}
+timestep      {elastic.dt:.6g}
 """
 
 
@@ -65,7 +65,8 @@ def _rolling(setup: Setup) -> str:
     return "epsd" if any(each.rolling_dashpot > 0 for each in laws) else "epsd2"
 
 
-def _stiffness(setup: Setup, young: float | None) -> Stiffness:
+def stiffness(setup: Setup, young: float | None = None) -> Stiffness:
+    """Returns stiffness and time step, of `LEAST_YOUNG` where less is asked for."""
     usual = setup.stiffness(young)
     return usual if usual.young >= LEAST_YOUNG else setup.stiffness(LEAST_YOUNG)
 
@@ -79,9 +80,9 @@ def _value(of: Contact, name: str) -> float:
 
 def scene(setup: Setup, young: float | None = None) -> dict[str, str]:
     """Returns the files of a pour: `liggghts -in in.pour` leaves grains.dump."""
-    stiffness = _stiffness(setup, young)
+    elastic = stiffness(setup, young)
     w, largest = setup.half_width, float(setup.radii.max())
-    look = max(1, round(_LOOK / stiffness.dt))
+    look = max(1, round(_LOOK / elastic.dt))
     files = {f"{body.name}.stl": stl(triangles(body.shape), body.name) for body in setup.walls}
     meshes = "\n".join(
         f"fix           {body.name} all mesh/surface file {body.name}.stl type {k}"
@@ -127,7 +128,7 @@ thermo_modify lost ignore norm no
 run           1
 label         again
 run           {look}
-variable      now equal "step * {stiffness.dt:.9g}"
+variable      now equal "step * {elastic.dt:.9g}"
 variable      share equal c_resting
 if            "(${{now}} > {setup.earliest:.4g}) && (${{share}} > {_RESTING})" then "jump SELF done"
 if            "${{now}} > {setup.horizon:g}" then "jump SELF done"
