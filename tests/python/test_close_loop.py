@@ -269,7 +269,7 @@ def test_what_a_task_file_lacks_is_named(tilted: Path, tmp_path: Path) -> None:
         ObservationError, match="condition 'low': path \"start.bsae\" does not name"
     ):
         load(text.replace("start.base", "start.bsae"))
-    with pytest.raises(ObservationError, match="condition 'high': start.spacing less the grains"):
+    with pytest.raises(ObservationError, match="condition 'high': start.spacing must be positive"):
         load(text.replace("start.base", "start.spacing").replace("0.06", "-6.0"))
     definitions = "".join(
         f'[[definitions]]\nname = "{value}"\nat = {{ "camera.height_threshold" = {value} }}\n'

@@ -117,6 +117,7 @@ fn accepted(
     options: &GenerateOptions,
 ) -> Result<Header, DatasetError> {
     check(options)?;
+    check_grains(scene)?;
     let mut header = Header::new(scene, prior, options.seed)?;
     prior.check_draws(scene, options.seed, options.rows).map_err(DatasetError::Prior)?;
     if let Some(engine) = engine {
@@ -128,6 +129,15 @@ fn accepted(
         starts::check(scene, prior, options)?;
     }
     Ok(header)
+}
+
+/// Refuses a batch whose every row would be empty.
+fn check_grains(scene: &granulcal_dem::Scene) -> Result<(), DatasetError> {
+    if scene.grains.count > 0 || scene.bed.is_some() || scene.intruder.is_some() {
+        return Ok(());
+    }
+    let allowed = "at least 1, for every row of a batch would be empty";
+    Err(DatasetError::Argument { what: "grains.count", got: "0".to_owned(), allowed })
 }
 
 /// More pours at once than this gain nothing: the cores, or enough to test many.

@@ -36,7 +36,7 @@ impl Bed {
             positive(&format!("bed.{name}"), number)?;
         }
         non_negative("bed.settle", self.settle)?;
-        start::jitter_fits("bed.jitter", self.jitter, self.spacing - grains.diameter)?;
+        start::jitter_fits("bed.jitter", self.jitter, self.spacing, grains.diameter)?;
         start::check_places("bed", self.radius, self.height, self.spacing)?;
         if self.lattice(grains).is_empty() {
             let allowed = "wide and high enough for a grain, which may move by bed.jitter";

@@ -30,6 +30,41 @@ pub enum SceneError {
         /// Why it does not fit, with what is allowed there.
         reason: String,
     },
+    /// A value that the number at a path cannot have.
+    #[error("{path} {reason}")]
+    Value {
+        /// The path of the number.
+        path: String,
+        /// What it must be, and what was found.
+        reason: String,
+    },
+    /// A whole number of the scene that would not be one.
+    #[error("{path} must be a whole number, got {}", General(*got))]
+    NotWhole {
+        /// The path of the number.
+        path: String,
+        /// The value found.
+        got: f64,
+    },
+    /// Places of a lattice that are so near that grains would begin in each other.
+    #[error(
+        "{name} must be {bound} {} m, got {}: a grain needs {} m, however it is turned",
+        General(*limit),
+        General(*got),
+        General(*needs)
+    )]
+    Lattice {
+        /// Path of the number, a spacing or a jitter.
+        name: String,
+        /// The value found `[m]`.
+        got: f64,
+        /// `at least` or `at most`.
+        bound: &'static str,
+        /// What it may be `[m]`.
+        limit: f64,
+        /// Diameter of the ball that holds a grain `[m]`.
+        needs: f64,
+    },
     /// A count of grains does not fit the start that should hold it.
     #[error("start {kind} holds {capacity} grains, but grains.count is {count}")]
     StartTooSmall {
@@ -149,6 +184,16 @@ pub enum SceneError {
         got: String,
         /// What is allowed.
         allowed: &'static str,
+    },
+    /// A parameter that is drawn, of a whole number of the scene.
+    #[error(
+        "prior of {parameter:?}: its draws are no whole numbers, and that number of the scene is one; fix it{hint}"
+    )]
+    PriorOfWhole {
+        /// Path of the parameter in the scene.
+        parameter: String,
+        /// What may be drawn in its place, if something may.
+        hint: &'static str,
     },
     /// A value that the prior can draw has no place in the scene.
     #[error("prior of {parameter:?} does not fit the scene at the value {}", General(*value))]

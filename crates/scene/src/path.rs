@@ -32,7 +32,7 @@ impl Scene {
         let paths = || values.iter().map(|(path, _)| *path).collect::<Vec<_>>().join(", ");
         let mut changed: Self = Value::Table(tree)
             .try_into()
-            .map_err(|e: toml::de::Error| path_error(&paths(), e.message()))?;
+            .map_err(|e: toml::de::Error| not_a_scene(&paths(), e.message()))?;
         changed.take_meshes(self);
         changed.check()?;
         *self = changed;
@@ -152,6 +152,16 @@ fn path_error(path: &str, reason: &str) -> SceneError {
     SceneError::Path { path: path.to_owned(), reason: reason.to_owned() }
 }
 
+/// What a changed scene's text is refused for: a key that is none, or a value that nothing there can be.
+fn not_a_scene(paths: &str, message: &str) -> SceneError {
+    let is_of_value = ["invalid value", "invalid type", "volume of grains"];
+    if is_of_value.iter().any(|begin| message.starts_with(begin)) {
+        SceneError::Value { path: paths.to_owned(), reason: format!("is refused: {message}") }
+    } else {
+        path_error(paths, message)
+    }
+}
+
 /// Puts `value` at `path`. A missing number or table of coefficients is created, and whether it may exist
 /// is the scene's to say; other missing tables are not: a height must not conjure up a funnel.
 fn insert(tree: &mut Table, path: &str, value: f64) -> Result<(), SceneError> {
@@ -184,26 +194,29 @@ fn insert(tree: &mut Table, path: &str, value: f64) -> Result<(), SceneError> {
     // A scene takes a whole number for either kind; which one belongs here its tree does not say.
     let is_whole = value.fract() == 0.0 && value.abs() < LARGEST_WHOLE;
     let new = if is_whole { Value::Integer(value as i64) } else { Value::Float(value) };
-    set_number(path, table.entry((*last).to_owned()).or_insert(new), value)
+    if let Some(there) = table.get_mut(*last) {
+        return set_number(path, there, value);
+    }
+    table.insert((*last).to_owned(), new);
+    Ok(())
 }
 
 /// From here on not every whole number is a number of double precision.
 const LARGEST_WHOLE: f64 = 9_007_199_254_740_992.0;
 
-/// Replaces a number by another; a whole number stays one.
+/// Replaces a number by another; a whole number, of which a scene has none below 0, stays one.
 fn set_number(path: &str, place: &mut Value, value: f64) -> Result<(), SceneError> {
     *place = match place {
-        Value::Integer(_) if value.fract() == 0.0 && value.abs() < LARGEST_WHOLE => {
+        Value::Integer(_) if value.fract() == 0.0 && (0.0..LARGEST_WHOLE).contains(&value) => {
             Value::Integer(value as i64)
         }
         Value::Integer(_) if value.fract() == 0.0 => {
-            return Err(path_error(path, &format!("must be below 2^53, got {}", General(value))));
+            let reason =
+                format!("must be a whole number from 0 to below 2^53, got {}", General(value));
+            return Err(SceneError::Value { path: path.to_owned(), reason });
         }
         Value::Integer(_) => {
-            return Err(path_error(
-                path,
-                &format!("must be a whole number, got {}", General(value)),
-            ));
+            return Err(SceneError::NotWhole { path: path.to_owned(), got: value });
         }
         Value::Float(_) => Value::Float(value),
         other => {
@@ -312,7 +325,7 @@ mod tests {
 
     #[test]
     fn refuses_what_is_no_number_of_a_scene() {
-        let scene = Scene::drop(0.1);
+        let mut scene = Scene::drop(0.1);
         for path in [
             "material.friction",
             "scene.start.kind",
@@ -325,7 +338,16 @@ mod tests {
             let error = scene.with(path, 0.1).unwrap_err();
             assert!(matches!(error, SceneError::Path { .. }), "{path}: {error}");
         }
-        assert!(scene.with("grains.count", 1.5).is_err());
+        for (value, told) in [
+            (1.5, "grains.count must be a whole number, got 1.5"),
+            (-1.0, "grains.count must be a whole number from 0 to below 2^53, got -1"),
+            (f64::NAN, "grains.count must be a whole number, got NaN"),
+        ] {
+            assert_eq!(scene.with("grains.count", value).unwrap_err().to_string(), told);
+        }
+        let spheres = scene.set(&[("effects.clump.aspect", 2.5), ("effects.clump.spheres", -1.0)]);
+        let told = spheres.unwrap_err().to_string();
+        assert!(told.contains("effects.clump.spheres is refused: invalid value"), "{told}");
     }
 
     #[test]

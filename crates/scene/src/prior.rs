@@ -106,9 +106,11 @@ impl Prior {
     /// Checks that every parameter has a place in the scene over its whole range.
     ///
     /// # Errors
-    /// [`SceneError::PriorDoesNotFit`] names the parameter and the value that does not fit.
+    /// [`SceneError::PriorDoesNotFit`] names the parameter and the value that does not fit,
+    /// [`SceneError::PriorOfWhole`] one that draws what the scene has whole numbers for.
     pub fn check(&self, scene: &Scene) -> Result<(), SceneError> {
         for parameter in &self.parameters {
+            parameter.check_whole(scene)?;
             for value in parameter.distribution.extremes() {
                 scene.with(&parameter.path, value).map_err(|source| {
                     let parameter = parameter.path.clone();
@@ -305,6 +307,11 @@ mod tests {
             ("\"fixed\"", "\"constant\"", "one of uniform"),
             ("\"material.restitution\"", "\"material.sliding_friction\"", "given once"),
             ("value = 0.4", "value = nan", "finite"),
+            (
+                "low = 0.1\n        high = 1.0",
+                "low = -1e308\n        high = 1e308",
+                "high less low",
+            ),
             ("low = 0.05", "low = 0.25", "of the normal's mass"),
             ("\"material.restitution\"", "\"material restitution\"", "words joined by dots"),
         ];
@@ -316,6 +323,16 @@ mod tests {
         let unknown = Prior::from_toml(&TEXT.replace("sd =", "sigma =")).unwrap_err();
         let source = std::error::Error::source(&unknown).unwrap().to_string();
         assert!(source.contains("sigma"), "{source}");
+    }
+
+    #[test]
+    fn whole_numbers_are_not_drawn() {
+        let text = |rest: &str| format!("[[parameter]]\npath = \"grains.count\"\n{rest}");
+        let drawn = Prior::from_toml(&text("distribution = \"uniform\"\nlow = 100\nhigh = 200"));
+        let error = drawn.unwrap().check(&Scene::drop(0.1)).unwrap_err().to_string();
+        assert!(error.contains("grains.count") && error.contains("grains.volume"), "{error}");
+        let fixed = Prior::from_toml(&text("distribution = \"fixed\"\nvalue = 100"));
+        fixed.unwrap().check(&Scene::drop(0.1)).unwrap();
     }
 
     #[test]

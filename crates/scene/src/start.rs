@@ -15,6 +15,8 @@ use crate::walls::Funnel;
 const MOST_PLACES: f64 = 1e8;
 /// Solid fraction of the closest packing of equal spheres, pi / sqrt(18).
 const CLOSEST_PACKING: f64 = 0.740_480_489_693_061;
+/// What a limit in a message is within, as a share, so that it may be taken over as it is shown, with ten digits.
+const TOLD: f64 = 1e-9;
 
 /// The arrangement of the grains at time zero, at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,8 +72,8 @@ impl Start {
         match self {
             &Self::Grid { counts, spacing, jitter, base } => {
                 finite("start.base", base)?;
-                jitter_fits("start.jitter", jitter, spacing - grains.diameter)?;
                 positive("start.spacing", spacing)?;
+                jitter_fits("start.jitter", jitter, spacing, grains.diameter)?;
                 let capacity =
                     counts.iter().fold(1, |all: usize, &count| all.saturating_mul(count));
                 if grains.count > capacity {
@@ -88,7 +90,8 @@ impl Start {
                 jitter_fits(
                     "start.jitter",
                     jitter,
-                    lattice_spacing(grains.diameter, solid_fraction) - grains.diameter,
+                    lattice_spacing(grains.diameter, solid_fraction),
+                    grains.diameter,
                 )?;
             }
             &Self::Cylinder { from, to, radius, spacing, jitter } => {
@@ -99,7 +102,7 @@ impl Start {
                 positive("start (distance of from and to)", length)?;
                 positive("start.radius", radius)?;
                 positive("start.spacing", spacing)?;
-                jitter_fits("start.jitter", jitter, spacing - grains.diameter)?;
+                jitter_fits("start.jitter", jitter, spacing, grains.diameter)?;
                 check_places("start", radius, length, spacing)?;
                 let capacity = cylinder(grains, from, to, radius, spacing, jitter).len();
                 if grains.count > capacity {
@@ -193,19 +196,29 @@ pub(crate) fn displace(points: &mut [Vector3<f64>], jitter: f64, random: &mut Pc
     }
 }
 
-/// Two neighbours may move towards each other by `jitter` along every axis, so twice its length must fit the gap.
-pub(crate) fn jitter_fits(name: &str, jitter: f64, gap: f64) -> Result<(), SceneError> {
+/// Two neighbours may move towards each other by `jitter` along every axis, so twice its length must fit the gap that
+/// grains of `diameter` leave in a lattice of `spacing` `[m]`.
+pub(crate) fn jitter_fits(
+    name: &str,
+    jitter: f64,
+    spacing: f64,
+    diameter: f64,
+) -> Result<(), SceneError> {
     non_negative(name, jitter)?;
+    let gap = spacing - diameter;
+    let refused = |name: String, got, bound, limit| {
+        Err(SceneError::Lattice { name, got, bound, limit, needs: diameter })
+    };
+    let diagonal = 2.0 * 3f64.sqrt();
     if gap < 0.0 {
         let table = name.strip_suffix(".jitter").unwrap_or(name);
-        let (name, allowed) =
-            (format!("{table}.spacing less the grains' diameter"), "at least 0 m");
-        return Err(SceneError::range(name, gap, allowed));
+        let least = (1.0 + TOLD) * (diameter + diagonal * jitter);
+        return refused(format!("{table}.spacing"), spacing, "at least", least);
     }
-    if 2.0 * jitter * 3f64.sqrt() <= gap + 1e-12 {
+    if diagonal * jitter <= gap + 1e-12 {
         return Ok(());
     }
-    Err(SceneError::range(name, jitter, "small enough that no two grains overlap"))
+    refused(name.to_owned(), jitter, "at most", (1.0 - TOLD) * gap / diagonal)
 }
 
 /// Refuses a lattice in a cylinder of more places than anybody fills.
@@ -353,6 +366,27 @@ mod tests {
             assert_eq!(points.len(), 700);
             assert!(nearest_pair(&points) >= scene.grains.diameter);
         }
+    }
+
+    #[test]
+    fn limits_of_a_lattice_are_told_and_hold() {
+        let mut scene = Scene::funnel(0.12);
+        scene.grains.shape = Some(crate::GrainShape::Box { aspect: [1.0, 1.0, 1.7] });
+        scene.effects = crate::Effects::default();
+        let Start::Grid { jitter, .. } = scene.start else { panic!() };
+        let error = scene.with("start.spacing", 8e-3).unwrap_err();
+        let SceneError::Lattice { name, bound, limit, needs, .. } = &error else {
+            panic!("{error}")
+        };
+        assert_eq!((name.as_str(), *bound), ("start.spacing", "at least"));
+        assert!((needs - scene.held_grains().diameter).abs() < 1e-15 && jitter > 0.0);
+        assert!(error.to_string().contains("got 0.008: a grain needs 0.0088"), "{error}");
+        let wide = scene.with("start.spacing", *limit).unwrap();
+        let error = wide.with("start.jitter", 2e-4).unwrap_err();
+        let SceneError::Lattice { name, bound, limit, .. } = &error else { panic!("{error}") };
+        assert_eq!((name.as_str(), *bound), ("start.jitter", "at most"));
+        assert!((limit - jitter).abs() < 1e-6 * jitter, "{limit}");
+        wide.with("start.jitter", *limit).unwrap();
     }
 
     #[test]

@@ -2,6 +2,10 @@
 
 use std::time::Duration;
 
+pub fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("must be a whole number from 0 to 2^64 - 1, got {text:?}"))
+}
+
 pub fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|&number: &f64| number > 0.0 && number.is_finite());
     number.ok_or_else(|| format!("must be a positive number, got {text:?}"))

@@ -10,7 +10,7 @@ use granulcal_scene::Scene;
 use serde_json::json;
 
 use crate::args::SceneArgs;
-use crate::args::numbers::period;
+use crate::args::numbers::{period, seed};
 use crate::args::paths::{Reads, Writes, writes};
 use crate::context::{Context, print_json, print_line};
 use crate::interrupt::keeps_going;
@@ -60,7 +60,7 @@ pub struct GenerateArgs {
     #[arg(long = "out", short = 'o', value_name = "DIR", value_parser = writes(Product::DATA_SET))]
     pub out: Writes,
     /// Seed of the data set
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
     pub seed: u64,
     /// Make the i-th of k parts only, counted from 0
     #[arg(long, value_name = "I/K", default_value = "0/1")]

@@ -14,6 +14,7 @@ use granulcal_scene::Scene;
 use serde_json::json;
 
 use crate::args::ReadArgs;
+use crate::args::numbers::seed;
 use crate::args::paths::{Reads, Writes, recording, writes};
 use crate::context::{note, print_json};
 use crate::edge::pixels_at_edge;
@@ -71,7 +72,7 @@ pub struct InferArgs {
     #[arg(long)]
     pub scene: Option<Reads>,
     /// Seed of the draws
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
     pub seed: u64,
     /// Print one JSON object
     #[arg(long)]

@@ -12,7 +12,7 @@ use granulcal_scene::{Projection, Scene, ViewSpec};
 use serde_json::{Value, json};
 
 use crate::args::SceneArgs;
-use crate::args::numbers::positive;
+use crate::args::numbers::{positive, seed};
 use crate::args::paths::{Reads, Writes, writes};
 use crate::context::{Context, note, print_json, print_line};
 use crate::outcome::{BadArgument, Outcome};
@@ -45,7 +45,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "IN.npy")]
     pub positions: Option<Reads>,
     /// Seed of the pour, of the radii of --positions and of the camera's noise
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
     pub seed: u64,
     /// Metres per count of the PNG
     #[arg(long, default_value_t = granulcal_dataset::png::DEPTH_UNIT, value_name = "METRES",

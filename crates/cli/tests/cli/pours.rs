@@ -160,7 +160,8 @@ fn positions_are_drawn_as_large_as_the_pour_left_them() {
     }
 }
 
-const INTRUDER: &str = "[intruder]\ndiameter = 0.02\ndensity = 2500.0\nposition = [0.0, 0.0, 0.1]\n";
+const INTRUDER: &str =
+    "[intruder]\ndiameter = 0.02\ndensity = 2500.0\nposition = [0.0, 0.0, 0.1]\n";
 
 #[test]
 fn a_view_shows_the_pour_from_where_it_stands() {

@@ -125,6 +125,30 @@ fn bad_recordings_are_named() {
 }
 
 #[test]
+fn numbers_of_a_scene_that_cannot_be_are_told_from_paths_that_are_none() {
+    let place = Place::new();
+    let set = |change| ["simulate", "drop", "--set", change];
+    place.refused(&set("grains.count=17.4"), &["grains.count must be a whole number, got 17.4"]);
+    place.refused(&set("grains.count=-1"), &["grains.count must be a whole number from 0", "-1"]);
+    place.refused(&set("grains.number=3"), &["does not name a number", "grains.number"]);
+    for command in [&["simulate", "drop"][..], &["render", "drop", "-o", "a.png"]] {
+        let seed = ["--seed", "-1"];
+        place.refused(&[command, &seed].concat(), &["--seed", "whole number from 0 to", "-1"]);
+    }
+    place.write(
+        "prior.toml",
+        "[[parameter]]\npath = \"grains.count\"\ndistribution = \"uniform\"\nlow = 10\nhigh = 20\n",
+    );
+    let batch = |prior, more: &[&'static str]| {
+        let command = ["generate", "drop", prior, "-n", "2", "-o", "d"];
+        [&command[..], more].concat()
+    };
+    place.refused(&batch("prior.toml", &[]), &["grains.count", "whole number", "grains.volume"]);
+    let none = batch("default", &["--set", "grains.count=0"]);
+    place.refused(&none, &["grains.count", "at least 1", "got 0"]);
+}
+
+#[test]
 fn inspect_says_what_reads_the_task_of_a_loop() {
     let place = Place::new();
     place.write("loop.toml", "scene = \"scene.toml\"\n[[conditions]]\nname = \"low\"\n");

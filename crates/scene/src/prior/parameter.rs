@@ -2,9 +2,13 @@
 
 use crate::distribution::Distribution;
 use crate::error::SceneError;
+use crate::scene::Scene;
 
 /// A normal that is cut to less mass than this is a mistake, and its inverse would lose all its digits.
 const SMALLEST_NORMAL_MASS: f64 = 1e-6;
+
+/// A share of a distribution, of no round number.
+const INSIDE: f64 = 0.381_966_011_250_105;
 
 /// One parameter of a prior.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,6 +52,31 @@ impl Parameter {
     }
 }
 
+impl Parameter {
+    /// Refuses draws of what is a whole number in the scene: hardly any of them is one.
+    ///
+    /// # Errors
+    /// [`SceneError::PriorOfWhole`].
+    pub(super) fn check_whole(&self, scene: &Scene) -> Result<(), SceneError> {
+        if matches!(self.distribution, Distribution::Fixed { .. }) {
+            return Ok(());
+        }
+        match scene.with(&self.path, self.distribution.quantile(INSIDE)) {
+            Err(SceneError::NotWhole { path, .. }) => {
+                let is_count = path.ends_with("grains.count");
+                let hint = if is_count {
+                    "; of round grains the scene may state grains.volume in place of grains.count, and a prior may \
+                     draw that"
+                } else {
+                    ""
+                };
+                Err(SceneError::PriorOfWhole { parameter: path, hint })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 /// What is wrong with a parameter, for messages.
 pub(super) fn refuse(
     parameter: &str,
@@ -69,7 +98,10 @@ fn check_distribution(path: &str, distribution: &Distribution) -> Result<(), Sce
     };
     match *distribution {
         Distribution::Uniform { low, high } => {
-            finite("low", low).and(finite("high", high)).and(ordered(low, high))
+            finite("low", low).and(finite("high", high)).and(ordered(low, high))?;
+            let refusal =
+                || refuse(path, "high less low", format!("{low:e} and {high:e}"), "finite");
+            if (high - low).is_finite() { Ok(()) } else { Err(refusal()) }
         }
         Distribution::LogUniform { low, high } => {
             if low <= 0.0 {

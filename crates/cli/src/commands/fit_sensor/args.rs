@@ -5,6 +5,7 @@ use granulcal_dataset::{Form, Product};
 use granulcal_features::Region;
 
 use crate::args::ReadArgs;
+use crate::args::numbers::seed;
 use crate::args::paths::{Reads, Writes, recording, writes};
 
 /// Fit a depth camera's noise, fixed pattern, rounding and holes to frames of a flat surface
@@ -68,7 +69,7 @@ pub struct FitSensorArgs {
     #[arg(long, default_value_t = 24, value_name = "N")]
     pub sessions: usize,
     /// Seed of the simulated sessions
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
     pub seed: u64,
     /// Recordings to compare with that the fit does not see [default: those of the fit]
     #[arg(long, value_name = "RECORDING", num_args = 1.., value_parser = recording())]

@@ -6,7 +6,7 @@ use clap::Args;
 use granulcal_dataset::{Form, Product};
 
 use crate::args::SceneArgs;
-use crate::args::numbers::{period, positive};
+use crate::args::numbers::{period, positive, seed};
 use crate::args::paths::{Reads, Writes, kept, writes};
 
 /// Simulate one pour: status, health and statistics
@@ -36,7 +36,7 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "ENGINE")]
     pub engine: Option<String>,
     /// Seed of the grains' jitter at the start and of the camera's noise
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
     pub seed: u64,
     /// Cores for the one pour; only very large scenes gain, and none changes by a bit
     #[arg(long, default_value_t = 1)]
@@ -50,7 +50,8 @@ pub struct SimulateArgs {
     /// Write the final centres [m] as an array (n, 3)
     #[arg(long, value_name = "OUT.npy", value_parser = writes(Product::File(Form::Npy)))]
     pub positions: Option<Writes>,
-    /// Write the final depth image (16-bit PNG), or the height map of an orthographic camera (.npz)
+    /// Write the final depth image (16-bit PNG, with the camera as OUT.toml beside it), or the height map of an
+    /// orthographic camera (.npz)
     #[arg(long, value_name = "OUT.png", value_parser = writes(Product::View))]
     pub depth: Option<Writes>,
     /// Metres per count of the PNG
