@@ -2,7 +2,7 @@
 //!
 //! | topic | schema | what |
 //! |---|---|---|
-//! | `/grains` | foxglove.PointCloud | centres and radii, f32 `[m]`, frame `world`; of convex bodies also the quaternion qx, qy, qz, qw |
+//! | `/grains` | foxglove.PointCloud | centres and radii, f32 `[m]`, frame `world`; of convex bodies also their turn, the quaternion qx, qy, qz, qw from the body's axes (docs/scenes.md, "Shape of the grains") |
 //! | `/walls` | foxglove.SceneUpdate | ground, funnel and walls, once, or in every frame where one moves |
 //! | `/depth` | foxglove.RawImage, 32FC1 | what the scene's camera delivers `[m]`, frame `camera`; 0 is no data |
 //! | `/heights` | foxglove.RawImage, 32FC1 | the same for an orthographic camera, instead of `/depth` |

@@ -53,7 +53,8 @@ impl fmt::Display for Status {
 /// Grains at the end of a pour: those that have not left the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pour {
-    /// Centres `[m]`, ground at z = 0.
+    /// Centres `[m]`, ground at z = 0; of grains that are several spheres those of all spheres, of one grain after the
+    /// other.
     pub positions: Vec<Vector3<f64>>,
     /// Velocities `[m/s]`.
     pub velocities: Vec<Vector3<f64>>,
@@ -89,7 +90,8 @@ pub struct BedAtRest {
 }
 
 /// Grains that are convex bodies of one shape: an intersection of half spaces, and of a cylinder about the y axis if it
-/// is round.
+/// is round. The axes of a box are along its edges, in the order in which the scene states them; of a superquadric and a
+/// hull they are the principal ones, which [`Solid::axes`] has in the shape as it is stated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvexGrains {
     /// Outward unit normals and distances from the centre of mass of the flat faces, in the body's axes `[m]`.

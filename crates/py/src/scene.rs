@@ -152,6 +152,23 @@ impl Scene {
         Ok((positions, PyArray1::from_slice(py, &simulation.radii())))
     }
 
+    /// Points whose hull every grain is, in the axes of its turn [m], so many on each rim of a cylinder; its centre of mass
+    /// where the shape is stated [m], and its axes there, a column each. None of round grains.
+    #[allow(clippy::type_complexity)] // Python's tuple.
+    fn body<'py>(
+        &self,
+        py: Python<'py>,
+        on_rim: usize,
+    ) -> PyResult<
+        Option<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)>,
+    > {
+        let Some(solid) = self.inner.grains.solid() else { return Ok(None) };
+        let vertices = array::from_vectors(py, &solid.vertices(on_rim))?;
+        let centre = PyArray1::from_slice(py, solid.centre.as_slice());
+        let axes = array::matrix(py, solid.axes.transpose().as_slice().to_vec(), 3, 3)?;
+        Ok(Some((vertices, centre, axes)))
+    }
+
     /// The pour of this scene that another simulator has left as spheres at rest.
     fn pour_of(
         &self,

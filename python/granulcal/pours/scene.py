@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
-from granulcal.whole import check_seed
+from granulcal.real import check_real
+from granulcal.whole import check_seed, check_whole
 from granulcal.words import not_there
 
 if TYPE_CHECKING:
@@ -59,8 +60,7 @@ class Material:
     def __post_init__(self) -> None:
         """Checks the types; which numbers may be is the scene's to say."""
         for name, value in asdict(self).items():
-            if isinstance(value, bool | str) or not hasattr(value, "__float__"):
-                raise TypeError(f"{name} must be a number, got {value!r}")
+            check_real(name, value)
 
     def values(self) -> dict[str, float]:
         """Returns the coefficients by their path in a scene."""
@@ -102,8 +102,10 @@ class Scene:
             preset: `fast`, `default`, `accurate` or `paper`; the default is `default`.
 
         Raises:
+            TypeError: the height is no number.
             ValueError: a number is out of its range; the message says which.
         """
+        check_real("height", height)
         return cls(_native.Scene.funnel(height))._with_options(count, material, preset)
 
     @classmethod
@@ -124,8 +126,10 @@ class Scene:
             preset: `fast`, `default`, `accurate` or `paper`; the default is `default`.
 
         Raises:
+            TypeError: the height is no number.
             ValueError: a number is out of its range; the message says which.
         """
+        check_real("height", height)
         return cls(_native.Scene.drop(height))._with_options(count, material, preset)
 
     @classmethod
@@ -193,8 +197,10 @@ class Scene:
 
         Raises:
             ValueError: a path does not exist or a value is out of its range.
-            TypeError: a word where a number belongs.
+            TypeError: what is no number where a number belongs, or no mapping.
         """
+        if changes is not None and not isinstance(changes, Mapping):
+            raise TypeError(f"changes must be values by path, a dict, got {changes!r}")
         wanted = {**(changes or {}), **more}
         native = self.native
         if "preset" in wanted:
@@ -240,6 +246,55 @@ class Scene:
         """
         check_seed(seed)
         return self.native.start(seed)
+
+    def body_vertices(self, on_rim: int = 64) -> NDArray[np.float64]:
+        r"""Returns points whose hull every grain with a shape is, in the body's own axes.
+
+        The body's origin is its centre of mass. A box has its axes along its edges, in the order
+        of `aspect`; a cylinder's axis is y; a superquadric and a hull have their principal axes,
+        in no set order, of which `body_frame` tells where they are. In the scene a point v of grain
+        i of a pour is at `positions[i] + R @ v`, with R the turn of `orientations[i]`.
+
+        Args:
+            on_rim: points on each rim of a cylinder.
+
+        Returns:
+            Points [m], shape (k, 3); (0, 3) if the grains are round or clumps of spheres.
+
+        Raises:
+            TypeError: `on_rim` is no whole number.
+            ValueError: it is below 3 or above 100,000.
+
+        Examples:
+            >>> box = 'shape = { kind = "box", aspect = [1.0, 2.0, 0.5] }'
+            >>> text = Scene.drop(0.02, count=5).to_toml().replace("[grains]", f"[grains]\n{box}")
+            >>> Scene.from_toml(text).body_vertices().max(axis=0)
+            array([0.002, 0.004, 0.001])
+        """
+        check_whole("on_rim", on_rim, at_least=3, at_most=100_000)
+        body = self.native.body(on_rim)
+        return np.zeros((0, 3)) if body is None else body[0]
+
+    def body_frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Returns where a grain's own axes are in its shape as the scene states it.
+
+        A stated point p [m] is `(p - centre) @ axes` in the body's axes: of a hull p is one of its
+        `points` times the diameter over their longest extent, of a superquadric one of its formula.
+        That brings a mesh of the user's own into the axes that `Pour.orientations` turns.
+
+        Returns:
+            The centre of mass [m], shape (3,), and the axes, a column each, right-handed, shape
+            (3, 3).
+
+        Raises:
+            ValueError: the grains have no shape.
+        """
+        body = self.native.body(3)
+        if body is None:
+            raise ValueError(
+                f"{self.name}: the grains have no grains.shape, so no axes of their own"
+            )
+        return body[1], body[2]
 
     def get(self, path: str) -> float:
         """Returns the number at `path`, for example `scene.get("funnel.height")`.
@@ -337,8 +392,7 @@ def _word(path: str, value: float | str) -> str:
 
 
 def _number(path: str, value: float | str) -> float:
-    if isinstance(value, str | bool):
-        raise TypeError(f"{path} must be a number, got {value!r}")
+    check_real(path, value)
     try:
         return float(value)
     except OverflowError:

@@ -41,7 +41,11 @@ class Pour:
 
     @cached_property
     def positions(self) -> Array:
-        """Centres of the grains [m], ground at z = 0, shape (n, 3): of those in the scene."""
+        """Centres of the grains [m], ground at z = 0, shape (n, 3): of those in the scene.
+
+        Grains that are clumps (`effects.clump`) have a row for each sphere, of one grain after the
+        other; so have velocities and radii.
+        """
         return read_only(self._native.positions)
 
     @cached_property
@@ -56,12 +60,18 @@ class Pour:
 
     @cached_property
     def orientations(self) -> Array:
-        """Turns of grains that are not round, quaternions i, j, k, w, shape (n, 4); else (0, 4)."""
+        """Turns of grains with a shape, quaternions i, j, k, w, shape (n, 4); else (0, 4).
+
+        From the body's axes, about its centre of mass, to the scene's: those of a box are along its
+        edges, a cylinder's axis is y, a superquadric and a hull have their principal axes.
+        `Scene.body_vertices` has the body in them, `vertices` in the scene. SciPy's
+        `Rotation.from_quat` takes this order.
+        """
         return read_only(self._native.orientations)
 
     @cached_property
     def radii(self) -> Array:
-        """Radii of the grains [m], shape (n,); half the diameter if they are not round."""
+        """Radii [m], shape (n,), of clumps those of spheres; of a shape half the diameter."""
         return read_only(self._native.radii)
 
     @cached_property
@@ -98,6 +108,26 @@ class Pour:
     def cpu_seconds(self) -> float:
         """Processor time of the simulation [s]."""
         return self._native.cpu_seconds
+
+    def vertices(self, on_rim: int = 64) -> Array:
+        """Returns where the points of `Scene.body_vertices` are at the end [m], shape (n, k, 3).
+
+        (0, 0, 3) if the grains are round or clumps.
+
+        Args:
+            on_rim: points on each rim of a cylinder.
+
+        Raises:
+            TypeError: `on_rim` is no whole number.
+            ValueError: it is below 3 or above 100,000.
+        """
+        body = self.scene.body_vertices(on_rim)
+        if len(self.orientations) == 0:
+            return np.zeros((0, 0, 3))
+        axis, w = self.orientations[:, None, :3], self.orientations[:, None, 3:]
+        across = np.cross(axis, body[None])
+        turned = body[None] + 2.0 * (w * across + np.cross(axis, across))
+        return self.positions[:, None] + turned
 
     def depth_image(self) -> NDArray[np.float32]:
         """Returns what the scene's pinhole camera sees: depth [m], 0 is no data, shape (h, w).
@@ -189,13 +219,22 @@ class Pour:
     def _repr_html_(self) -> str:
         from granulcal.html import page, picture, seen_from_above
 
-        rows = {"status": self.status, "grains": len(self.radii)}
+        rows = {"status": self.status, "what": self._told_count}
         rows |= {"simulated": f"{self.simulated_s:.2f} s", "seed": self.seed}
         view = self._observation
         label = "z [m]" if view.depth is None else "depth [m]"
         image = view.heights if view.depth is None else view.depth
         drawn = "" if image is None else picture(seen_from_above(image, label))
         return page(f"Pour of {self.scene.name}", rows, drawn)
+
+    @property
+    def _told_count(self) -> str:
+        spheres = len(self.radii)
+        if self.scene.get("effects.clump.aspect") <= 1.0:
+            return f"{spheres} grains"
+        return (
+            f"{spheres} spheres of {spheres // int(self.scene.get('effects.clump.spheres'))} grains"
+        )
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
@@ -204,7 +243,7 @@ class Pour:
         )
 
     def __repr__(self) -> str:
-        return f"Pour({len(self.radii)} grains, {self.status}, {self.simulated_s:.2f} s)"
+        return f"Pour({self._told_count}, {self.status}, {self.simulated_s:.2f} s)"
 
 
 def simulate(

@@ -40,6 +40,10 @@ pub struct Solid {
     pub half_extents: Vector3<f64>,
     /// Radius of the ball about the centre that holds it `[m]`.
     pub reach: f64,
+    /// Its centre of mass where the shape is stated, in units of the scene `[m]`.
+    pub centre: Vector3<f64>,
+    /// Its axes there, a column each, right-handed: the shape's own of a box and a cylinder.
+    pub axes: Matrix3<f64>,
     /// The body scaled so that `reach` is 1: parry's tolerances are absolute.
     pub unit: SharedShape,
 }
@@ -93,6 +97,8 @@ impl Solid {
             ) / 12.0,
             half_extents: half,
             reach,
+            centre: Vector3::zeros(),
+            axes: Matrix3::identity(),
             unit: SharedShape::new(Cuboid::new(parry(&(half / reach)))),
         }
     }
@@ -108,6 +114,8 @@ impl Solid {
             inertia: Vector3::new(across, radius * radius / 2.0, across),
             half_extents: Vector3::new(radius, half, radius),
             reach,
+            centre: Vector3::zeros(),
+            axes: Matrix3::identity(),
             unit: SharedShape::new(Cylinder::new(half / reach, radius / reach)),
         }
     }
@@ -144,8 +152,20 @@ impl Solid {
             volume,
             inertia: eigen.eigenvalues,
             reach,
+            centre,
+            axes,
             unit: SharedShape::new(body),
         })
+    }
+
+    /// Points whose hull it is, in its own axes `[m]`: its corners, or as many points as asked for on each rim of a cylinder.
+    pub fn vertices(&self, on_rim: usize) -> Vec<Vector3<f64>> {
+        let Some((radius, half)) = self.round else { return self.corners.clone() };
+        let at = |number: usize, y: f64| {
+            let angle = std::f64::consts::TAU * number as f64 / on_rim as f64;
+            Vector3::new(radius * angle.cos(), y, radius * angle.sin())
+        };
+        [-half, half].iter().flat_map(|&y| (0..on_rim).map(move |number| at(number, y))).collect()
     }
 
     /// Whether it is a box, of [`Self::half_extents`].
@@ -264,8 +284,8 @@ mod tests {
             let at = turn * Vector3::new(side(0, 0.5), side(1, 1.0), side(2, 1.5));
             (at + Vector3::new(5.0, -2.0, 1.0)).into()
         };
-        let points = (0..8).map(corner).collect();
-        let hull = of(GrainShape::Hull { points });
+        let points: Vec<[f64; 3]> = (0..8).map(corner).collect();
+        let hull = of(GrainShape::Hull { points: points.clone() });
         // The longest extent of the points is not that of the box: the size is set by the points as they are.
         let scale = (hull.volume / 6.0).cbrt();
         let mut moments: Vec<_> = hull.inertia.iter().map(|m| 12.0 * m / scale.powi(2)).collect();
@@ -274,6 +294,13 @@ mod tests {
             assert!((got - expected).abs() < 1e-6, "{moments:?}");
         }
         assert_eq!((hull.corners.len(), hull.faces.len()), (8, 6));
+        // Back where they were stated, in metres.
+        let shape = GrainShape::Hull { points };
+        for stated in shape.points(4e-3) {
+            let back = |c: &Vector3<f64>| (hull.axes * c + hull.centre - stated).norm();
+            assert!(hull.vertices(0).iter().map(back).fold(f64::MAX, f64::min) < 1e-12);
+        }
+        assert!((hull.axes.determinant() - 1.0).abs() < 1e-12);
         for (normal, distance) in &hull.faces {
             let farthest = hull.corners.iter().map(|c| c.dot(normal)).fold(f64::MIN, f64::max);
             assert!(close(farthest, *distance), "{farthest} {distance}");
