@@ -14,6 +14,7 @@ from granulcal.bayessim.arrays import as_matrix
 from granulcal.documents import LARGEST_DOCUMENT, read_bytes
 from granulcal.errors import PriorError
 from granulcal.parameter import Parameter
+from granulcal.real import check_real
 from granulcal.words import not_there
 
 __all__ = ["Parameter", "Prior"]
@@ -38,6 +39,7 @@ class Prior:
         parameters: the parameters, each path once, at least one of them free.
 
     Raises:
+        TypeError: one is no `Parameter`.
         PriorError: a path is repeated, or no parameter is free.
 
     Examples:
@@ -51,6 +53,9 @@ class Prior:
     def __init__(self, parameters: Iterable[Parameter]) -> None:
         """Checks the list as a whole; each parameter has checked itself."""
         self.parameters: tuple[Parameter, ...] = tuple(parameters)
+        for each in self.parameters:
+            if not isinstance(each, Parameter):
+                raise TypeError(f"parameters must be Parameter objects, got {each!r} among them")
         paths = [parameter.path for parameter in self.parameters]
         repeated = sorted({path for path in paths if paths.count(path) > 1})
         if repeated:
@@ -74,7 +79,12 @@ class Prior:
 
         Args:
             grain_diameter: diameter of the grains [m].
+
+        Raises:
+            TypeError: the diameter is no number.
+            PriorError: it is not positive.
         """
+        check_real("grain_diameter", grain_diameter)
         if not (np.isfinite(grain_diameter) and grain_diameter > 0):
             raise PriorError(f"grain_diameter must be positive [m], got {grain_diameter}")
         effective_radius = grain_diameter / 4
@@ -129,8 +139,11 @@ class Prior:
         """Returns the prior written as `[[parameter]]` tables.
 
         Raises:
+            TypeError: not text.
             PriorError: not TOML, an unknown key, or numbers that do not fit.
         """
+        if not isinstance(text, str):
+            raise TypeError(f"text must be the TOML of a prior, a str, got {text!r}")
         try:
             document = tomllib.loads(text)
         except (tomllib.TOMLDecodeError, RecursionError) as error:

@@ -70,18 +70,31 @@ impl Intrinsics {
         cx: f64,
         cy: f64,
     ) -> Result<Self, FeatureError> {
+        Self::checked((width, height), (fx, fy), (cx, cy), 0.0)
+    }
+
+    /// As [`Intrinsics::new`] from a principal point that the caller counts from a place that lies `shift` beyond the
+    /// corner, in whose numbers it is refused.
+    fn checked(
+        (width, height): (usize, usize),
+        (fx, fy): (f64, f64),
+        (stated_x, stated_y): (f64, f64),
+        shift: f64,
+    ) -> Result<Self, FeatureError> {
         require_in("image width [px]", width as f64, 1.0, MAX_SIDE_PX as f64)?;
         require_in("image height [px]", height as f64, 1.0, MAX_SIDE_PX as f64)?;
         require_in("focal length fx [px]", fx, f64::MIN_POSITIVE, MAX_FOCAL_PX)?;
         require_in("focal length fy [px]", fy, f64::MIN_POSITIVE, MAX_FOCAL_PX)?;
-        require_finite("principal point [px]", [cx, cy].into_iter())?;
+        require_finite("principal point [px]", [stated_x, stated_y].into_iter())?;
         // A part of an image may have it outside, but not far.
-        for (name, at, side) in
-            [("principal point cx [px]", cx, width), ("principal point cy [px]", cy, height)]
-        {
-            require_in(name, at, -(side as f64), 2.0 * side as f64)?;
+        for (name, at, side) in [
+            ("principal point cx [px]", stated_x, width),
+            ("principal point cy [px]", stated_y, height),
+        ] {
+            require_in(name, at, -(side as f64) - shift, 2.0 * side as f64 - shift)?;
         }
         require_in("focal lengths fy over fx", fy / fx, 0.5, 2.0)?;
+        let (cx, cy) = (stated_x + shift, stated_y + shift);
         Ok(Self { width, height, fx, fy, cx, cy })
     }
 
@@ -98,7 +111,7 @@ impl Intrinsics {
         ppx: f64,
         ppy: f64,
     ) -> Result<Self, FeatureError> {
-        Self::new(width, height, fx, fy, ppx + 0.5, ppy + 0.5)
+        Self::checked((width, height), (fx, fy), (ppx, ppy), 0.5)
     }
 
     /// Intrinsics of the image that keeps every `n`-th pixel (see [`sample_offset`]).

@@ -1,7 +1,7 @@
 //! How a recording is segmented, as Python's keywords.
 
 use granulcal_features::{Segmentation, Threshold};
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -12,8 +12,8 @@ const KEYWORDS: &str = "height_threshold, threshold_floor, border_px, downsample
 /// A recording's own segmentation with what the keywords change; what is None stays.
 ///
 /// # Errors
-/// `TypeError` names a keyword that there is not, and one whose value is of another type; `OverflowError` one that is
-/// no count.
+/// `TypeError` names a keyword that there is not, and one whose value is of another type; `ValueError` one that is no
+/// count.
 pub(crate) fn changed(
     own: &Segmentation,
     keywords: Option<&Bound<'_, PyDict>>,
@@ -39,7 +39,7 @@ pub(crate) fn changed(
             PyErr::from_type(error.get_type(value.py()), text)
         };
         let real = || value.extract::<f64>().map_err(named);
-        let whole = || value.extract::<usize>().map_err(named);
+        let whole = || value.extract::<usize>().map_err(|error| whole_or(error, &value, named));
         match keyword.as_str() {
             "height_threshold" => threshold = Some(real()?),
             "threshold_floor" => floor = Some(real()?),
@@ -52,7 +52,10 @@ pub(crate) fn changed(
             "flying_deg" => settings.flying_deg = real()?,
             "max_height" => settings.max_height = Some(real()?),
             "min_component_px" => settings.min_component_px = whole()?,
-            "plane_seed" => settings.plane_seed = value.extract().map_err(named)?,
+            "plane_seed" => {
+                settings.plane_seed =
+                    value.extract().map_err(|error| whole_or(error, &value, named))?;
+            }
             other => refuse_unknown(other)?,
         }
     }
@@ -62,6 +65,15 @@ pub(crate) fn changed(
         (None, None) => settings.height_threshold,
     };
     Ok(settings)
+}
+
+/// What is wrong with a count or a seed: below 0 or too large for one, or else what `named` makes of it.
+fn whole_or(error: PyErr, value: &Bound<'_, PyAny>, named: impl Fn(PyErr) -> PyErr) -> PyErr {
+    if !error.is_instance_of::<PyOverflowError>(value.py()) {
+        return named(error);
+    }
+    let text = format!("must be a whole number from 0 to 2^64 - 1, got {value}");
+    named(PyValueError::new_err(text))
 }
 
 fn refuse_unknown(keyword: &str) -> PyResult<()> {

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from granulcal.real import check_real
+
 __all__ = ["PERCENTILES", "STATISTICS", "Ring"]
 
 PERCENTILES: tuple[float, float] = (5.0, 50.0)
@@ -35,6 +37,9 @@ class Ring:
 
     def __post_init__(self) -> None:
         """Checks that the radii can be those of a ring."""
+        check_real("outer", self.outer)
+        if self.inner is not None:
+            check_real("inner", self.inner)
         if not (np.isfinite(self.outer) and self.outer > 0):
             raise ValueError(f"outer must be a positive radius [m], got {self.outer}")
         if self.inner is not None and not 0 < self.inner < self.outer:

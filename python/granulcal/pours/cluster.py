@@ -96,8 +96,16 @@ def cluster_in_use() -> Cluster | None:
 
 
 def cluster_asked(ray: "str | Cluster | None") -> Cluster | None:
-    """Returns the cluster of an argument `ray`: an address, a cluster, or None for the job's."""
-    return Cluster(ray) if isinstance(ray, str) else ray or cluster_in_use()
+    """Returns the cluster of an argument `ray`: an address, a cluster, or None for the job's.
+
+    Raises:
+        TypeError: something else.
+    """
+    if ray is None:
+        return cluster_in_use()
+    if not isinstance(ray, str | Cluster):
+        raise TypeError(f"ray must be the address of a cluster, a str, or None, got {ray!r}")
+    return Cluster(ray) if isinstance(ray, str) else ray
 
 
 def refuse_engine(engine: "Engine | None") -> None:

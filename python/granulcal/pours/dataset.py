@@ -224,6 +224,7 @@ def generate(
             has parts already keeps their size.
 
     Raises:
+        TypeError: an argument is of another kind.
         ValueError: a number that is out of its range, a parameter that does not fit the scene, or
             a folder made from something else.
         OSError: the folder cannot be written.
@@ -244,12 +245,12 @@ def generate(
         check_whole("chunk", chunk, at_least=1)
     if threads is not None:
         check_whole("threads", threads, at_least=1)
-    folder = Path(tempfile.mkdtemp(prefix="granulcal-") if out is None else out)
-    line = ProgressLine() if progress is True else None
-    report = line if line is not None else (progress if callable(progress) else None)
     cluster = cluster_asked(ray)
     if cluster is not None:
         refuse_engine(engine)
+    folder = Path(tempfile.mkdtemp(prefix="granulcal-") if out is None else out)
+    line = ProgressLine() if progress is True else None
+    report = line if line is not None else (progress if callable(progress) else None)
     try:
         if cluster is not None:
             counts = gather(

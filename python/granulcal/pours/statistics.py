@@ -107,6 +107,18 @@ class _Named:
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self._values, dtype=dtype, copy=True if copy is None else copy)
 
+    def __eq__(self, other: object) -> bool:
+        """Whether the other is of the same kind, names and values; NaN is as NaN."""
+        if not isinstance(other, _Named) or type(other) is not type(self):
+            return NotImplemented
+        same = np.array_equal(other._values, self._values, equal_nan=True)
+        return other.names == self.names and same
+
+    def __hash__(self) -> int:
+        # One zero, and one NaN.
+        values = np.nan_to_num(np.asarray(self._values, float)) + 0.0
+        return hash((tuple(self._names), values.tobytes()))
+
     def __repr__(self) -> str:
         shown = ", ".join(f"{name}={value:.4g}" for name, value in self.to_dict().items())
         return f"{type(self).__name__}({shown})"

@@ -24,6 +24,7 @@ from granulcal.bayessim.posterior.doubts import (
 from granulcal.bayessim.posterior.marginal import CredibleRegion, Marginal, kernel_density
 from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
+from granulcal.real import check_real
 from granulcal.whole import check_seed, check_whole
 
 if TYPE_CHECKING:
@@ -70,7 +71,17 @@ class Posterior:
     def __init__(
         self, prior: Prior, density: _native.Posterior, *, warnings: tuple[Doubt, ...] = ()
     ) -> None:
-        """Joins a prior and a density over its coordinates."""
+        """Joins a prior and a density over its coordinates.
+
+        Raises:
+            TypeError: one is something else.
+        """
+        if not isinstance(prior, Prior):
+            raise TypeError(f"prior must be a Prior, got {prior!r}")
+        if not isinstance(density, _native.Posterior):
+            raise TypeError(
+                f"density must be the extension's, as `from_mixture` makes it, got {density!r}"
+            )
         self.prior = prior
         self.density = density
         self.warnings = (*warnings, *doubts_of(density))
@@ -234,7 +245,13 @@ class Posterior:
 
     @one_thread()
     def credible_region(self, level: float = 0.9) -> CredibleRegion:
-        """Returns central intervals and the highest-density region of probability `level`."""
+        """Returns central intervals and the highest-density region of probability `level`.
+
+        Raises:
+            TypeError: the level is no number.
+            ValueError: it does not lie between 0 and 1.
+        """
+        check_real("level", level)
         if not 0 < level < 1:
             raise ValueError(f"level must lie between 0 and 1, got {level}")
         draws, log_density = self._draws()
