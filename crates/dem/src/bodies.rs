@@ -19,6 +19,7 @@
 //! | `contact` | the law at a point |
 //! | `impact` | impacts, each at its time |
 //! | `rims` | points of contact at the rims of walls |
+//! | `edges` | points of contact at the edges of boxes and meshes |
 //! | `lever` | what a point's arm does where the inertia is 1 |
 //! | `batch` | eight points, and one round of the law for them |
 //! | `sweeps` | sweeps over all points |
@@ -31,6 +32,7 @@ mod collide;
 mod contact;
 mod corners;
 mod cylinders;
+mod edges;
 #[cfg(test)]
 mod exams;
 mod foresee;

@@ -2,7 +2,7 @@
 //!
 //! Pure functions without loops over contacts; docs/theory/contact.md derives them.
 
-use granulcal_scene::{Effect, Effects, GrainShape, Scene, Start};
+use granulcal_scene::{Effect, Effects, GrainShape, Scene, Shape, Start, Wall};
 use nalgebra::Vector3;
 
 use crate::lanes::{Reg, Reg3, Width};
@@ -59,7 +59,8 @@ pub fn law_of(scene: &Scene) -> u32 {
 /// foreseen, no deeper than sweeps may leave a point, was no point of contact yet; to 8 and 7 when corners that go through
 /// a shell were foreseen as those that go through a plane. Bodies and clumps that nutate came one farther when they turned
 /// in parts of a substep, and bodies where walls move when those were looked at where they go; bodies in scenes with walls of
-/// their own when corners that go through the edge where two sides meet were found. Balls with a film between
+/// their own when corners that go through the edge where two sides meet were found, and those at boxes, meshes and other
+/// outlets than round ones once more when they touched the edges of triangles and went round them. Balls with a film between
 /// them came to 2 when Newton's steps told what it leaves of a speed, and clumps to 3 when the ends of their ways were
 /// looked at. Unequal balls came to 2 when contacts were solved to the least of them, and
 /// those that are parted to 3 when none went through a wall for it, and they were parted across the ends of a period.
@@ -76,10 +77,14 @@ pub fn arithmetic(scene: &Scene) -> u32 {
     let mut motions = motions.chain(scene.funnel.iter().map(|funnel| &funnel.motion));
     let meets_moving = solid.is_some() && motions.any(|motion| !motion.is_still());
     let meets_edges = solid.is_some() && !scene.walls.is_empty();
-    let Effects { clump, lubrication, polydispersity, .. } = &scene.effects;
+    let Effects { clump, lubrication, polydispersity, outlet, .. } = &scene.effects;
+    let has_facets = |wall: &Wall| matches!(wall.shape, Shape::Box { .. } | Shape::Mesh(_));
+    let has_facets = scene.walls.iter().any(has_facets) || outlet.is_on();
+    let meets_facets = solid.is_some() && has_facets;
     let solved_anew = [clump.is_on(), lubrication.is_on(), polydispersity.is_on()];
     let of_effects: u32 = solved_anew.map(u32::from).iter().sum();
-    let of_shape = of_shape + u32::from(nutates || meets_moving) + u32::from(meets_edges);
+    let of_shape = of_shape + u32::from(nutates || meets_moving);
+    let of_shape = of_shape + u32::from(meets_edges) + u32::from(meets_facets);
     of_shape + of_effects + u32::from(is_parted(scene))
 }
 
@@ -190,7 +195,7 @@ pub(crate) fn project_ball<W: Width>(impulse: Reg3<W>, limit: Reg<W>) -> Reg3<W>
 
 #[cfg(test)]
 mod tests {
-    use granulcal_scene::{Shape, Wall, WallMaterial};
+    use granulcal_scene::WallMaterial;
     use proptest::prelude::*;
 
     use super::*;
@@ -224,7 +229,7 @@ mod tests {
         boxed.grains.shape = Some(GrainShape::Box { aspect: [1.0; 3] });
         let shape = Shape::Box { min: [-0.1; 3], max: [0.1; 3], open: Vec::new() };
         boxed.walls.push(Wall::fixed(shape, WallMaterial::default()));
-        assert_eq!(arithmetic(&boxed), 9);
+        assert_eq!(arithmetic(&boxed), 10);
         let mut clumps = balls.clone();
         clumps.effects.clump.aspect = 1.5;
         assert_eq!(arithmetic(&clumps), 3);

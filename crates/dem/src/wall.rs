@@ -2,6 +2,7 @@
 //! surfaces, and a grain may touch each of them once.
 //! Planes and discs are in `wall/surface.rs`, shells in `wall/frustum.rs`, triangles in `wall/facets.rs`.
 
+mod edges;
 mod facets;
 mod frustum;
 mod nearest;
@@ -13,6 +14,7 @@ use std::sync::Arc;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::placement::Placement;
+pub(crate) use edges::{Edge, Led};
 use facets::Facets;
 use granulcal_scene::{BoxSide, Material, Motion, Scene, Shape, WallMaterial};
 pub(crate) use nearest::{Nearest, Passage, any_normal};
@@ -202,7 +204,7 @@ impl Walls {
     }
 
     /// Whether the way from one place to another, at `now` `[s]` into a substep, changes the side of a surface round an end
-    /// at which nothing goes on. Of triangles it is not told.
+    /// at which nothing goes on. Of triangles [`Self::way`] tells it.
     pub fn leads_round(
         &self,
         surface: usize,
@@ -285,9 +287,16 @@ impl Walls {
         self.all.iter_mut().filter_map(|wall| wall.placement.as_mut())
     }
 
-    /// The number of a surface's wall.
+    /// The number of a surface's wall; of what is numbered after the surfaces, too: rims, and the edges of each wall.
     pub fn owner(&self, surface: usize) -> usize {
-        self.owner[surface] as usize
+        let Some(&owner) = self.owner.get(surface) else {
+            let after = surface - self.owner.len();
+            return self
+                .rims
+                .get(after)
+                .map_or_else(|| after - self.rims.len(), |(owner, _)| *owner);
+        };
+        owner as usize
     }
 
     /// The number of a surface's wall, that wall, and the number of the surface on it.

@@ -7,12 +7,14 @@ use super::around::Around;
 use super::body::Moving;
 use super::boxes;
 use super::contact::Point;
+use super::edges::at_edges;
 use super::manifold::manifold;
 use super::meeting::{Asked, Meeting};
 use super::motion::{Motion, Way};
 use super::pairs::{Neighbours, Pair};
 use super::pose::Pose;
 use super::rims::at_rims;
+use crate::wall::Led;
 use granulcal_scene::Solid;
 
 /// What may meet in a substep, and where.
@@ -46,7 +48,8 @@ pub(super) fn contacts(
         let first = points.len();
         let range = around.range(&motions[i], None) + around.way_of_walls(&pose.centre);
         let is_near = at_walls(around, pose, i, (0.0, range), &mut points)
-            | at_rims(around, pose, i, (0.0, range), &mut points);
+            | at_rims(around, pose, i, (0.0, range), &mut points)
+            | at_edges(around, pose, i, (0.0, range), &mut points);
         clear_of_walls.push(if is_near { f64::NEG_INFINITY } else { range });
         points[first..].sort_by_key(Point::name);
     }
@@ -127,9 +130,7 @@ pub(super) fn at_walls(
         let mut touch = |mark: Vector3<f64>| {
             let arm = body.axes * mark;
             let near = walls.nearest(surface, &(body.centre + arm), now);
-            // Beyond the end of a shell or a disc it is its rim that touches.
             let is_beyond = near.side == 0 && near.distance > 0.0;
-            let is_at_rim = is_beyond && !wall.has_facets();
             // Behind two surfaces that meet there it has come through one of them.
             if is_beyond {
                 let corner = body.centre + arm;
@@ -139,15 +140,27 @@ pub(super) fn at_walls(
                     return;
                 }
             }
-            if near.distance.is_infinite() || is_at_rim {
+            if near.distance.is_infinite() {
+                return;
+            }
+            let corner = body.centre + arm;
+            // Beyond the end of a shell or a disc it is its rim that touches, of triangles their edge.
+            if is_beyond && (!wall.has_facets() || walls.is_sharp_at(surface, &corner, now)) {
                 return;
             }
             // A corner that has come through a shell, and not round its end, is on the other side of it than the centre.
             let from_wall = near.distance * near.normal - arm;
-            let is_through = near.side != 0
+            let mut is_through = near.side != 0
                 && near.distance > 0.0
                 && from_wall.dot(&near.normal) < 0.0
-                && !walls.leads_round(surface, &body.centre, &(body.centre + arm), now);
+                && !walls.leads_round(surface, &body.centre, &corner, now);
+            if is_through && wall.has_facets() {
+                match walls.way(surface, [&body.centre, &corner], now, around.least()) {
+                    Led::Through => {}
+                    Led::Round => is_through = false,
+                    Led::Elsewhere => return,
+                }
+            }
             let (gap, normal) = if is_through {
                 (-near.distance, -near.normal)
             } else {

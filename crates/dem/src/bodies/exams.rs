@@ -1,5 +1,7 @@
 //! Bodies against answers that are known: one body first, then a stack and a heap.
 
+mod edges;
+
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::body::{Moving, RigidBody};

@@ -4,6 +4,7 @@ use super::around::Around;
 use super::body::Moving;
 use super::collide::{Contacts, at_walls, clearance, meet};
 use super::contact::Point;
+use super::edges::at_edges;
 use super::meeting::Asked;
 use super::motion::{Motion, Way};
 use super::pairs::{Neighbours, Pair, SLACK};
@@ -45,6 +46,7 @@ impl Contacts {
                 let pose = later.find(i);
                 at_walls(around, pose, i, (dt, range), &mut new);
                 at_rims(around, pose, i, (dt, range), &mut new);
+                at_edges(around, pose, i, (dt, range), &mut new);
             }
         }
         let mut asked = Vec::new();

@@ -17,11 +17,14 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation};
 use parry3d_f64::shape::{Triangle, TrianglePointLocation};
 
+use super::edges::Edge;
 use super::surface::crossing_of_plane;
 use super::{Nearest, Passage};
 
 /// Shares of a triangle and sines of angles that are zero but for rounding `[-]`.
 const ROUNDING: f64 = 1e-9;
+/// Triangles that bend by less than this at an edge lie flat there, as a sine `[-]`.
+const FLAT: f64 = 1e-3;
 
 /// The triangles of a mesh, in metres.
 #[derive(Clone, Debug)]
@@ -42,14 +45,16 @@ struct Facet {
     corners: [u32; 3],
     /// Edges AB, BC and CA into `Facets::across`.
     edges: [Range<u32>; 3],
+    /// At which of them the mesh ends or bends.
+    is_sharp: [bool; 3],
 }
 
 /// A triangle across an edge.
 #[derive(Clone, Debug)]
-struct Across {
+pub(super) struct Across {
     facet: u32,
     /// From the edge into that triangle, at right angles to the edge.
-    inwards: Vector3<f64>,
+    pub inwards: Vector3<f64>,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -58,6 +63,8 @@ struct Corner {
     owner: u32,
     /// Into `Facets::leaving`.
     leaving: Range<u32>,
+    /// Whether the mesh ends or bends there.
+    is_sharp: bool,
 }
 
 fn parry(v: &Vector3<f64>) -> ParryVector {
@@ -100,9 +107,25 @@ impl Facets {
                 });
                 let triangle = Triangle::new(parry(&a), parry(&b), parry(&c));
                 let normal = (b - a).cross(&(c - a)).normalize();
-                Facet { triangle, normal, corners, edges }
+                let is_sharp = [0, 1, 2].map(|edge: usize| {
+                    let ends = [corners[edge], corners[(edge + 1) % 3]];
+                    let Range { start, end } = edges[edge];
+                    is_sharp(
+                        &inwards(vertices, ends, corners),
+                        &across[start as usize..end as usize],
+                    )
+                });
+                Facet { triangle, normal, corners, edges, is_sharp }
             })
             .collect();
+        let mut sharp_corners = vec![false; vertices.len()];
+        for facet in &all {
+            for edge in (0..3).filter(|&edge| facet.is_sharp[edge]) {
+                for end in [edge, (edge + 1) % 3] {
+                    sharp_corners[facet.corners[end] as usize] = true;
+                }
+            }
+        }
         let mut leaving = Vec::new();
         let corners = at_corner
             .iter()
@@ -117,7 +140,8 @@ impl Facets {
                     }
                 }
                 let owner = users.first().copied().unwrap_or_default();
-                Corner { owner, leaving: first..leaving.len() as u32 }
+                let is_sharp = sharp_corners[corner];
+                Corner { owner, leaving: first..leaving.len() as u32, is_sharp }
             })
             .collect();
         let boxes = all.iter().map(|facet| facet.triangle.local_aabb()).enumerate();
@@ -199,6 +223,67 @@ impl Facets {
         is_through.then_some(passage)
     }
 
+    /// Whether the point of a triangle that is nearest to a place is on an edge or a corner where the mesh ends or bends.
+    pub fn is_sharp_at(&self, number: usize, place: &Vector3<f64>) -> bool {
+        let facet = &self.all[number];
+        match facet.triangle.project_local_point_and_get_location(parry(place), false).1 {
+            TrianglePointLocation::OnEdge(edge, _) => facet.is_sharp[edge as usize],
+            TrianglePointLocation::OnVertex(corner) => {
+                self.corners[facet.corners[corner as usize] as usize].is_sharp
+            }
+            TrianglePointLocation::OnFace(..) | TrianglePointLocation::OnSolid => false,
+        }
+    }
+
+    /// The edges of a triangle where the mesh ends or bends, but for those that an earlier triangle has.
+    pub fn sharp_edges(&self, number: usize) -> impl Iterator<Item = Edge<'_>> {
+        let facet = &self.all[number];
+        let Triangle { a, b, c } = facet.triangle;
+        let vertices = [a, b, c].map(plain);
+        (0..3).filter_map(move |edge| {
+            let across = self.across(number, edge as u32);
+            let is_own = across.iter().all(|other| other.facet as usize > number);
+            let next = (edge + 1) % 3;
+            let leaving = [edge, next].map(|corner| self.leaving(number, corner as u32));
+            let [from, to, third] = [edge, next, (edge + 2) % 3].map(|corner| vertices[corner]);
+            (is_own && facet.is_sharp[edge]).then(|| Edge::new([from, to], third, across, leaving))
+        })
+    }
+
+    /// How far from a triangle a way from one place to another crosses its plane, 0 in it `[m]`, and where; nothing if it
+    /// does not but for rounding.
+    pub fn crossed_beside(
+        &self,
+        number: usize,
+        from: &Vector3<f64>,
+        to: &Vector3<f64>,
+    ) -> Option<(f64, Vector3<f64>)> {
+        let Facet { triangle, normal, .. } = &self.all[number];
+        let crossing = crossing_of_plane(&plain(triangle.a), normal, from, to)?;
+        let distance = triangle.distance_to_local_point(parry(&crossing), false);
+        let size = (triangle.b - triangle.a).length() + (triangle.c - triangle.a).length();
+        Some((if distance > ROUNDING * size { distance } else { 0.0 }, crossing))
+    }
+
+    /// Calls `found` for every triangle through which a way from one place to another goes, with where.
+    pub fn crossed(
+        &self,
+        from: &Vector3<f64>,
+        to: &Vector3<f64>,
+        mut found: impl FnMut(usize, Vector3<f64>),
+    ) {
+        let way = Aabb::new(parry(&from.inf(to)), parry(&from.sup(to)));
+        for number in self.tree.intersect_aabb(&way) {
+            let Facet { triangle, normal, .. } = &self.all[number as usize];
+            let crossing = crossing_of_plane(&plain(triangle.a), normal, from, to);
+            if let Some(crossing) = crossing
+                && self.passed(number as usize, from, to).is_some()
+            {
+                found(number as usize, crossing);
+            }
+        }
+    }
+
     /// Whether the distance at this edge falls into no triangle across, and none of them comes first.
     fn owns_edge(&self, number: usize, edge: u32, offset: &Vector3<f64>) -> bool {
         self.across(number, edge)
@@ -264,6 +349,13 @@ impl Facets {
 /// Whether the distance falls in this direction, by more than rounding.
 fn falls(offset: &Vector3<f64>, direction: &Vector3<f64>) -> bool {
     offset.dot(direction) > ROUNDING * offset.norm() * direction.norm()
+}
+
+/// Whether a mesh ends or bends at an edge, from the ways into its triangles there.
+fn is_sharp(inwards: &Vector3<f64>, across: &[Across]) -> bool {
+    let [other] = across else { return true };
+    let bend = (inwards.normalize() + other.inwards.normalize()).norm();
+    bend > FLAT
 }
 
 fn sorted([a, b]: [u32; 2]) -> [u32; 2] {

@@ -196,6 +196,15 @@ impl Solid {
     /// How far a point of its own axes is above the face that it is highest over, negative inside `[m]`; and that face's
     /// outward unit normal.
     pub fn height(&self, point: &Vector3<f64>) -> (f64, Vector3<f64>) {
+        self.height_over(point, |_| true)
+    }
+
+    /// The same of those faces alone whose normals are admitted: infinitely far below if none is.
+    pub fn height_over(
+        &self,
+        point: &Vector3<f64>,
+        admits: impl Fn(&Vector3<f64>) -> bool,
+    ) -> (f64, Vector3<f64>) {
         let above =
             self.faces.iter().map(|(normal, distance)| (normal.dot(point) - distance, *normal));
         let round = self.round.map(|(radius, _)| {
@@ -206,7 +215,8 @@ impl Solid {
             (length - radius, outward)
         });
         let first = (f64::NEG_INFINITY, Vector3::zeros());
-        above.chain(round).fold(first, |most, next| if next.0 > most.0 { next } else { most })
+        let higher = |next: &(f64, Vector3<f64>), most: f64| next.0 > most && admits(&next.1);
+        above.chain(round).fold(first, |most, next| if higher(&next, most.0) { next } else { most })
     }
 
     /// Density-free energy of turning, `omega . I omega / 2 m`, from the angular momentum over the mass in the body's
