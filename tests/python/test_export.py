@@ -20,7 +20,6 @@ from granulcal.export.mesh import triangles
 from granulcal.export.mujoco import solref
 from granulcal.export.setup import Setup
 
-pytestmark = pytest.mark.filterwarnings("ignore::granulcal.export.landing.DeepContactWarning")
 MATERIAL = gc.Material(sliding_friction=0.4, rolling_friction=0.12, restitution=0.6)
 RADIUS = 0.002
 

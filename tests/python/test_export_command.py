@@ -9,7 +9,6 @@ import pytest
 import granulcal as gc
 from granulcal.cli import main
 
-pytestmark = pytest.mark.filterwarnings("ignore::granulcal.export.landing.DeepContactWarning")
 NAME, FIXED = "material.sliding_friction", "material.restitution"
 
 

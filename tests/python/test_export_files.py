@@ -25,7 +25,6 @@ from granulcal.export.law import nominal_restitution
 from granulcal.export.mark import MARK, plain
 from granulcal.export.setup import Setup
 
-pytestmark = pytest.mark.filterwarnings("ignore::granulcal.export.landing.DeepContactWarning")
 WITHOUT_USD = [name for name in ENGINES if name != "isaac"]
 EVIL = 'x"""\nimport os\n-->&<b>\\ ---- $y'
 

@@ -43,7 +43,11 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         help=".bag, .mcap, .npz height map, 16-bit depth PNG or folder of PNGs; "
         "several: pours of one material",
     )
-    parser.add_argument("--camera", type=READS, help="TOML of the camera (default: of PNGs camera.toml or NAME.toml beside them)")
+    parser.add_argument(
+        "--camera",
+        type=READS,
+        help="TOML of the camera (default: of PNGs camera.toml or NAME.toml beside them)",
+    )
     parser.add_argument("--topic", help="topic of the depth images, where several fit")
     parser.add_argument("--camera-topic", help="topic of the lens, where several fit")
     parser.add_argument("--colour-topic", help="topic of the colour images, where several fit")
