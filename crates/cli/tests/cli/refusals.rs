@@ -96,7 +96,9 @@ fn bad_recordings_are_named() {
     fs::create_dir(place.at("nothing")).unwrap();
 
     let features = |recording, camera| ["features", recording, "--camera", camera];
-    place.refused(&["features", "flat.png"], &["flat.png", "camera"]);
+    fs::create_dir_all(place.at("far/away")).unwrap();
+    place.write("far/away/flat.png", &whole);
+    place.refused(&["features", "far/away/flat.png"], &["flat.png", "camera must be given"]);
     place.refused(&features("missing.png", "camera.toml"), &["missing.png"]);
     place.refused(&features("flat.png", "missing.toml"), &["missing.toml"]);
     place.refused(&features("flat.png", "unknown.toml"), &["unknown.toml", "tilt"]);
