@@ -33,11 +33,7 @@ impl Simulation {
             if self.mean_in_view(&energies) > rest.falling {
                 self.seemed_ended = None;
             }
-            if self.time() < self.origin.scene.end.horizon {
-                return None;
-            }
-            let has_stopped = self.flow_has_stopped(&energies);
-            return Some(if has_stopped { Status::Jammed } else { Status::Horizon });
+            return self.at_horizon(&energies);
         };
         let list_period = self.around.settings.list_period;
         let window = REST_SAMPLES.max(rest.looks) * list_period;
@@ -47,7 +43,21 @@ impl Simulation {
         if ends || seen.is_none() {
             self.seemed_ended = Some((now, self.substep));
         }
-        ends.then_some(now)
+        match (ends, rest.looks) {
+            (true, _) => Some(now),
+            // The next look tells.
+            (false, 1) => None,
+            (false, _) => self.at_horizon(&energies),
+        }
+    }
+
+    /// How the pour ends if it has come to its horizon.
+    fn at_horizon(&self, energies: &[f64]) -> Option<Status> {
+        if self.time() < self.origin.scene.end.horizon {
+            return None;
+        }
+        let has_stopped = self.flow_has_stopped(energies);
+        Some(if has_stopped { Status::Jammed } else { Status::Horizon })
     }
 
     /// What rest is in this scene.
