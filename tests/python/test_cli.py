@@ -194,12 +194,13 @@ def test_calibrate_needs_no_model_and_goes_on_where_it_stopped(
     assert (out / "pours.json").read_bytes() == kept
 
 
-def test_bad_input_is_exit_code_2(model, recording, tmp_path, capfd):
+def test_bad_input_is_exit_code_2(model, recording, tmp_path, tmp_path_factory, capfd):
+    alone = shutil.copy(recording[0], tmp_path_factory.mktemp("alone"))
     for words, message in (
         (["train", str(tmp_path / "none"), "-o", str(tmp_path / "m")], "none"),
         (["infer", str(tmp_path / "none"), recording[0]], "none"),
         (["infer", str(model), str(tmp_path / "none.png"), "--camera", recording[1]], "none.png"),
-        (["infer", str(model), recording[0]], "camera"),
+        (["infer", str(model), str(alone)], "camera"),
         (["report", str(model), recording[0], "-o", "x.html", "--seeds", "0"], "--seeds"),
         (["infer", str(model)], "recording"),
         (["demo", "--pours"], "--pours"),

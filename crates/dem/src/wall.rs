@@ -2,6 +2,7 @@
 //! surfaces, and a grain may touch each of them once.
 //! Planes and discs are in `wall/surface.rs`, shells in `wall/frustum.rs`, triangles in `wall/facets.rs`.
 
+mod edge;
 mod edges;
 mod facets;
 mod frustum;
@@ -14,7 +15,8 @@ use std::sync::Arc;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::placement::Placement;
-pub(crate) use edges::{Edge, Led};
+pub(crate) use edge::Edge;
+pub(crate) use edges::Led;
 use facets::Facets;
 use granulcal_scene::{BoxSide, Material, Motion, Scene, Shape, WallMaterial};
 pub(crate) use nearest::{Nearest, Passage, any_normal};

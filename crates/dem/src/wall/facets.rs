@@ -17,7 +17,7 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation};
 use parry3d_f64::shape::{Triangle, TrianglePointLocation};
 
-use super::edges::Edge;
+use super::edge::{Across, Edge};
 use super::surface::crossing_of_plane;
 use super::{Nearest, Passage};
 
@@ -47,14 +47,6 @@ struct Facet {
     edges: [Range<u32>; 3],
     /// At which of them the mesh ends or bends.
     is_sharp: [bool; 3],
-}
-
-/// A triangle across an edge.
-#[derive(Clone, Debug)]
-pub(super) struct Across {
-    facet: u32,
-    /// From the edge into that triangle, at right angles to the edge.
-    pub inwards: Vector3<f64>,
 }
 
 #[derive(Clone, Debug, Default)]
