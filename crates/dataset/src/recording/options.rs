@@ -11,8 +11,8 @@ pub const FRAMES: usize = 10;
 /// What of a recording is read, and what is known besides.
 #[derive(Clone, Debug)]
 pub struct ReadOptions {
-    /// TOML of the camera, for images as PNG that of [`camera_beside`] if there is none; for the others it replaces what
-    /// they say.
+    /// TOML of the camera. Without one images as PNG take that under their own name, else `camera.toml` in their folder or
+    /// the one above; for other recordings it replaces what they say.
     pub camera: Option<PathBuf>,
     /// Topic of the depth images, where several fit.
     pub topic: Option<String>,
