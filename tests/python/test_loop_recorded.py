@@ -211,6 +211,9 @@ def test_a_none_by_the_base_models_own_pours_shows_the_p_that_decided() -> None:
     assert (found.verdict.kind, found.verdict.p, found.surrogate_p) == ("NONE", 0.3, 0.002)
     assert found.to_dict()["p_before_checks"] == 0.002
     assert "no residual was found" not in sentence_of(found)
+    for names, said in ((("camera.y",), "Not the grains"), (("camera.y", "drag"), "The grains do")):
+        seen = stand(replace(fits, named=names, p=1e-4), Thresholds(), confirmed=0.5)
+        assert sentence_of(seen).startswith(said)
     none = stand(replace(fits, kind="NONE", named=(), p=0.3), Thresholds(), confirmed=0.5)
     assert none.surrogate_p is None and "no residual was found" in sentence_of(none)
 

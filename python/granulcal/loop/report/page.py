@@ -15,6 +15,7 @@ from granulcal.loop.check.standing import Standing
 from granulcal.loop.check.unseen import Seen
 from granulcal.loop.closed import Closed
 from granulcal.loop.effects.image_faults import Frame
+from granulcal.loop.effects.library import LIBRARY
 from granulcal.loop.pours.measures import Measures, formation_of
 from granulcal.loop.task import Condition
 from granulcal.pours.formation_image import formation_figure
@@ -94,6 +95,9 @@ def sentence_of(standing: Standing, seen: Sequence[Seen] = ()) -> str:
         )
     if standing.verdict.kind == "NONE" and standing.surrogate_p is not None:
         return "The model explains these pours: pours of it leave no more than chance does."
+    named = [effect for effect in LIBRARY if effect.name in standing.verdict.named]
+    if named and all(effect.image or effect.camera or effect.series for effect in named):
+        return "Not the grains: what this model leaves is how they were seen."
     return _SENTENCES[standing.verdict.kind]
 
 
