@@ -7,6 +7,7 @@ task at full strength.
 
 import warnings
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,10 @@ from numpy.typing import NDArray
 from granulcal.errors import ObservationError
 from granulcal.loop.condition import Condition, digest_of
 from granulcal.loop.effects.library import LibraryEffect
-from granulcal.loop.pours.measures import camera_used, formation_of
+from granulcal.loop.pours.measures import camera_used
 from granulcal.measured.different import first_copy
 from granulcal.measured.plausible import doubts, violations
-from granulcal.measured.recording import Recording, UnlikeFramesWarning
+from granulcal.measured.recording import Formation, Recording, UnlikeFramesWarning
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
@@ -72,8 +73,8 @@ def doubts_of(
     there = scene.with_(condition.at)
     if there.observed_names:
         return []
-    found = doubt_of_funnel(condition.name, there)
-    found += _doubt_of_missing(there, condition)
+    found: list[str] = []
+    missing: list[float] = []
     for path in condition.recordings:
         with warnings.catch_warnings():
             # Told by the doubts.
@@ -89,7 +90,10 @@ def doubts_of(
         if recording.unlike is not None:
             found.append(f"{path}: {recording.unlike}")
         found += doubts(there, prior, *of_it)
-    return found
+        settings: dict[str, Any] = {**there.reading, **condition.reading}
+        missing.append(_missing_share(recording.formation(**settings)))
+    of_funnel = doubt_of_funnel(condition.name, there)
+    return [*of_funnel, *_doubt_of_missing(there, condition, missing), *found]
 
 
 def doubt_of_funnel(name: str, there: Scene) -> list[str]:
@@ -107,16 +111,17 @@ def doubt_of_funnel(name: str, there: Scene) -> list[str]:
     ]
 
 
-def _doubt_of_missing(there: Scene, condition: Condition) -> list[str]:
+def _missing_share(formation: Formation) -> float:
+    """The share of the pixels about a formation that have no data."""
+    rows, columns = (np.flatnonzero(formation.mask.any(axis=axis)) for axis in (1, 0))
+    around = formation.heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return float(np.isnan(around).mean())
+
+
+def _doubt_of_missing(there: Scene, condition: Condition, shares: Sequence[float]) -> list[str]:
     """Whether pixels have no data where those of the scene's images have."""
     if "sensor" in there.to_dict()["camera"]:
         return []
-    shares = []
-    for path in condition.recordings:
-        formation = formation_of(path, there, condition.camera, condition.reading)[1]
-        rows, columns = (np.flatnonzero(formation.mask.any(axis=axis)) for axis in (1, 0))
-        around = formation.heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        shares.append(float(np.isnan(around).mean()))
     most = int(np.argmax(shares))
     if shares[most] < _MISSING:
         return []
