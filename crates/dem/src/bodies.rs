@@ -17,6 +17,7 @@
 //! | `cylinders` | the nearest points of two cylinders |
 //! | `manifold` | where two bodies that are no boxes meet, by parry |
 //! | `contact` | the law at a point |
+//! | `marks` | the impulses that points go on with |
 //! | `impact` | impacts, each at its time |
 //! | `rims` | points of contact at the rims of walls |
 //! | `edges` | points of contact at the edges of boxes and meshes |
@@ -39,6 +40,7 @@ mod foresee;
 mod impact;
 mod lever;
 mod manifold;
+mod marks;
 mod meeting;
 mod motion;
 mod pairs;
@@ -58,11 +60,12 @@ use crate::turns::turns;
 use crate::wall::Walls;
 use around::Around;
 use body::{Moving, RigidBody};
-use contact::{Name, Other, Point};
+use contact::{Other, Point};
 use corners::Corners;
 use granulcal_scene::Material;
 use granulcal_scene::Scene;
 use granulcal_scene::Solid;
+use marks::Marks;
 use pairs::Neighbours;
 use sweeps::Batches;
 pub(crate) use sweeps::Sweeps;
@@ -70,21 +73,15 @@ pub(crate) use sweeps::Sweeps;
 /// Keeps the orientations of a seed apart from its places.
 const STREAM: u64 = 0xbb67_ae85_84ca_a73b;
 
-/// A point is known again within this distance from where it was on its body, in its reach `[-]`.
-const KNOWN: f64 = 0.15;
-
 /// How often impacts are resolved in a substep and its points are swept, at most: after each time what is foreseen may
 /// add points.
 const ROUNDS: usize = 3;
-
-/// A point's manifold, where the point was on its body, and its impulse.
-type Mark = (Name, [f64; 3], [f64; 3]);
 
 /// What of the bodies changes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct BodiesState {
     all: Vec<RigidBody>,
-    known: Vec<Mark>,
+    known: Marks,
 }
 
 /// What a body is in.
@@ -119,8 +116,7 @@ pub(crate) struct Bodies {
     /// None of a cylinder.
     corners: Option<Corners>,
     all: Vec<RigidBody>,
-    /// Those with an impulse, in the order of their manifolds.
-    known: Vec<Mark>,
+    known: Marks,
     // Only their memory goes from substep to substep.
     points: Vec<Point>,
     batches: Batches,
@@ -135,7 +131,7 @@ impl Bodies {
             small,
             solid,
             all,
-            known: Vec::new(),
+            known: Marks::default(),
             points: Vec::new(),
             batches,
             neighbours: Neighbours::default(),
@@ -190,11 +186,7 @@ impl Bodies {
     /// What is wrong.
     pub fn take(&mut self, state: BodiesState) -> Result<(), &'static str> {
         let count = self.all.len();
-        let is_there = |&((is_of_two, i, j), ..): &Mark| {
-            (i as usize) < count && (!is_of_two || (j as usize) < count)
-        };
-        let is_sorted = state.known.is_sorted_by_key(|mark| mark.0);
-        if state.all.len() != count || !is_sorted || !state.known.iter().all(is_there) {
+        if state.all.len() != count || !state.known.are_of(count) {
             return Err("another number of bodies");
         }
         (self.all, self.known) = (state.all, state.known);
@@ -255,7 +247,7 @@ impl Bodies {
             }
             contacts.merge(known);
         }
-        self.recall(&mut contacts.points, &mut moving);
+        self.known.recall(&mut contacts.points, &mut moving, solid.reach);
         let sorted = contacts.points.len();
         let mut known = 0;
         contacts.corrected.clear();
@@ -276,54 +268,10 @@ impl Bodies {
         let at_walls = points[..sorted].iter().take_while(|point| point.j().is_none());
         let work = at_walls.chain(&points[sorted..]).map(Point::work_of_wall);
         step.work_of_walls += work.sum::<f64>();
-        self.remember(&points, sorted);
+        self.known.take(&points, sorted);
         self.points = points;
         self.all = moving.iter().map(|body| body.moved(&solid, dt)).collect();
         step
-    }
-
-    /// Warm start: a point that is where one was begins with its impulse, which its bodies get.
-    fn recall(&self, points: &mut [Point], bodies: &mut [Moving]) {
-        let near = KNOWN * self.solid.reach;
-        debug_assert!(points.is_sorted_by_key(Point::name));
-        let (mut is_free, mut first) = (vec![true; self.known.len()], 0);
-        for point in points {
-            // Both are in one order.
-            while self.known.get(first).is_some_and(|mark| mark.0 < point.name()) {
-                first += 1;
-            }
-            let of_manifold = (first..self.known.len())
-                .take_while(|&number| self.known[number].0 == point.name());
-            let nearest = of_manifold
-                .filter(|&number| is_free[number])
-                .map(|number| (number, (Vector3::from(self.known[number].1) - point.mark).norm()))
-                .min_by(|a, b| a.1.total_cmp(&b.1));
-            if let Some((number, distance)) = nearest
-                && distance < near
-            {
-                // No two points go on from one.
-                is_free[number] = false;
-                let impulse = Vector3::from(self.known[number].2);
-                // The part along the new normal, and what is left across it.
-                let along = point.normal.dot(&impulse);
-                let (normal, across) = (along.max(0.0), impulse - along * point.normal);
-                let (limit, length) = (point.friction * normal, across.norm());
-                let scale = if length > limit { limit / length } else { 1.0 };
-                point.impulse = normal * point.normal + scale * across;
-                point.give(bodies, &point.impulse);
-            }
-        }
-    }
-
-    /// Keeps the impulses of the points, those before `sorted` in the order of their names, in this order.
-    fn remember(&mut self, points: &[Point], sorted: usize) {
-        self.known.clear();
-        let acting = points.iter().filter(|point| point.impulse != Vector3::zeros());
-        let mark = |point: &Point| (point.name(), point.mark.into(), point.impulse.into());
-        self.known.extend(acting.map(mark));
-        if sorted < points.len() {
-            self.known.sort_by_key(|mark| mark.0);
-        }
     }
 
     /// Energy over the mass of a body.

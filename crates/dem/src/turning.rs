@@ -15,6 +15,9 @@ const NUTATION: f64 = 0.05;
 /// Bodies whose moments of inertia differ by no more than this share turn in one part, for they hardly nutate `[-]`.
 const ALIKE: f64 = 0.2;
 
+/// Moments that differ by less than this of the least are the same `[-]`.
+const SAME: f64 = 1e-12;
+
 /// The inverse of the tensor of inertia in the scene's axes, from the moments about the body's.
 pub(crate) fn inverse_inertia(axes: &Matrix3<f64>, moments: &Vector3<f64>) -> Matrix3<f64> {
     let inverse = Matrix3::from_diagonal(&moments.map(|moment| 1.0 / moment));
@@ -24,6 +27,11 @@ pub(crate) fn inverse_inertia(axes: &Matrix3<f64>, moments: &Vector3<f64>) -> Ma
 /// By how much the largest moment of inertia exceeds the least, in the least.
 fn unlikeness(moments: &Vector3<f64>) -> f64 {
     moments.max() / moments.min() - 1.0
+}
+
+/// Whether a body turns alike about all axes.
+pub(crate) fn turns_alike(moments: &Vector3<f64>) -> bool {
+    unlikeness(moments) <= SAME
 }
 
 /// Whether a body's turn about its middle angular velocity may need more than one part.
@@ -40,6 +48,10 @@ pub(crate) fn turned_on(
     twist: &Vector3<f64>,
     dt: f64,
 ) -> UnitQuaternion<f64> {
+    if turns_alike(moments) {
+        // Its angular velocity stays as it is.
+        return UnitQuaternion::new(dt * omega + twist) * from;
+    }
     let of = |turned: &UnitQuaternion<f64>| {
         inverse_inertia(turned.to_rotation_matrix().matrix(), moments) * momentum
     };

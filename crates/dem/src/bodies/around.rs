@@ -36,10 +36,6 @@ impl Around<'_> {
 
     /// How far the points of a body go in a substep relative to those of another, and a little more `[m]`.
     pub fn range(&self, a: &Motion, b: Option<&Motion>) -> f64 {
-        let fastest = b.map_or_else(
-            || a.fastest(),
-            |b| (a.velocity - b.velocity).norm() + a.turning + b.turning,
-        );
-        self.least() + self.dt * fastest
+        self.least() + self.dt * b.map_or_else(|| a.fastest(), |b| a.beside(b))
     }
 }

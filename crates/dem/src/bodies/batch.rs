@@ -52,10 +52,6 @@ impl<L: Lever> Batch<L> {
         self.used = 0;
     }
 
-    pub fn is_full(&self) -> bool {
-        self.used as usize == LANES
-    }
-
     /// Appends a point with its bias; `j` is its second body among those of the sweeps, `frames` are F of all bodies.
     /// Returns its lane.
     #[inline(always)]
@@ -129,10 +125,10 @@ impl<L: Lever> Batch<L> {
         one.over(largest).store(&mut self.compliance_t);
     }
 
-    /// One round of the two lines for each point.
+    /// One round of the two lines for each point; returns whether all are open and stay so.
     #[inline(always)]
     #[allow(unsafe_code)]
-    fn solve<W: Width>(&mut self, bodies: &SharedBodies<'_>, sums: &mut Sums<W>) {
+    fn solve<W: Width>(&mut self, bodies: &SharedBodies<'_>, sums: &mut Sums<W>) -> bool {
         let zero = Reg::<W>::splat(0.0);
         // SAFETY: the indices are of bodies that `BatchesOf` has taken over, and nobody else has them.
         let ([mut v_i, mut s_i], [mut v_j, mut s_j]) =
@@ -144,7 +140,7 @@ impl<L: Lever> Batch<L> {
         let was = n.dot(old);
         // A batch without impulses that stays open is left as it is.
         if W::less_bits(zero.0, was.0) | W::less_bits(zero.0, closing.0) == 0 {
-            return;
+            return true;
         }
         let normal = closing.times_plus(Reg::load(&self.compliance_n), was).max(zero);
         let u = u.plus(normal - was, Reg3::load(&self.pushed));
@@ -164,6 +160,7 @@ impl<L: Lever> Batch<L> {
             bodies.scatter::<W>(self.used, &self.i, v_i, s_i);
             bodies.scatter::<W>(self.used, &self.j, v_j, s_j);
         }
+        false
     }
 }
 
@@ -181,24 +178,34 @@ fn across<W: Width>(n: Reg3<W>) -> Reg3<W> {
 
 widest! {
     /// Makes what is needed of all blocks.
-    pub(super) fn assemble<W, L: Lever>(batches: &mut [Batch<L>]) {
-        for batch in batches {
-            batch.assemble::<W>();
-        }
+    pub(super) fn assemble<W, L: Lever>(batch: &mut Batch<L>) {
+        batch.assemble::<W>();
     }
 }
 
 widest! {
-    /// Solves every point once.
-    pub(super) fn sweep<W, L: Lever>(batches: &mut [Batch<L>], bodies: &SharedBodies<'_>, backwards: bool) -> Progress {
+    /// Solves the points of those batches once that are open, or those that are not, or both.
+    pub(super) fn sweep<W, L: Lever>(
+        batches: &mut [Batch<L>],
+        is_open: &mut [bool],
+        asked: [bool; 2],
+        bodies: &SharedBodies<'_>,
+        backwards: bool,
+    ) -> Progress {
         let mut sums = Sums::<W>::default();
+        let mut solve = |batch: &mut Batch<L>, is_open: &mut bool| {
+            if asked[usize::from(*is_open)] {
+                *is_open = batch.solve(bodies, &mut sums);
+            }
+        };
+        let all = batches.iter_mut().zip(is_open);
         if backwards {
-            for batch in batches.iter_mut().rev() {
-                batch.solve(bodies, &mut sums);
+            for (batch, is_open) in all.rev() {
+                solve(batch, is_open);
             }
         } else {
-            for batch in batches {
-                batch.solve(bodies, &mut sums);
+            for (batch, is_open) in all {
+                solve(batch, is_open);
             }
         }
         sums.progress()
@@ -212,8 +219,25 @@ pub(super) struct Progress {
     pub change: f64,
     /// Fastest that a point closed beyond what its gap allows `[m/s]`.
     pub closing: f64,
+    /// Squares of all changes, and of the normal impulses `[m^2/s^2]`.
+    squares: [f64; 2],
+}
+
+impl Progress {
     /// Root mean square of all changes over that of the normal impulses `[-]`.
-    pub residual: f64,
+    pub fn residual(&self) -> f64 {
+        let [changes, normals] = self.squares;
+        if normals > 0.0 { (changes / normals).sqrt() } else { 0.0 }
+    }
+
+    /// Of a sweep in two parts.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            change: self.change.max(other.change),
+            closing: self.closing.max(other.closing),
+            squares: [0, 1].map(|k| self.squares[k] + other.squares[k]),
+        }
+    }
 }
 
 /// What a sweep gathers, lane by lane.
@@ -249,11 +273,7 @@ impl<W: Width> Sums<W> {
             lanes.0
         };
         let largest = |value| lanes(value).into_iter().fold(0.0, f64::max);
-        let [changes, normals] = [self.changes, self.normals].map(|v| lanes(v).iter().sum::<f64>());
-        Progress {
-            change: largest(self.largest).sqrt(),
-            closing: largest(self.closing),
-            residual: if normals > 0.0 { (changes / normals).sqrt() } else { 0.0 },
-        }
+        let squares = [self.changes, self.normals].map(|v| lanes(v).iter().sum::<f64>());
+        Progress { change: largest(self.largest).sqrt(), closing: largest(self.closing), squares }
     }
 }

@@ -119,10 +119,9 @@ impl Moving {
         self.omega += product(&self.inverse_inertia, &arm.cross(impulse));
     }
 
-    /// What a unit impulse at `arm` does to the velocity there: `1 - [arm] I^-1 [arm]`.
-    pub fn response(&self, arm: &Vector3<f64>) -> Matrix3<f64> {
-        let cross = arm.cross_matrix();
-        Matrix3::identity() - cross * self.inverse_inertia * cross
+    /// What an impulse at the arm `of` does to the velocity at `at`: `1 - [at] I^-1 [of]`.
+    pub fn response(&self, at: &Vector3<f64>, of: &Vector3<f64>) -> Matrix3<f64> {
+        Matrix3::identity() - at.cross_matrix() * self.inverse_inertia * of.cross_matrix()
     }
 
     /// The body a substep later.
@@ -145,7 +144,7 @@ impl Moving {
 
 /// `matrix * vector`, which must be inlined in the innermost loop.
 #[inline(always)]
-fn product(m: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+pub(super) fn product(m: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
     Vector3::new(
         m.m11 * v.x + m.m12 * v.y + m.m13 * v.z,
         m.m21 * v.x + m.m22 * v.y + m.m23 * v.z,

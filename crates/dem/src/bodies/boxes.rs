@@ -231,11 +231,13 @@ impl<'a> Boxes<'a> {
         let edge = |k: usize| over(in_first(self.half[k] * self.b.axes.column(k)), 0.0);
         let [p, q] = far.across.map(edge);
         let shared = Corners::shared(middle, [p, q], near.across.map(|k| self.half[k]));
+        let mut mark = Vector3::zeros();
+        mark[near.axis] = near.side * self.half[near.axis];
+        let face = mark[near.axis] * self.a.axes.column(near.axis);
+        let sides = near.across.map(|k| self.a.axes.column(k));
         for &[s, t, gap] in shared.all() {
-            let mut mark = Vector3::zeros();
-            mark[near.axis] = near.side * self.half[near.axis];
             (mark[near.across[0]], mark[near.across[1]]) = (s, t);
-            let on_a = self.a.axes * mark;
+            let on_a = face + s * sides[0] + t * sides[1];
             let on_b = on_a + gap * normal - self.offset;
             spots.push(Spot { mark, on_a, on_b, gap });
         }

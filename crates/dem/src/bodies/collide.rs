@@ -56,8 +56,7 @@ pub(super) fn contacts(
     let mut pairs = neighbours.near(around, bodies, &motions);
     let mut near = Vec::new();
     for (number, pair) in pairs.iter_mut().enumerate() {
-        let Pair { i, j, .. } = *pair;
-        let range = around.range(&motions[i], Some(&motions[j]));
+        let Pair { i, j, range, .. } = *pair;
         pair.clear = clearance(around.solid, &bodies[i].pose, &bodies[j].pose);
         if pair.clear <= range {
             pair.clear = range;

@@ -10,7 +10,7 @@
 //! Unlike a ball's, the block W couples the normal to the tangent, so that the two lines are repeated until they stand:
 //! by the sweeps over all points, and in an impact over those of its manifold.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::body::Moving;
 use super::pose::Pose;
@@ -51,6 +51,8 @@ pub(super) struct Point {
     pub mark: Vector3<f64>,
     /// On body i `[m/s]`.
     pub impulse: Vector3<f64>,
+    /// Whether impacts have not been looked for at it since it was found or its gap corrected.
+    pub is_news: bool,
 }
 
 /// What the law needs of a point's block W.
@@ -75,6 +77,7 @@ impl Point {
             restitution: 0.0,
             mark: Vector3::zeros(),
             impulse: Vector3::zeros(),
+            is_news: true,
         }
     }
 
@@ -106,6 +109,11 @@ impl Point {
             Other::Wall { .. } => None,
             Other::Body { j, .. } => Some(j as usize),
         }
+    }
+
+    /// Whether nothing is pressed on it yet.
+    pub fn is_open(&self) -> bool {
+        self.gap > 0.0 && self.impulse == Vector3::zeros()
     }
 
     /// The manifold that it belongs to.
@@ -149,12 +157,19 @@ impl Point {
             && self.normal.dot(&other.normal) > SAME_NORMAL
     }
 
-    /// What the law needs of its block.
-    pub fn block(&self, bodies: &[Moving]) -> Block {
-        let mut block = bodies[self.i()].response(&self.arm);
-        if let Other::Body { j, arm } = &self.other {
-            block += bodies[*j as usize].response(arm);
+    /// What an impulse at another point between the same two does to the velocity here.
+    pub fn response(&self, of: &Self, bodies: &[Moving]) -> Matrix3<f64> {
+        let of_i = bodies[self.i()].response(&self.arm, &of.arm);
+        match (&self.other, &of.other) {
+            (Other::Body { j, arm }, Other::Body { arm: of, .. }) => {
+                of_i + bodies[*j as usize].response(arm, of)
+            }
+            _ => of_i,
         }
+    }
+
+    /// What the law needs of its block.
+    pub fn block(&self, block: &Matrix3<f64>) -> Block {
         let n = self.normal;
         let other = if n.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
         let s = n.cross(&other).normalize();
@@ -199,6 +214,15 @@ impl Point {
         }
     }
 
+    /// What of an impulse of before its normal and its friction allow.
+    pub fn admitted(&self, impulse: &Vector3<f64>) -> Vector3<f64> {
+        let along = self.normal.dot(impulse);
+        let (normal, across) = (along.max(0.0), impulse - along * self.normal);
+        let (limit, length) = (self.friction * normal, across.norm());
+        let scale = if length > limit { limit / length } else { 1.0 };
+        normal * self.normal + scale * across
+    }
+
     /// Gives both bodies an impulse.
     #[inline(always)]
     pub fn give(&self, bodies: &mut [Moving], impulse: &Vector3<f64>) {
@@ -208,21 +232,18 @@ impl Point {
         }
     }
 
-    /// One round of the two lines, without bias; returns the change of the impulse `[m/s]`.
+    /// One round of the two lines at this velocity, without bias; returns the change of the impulse `[m/s]`.
     #[inline(always)]
-    pub fn solve(&mut self, block: &Block, bodies: &mut [Moving]) -> f64 {
-        let (n, old, u) = (self.normal, self.impulse, self.velocity(bodies));
+    pub fn solve(&mut self, block: &Block, u: Vector3<f64>) -> Vector3<f64> {
+        let (n, old) = (self.normal, self.impulse);
         let was = n.dot(&old);
         let normal = (was - n.dot(&u) * block.compliance[0]).max(0.0);
         let u = u + block.pushed * (normal - was);
         let wanted = old - was * n - block.compliance[1] * (u - n.dot(&u) * n);
-        let (limit, length) = (self.friction * normal, wanted.norm());
-        let tangent = if length > limit { wanted * (limit / length) } else { wanted };
+        let (limit, square) = (self.friction * normal, wanted.norm_squared());
+        let slides = square > limit * limit;
+        let tangent = if slides { wanted * (limit / square.sqrt()) } else { wanted };
         self.impulse = normal * n + tangent;
-        let change = self.impulse - old;
-        if change != Vector3::zeros() {
-            self.give(bodies, &change);
-        }
-        change.norm()
+        self.impulse - old
     }
 }

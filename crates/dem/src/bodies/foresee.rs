@@ -41,7 +41,7 @@ impl Contacts {
         let mut later = Later::new(around, bodies);
         let mut new = Vec::new();
         for (i, way) in ways.iter().enumerate() {
-            let goes = way.length() + around.way_of_walls(&bodies[i].pose.centre);
+            let goes = way.length + around.way_of_walls(&bodies[i].pose.centre);
             if is_other[i] && goes > least.max(self.clear_of_walls[i]) {
                 let pose = later.find(i);
                 at_walls(around, pose, i, (dt, range), &mut new);
@@ -50,10 +50,10 @@ impl Contacts {
             }
         }
         let mut asked = Vec::new();
-        for &Pair { i, j, clear } in &self.pairs {
+        for &Pair { i, j, clear, .. } in &self.pairs {
             let far = least.max(clear);
             if (is_other[i] || is_other[j])
-                && ways[i].length() + ways[j].length() > far
+                && ways[i].length + ways[j].length > far
                 && ways[i].beside(&ways[j]) > far
             {
                 later.find(i);
@@ -84,6 +84,7 @@ impl Contacts {
                 // Its bodies turn so far that it gets there sooner than its velocity says.
                 Some(number) if point.gap < self.points[number].gap - least => {
                     self.points[number].gap = point.gap;
+                    self.points[number].is_news = true;
                     self.corrected.push(number);
                 }
                 Some(_) => continue,

@@ -15,14 +15,14 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::body::Moving;
+use super::body::{Moving, product};
 use super::contact::Point;
 use super::motion::Motion;
 use crate::law::Small;
 
 /// Sweeps over the points of a manifold at most, and the change over the impulse at which they stand.
 const SWEEPS: usize = 300;
-const STANDS: f64 = 1e-11;
+const STANDS: f64 = 1e-9;
 /// Impacts of a substep at most, over its manifolds: a cube between two others may be hit often.
 const ROUNDS: usize = 8;
 /// Points are no farther from a body's centre than this in its reach: half a gap aside of it `[-]`.
@@ -40,14 +40,14 @@ pub(super) fn resolve(
     let (mut count, mut work) = (0, 0.0);
     // The round in which each body was hit last: what is not due stays so until a body of it is.
     let mut hit_in = vec![0; bodies.len()];
-    let fastest = |body: usize| Motion::of(&bodies[body], FARTHEST * reach).fastest();
-    let fastest: Vec<_> = (0..bodies.len()).map(fastest).collect();
+    let motions: Vec<_> = bodies.iter().map(|body| Motion::of(body, FARTHEST * reach)).collect();
     for round in 1..=ROUNDS {
         let may_be_due = |range: &Range<usize>| {
             let (i, j) = (points[range.start].i(), points[range.start].j());
             if round == 1 {
-                // Two that are slow do not close fast, wherever they touch.
-                j.is_none_or(|j| fastest[i] + fastest[j] > small.impact_speed)
+                // Two that go side by side do not close fast, wherever they touch.
+                points[range.clone()].iter().any(|point| point.is_news)
+                    && j.is_none_or(|j| motions[i].beside(&motions[j]) > small.impact_speed)
             } else {
                 hit_in[i] + 1 == round || j.is_some_and(|j| hit_in[j] + 1 == round)
             }
@@ -61,6 +61,8 @@ pub(super) fn resolve(
             })
             .collect();
         if due.is_empty() {
+            // None of them comes to be due before a body of it is hit again.
+            points.iter_mut().for_each(|point| point.is_news = false);
             break;
         }
         due.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -113,38 +115,50 @@ fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64
     let meets = |point: &Point, bodies: &[Moving]| {
         point.gap_of_last_motion(bodies) <= -dt * point.normal.dot(&point.velocity(bodies))
     };
-    let touching: Vec<_> = (0..group.len())
-        .filter(|&k| meets(&group[k], bodies))
-        .map(|k| (k, group[k].block(bodies)))
-        .collect();
+    let touching: Vec<_> = (0..group.len()).filter(|&k| meets(&group[k], bodies)).collect();
     for point in group.iter_mut() {
         point.impulse = Vector3::zeros();
     }
-    for _ in 0..SWEEPS {
-        let (mut changed, mut largest) = (0.0_f64, 0.0_f64);
-        for (k, block) in &touching {
-            changed = changed.max(group[*k].solve(block, bodies));
-            largest = largest.max(group[*k].impulse.norm());
-        }
-        if changed <= STANDS * largest {
-            break;
-        }
-    }
+    let mut touching: Vec<_> = touching.into_iter().map(|k| group[k]).collect();
+    solve(&mut touching, bodies);
     let mut work = 0.0;
-    for &(k, _) in &touching {
-        let again = group[k].restitution * group[k].impulse;
-        group[k].give(bodies, &again);
-        group[k].impulse += again;
-        work += group[k].work_of_wall();
+    for mut point in touching {
+        point.impulse *= 1.0 + point.restitution;
+        point.give(bodies, &point.impulse);
+        work += point.work_of_wall();
     }
     for (body, before) in touched.into_iter().zip(before) {
         if let (Some(body), Some(before)) = (body, before) {
             bodies[body].was_hit(time, &before);
         }
     }
-    // What was given in an impact is no impulse of a lasting contact.
-    for point in group.iter_mut() {
-        point.impulse = Vector3::zeros();
-    }
     work
+}
+
+/// Finds the impulses of a plastic impact of points between the same two: with the velocities of all at hand,
+/// `u_l += W_lk lambda_k`.
+fn solve(points: &mut [Point], bodies: &[Moving]) {
+    let mut velocities: Vec<_> = points.iter().map(|point| point.velocity(bodies)).collect();
+    let between = |(l, k): (&Point, &Point)| l.response(k, bodies);
+    let all = |k| points.iter().map(move |l| (l, k));
+    let responses: Vec<_> = points.iter().flat_map(all).map(between).collect();
+    let count = points.len();
+    let blocks: Vec<_> = (0..count).map(|k| points[k].block(&responses[k * count + k])).collect();
+    for _ in 0..SWEEPS {
+        let (mut changed, mut largest) = (0.0_f64, 0.0_f64);
+        for ((k, point), block) in points.iter_mut().enumerate().zip(&blocks) {
+            let change = point.solve(block, velocities[k]);
+            if change != Vector3::zeros() {
+                let of_k = &responses[k * count..(k + 1) * count];
+                for (velocity, response) in velocities.iter_mut().zip(of_k) {
+                    *velocity += product(response, &change);
+                }
+            }
+            changed = changed.max(change.norm_squared());
+            largest = largest.max(point.impulse.norm_squared());
+        }
+        if changed <= STANDS * STANDS * largest {
+            break;
+        }
+    }
 }

@@ -13,9 +13,6 @@ use super::body::Moving;
 use crate::lanes::{Lanes3, Reg3, Width};
 use granulcal_scene::Solid;
 
-/// Moments that differ by less than this of the largest are the same `[-]`.
-const ALIKE: f64 = 1e-12;
-
 /// B of eight points.
 pub(super) trait Lever: Clone + std::fmt::Debug {
     /// No arm.
@@ -32,12 +29,6 @@ pub(super) trait Lever: Clone + std::fmt::Debug {
 
     /// `B^T impulse`: what an impulse at the point adds to s.
     fn turn<W: Width>(&self, impulse: Reg3<W>) -> Reg3<W>;
-}
-
-/// Whether a body turns alike about all axes.
-pub(super) fn is_round(solid: &Solid) -> bool {
-    let moments = solid.inertia;
-    moments.max() - moments.min() <= ALIKE * moments.max()
 }
 
 /// Of a body that turns alike about all axes: a.

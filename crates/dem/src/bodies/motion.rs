@@ -23,6 +23,11 @@ impl Motion {
     pub fn fastest(&self) -> f64 {
         self.velocity.norm() + self.turning
     }
+
+    /// How fast its points move beside those of another at most `[m/s]`.
+    pub fn beside(&self, other: &Self) -> f64 {
+        (self.velocity - other.velocity).norm() + self.turning + other.turning
+    }
 }
 
 /// Where a body is at the end of a substep, seen from its begin.
@@ -34,18 +39,16 @@ pub(super) struct Way {
     turns: Vector3<f64>,
     /// How far it turns its farthest points, at most `[m]`.
     swings: f64,
+    /// How far its points go, at most `[m]`.
+    pub length: f64,
 }
 
 impl Way {
     /// Of a body of this reach `[m]` in this time `[s]`.
     pub fn of(body: &Moving, reach: f64, dt: f64) -> Self {
         let (goes, turns) = body.way(dt);
-        Self { goes, turns, swings: reach * turns.norm() }
-    }
-
-    /// How far its points go, at most `[m]`.
-    pub fn length(&self) -> f64 {
-        self.goes.norm() + self.swings
+        let swings = reach * turns.norm();
+        Self { goes, turns, swings, length: goes.norm() + swings }
     }
 
     /// How far its points go beside those of another, at most `[m]`.

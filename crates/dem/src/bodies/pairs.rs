@@ -20,6 +20,8 @@ const AHEAD: f64 = 6.0;
 pub(super) struct Pair {
     pub i: usize,
     pub j: usize,
+    /// How far from each other they may be at the begin of the substep and meet in it `[m]`.
+    pub range: f64,
     /// They are at least so far from each other at the begin of the substep; minus infinity where nothing is known `[m]`.
     pub clear: f64,
 }
@@ -79,10 +81,10 @@ impl Neighbours {
             if square >= most * most {
                 continue;
             }
-            let range = apart + around.range(&motions[i], Some(&motions[j]));
-            if square < range * range {
+            let range = around.range(&motions[i], Some(&motions[j]));
+            if square < (apart + range) * (apart + range) {
                 *is_given = true;
-                given.push(Pair { i, j, clear: square.sqrt() - 2.0 * reach });
+                given.push(Pair { i, j, range, clear: square.sqrt() - 2.0 * reach });
             }
         }
     }
@@ -113,7 +115,7 @@ impl Neighbours {
         self.pairs.clear();
         let slow = base + 4.0 * skin;
         pairs_within(&self.centres, &self.allowed, base, slow, |i, j| self.pairs.push((i, j)));
-        self.pairs.sort_unstable();
+        self.pairs.sort_unstable_by_key(|&(i, j)| u64::from(i) << 32 | u64::from(j));
         true
     }
 }

@@ -20,16 +20,19 @@ impl Corners {
     pub fn shared(middle: [f64; 3], [p, q]: [[f64; 3]; 2], half: [f64; 2]) -> Self {
         let mut corners = Self { all: [[0.0; 3]; 13], count: 0 };
         let at = |s: f64, t: f64| along(&along(&middle, s, &p), t, &q);
+        let whole = |edge: [f64; 3]| [0, 1].map(|axis| 0.5 / edge[axis]);
+        let (of_p, of_q) = (whole(p), whole(q));
         let edges = [
-            (1.0, 1.0, -2.0, &p),
-            (-1.0, 1.0, -2.0, &q),
-            (-1.0, -1.0, 2.0, &p),
-            (1.0, -1.0, 2.0, &q),
+            (1.0, 1.0, -1.0, &p, &of_p),
+            (-1.0, 1.0, -1.0, &q, &of_q),
+            (-1.0, -1.0, 1.0, &p, &of_p),
+            (1.0, -1.0, 1.0, &q, &of_q),
         ];
-        for (s, t, scale, edge) in edges {
+        for (s, t, sign, edge, inverse) in edges {
             let from = at(s, t);
+            let scale = 2.0 * sign;
             let [one, other] =
-                [0, 1].map(|axis| between(from[axis], scale * edge[axis], half[axis]));
+                [0, 1].map(|axis| between(from[axis], sign * inverse[axis], half[axis]));
             let (enters, leaves) = (one.0.max(other.0).max(0.0), one.1.min(other.1).min(1.0));
             corners.add(enters <= leaves, along(&from, enters * scale, edge));
             corners.add(enters < leaves && leaves < 1.0, along(&from, leaves * scale, edge));
@@ -64,10 +67,10 @@ fn along(from: &[f64; 3], share: f64, way: &[f64; 3]) -> [f64; 3] {
     [from[0] + share * way[0], from[1] + share * way[1], from[2] + share * way[2]]
 }
 
-/// Between which shares of the way `by` what begins at `from` is no farther than `half` from 0.
+/// Between which shares of a way, given by its reciprocal, what begins at `from` is no farther than `half` from 0.
 #[inline(always)]
-fn between(from: f64, by: f64, half: f64) -> (f64, f64) {
-    if by == 0.0 {
+fn between(from: f64, inverse: f64, half: f64) -> (f64, f64) {
+    if inverse.is_infinite() {
         let is_in = from.abs() <= half;
         return if is_in {
             (f64::NEG_INFINITY, f64::INFINITY)
@@ -75,7 +78,7 @@ fn between(from: f64, by: f64, half: f64) -> (f64, f64) {
             (f64::INFINITY, f64::NEG_INFINITY)
         };
     }
-    let (low, high) = ((-half - from) / by, (half - from) / by);
+    let (low, high) = ((-half - from) * inverse, (half - from) * inverse);
     (low.min(high), low.max(high))
 }
 

@@ -17,13 +17,17 @@ use super::around::Around;
 use super::batch::{Batch, assemble, sweep};
 use super::body::Moving;
 use super::contact::{Other, Point};
-use super::lever::{Arm, Lever, Rows, is_round};
+use super::lever::{Arm, Lever, Rows};
 use crate::body::{Body, SharedBodies};
 use crate::lanes::{LANES, Row};
+use crate::turning::turns_alike;
 use granulcal_scene::Solid;
 
 /// Colours that a body's mask can distinguish; points beyond them get a batch of their own.
 const COLOURS: usize = 63;
+
+/// Batches that a sweep has left open are asked again in every so many sweeps, and before the end.
+const WHOLE: usize = 3;
 
 /// When the sweeps over all points of a substep end: the rule of spheres (`solver/nsgs.rs`).
 #[derive(Clone, Copy, Debug)]
@@ -57,7 +61,7 @@ pub(super) enum Batches {
 
 impl Batches {
     pub fn of(solid: &Solid) -> Self {
-        if is_round(solid) {
+        if turns_alike(&solid.inertia) {
             Self::Round(BatchesOf::default())
         } else {
             Self::Other(BatchesOf::default())
@@ -157,37 +161,51 @@ impl<L: Lever> BatchesOf<L> {
         self.bodies.push(Body::default());
     }
 
-    /// Puts points into batches of their own.
+    /// Puts points into batches: those that push first, apart from those that are open, of which most batches stay as they
+    /// are in a sweep.
     fn add(&mut self, points: &[Point], moving: &[Moving], around: &Around<'_>) {
-        let (first, resting) = (self.used, moving.len());
-        let (colours, mut next) = colour(points, &mut self.masks);
-        self.used += next[COLOURS + 1];
-        if self.all.len() < self.used {
-            self.all.resize_with(self.used, || Batch::empty(resting as u32));
+        let known = self.places.len();
+        self.places.resize(known + points.len(), (0, 0));
+        let (open, pushing): (Vec<_>, Vec<_>) =
+            (0..points.len() as u32).partition(|&number| points[number as usize].is_open());
+        for some in [open, pushing] {
+            for numbers in together(points, &some, &mut self.masks) {
+                self.fill(points, (known, &numbers), moving, around);
+            }
         }
-        let batches = &mut self.all[first..self.used];
-        batches.iter_mut().for_each(Batch::clear);
-        for (point, colour) in points.iter().zip(colours) {
+    }
+
+    /// Makes a batch of the points with these numbers; before the points there are `known` ones.
+    fn fill(
+        &mut self,
+        points: &[Point],
+        (known, numbers): (usize, &[u32; LANES]),
+        moving: &[Moving],
+        around: &Around<'_>,
+    ) {
+        let resting = moving.len() as u32;
+        if self.all.len() == self.used {
+            self.all.push(Batch::empty(resting));
+        }
+        let batch = &mut self.all[self.used];
+        batch.clear();
+        for &number in numbers.iter().filter(|&&number| number != NONE) {
+            let point = &points[number as usize];
             let j = match point.other {
                 Other::Body { j, .. } => j,
-                Other::Wall { velocity, .. } if velocity == Vector3::zeros() => resting as u32,
+                Other::Wall { velocity, .. } if velocity == Vector3::zeros() => resting,
                 Other::Wall { velocity, .. } => {
                     self.bodies.push(body(velocity, Vector3::zeros()));
                     (self.bodies.len() - 1) as u32
                 }
             };
-            let batch = &mut batches[next[colour]];
             let bias = point.bias(moving, around.dt, around.small);
             let lane = batch.add(j, point, bias, &self.frames);
-            self.places.push(((first + next[colour]) as u32, lane));
-            if batch.is_full() || colour == COLOURS {
-                next[colour] += 1;
-            }
+            self.places[known + number as usize] = (self.used as u32, lane);
         }
-        for batch in batches.iter_mut() {
-            batch.clear_rest(resting as u32);
-        }
-        assemble(batches);
+        batch.clear_rest(resting);
+        assemble(batch);
+        self.used += 1;
     }
 
     /// Sweeps until the rule says that it is enough.
@@ -197,11 +215,17 @@ impl<L: Lever> BatchesOf<L> {
         let mut settled = Settled { sweeps: 0, residual: 0.0, unconverged };
         let mut has_settled = false;
         let bodies = SharedBodies::new(&mut self.bodies);
+        let mut is_open = vec![false; batches.len()];
         for sweeps in 1..=if unconverged { rule.most } else { 0 } {
-            let worst = sweep(batches, &bodies, sweeps % 2 == 0);
-            settled.sweeps = sweeps;
-            settled.residual = worst.residual;
+            let backwards = sweeps % 2 == 0;
+            let is_whole = sweeps % WHOLE == 1;
+            let mut worst = sweep(batches, &mut is_open, [true, is_whole], &bodies, backwards);
             let is_enough = has_settled || sweeps >= rule.least;
+            if is_enough && worst.closing <= rule.closing && !is_whole {
+                worst = worst.and(sweep(batches, &mut is_open, [false, true], &bodies, backwards));
+            }
+            settled.sweeps = sweeps;
+            settled.residual = worst.residual();
             if is_enough && worst.closing <= rule.closing {
                 settled.unconverged = false;
                 break;
@@ -231,25 +255,36 @@ fn body(velocity: Vector3<f64>, spin: Vector3<f64>) -> Body {
     Body { velocity: Row::new(&velocity, 0.0), spin: Row::new(&spin, 0.0) }
 }
 
-/// The colour of each point: the lowest that neither of its bodies has yet, as the bodies' masks say; and the first batch
-/// of each, with their number behind the last.
-fn colour(points: &[Point], masks: &mut [u64]) -> (Vec<usize>, [usize; COLOURS + 2]) {
+/// No point.
+const NONE: u32 = u32::MAX;
+
+/// Puts points together that share no body, eight at most: those of one colour, which is the lowest that neither body has
+/// yet.
+fn together(points: &[Point], some: &[u32], masks: &mut [u64]) -> Vec<[u32; LANES]> {
+    masks.fill(0);
     let mut counts = [0; COLOURS + 1];
-    let mut of = |point: &Point| {
+    let of = |number: &u32| {
+        let point = &points[*number as usize];
         let both = [Some(point.i()), point.j()];
         let taken = both.iter().flatten().fold(0, |mask, &body| mask | masks[body]);
         let colour = (taken.trailing_ones() as usize).min(COLOURS);
         for &body in both.iter().flatten() {
             masks[body] |= if colour < COLOURS { 1 << colour } else { 0 };
         }
-        counts[colour] += 1;
+        // Beyond the last colour each is alone.
+        counts[colour] += if colour < COLOURS { 1 } else { LANES };
         colour
     };
-    let colours = points.iter().map(&mut of).collect();
-    let mut starts = [0; COLOURS + 2];
+    let colours: Vec<_> = some.iter().map(of).collect();
+    // The next free lane of each colour, counted through all batches.
+    let mut next = [0; COLOURS + 2];
     for (colour, &count) in counts.iter().enumerate() {
-        let batches = if colour == COLOURS { count } else { usize::div_ceil(count, LANES) };
-        starts[colour + 1] = starts[colour] + batches;
+        next[colour + 1] = next[colour] + usize::next_multiple_of(count, LANES);
     }
-    (colours, starts)
+    let mut batches = vec![[NONE; LANES]; next[COLOURS + 1] / LANES];
+    for (&number, colour) in some.iter().zip(colours) {
+        batches[next[colour] / LANES][next[colour] % LANES] = number;
+        next[colour] += if colour < COLOURS { 1 } else { LANES };
+    }
+    batches
 }

@@ -1,0 +1,68 @@
+//! Warm start: the impulses with which points go on from a substep to the next.
+
+use serde::{Deserialize, Serialize};
+
+use super::body::Moving;
+use super::contact::{Name, Point};
+use nalgebra::Vector3;
+
+/// A point is known again within this distance from where it was on its body, in its reach `[-]`.
+const KNOWN: f64 = 0.15;
+
+/// A point's manifold, where the point was on its body, and its impulse.
+type Mark = (Name, [f64; 3], [f64; 3]);
+
+/// The points of a substep that had an impulse, in the order of their manifolds.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Marks(Vec<Mark>);
+
+impl Marks {
+    /// Whether they are in order, and of no more than so many bodies.
+    pub fn are_of(&self, bodies: usize) -> bool {
+        let is_there = |&((is_of_two, i, j), ..): &Mark| {
+            (i as usize) < bodies && (!is_of_two || (j as usize) < bodies)
+        };
+        self.0.is_sorted_by_key(|mark| mark.0) && self.0.iter().all(is_there)
+    }
+
+    /// A point that is where one was begins with its impulse, which its bodies get; `reach` is theirs `[m]`.
+    pub fn recall(&self, points: &mut [Point], bodies: &mut [Moving], reach: f64) {
+        debug_assert!(points.is_sorted_by_key(Point::name));
+        let near = KNOWN * reach;
+        let mut is_free = vec![true; self.0.len()];
+        let mut first = 0;
+        for manifold in points.chunk_by_mut(|a, b| a.name() == b.name()) {
+            // Both are in one order.
+            let name = manifold[0].name();
+            first += self.0[first..].iter().take_while(|mark| mark.0 < name).count();
+            let end = first + self.0[first..].iter().take_while(|mark| mark.0 == name).count();
+            for point in manifold {
+                let square = |mark: &Mark| (Vector3::from(mark.1) - point.mark).norm_squared();
+                let nearest = (first..end)
+                    .filter(|&number| is_free[number])
+                    .map(|number| (number, square(&self.0[number])))
+                    .min_by(|a, b| a.1.total_cmp(&b.1));
+                if let Some((number, square)) = nearest
+                    && square < near * near
+                {
+                    // No two points go on from one.
+                    is_free[number] = false;
+                    point.impulse = point.admitted(&self.0[number].2.into());
+                    point.give(bodies, &point.impulse);
+                }
+            }
+            first = end;
+        }
+    }
+
+    /// Keeps the impulses of the points, those before `sorted` in the order of their names, in this order.
+    pub fn take(&mut self, points: &[Point], sorted: usize) {
+        self.0.clear();
+        let acting = points.iter().filter(|point| point.impulse != Vector3::zeros());
+        let mark = |point: &Point| (point.name(), point.mark.into(), point.impulse.into());
+        self.0.extend(acting.map(mark));
+        if sorted < points.len() {
+            self.0.sort_by_key(|mark| mark.0);
+        }
+    }
+}
