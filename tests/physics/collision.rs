@@ -99,6 +99,40 @@ fn an_oblique_pair_keeps_its_momentum_and_its_restitution() {
     assert!(most_oblique < 0.9, "{most_oblique}");
 }
 
+/// The contact problem of the substep before the touch must not push what will pass: the first normal's prediction is
+/// too near by `w_t^2 dt / (2 d)`, and by more where the centres go far beside each other.
+#[test]
+fn a_fast_oblique_pair_meets_alike_wherever_in_a_substep() {
+    let elastic = Material {
+        restitution: 1.0,
+        sliding_friction: 0.0,
+        rolling_friction: 0.0,
+        torsional_friction: 0.0,
+        ..Material::default()
+    };
+    for preset in Preset::ALL {
+        let mut scene = one_grain(0.05, elastic);
+        scene.preset = preset;
+        scene.gravity = [0.0; 3];
+        scene.camera.field_width = 1000.0;
+        scene.grains.count = 2;
+        for number in 0..200 {
+            // They touch after a way of 1 to 9 radii along x, beside each other as far as the first goes along y.
+            let way = RADIUS * (1.0 + 0.04 * f64::from(number));
+            let from = [-RADIUS - way, -3.0 * way, 0.05];
+            scene.start = Start::Positions { positions: vec![from, [RADIUS, 0.0, 0.05]] };
+            let mut simulation = Simulation::new(&scene, 1).expect("a valid scene");
+            let velocity = Vector3::new(1.0, 3.0, 0.0);
+            simulation.set_motion(0, velocity, Vector3::zeros()).expect("a grain");
+            simulation.advance(0.03);
+            let v = [0, 1].map(|grain| motion(&simulation, grain).v);
+            // The normal is x: what is along it is exchanged.
+            let left = (v[0] - Vector3::y() * 3.0).norm() + (v[1] - Vector3::x()).norm();
+            assert!(left < 1e-9, "{preset} {number}: {v:?}");
+        }
+    }
+}
+
 #[test]
 fn tangential_restitution_reverses_the_sliding_of_a_sticking_impact() {
     // So much friction that every impact sticks, and no rolling friction.

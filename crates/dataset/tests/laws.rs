@@ -75,11 +75,11 @@ fn rows_of_two_arithmetics_are_neither_gone_on_with_nor_merged() {
         make(out).unwrap();
     }
     let manifest = fs::read_to_string(other.join("manifest.toml")).unwrap();
-    let changed = manifest.replace("arithmetic = 1", "arithmetic = 99");
+    let changed = manifest.replace("arithmetic = 2", "arithmetic = 99");
     assert_ne!(changed, manifest);
     fs::write(other.join("manifest.toml"), changed).unwrap();
     let said = make(&other).unwrap_err().to_string();
-    assert!(said.contains("the arithmetic of the solver is 1, but 99 is given"), "{said}");
+    assert!(said.contains("the arithmetic of the solver is 2, but 99 is given"), "{said}");
     // Its parts say what they are themselves, too.
     assert!(Dataset::open(&other).unwrap_err().to_string().contains("the arithmetic"));
     let out = place.path().join("merged.parquet");

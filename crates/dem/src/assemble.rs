@@ -52,7 +52,9 @@ widest! {
             let v_j = vectors::<W>(each(&batch.j, velocity));
             let dv = v_i - v_j;
             let w_n = Reg3::load(&batch.normal).dot(dv);
-            finish(batch, law::bias_lanes(gap, dt, small) + passing(distance, dv, w_n, dt));
+            let time = Reg::splat(dt);
+            let aside = passing(distance, dv, w_n, time).over(time);
+            finish(batch, law::bias_lanes(gap, dt, small) + aside);
             let closes = closing_bits(gap, w_n, dt, impact_speed);
             for lane in batch.lanes().filter(|lane| closes >> lane & 1 == 1) {
                 candidates.push(Candidate { i: batch.i[lane], partner: batch.j[lane] });
@@ -126,8 +128,10 @@ widest! {
             let dv = vectors::<W>(each(&batch.i, velocity)) - vectors(each(&batch.j, velocity));
             let w_n = Reg3::load(&batch.normal).dot(dv);
             let gap = empty_lanes_open(batch, gap);
-            let bias = law::bias_after_impact(gap, w_n, Reg::load(&clocks), dt, small);
-            finish(batch, bias + passing(distance, dv, w_n, dt));
+            let clock = Reg::load(&clocks);
+            let bias = law::bias_after_impact(gap, w_n, clock, dt, small);
+            let time = Reg::splat(dt);
+            finish(batch, bias + passing(distance, dv, w_n, time - clock).over(time));
         }
     }
 }
@@ -177,12 +181,17 @@ fn empty_lanes_open<W: Width>(batch: &Batch, gap: Reg<W>) -> Reg<W> {
     Reg::load(&gaps)
 }
 
-/// How much slower two centres approach, on the mean of the substep, than along their first normal, for they
-/// pass each other: `w_t^2 dt / (2 d)`.
+/// How much farther from each other two centres are after a time, for they pass each other, than along their first normal
+/// `[m]`: `d' - d - w_n time` with their distance `d'` then, to second order `w_t^2 time^2 / (2 d)`.
 #[inline(always)]
-fn passing<W: Width>(distance: Reg<W>, dv: Reg3<W>, w_n: Reg<W>, dt: f64) -> Reg<W> {
-    let across = dv.dot(dv) - w_n * w_n;
-    (Reg::splat(0.5 * dt) * across).over(distance.max(Reg::splat(COINCIDENT)))
+fn passing<W: Width>(distance: Reg<W>, dv: Reg3<W>, w_n: Reg<W>, time: Reg<W>) -> Reg<W> {
+    let (zero, two) = (Reg::splat(0.0), Reg::splat(2.0));
+    let way = time * dv.dot(dv);
+    let square = distance.times_plus(distance, time * (two * distance).times_plus(w_n, way));
+    let end = square.max(zero).sqrt();
+    // Without the difference of two distances that hardly differ.
+    let twice = time * w_n.times_plus(distance - end, way);
+    twice.over((end + distance).max(Reg::splat(COINCIDENT)))
 }
 
 /// Sets the normals and returns the gaps and distances of a batch of pairs whose grains are these spheres.
