@@ -11,9 +11,9 @@ from typing import Any, TypeVar
 
 from granulcal import _native
 from granulcal.engines.in_use import engine_in_use
+from granulcal.pours.awaited import Awaited
 from granulcal.pours.cluster import (
     AHEAD,
-    PATIENCE_S,
     RETRIES,
     LostResultError,
     cluster_in_use,
@@ -67,15 +67,14 @@ def _on_cluster(
     ray = connected()
     remote = ray.remote(num_cpus=1, max_retries=RETRIES)(_one)
     waiting, tasks = deque(range(len(each))), {}
-    shared = ray.put(work)
+    shared, awaited = ray.put(work), Awaited(ray)
     try:
         while waiting or tasks:
             cores = max(1, int(ray.cluster_resources().get("CPU", 1)))
             while waiting and len(tasks) < AHEAD * cores:
                 place = waiting.popleft()
                 tasks[remote.remote(shared, each[place], _law())] = place
-            done, _ = ray.wait(list(tasks), timeout=PATIENCE_S)
-            for reference in done:
+            for reference in awaited.done(tasks):
                 place = tasks.pop(reference)
                 try:
                     row = result_of(ray, reference)

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from granulcal import _native
+from granulcal.pours.awaited import Awaited
 from granulcal.pours.part_store import PartStore
 from granulcal.pours.stored_parts import StoredParts
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AHEAD",
-    "PATIENCE_S",
     "RETRIES",
     "Cluster",
     "LostResultError",
@@ -45,8 +45,6 @@ AHEAD = 2
 # Tasks that take this many medians are made a second time on a core that has nothing to do.
 _STRAGGLES = 3.0
 _LEAST_STRAGGLE_S = 20.0
-PATIENCE_S = 0.5
-"""How long the driver waits for a task before it looks around [s]."""
 RETRIES = 20
 """Workers that are killed under the same part so often are not killed by chance."""
 
@@ -146,9 +144,14 @@ def _require_listener(address: str) -> None:
     Raises:
         ConnectionError: nobody answers there.
     """
+    if address in ("auto", "local"):
+        return
     host, mark, port = address.removeprefix("ray://").rpartition(":")
     if not mark or not port.isdecimal():
-        return
+        raise ConnectionError(
+            "the address of a Ray cluster must be auto, local, HOST:PORT or ray://HOST:PORT, "
+            f"got {address!r}"
+        )
     try:
         socket.create_connection(
             (host.strip("[]"), int(port)), timeout=_PATIENCE_OF_ADDRESS_S
@@ -309,6 +312,7 @@ class _Gathering:
         report: Callable[..., object] | None,
     ) -> None:
         self.ray, self.batch, self.order = ray, batch, order
+        self.awaited = Awaited(ray)
         self.stored, self.report = stored, report
         self.remote = ray.remote(num_cpus=1, max_retries=RETRIES)(_make_part)
         self.waiting = deque(batch.missing())
@@ -320,8 +324,7 @@ class _Gathering:
         try:
             while self.batch.missing():
                 self._submit()
-                done, _ = self.ray.wait(list(self.tasks), timeout=PATIENCE_S)
-                for reference in done:
+                for reference in self.awaited.done(self.tasks):
                     self._take(reference)
                 if self.report is not None:
                     self.report(*self.batch.counts())
