@@ -1,7 +1,5 @@
 //! Meshes as walls against the shapes that they are meshes of.
 
-use std::sync::Arc;
-
 use granulcal::dem::{
     Funnel, Mesh, MeshFile, Motion as WallMotion, Scene, Shape, Simulation, Start, Status, Wall,
     WallMaterial,
@@ -12,8 +10,7 @@ use crate::scenes::{RADIUS, material, motion, one_grain, start};
 
 fn wall(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Wall {
     let mesh = Mesh::new(vertices, triangles, "test").expect("a mesh");
-    let (file, mesh) = ("test.stl".to_owned(), Some(Arc::new(mesh)));
-    let shape = Shape::Mesh(MeshFile { file, unit: 1.0, closed: false, hash: None, mesh });
+    let shape = Shape::Mesh(MeshFile::of(mesh, "test.stl", 1.0, false));
     Wall::fixed(shape, WallMaterial::default())
 }
 

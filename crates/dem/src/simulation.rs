@@ -304,13 +304,29 @@ impl Simulation {
     }
 
     /// Simulates `seconds`, rounded to whole substeps, or less if the pour ends before; to its end for infinity. Nothing
-    /// is simulated for less than half a substep, nor for a negative number or NaN.
-    pub fn advance(&mut self, seconds: f64) {
-        let substeps = (seconds / self.around.settings.dt).round() as usize;
+    /// is simulated for less than half a substep, nor for a negative number or NaN. Returns how the pour ended, once it
+    /// has: from then on no call simulates anything. Each call rounds by itself; see [`Self::advance_to`].
+    pub fn advance(&mut self, seconds: f64) -> Option<Status> {
+        self.advance_by(self.substeps(seconds))
+    }
+
+    /// Simulates to the substep that ends nearest to `time` `[s]`, or less if the pour ends before, in which case it
+    /// returns how. A loop over the times of frames does not drift by this.
+    pub fn advance_to(&mut self, time: f64) -> Option<Status> {
+        self.advance_by(self.substeps(time).saturating_sub(self.substep))
+    }
+
+    /// Whole substeps in a time, none in a negative one or NaN.
+    fn substeps(&self, seconds: f64) -> usize {
+        (seconds / self.around.settings.dt).round() as usize
+    }
+
+    fn advance_by(&mut self, substeps: usize) -> Option<Status> {
         let last = self.substep.saturating_add(substeps);
         while self.ended.is_none() && self.substep < last {
             self.step();
         }
+        self.ended
     }
 
     /// Simulates to the end.

@@ -12,6 +12,9 @@ use crate::grain_shape::{GrainShape, Solid};
 /// Grains that a volume may stand for; no machine holds as many.
 const MOST: f64 = 1e12;
 
+/// Grains of a scene at most: the state of as many takes some 100 GB.
+const MOST_GRAINS: usize = 100_000_000;
+
 /// What is poured: equal spheres, or equal convex bodies.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Stated", into = "Stated")]
@@ -102,6 +105,9 @@ impl Grains {
     pub(crate) fn check(&self) -> Result<(), SceneError> {
         positive("grains.diameter", self.diameter)?;
         positive("grains.density", self.density)?;
+        if self.count > MOST_GRAINS {
+            return Err(SceneError::range("grains.count", self.count as f64, "at most 1e8"));
+        }
         let Some(volume) = self.volume else { return Ok(()) };
         if self.shape.is_some() {
             return Err(SceneError::Exclude { one: "grains.volume", other: "grains.shape" });

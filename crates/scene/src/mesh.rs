@@ -91,6 +91,14 @@ impl Mesh {
         count.values().filter(|&&uses| uses != [1, 1]).count()
     }
 
+    /// Hash of its vertices and triangles, in their order (XXH3-64, hexadecimal).
+    pub fn hash(&self) -> String {
+        let vertices = self.vertices.iter().flatten().flat_map(|c| c.to_le_bytes());
+        let triangles = self.triangles.iter().flatten().flat_map(|v| v.to_le_bytes());
+        let bytes: Vec<u8> = vertices.chain(triangles).collect();
+        format!("{:016x}", xxhash_rust::xxh3::xxh3_64(&bytes))
+    }
+
     /// Largest extent along an axis, in the units of the file.
     pub fn extent(&self) -> f64 {
         let extent = |axis: usize| {
@@ -117,7 +125,8 @@ pub struct MeshFile {
     /// Whether the mesh has to be closed (no holes, one side out). A shell that is open touches grains on both sides.
     #[serde(default)]
     pub closed: bool,
-    /// Hash of the file (XXH3-64, hexadecimal), set when it is read; another file by that name is refused then.
+    /// Hash of the file (XXH3-64, hexadecimal), set when it is read; another file by that name is refused then. By it
+    /// checkpoints and data sets tell one mesh from another.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hash: Option<String>,
     /// What stands in the file, once it has been read.
@@ -126,6 +135,13 @@ pub struct MeshFile {
 }
 
 impl MeshFile {
+    /// A mesh made in memory, in units of `unit` `[m]`, under a name for messages. Its hash is that of its triangles, so
+    /// that a checkpoint or a data set of another mesh is refused; from its TOML alone it cannot be had again.
+    pub fn of(mesh: Mesh, name: &str, unit: f64, closed: bool) -> Self {
+        let hash = Some(mesh.hash());
+        Self { file: name.to_owned(), unit, closed, hash, mesh: Some(Arc::new(mesh)) }
+    }
+
     /// The triangles, or what to do to have them.
     ///
     /// # Errors
@@ -140,6 +156,11 @@ impl MeshFile {
         positive(&format!("{name}.shape.unit"), self.unit)?;
         let mesh = self.read()?;
         let bad = |reason: String| SceneError::Mesh { file: self.file.clone(), reason };
+        if self.hash.is_none() {
+            return Err(bad(
+                "has no hash, by which it is told from another: MeshFile::of sets it".to_owned()
+            ));
+        }
         let (unit, extent) = (self.unit, mesh.extent() * self.unit);
         if !(LEAST_DIAMETERS..=MOST_DIAMETERS).contains(&(extent / diameter)) {
             let [least, most] = [LEAST_DIAMETERS, MOST_DIAMETERS].map(|n| n * diameter);
@@ -170,8 +191,7 @@ mod tests {
     const FACES: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
 
     fn file(mesh: Mesh, unit: f64, closed: bool) -> MeshFile {
-        let file = "vessel.stl".to_owned();
-        MeshFile { file, unit, closed, hash: None, mesh: Some(Arc::new(mesh)) }
+        MeshFile::of(mesh, "vessel.stl", unit, closed)
     }
 
     #[test]
@@ -188,6 +208,19 @@ mod tests {
         assert!(other.is_some_and(|path| path.starts_with("shape.")));
         let unknown = |place: &str| format!("[shape]\nfile = \"{place}/vessel.stl\"\n");
         assert_eq!(differ(unknown("a"), unknown("b")), Some("shape.file".to_owned()));
+    }
+
+    #[test]
+    fn a_mesh_made_in_memory_is_told_from_another_by_its_triangles() {
+        let mesh = |corners: [[f64; 3]; 4]| Mesh::new(&corners, &FACES, "a.stl").unwrap();
+        let mut moved = CORNERS;
+        moved[3][2] = 9.0;
+        let [one, same, other] = [CORNERS, CORNERS, moved].map(|of| file(mesh(of), 1e-3, false));
+        assert_eq!(one.hash, same.hash);
+        assert_ne!(one.hash, other.hash);
+        let unknown = MeshFile { hash: None, ..one };
+        let said = unknown.check("walls.0", 4e-3).unwrap_err().to_string();
+        assert!(said.contains("vessel.stl has no hash") && said.contains("MeshFile::of"), "{said}");
     }
 
     #[test]
