@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from granulcal.bayessim.storage.place import require_place
 from granulcal.calibrate import Calibrated, calibrate
 from granulcal.files import write_toml
 from granulcal.measured.recording import Recording
@@ -68,6 +69,7 @@ def run(out: Path, *, pours: int = _DEFAULT_POURS, threads: int | None = None) -
     """Runs the demo into the folder `out`; pours that are there already are not repeated."""
     from granulcal.bayessim import BayesSim
 
+    require_place(out / "model")
     scene, prior = demo_scene(), Prior.default()
     _say("1/4 recording a pour of a hidden material (tilted, noisy camera; accurate preset)")
     recording = record(out / "recording", scene)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from granulcal import _native
+from granulcal.bayessim.storage.place import require_place
 
 __all__ = ["KEPT", "READS", "RECORDING", "Reads", "Writes", "actions", "check", "writes"]
 
@@ -71,6 +72,21 @@ def check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
             elif isinstance(action.type, Writes):
                 outputs.append((_shown(action), path, action.type.kind))
     _native.check_paths(reads, outputs)
+    for argument, path, kind in outputs:
+        if kind == "model":
+            _require_model_place(argument, path)
+
+
+def _require_model_place(argument: str, path: Path) -> None:
+    """Refuses a folder that saving would refuse after the training.
+
+    Raises:
+        ValueError: it holds something else than a model.
+    """
+    try:
+        require_place(path)
+    except FileExistsError as error:
+        raise ValueError(f"{argument}: {error}") from None
 
 
 def _given(

@@ -213,7 +213,7 @@ def test_bad_input_is_exit_code_2(model, recording, tmp_path, tmp_path_factory, 
 
 def test_a_folder_that_is_no_model_is_left_alone(small_data, tmp_path, capsys):
     (tmp_path / "precious.txt").write_text("keep")
-    assert main(["train", str(small_data.path), "-o", str(tmp_path)]) == 1
+    assert main(["train", str(small_data.path), "-o", str(tmp_path)]) == 2
     assert "not a saved model" in capsys.readouterr().err
     assert (tmp_path / "precious.txt").read_text() == "keep"
 

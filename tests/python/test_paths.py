@@ -147,6 +147,22 @@ def test_paths_are_tested_before_the_pour(tmp_path, capsys):
     assert "make it first" in capsys.readouterr().err
 
 
+def test_a_model_finds_its_place_before_the_training(tmp_path, capsys, monkeypatch):
+    from granulcal.starter.models import make_model
+
+    taken = tmp_path / "pours"
+    taken.mkdir()
+    (taken / "part-000000.parquet").write_text("mine")
+    monkeypatch.setattr("granulcal.bayessim.BayesSim.fit", lambda *_, **__: pytest.fail("trained"))
+    for words in (["train", str(taken)], ["train", str(taken), "--dry-run"], ["model", "drop"]):
+        assert cli.main([*words, "-o", str(taken)]) == 2, words
+        error = capsys.readouterr().err
+        assert "--out: " in error and "not a saved model" in error and "another folder" in error
+    with pytest.raises(FileExistsError, match="not a saved model"):
+        make_model("drop", pours=50, out=taken)
+    assert [path.name for path in taken.iterdir()] == ["part-000000.parquet"]
+
+
 def test_a_recorded_camera_does_not_eat_the_measured_one(tmp_path):
     camera = gc.Camera.overhead(height=0.4, field_width=0.4, pixels=64)
     grains = [[0.0, 0.0, 0.01]], [0.01]

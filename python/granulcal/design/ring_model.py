@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.bayessim.storage.place import require_place
 from granulcal.design.reach import Reach
 from granulcal.design.ring import PERCENTILES, STATISTICS
 from granulcal.errors import TrainingDataError
@@ -146,6 +147,8 @@ class RingModel:
         if pours < _FEWEST_POURS:
             raise ValueError(f"pours must be at least {_FEWEST_POURS}, got {pours}")
         folder = None if out is None else Path(out)
+        if folder is not None:
+            require_place(folder / _MODEL)
         data = generate(
             observing_radii(scene),
             height_prior(heights),

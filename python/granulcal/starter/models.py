@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from granulcal import _native
+from granulcal.bayessim.storage.place import require_place
 from granulcal.documents import Table, read_json
 from granulcal.files import write_beside
 from granulcal.pours.scene import Scene
@@ -137,6 +138,7 @@ def make_model(
 
     scene, prior = Scene.built_in(name), Prior.default()
     folder = cache_folder() / "models" / name if out is None else out
+    require_place(folder)
     there = None if data is None else Dataset.load(data)
     if there is not None:
         require_pours_of(name, there)

@@ -21,6 +21,7 @@ from granulcal.bayessim.posterior.average import FORMS, Average
 from granulcal.bayessim.storage.damage import hashes, in_order, verify
 from granulcal.bayessim.storage.model_schema import check_model
 from granulcal.bayessim.storage.parts import Parts, Trained
+from granulcal.bayessim.storage.place import MODEL_JSON, require_place
 from granulcal.bayessim.storage.tensors import Tensors, model_tensors
 from granulcal.bayessim.training.config import Config
 from granulcal.bayessim.training.summary import TrainingSummary
@@ -34,7 +35,7 @@ __all__ = ["Parts", "load_parts", "save_model"]
 FORMAT, VERSION = "granulcal-bayessim", 4
 # Of these the emulator's weight is that of an arithmetic average.
 _OLDER_VERSIONS = (3,)
-_JSON_NAME, _TENSORS_NAME = "model.json", "weights.safetensors"
+_TENSORS_NAME = "weights.safetensors"
 
 
 def save_model(model: Trained, path: str | PathLike[str], *, compact: bool = False) -> None:
@@ -45,8 +46,7 @@ def save_model(model: Trained, path: str | PathLike[str], *, compact: bool = Fal
     """
     # A link to a folder stays a link.
     target = Path(path).resolve() if Path(path).is_symlink() else Path(path)
-    if target.exists() and not (target / _JSON_NAME).is_file() and not _is_empty(target):
-        raise FileExistsError(f"{target} exists and is not a saved model; it is left as it is")
+    require_place(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     workshop = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
     new, old = workshop / "new", workshop / "old"
@@ -54,7 +54,7 @@ def save_model(model: Trained, path: str | PathLike[str], *, compact: bool = Fal
         new.mkdir()
         text = (json.dumps(_document(model), indent=1, allow_nan=False) + "\n").encode()
         tensors = model_tensors(model, compact=compact)
-        write_beside(new / _JSON_NAME, text)
+        write_beside(new / MODEL_JSON, text)
         write_beside(
             new / _TENSORS_NAME, in_order(tensor_bytes(tensors, metadata=hashes(text, tensors)))
         )
@@ -74,10 +74,10 @@ def save_model(model: Trained, path: str | PathLike[str], *, compact: bool = Fal
 def load_parts(path: str | PathLike[str]) -> Parts:
     """Returns what the model in the folder `path` is joined from; see `BayesSim.load`."""
     folder = Path(path)
-    for name in (_JSON_NAME, _TENSORS_NAME):
+    for name in (MODEL_JSON, _TENSORS_NAME):
         if not (folder / name).is_file():
             raise FileNotFoundError(f"{folder / name} does not exist: {folder} is no saved model")
-    where = folder / _JSON_NAME
+    where = folder / MODEL_JSON
     text = read_bytes(where, most=LARGEST_DOCUMENT)
     document = parse_json(text, where, error=ModelFormatError)
     _check_header(document, where)
@@ -217,7 +217,3 @@ def _average(document: dict[str, Any], where: Path) -> Average:
             f"{found.emulator!r} and {found.network!r}"
         )
     return found
-
-
-def _is_empty(path: Path) -> bool:
-    return path.is_dir() and not any(path.iterdir())
