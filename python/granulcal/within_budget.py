@@ -14,6 +14,7 @@ from granulcal.measured.different import require_different
 from granulcal.measured.recording import Recording
 from granulcal.pours.cluster import Cluster, cluster_asked, spread_over
 from granulcal.pours.kept_pours import KeptPours
+from granulcal.pours.made_for import MadeFor
 from granulcal.pours.scene import Scene
 from granulcal.pours.statistics import NAMES
 from granulcal.prior import Prior
@@ -41,7 +42,8 @@ def calibrate_within(
 ) -> "SequentialFit":
     """Returns the posterior of recordings of one material from `budget` pours.
 
-    Stop it anywhere: the same call goes on after the last pour that is kept in `out`.
+    Stop it anywhere: the same call goes on after the last pour that is kept in `out`. The folder is
+    of these recordings: with others it is refused.
 
     Args:
         scene: what was poured, with the camera that looked.
@@ -60,7 +62,8 @@ def calibrate_within(
     Raises:
         PriorError: a parameter that has no place in the scene over its whole range.
         TypeError: something that is no recording.
-        ValueError: no recording, one that is given twice, or too small a budget.
+        ValueError: no recording, one that is given twice, too small a budget, or a folder of pours
+            that were made for other recordings.
 
     Warns:
         DoubtfulRecordingWarning: what `Recording.doubts` says.
@@ -91,6 +94,7 @@ def calibrate_within(
         threads=threads,
         progress=poured,
         engine=engine,
+        made_for=MadeFor.of([each.path for each in recordings], observed),
     )
     with spread_over(cluster_asked(ray)):
         found = infer_within_budget(

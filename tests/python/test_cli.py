@@ -192,6 +192,17 @@ def test_calibrate_needs_no_model_and_goes_on_where_it_stopped(
     assert main([*words, "--budget", "60", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == found
     assert (out / "pours.json").read_bytes() == kept
+    # Another recording, of whatever name, would replace these pours and their posterior.
+    pour = gc.simulate(small_scene, seed=12)
+    camera = gc.Camera.overhead(height=0.29, field_width=0.58, pixels=580)
+    image, _ = camera.record(pour.positions, pour.radii, tmp_path / "other")
+    before = (out / "posterior.json").read_bytes()
+    other = [*words[:3], str(image), *words[4:], "--budget", "60"]
+    assert main(other) == 2
+    told = capsys.readouterr().err
+    assert f"another recording, {recording[0]}" in told and "give another folder" in told
+    assert (out / "posterior.json").read_bytes() == before
+    assert (out / "pours.json").read_bytes() == kept
 
 
 def test_bad_input_is_exit_code_2(model, recording, tmp_path, tmp_path_factory, capfd):

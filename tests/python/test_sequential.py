@@ -12,6 +12,7 @@ from granulcal.bayessim.training.sequential import infer_within_budget, round_si
 from granulcal.errors import ObservationError, PriorError, TrainingDataError
 from granulcal.parameter import Parameter
 from granulcal.pours.kept_pours import KeptPours
+from granulcal.pours.made_for import MadeFor
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 from granulcal.within_budget import calibrate_within
@@ -95,3 +96,29 @@ def test_pours_are_kept_and_never_made_twice(tmp_path):
     file.write_text("{")
     with pytest.raises(ValueError, match="truncated or not JSON"):
         KeptPours(scene, prior, file)
+
+
+def test_a_folder_is_of_one_observation(tmp_path):
+    scene, prior = Scene.drop(0.02, count=20), Prior.default()
+    theta, file = prior.sample(2, seed=1), tmp_path / "pours.json"
+    x = np.arange(32.0).reshape(2, 16)
+    first = MadeFor.of(["a.png", "b.png"], x)
+    made = KeptPours(scene, prior, file, threads=1, made_for=first)
+    kept = made(theta, 0)
+    del made
+    # Moved, and in another order, they are the same; what asks without an observation keeps it.
+    moved = MadeFor.of(["there/b.png", "there/a.png"], x[::-1] * (1 + 1e-9))
+    for same in (moved, None):
+        again = KeptPours(scene, prior, file, threads=1, made_for=same)
+        np.testing.assert_array_equal(again(np.r_[theta, theta[:1]], 0)[:2], kept)
+        del again
+    others = {
+        r"another recording, a\.png, b\.png": MadeFor.of(["c.png", "d.png"], x + 1e-3),
+        "for another recording": MadeFor.of(["a.png"], x[:1]),
+        "showed before it": MadeFor.of(["a.png", "b.png"], x + 1e-3),
+    }
+    before = file.read_bytes()
+    for told, other in others.items():
+        with pytest.raises(ValueError, match=f"{told}.* give another folder, or remove"):
+            KeptPours(scene, prior, file, made_for=other)
+    assert file.read_bytes() == before

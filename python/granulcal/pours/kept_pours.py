@@ -27,6 +27,8 @@ from granulcal.pours.at_once import at_once
 from granulcal.pours.cluster import cluster_in_use, refuse_engine
 from granulcal.pours.forward import scene_at
 from granulcal.pours.left_out import LeftOut
+from granulcal.pours.made_for import SCHEMA as MADE_FOR
+from granulcal.pours.made_for import MadeFor
 from granulcal.pours.one_run import OneRun
 from granulcal.pours.scene import Scene
 from granulcal.pours.simulate import Pour, simulate
@@ -47,7 +49,7 @@ _POUR = Table(
 )
 _SCHEMA = Table(
     {"key": Text(), "pours": Mapping(_POUR)},
-    {"names": ListOf(Text()), "hash": Text(), "law": Whole()},
+    {"names": ListOf(Text()), "hash": Text(), "law": Whole(), "made_for": MADE_FOR},
 )
 # Seeds of pours of one run; data sets' are hashes, and reports' begin at 9000.
 _FIRST_SEED = 40_000_000
@@ -69,9 +71,11 @@ class KeptPours:
         look: what to keep of a pour in place of both: names, and the function that measures them;
             a ValueError of the function says that too few grains are in view.
         engine: another simulator in place of ours, or of the one in use.
+        made_for: the observation that leads the run; a file that states none takes it.
 
     Raises:
-        ValueError: the file is that of another scene, prior, seed, law or engine, or is damaged.
+        ValueError: the file is that of another scene, prior, seed, law, engine or observation, or
+            is damaged.
         BlockingIOError: another process pours into the file.
     """
 
@@ -87,6 +91,7 @@ class KeptPours:
         observed: bool = False,
         look: tuple[tuple[str, ...], Callable[[Pour], ArrayLike]] | None = None,
         engine: "Engine | None" = None,
+        made_for: MadeFor | None = None,
     ) -> None:
         """Reads what is kept already."""
         own = (scene.observed_names, Pour.observed) if observed else (NAMES, Pour.statistics)
@@ -101,10 +106,11 @@ class KeptPours:
         text += "" if engine is None else f"\n{engine.name}"
         # Another simulator has another law, whatever it is.
         self.law = law_of_pours(scene) if engine is None else 0
+        self.made_for = None if made_for is None else made_for.as_dict()
         self.key = hashlib.sha256(text.encode()).hexdigest()
         # Before it is read: what another run writes after that would be lost.
         self._held = OneRun.of(path)
-        self.rows: dict[str, dict] = self._read() if path.exists() else {}
+        self.rows: dict[str, dict] = self._read(made_for) if path.exists() else {}
 
     def __call__(self, theta: Array, first: int) -> Array:
         """Returns the statistics of pours at `theta` (b, p), NaN where there are none, (b, s)."""
@@ -146,7 +152,7 @@ class KeptPours:
         row = self.rows.get(str(index))
         return row is not None and np.allclose(row["theta"], theta, rtol=1e-12, atol=0)
 
-    def _read(self) -> dict[str, dict]:
+    def _read(self, made_for: MadeFor | None) -> dict[str, dict]:
         document = read_json(self.path, _SCHEMA)
         key, rows = document["key"], document["pours"]
         if document.get("hash") not in (None, _hash(rows)):
@@ -162,10 +168,15 @@ class KeptPours:
             raise ValueError(
                 f"{self.path} has the pours of another scene, prior or seed, or engine"
             )
+        stated = document.get("made_for")
+        if stated is not None and made_for is not None:
+            made_for.require_same(stated, self.path)
+        self.made_for = stated or self.made_for
         return rows
 
     def _write(self) -> None:
         document = {"key": self.key, "law": self.law, "names": self.prior.names}
+        document |= {} if self.made_for is None else {"made_for": self.made_for}
         write_beside(
             self.path, json.dumps({**document, "hash": _hash(self.rows), "pours": self.rows})
         )
