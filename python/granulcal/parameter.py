@@ -77,6 +77,17 @@ class Parameter:
         return self.distribution == "log_uniform"
 
     @property
+    def in_words(self) -> str:
+        """The distribution as `granulcal inspect` says it, for example `normal 0.08 ± 0.004`."""
+        if self.distribution == "fixed":
+            return f"fixed at {self.value:g}"
+        if self.distribution != "normal":
+            return f"{self.distribution} from {self.low:g} to {self.high:g}"
+        low = "" if self.low is None else f" from {self.low:g}"
+        high = "" if self.high is None else f" to {self.high:g}"
+        return f"normal {self.mean:g} ± {self.sd:g}{low}{high}"
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest possible value, in the parameter's own unit; may be infinite."""
         if self.distribution == "fixed":

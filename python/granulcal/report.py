@@ -214,17 +214,12 @@ def _parameters(posterior: "Posterior", truth: ArrayLike | None) -> list[dict[st
                 "mean": float(mean[i]),
                 "low": low,
                 "high": high,
-                "prior": _prior_text(parameter),
+                "prior": parameter.in_words,
                 "truth": known,
                 "is_inside": None if known is None else low <= known <= high,
             }
         )
     return rows
-
-
-def _prior_text(parameter: Any) -> str:
-    low, high = (_number(bound) for bound in parameter.bounds)
-    return f"{parameter.distribution.replace('_', '-')} {low} to {high}"
 
 
 def _distances(

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from granulcal.cli import main
 from granulcal.errors import PriorError
 from granulcal.parameter import Parameter
 from granulcal.prior import Prior
@@ -70,6 +71,24 @@ def test_any_range_survives_toml_and_coordinates(low: float, factor: float, kind
     np.testing.assert_allclose(back, theta, rtol=1e-9)
     assert np.all(np.isfinite(prior.log_prob(theta)))
     assert np.all(np.isfinite(prior.log_prob(prior.bounds.T)))
+
+
+def test_a_distribution_is_said_as_inspect_says_it(tmp_path, capfd):
+    path = tmp_path / "prior.toml"
+    kinds = {
+        "material.sliding_friction": {"distribution": "uniform", "low": 0.05, "high": 1},
+        "material.rolling_friction": {"distribution": "log_uniform", "low": 1e-3, "high": 1.5},
+        "material.restitution": {"distribution": "fixed", "value": 0.4},
+        "funnel.height": {"distribution": "normal", "mean": 0.08, "sd": 0.004},
+        "camera.height": {"distribution": "normal", "mean": 0.3, "sd": 0.01, "low": 0.25},
+        "start.base": {"distribution": "normal", "mean": 0, "sd": 1, "low": -0.5, "high": 0.5},
+    }
+    prior = Prior.from_tables([{"path": path, **kind} for path, kind in kinds.items()])
+    path.write_text(prior.to_toml())
+    assert main(["inspect", str(path)]) == 0
+    told = capfd.readouterr().out.splitlines()
+    assert told[: len(kinds)] == [f"{each.path}: {each.in_words}" for each in prior.parameters]
+    assert prior.parameters[3].in_words == "normal 0.08 ± 0.004"
 
 
 def test_log_prob_matches_scipy():

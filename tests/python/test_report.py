@@ -97,6 +97,7 @@ def test_the_page_shows_every_number(page, small_data):
     assert "Read this." in text
     assert "granulcal report a b -o c" in text
     assert "80 at_rest" in text
+    assert "<td>log_uniform from 0.001 to 1</td>" in text
     assert "Not checked" in text
     assert gc.__version__ in text
 
