@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
 from granulcal.arrays import unmasked
+from granulcal.assumed import assumed
 from granulcal.files import write_beside
 from granulcal.pours.compare import Scale, comparison_table, nearest_row, standardised_distance
 from granulcal.pours.dataset import Dataset
@@ -141,6 +142,7 @@ def write_report(
         drawn_count=len(drawn),
         pairs=_pair_plot(posterior, truth),
         parameters=_parameters(posterior, truth),
+        assumed=assumed(data.scene_toml, posterior.prior),
         has_truth=truth is not None,
         statistics=comparison_table(measured, simulated, scale),
         docs=DOCS,

@@ -192,6 +192,9 @@ def test_calibrate_needs_no_model_and_goes_on_where_it_stopped(
     assert main([*words, "--budget", "60", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == found
     assert (out / "pours.json").read_bytes() == kept
+    assert main([*words, "--budget", "60"]) == 0
+    told = capsys.readouterr().out
+    assert f"\nassumed: grains.count {small_scene.get('grains.count'):g}, grains.diameter" in told
     # Another recording, of whatever name, would replace these pours and their posterior.
     pour = gc.simulate(small_scene, seed=12)
     camera = gc.Camera.overhead(height=0.29, field_width=0.58, pixels=580)

@@ -98,6 +98,7 @@ def test_the_page_shows_every_number(page, small_data):
     assert "granulcal report a b -o c" in text
     assert "80 at_rest" in text
     assert "<td>log_uniform from 0.001 to 1</td>" in text
+    assert f"assumed: grains.count {small_data.scene.get('grains.count'):g}, " in text
     assert "Not checked" in text
     assert gc.__version__ in text
 

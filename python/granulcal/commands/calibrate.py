@@ -55,6 +55,7 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from granulcal.assumed import assumed
     from granulcal.bayessim.training.sequential import round_sizes
     from granulcal.engines import engine_named
     from granulcal.measured.plausible import doubts, violations
@@ -123,7 +124,7 @@ def _run(options: argparse.Namespace) -> int:
         write_beside(options.out / "posterior.json", json.dumps(document, indent=1) + "\n")
     except OSError as error:
         lost = error
-    code = _say(options, found, document, recordings)
+    code = _say(options, found, document, recordings, assumed(scene.to_toml(), prior))
     if lost is not None:
         raise lost
     return code
@@ -134,8 +135,9 @@ def _say(
     found: "SequentialFit",
     document: dict[str, Any],
     recordings: "list[Recording]",
+    taken_for_known: str,
 ) -> int:
-    """Prints what was found; returns the exit code."""
+    """Prints what was found, and under what; returns the exit code."""
     posterior = found.posterior
     if options.json:
         del document["samples"]
@@ -143,6 +145,7 @@ def _say(
         return exit_code_of(recordings, found.misfit.is_inside)
     print(found.misfit)
     _print_parameters(document["parameters"])
+    print(taken_for_known)
     print(f"{found.rounds[-1]}; {found.choice}")
     print(f"pours that cannot be used: {found.left_out}")
     for warning in posterior.warnings:

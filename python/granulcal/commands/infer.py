@@ -1,10 +1,11 @@
-"""The word `infer`: the parameters of recordings, by granulcal-cli; the plot is drawn here."""
+"""The word `infer`: the parameters of recordings, by granulcal-cli; plots and what was assumed here."""
 
 import argparse
 import contextlib
 import importlib.util
 import io
 import sys
+from pathlib import Path
 from typing import Any
 
 from granulcal import _native
@@ -33,7 +34,7 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Everything but the plot is by granulcal-cli, so that both say the same."""
+    """Posterior and table are by granulcal-cli, so that both say the same."""
     from granulcal.starter.models import model_named
 
     if options.plot is not None and importlib.util.find_spec("torch") is None:
@@ -48,9 +49,22 @@ def _run(options: argparse.Namespace) -> int:
     if options.json:
         words.append("--json")
     code = _native.run_cli(words)
+    if not options.json and code in (DONE, UNHEALTHY):
+        _say_assumed(model)
     if options.plot is not None and code in (DONE, UNHEALTHY):
         _plot(options, code)
     return code
+
+
+def _say_assumed(model: Path) -> None:
+    """Says below the table what nobody inferred."""
+    from granulcal.assumed import assumed
+    from granulcal.bayessim.storage.model_document import read_model_document
+    from granulcal.prior import Prior
+
+    _, document = read_model_document(model)
+    if line := assumed(document["scene_toml"], Prior.from_toml(document["prior_toml"])):
+        print(line, flush=True)
 
 
 def _plot(options: argparse.Namespace, code: int) -> None:

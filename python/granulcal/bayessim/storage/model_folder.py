@@ -19,22 +19,24 @@ from granulcal.bayessim.check.calibration import Calibration
 from granulcal.bayessim.check.identifiability import Identifiability
 from granulcal.bayessim.posterior.average import FORMS, Average
 from granulcal.bayessim.storage.damage import hashes, in_order, verify
-from granulcal.bayessim.storage.model_schema import check_model
+from granulcal.bayessim.storage.model_document import (
+    FORMAT,
+    OLDER_VERSIONS,
+    VERSION,
+    read_model_document,
+)
 from granulcal.bayessim.storage.parts import Parts, Trained
 from granulcal.bayessim.storage.place import MODEL_JSON, require_place
 from granulcal.bayessim.storage.tensors import Tensors, model_tensors
 from granulcal.bayessim.training.config import Config
 from granulcal.bayessim.training.summary import TrainingSummary
-from granulcal.documents import LARGEST_DOCUMENT, parse_json, read_bytes
+from granulcal.documents import read_bytes
 from granulcal.errors import ModelFormatError, OtherLawWarning, UnverifiedModelWarning
 from granulcal.files import write_beside
 from granulcal.prior import Prior
 
 __all__ = ["Parts", "load_parts", "save_model"]
 
-FORMAT, VERSION = "granulcal-bayessim", 4
-# Of these the emulator's weight is that of an arithmetic average.
-_OLDER_VERSIONS = (3,)
 _TENSORS_NAME = "weights.safetensors"
 
 
@@ -78,10 +80,7 @@ def load_parts(path: str | PathLike[str]) -> Parts:
         if not (folder / name).is_file():
             raise FileNotFoundError(f"{folder / name} does not exist: {folder} is no saved model")
     where = folder / MODEL_JSON
-    text = read_bytes(where, most=LARGEST_DOCUMENT)
-    document = parse_json(text, where, error=ModelFormatError)
-    _check_header(document, where)
-    check_model(document, where)
+    text, document = read_model_document(folder)
     data = read_bytes(folder / _TENSORS_NAME)
     try:
         tensors = read_tensors(data)
@@ -174,32 +173,9 @@ def _document(model: Trained) -> dict[str, Any]:
     }
 
 
-def _check_header(document: Any, where: Path) -> None:
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise ModelFormatError(f"{where} is not a {FORMAT} file")
-    found = document.get("version")
-    if (
-        isinstance(found, bool)
-        or not isinstance(found, int)
-        or found not in (*_OLDER_VERSIONS, VERSION)
-    ):
-        made_by = document.get("made_by", "an earlier granulcal")
-        newer = isinstance(found, int) and found > VERSION
-        advice = "update granulcal" if newer else "train the model again"
-        raise ModelFormatError(
-            f"{where}: version must be {_versions()} (granulcal {_native.__version__}), "
-            f"got {found!r} (made by {made_by}): {advice}"
-        )
-
-
-def _versions() -> str:
-    """The versions that can be read, in words."""
-    return " or ".join(str(version) for version in (*_OLDER_VERSIONS, VERSION))
-
-
 def _average(document: dict[str, Any], where: Path) -> Average:
     weight = document["emulator_weight"]
-    if document["version"] in _OLDER_VERSIONS:
+    if document["version"] in OLDER_VERSIONS:
         found = Average(weight, 1 - weight, "arithmetic")
     else:
         found = Average(weight, document["network_weight"], document["average"])
