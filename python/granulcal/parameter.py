@@ -79,13 +79,16 @@ class Parameter:
     @property
     def in_words(self) -> str:
         """The distribution as `granulcal inspect` says it, for example `normal 0.08 ± 0.004`."""
+        low, high, mean, sd, value = (
+            None if number is None else repr(number).removesuffix(".0")
+            for number in (self.low, self.high, self.mean, self.sd, self.value)
+        )
         if self.distribution == "fixed":
-            return f"fixed at {self.value:g}"
+            return f"fixed at {value}"
         if self.distribution != "normal":
-            return f"{self.distribution} from {self.low:g} to {self.high:g}"
-        low = "" if self.low is None else f" from {self.low:g}"
-        high = "" if self.high is None else f" to {self.high:g}"
-        return f"normal {self.mean:g} ± {self.sd:g}{low}{high}"
+            return f"{self.distribution} from {low} to {high}"
+        bounds = [f" from {low}"] * (low is not None) + [f" to {high}"] * (high is not None)
+        return f"normal {mean} ± {sd}{''.join(bounds)}"
 
     @property
     def bounds(self) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from signed import sign
 
 import granulcal as gc
 from granulcal import cli
+from granulcal.bayessim import BayesSim
 from granulcal.cli import main
 from granulcal.commands import check
 
@@ -241,6 +242,37 @@ def test_check_tells_its_coverage_as_json(model, small_data, capfd):
         assert 0 <= count["inside"] <= count["total"] and count["low"] <= count["high"]
     assert len(told["rank_p_values"]) == len(small_data.prior.names)
     assert 0 < told["tarp_p_value"] <= 1 and told["gain_nat"] > 0
+    assert set(told["identifiability"]["names"]) == set(small_data.prior.names)
+
+
+def test_what_a_check_says_of_other_pours_is_of_them(
+    model, small_data, small_scene, tmp_path, capfd
+):
+    other = tmp_path / "other"
+    gc.generate(small_scene, small_data.prior, 30, seed=77, out=other, progress=False)
+    told = []
+    for words in ([], ["--data", str(other)]):
+        assert main(["check", str(model), *words, "--json"]) in (0, 3)
+        told.append(json.loads(capfd.readouterr().out))
+    assert told[0]["gain_nat"] != told[1]["gain_nat"]
+    assert told[0]["identifiability"]["gains"] != told[1]["identifiability"]["gains"]
+    pairs = gc.Dataset.load(other)
+    loaded = BayesSim.load(model)
+    found, known = loaded.examine(pairs.theta, pairs.x)
+    assert told[1]["identifiability"] == known.as_dict() and told[1]["gain_nat"] == found.gain
+
+
+def test_pours_of_another_prior_are_refused_with_what_differs(
+    model, small_data, small_scene, tmp_path, capfd
+):
+    narrow = small_data.prior.to_toml().replace("low = 0.2\n", "low = 0.25\n", 1)
+    prior = gc.Prior.from_toml(narrow)
+    gc.generate(small_scene, prior, 4, seed=7, out=tmp_path / "few", progress=False)
+    assert main(["check", str(model), "--data", str(tmp_path / "few")]) == 2
+    error = capfd.readouterr().err
+    assert "material.sliding_friction is uniform from 0.25 to 1 there" in error
+    assert "uniform from 0.2 to 1 in the model" in error and "rolling" not in error
+    assert "leave `prior` out" not in error and "with the model's prior" in error
 
 
 @pytest.mark.parametrize(("words", "goes_on"), [("calibrate", True), ("check", False)])

@@ -235,9 +235,11 @@ def test_a_failed_check_is_loud(toy, model):
     check = model.check(theta, x, draw_count=200)
     assert not check.is_calibrated
     assert "TOO WIDE" in str(check) and "remedy" in str(check)
+    assert "more often than they say" in str(check) and "too narrow" not in str(check)
     louder = LinearGaussian(toy.prior, toy.matrix, 9 * toy.noise_covariance)
     check = model.check(*louder.simulate(150, seed=1), draw_count=200)
     assert "OVERCONFIDENT" in str(check)
+    assert "read the intervals as too narrow" in str(check) and "WIDE" not in str(check)
 
 
 def test_the_noise_of_several_pours_is_as_large_as_it_is_at_their_fit():

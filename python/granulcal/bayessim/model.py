@@ -287,7 +287,6 @@ class BayesSim:
         z = self.standardiser.apply(self._checked(x_obs), clip=False)
         return self.misfit_reference.test(self.likelihood, z, self.x_names)
 
-    @one_thread()
     def check(self, theta: Any, x: Any, *, draw_count: int = 1000) -> Calibration:
         """Returns the calibration on pairs, which must not have been trained on.
 
@@ -301,6 +300,17 @@ class BayesSim:
             TypeError: `draw_count` is no whole number.
             ValueError: it is less than 1.
         """
+        return self.examine(theta, x, draw_count=draw_count)[0]
+
+    @one_thread()
+    def examine(
+        self, theta: Any, x: Any, *, draw_count: int = 1000
+    ) -> tuple[Calibration, Identifiability]:
+        """Returns the calibration on pairs and what their statistics tell on average.
+
+        Both are of the same posteriors, one for each pair. Arguments and errors are those of
+        `check`.
+        """
         check_whole("draw_count", draw_count, at_least=1)
         x = by_name("x", x, self.x_names, whose="the model", error=TrainingDataError)
         pairs = TrainingPairs.gather(
@@ -308,7 +318,8 @@ class BayesSim:
         )
         truth, observed = pairs.theta, pairs.x
         posteriors = [self.posterior(row) for row in steps("posteriors", list(observed))]
-        return Calibration.of(self.prior, posteriors, truth, draw_count=draw_count)
+        known = Identifiability.average(posteriors, truth)
+        return Calibration.of(self.prior, posteriors, truth, draw_count=draw_count), known
 
     def save(self, path: str | PathLike[str], *, compact: bool = False) -> None:
         """Writes the folder `path`: model.json and weights.safetensors, all or nothing.

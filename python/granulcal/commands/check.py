@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from granulcal.bayessim import BayesSim
     from granulcal.bayessim.training.pairs import TrainingPairs
     from granulcal.pours.dataset import Dataset
+    from granulcal.prior import Prior
 
 __all__ = ["add"]
 
@@ -44,11 +45,11 @@ def _run(options: argparse.Namespace) -> int:
     if options.dry_run:
         return _say_how_long(options, model, pairs)
     print(model.summary)
-    calibration = model.calibration
+    calibration, known = model.calibration, model.identifiability
     if pairs is not None:
         print(f"on the {len(pairs.theta)} usable pours of {options.data}:")
         with shown():
-            calibration = model.check(pairs.theta, pairs.x)
+            calibration, known = model.examine(pairs.theta, pairs.x)
     options.told["model"] = str(options.model)
     options.told["calibrated"] = None if calibration is None else calibration.is_calibrated
     if calibration is None:
@@ -61,9 +62,10 @@ def _run(options: argparse.Namespace) -> int:
         "coverage": [vars(count) for count in calibration.coverage.counts],
         "rank_p_values": calibration.ranks.p_values.tolist(),
         "tarp_p_value": calibration.tarp.p_value,
+        "identifiability": None if known is None else known.as_dict(),
     }
-    if model.identifiability is not None:
-        print(model.identifiability)
+    if known is not None:
+        print(known)
     if options.plots is not None:
         calibration.plot(options.plots)
         if model.summary.plot(options.plots / "training.png") is None:
@@ -74,12 +76,12 @@ def _run(options: argparse.Namespace) -> int:
 
 def _pairs(options: argparse.Namespace, model: "BayesSim") -> "TrainingPairs":
     from granulcal.bayessim.model import FEWEST_TO_CHECK
-    from granulcal.bayessim.training.pairs import TrainingPairs, require_same_prior
+    from granulcal.bayessim.training.pairs import TrainingPairs
     from granulcal.calibrate import require_same_scene
     from granulcal.pours.dataset import Dataset
 
     data = Dataset.load(options.data)
-    require_same_prior(data.prior, model.prior)
+    _require_same_prior(options, data.prior, model.prior)
     if model.scene_toml is not None:
         require_same_scene(model, data.scene)
     pairs = TrainingPairs.gather(data, prior=model.prior, fewest=FEWEST_TO_CHECK)
@@ -91,6 +93,30 @@ def _pairs(options: argparse.Namespace, model: "BayesSim") -> "TrainingPairs":
     if training.exists():
         _require_unseen(options, pairs, Dataset.load(training))
     return pairs
+
+
+def _require_same_prior(options: argparse.Namespace, found: "Prior", own: "Prior") -> None:
+    """Refuses pours of another prior than the model's, under which its intervals need not hold.
+
+    Raises:
+        ValueError: says what differs.
+    """
+    if found.to_toml() == own.to_toml():
+        return
+    there, here = (
+        {each.path: each.in_words for each in prior.parameters} for prior in (found, own)
+    )
+    differ = [
+        f"{path} is {there.get(path, 'not named')} there and {here.get(path, 'not named')} in the "
+        "model"
+        for path in {**here, **there}
+        if there.get(path) != here.get(path)
+    ]
+    what = "; ".join(differ) or "its parameters are in another order"
+    raise ValueError(
+        f"{options.data} was drawn from another prior than the model's: {what}. A check needs "
+        "pours of `granulcal generate` with the model's prior and another --seed"
+    )
 
 
 def _require_unseen(

@@ -156,7 +156,7 @@ def _extrapolated(reach: Reach, ring: Ring, order: int, allowed: bool) -> Planne
     if not allowed:
         raise ExtrapolationError(
             f"{told}; the trend at its end would reach it at {100 * height:.1f} cm: train on "
-            "heights that include it, or allow extrapolation"
+            "heights that include it, or extrapolate (--extrapolate, extrapolate=True)"
         )
     if not height > 0:
         raise ExtrapolationError(f"{told}; the trend at its end reaches it at no height")

@@ -36,10 +36,12 @@ Array = NDArray[np.float64]
 _TARP_SEED = 0x7A52_91C4_66E3
 _SIGNIFICANCE = 0.05 / 3
 _RANK_DRAWS = 200
-_REMEDY = (
-    "remedy: more pours (`generate` goes on where it stopped), or another --method; until then "
-    "read the intervals as too narrow where it says OVERCONFIDENT"
-)
+_OVERCONFIDENT, _TOO_WIDE = "OVERCONFIDENT", "TOO WIDE"
+_REMEDY = "remedy: more pours (`generate` goes on where it stopped), or another --method"
+_UNTIL_THEN = {
+    _OVERCONFIDENT: f"read the intervals as too narrow where it says {_OVERCONFIDENT}",
+    _TOO_WIDE: f"intervals hold the truth more often than they say where it says {_TOO_WIDE}",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,11 +116,9 @@ class Calibration:
     def failures(self) -> tuple[str, ...]:
         """What is wrong, each in a few words; empty if nothing is."""
         found = []
-        wrong = [count for count in self.coverage.counts if not count.is_within_band]
-        if wrong:
-            sides = {"OVERCONFIDENT" if c.inside < c.low else "TOO WIDE" for c in wrong}
+        if wrong := self._wrong:
             levels = ", ".join(f"{count.level:.0%}" for count in wrong)
-            found.append(f"regions at {levels}: {' and '.join(sorted(sides))}")
+            found.append(f"regions at {levels}: {' and '.join(self._sides)}")
         least = _SIGNIFICANCE / len(self.names)
         for name, p_value in zip(self.names, self.ranks.p_values, strict=True):
             if p_value < least:
@@ -128,6 +128,16 @@ class Calibration:
         if not np.isfinite(self.posterior_loss) or self.gain <= 0:
             found.append("THE POSTERIOR IS NO BETTER THAN THE PRIOR")
         return tuple(found)
+
+    @property
+    def _wrong(self) -> list[CoverageCount]:
+        """The levels at which the coverage fails."""
+        return [count for count in self.coverage.counts if not count.is_within_band]
+
+    @property
+    def _sides(self) -> list[str]:
+        """To which sides it fails, in words."""
+        return sorted({_OVERCONFIDENT if c.inside < c.low else _TOO_WIDE for c in self._wrong})
 
     @property
     def is_calibrated(self) -> bool:
@@ -196,7 +206,8 @@ class Calibration:
         lines.append(f"  p-values: ranks {shown}; TARP {self.tarp.p_value:.2g}")
         if self.failures:
             lines.append(f"  !!! NOT CALIBRATED: {'; '.join(self.failures)} !!!")
-            lines.append(f"  {_REMEDY}")
+            until_then = " and ".join(_UNTIL_THEN[side] for side in self._sides)
+            lines.append(f"  {_REMEDY}{f'; until then {until_then}' if until_then else ''}")
         else:
             lines.append("  calibrated: no test says otherwise (5 % false alarms in all)")
         return "\n".join(lines)
