@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from granulcal import _native, paths
-from granulcal.commands import elsewhere
+from granulcal.commands import elsewhere, inferred
 from granulcal.commands.exit_code import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from granulcal.commands.program import Parser, describe
 from granulcal.one_thread import one_thread
@@ -89,6 +89,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     word = words[0] if words else ""
     if word in ("simulate", "generate") and elsewhere.is_asked(words):
         return _guarded(lambda: elsewhere.run(words), goes_on=word == "generate")
+    if word == "inspect" and inferred.is_asked(words):
+        return _guarded(lambda: inferred.run(words))
     if word not in known:
         with _interruptible(raises=False):
             return _native.run_cli(["granulcal", *words], describe(parser, after_help=_EPILOG))
