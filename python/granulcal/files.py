@@ -50,8 +50,27 @@ def replace_file(path: Path, text: str | bytes) -> None:
         new.write_bytes(text.encode("utf-8") if isinstance(text, str) else text)
 
 
+def require_figure(path: str | PathLike[str]) -> None:
+    """Checks that the ending of a figure's path says what it can be written as.
+
+    Raises:
+        ValueError: names what is allowed.
+    """
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    ending = Path(path).suffix
+    known = sorted(FigureCanvasBase.get_supported_filetypes())
+    if ending and ending.removeprefix(".").lower() not in known:
+        raise ValueError(f"{path} must end in one of .{', .'.join(known)}, got {ending}")
+
+
 def save_figure(figure: "Figure", path: str | PathLike[str], **options: Any) -> None:
-    """Writes a figure as its ending says, PNG if it has none; whole or not at all."""
+    """Writes a figure as its ending says, PNG if it has none; whole or not at all.
+
+    Raises:
+        ValueError: an ending of another kind.
+    """
+    require_figure(path)
     target = Path(path)
     if not target.suffix:
         target = target.with_suffix(".png")

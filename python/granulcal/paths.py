@@ -12,6 +12,7 @@ from pathlib import Path
 
 from granulcal import _native
 from granulcal.bayessim.storage.place import require_place
+from granulcal.files import require_figure
 
 __all__ = ["KEPT", "READS", "RECORDING", "Reads", "Writes", "actions", "check", "writes"]
 
@@ -73,20 +74,14 @@ def check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
                 outputs.append((_shown(action), path, action.type.kind))
     _native.check_paths(reads, outputs)
     for argument, path, kind in outputs:
-        if kind == "model":
-            _require_model_place(argument, path)
-
-
-def _require_model_place(argument: str, path: Path) -> None:
-    """Refuses a folder that saving would refuse after the training.
-
-    Raises:
-        ValueError: it holds something else than a model.
-    """
-    try:
-        require_place(path)
-    except FileExistsError as error:
-        raise ValueError(f"{argument}: {error}") from None
+        try:
+            # What writing would refuse when the work is done.
+            if kind == "model":
+                require_place(path)
+            if kind == "figure":
+                require_figure(path)
+        except (FileExistsError, ValueError) as error:
+            raise ValueError(f"{argument}: {error}") from None
 
 
 def _given(

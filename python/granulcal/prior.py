@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from granulcal.bayessim.arrays import as_matrix
+from granulcal.bayessim.arrays import as_matrix, known
 from granulcal.documents import LARGEST_DOCUMENT, read_bytes
 from granulcal.errors import PriorError
 from granulcal.parameter import Parameter
@@ -207,8 +207,11 @@ class Prior:
         """Returns the log density at `theta` (n, p) or (p,), shape (n,); -inf outside the bounds.
 
         The density is with respect to the parameters' own units.
+
+        Raises:
+            ValueError: another shape, or a parameter that is NaN.
         """
-        values = as_matrix("theta", theta, columns=len(self.free))
+        values = known(as_matrix("theta", theta, columns=len(self.free)), self.names)
         low, high = self.bounds.T
         inside = np.all((values >= low) & (values <= high), axis=1)
         density = np.full(len(values), -np.inf)

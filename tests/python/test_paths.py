@@ -147,6 +147,17 @@ def test_paths_are_tested_before_the_pour(tmp_path, capsys):
     assert "make it first" in capsys.readouterr().err
 
 
+def test_a_figure_has_an_ending_that_can_be_drawn(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    words = ["infer", str(tmp_path / "model"), str(tmp_path / "a.png"), "--plot"]
+    assert cli.main([*words, str(tmp_path / "pair.xyz")]) == 2
+    error = capsys.readouterr().err
+    assert "--plot: " in error and ".pdf, " in error and "got .xyz" in error
+    for name in ("pair", "pair.PNG"):
+        assert cli.main([*words, str(tmp_path / name)]) == 2
+        assert "--plot" not in capsys.readouterr().err
+
+
 def test_a_model_finds_its_place_before_the_training(tmp_path, capsys, monkeypatch):
     from granulcal.starter.models import make_model
 

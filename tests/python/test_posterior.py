@@ -136,6 +136,19 @@ def test_mode_and_mean_of_one_normal():
     assert np.all(np.abs(posterior.mean() - exact) < 0.05 * spread)
 
 
+def test_what_has_no_density_is_refused():
+    posterior = Posterior.from_mixture(BOX, random_mixture(7))
+    with pytest.raises(ValueError, match="grid must be at least 2, got 1"):
+        posterior.marginals(grid=1)
+    theta = np.tile(BOX.mean(), (2, 1))
+    theta[1, 0] = np.nan
+    for density in (posterior.log_prob, posterior.coordinate_log_prob, BOX.log_prob):
+        with pytest.raises(ValueError, match=f"{BOX.names[0]} is NaN in row 1"):
+            density(theta)
+    theta[1, 0] = np.inf
+    assert np.isneginf(posterior.log_prob(theta)[1]) and np.isneginf(BOX.log_prob(theta)[1])
+
+
 def test_marginals_integrate_to_one():
     for parameter, marginal in zip(
         BOX.free, Posterior.from_mixture(BOX, random_mixture(7)).marginals().values(), strict=True

@@ -1,5 +1,6 @@
 """The one place where arrays from outside become float64 matrices of a known shape."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ from numpy.typing import NDArray
 
 from granulcal.arrays import unmasked
 
-__all__ = ["as_matrix", "as_real"]
+__all__ = ["as_matrix", "as_real", "known"]
 
 
 def as_real(name: str, value: Any) -> NDArray[np.float64]:
@@ -43,3 +44,15 @@ def as_matrix(name: str, value: Any, *, columns: int | None = None) -> NDArray[n
         found = np.shape(value)
         raise ValueError(f"{name} must have shape {expected}, got {found}")
     return array
+
+
+def known(theta: NDArray[np.float64], names: Sequence[str]) -> NDArray[np.float64]:
+    """Returns `theta` (n, p), whose columns are `names`, if none is NaN: it lies nowhere.
+
+    Raises:
+        ValueError: names the first that is.
+    """
+    rows, columns = np.nonzero(np.isnan(theta))
+    if len(rows):
+        raise ValueError(f"theta: {names[columns[0]]} is NaN in row {rows[0]}; give a number")
+    return theta

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
-from granulcal.bayessim.arrays import as_matrix
+from granulcal.bayessim.arrays import as_matrix, known
 from granulcal.bayessim.emulator.likelihood import Likelihood
 from granulcal.bayessim.network.mixture import Mixture
 from granulcal.bayessim.posterior.average import EMULATOR_ALONE, NETWORK_ALONE, Average
@@ -194,6 +194,9 @@ class Posterior:
         """Returns the log density at `theta` (n, p) or (p,), shape (n,); -inf outside the bounds.
 
         The density is with respect to the parameters' own units and integrates to 1.
+
+        Raises:
+            ValueError: another shape, or a parameter that is NaN.
         """
         values = as_matrix("theta", theta, columns=len(self.names))
         result = self.coordinate_log_prob(values)
@@ -207,8 +210,11 @@ class Posterior:
 
         This is the density that modes and regions are about: in coordinates a uniform or
         log-uniform prior is flat.
+
+        Raises:
+            ValueError: another shape, or a parameter that is NaN.
         """
-        values = as_matrix("theta", theta, columns=len(self.names))
+        values = known(as_matrix("theta", theta, columns=len(self.names)), self.names)
         low, high = self.prior.bounds.T
         inside = np.all((values >= low) & (values <= high), axis=1)
         result = np.full(len(values), -np.inf)
@@ -329,7 +335,13 @@ class Posterior:
 
     @one_thread()
     def marginals(self, *, grid: int = 200) -> dict[str, Marginal]:
-        """Returns the marginal of each parameter by name, on `grid` points."""
+        """Returns the marginal of each parameter by name, on `grid` points, at least 2.
+
+        Raises:
+            TypeError: `grid` is no whole number.
+            ValueError: it is less than 2.
+        """
+        check_whole("grid", grid, at_least=2)
         draws = self._draws()[0]
         result = {}
         for i, parameter in enumerate(self.prior.free):
