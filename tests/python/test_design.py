@@ -140,6 +140,12 @@ def test_extrapolation_is_refused_or_flagged(line):
 def test_radii_that_no_height_gives_are_refused(line):
     with pytest.raises(UnreachableRingError, match=r"the nearest, .* give from 1\.\d+ / 3\.\d+ to"):
         gc.design_rings(line, [gc.Ring(outer=0.08, inner=0.07)])
+    # All that cannot be had are named at once, and that the others can.
+    both = [gc.Ring(outer=0.08, inner=0.07), _at(0.271)]
+    with pytest.raises(ExtrapolationError, match=r"lies outside the training.*; no height gives"):
+        gc.design_rings(line, both)
+    with pytest.raises(ExtrapolationError, match="; without them there is a plan for the rest"):
+        gc.design_rings(line, [*both, _at(0.05)])
     with pytest.raises(ValueError, match="at least one ring"):
         gc.design_rings(line, [])
     with pytest.raises(ValueError, match="tolerance must be positive, got 0"):

@@ -63,23 +63,16 @@ def design_rings(
     require_tolerance(tolerance)
     reach = model.reach
     pours, notes = [], [_FAILED] if model.fails_its_check else []
+    refused: list[ExtrapolationError | UnreachableRingError] = []
     for order, ring in enumerate(sorted(rings, key=lambda r: -r.outer), start=1):
-        if _is_outside(reach, ring):
-            pour = _extrapolated(reach, ring, order, extrapolate)
-            notes.append(
-                f"pour {order} is extrapolated: {100 * pour.height:.1f} cm is outside the heights "
-                f"of the training, {_centimetres(reach.low, reach.high)}, where the trend gives "
-                f"{100 * pour.expected_inner:.2f} / {100 * pour.expected_outer:.2f} cm; its "
-                "interval leaves out that the trend may not go on"
-            )
-        else:
-            pour, is_of_two = _inferred(model, ring, order, tolerance)
-            if is_of_two:
-                notes.append(
-                    f"pour {order}: more than one height gives this ring, of which "
-                    f"{100 * pour.height:.1f} cm comes nearest; its interval holds the others, too"
-                )
+        try:
+            pour, told = _planned_with(model, ring, order, tolerance, extrapolate)
+        except (ExtrapolationError, UnreachableRingError) as error:
+            refused.append(error)
+            continue
         pours.append(pour)
+        notes += told
+    _refuse(refused, len(pours))
     return Plan(
         pours=tuple(pours),
         trained_low=reach.low,
@@ -88,6 +81,42 @@ def design_rings(
         scene_toml=model.scene.to_toml(),
         notes=tuple(notes),
     )
+
+
+def _planned_with(
+    model: RingModel, ring: Ring, order: int, tolerance: float, extrapolate: bool
+) -> tuple[PlannedPour, list[str]]:
+    """The pour of one ring, and what must be known of it."""
+    reach = model.reach
+    if _is_outside(reach, ring):
+        pour = _extrapolated(reach, ring, order, extrapolate)
+        return pour, [
+            f"pour {order} is extrapolated: {100 * pour.height:.1f} cm is outside the heights "
+            f"of the training, {_centimetres(reach.low, reach.high)}, where the trend gives "
+            f"{100 * pour.expected_inner:.2f} / {100 * pour.expected_outer:.2f} cm; its "
+            "interval leaves out that the trend may not go on"
+        ]
+    pour, is_of_two = _inferred(model, ring, order, tolerance)
+    told = (
+        f"pour {order}: more than one height gives this ring, of which "
+        f"{100 * pour.height:.1f} cm comes nearest; its interval holds the others, too"
+    )
+    return pour, [told] * is_of_two
+
+
+def _refuse(refused: Sequence[ExtrapolationError | UnreachableRingError], planned: int) -> None:
+    """Tells of every ring that cannot be had, and that the others can.
+
+    Raises:
+        ExtrapolationError: the first is of this kind.
+        UnreachableRingError: likewise.
+    """
+    if not refused:
+        return
+    told = "; ".join(str(error) for error in refused)
+    if planned:
+        told += f"; without {'it' if len(refused) == 1 else 'them'} there is a plan for the rest"
+    raise type(refused[0])(told)
 
 
 def require_tolerance(tolerance: float) -> None:
