@@ -6,8 +6,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// Every keyword, in the order of the page.
-const KEYWORDS: &str = "height_threshold, threshold_floor, border_px, downsample, ground_resolution, field_width, inlier_distance, \
-                        max_tilt_deg, flying_deg, max_height, min_component_px, plane_seed";
+const KEYWORDS: &str = "height_threshold, threshold_floor, scene_threshold, border_px, downsample, ground_resolution, field_width, \
+                        inlier_distance, max_tilt_deg, flying_deg, max_height, min_component_px, plane_seed";
 
 /// A recording's own segmentation with what the keywords change; what is None stays.
 ///
@@ -19,7 +19,7 @@ pub(crate) fn changed(
     keywords: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Segmentation> {
     let mut settings = own.clone();
-    let (mut threshold, mut floor) = (None, None);
+    let (mut threshold, mut floor, mut of_scene) = (None, None, None);
     let is_given = |keyword: &str| -> PyResult<bool> {
         let value = keywords.map(|all| all.get_item(keyword)).transpose()?.flatten();
         Ok(value.is_some_and(|value| !value.is_none()))
@@ -43,6 +43,7 @@ pub(crate) fn changed(
         match keyword.as_str() {
             "height_threshold" => threshold = Some(real()?),
             "threshold_floor" => floor = Some(real()?),
+            "scene_threshold" => of_scene = Some(real()?),
             "border_px" => settings.border_px = whole()?,
             "downsample" => settings.downsample = Some(whole()?),
             "ground_resolution" => settings.ground_resolution = Some(real()?),
@@ -64,6 +65,9 @@ pub(crate) fn changed(
         (None, Some(floor)) => Threshold::Automatic { floor },
         (None, None) => settings.height_threshold,
     };
+    if let (None, None, Some(of_scene)) = (threshold, floor, of_scene) {
+        settings = settings.with_scene_threshold(of_scene);
+    }
     Ok(settings)
 }
 

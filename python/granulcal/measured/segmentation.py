@@ -15,6 +15,8 @@ class SegmentationSettings(TypedDict, total=False):
             automatic, three robust standard deviations of the ground; a patch of
             grains must reach six of them somewhere.
         threshold_floor: least automatic threshold [m]; the default is 1 mm.
+        scene_threshold: the same where neither these nor the camera's file state a threshold: the
+            `camera.height_threshold` of the scene to compare with; see `Scene.reading`.
         border_px: frame at the edge of the full image that is ignored [px]; default 0.
         downsample: keep one pixel of every block of this side; the default matches
             `ground_resolution`, or is 1 without.
@@ -35,6 +37,7 @@ class SegmentationSettings(TypedDict, total=False):
 
     height_threshold: float | None
     threshold_floor: float | None
+    scene_threshold: float | None
     border_px: int | None
     downsample: int | None
     ground_resolution: float | None

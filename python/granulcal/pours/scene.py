@@ -339,11 +339,17 @@ class Scene:
     def reading(self) -> "SegmentationSettings":
         """Arguments of `Recording.formation` that make a recording like this scene's images.
 
-        Pixels as wide on the ground, and where a recording shows more of it, the square that the
-        images show, about the formation.
+        Pixels as wide on the ground, where a recording shows more of it, the square that the images
+        show, about the formation, and unless the camera's file states one, the height from which
+        their pixels count as grain.
         """
-        field = self.get("camera.field_width")
-        return {"ground_resolution": self.ground_resolution, "field_width": field}
+        found: SegmentationSettings = {
+            "ground_resolution": self.ground_resolution,
+            "field_width": self.get("camera.field_width"),
+        }
+        if self.to_dict()["camera"].get("mask", "height") == "height":
+            found["scene_threshold"] = self.get("camera.height_threshold")
+        return found
 
     @property
     def name(self) -> str:

@@ -8,7 +8,7 @@ use granulcal_dataset::{
     write_height_map,
 };
 use granulcal_dem::{Simulation, Status};
-use granulcal_scene::{Projection, Scene, ViewSpec};
+use granulcal_scene::{CameraSpec, Projection, Scene, ViewSpec};
 use serde_json::{Value, json};
 
 use crate::args::SceneArgs;
@@ -103,7 +103,7 @@ fn run(context: &Context, args: &RenderArgs) -> anyhow::Result<Outcome> {
         Some(further) => capture_from(further, &drawn)?,
         None => capture(&scene.camera, &drawn, args.seed)?,
     };
-    write_view(&args.out, &view, args.depth_unit)?;
+    write_view(&args.out, &view, args.depth_unit, &scene.camera)?;
     if args.json {
         print_json(&as_json(&args.out, &view))?;
     } else {
@@ -197,15 +197,22 @@ fn check_ending(path: &Path, kind: &str, ending: &str) -> Result<(), BadArgument
     Err(BadArgument(format!("{path}: the image of {kind} must be named .{ending}")))
 }
 
-/// Writes a depth image with its camera beside it, or a height map.
+/// Writes a depth image with its camera beside it, which states the threshold of the scene's, or a height map.
 ///
 /// # Errors
 /// What the file system or a depth unit that is too small says.
-pub fn write_view(path: &Path, view: &View, depth_unit: f64) -> anyhow::Result<()> {
+pub fn write_view(
+    path: &Path,
+    view: &View,
+    depth_unit: f64,
+    of_scene: &CameraSpec,
+) -> anyhow::Result<()> {
     match view {
         View::Depth(camera, image) => {
             png::write_depth(path, image, depth_unit)?;
-            CameraFile::of(camera, depth_unit).save(&path.with_extension("toml"))?;
+            let file = CameraFile::of(camera, depth_unit);
+            let segmentation = file.segmentation.at_threshold_of(of_scene);
+            CameraFile { segmentation, ..file }.save(&path.with_extension("toml"))?;
         }
         View::Heights(map) => write_height_map(path, map)?,
     }

@@ -145,7 +145,9 @@ fn describe(
         other => other?,
     };
     if let Some(path) = &args.depth {
-        sides.keep(write_view(path, &seen.view, args.depth_unit).context("writing --depth"));
+        sides.keep(
+            write_view(path, &seen.view, args.depth_unit, &scene.camera).context("writing --depth"),
+        );
     }
     match &seen.statistics {
         Ok(values) => {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::camera::sample_offset;
 use crate::colour::HsvRange;
 use crate::error::{FeatureError, require_in};
-use granulcal_scene::CameraSpec;
+use granulcal_scene::{CameraSpec, Mask};
 
 /// Largest length `[m]` that a setting may have.
 const MAX_LENGTH: f64 = 1e3;
@@ -116,15 +116,35 @@ impl Default for Segmentation {
 
 impl Segmentation {
     /// These settings for a recording that is held against the images of a scene's camera: pixels as wide on the ground,
-    /// and no more of the ground in view.
+    /// no more of the ground in view and, unless they state one, its threshold.
     #[must_use]
     pub fn as_seen_by(&self, camera: &CameraSpec) -> Self {
         Self {
             downsample: None,
             ground_resolution: Some(camera.ground_resolution()),
             field_width: Some(camera.field_width),
-            ..self.clone()
+            ..self.at_threshold_of(camera)
         }
+    }
+
+    /// These settings with the height from which the camera's images show grain as the floor of the automatic threshold,
+    /// which stays above the ground's noise; unless they state a threshold, or its images are told apart by colour.
+    #[must_use]
+    pub fn at_threshold_of(&self, camera: &CameraSpec) -> Self {
+        match camera.mask {
+            Mask::Height => self.with_scene_threshold(camera.height_threshold),
+            Mask::Colour => self.clone(),
+        }
+    }
+
+    /// These settings with an automatic threshold of at least `floor` `[m]`, unless they state another than the default.
+    #[must_use]
+    pub fn with_scene_threshold(&self, floor: f64) -> Self {
+        let height_threshold = match self.height_threshold {
+            own if own == Threshold::default() => Threshold::Automatic { floor },
+            own => own,
+        };
+        Self { height_threshold, ..self.clone() }
     }
 
     /// Refuses lengths that mean nothing.
@@ -168,5 +188,26 @@ impl Segmentation {
             full >= border && full < side.saturating_sub(border)
         };
         move |u, v| kept(u, width) && kept(v, height)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_says_the_threshold_where_the_settings_say_none() {
+        let camera = CameraSpec { height_threshold: 1.5e-3, ..CameraSpec::default() };
+        let none = Segmentation::default();
+        let of_scene = Threshold::Automatic { floor: 1.5e-3 };
+        assert_eq!(none.as_seen_by(&camera).height_threshold, of_scene);
+        // As in the scene's images where there is no noise, and above the noise where there is.
+        assert_eq!([0.0, 4e-4, 1e-3].map(|sd| of_scene.height(sd)), [1.5e-3, 1.5e-3, 3e-3]);
+        for stated in [Threshold::Absolute(1e-3), Threshold::Automatic { floor: 2e-3 }] {
+            let own = Segmentation { height_threshold: stated, ..none.clone() };
+            assert_eq!(own.as_seen_by(&camera).height_threshold, stated);
+        }
+        let by_colour = CameraSpec { mask: Mask::Colour, ..camera };
+        assert_eq!(none.as_seen_by(&by_colour).height_threshold, Threshold::default());
     }
 }
