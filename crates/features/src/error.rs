@@ -121,8 +121,24 @@ pub enum FeatureError {
         /// Valid pixels needed.
         min: usize,
     },
+    /// Pixels as wide as they are asked for leave next to none of the image.
+    #[error(
+        "the image shows {} m x {} m, of which pixels of {} m leave {got} that carry depth, and at least 3 must: are its \
+         lengths in metres?",
+        General(extent.0),
+        General(extent.1),
+        General(*wanted)
+    )]
+    TooSmall {
+        /// Width and height of what it shows, on the ground `[m]`.
+        extent: (f64, f64),
+        /// Width of a pixel that is asked for `[m]`.
+        wanted: f64,
+        /// Valid pixels that are left.
+        got: usize,
+    },
     /// No pixel was taken for a grain.
-    #[error("{}", no_grain(*valid, *highest, *threshold, *above))]
+    #[error("{}", no_grain(*valid, *highest, *threshold, *above, *cleaned))]
     EmptyMask {
         /// Valid pixels.
         valid: usize,
@@ -132,6 +148,8 @@ pub enum FeatureError {
         threshold: f64,
         /// Pixels above `max_height`, which are none of them.
         above: usize,
+        /// Why pixels above the threshold are none; `None` where there are none.
+        cleaned: Option<Cleaned>,
     },
     /// Segmentation by colour was half asked for.
     #[error(
@@ -173,8 +191,33 @@ pub enum FeatureError {
     },
 }
 
+/// Why pixels above the threshold are no grains.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Cleaned {
+    /// None of their patches is high enough to be told from the ground's noise.
+    Low {
+        /// Pixels above the threshold.
+        pixels: usize,
+        /// Height that a patch must reach somewhere `[m]`.
+        peak: f64,
+    },
+    /// None of their patches has as many pixels as are asked for.
+    Small {
+        /// Pixels of those that are high enough.
+        pixels: usize,
+        /// Pixels that a patch must have.
+        min_px: usize,
+    },
+}
+
 /// What is said of an image without a grain, and of its pixels above the greatest height.
-fn no_grain(valid: usize, highest: f64, threshold: f64, above: usize) -> String {
+fn no_grain(
+    valid: usize,
+    highest: f64,
+    threshold: f64,
+    above: usize,
+    cleaned: Option<Cleaned>,
+) -> String {
     if valid == 0 {
         return format!(
             "all {above} pixels with data are above max_height: are the depths in metres?"
@@ -187,11 +230,21 @@ fn no_grain(valid: usize, highest: f64, threshold: f64, above: usize) -> String 
     } else {
         String::new()
     };
-    format!(
-        "none of {valid} valid pixels belongs to a grain (highest is {} m, threshold {} m){hidden}",
-        General(highest),
-        General(threshold)
-    )
+    let why = match cleaned {
+        None => format!(" (highest is {} m, threshold {} m)", General(highest), General(threshold)),
+        Some(Cleaned::Low { pixels, peak }) => format!(
+            ": {pixels} are above the threshold of {} m, but no patch of them reaches {} m, above the ground's noise \
+             (highest is {} m); average more frames, or state height_threshold",
+            General(threshold),
+            General(peak),
+            General(highest)
+        ),
+        Some(Cleaned::Small { pixels, min_px }) => format!(
+            ": {pixels} are above the threshold of {} m, but no patch of them has min_component_px = {min_px} pixels",
+            General(threshold)
+        ),
+    };
+    format!("none of {valid} valid pixels belongs to a grain{why}{hidden}")
 }
 
 /// Refuses the first value of `values` that is not finite.

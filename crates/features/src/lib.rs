@@ -59,7 +59,7 @@ pub mod stats;
 pub use camera::{Camera, Intrinsics};
 pub use colour::{ColourImage, HsvRange, Picked, pick_range};
 pub use depth::DepthImage;
-pub use error::FeatureError;
+pub use error::{Cleaned, FeatureError};
 pub use height_map::HeightMap;
 pub use plane::{Plane, PlaneFit, fit_plane, fit_plane_within};
 pub use raster::{ConvexShape, height_map, render, render_convex, render_grid};

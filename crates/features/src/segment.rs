@@ -39,6 +39,9 @@ use levelled::{Cloud, Footprint, flipped};
 /// Sides of the grid `[px]` on which the ground is looked for to choose the down-sampling.
 const COARSE_SIDE_PX: usize = 160;
 
+/// Points that a plane needs.
+const LEAST_POINTS: usize = 3;
+
 /// The formation in a depth image.
 ///
 /// With a colour image and `segmentation.colour` the colour decides what is a grain and the ground
@@ -47,7 +50,7 @@ const COARSE_SIDE_PX: usize = 160;
 ///
 /// # Errors
 /// `IncompleteColour` when only one of image and range is given, `SizeMismatch` when camera, depth
-/// and colour differ in size, `NoValidDepth`, `DegeneratePlane`, `TooSteep` for a ground beyond
+/// and colour differ in size, `NoValidDepth`, `TooSmall` on the ground for `ground_resolution`, `DegeneratePlane`, `TooSteep` for a ground beyond
 /// `max_tilt_deg`, `EmptyMask`, `OutOfRange` for a setting.
 pub fn segment_depth(
     camera: &Camera,
@@ -103,18 +106,38 @@ pub fn level_depth(
     let side = image.width.min(image.height);
     let cloud = |n: usize| depth_cloud(camera, &image, segmentation, n);
     let grains = |n: usize| colour.map(|(colour, range)| colour.mask(range, n)).transpose();
-    let n = if segmentation.downsample.is_none() && segmentation.ground_resolution.is_some() {
-        // A pixel's width on the ground needs the ground, for which some pixels are enough.
-        let coarse = (side / COARSE_SIDE_PX).max(1);
-        let glance = cloud(coarse)?;
-        let (plane, _) = glance.ground(segmentation, grains(coarse)?.as_deref(), up)?;
-        segmentation.factor(of_area(glance.resolution(&plane)) / coarse as f64, side)
-    } else {
-        segmentation.factor(1.0, side)
-    };
-    let levelled = cloud(n)?.level(segmentation, grains(n)?.as_deref(), up)?;
+    let (n, small) =
+        if segmentation.downsample.is_none() && segmentation.ground_resolution.is_some() {
+            // A pixel's width on the ground needs the ground, for which some pixels are enough.
+            let coarse = (side / COARSE_SIDE_PX).max(1);
+            let glance = cloud(coarse)?;
+            let (plane, _) = glance.ground(segmentation, grains(coarse)?.as_deref(), up)?;
+            let pixel = glance.resolution(&plane);
+            let n = segmentation.factor(of_area(pixel) / coarse as f64, side);
+            let whole = |width: f64, pixels: usize| width * pixels as f64 / coarse as f64;
+            let extent = (whole(pixel.0, image.width), whole(pixel.1, image.height));
+            (n, require_some(cloud(n)?, segmentation, extent)?)
+        } else {
+            let n = segmentation.factor(1.0, side);
+            (n, cloud(n)?)
+        };
+    let levelled = small.level(segmentation, grains(n)?.as_deref(), up)?;
     let along = camera.camera_from_world.inverse_transform_vector(&Vector3::x());
     Ok(in_field(levelled, segmentation, &along))
+}
+
+/// Refuses an image that is so small on the ground, `extent` `[m]`, that pixels of the width that is asked for leave none.
+fn require_some(
+    cloud: Cloud,
+    segmentation: &Segmentation,
+    extent: (f64, f64),
+) -> Result<Cloud, FeatureError> {
+    match segmentation.ground_resolution {
+        Some(wanted) if cloud.downsample > 1 && cloud.points.len() < LEAST_POINTS => {
+            Err(FeatureError::TooSmall { extent, wanted, got: cloud.points.len() })
+        }
+        _ => Ok(cloud),
+    }
 }
 
 /// Side of the square that is as large as a pixel.
@@ -176,6 +199,12 @@ pub fn level_height_map(
         let point = small.point(u, v);
         (inside(u, v) && point.z.is_finite()).then_some(point)
     });
+    let extent = (map.resolution_x * map.width as f64, map.resolution_y * map.height as f64);
+    let cloud = if map.z.iter().any(|z| z.is_finite()) {
+        require_some(cloud, segmentation, extent)?
+    } else {
+        cloud
+    };
     let levelled = cloud.level(segmentation, None, |fit| fit)?;
     Ok(in_field(levelled, segmentation, &Vector3::x()))
 }
@@ -212,7 +241,7 @@ pub fn grain_points(
         return Err(FeatureError::NoValidDepth { pixels: image.depth.len(), got: 0, min: 1 });
     }
     if points.is_empty() {
-        return Err(FeatureError::EmptyMask { valid, highest, threshold, above: 0 });
+        return Err(FeatureError::EmptyMask { valid, highest, threshold, above: 0, cleaned: None });
     }
     Ok(points)
 }

@@ -26,7 +26,13 @@ fn every_kind_of_message_with_a_number_is_short() {
             height: huge,
             ratio: 1.0 / 3e-300,
         },
-        FeatureError::EmptyMask { valid: 1, highest: huge, threshold: tiny, above: 2 },
+        FeatureError::EmptyMask {
+            valid: 1,
+            highest: huge,
+            threshold: tiny,
+            above: 2,
+            cleaned: None,
+        },
         FeatureError::DegeneratePlane { got: tiny, min: huge },
         FeatureError::TooSteep { got_deg: huge, max_deg: tiny },
     ] {

@@ -64,8 +64,8 @@ impl Levelled {
         let mut points: Vec<_> = masked().map(|(_, i)| self.points[i]).collect();
         if points.is_empty() {
             let highest = self.points.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
-            let Self { valid_count: valid, threshold, above_count: above, .. } = self;
-            return Err(FeatureError::EmptyMask { valid, highest, threshold, above });
+            let Self { valid_count: valid, threshold, above_count: above, cleaned, .. } = self;
+            return Err(FeatureError::EmptyMask { valid, highest, threshold, above, cleaned });
         }
         let volume = masked().map(|(_, i): (_, usize)| self.volumes[i]).sum();
         let shape = shape::of(&self);

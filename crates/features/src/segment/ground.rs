@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::{Vector2, Vector3};
 
+use super::LEAST_POINTS;
 use super::levelled::Cloud;
 use super::settings::Segmentation;
 use crate::error::FeatureError;
@@ -62,9 +63,9 @@ impl Cloud {
         grains: Option<&[bool]>,
         up: impl Fn(PlaneFit) -> PlaneFit,
     ) -> Result<(PlaneFit, f64), FeatureError> {
-        if self.points.len() < 3 {
-            let pixels = self.width * self.height;
-            return Err(FeatureError::NoValidDepth { pixels, got: self.points.len(), min: 3 });
+        if self.points.len() < LEAST_POINTS {
+            let (pixels, got) = (self.width * self.height, self.points.len());
+            return Err(FeatureError::NoValidDepth { pixels, got, min: LEAST_POINTS });
         }
         let ground: Vec<_> = self
             .pixels

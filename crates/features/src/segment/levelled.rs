@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::component::{remove_low, remove_small};
 use super::part::Part;
 use super::settings::Segmentation;
-use crate::error::FeatureError;
+use crate::error::{Cleaned, FeatureError};
 use crate::plane::PlaneFit;
 
 /// A camera that looks along the ground sees it under no angle whose cosine is less.
@@ -57,6 +57,8 @@ pub struct Levelled {
     pub valid_count: usize,
     /// Pixels above the greatest height, which carry none.
     pub above_count: usize,
+    /// Why pixels above the threshold are no grains, where none is; `None` otherwise.
+    pub cleaned: Option<Cleaned>,
     /// Share of the square of ground that was asked for which the image shows `[-]`; none without one.
     pub shown: Option<f64>,
     /// Whether the image shows more, which was cut off.
@@ -121,10 +123,19 @@ impl Cloud {
             volumes.push(self.volume(&plane, seen, point.z));
             points.push(point);
         }
+        let count = |mask: &[bool]| mask.iter().filter(|&&is_grain| is_grain).count();
+        let mut cleaned = None;
         if let (Some(peak), None) = (settings.height_threshold.peak(ground_sd), grains) {
+            let passed = count(&mask);
             remove_low(&mut mask, self.width, |pixel| heights[pixel].is_some_and(|z| z > peak));
+            let is_none = passed > 0 && count(&mask) == 0;
+            cleaned = is_none.then_some(Cleaned::Low { pixels: passed, peak });
         }
-        remove_small(&mut mask, self.width, settings.min_component_px);
+        let (high, min_px) = (count(&mask), settings.min_component_px);
+        remove_small(&mut mask, self.width, min_px);
+        if high > 0 && count(&mask) == 0 {
+            cleaned = Some(Cleaned::Small { pixels: high, min_px });
+        }
         Ok(Levelled {
             width: self.width,
             height: self.height,
@@ -135,6 +146,7 @@ impl Cloud {
             is_by_colour: grains.is_some(),
             valid_count: points.len(),
             above_count: self.points.len() - points.len(),
+            cleaned,
             shown: None,
             is_cropped: false,
             left_out: Vec::new(),

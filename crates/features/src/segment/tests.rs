@@ -387,7 +387,32 @@ fn a_flat_bed_has_a_ground_and_no_formation() {
     let got = level_depth(&camera(), &noisy, None, &Segmentation::default()).unwrap();
     assert!(got.mask.iter().all(|&m| !m) && got.heights.iter().all(Option::is_some));
     assert!((got.ground_sd / 1e-3 - 1.0).abs() < 0.05);
-    assert!(matches!(got.into_formation(), Err(FeatureError::EmptyMask { valid: 57600, .. })));
+    let error = got.into_formation().unwrap_err();
+    assert!(matches!(error, FeatureError::EmptyMask { valid: 57600, .. }));
+    // Some of the noise is above three standard deviations, none above six.
+    let text = error.to_string();
+    assert!(
+        text.contains("above the threshold of 0.00") && text.contains("reaches 0.005"),
+        "{text}"
+    );
+    assert!(text.contains("average more frames"), "{text}");
+    let exact = Segmentation { height_threshold: Threshold::Absolute(5e-4), ..Default::default() };
+    let small = Segmentation { min_component_px: 60_000, ..exact };
+    let refused = segment_depth(&camera(), &noisy, None, &small).unwrap_err().to_string();
+    assert!(refused.contains("no patch of them has min_component_px = 60000 pixels"), "{refused}");
+}
+
+#[test]
+fn lengths_of_another_unit_are_told_by_what_they_would_show() {
+    let (positions, radii) = pile();
+    let map = height_map(&positions, &radii, 157, 0.0028, (0.0, 0.0)).unwrap();
+    let thousandth = |value: f64| 1e-3 * value;
+    let (small, z) = (thousandth(0.0028), map.z.iter().copied().map(thousandth).collect());
+    let small = HeightMap::new(157, 157, small, small, z).unwrap();
+    let settings = Segmentation { ground_resolution: Some(5e-3), ..Default::default() };
+    let text = segment_height_map(&small, &settings).unwrap_err().to_string();
+    assert!(text.starts_with("the image shows 0.0004396 m x 0.0004396 m"), "{text}");
+    assert!(text.contains("pixels of 0.005 m leave 1") && text.contains("in metres?"), "{text}");
 }
 
 /// A height map of a ground tilted about y, 2 mm a pixel, without and with rubble on its low side.
