@@ -4,7 +4,9 @@
 //! which the ground is z = 0, mask ([`Levelled`]), points centred at their centroid ([`Formation`]).
 //! For a noise-free simulated image the plane is known and [`grain_points`] skips the fit.
 
+mod bow;
 mod component;
+mod directions;
 mod edge;
 mod field;
 mod flat;

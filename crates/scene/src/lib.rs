@@ -36,6 +36,7 @@ mod prior;
 mod scene;
 mod sensor;
 mod start;
+mod symmetry;
 mod together;
 mod uniforms;
 mod view;

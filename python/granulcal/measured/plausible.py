@@ -42,9 +42,9 @@ def doubts(
 ) -> list[str]:
     """Returns what makes recordings doubtful that may show the scene, a sentence each.
 
-    A formation that the image's edge cuts off, that takes less room than the scene's grains, an
-    image without much data, a second heap; the bounds are those of `infer`, the arguments those of
-    `violations`.
+    A formation that the image's edge cuts off, that is longer than wide or takes less room than the
+    scene's grains, a bent ground, an image without much data, a second heap; the bounds are those
+    of `infer`, the arguments those of `violations`.
     """
     return _told(scene.native.doubts, prior, recordings, names, reading)
 

@@ -347,7 +347,7 @@ class Recording:
         """Returns why this can be no recording of the scene, and what makes it doubtful.
 
         A sentence each, as `granulcal infer` says them; none where nothing is known against it. The
-        bounds are wide and hold over the whole prior.
+        bounds hold over the whole prior: of the scene's own pours a few in a hundred are doubted.
 
         Args:
             scene: what was poured, with the camera that looked.

@@ -27,6 +27,13 @@ impl Formation {
         2.0 * least as f64 / self.width.min(self.height) as f64
     }
 
+    /// Share of the formation's volume that its largest patch holds: near 1 of a heap, little of scattered grains `[-]`.
+    pub fn body_share(&self) -> f64 {
+        let parts = self.patches_by_volume();
+        let all: f64 = parts.iter().map(|(part, _)| part.volume).sum();
+        parts.first().map_or(0.0, |(body, _)| body.volume / all)
+    }
+
     /// Whether the edge of the image cuts the formation off: its largest patch reaches it.
     pub fn is_cut_off(&self) -> bool {
         let Some(depth) = depth_in(self.mask.len(), self.width) else { return false };
@@ -144,6 +151,10 @@ mod tests {
         assert!((pile.margin() - 0.64).abs() < 0.05, "{}", pile.margin());
         assert!(!pile.is_cut_off() && pile.other_heaps(DIAMETER).is_empty());
         assert_eq!(pile.seen_share(), 1.0);
+        assert_eq!(pile.body_share(), 1.0);
+        // A cone of half the height and half the radius holds an eighth.
+        let both = seen(&[([40.0, 40.0], 0.02, 0.03), ([70.0, 70.0], 0.01, 0.015)], 0);
+        assert!((both.body_share() - 8.0 / 9.0).abs() < 0.02, "{}", both.body_share());
     }
 
     #[test]

@@ -1,0 +1,178 @@
+use granulcal_features::{HeightMap, Part, Segmentation, Threshold, segment_height_map};
+use granulcal_scene::{Bed, DepthSensor, NoiseField, Projection, StereoSensor};
+
+use super::doubts::rounded_up;
+use super::*;
+
+/// A cone in the middle of a field of half a metre, 4 mm to a pixel.
+fn cone(height: f64, radius: f64) -> Formation {
+    let (side, step) = (120, 4e-3);
+    let middle = 0.5 * side as f64;
+    let at = |pixel: usize| {
+        let (u, v) = ((pixel % side) as f64 - middle, (pixel / side) as f64 - middle);
+        (height * (1.0 - step * u.hypot(v) / radius)).max(0.0)
+    };
+    let z = (0..side * side).map(at).collect();
+    let map = HeightMap::new(side, side, step, step, z).unwrap();
+    let height_threshold = Threshold::Absolute(2e-4);
+    let settings = Segmentation { height_threshold, ..Segmentation::default() };
+    segment_height_map(&map, &settings).unwrap()
+}
+
+#[test]
+fn a_heap_that_lacks_grains_or_is_in_another_unit_cannot_be_of_the_scene() {
+    let limits = Limits::of(&Scene::funnel(0.12), &Prior::default()).unwrap().unwrap();
+    // 2000 balls of 4 mm are 67 ml.
+    assert!((limits.least_volume / 0.7 - 6.7e-5).abs() < 1e-6, "{limits:?}");
+    assert_eq!(limits.violations(&cone(0.03, 0.06)), Vec::<String>::new());
+    let few = limits.violations(&cone(0.02, 0.04));
+    assert!(few.len() == 1 && few[0].contains("as many grains"), "{few:?}");
+    let small = limits.violations(&cone(1e-3, 0.06));
+    assert!(small.iter().any(|reason| reason.contains("unit of the depths")), "{small:?}");
+    // Leftovers of a pour that has rolled out of view are a formation of the scene.
+    assert_eq!(limits.violations(&cone(8e-3, 0.015)), Vec::<String>::new());
+    let of_threshold = limits.doubts(&cone(0.03, 0.06));
+    assert!(of_threshold.len() == 1 && of_threshold[0].contains("height_threshold"));
+    assert!(of_threshold[0].contains("height_threshold = 0.001 m in both"), "{of_threshold:?}");
+    let by_colour = Formation { is_by_colour: true, ..cone(0.03, 0.06) };
+    let hollow = Formation { volume: -1e-6, ..by_colour.clone() };
+    assert!(limits.violations(&hollow)[0].contains("of the ground's colour"));
+    // Below three standard deviations the ground's noise is taken for grains, whatever the scene says.
+    let noisy = Formation { threshold: 1e-3, ground_sd: 5e-4, ..cone(0.03, 0.06) };
+    let of_noise = limits.doubts(&noisy);
+    assert!(
+        of_noise.len() == 1 && of_noise[0].contains("height_threshold = 0.0015 m here"),
+        "{of_noise:?}"
+    );
+    assert_eq!([1.626e-3, 1e-3, 9.91e-3].map(rounded_up), ["0.0017", "0.001", "0.01"]);
+    let still = Formation { ground_sd: 3e-4, ..noisy };
+    assert_eq!(limits.doubts(&still), Vec::<String>::new());
+    let from_nought = Limits { threshold: Some(0.0), ..limits };
+    let all = Formation { threshold: 0.0, ground_sd: 0.0, ..still.clone() };
+    assert_eq!(from_nought.doubts(&all), Vec::<String>::new());
+    let coarse = Formation { resolution: (1e-2, 1e-2), ..still };
+    let of_pixels = limits.doubts(&coarse);
+    assert!(of_pixels.len() == 1 && of_pixels[0].contains("a pixel is 10 mm wide"));
+    assert_eq!(limits.doubts(&by_colour), Vec::<String>::new());
+    let limits = Limits { threshold: None, ..limits };
+    assert!(limits.doubts(&cone(0.03, 0.06)).is_empty());
+    let doubt = |formation: &Formation| limits.doubts(formation).join("; ");
+    let seen = cone(0.03, 0.06);
+    let mut heights = seen.heights.clone();
+    // Of 120 columns those from the middle on are not seen.
+    let blind = |pixel: &usize| pixel % 120 >= 60;
+    (0..heights.len()).filter(blind).for_each(|pixel| heights[pixel] = None);
+    let mask = (0..heights.len()).map(|pixel| seen.mask[pixel] && !blind(&pixel)).collect();
+    let half = Formation { mask, heights, ..seen.clone() };
+    assert!(doubt(&half).contains("of the formation's outline nothing is seen"));
+    let uneven = Formation { ground_sd: 3e-3, ..seen.clone() };
+    assert!(doubt(&uneven).contains("of two levels?"), "{}", doubt(&uneven));
+    let beyond = vec![Part { volume: 4e-5, height: 0.02 }, Part { volume: 3e-8, height: 4e-3 }];
+    let chosen = Formation { left_out: beyond, ..seen.clone() };
+    assert!(
+        doubt(&chosen).starts_with("40 ml, 20 mm high, stand beyond the 0.58 m"),
+        "{}",
+        doubt(&chosen)
+    );
+    // It shows less than the scene's images, which matters where grains come to its edge.
+    let mut mask = seen.mask.clone();
+    mask[0] = true;
+    let small = Formation { shown: Some(0.8), ..seen.clone() };
+    let at_edge = Formation { mask, ..small.clone() };
+    assert!(doubt(&small).is_empty() && doubt(&at_edge).contains("those that have rolled on"));
+    // On a bed of some 10,000 grains it may be as small as it likes.
+    let bed = Bed { radius: 0.1, height: 0.03, spacing: 4.5e-3, jitter: 0.0, settle: 0.3 };
+    let mut on_bed = Scene { bed: Some(bed), ..Scene::drop(0.1) };
+    on_bed.camera.projection = Projection::Orthographic;
+    (on_bed.camera.pixels, on_bed.camera.downsample) = (200, 1);
+    let limits = Limits::of(&on_bed, &Prior::default()).unwrap().unwrap();
+    let limits = Limits { threshold: None, ..limits };
+    assert_eq!(limits.violations(&cone(0.02, 0.04)), Vec::<String>::new());
+    assert!(limits.doubts(&cone(0.02, 0.04)).is_empty());
+}
+
+/// Heaps of a height and radius at places of a field of half a metre, 4 mm to a pixel, on a ground of some bow `[m]`, all
+/// stretched along x.
+fn field(heaps: &[(f64, f64)], (high, radius): (f64, f64), stretch: f64, bow: f64) -> Formation {
+    let (side, step) = (146, 4e-3);
+    let half = 0.5 * side as f64;
+    let at = |pixel: usize| {
+        let (u, v) = ((pixel % side) as f64 + 0.5 - half, (pixel / side) as f64 + 0.5 - half);
+        let top = |&(x, y): &(f64, f64)| {
+            high * (1.0 - (step * u / stretch - x).hypot(step * v - y) / radius)
+        };
+        bow * (u * u + v * v) / (half * half) + heaps.iter().map(top).fold(0.0, f64::max)
+    };
+    let map = HeightMap::new(side, side, step, step, (0..side * side).map(at).collect()).unwrap();
+    let height_threshold = Threshold::Absolute(1e-3);
+    let settings = Segmentation { height_threshold, ..Segmentation::default() };
+    segment_height_map(&map, &settings).unwrap()
+}
+
+fn funnel() -> Limits {
+    Limits::of(&Scene::funnel(0.12), &Prior::default()).unwrap().unwrap()
+}
+
+const HEAP: (f64, f64) = (0.03, 0.06);
+
+#[test]
+fn a_formation_that_is_longer_than_wide_is_told_where_nothing_makes_it_so() {
+    let limits = funnel();
+    let told = |stretch| limits.doubts(&field(&[(0.0, 0.0)], HEAP, stretch, 0.0)).join("; ");
+    assert_eq!((told(1.0), told(1.1)), (String::new(), String::new()));
+    assert!(told(1.7).starts_with("the formation is 1.7 times as long as wide"), "{}", told(1.7));
+    // Few grains lie anyhow.
+    let few = [(0.1, 0.01), (-0.1, 0.0), (0.15, -0.01), (-0.12, 0.02), (0.05, 0.01)];
+    let lone = field(&few, (4e-3, 4e-3), 1.0, 0.0);
+    assert!(lone.elongation() > 0.8);
+    assert_eq!(limits.doubts(&lone), Vec::<String>::new());
+    let mut tilted = Scene::funnel(0.12);
+    tilted.set(&[("effects.tilt.x", 0.1)]).unwrap();
+    let limits = Limits::of(&tilted, &Prior::default()).unwrap().unwrap();
+    let long = field(&[(0.0, 0.0)], HEAP, 1.7, 0.0);
+    assert_eq!(limits.doubts(&long), Vec::<String>::new());
+}
+
+#[test]
+fn a_bent_ground_is_told() {
+    let told = |bow| funnel().doubts(&field(&[(0.0, 0.0)], HEAP, 1.0, bow)).join("; ");
+    assert_eq!(told(2e-4), "");
+    assert!(told(-5e-4).starts_with("the ground is bent: its middle lies 0.5"), "{}", told(-5e-4));
+}
+
+#[test]
+fn grains_are_missed_from_a_heap_and_from_one_side_and_not_from_those_that_roll_away() {
+    let limits = funnel();
+    let told = |formation: &Formation| {
+        let all = limits.doubts(formation);
+        all.iter().any(|doubt| doubt.contains("the scene's grains by themselves 67"))
+    };
+    // 2000 grains are 67 ml, and a heap of them takes 1.27 times that or more.
+    let cone = |volume: f64| (volume / (std::f64::consts::PI / 3.0 * 0.06 * 0.06), 0.06);
+    assert!(!told(&field(&[(0.0, 0.0)], cone(7.5e-5), 1.0, 0.0)));
+    assert!(told(&field(&[(0.0, 0.0)], cone(5.5e-5), 1.0, 0.0)));
+    // A lattice of lone grains that goes on out of view, and half of it.
+    let lattice: Vec<_> = (-9..=9)
+        .flat_map(|i| (-9..=9).map(move |j| (0.03 * f64::from(i), 0.03 * f64::from(j))))
+        .collect();
+    let grains = (6e-3, 4e-3);
+    let whole = field(&lattice, grains, 1.0, 0.0);
+    assert!(whole.volume > limits.least_volume * 0.2 && whole.volume < limits.least_volume);
+    assert_eq!(limits.doubts(&whole), Vec::<String>::new());
+    let right: Vec<_> = lattice.into_iter().filter(|(x, _)| *x > 0.0).collect();
+    assert!(told(&field(&right, grains, 1.0, 0.0)));
+}
+
+#[test]
+fn what_a_scenes_sensor_does_to_its_own_images_is_no_doubt() {
+    let mut scene = Scene::funnel(0.12);
+    let whole = Limits::of(&scene, &Prior::default()).unwrap().unwrap();
+    assert_eq!((whole.bow, whole.shown), (0.0, 1.0));
+    let noise = NoiseField { broad: 0.3, broad_x: 60.0, broad_y: 60.0, ..NoiseField::default() };
+    let stereo = StereoSensor { left_margin: 11.0, noise, ..StereoSensor::new(390.0, 0.05) };
+    scene.camera.sensor = Some(DepthSensor::Stereo(stereo));
+    let limits = Limits::of(&scene, &Prior::default()).unwrap().unwrap();
+    // The right imager misses a band of 67 + 11 of the 780 columns.
+    assert!((limits.shown - 0.9).abs() < 0.02, "{}", limits.shown);
+    assert!(limits.bow > 2e-4 && limits.bow < 4e-3, "{}", limits.bow);
+}
