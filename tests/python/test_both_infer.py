@@ -155,6 +155,34 @@ def test_several_pours_of_a_network_count_as_one_in_both(
         assert abs(found["parameters"][name]["mean"] - posterior.mean()[i]) < 0.25 * spread[i]
 
 
+def test_a_model_of_some_of_the_statistics_takes_those_by_name(
+    small_data, recording, tmp_path, capfd
+):
+    chosen = ["sd_r", "max_z", "iqr_y", "mean_r"]
+    columns = [small_data.x_names.index(name) for name in chosen]
+    usable = small_data.is_usable
+    made = BayesSim.fit(
+        small_data.theta[usable],
+        small_data.x[usable][:, columns],
+        prior=small_data.prior,
+        x_names=chosen,
+        scene=small_data.scene,
+        quiet=True,
+        method="mdrff",
+        **SMALL,
+    )
+    made.save(tmp_path / "m")
+    opened = gc.Recording.open(recording[0], camera=recording[2])
+    seen = opened.formation(**small_data.scene.reading).statistics()
+    misfit = made.misfit(seen)
+    assert np.array_equal(made.posterior(seen).mean(), made.posterior(seen.to_dict()).mean())
+    words = ["infer", str(tmp_path / "m"), *recording, "--json"]
+    found = both(capfd, 0 if misfit.is_inside else 3, words)
+    told = found["statistics"][0]
+    assert told == pytest.approx({name: seen[name] for name in chosen})
+    assert found["inside_model"]["p_value"] == pytest.approx(misfit.p_value, abs=1e-9)
+
+
 def test_what_is_outside_is_said_with_exit_code_3(model, small_scene, tmp_path, capfd):
     # A room: a floor with boxes of half a metre, seen from two metres.
     camera = gc.Camera.overhead(height=2.0, field_width=2.0, pixels=160)

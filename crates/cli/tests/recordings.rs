@@ -200,7 +200,7 @@ fn infer_evaluates_a_model_without_python() {
     assert!(lines.contains("OUTSIDE THE MODEL"), "{lines}");
     assert!(lines.contains("material.restitution") && lines.contains("90 % interval"), "{lines}");
     let other = models.join("auto").display().to_string();
-    place.refused(&["infer", &other, BAG], &["in this order", "statistic_0"]);
+    place.refused(&["infer", &other, BAG], &["of statistics that a recording has", "statistic_0"]);
     place.refused(&["infer", "nothing", BAG], &["nothing", "model.json"]);
     place.refused(&["infer", &model, "nothing.bag"], &["nothing.bag"]);
 }

@@ -242,8 +242,8 @@ class BayesSim:
     def posterior(self, x_obs: Any) -> Posterior:
         """Returns the posterior given one observation, or several of one material.
 
-        What carries names is matched with `x_names`: statistics, a dict, a series, a data frame, or
-        a list of such. Plain numbers are taken in the order of `x_names`.
+        What carries names is matched with `x_names`, and may have others: statistics, a dict, a
+        series, a data frame, or a list of such. Plain numbers are taken in the order of `x_names`.
 
         Ask `misfit` first: a posterior comes out whether or not any parameters explain the
         observation, and is of no use if none do.
@@ -353,7 +353,14 @@ class BayesSim:
         return f"BayesSim({names} of {statistics} statistics, {self.summary.pair_count} pours)"
 
     def _checked(self, x_obs: Any) -> Array:
-        named = by_name("x_obs", x_obs, self.x_names, whose="the model", error=ObservationError)
+        named = by_name(
+            "x_obs",
+            x_obs,
+            self.x_names,
+            whose="the model",
+            error=ObservationError,
+            may_have_more=True,
+        )
         observed = as_real("x_obs", named)
         count = len(self.x_names)
         rows = observed[None] if observed.ndim == 1 else observed

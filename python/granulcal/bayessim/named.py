@@ -38,28 +38,37 @@ def names_of(value: Any) -> tuple[str, ...] | None:
 
 
 def by_name(
-    argument: str, value: Any, names: Sequence[str], *, whose: str, error: type[ValueError]
+    argument: str,
+    value: Any,
+    names: Sequence[str],
+    *,
+    whose: str,
+    error: type[ValueError],
+    may_have_more: bool = False,
 ) -> Any:
     """Returns `value` with its last axis in the order of `names`; as it is where it has no names.
 
     Args:
         argument: what the caller calls it.
         value: numbers with names, a list of such, or plain numbers.
-        names: the names wanted, each of them and no other.
+        names: the names wanted, each of them and, unless `may_have_more`, no other.
         whose: owner of the names, for messages.
         error: raised where the names differ.
+        may_have_more: whether what has further names is taken, without their values.
 
     Raises:
         TypeError: no real numbers.
         error: `value` has other names, or one of them twice.
     """
     if isinstance(value, list | tuple) and any(names_of(each) is not None for each in value):
-        return [by_name(argument, each, names, whose=whose, error=error) for each in value]
+        options: Any = dict(whose=whose, error=error, may_have_more=may_have_more)
+        return [by_name(argument, each, names, **options) for each in value]
     found = names_of(value)
     if found is None:
         return value
     numbers = _numbers(argument, value, error)
-    if set(found) != set(names):
+    is_enough = may_have_more and set(names) <= set(found)
+    if set(found) != set(names) and not is_enough:
         # Nobody named the statistics of this model: the order is all there is.
         if tuple(names) == placeholders(len(names)) and not isinstance(value, Mapping):
             return numbers
@@ -68,7 +77,7 @@ def by_name(
         told = [f"{argument} lacks {_listed(lacking)}"] if lacking else []
         told += [f"{whose} has no {_listed(unknown)}"] if unknown else []
         raise error(f"{argument} must have the names of {whose}: {'; '.join(told)}")
-    if len(found) != len(names):
+    if len(set(found)) != len(found):
         twice = sorted({name for name in found if found.count(name) > 1})
         raise error(f"{argument} has {_listed(twice)} more than once")
     return numbers[..., [found.index(name) for name in names]]

@@ -69,8 +69,6 @@ def _say_assumed(model: Path) -> None:
 
 def _plot(options: argparse.Namespace, code: int) -> None:
     """Draws the posterior that was told; none where none was given."""
-    import numpy as np
-
     from granulcal.measured.plausible import violations
     from granulcal.pours.scene import Scene
 
@@ -90,7 +88,7 @@ def _plot(options: argparse.Namespace, code: int) -> None:
             return
     if options.border is not None:
         matched["border_px"] = options.border
-    observed = [recording.formation(**matched).statistics() for recording in recordings]
-    x = np.array([np.asarray(each) for each in observed])
+    # By name: the model may be of some of them.
+    x = [recording.formation(**matched).statistics() for recording in recordings]
     title = "" if model.misfit(x).is_inside else "OUTSIDE THE MODEL: its best compromise"
     model.posterior(x).pair_plot(options.plot, title=title)

@@ -92,12 +92,7 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
             "note: the model is of an earlier version without hashes: damage in it cannot be found",
         );
     }
-    if !model.x_names.iter().map(String::as_str).eq(PAPER16.iter().map(|s| s.name)) {
-        let (names, found) = (PAPER16.map(|s| s.name).join(", "), model.x_names.join(", "));
-        let refusal =
-            format!("the model must be of the statistics {names}, in this order; it is of {found}");
-        return Err(BadArgument(refusal).into());
-    }
+    let chosen = places(&model.x_names)?;
     // The scene may name meshes that are not here; the camera does not need them.
     let trained =
         model.scene_toml.as_deref().and_then(|text| scene_from_text(text, Path::new("")).ok());
@@ -147,7 +142,7 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
             doubts.extend(limits.doubts(&formation).into_iter().map(of_it));
         }
         observed.push(match recording.statistics_of(&formation) {
-            Ok(statistics) => statistics.to_vec(),
+            Ok(statistics) => chosen.iter().map(|&at| statistics[at]).collect(),
             // What cannot be of the scene need not be described.
             Err(_) if !impossible.is_empty() => Vec::new(),
             Err(error) => return Err(error.into()),
@@ -186,6 +181,22 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
     let outcome =
         if report.is_inside() { Outcome::whole_if(is_whole) } else { Outcome::OutsideModel };
     Ok(sides.finish(outcome))
+}
+
+/// Where the statistics of a model stand among those of a recording.
+fn places(names: &[String]) -> Result<Vec<usize>, BadArgument> {
+    let place = |name: &String| PAPER16.iter().position(|statistic| statistic.name == *name);
+    let unknown: Vec<_> =
+        names.iter().filter(|name| place(name).is_none()).map(String::as_str).collect();
+    if unknown.is_empty() {
+        return Ok(names.iter().filter_map(place).collect());
+    }
+    let known = PAPER16.map(|statistic| statistic.name).join(", ");
+    let refusal = format!(
+        "the model must be of statistics that a recording has ({known}); it is of {}, too",
+        unknown.join(", ")
+    );
+    Err(BadArgument(refusal))
 }
 
 /// Refuses a recording that is given twice: it would count as two pours.
