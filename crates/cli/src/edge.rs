@@ -25,7 +25,32 @@ pub fn pixels_at_edge(formation: &Formation) -> Option<String> {
     };
     let side = formation.width.min(formation.height) as f64;
     if edge.frame as f64 <= FRAME * side {
-        return Some(format!("{what}; --border {frame} leaves them out"));
+        return Some(format!("{what}{}", advice(frame, is_matched)));
     }
     (!is_matched).then(|| format!("{what}: others may have rolled out of view"))
+}
+
+/// What leaves out a thin frame of so many pixels. Images of a scene, as wide as these, have grains that rolled to their
+/// edge, too, and a model has learnt from those.
+fn advice(frame: usize, is_matched: bool) -> String {
+    let leaves = format!("--border {frame} leaves them out");
+    if is_matched {
+        format!(
+            ", as those are that rolled there in the scene's images; if these are the camera's, {leaves}"
+        )
+    } else {
+        format!("; {leaves}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_that_the_scenes_images_have_too_are_left_out_only_if_they_are_the_cameras() {
+        assert_eq!(advice(4, false), "; --border 4 leaves them out");
+        let matched = advice(4, true);
+        assert!(matched.contains("in the scene's images; if these are the camera's, --border 4"));
+    }
 }
