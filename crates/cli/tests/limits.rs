@@ -23,9 +23,9 @@ const TINY: [&str; 8] = [
 fn what_has_no_room_is_refused_by_name() {
     let place = Place::new();
     let room = ["GRANULCAL_NO_LIMITS", "memory"];
-    place.refused(&["simulate", "drop", "--set", "grains.count=1e15"], &room);
-    place.refused(&["render", "drop", "--set", "grains.count=1e11", "-o", "a.png"], &room);
-    place.refused(&["generate", "drop", "default", "--set", "grains.count=1e11", "-o", "d"], &room);
+    place.refused(&["simulate", "drop", "--set", "grains.count=1e8"], &room);
+    place.refused(&["render", "drop", "--set", "grains.count=1e8", "-o", "a.png"], &room);
+    place.refused(&["generate", "drop", "default", "--set", "grains.count=1e8", "-o", "d"], &room);
     let disk = ["GRANULCAL_NO_LIMITS", "disk"];
     place.refused(&["generate", "drop", "default", "-n", "200000000000000", "-o", "d"], &disk);
     let film = [&["simulate", "drop", "--mcap", "a.mcap", "--fps", "1e12"][..], &TINY].concat();

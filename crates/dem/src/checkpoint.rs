@@ -241,7 +241,7 @@ mod tests {
     fn another_arithmetic_is_refused_and_named() {
         let mut bytes = simulation().checkpoint();
         let at = LEAST - HASH + 1 + VERSION.len() + 1;
-        assert_eq!(bytes[at], 1);
+        assert_eq!(u32::from(bytes[at]), arithmetic(&Scene::drop(0.01)));
         bytes[at] = 99;
         let error = simulation().resume(&sealed(bytes)).unwrap_err();
         assert!(matches!(error, DemError::CheckpointArithmetic { got: 99, .. }), "{error}");

@@ -74,17 +74,18 @@ fn column() -> FrozenSolve {
 
 /// A heap of 80 grains as it falls apart, with the impulses of the substep before.
 fn heap() -> FrozenSolve {
-    heap_of(Material::new(0.5, 0.2, 0.3).expect("a valid material"))
+    heap_of(0.5, 0.2, 0.1)
 }
 
-fn heap_of(grains: Material) -> FrozenSolve {
+/// Of grains of these frictions, this time after it was let go `[s]`: at some moments contacts lock, and no method ends.
+fn heap_of(sliding: f64, rolling: f64, seconds: f64) -> FrozenSolve {
     let mut scene = Scene::drop(0.01);
     scene.grains.count = 80;
     scene.preset = Preset::Paper;
-    scene.material = grains;
+    scene.material = Material::new(sliding, rolling, 0.3).expect("a valid material");
     let pour = Simulation::new(&scene, 1).expect("a valid scene");
     let mut pour = pour.with_settings(gauss_seidel(40)).expect("valid settings");
-    pour.advance(0.1);
+    pour.advance(seconds);
     pour.frozen_solve().expect("balls")
 }
 
@@ -147,31 +148,31 @@ fn the_reference_meets_its_residual_or_says_so() {
 
 #[test]
 fn conjugate_directions_save_sweeps() {
-    let problem = heap();
+    let problem = heap_of(0.5, 0.2, 0.12);
     let solution = solve(&problem, &reference(1e-8));
     let sweeps = solve(&problem, &gauss_seidel(solution.sweeps));
     println!(
         "{} sweeps: {:.1e} against {:.1e}",
         solution.sweeps, solution.residual, sweeps.residual
     );
-    // Measured: 72 sweeps leave 1.8e-9 with and 2.4e-6 without.
+    // Measured: 136 sweeps leave 9.5e-9 with and 1.5e-4 without.
     assert!(sweeps.residual > 100.0 * solution.residual, "{}", sweeps.residual);
 }
 
 #[test]
 fn over_relaxed_sweeps_meet_the_solution_up_to_a_limit() {
     // Rough grains, whose contacts lock.
-    let problem = heap_of(Material::new(0.9, 0.5, 0.3).expect("a valid material"));
+    let problem = heap_of(0.9, 0.5, 0.12);
     let relative = |relaxation| {
         let settings = SolverSettings { relaxation, ..gauss_seidel(20_000) };
         solve(&problem, &settings).residual
     };
-    // Measured: 1e-16 with 1; 2e-4 with 1.2, 4e-3 with 1.4 and 2e-2 with 1.6, where they circle.
+    // Measured: 1e-16 with 1 and 1.2; 3e-3 with 1.4 and 2e-2 with 1.6, where they circle.
     let [one, less, more, most] = [1.0, 1.2, 1.4, 1.6].map(relative);
     println!("{one:.1e} {less:.1e} {more:.1e} {most:.1e}");
     assert!(one < 1e-10, "{one:e}");
     // What is over-relaxed too far does not end at the solution, and the further the worse.
-    assert!(one < less && less < more && more < most && most < 1.0, "{less:e} {more:e} {most:e}");
+    assert!(less < more && more < most && most < 1.0, "{less:e} {more:e} {most:e}");
     assert!(more > 1e-5, "{more:e}");
 }
 

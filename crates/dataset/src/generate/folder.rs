@@ -302,7 +302,7 @@ mod tests {
         let more = GenerateOptions { rows: 4, ..options };
         let error = generate(&scene, &prior, &more, place.path(), &mut |_| true).unwrap_err();
         let said = error.to_string();
-        assert!(said.contains("the arithmetic of the solver is 99, but 1 is given"), "{said}");
+        assert!(said.contains("the arithmetic of the solver is 99, but 2 is given"), "{said}");
         assert_eq!(Dataset::open(place.path()).unwrap().rows.len(), 3);
     }
 }

