@@ -127,7 +127,7 @@ def shelf(tmp_path_factory) -> Shelf:
 def kept(path: Path) -> None:
     pours = KeptPours(SCENE, gc.Prior.default(), path.with_name("none.json"))
     pours.path = path
-    pours._read()
+    pours._read(None)
 
 
 def frozen_model(folder: Path, name: str, data: bytes) -> Path:

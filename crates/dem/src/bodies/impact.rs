@@ -62,7 +62,9 @@ pub(super) fn resolve(
             .collect();
         if due.is_empty() {
             // None of them comes to be due before a body of it is hit again.
-            points.iter_mut().for_each(|point| point.is_news = false);
+            for point in points.iter_mut() {
+                point.is_news = false;
+            }
             break;
         }
         due.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
