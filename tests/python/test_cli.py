@@ -150,17 +150,16 @@ def test_a_model_of_another_scene_is_refused(model, recording, small_scene, tmp_
     assert said.out == ""
 
 
-def test_a_model_of_statistics_in_another_order_is_refused(model, recording, tmp_path, capfd):
-    swapped = tmp_path / "swapped"
-    shutil.copytree(model, swapped)
-    document = json.loads((swapped / "model.json").read_text())
-    names = document["x_names"]
-    names[0], names[1] = names[1], names[0]
-    (swapped / "model.json").write_text(json.dumps(document))
-    sign(swapped)
-    assert main(["infer", str(swapped), recording[0], "--camera", recording[1], "--json"]) == 2
+def test_a_model_of_statistics_that_an_image_has_not_is_refused(model, recording, tmp_path, capfd):
+    other = tmp_path / "other"
+    shutil.copytree(model, other)
+    document = json.loads((other / "model.json").read_text())
+    document["x_names"][0] = "max_z[0.3]"
+    (other / "model.json").write_text(json.dumps(document))
+    sign(other)
+    assert main(["infer", str(other), recording[0], "--camera", recording[1], "--json"]) == 2
     said = capfd.readouterr()
-    assert "in this order; it is of mean_z, max_z, sd_z" in said.err
+    assert "max_z[0.3]" in said.err
     assert said.out == ""
 
 

@@ -106,7 +106,7 @@ COMMANDS = {
     ),
     "check": (
         ["check", "model", "--data", "pours.parquet"],
-        ("granulcal.bayessim:BayesSim", "check", True),
+        ("granulcal.bayessim:BayesSim", "examine", True),
     ),
     "infer": (
         ["infer", "model", "depth.png", "--camera", "camera.toml"],
