@@ -379,7 +379,7 @@ def test_a_scene_of_more_grains_than_there_is_room_for_is_refused(
     words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    many = gc.Scene.drop(0.1).with_({"grains.count": 1e12})
+    many = gc.Scene.drop(0.1).with_({"grains.count": 1e8})
     (tmp_path / "many.toml").write_text(many.to_toml())
     camera = gc.Camera.overhead(height=0.4, field_width=0.4, pixels=64)
     grains = np.array([[0.01 * x, 0.01 * y, 0.004] for x in range(5) for y in range(5)])
