@@ -3,7 +3,7 @@
 
 use granulcal::dem::{Scene, Simulation, Start, Status};
 
-const SEEDS: u64 = 6;
+const SEEDS: u64 = 12;
 
 /// Median distance from the axis of the grains of a drop, over their radius: mean over seeds and its standard error.
 fn spread_of_a_drop(size: f64) -> [f64; 2] {
@@ -38,5 +38,5 @@ fn grains_of_half_a_millimetre_spread_as_those_of_four() {
     let [small, of_small] = spread_of_a_drop(0.125);
     // With the lengths and speeds of large grains they spread 0.9 radii less.
     let error = of_large.hypot(of_small);
-    assert!((large - small).abs() < 3.0 * error && error < 0.3, "{large} {small} {error}");
+    assert!((large - small).abs() < 3.0 * error && error < 0.25, "{large} {small} {error}");
 }
