@@ -69,7 +69,7 @@ pub(super) fn resolve(
         }
         due.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (_, number) in due {
-            let group = &mut points[manifolds[number].clone()];
+            let group = &points[manifolds[number].clone()];
             // What has been hit meanwhile may be on its way out.
             if let Some(time) = first_touch(group, bodies, dt, small) {
                 work += bounce(group, bodies, time, dt);
@@ -109,19 +109,15 @@ fn first_touch(group: &[Point], bodies: &[Moving], dt: f64, small: &Small) -> Op
     group.iter().filter_map(of).min_by(f64::total_cmp)
 }
 
-/// Lets a manifold's bodies bounce; returns what a moving wall has put in.
-fn bounce(group: &mut [Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64 {
+/// Lets a manifold's bodies bounce, whose points carry nothing yet; returns what a moving wall has put in.
+fn bounce(group: &[Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64 {
     let touched = [Some(group[0].i()), group[0].j()];
     let motion = |body: usize| [bodies[body].velocity, bodies[body].omega];
     let before = touched.map(|body| body.map(motion));
     let meets = |point: &Point, bodies: &[Moving]| {
         point.gap_of_last_motion(bodies) <= -dt * point.normal.dot(&point.velocity(bodies))
     };
-    let touching: Vec<_> = (0..group.len()).filter(|&k| meets(&group[k], bodies)).collect();
-    for point in group.iter_mut() {
-        point.impulse = Vector3::zeros();
-    }
-    let mut touching: Vec<_> = touching.into_iter().map(|k| group[k]).collect();
+    let mut touching: Vec<_> = group.iter().filter(|point| meets(point, bodies)).copied().collect();
     solve(&mut touching, bodies);
     let mut work = 0.0;
     for mut point in touching {
