@@ -133,6 +133,50 @@ fn a_fast_oblique_pair_meets_alike_wherever_in_a_substep() {
     }
 }
 
+/// A pair of equal mass and radius that nothing else acts on keeps it, wherever in a substep it meets.
+#[test]
+fn a_pair_in_flight_keeps_its_angular_momentum() {
+    let rough = Material {
+        restitution: 0.8,
+        sliding_friction: 0.4,
+        rolling_friction: 0.0,
+        torsional_friction: 0.0,
+        ..Material::default()
+    };
+    let of = |simulation: &Simulation| -> Vector3<f64> {
+        let grains = [0, 1].map(|grain| motion(simulation, grain));
+        grains.iter().map(|g| g.x.cross(&g.v) + 0.4 * RADIUS * g.w).sum()
+    };
+    for preset in Preset::ALL {
+        let mut scene = one_grain(0.05, rough);
+        scene.preset = preset;
+        scene.gravity = [0.0; 3];
+        scene.camera.field_width = 1000.0;
+        scene.grains.count = 2;
+        let (mut met, mut worst) = (0, 0.0_f64);
+        for number in 0..200 {
+            let any = |f: f64| (f * (f64::from(number) + 1.0)).sin();
+            let beside = RADIUS * any(3.7);
+            let positions = vec![[-4.0 * RADIUS, beside, 0.5], [4.0 * RADIUS, -beside, 0.5]];
+            scene.start = Start::Positions { positions };
+            let mut simulation = Simulation::new(&scene, 1).expect("a valid scene");
+            for (grain, side) in [1.0, -1.0].into_iter().enumerate() {
+                let f = 1.0 + grain as f64;
+                // Beside each other they go as the first grain goes along y and z.
+                let across = Vector3::new(0.0, any(1.3), any(2.1)) * 2.0;
+                let velocity = Vector3::x() * side * (1.5 + any(0.3 * f)) + across;
+                let spin = 100.0 * Vector3::new(any(0.9 * f), any(1.7 * f), any(2.9 * f));
+                simulation.set_motion(grain, velocity, spin).expect("a grain");
+            }
+            let (before, momentum) = (of(&simulation), simulation.velocities());
+            simulation.advance(0.03);
+            met += usize::from(simulation.velocities() != momentum);
+            worst = worst.max((of(&simulation) - before).norm() / (2.0 * RADIUS * 3.0));
+        }
+        assert!(met > 100 && worst < 1e-5, "{preset}: {met} met, {worst:e} lost");
+    }
+}
+
 #[test]
 fn tangential_restitution_reverses_the_sliding_of_a_sticking_impact() {
     // So much friction that every impact sticks, and no rolling friction.

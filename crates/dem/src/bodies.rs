@@ -238,7 +238,7 @@ impl Bodies {
         step.deepest = depths.fold(0.0, f64::max);
         for round in 1..=ROUNDS {
             let (impacts, work) =
-                impact::resolve(&mut contacts.points, &mut moving, (solid.reach, dt), &small);
+                impact::resolve(&mut contacts.points, &mut moving, &solid, dt, &small);
             step.impacts += impacts;
             step.work_of_walls += work;
             let known = contacts.points.len();
@@ -247,6 +247,7 @@ impl Bodies {
             }
             contacts.merge(known);
         }
+        contacts.carry(0, &moving);
         self.known.recall(&mut contacts.points, &mut moving, solid.reach);
         let sorted = contacts.points.len();
         let mut known = 0;
@@ -261,6 +262,7 @@ impl Bodies {
             {
                 break;
             }
+            contacts.carry(known, &moving);
         }
         self.batches.put_back(&mut contacts.points);
         let points = contacts.points;

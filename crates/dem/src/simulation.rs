@@ -77,7 +77,8 @@ struct Origin {
 }
 
 impl Simulation {
-    /// Puts the grains of `scene` at their start; the seed moves them within the start's jitter.
+    /// Puts the grains of `scene` at their start; the seed moves them within the start's jitter. Grains that begin in each
+    /// other or in a wall are taken as they are: [`Simulation::check_start`] refuses them.
     ///
     /// # Errors
     /// What [`Scene::check`] says.

@@ -322,10 +322,18 @@ fn heights(simulation: &Simulation, gravity: Vector3<f64>) -> [f64; 2] {
     [grains().map(|(x, _)| -gravity.z * x.z).sum(), grains().count() as f64 * low]
 }
 
+/// Whether no wall is refused for how far its tip goes in a substep, which few of the drawn ones are.
+fn turns_no_tip_through_grains(scene: &Scene) -> bool {
+    scene.check().map_or_else(|error| !error.to_string().contains("speed of its tip"), |()| true)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(cases()))]
     #[test]
-    fn whatever_the_scene_the_outcome_says_what_happened(scene in scene(), cut in 0.0..1.0f64) {
+    fn whatever_the_scene_the_outcome_says_what_happened(
+        scene in scene().prop_filter("a tip goes too far", turns_no_tip_through_grains),
+        cut in 0.0..1.0f64,
+    ) {
         let mut simulation = Simulation::new(&scene, 1).expect("a valid scene");
         let settings = *simulation.settings();
         let gravity = Vector3::from(scene.gravity);

@@ -36,6 +36,7 @@ mod prior;
 mod scene;
 mod sensor;
 mod start;
+mod sweep;
 mod symmetry;
 mod together;
 mod uniforms;

@@ -269,10 +269,12 @@ impl Scene {
         }
         let (dt, diameter) = (self.settings().dt, self.grains.diameter);
         let walls = self.walls.iter().enumerate();
-        let named = walls.map(|(index, wall)| (format!("walls.{index}"), &wall.motion));
-        let funnel = self.funnel.iter().map(|funnel| ("funnel".to_owned(), &funnel.motion));
-        for (name, motion) in named.chain(funnel) {
-            motion.check_jumps(&name, dt, diameter)?;
+        let named = walls.map(|(index, wall)| (format!("walls.{index}"), wall.clone()));
+        let funnel = self.funnel.iter().flat_map(Funnel::walls);
+        for (name, Wall { shape, motion, .. }) in
+            named.chain(funnel.map(|of| ("funnel".into(), of)))
+        {
+            motion.check_jumps(&name, dt, diameter, shape.sweeps(&motion))?;
         }
         if let Some(periodic) = &self.periodic {
             periodic.check(self.widest_grain())?;

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::pose::Pose;
-use crate::turning::turned_on;
+use crate::turning::{inverse_inertia, turned_on, turns_alike};
 use granulcal_scene::Solid;
 
 /// Place and motion.
@@ -66,20 +66,24 @@ pub(super) struct Moving {
     pub twist: Vector3<f64>,
     /// When the last of them was, from the begin of the substep; 0 if there was none `[s]`.
     pub hit: f64,
+    /// How it was turned then, and the angular velocity with which it went on `[rad/s]`; as at the begin if there was none.
+    left: (UnitQuaternion<f64>, Vector3<f64>),
 }
 
 impl Moving {
     pub fn of(body: &RigidBody, solid: &Solid) -> Self {
         let pose = Pose::new(body.centre.into(), body.turned());
         let inverse_inertia = pose.inverse_inertia(&solid.inertia);
+        let omega = inverse_inertia * Vector3::from(body.momentum);
         Self {
             pose,
             velocity: body.velocity.into(),
-            omega: inverse_inertia * Vector3::from(body.momentum),
+            omega,
             inverse_inertia,
             shift: Vector3::zeros(),
             twist: Vector3::zeros(),
             hit: 0.0,
+            left: (pose.turned, omega),
         }
     }
 
@@ -105,11 +109,37 @@ impl Moving {
         self.shift + self.twist.cross(arm)
     }
 
-    /// Was hit at `time` `[s]`: until then it had this velocity and this angular velocity.
-    pub fn was_hit(&mut self, time: f64, [velocity, omega]: &[Vector3<f64>; 2]) {
+    /// The body `time` into the substep `[s]`, not before it was hit the last time: as it lies then, it takes impulses and
+    /// has its angular velocity.
+    pub fn at(&self, time: f64, solid: &Solid) -> Self {
+        if turns_alike(&solid.inertia) {
+            return Self { pose: self.foreseen(time), ..*self };
+        }
+        let momentum = self.momentum(solid);
+        let turned = self.turned_on(&momentum, &Vector3::zeros(), time - self.hit, solid);
+        let pose = Pose::new(self.pose.centre + self.way(time).0, turned);
+        let inverse_inertia = pose.inverse_inertia(&solid.inertia);
+        Self { pose, omega: inverse_inertia * momentum, inverse_inertia, ..*self }
+    }
+
+    /// Was hit at `time` `[s]`, after which it moves like `then`, the body as it lies at that time.
+    pub fn was_hit(&mut self, time: f64, then: &Self, solid: &Solid) {
+        let (velocity, omega) = (self.velocity, self.omega);
+        self.velocity = then.velocity;
+        self.omega = if turns_alike(&solid.inertia) {
+            then.omega
+        } else {
+            self.inverse_inertia * then.momentum(solid)
+        };
         self.shift += time * (velocity - self.velocity);
         self.twist += time * (omega - self.omega);
         self.hit = time;
+        self.left = (then.pose.turned, self.omega);
+    }
+
+    /// Angular momentum about the centre over the mass `[m^2/s]`.
+    fn momentum(&self, solid: &Solid) -> Vector3<f64> {
+        self.pose.axes * self.pose.seen(&self.omega).component_mul(&solid.inertia)
     }
 
     /// Takes an impulse at `arm`.
@@ -124,17 +154,36 @@ impl Moving {
         Matrix3::identity() - at.cross_matrix() * self.inverse_inertia * of.cross_matrix()
     }
 
+    /// How it is turned `time` after it was hit the last time `[s]`, with this angular momentum; `twist` is by how much it
+    /// turns besides `[rad]`.
+    fn turned_on(
+        &self,
+        momentum: &Vector3<f64>,
+        twist: &Vector3<f64>,
+        time: f64,
+        solid: &Solid,
+    ) -> UnitQuaternion<f64> {
+        let turned = self.left.0;
+        let axes = turned.to_rotation_matrix();
+        let omega = inverse_inertia(axes.matrix(), &solid.inertia) * momentum;
+        turned_on(&turned, &solid.inertia, [momentum, &omega], twist, time)
+    }
+
     /// The body a substep later.
     pub fn moved(&self, solid: &Solid, dt: f64) -> RigidBody {
-        let Pose { turned, axes, .. } = self.pose;
-        let momentum = axes * self.pose.seen(&self.omega).component_mul(&solid.inertia);
-        let (goes, _) = self.way(dt);
-        let spin = [&momentum, &self.omega];
-        let turned = turned_on(&turned, &solid.inertia, spin, &self.twist, dt);
+        let momentum = self.momentum(solid);
+        let turned = if self.hit == 0.0 || turns_alike(&solid.inertia) {
+            let spin = [&momentum, &self.omega];
+            turned_on(&self.pose.turned, &solid.inertia, spin, &self.twist, dt)
+        } else {
+            // What sweeps have changed since it was hit acts from the begin on.
+            let twist = self.hit * (self.omega - self.left.1);
+            self.turned_on(&momentum, &twist, dt - self.hit, solid)
+        };
         // Products of unit quaternions stay of unit length to rounding only.
         let turned = UnitQuaternion::new_normalize(turned.into_inner());
         RigidBody {
-            centre: (self.pose.centre + goes).into(),
+            centre: (self.pose.centre + self.way(dt).0).into(),
             velocity: self.velocity.into(),
             turned: turned.coords.into(),
             momentum: momentum.into(),

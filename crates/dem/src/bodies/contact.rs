@@ -140,15 +140,27 @@ impl Point {
         later: impl Fn(usize) -> &'p Pose,
         dt: f64,
     ) -> Self {
-        let turned_back =
-            |body: usize, arm: &Vector3<f64>| bodies[body].pose.axes * later(body).seen(arm);
-        self.arm = turned_back(self.i(), &self.arm);
-        if let Other::Body { j, arm } = &mut self.other {
-            *arm = turned_back(*j as usize, arm);
-        }
+        self.carry(|body| *later(body), |body| bodies[body].pose);
         self.gap -= dt * self.normal.dot(&self.velocity(bodies));
         self.gap -= self.gap_of_last_motion(bodies) - self.gap;
         self
+    }
+
+    /// Moves it with its bodies, from where these lay to where they lie: half way between its places on both, for only an
+    /// impulse at one place keeps their angular momentum.
+    pub fn carry(&mut self, lay: impl Fn(usize) -> Pose, lies: impl Fn(usize) -> Pose) {
+        let carried = |body: usize, arm: &Vector3<f64>| {
+            let pose = lies(body);
+            (pose.centre, pose.axes * lay(body).seen(arm))
+        };
+        let (centre, of_i) = carried(self.i(), &self.arm);
+        self.arm = of_i;
+        if let Other::Body { j, arm } = &mut self.other {
+            let (other, of_j) = carried(*j as usize, arm);
+            let half = 0.5 * (other + of_j - centre - of_i);
+            *arm = of_j - half;
+            self.arm += half;
+        }
     }
 
     /// Whether it says what another of its manifold says, of bodies of this reach `[m]`.

@@ -1,6 +1,7 @@
 //! Bodies against answers that are known: one body first, then a stack and a heap.
 
 mod edges;
+mod flight;
 
 use nalgebra::{UnitQuaternion, Vector3};
 

@@ -95,6 +95,16 @@ impl Contacts {
         is_news
     }
 
+    /// Moves those of the points from `first` on of which impacts have moved a body to where its last motion begins: the
+    /// impulses of sweeps act from there.
+    pub fn carry(&mut self, first: usize, bodies: &[Moving]) {
+        for point in &mut self.points[first..] {
+            if point.last_hit(bodies) > 0.0 {
+                point.carry(|body| bodies[body].pose, |body| bodies[body].foreseen(0.0));
+            }
+        }
+    }
+
     /// Puts the points from `sorted` on among those before, in the order of their names: behind those of the same.
     pub fn merge(&mut self, sorted: usize) {
         let mut new = self.points.split_off(sorted);

@@ -19,6 +19,7 @@ use super::body::{Moving, product};
 use super::contact::Point;
 use super::motion::Motion;
 use crate::law::Small;
+use granulcal_scene::Solid;
 
 /// Sweeps over the points of a manifold at most, and the change over the impulse at which they stand.
 const SWEEPS: usize = 300;
@@ -33,14 +34,16 @@ const FARTHEST: f64 = 2.0;
 pub(super) fn resolve(
     points: &mut [Point],
     bodies: &mut [Moving],
-    (reach, dt): (f64, f64),
+    solid: &Solid,
+    dt: f64,
     small: &Small,
 ) -> (usize, f64) {
     let manifolds = manifolds(points);
     let (mut count, mut work) = (0, 0.0);
     // The round in which each body was hit last: what is not due stays so until a body of it is.
     let mut hit_in = vec![0; bodies.len()];
-    let motions: Vec<_> = bodies.iter().map(|body| Motion::of(body, FARTHEST * reach)).collect();
+    let motions: Vec<_> =
+        bodies.iter().map(|body| Motion::of(body, FARTHEST * solid.reach)).collect();
     for round in 1..=ROUNDS {
         let may_be_due = |range: &Range<usize>| {
             let (i, j) = (points[range.start].i(), points[range.start].j());
@@ -72,7 +75,7 @@ pub(super) fn resolve(
             let group = &points[manifolds[number].clone()];
             // What has been hit meanwhile may be on its way out.
             if let Some(time) = first_touch(group, bodies, dt, small) {
-                work += bounce(group, bodies, time, dt);
+                work += bounce(group, bodies, solid, [time, dt]);
                 count += 1;
                 hit_in[group[0].i()] = round;
                 if let Some(j) = group[0].j() {
@@ -109,15 +112,21 @@ fn first_touch(group: &[Point], bodies: &[Moving], dt: f64, small: &Small) -> Op
     group.iter().filter_map(of).min_by(f64::total_cmp)
 }
 
-/// Lets a manifold's bodies bounce, whose points carry nothing yet; returns what a moving wall has put in.
-fn bounce(group: &[Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64 {
-    let touched = [Some(group[0].i()), group[0].j()];
-    let motion = |body: usize| [bodies[body].velocity, bodies[body].omega];
-    let before = touched.map(|body| body.map(motion));
-    let meets = |point: &Point, bodies: &[Moving]| {
+/// Lets a manifold's bodies bounce, whose points carry nothing yet, as they lie at that time: only there both take the
+/// impulse at one place, and keep their angular momentum. Returns what a moving wall has put in.
+fn bounce(group: &[Point], bodies: &mut [Moving], solid: &Solid, [time, dt]: [f64; 2]) -> f64 {
+    let meets = |point: &Point| {
         point.gap_of_last_motion(bodies) <= -dt * point.normal.dot(&point.velocity(bodies))
     };
-    let mut touching: Vec<_> = group.iter().filter(|point| meets(point, bodies)).copied().collect();
+    let mut touching: Vec<_> = group.iter().copied().filter(meets).collect();
+    let touched = [Some(group[0].i()), group[0].j()];
+    let begun: Vec<_> = touched.into_iter().flatten().map(|body| (body, bodies[body])).collect();
+    for (body, begun) in &begun {
+        bodies[*body] = begun.at(time, solid);
+    }
+    for point in &mut touching {
+        point.carry(|body| begun[usize::from(body != begun[0].0)].1.pose, |body| bodies[body].pose);
+    }
     solve(&mut touching, bodies);
     let mut work = 0.0;
     for mut point in touching {
@@ -125,10 +134,9 @@ fn bounce(group: &[Point], bodies: &mut [Moving], time: f64, dt: f64) -> f64 {
         point.give(bodies, &point.impulse);
         work += point.work_of_wall();
     }
-    for (body, before) in touched.into_iter().zip(before) {
-        if let (Some(body), Some(before)) = (body, before) {
-            bodies[body].was_hit(time, &before);
-        }
+    for (body, mut begun) in begun {
+        begun.was_hit(time, &bodies[body], solid);
+        bodies[body] = begun;
     }
     work
 }
