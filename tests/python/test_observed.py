@@ -191,6 +191,17 @@ def test_a_discharge_curve_gives_shares_and_rate(scene: gc.Scene, tmp_path: Path
         DischargeCurve.open(path)
 
 
+def test_what_stays_behind_does_not_slow_a_discharge(scene: gc.Scene, tmp_path: Path) -> None:
+    path = tmp_path / "flat.csv"
+    # 40 %/s for a second and a half; the rest lies on the flat bottom, however long one looks.
+    for seconds in (1.6, 4.0, 40.0):
+        times = np.arange(0.0, seconds, 0.01)
+        rows = [f"a,{t:.2f},{min(60.0, 40.0 * t):.4f}" for t in times]
+        path.write_text("\n".join(["series,time_s,discharged_percent", *rows]) + "\n")
+        observed = gc.Recording.observed(path, scene)
+        assert observed["discharge_rate"] == pytest.approx(40.0), seconds
+
+
 def test_a_drum_picture_gives_its_surface(scene: gc.Scene, tmp_path: Path) -> None:
     image = pytest.importorskip("PIL.Image")
     pixels, width, slope = 200, 0.04, 0.6

@@ -74,8 +74,12 @@ class DischargeCurve:
         return cls(series=series, time=time, percent=percent)
 
     def rate(self) -> float:
-        """Returns the least-squares slope of the share between 5 and 85 % [%/s]."""
-        low, high = _RATE_RANGE
+        """Returns the least-squares slope between 5 and 85 % of what runs out [%/s].
+
+        What stays behind, on a flat bottom or above an arch, is in no point of the flow.
+        """
+        out = min(float(self.percent.max()), 100.0)
+        low, high = (out * share / 100.0 for share in _RATE_RANGE)
         within = (self.percent >= low) & (self.percent <= high)
         if within.sum() < 2:
             return float("nan")

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 
-/// Between these shares the rate of a discharge is taken `[%]`: after the start, before the end.
+/// Between these shares of what runs out the rate of a discharge is taken `[%]`: after the start, before the end.
 pub const RATE_RANGE: (f64, f64) = (5.0, 85.0);
 
 /// `discharged[t]` at the stated times, and `discharge_rate`.
@@ -48,7 +48,9 @@ impl Observation for Discharge {
         all.push(ObservedStatistic {
             name: "discharge_rate".to_owned(),
             unit: "%/s",
-            doc: format!("least-squares slope of the share between {low} and {high} %"),
+            doc: format!(
+                "least-squares slope of the share between {low} and {high} % of what runs out"
+            ),
         });
         all
     }
@@ -73,13 +75,50 @@ impl Observation for Discharge {
     }
 }
 
-/// Least-squares slope of a share against time within [`RATE_RANGE`] `[%/s]`; NaN with fewer than two samples there.
+/// Least-squares slope of a share against time within [`RATE_RANGE`] of the largest share `[%/s]`; NaN with fewer than
+/// two samples there, and where no more than the lower of them runs out at all: some grains are no flow. What stays behind, on a flat bottom or above an arch, is in no sample of the flow: however long it
+/// is looked at after the flow has stopped, the slope is the same.
 pub fn rate(times: &[f64], percent: &[f64]) -> f64 {
-    let (low, high) = RATE_RANGE;
+    let out = percent.iter().copied().fold(0.0, f64::max).min(100.0);
+    if out <= RATE_RANGE.0 {
+        return f64::NAN;
+    }
+    let (low, high) = (out * RATE_RANGE.0 / 100.0, out * RATE_RANGE.1 / 100.0);
     let within: Vec<_> =
         times.iter().zip(percent).filter(|(_, p)| (low..=high).contains(*p)).collect();
     let count = within.len() as f64;
     let mean = |of: &dyn Fn(&(&f64, &f64)) -> f64| within.iter().map(of).sum::<f64>() / count;
     let (t0, p0) = (mean(&|s| *s.0), mean(&|s| *s.1));
     mean(&|s| (s.0 - t0) * (s.1 - p0)) / mean(&|s| (s.0 - t0).powi(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rate;
+
+    #[test]
+    fn what_stays_behind_is_no_part_of_the_flow() {
+        // 40 %/s for a second and a half, and 60 % at most.
+        let curve = |until: usize| -> (Vec<f64>, Vec<f64>) {
+            (0..=until).map(|i| 0.01 * i as f64).map(|t| (t, (40.0 * t).min(60.0))).unzip()
+        };
+        for until in [160, 400, 4000] {
+            let (times, percent) = curve(until);
+            assert!((rate(&times, &percent) - 40.0).abs() < 1e-9, "{until}");
+        }
+        assert!(rate(&[0.0, 1.0, 2.0], &[0.0; 3]).is_nan());
+    }
+
+    #[test]
+    fn of_what_runs_out_altogether_the_range_is_of_all() {
+        // Slow below 5 % and above 85 %.
+        let times: Vec<f64> = (0..=300).map(|i| 0.01 * f64::from(i)).collect();
+        let share = |t: f64| match t {
+            t if t < 1.0 => 4.99 * t,
+            t if t < 2.0 => 5.0 + 80.0 * (t - 1.0),
+            t => 85.1 + 14.9 * (t - 2.0),
+        };
+        let percent: Vec<f64> = times.iter().map(|&t| share(t)).collect();
+        assert!((rate(&times, &percent) - 80.0).abs() < 1e-9);
+    }
 }
