@@ -114,14 +114,14 @@ impl CameraFile {
         }
     }
 
-    /// The lens and the metres per count of the file at `path`, which images as PNG need.
+    /// The lens and the metres per count of the file at `path`, which images of counts need.
     pub(crate) fn lens_and_unit(&self, path: &Path) -> Result<(Intrinsics, f64), DatasetError> {
         match (self.lens, self.depth_unit) {
             // Both can be set by hand.
             (Some(lens), Some(unit)) => require_unit(path, unit).map(|()| (lens, unit)),
             (lens, _) => {
                 let found = if lens.is_some() { "no depth_unit" } else { "no lens" };
-                let allowed = "width, height, fx, fy, cx, cy and depth_unit for an image as PNG";
+                let allowed = "width, height, fx, fy, cx, cy and depth_unit for an image of counts";
                 Err(DatasetError::content(path, "the camera", found, allowed))
             }
         }

@@ -37,6 +37,16 @@ pub(crate) fn parse(
     reader: &mut dyn Read,
     limit: u64,
 ) -> Result<Array, DatasetError> {
+    parse_typed(file, array, reader, limit).map(|(array, _)| array)
+}
+
+/// As [`parse`], with whether the numbers are whole by their type.
+pub(crate) fn parse_typed(
+    file: &Path,
+    array: &str,
+    reader: &mut dyn Read,
+    limit: u64,
+) -> Result<(Array, bool), DatasetError> {
     let mut source = Source::new(file, array, reader);
     let header = source.header()?;
     let bad_type = || source.place.error("the dtype", format!("{:?}", header.descr), NUMBERS);
@@ -72,7 +82,7 @@ pub(crate) fn parse(
     if header.fortran_order {
         values = to_row_major(&values, &header.shape);
     }
-    Ok(Array { shape: header.shape, values })
+    Ok((Array { shape: header.shape, values }, kind != 'f'))
 }
 
 /// Reads one word (`<U2` and its kin, or bytes) from a .npy file.
@@ -208,6 +218,11 @@ pub(crate) fn encode_text(word: &str) -> Vec<u8> {
 /// times as many as 64-bit ones, and small files may be packed well.
 pub(crate) fn array_limit(length: u64) -> u64 {
     length.saturating_mul(4).max(64 << 20)
+}
+
+/// Whether a file begins as a .npy file does.
+pub(crate) fn is_npy(first: &[u8]) -> bool {
+    first.starts_with(MAGIC)
 }
 
 /// Reads any array of numbers.

@@ -1,5 +1,6 @@
 //! Measured height maps and depth images, described by the same code as simulated ones.
 
+mod depth_array;
 mod folder;
 mod messages;
 mod options;
@@ -13,7 +14,6 @@ use granulcal_features::{
 };
 
 pub use folder::{Folder, Frame};
-use options::camera_beside;
 pub use options::{FRAMES, ReadOptions};
 
 use crate::camera_file::camera_of;
@@ -22,7 +22,7 @@ use crate::fault::Fault;
 use crate::input::{Input, ReadSeek};
 use crate::mean::Mean;
 use crate::message_file::MessageFormat;
-use crate::{CameraFile, DatasetError, Lost, Npz, files};
+use crate::{CameraFile, DatasetError, Lost, Npz, files, npy};
 
 /// Largest depth that an image in memory may have `[m]`: beyond it are other units.
 const DEEPEST: f32 = 100.0;
@@ -72,8 +72,8 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Opens a recording: a ROS 1 .bag, an .mcap, an .npz height map, a 16-bit depth PNG, or a folder
-    /// of such PNGs of one formation or of one .bag or .mcap. What a file is says its content.
+    /// Opens a recording: a ROS 1 .bag, an .mcap, an .npz height map, depth images as a 16-bit PNG or an .npy array, or
+    /// a folder of such PNGs of one formation or of one .bag or .mcap. What a file is says its content.
     ///
     /// Of several frames the mean is taken, pixel by pixel over those that have data there. A file
     /// that is cut off or damaged gives the frames that are whole; [`Recording::lost`] counts the
@@ -152,6 +152,7 @@ impl Recording {
                 options.window(&path, 1)?;
                 Self::take_frames(&path, [Ok((path.clone(), frame))], options)
             }
+            first if npy::is_npy(first) => Self::take_array(input, options),
             _ => Err(other_content(&path, &first)),
         }
     }
@@ -166,6 +167,19 @@ impl Recording {
         options.window(&path, 1)?;
         let source = Source::Heights(Npz::take(input)?.height_map()?);
         Ok(Self::of_one(path, source, Segmentation::default()))
+    }
+
+    fn take_array(input: Input<'_>, options: &ReadOptions) -> Result<Self, DatasetError> {
+        let path = input.path().to_owned();
+        let depth_array::Depths { camera, lens, images, window, count } =
+            depth_array::read(input, options)?;
+        let mut mean = Self::of_depths(&path, lens, images)?;
+        if let Source::Depth { colour, .. } = &mut mean.source {
+            *colour = camera.read_colour(&lens)?;
+        }
+        // Of depths in metres the unit is what the camera rounded them to, if its file says so.
+        let (depth_unit, segmentation) = (camera.depth_unit, camera.segmentation);
+        Ok(Self { window, whole_frames: count, depth_unit, segmentation, ..mean })
     }
 
     /// A recording of one frame.
@@ -191,11 +205,7 @@ impl Recording {
         options: &ReadOptions,
     ) -> Result<Self, DatasetError> {
         options.refuse_topics(path)?;
-        let Some(camera) = options.camera.clone().or_else(|| camera_beside(path)) else {
-            let allowed = "given for depth images as PNG (--camera camera.toml), or beside them as camera.toml or under an \
-                           image's own name";
-            return Err(DatasetError::content(path, "the camera", "none", allowed));
-        };
+        let camera = options.camera_of_images(path)?;
         Self::of_frames(path, frames, &CameraFile::load(&camera)?, &camera)
     }
 
@@ -358,7 +368,8 @@ fn other_content(path: &Path, first: &[u8]) -> DatasetError {
         }
         _ => "bytes of another kind".to_owned(),
     };
-    let allowed = "a ROS 1 bag (#ROSBAG V2.0), MCAP, .npz or .png, or a folder of .png";
+    let allowed = "a ROS 1 bag (#ROSBAG V2.0), MCAP, .npz, .npy or .png, or a folder of .png; docs/guide.md makes .npy of \
+                   raw counts and of point clouds";
     DatasetError::content(path, "the first bytes of a recording", found, allowed)
 }
 

@@ -40,13 +40,13 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         "recording",
         type=RECORDING,
         nargs="+",
-        help=".bag, .mcap, .npz height map, 16-bit depth PNG or folder of PNGs; "
+        help=".bag, .mcap, .npz height map, 16-bit depth PNG, .npy or folder of PNGs; "
         "several: pours of one material",
     )
     parser.add_argument(
         "--camera",
         type=READS,
-        help="TOML of the camera (default: of PNGs camera.toml or NAME.toml beside them)",
+        help="TOML of the camera (default: of images camera.toml or NAME.toml beside them)",
     )
     parser.add_argument("--topic", help="topic of the depth images, where several fit")
     parser.add_argument("--camera-topic", help="topic of the lens, where several fit")

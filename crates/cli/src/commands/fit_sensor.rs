@@ -86,7 +86,12 @@ fn frames(paths: &[Reads], args: &FitSensorArgs) -> anyhow::Result<(FlatFrames, 
             match (recording.source, recording.depth_unit) {
                 (Source::Heights(map), _) => maps.push(map),
                 (Source::Depth { camera, image, .. }, unit) => {
-                    let unit = unit.context("a depth image without a unit")?;
+                    let unit = unit.ok_or_else(|| {
+                        BadArgument(format!(
+                            "{}: the camera must have a depth_unit: depths in metres are rounded to it, too",
+                            recording.path.display()
+                        ))
+                    })?;
                     let (first, first_unit) = *taken.get_or_insert((camera, unit));
                     if (first.intrinsics, first_unit) != (camera.intrinsics, unit) {
                         let other = format!("{} was taken by another camera", path.display());

@@ -11,7 +11,7 @@ pub const FRAMES: usize = 10;
 /// What of a recording is read, and what is known besides.
 #[derive(Clone, Debug)]
 pub struct ReadOptions {
-    /// TOML of the camera. Without one images as PNG take that under their own name, else `camera.toml` in their folder or
+    /// TOML of the camera. Without one images as PNG or .npy take that under their own name, else `camera.toml` in their folder or
     /// the one above; for other recordings it replaces what they say.
     pub camera: Option<PathBuf>,
     /// Topic of the depth images, where several fit.
@@ -26,9 +26,9 @@ pub struct ReadOptions {
     pub first_frame: Option<u64>,
 }
 
-/// The camera of an image as PNG, or of a folder of them: a TOML under the image's name, as images are written with, else
+/// The camera of an image as PNG or .npy, or of a folder of them: a TOML under the image's name, as images are written with, else
 /// `camera.toml` in its folder or the one above.
-pub(super) fn camera_beside(path: &Path) -> Option<PathBuf> {
+fn camera_beside(path: &Path) -> Option<PathBuf> {
     let own = path.is_file().then(|| path.with_extension("toml"));
     let folders = if path.is_dir() { path.ancestors().take(2) } else { path.ancestors().take(3) };
     let skipped = usize::from(!path.is_dir());
@@ -68,6 +68,15 @@ impl ReadOptions {
             return Err(DatasetError::content(path, "the first frame", first.to_string(), allowed));
         }
         Ok(first..whole.min(first.saturating_add(count)))
+    }
+
+    /// The TOML of the camera that took the images at `path`, which say nothing of it themselves.
+    pub(super) fn camera_of_images(&self, path: &Path) -> Result<PathBuf, DatasetError> {
+        self.camera.clone().or_else(|| camera_beside(path)).ok_or_else(|| {
+            let allowed = "given for depth images as PNG or .npy (--camera camera.toml), or beside them as camera.toml or \
+                           under an image's own name";
+            DatasetError::content(path, "the camera", "none", allowed)
+        })
     }
 
     /// Refuses names of topics for a file that has none.

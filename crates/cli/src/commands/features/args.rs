@@ -20,6 +20,8 @@ RECORDING is one of, as its content says:
           CameraCalibration of Foxglove
   .png    16-bit depth, or a folder of such frames; needs --camera, the TOML of
           lens and unit
+  .npy    depth images (h, w) or (k, h, w), metres as floats or counts as
+          whole numbers; needs --camera, too
   .npz    height map: arrays depthmap, xres, yres, zres, scale
 
 Topics are found by type. Where several fit, the message lists them, and
