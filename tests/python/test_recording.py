@@ -37,6 +37,28 @@ def test_a_photograph_of_a_pour_has_the_pours_statistics(pour, tmp_path):
         assert seen[name] == pytest.approx(value, rel=0.01, abs=1e-4), name
 
 
+def test_an_array_of_depths_is_a_recording(pour, camera, tmp_path):
+    image, toml = camera.record(pour.positions, pour.radii, tmp_path, depth_unit=1e-4)
+    stored = gc.Recording.open(image, camera=toml)
+    counts = np.rint(np.asarray(stored.depth, float) / 1e-4).astype(np.uint16)
+    wanted = stored.statistics()
+    for name, array in {"metres": stored.depth, "counts": counts, "frames": counts[None]}.items():
+        np.save(tmp_path / f"{name}.npy", array)
+        read = gc.Recording.open(tmp_path / f"{name}.npy")  # camera.toml lies beside it.
+        for statistic, value in wanted.to_dict().items():
+            assert read.statistics()[statistic] == pytest.approx(value, rel=1e-3, abs=1e-5), name
+
+
+def test_an_image_without_grains_says_what_ground_it_shows(camera, tmp_path):
+    flat = np.full((400, 400), 400, np.uint16)
+    np.save(tmp_path / "flat.npy", flat)
+    text = (tmp_path / "camera.toml").write_text
+    lens = "width = 400\nheight = 400\nfx = 400\nfy = 400\ncx = 199.5\ncy = 199.5\n"
+    text(f"{lens}depth_unit = 1e-4\n")
+    with pytest.raises(ValueError, match=r"the image shows 0.04 m x 0.04 m of the ground"):
+        gc.Recording.open(tmp_path / "flat.npy").formation()
+
+
 @pytest.mark.parametrize("tilt", [(3.0, 0.0), (-2.0, 4.0)])
 def test_tilt_and_noise_are_undone(pour, camera, tmp_path, tilt):
     straight = camera.record(pour.positions, pour.radii, tmp_path / "straight")

@@ -138,7 +138,7 @@ pub enum FeatureError {
         got: usize,
     },
     /// No pixel was taken for a grain.
-    #[error("{}", no_grain(*valid, *highest, *threshold, *above, *cleaned))]
+    #[error("{}", no_grain(*valid, *highest, *threshold, *above, *cleaned, *extent))]
     EmptyMask {
         /// Valid pixels.
         valid: usize,
@@ -150,6 +150,8 @@ pub enum FeatureError {
         above: usize,
         /// Why pixels above the threshold are none; `None` where there are none.
         cleaned: Option<Cleaned>,
+        /// Width and height of the ground that a measured image shows `[m]`; `None` of a simulated one.
+        extent: Option<(f64, f64)>,
     },
     /// Segmentation by colour was half asked for.
     #[error(
@@ -217,6 +219,7 @@ fn no_grain(
     threshold: f64,
     above: usize,
     cleaned: Option<Cleaned>,
+    extent: Option<(f64, f64)>,
 ) -> String {
     if valid == 0 {
         return format!(
@@ -231,7 +234,20 @@ fn no_grain(
         String::new()
     };
     let why = match cleaned {
-        None => format!(" (highest is {} m, threshold {} m)", General(highest), General(threshold)),
+        None => {
+            let shown = extent.map_or_else(String::new, |(width, height)| {
+                format!(
+                    "; the image shows {} m x {} m of the ground: if it does not, its unit or its lens is another",
+                    three_digits(width),
+                    three_digits(height)
+                )
+            });
+            format!(
+                " (highest is {} m, threshold {} m){shown}",
+                General(highest),
+                General(threshold)
+            )
+        }
         Some(Cleaned::Low { pixels, peak }) => format!(
             ": {pixels} are above the threshold of {} m, but no patch of them reaches {} m, above the ground's noise \
              (highest is {} m); average more frames, or state height_threshold",
@@ -245,6 +261,13 @@ fn no_grain(
         ),
     };
     format!("none of {valid} valid pixels belongs to a grain{why}{hidden}")
+}
+
+/// A length as it is told where its order counts.
+fn three_digits(length: f64) -> General {
+    let step = 10f64.powf(length.abs().log10().floor() - 2.0);
+    let rounded = (length / step).round() * step;
+    General(if rounded.is_finite() { rounded } else { length })
 }
 
 /// Refuses the first value of `values` that is not finite.

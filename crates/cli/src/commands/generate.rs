@@ -116,7 +116,7 @@ fn run(context: &Context, args: &GenerateArgs) -> anyhow::Result<Outcome> {
         keeps_going()
     });
     progress.finish();
-    report(args, &summary?)
+    report(args, &scene, &summary?)
 }
 
 /// Pours the first rows, keeps nothing and tells what all of them would take.
@@ -176,7 +176,7 @@ fn dry_run(
     Ok(Outcome::Done)
 }
 
-fn report(args: &GenerateArgs, summary: &Summary) -> anyhow::Result<Outcome> {
+fn report(args: &GenerateArgs, scene: &Scene, summary: &Summary) -> anyhow::Result<Outcome> {
     let Summary { progress, stopped } = *summary;
     let complete = progress.resumed + progress.made;
     if args.json {
@@ -214,7 +214,9 @@ fn report(args: &GenerateArgs, summary: &Summary) -> anyhow::Result<Outcome> {
             args.chunk
         );
     }
-    if 2 * progress.at_horizon > complete {
+    // What is in motion to its end rests at no horizon.
+    let keeps_moving = scene.moves_until() >= scene.end.horizon;
+    if 2 * progress.at_horizon > complete && !keeps_moving {
         tracing::warn!(
             "{} of {complete} pours were still moving at the horizon: where grains have not rolled out of view, a longer \
              end.horizon lets them come to rest",

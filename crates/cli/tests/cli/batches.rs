@@ -212,3 +212,24 @@ fn rows_of_before_laws_had_numbers_are_told_by_who_looks() {
     assert_eq!(text(&place.run(&["inspect", "d", "-q"]).stderr), "");
     assert!(!text(&place.run(&["inspect", "d"]).stderr).contains("law"));
 }
+
+#[test]
+fn a_longer_horizon_is_advised_where_something_can_come_to_rest() {
+    let place = Place::new();
+    let short = ["--set", "end.horizon=0.02", "-n", "2", "-o"];
+    let warned = |scene: &str, out: &str| {
+        let args = [&["generate", scene, "default"][..], &short[..], &[out][..]].concat();
+        text(&place.run(&args).stderr)
+    };
+    assert!(warned("drop", "d").contains("a longer end.horizon"), "{}", warned("drop", "d"));
+    // A wall that turns for ever comes to rest at no horizon.
+    let turning = place.expect(0, &["scene", "drop"])
+        + "\n[[walls]]\nshape = { kind = \"disc\", centre = [0.0, 0.0, 1.0], normal = [0.0, 0.0, 1.0], radius = 0.1 }\n\
+           motion = { kind = \"spin\", point = [0.0, 0.0, 1.0], axis = [0.0, 0.0, 1.0], rate = 1.0 }\n";
+    place.write("turning.toml", &turning);
+    assert!(
+        !warned("turning.toml", "t").contains("end.horizon"),
+        "{}",
+        warned("turning.toml", "t")
+    );
+}
