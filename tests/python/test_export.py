@@ -222,6 +222,18 @@ def test_what_cannot_be_exported_is_named(tmp_path: Path) -> None:
     drum = gc.Scene.load(Path(__file__).parents[2] / "examples/drum.toml")
     with pytest.raises(ValueError, match=r"walls\.\d: motion 'spin' is not exported"):
         export_scene(drum, "lammps", tmp_path)
+    # Its material is as any other: what is learnt in a drum is carried over.
+    for name in ("drum", "drum_periodic", "hopper", "crater", "scoop"):
+        scene = gc.Scene.load(Path(__file__).parents[2] / f"examples/{name}.toml")
+        text = export_material(scene, "mujoco", tmp_path / f"{name}.xml").read_text()
+        assert f"material.sliding_friction = {scene.get('material.sliding_friction'):g}" in text
+    shape = (
+        gc.Scene.drop(0.02, count=20)
+        .to_toml()
+        .replace("[grains]", '[grains]\nshape = { kind = "box", aspect = [1.0, 1.0, 2.0] }')
+    )
+    with pytest.raises(ValueError, match=r"`grains.shape` has no counterpart"):
+        export_material(gc.Scene.from_toml(shape), "lammps", tmp_path)
     with pytest.raises(ValueError, match="engines are lammps"):
         export_material(gc.Scene.built_in("drop"), "sandbox", tmp_path)
 

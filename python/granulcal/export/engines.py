@@ -96,7 +96,7 @@ def material_text(
     """Returns the material of a scene for an engine, with its head; arguments as `export_material`."""
     module = _engine(to)
     _check_young(to, young)
-    setup = Setup.of(scene)
+    setup = Setup.of_material(scene)
     landing = _landing(setup, to, young)
     _warn_of(landing)
     lines = head(setup, module, source, landing)

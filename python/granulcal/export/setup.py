@@ -20,8 +20,9 @@ _LEAST_WIDTH, _FARTHEST = 0.8, 4.0
 # A ball that rolls without sliding slows down by 5/7 mu_r g.
 _ROLLING_LOSS = 5.0 / 7.0
 _FALLEN = 0.25
-# What no engine's file can say, by path in the scene.
-_REFUSED = ("periodic", "outflow", "intruder", "bed", "grains.shape", "effects.clump")
+# What no engine's file can say, by path in the scene: of the grains, and of a pour of them.
+_NOT_ROUND = ("grains.shape", "effects.clump")
+_REFUSED = ("periodic", "outflow", "intruder", "bed", *_NOT_ROUND)
 _POSE = ("x", "y", "lean_x", "lean_y")
 
 
@@ -80,12 +81,27 @@ class Setup:
                 walls, a period, an outflow, an intruder or a bed.
         """
         table = scene.to_dict()
-        for path in _REFUSED:
-            *places, key = path.split(".")
-            if key in (table.get(places[0], {}) if places else table):
-                raise ValueError(
-                    f"{scene.name}: `{path}` has no counterpart in other engines' files"
-                )
+        _refuse(scene.name, table, _REFUSED)
+        for name, wall in _movable(table):
+            _refuse_motion(name, wall)
+        return cls._of(scene, table, seed)
+
+    @classmethod
+    def of_material(cls, scene: Scene) -> "Setup":
+        """Returns what a material needs of a scene: its grains, and what they touch at rest.
+
+        A drum that turns or a hopper that runs out has a material as any scene has, though its pour
+        is none that another engine is told.
+
+        Raises:
+            ValueError: the scene has grains that are not round or are clumps.
+        """
+        table = scene.to_dict()
+        _refuse(scene.name, table, _NOT_ROUND)
+        return cls._of(scene, table, 0)
+
+    @classmethod
+    def _of(cls, scene: Scene, table: dict[str, Any], seed: int) -> "Setup":
         grains = Contact.of(table["material"])
         ground = Contact.of(table.get("ground", {}).get("material", {}), grains)
         walls = _walls(table, grains)
@@ -169,13 +185,27 @@ def walls_of(scene: Scene) -> tuple[Body, ...]:
         ValueError: one of them moves, or is a mesh.
     """
     table = scene.to_dict()
+    for name, wall in _movable(table):
+        _refuse_motion(name, wall)
     return tuple(_walls(table, Contact.of(table["material"])))
+
+
+def _refuse(name: str, table: dict[str, Any], paths: tuple[str, ...]) -> None:
+    for path in paths:
+        *places, key = path.split(".")
+        if key in (table.get(places[0], {}) if places else table):
+            raise ValueError(f"{name}: `{path}` has no counterpart in other engines' files")
+
+
+def _movable(table: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Returns the tables of what may have a motion, with the names that messages give them."""
+    funnel = [("funnel", table["funnel"])] if "funnel" in table else []
+    return [*funnel, *((f"walls.{i}", wall) for i, wall in enumerate(table.get("walls", [])))]
 
 
 def _walls(table: dict[str, Any], grains: Contact) -> list[Body]:
     walls = [*_funnel(table.get("funnel"), grains)]
     for i, wall in enumerate(table.get("walls", [])):
-        _refuse_motion(f"walls.{i}", wall)
         law = Contact.of(wall.get("material", {}), grains)
         walls.append(Body(f"wall_{i}", wall["shape"], law))
     return walls
@@ -192,8 +222,8 @@ def _half_width(
     loss = _ROLLING_LOSS * g * rolling - float(np.hypot(*gravity[:2]))
     stops = speed**2 / (2.0 * loss) if loss > 0 else np.inf
     rolled = min(speed * float(table["end"]["horizon"]), stops, _FARTHEST)
-    # A plane has no end.
-    shapes = [body.shape for body in walls if body.shape["kind"] != "plane"]
+    # A plane has no end, and a mesh is in no pour that is exported.
+    shapes = [body.shape for body in walls if body.shape["kind"] not in ("plane", "mesh")]
     ends = [np.abs(triangles(shape).vertices[:, :2]).max() for shape in shapes]
     farthest = max([np.abs(centres[:, :2]).max() + rolled, *ends])
     return float(max(_LEAST_WIDTH, farthest + 2.0 * radius))
@@ -202,7 +232,6 @@ def _half_width(
 def _funnel(table: dict[str, Any] | None, grains: Contact) -> list[Body]:
     if table is None:
         return []
-    _refuse_motion("funnel", table)
     law = Contact.of(table.get("material", {}), grains)
     tip = float(table["height"])
     neck = tip + float(table["stem_length"])
