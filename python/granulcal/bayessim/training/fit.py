@@ -274,6 +274,12 @@ class _Work:
             if size > _FAR * np.sqrt(len(self.z))
         ]
         notes = [f"never changed in training: {', '.join(constant)}"] if constant else []
+        if lacking := self.pairs.without_value:
+            told = ", ".join(f"{name} ({count})" for name, count in lacking.items())
+            notes.append(
+                f"left out for having no value of {told}: where these pours lie in the prior "
+                "nothing is learnt and nothing checked; observe what every pour has"
+            )
         if far:
             notes.append(
                 f"one pair has nearly all of the spread of {', '.join(far)}: is it a pour at all?"

@@ -43,6 +43,8 @@ class TrainingPairs:
         law: number of the solver's law that the pours follow, 0 for another simulator, or None.
         not_of_prior: parameters that do not look drawn from the prior in all pairs given, the
             excluded ones too, each with its Kolmogorov-Smirnov p-value.
+        without_value: pairs that were left out because a statistic has no value in them, by the
+            name of the statistic, the most first.
     """
 
     prior: Prior
@@ -55,6 +57,7 @@ class TrainingPairs:
     scene_toml: str | None
     law: int | None = None
     not_of_prior: dict[str, float] = field(default_factory=dict)
+    without_value: dict[str, int] = field(default_factory=dict)
 
     @classmethod
     def gather(
@@ -122,6 +125,7 @@ class TrainingPairs:
         is_healthy = ~np.isin(statuses, EXCLUDED_STATUSES)
         is_finite = np.isfinite(statistics).all(axis=1)
         excluded["non_finite"] = int(np.sum(is_healthy & ~is_finite))
+        without_value = _without_value(statistics[is_healthy], names)
         keep = is_healthy & is_finite
         # A pair that is there again would be on both sides of a split.
         is_first = _is_first(np.column_stack([theta, statistics]))
@@ -137,6 +141,7 @@ class TrainingPairs:
         _check_inside(theta[keep], prior)
         if keep.sum() < fewest:
             dropped = [f"{count} {reason}" for reason, count in excluded.items() if count]
+            dropped += [f"{count} have no {name}" for name, count in without_value.items()]
             raise TrainingDataError(
                 f"at least {fewest} usable pairs are needed, got {int(keep.sum())} "
                 f"of {len(theta)} (excluded: {', '.join(dropped) or 'none'})"
@@ -152,6 +157,7 @@ class TrainingPairs:
             scene_toml=scene_toml,
             law=law,
             not_of_prior=not_of_prior,
+            without_value=without_value,
         )
 
     def require_varied(self) -> None:
@@ -168,6 +174,13 @@ class TrainingPairs:
                 f"theta: {', '.join(still)} is the same in all {len(self.theta)} usable pairs; "
                 "nothing can be learnt of it"
             )
+
+
+def _without_value(statistics: Array, names: Sequence[str]) -> dict[str, int]:
+    """Returns how many rows of `statistics` (n, s) lack each statistic that some lack."""
+    lacking = np.sum(~np.isfinite(statistics), axis=0)
+    found = {name: int(n) for name, n in zip(names, lacking, strict=True) if n}
+    return dict(sorted(found.items(), key=lambda each: -each[1]))
 
 
 def require_same_prior(stated: Prior | None, given: Prior | None) -> None:
