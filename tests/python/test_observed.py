@@ -202,6 +202,34 @@ def test_what_stays_behind_does_not_slow_a_discharge(scene: gc.Scene, tmp_path: 
         assert observed["discharge_rate"] == pytest.approx(40.0), seconds
 
 
+def test_numbers_measured_by_other_means_have_their_names(scene: gc.Scene, tmp_path: Path) -> None:
+    table = tmp_path / "counted.csv"
+    table.write_text("\ufeffstatistic, value\nspilled, 12\n\nradius[50],0.013\n", "utf-8")
+    observed = gc.Recording.observed(table, scene)
+    assert observed["spilled"] == 12.0 and observed["radius[50]"] == 0.013
+    assert np.isnan(observed["discharge_rate"])
+    printed = tmp_path / "pour.json"
+    printed.write_text('{"scene": "mine", "observed": {"spilled": 3, "radius[50]": null}}')
+    observed = gc.Recording.observed(printed, scene)
+    assert observed["spilled"] == 3.0 and np.isnan(observed["radius[50]"])
+    cases = {
+        "spiled,3": "'spiled' is no statistic of the scene .is it spilled",
+        "spilled,many": "line 2 must be a name and a number",
+        "spilled,nan": "line 2 must be a finite number",
+        "spilled,1;spilled,2": "line 3: spilled stands there twice",
+        "": "has no statistic",
+    }
+    for text, match in cases.items():
+        table.write_text("\n".join(["statistic,value", *text.split(";")]) + "\n")
+        with pytest.raises(ValueError, match=match):
+            gc.Recording.observed(table, scene)
+    printed.write_text('{"scene": "mine"}')
+    with pytest.raises(ValueError, match="observed must be there"):
+        gc.Recording.observed(printed, scene)
+    with pytest.raises(ValueError, match="a .json file takes nothing, not width"):
+        gc.Recording.observed(printed, scene, width=0.1)
+
+
 def test_a_drum_picture_gives_its_surface(scene: gc.Scene, tmp_path: Path) -> None:
     image = pytest.importorskip("PIL.Image")
     pixels, width, slope = 200, 0.04, 0.6

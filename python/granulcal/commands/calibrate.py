@@ -10,6 +10,7 @@ from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.counts import pour_count, seed_number, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
+from granulcal.commands.parameters import parameters_of, print_parameters
 from granulcal.commands.reading import (
     add_reading,
     exit_code_of,
@@ -105,7 +106,7 @@ def _run(options: argparse.Namespace) -> int:
     posterior = found.posterior
     document = {
         "recordings": [str(path) for path in options.recording],
-        "parameters": _parameters(posterior),
+        "parameters": parameters_of(posterior),
         "fixed": dict(prior.fixed),
         "inside_model": {
             "is_inside": found.misfit.is_inside,
@@ -144,25 +145,10 @@ def _say(
         print(json.dumps(document, indent=1))
         return exit_code_of(recordings, found.misfit.is_inside)
     print(found.misfit)
-    _print_parameters(document["parameters"])
+    print_parameters(document["parameters"])
     print(taken_for_known)
     print(f"{found.rounds[-1]}; {found.choice}")
     print(f"pours that cannot be used: {found.left_out}")
     for warning in posterior.warnings:
         print(f"note: {warning}", file=sys.stderr)
     return exit_code_of(recordings, found.misfit.is_inside)
-
-
-def _parameters(posterior: Any) -> dict[str, dict[str, Any]]:
-    mode, mean, region = posterior.mode(), posterior.mean(), posterior.credible_region(0.9)
-    return {
-        name: {"mode": float(mode[i]), "mean": float(mean[i]), "interval90": list(region[name])}
-        for i, name in enumerate(posterior.names)
-    }
-
-
-def _print_parameters(parameters: dict[str, Any]) -> None:
-    print(f"{'parameter':<30}{'mode':>10}{'mean':>10}   90 % interval")
-    for name, values in parameters.items():
-        low, high = values["interval90"]
-        print(f"{name:<30}{values['mode']:>10.4g}{values['mean']:>10.4g}   {low:.4g} to {high:.4g}")

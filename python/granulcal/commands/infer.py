@@ -5,23 +5,40 @@ import contextlib
 import importlib.util
 import io
 import sys
-from pathlib import Path
 from typing import Any
 
 from granulcal import _native
+from granulcal.commands import observed
 from granulcal.commands.counts import seed_number
 from granulcal.commands.exit_code import DONE, UNHEALTHY
+from granulcal.commands.observed import add_observed
 from granulcal.commands.reading import add_recordings, open_model, open_recordings, reading_words
 from granulcal.paths import writes
 
 __all__ = ["add"]
 
+_DESCRIPTION = """\
+Infer the parameters from recordings of formations, depth images each.
+
+Of a model of what its scene observes (docs/scenes.md, "Observations") RECORDING
+is a measurement of that: a drum's time-averaged picture (.bmp, .png; --width), a
+run-out file (.txt; --fps), a discharge curve (.csv; --series), or numbers of
+your own, as a table with the columns statistic and value (.csv) or as `simulate
+--json` prints them (.json).
+"""
+
 
 def add(commands: Any) -> None:
     """Adds the word to the command line."""
     text = "infer the parameters from recordings"
-    parser = commands.add_parser("infer", help=text, description=text)
+    parser = commands.add_parser(
+        "infer",
+        help=text,
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     add_recordings(parser)
+    add_observed(parser)
     parser.add_argument("--border", type=int, help="ignore a frame of so many pixels")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.add_argument("--samples", type=int, help="print so many draws in the JSON")
@@ -35,11 +52,16 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     """Posterior and table are by granulcal-cli, so that both say the same."""
+    from granulcal.bayessim.storage.model_document import read_model_document
     from granulcal.starter.models import model_named
 
     if options.plot is not None and importlib.util.find_spec("torch") is None:
         raise ModuleNotFoundError("--plot needs PyTorch")
     model = model_named(str(options.model))
+    _, document = read_model_document(model)
+    if observed.is_of_observed(document):
+        return observed.run(options, model, document)
+    observed.refuse(options)
     flags = ["-q"] * options.quiet + ["-v"] * options.verbose
     words = ["granulcal", *flags, "infer", str(model), *map(str, options.recording)]
     words += reading_words(options)
@@ -50,19 +72,17 @@ def _run(options: argparse.Namespace) -> int:
         words.append("--json")
     code = _native.run_cli(words)
     if not options.json and code in (DONE, UNHEALTHY):
-        _say_assumed(model)
+        _say_assumed(document)
     if options.plot is not None and code in (DONE, UNHEALTHY):
         _plot(options, code)
     return code
 
 
-def _say_assumed(model: Path) -> None:
+def _say_assumed(document: dict[str, Any]) -> None:
     """Says below the table what nobody inferred."""
     from granulcal.assumed import assumed
-    from granulcal.bayessim.storage.model_document import read_model_document
     from granulcal.prior import Prior
 
-    _, document = read_model_document(model)
     if line := assumed(document["scene_toml"], Prior.from_toml(document["prior_toml"])):
         print(line, flush=True)
 

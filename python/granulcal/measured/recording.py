@@ -12,7 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
 from granulcal.arrays import unmasked
-from granulcal.measured import DischargeCurve, DrumImage, RunOut
+from granulcal.measured import (
+    DischargeCurve,
+    DrumImage,
+    NamedValues,
+    RunOut,
+    is_of_named_values,
+)
 from granulcal.measured.formation import EdgePixelsWarning, Formation, Levelled, Plane, plane_of
 from granulcal.measured.segmentation import SegmentationSettings
 from granulcal.pours.camera import Camera
@@ -75,8 +81,9 @@ class Recording:
     """One measured formation: a height map, or a depth image with its camera.
 
     Reads ROS 1 .bag files as the RealSense viewer saves them, .mcap files of ROS 2 and of Foxglove,
-    16-bit depth PNGs, folders of such frames, and .npz height maps. Of several frames the mean of
-    each pixel is taken over those that have data there. PNGs need the TOML of their camera.
+    16-bit depth PNGs, folders of such frames, depth arrays as .npy, and .npz height maps. Of
+    several frames the mean of each pixel is taken over those that have data there. PNGs and .npy
+    need the TOML of their camera.
 
     Examples:
         >>> import tempfile
@@ -118,10 +125,10 @@ class Recording:
         says how many are not.
 
         Args:
-            path: .bag, .mcap, .npz, .png, or a folder of .png.
-            camera: TOML of the camera, which height maps have not; of PNGs that under the image's
-                own name, or camera.toml in its folder or the one above, if None; of a .bag or .mcap
-                it replaces lens, depth unit and segmentation, key by key.
+            path: .bag, .mcap, .npz, .png, .npy, or a folder of .png.
+            camera: TOML of the camera, which height maps have not; of .png and .npy that under the
+                image's own name, or camera.toml in its folder or the one above, if None; of a
+                .bag or .mcap it replaces lens, depth unit and segmentation, key by key.
             topic: topic of the depth images, where several fit.
             camera_topic: topic of the lens, where several fit.
             colour_topic: topic of the colour images, where several fit; they are read when the
@@ -377,7 +384,9 @@ class Recording:
 
         Time-averaged pictures of a drum (.bmp, .png) give `surface_z[x]` and `surface_slope`,
         run-out files (.txt) `front_radius[t]`, discharge curves (.csv) `discharged[t]` and
-        `discharge_rate`. What the scene observes besides is NaN.
+        `discharge_rate`. Numbers that were measured by other means have the names of the statistics
+        in a table (.csv, columns statistic and value), or in the `observed` of a JSON document as
+        `granulcal simulate --json` prints it. What the scene observes besides is NaN.
 
         Args:
             path: the file.
@@ -399,14 +408,14 @@ class Recording:
             ".png": ("width",),
             ".txt": ("fps", "camera"),
             ".csv": ("series",),
+            ".json": (),
         }
         if kind not in takes:
             raise ValueError(f"{path} must be one of {', '.join(takes)}")
         wrong = [name for name in given if given[name] is not None and name not in takes[kind]]
         if wrong:
-            raise ValueError(
-                f"a {kind} file takes {' and '.join(takes[kind])}, not {', '.join(wrong)}"
-            )
+            allowed = " and ".join(takes[kind]) or "nothing"
+            raise ValueError(f"a {kind} file takes {allowed}, not {', '.join(wrong)}")
         if "width" in takes[kind]:
             if width is None:
                 raise ValueError(f"{path}: width, the drum's inner diameter [m], is needed")
@@ -414,6 +423,8 @@ class Recording:
         if "fps" in takes[kind]:
             run_out = RunOut.open(path) if fps is None else RunOut.open(path, fps=fps)
             return run_out.observed(scene, camera=camera)
+        if series is None and is_of_named_values(path):
+            return NamedValues.open(path).observed(scene)
         return DischargeCurve.open(path, series).observed(scene)
 
     def _repr_html_(self) -> str:

@@ -193,7 +193,8 @@ fn places(names: &[String]) -> Result<Vec<usize>, BadArgument> {
     }
     let known = PAPER16.map(|statistic| statistic.name).join(", ");
     let refusal = format!(
-        "the model must be of statistics that a recording has ({known}); it is of {}, too",
+        "the model must be of statistics that a recording has ({known}); it is of {}, too: what a scene observes is \
+         measured by other means, which `infer` of the Python package takes",
         unknown.join(", ")
     );
     Err(BadArgument(refusal))

@@ -1,0 +1,153 @@
+"""`infer` by a model of what a scene observes: drums, run-outs, discharges, spills and the like."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from granulcal.commands.exit_code import DONE, UNHEALTHY
+from granulcal.commands.parameters import parameters_of, print_parameters
+from granulcal.files import write_beside
+from granulcal.pours.scene import Scene
+
+__all__ = ["add_observed", "is_of_observed", "run"]
+
+_SAMPLES = 1000
+_OURS = ("width", "fps", "series")
+_OF_RECORDINGS = ("camera", "topic", "camera_topic", "colour_topic", "first_frame", "border")
+
+
+def add_observed(parser: argparse.ArgumentParser) -> None:
+    """Adds what measurements of other kinds than depth images need besides their file."""
+    parser.add_argument("--width", type=float, help="inner diameter of a drum's picture [m]")
+    parser.add_argument("--fps", type=float, help="frames a second of a run-out file (240)")
+    parser.add_argument("--series", help="name of a discharge curve, where the file has several")
+
+
+def is_of_observed(document: dict[str, Any]) -> bool:
+    """Returns whether a model's document is of statistics that its scene observes."""
+    text = document["scene_toml"]
+    if text is None:
+        return False
+    try:
+        names = Scene.from_toml(text).observed_names
+    except ValueError:
+        # It may name meshes that are not here.
+        return False
+    return set(document["x_names"]) <= set(names)
+
+
+def refuse(options: argparse.Namespace) -> None:
+    """Refuses words for measurements that a model of depth images does not take.
+
+    Raises:
+        ValueError: one of them is there.
+    """
+    _refuse(options, _OURS, "goes with a model of what a scene observes; this one is of images")
+
+
+def run(options: argparse.Namespace, folder: Path, document: dict[str, Any]) -> int:
+    """Infers the parameters of measurements; returns the exit code.
+
+    Raises:
+        ValueError: a measurement lacks a statistic of the model, or is none of its scene.
+    """
+    from granulcal.assumed import assumed
+    from granulcal.bayessim import BayesSim
+    from granulcal.bayessim.check.identifiability import Identifiability
+    from granulcal.calibrate import require_same_scene
+
+    _refuse(options, _OF_RECORDINGS, "is of depth images; this model is of what its scene observes")
+    _require_different(options.recording)
+    scene = Scene.from_toml(document["scene_toml"])
+    # Before PyTorch is loaded.
+    observed = [_measured(options, path, scene, document["x_names"]) for path in options.recording]
+    model = BayesSim.load(folder)
+    if options.scene is not None:
+        require_same_scene(model, Scene.load(options.scene))
+    misfit, posterior = model.misfit(observed), model.posterior(observed)
+    known = Identifiability.of(posterior)
+    found = {
+        "recordings": [str(path) for path in options.recording],
+        "parameters": parameters_of(posterior),
+        "fixed": dict(model.prior.fixed),
+        "inside_model": {
+            "is_inside": misfit.is_inside,
+            "impossible": [],
+            "p_value": misfit.p_value,
+            "joint_p_value": misfit.joint_p_value,
+            "scatter_p_value": misfit.scatter_p_value,
+            "statistics": {
+                each.name: {"residual": each.residual, "p_value": each.p_value}
+                for each in misfit.statistics
+            },
+        },
+        "identifiability": known.as_dict(),
+        "calibrated": document.get("is_calibrated") is True,
+        "warnings": [str(warning) for warning in posterior.warnings],
+        "statistics": observed,
+    }
+    seed = options.seed or 0
+    if options.json:
+        drawn = (
+            {} if not options.samples else {"samples": _samples(posterior, options.samples, seed)}
+        )
+        print(json.dumps({**found, **drawn}, indent=1))
+    else:
+        print(misfit)
+        print_parameters(found["parameters"])
+        print(known)
+        if line := assumed(document["scene_toml"], model.prior):
+            print(line, flush=True)
+    for warning in found["warnings"]:
+        print(f"note: {warning}", file=sys.stderr)
+    if not found["calibrated"]:
+        told = "note: the model has not passed a check of its own: see `granulcal check`"
+        print(told, file=sys.stderr)
+    if options.out is not None:
+        kept = {**found, "samples": _samples(posterior, _SAMPLES, seed)}
+        write_beside(options.out, json.dumps(kept, indent=1) + "\n")
+    if options.plot is not None:
+        title = "" if misfit.is_inside else "OUTSIDE THE MODEL: its best compromise"
+        posterior.pair_plot(options.plot, title=title)
+    return DONE if misfit.is_inside else UNHEALTHY
+
+
+def _measured(
+    options: argparse.Namespace, path: Path, scene: Scene, names: Sequence[str]
+) -> dict[str, float]:
+    """The statistics of the model by name, as one measurement has them."""
+    from granulcal.measured.recording import Recording
+
+    found = Recording.observed(
+        path, scene, width=options.width, fps=options.fps, series=options.series
+    )
+    if lacking := [name for name in names if not found[name] == found[name]]:
+        raise ValueError(
+            f"{path} has no value of {', '.join(lacking)}, which the model was trained on: it "
+            "must be measured, or the scene must not observe it"
+        )
+    return {name: found[name] for name in names}
+
+
+def _require_different(paths: Sequence[Path]) -> None:
+    """Refuses a file that is given twice.
+
+    The same numbers may be two pours: grains that were counted, a slope read off to a degree.
+    """
+    there = [path.resolve() for path in paths]
+    for path, place in zip(paths, there, strict=True):
+        if there.count(place) > 1:
+            raise ValueError(f"each recording must be given once, got {path} twice")
+
+
+def _samples(posterior: Any, count: int, seed: int) -> list[list[float]]:
+    return posterior.sample(count, seed=seed).tolist()
+
+
+def _refuse(options: argparse.Namespace, names: Sequence[str], why: str) -> None:
+    for name in names:
+        if getattr(options, name) is not None:
+            raise ValueError(f"--{name.replace('_', '-')} {why}")
