@@ -92,6 +92,7 @@ def test_every_path_says_whether_it_is_read_or_written():
     known = {"method", "topic", "camera_topic", "colour_topic", "study", "engine", "to", "scene"}
     assert texts <= known | {
         "ray",
+        "series",
         "ray_store",
         "material",
         "kind",

@@ -21,10 +21,10 @@ _DESCRIPTION = """\
 Infer the parameters from recordings of formations, depth images each.
 
 Of a model of what its scene observes (docs/scenes.md, "Observations") RECORDING
-is a measurement of that: a drum's time-averaged picture (.bmp, .png; --width), a
-run-out file (.txt; --fps), a discharge curve (.csv; --series), or numbers of
-your own, as a table with the columns statistic and value (.csv) or as `simulate
---json` prints them (.json).
+is a measurement of that: a drum's time-averaged picture (.bmp, .png; --width),
+a run-out file (.txt; --fps), a discharge curve (.csv; --series), or numbers of
+your own, as a table with the columns statistic and value (.csv) or as
+`simulate --json` prints them (.json).
 """
 
 
