@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 _HEADER = ["series", "time_s", "discharged_percent"]
 # As the simulated `discharge_rate`: after the start, before the end.
 _RATE_RANGE = (5.0, 85.0)
+# The last of what runs out is left out in any case: below this share of it [-].
+_BEFORE_THE_END = 0.95
 # Percent by which a weighed share may be off: what swings on a balance falls and overshoots.
 _MARGIN = 1.0
 
@@ -74,12 +76,12 @@ class DischargeCurve:
         return cls(series=series, time=time, percent=percent)
 
     def rate(self) -> float:
-        """Returns the least-squares slope between 5 and 85 % of what runs out [%/s].
+        """Returns the least-squares slope between 5 and 85 % [%/s], below 95 % of what runs out.
 
         What stays behind, on a flat bottom or above an arch, is in no point of the flow.
         """
-        out = min(float(self.percent.max()), 100.0)
-        low, high = (out * share / 100.0 for share in _RATE_RANGE)
+        low, high = _RATE_RANGE
+        high = min(high, _BEFORE_THE_END * float(self.percent.max()))
         within = (self.percent >= low) & (self.percent <= high)
         if within.sum() < 2:
             return float("nan")

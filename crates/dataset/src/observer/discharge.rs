@@ -6,8 +6,10 @@ use nalgebra::Vector3;
 
 use super::observation::{Frame, Observation, ObservedStatistic, Series, holds};
 
-/// Between these shares of what runs out the rate of a discharge is taken `[%]`: after the start, before the end.
+/// Between these shares the rate of a discharge is taken `[%]`: after the start, before the end.
 pub const RATE_RANGE: (f64, f64) = (5.0, 85.0);
+/// The last of what runs out is left out in any case: below this share of it `[-]`.
+const BEFORE_THE_END: f64 = 0.95;
 
 /// `discharged[t]` at the stated times, and `discharge_rate`.
 #[derive(Clone, Debug)]
@@ -49,7 +51,7 @@ impl Observation for Discharge {
             name: "discharge_rate".to_owned(),
             unit: "%/s",
             doc: format!(
-                "least-squares slope of the share between {low} and {high} % of what runs out"
+                "least-squares slope of the share between {low} and {high} %, before the last twentieth of what runs out"
             ),
         });
         all
@@ -75,15 +77,14 @@ impl Observation for Discharge {
     }
 }
 
-/// Least-squares slope of a share against time within [`RATE_RANGE`] of the largest share `[%/s]`; NaN with fewer than
-/// two samples there, and where no more than the lower of them runs out at all: some grains are no flow. What stays behind, on a flat bottom or above an arch, is in no sample of the flow: however long it
-/// is looked at after the flow has stopped, the slope is the same.
+/// Least-squares slope of a share against time within [`RATE_RANGE`] `[%/s]`, below 95 % of the largest share; NaN with
+/// fewer than two samples there.
+///
+/// What stays behind, on a flat bottom or above an arch, is in no sample of the flow: however long it is looked at after
+/// the flow has stopped, the slope is the same.
 pub fn rate(times: &[f64], percent: &[f64]) -> f64 {
-    let out = percent.iter().copied().fold(0.0, f64::max).min(100.0);
-    if out <= RATE_RANGE.0 {
-        return f64::NAN;
-    }
-    let (low, high) = (out * RATE_RANGE.0 / 100.0, out * RATE_RANGE.1 / 100.0);
+    let out = percent.iter().copied().fold(0.0, f64::max);
+    let (low, high) = (RATE_RANGE.0, RATE_RANGE.1.min(BEFORE_THE_END * out));
     let within: Vec<_> =
         times.iter().zip(percent).filter(|(_, p)| (low..=high).contains(*p)).collect();
     let count = within.len() as f64;
