@@ -20,7 +20,7 @@ from granulcal.loop.effects.library import by_name
 from granulcal.loop.pours.archive import ArchivePlan
 from granulcal.loop.pours.measures import Measures
 from granulcal.loop.preregistration import register
-from granulcal.loop.recorded import doubt_of_funnel, require_no_copies
+from granulcal.loop.recorded import _missing_share, doubt_of_funnel, require_no_copies
 from granulcal.loop.report.page import sentence_of
 from granulcal.loop.task import Task
 from granulcal.loop.test.thresholds import Thresholds
@@ -188,6 +188,14 @@ def test_a_map_a_funnel_above_the_camera_and_pixels_without_data_are_told(
     told = task_of(scene, images).require_readable()
     (doubt,) = told
     assert "here: up to 2" in doubt and "% of the pixels about the formation have no" in doubt
+    # A rim of the levelled image that the camera did not see is no hole of it.
+    heights = np.full((20, 30), 0.01)
+    heights[:, -1], heights[:3, 0], heights[-2:, :] = np.nan, np.nan, np.nan
+    seen = SimpleNamespace(heights=heights, mask=np.isfinite(heights))
+    seen.mask[5, -1] = seen.mask[-1, 4] = True
+    assert _missing_share(cast(Any, seen)) == 0.0
+    heights[7, 8:10] = np.nan
+    assert _missing_share(cast(Any, seen)) == pytest.approx(2 / (18 * 29 - 3))
     # A map does not know where the axis was.
     from_far = scene.to_toml().replace('"pinhole"', '"orthographic"')
     pour = gc.simulate(gc.Scene.from_toml(from_far), seed=9)
@@ -195,6 +203,12 @@ def test_a_map_a_funnel_above_the_camera_and_pixels_without_data_are_told(
     np.savez(tmp_path / "map.npz", depthmap=heights, xres=wide, yres=wide, zres=1.0, scale="mm")
     with pytest.raises(ObservationError, match="map.npz is a height map, which does not say where"):
         Measures.of(scene).of_recording(tmp_path / "map.npz", scene, None)
+    # The depths are five per cent too large for where the scene has its camera.
+    lower = {"camera.height": 0.2857}
+    (doubt,) = task_of(scene.with_(lower), recorded).require_readable()
+    assert "the ground lies 0.3 m from the camera, of the scene's" in doubt
+    assert doubt.startswith("here: ") and "5 % too large" in doubt
+    assert task_of(scene.with_({"camera.height": 0.297}), recorded).require_readable() == ()
     # Two metres in place of two centimetres.
     hung = gc.Scene.funnel(0.02).with_({"funnel.height": 2.0, "camera.height": 0.3})
     assert (

@@ -7,6 +7,7 @@ task at full strength.
 
 import warnings
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,13 +23,17 @@ from granulcal.measured.recording import Formation, Recording, UnlikeFramesWarni
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
-__all__ = ["doubt_of_funnel", "doubts_of", "require_no_copies"]
+__all__ = ["doubt_of_funnel", "doubts_of", "doubts_of_distance", "require_no_copies"]
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 # Share of pixels without data from which the number of pixels shows it: that of a pour's scatters
 # by half a per cent.
 _MISSING = 0.005
+# Share by which the distance of the ground may be off the scene's: what stereo cameras promise of
+# their depths.
+_DISTANCE = 0.02
 
 
 def require_no_copies(conditions: Sequence[Condition], rows: Sequence[Array]) -> None:
@@ -76,10 +81,7 @@ def doubts_of(
     found: list[str] = []
     missing: list[float] = []
     for path in condition.recordings:
-        with warnings.catch_warnings():
-            # Told by the doubts.
-            warnings.simplefilter("ignore", UnlikeFramesWarning)
-            recording = Recording.open(path, camera=camera_used(path, condition.camera))
+        recording = _opened(path, condition)
         of_it = ([recording], [path], condition.reading)
         impossible = violations(there, prior, *of_it)
         if impossible and all(violations(s, prior, *of_it) for s in _with_effects(there, library)):
@@ -94,6 +96,13 @@ def doubts_of(
         missing.append(_missing_share(recording.formation(**settings)))
     of_funnel = doubt_of_funnel(condition.name, there)
     return [*of_funnel, *_doubt_of_missing(there, condition, missing), *found]
+
+
+def _opened(path: Path, condition: Condition) -> Recording:
+    """A recording; frames that are not of one picture are told by the doubts."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnlikeFramesWarning)
+        return Recording.open(path, camera=camera_used(path, condition.camera))
 
 
 def doubt_of_funnel(name: str, there: Scene) -> list[str]:
@@ -111,11 +120,58 @@ def doubt_of_funnel(name: str, there: Scene) -> list[str]:
     ]
 
 
+def doubts_of_distance(conditions: Sequence[Condition], scene: Scene) -> list[str]:
+    """Returns whether the ground is as far from the camera as the scene says, a sentence each.
+
+    Depths have their own scale in it. One recording speaks for those of its condition, for no
+    camera is moved between them.
+
+    Args:
+        conditions: all of a task.
+        scene: the base model.
+    """
+    conditions_of: dict[tuple[float, float], list[str]] = {}
+    for condition in conditions:
+        there = scene.with_(condition.at)
+        camera = there.to_dict()["camera"]
+        if there.observed_names or camera["projection"] != "pinhole":
+            continue
+        first = condition.recordings[0]
+        recording = _opened(first, condition)
+        settings: dict[str, Any] = {**there.reading, **condition.reading}
+        found = abs(recording.formation(**settings).plane.offset)
+        stated = float(camera["height"])
+        if max(found / stated, stated / found) > 1 + _DISTANCE:
+            key = stated, float(f"{found:.3g}")
+            conditions_of.setdefault(key, []).append(condition.name)
+    return [
+        f"{', '.join(names)}: the ground lies {found:g} m from the camera, of the scene's images "
+        f"camera.height = {stated:g} m: if that is where it stands, depths and all lengths that "
+        f"are told by them are {100 * abs(found / stated - 1):.2g} % too "
+        f"{'large' if found > stated else 'small'} (the unit or the calibration of the depths); if "
+        "not, say the height in the scene"
+        for (stated, found), names in conditions_of.items()
+    ]
+
+
 def _missing_share(formation: Formation) -> float:
-    """The share of the pixels about a formation that have no data."""
+    """The share of the pixels about a formation that have no data.
+
+    What lies beyond all data of its row or of its column is outside of the image, and no hole: a
+    levelled image may have a rim of such pixels, which one grain at its edge brings in.
+    """
     rows, columns = (np.flatnonzero(formation.mask.any(axis=axis)) for axis in (1, 0))
-    around = formation.heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    return float(np.isnan(around).mean())
+    box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    is_known = np.isfinite(formation.heights)
+    is_inside = (_is_between(is_known, 0) & _is_between(is_known, 1))[box]
+    return float(np.mean(~is_known[box][is_inside])) if is_inside.any() else 0.0
+
+
+def _is_between(is_known: Mask, axis: int) -> Mask:
+    """Which entries have a known one on either side along an axis, or are known, shape kept."""
+    before = np.logical_or.accumulate(is_known, axis=axis)
+    after = np.flip(np.logical_or.accumulate(np.flip(is_known, axis), axis=axis), axis)
+    return before & after
 
 
 def _doubt_of_missing(there: Scene, condition: Condition, shares: Sequence[float]) -> list[str]:

@@ -84,7 +84,7 @@ from granulcal.loop.effects.series_faults import require_series
 from granulcal.loop.effects.tolerance import Tolerances
 from granulcal.loop.pours.forward import Coarse
 from granulcal.loop.pours.measures import is_above_axis
-from granulcal.loop.recorded import doubts_of, require_no_copies
+from granulcal.loop.recorded import doubts_of, doubts_of_distance, require_no_copies
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
@@ -401,7 +401,8 @@ class Task:
         is_image = not self.scene.observed_names
         require_no_copies(self.conditions, rows if is_image else [row[:0] for row in rows])
         of_each = (doubts_of(c, self.scene, self.prior, self.library) for c in self.conditions)
-        return tuple(doubt for found in of_each for doubt in found)
+        found = [doubt for of_one in of_each for doubt in of_one]
+        return (*doubts_of_distance(self.conditions, self.scene), *found)
 
     def at_first(self) -> Scene:
         """Returns the scene with the numbers that all conditions share."""
