@@ -6,11 +6,20 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.loop.check.alarms import of_ends, of_error, of_labels, of_left, of_placebo
+from granulcal.loop.check.alarms import (
+    of_ends,
+    of_error,
+    of_labels,
+    of_left,
+    of_placebo,
+    of_untried,
+)
 from granulcal.loop.effects.library import by_name
+from granulcal.loop.effects.untried import untried
 from granulcal.loop.test.distance import Improvement, compare
 from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.verdict import Verdict
+from granulcal.pours.scene import Scene
 
 NAMED = Verdict("SET", ("cohesion.dry", "bonds"), ("cohesion", "bonds"), 5e-4, "70 nat")
 NONE = Verdict("NONE", (), (), 0.8, "nothing is left")
@@ -34,6 +43,14 @@ def test_a_name_with_which_the_error_grows_is_said_to() -> None:
     assert "at the sealed conditions from 0.99" in told and "fitted" not in told
     (told,) = of_error(NAMED, worse, worse)
     assert "at the fitted conditions from" in told and "and at the sealed conditions" in told
+    # What does not fall by chance grows by none, and what was nothing cannot fall.
+    before, after = error(0.5, 0.2).total_before, error(0.5, 0.55).total_after
+    flat = cast(Any, SimpleNamespace(total_before=before, total_after=after, is_worse=False))
+    (told,) = of_error(NAMED, flat, better)
+    assert "at the fitted conditions is no less than without" in told
+    nothing = SimpleNamespace(square=-0.1)
+    nil = cast(Any, SimpleNamespace(total_before=nothing, total_after=after, is_worse=False))
+    assert of_error(NAMED, nil, better) == ()
     # Where nothing is named both models are one.
     assert of_error(NONE, worse, worse) == ()
 
@@ -46,6 +63,21 @@ def test_an_error_that_is_left_of_an_explanation_is_said() -> None:
         assert "is left at there (fitted): 0.9" in told and "sealed" not in told
         assert "there (sealed)" in of_left(verdict, gone, left)[0]
     assert of_left(Verdict("UNEXPLAINED", (), (), 1e-3, ""), left, left) == ()
+
+
+def test_what_was_not_tried_is_said_beside_a_fault_of_the_image() -> None:
+    scene = Scene.funnel(height=0.1)
+    tried = by_name(["camera.offset", "drag", "height"])
+    others = untried(scene, tried, ("funnel.height",))
+    names = [effect.name for effect in others]
+    assert "clump" in names and "ground.layer" in names
+    # Tried, stated by a condition, of what is seen, or without anything to act on in the scene.
+    absent = {"drag", "fluid.viscosity", "height", "camera.blur", "clock.offset"}
+    assert not absent & set(names) and "liquid.permeability" not in names
+    offset = Verdict("EFFECT", ("camera.offset",), ("camera.offset",), 5e-4, "21 nat")
+    (told,) = of_untried(offset, others)
+    assert told.startswith("camera.offset is how the grains were seen") and "clump" in told
+    assert of_untried(offset, ()) == of_untried(NAMED, others) == of_untried(NONE, others) == ()
 
 
 def test_an_alarm_of_the_placebo_is_said_with_its_own_word() -> None:

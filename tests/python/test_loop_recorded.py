@@ -225,7 +225,10 @@ def test_a_none_by_the_base_models_own_pours_shows_the_p_that_decided() -> None:
     assert (found.verdict.kind, found.verdict.p, found.surrogate_p) == ("NONE", 0.3, 0.002)
     assert found.to_dict()["p_before_checks"] == 0.002
     assert "no residual was found" not in sentence_of(found)
-    for names, said in ((("camera.y",), "Not the grains"), (("camera.y", "drag"), "The grains do")):
+    for names, said in (
+        (("camera.y",), "Of what was tried it is not the grains"),
+        (("camera.y", "drag"), "The grains do"),
+    ):
         seen = stand(replace(fits, named=names, p=1e-4), Thresholds(), confirmed=0.5)
         assert sentence_of(seen).startswith(said)
     none = stand(replace(fits, kind="NONE", named=(), p=0.3), Thresholds(), confirmed=0.5)
@@ -243,7 +246,7 @@ def page(**values: Any) -> str:
     )
     words |= dict.fromkeys(("picture_of", "command"), "")
     filled |= {"is_named": True, "word": "EFFECT"}
-    lists = dict.fromkeys(("nearest", "beyond", "doubts", "held"), ())
+    lists = dict.fromkeys(("nearest", "beyond", "doubts", "held", "untried"), ())
     standing = SimpleNamespace(trivial=(), moved=(), draws=0, anchors=0, confirmed=0.5)
     placebo = SimpleNamespace(kind="NONE", p=0.5)
     return template("loop.html.j2").render(
@@ -260,6 +263,9 @@ def test_the_page_says_what_is_beyond_doubtful_and_which_p_decided() -> None:
     found = page(surrogate_p=0.002, beyond=("max_z at low: 4",), doubts=("a.png: a heap",))
     assert "by the surrogate alone 0.002" in found
     assert "<li>max_z at low: 4</li>" in found and "<li>a.png: a heap</li>" in found
+    assert "Not tried" not in plain and "name them: clump, bonds." in page(
+        untried=["clump", "bonds"]
+    )
     row = SimpleNamespace(label="low", before=2.0, after=1.0, refused="")
     assert "may repeat what the\nparameters could have done" in page(corrections=(row,))
 

@@ -44,6 +44,16 @@ def test_what_the_conditions_state_is_left_out_of_the_effects_that_nobody_names(
     assert missing == ["tilt.x", "count"]
 
 
+def test_the_usual_effects_and_more_are_asked_in_the_librarys_order(tmp_path: Path) -> None:
+    usual = [effect.name for effect in load(tmp_path, "", LOW, HIGH).library]
+    both = load(tmp_path, 'effects = ["clump", "usual", "drag"]', LOW, HIGH)
+    assert [effect.name for effect in both.library] == [*usual, "clump"]
+    assert "clump" not in [effect.name for effect in both.untried]
+    assert "clump" in [effect.name for effect in load(tmp_path, "", LOW, HIGH).untried]
+    with pytest.raises(TrainingDataError, match="no effect clumps"):
+        load(tmp_path, 'effects = ["usual", "clumps"]', LOW, HIGH)
+
+
 def test_who_asks_for_a_tilt_asks_where_the_camera_stood(tmp_path: Path) -> None:
     def names(head: str) -> list[str]:
         return [effect.name for effect in load(tmp_path, head, LOW, HIGH).library]

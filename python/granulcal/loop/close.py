@@ -20,7 +20,15 @@ from granulcal.errors import ObservationError
 from granulcal.files import write_beside
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.call import check_call
-from granulcal.loop.check.alarms import of_ends, of_error, of_labels, of_left, of_placebo, of_rows
+from granulcal.loop.check.alarms import (
+    of_ends,
+    of_error,
+    of_labels,
+    of_left,
+    of_placebo,
+    of_rows,
+    of_untried,
+)
 from granulcal.loop.check.checks import (
     calibrated,
     corrected,
@@ -234,6 +242,7 @@ def close_loop(
     alarms = of_error(standing.verdict, fit, sealed) + of_placebo(placebo.verdict, rules)
     alarms += of_left(standing.verdict, fit, sealed) + of_rows(standing) + told_unseen(poured)
     alarms += of_ends(standing.verdict, found.best, task)
+    alarms += of_untried(standing.verdict, task.untried)
     if fit.total_before.interval[0] > 0:
         spread = surrogate.raw_spread[: Measures.of(task.scene).head]
         fitted = {c.name: measured[c.name] for c in analysis.fitted}

@@ -136,6 +136,7 @@ class Closed:
             "correction": [one.to_dict() for one in self.corrections],
             "pours": self.pours,
             "archive": [one.to_dict() for one in self.seen],
+            "not_tried": [effect.name for effect in self.task.untried],
             "placebo": {"verdict": self.placebo.verdict.kind, "p": self.placebo.verdict.p},
             "registration_sha256": self.registration,
             "fit": self.fit.to_dict(),

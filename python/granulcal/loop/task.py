@@ -2,7 +2,8 @@
 
     scene = "scene.toml"            # paths are relative to this file
     prior = "prior.toml"
-    effects = ["drag", "tilt.x"]    # of the library; all that a funnel's pour may lack if left out
+    effects = ["drag", "tilt.x"]    # of the library; all that a funnel's pour may lack if left out,
+                                    # ["usual", "clump"] are these and one more
 
     [[conditions]]
     name = "4 cm"
@@ -82,17 +83,20 @@ from granulcal.loop.effects.nuisances import declared_nuisances
 from granulcal.loop.effects.resolution import Resolution
 from granulcal.loop.effects.series_faults import require_series
 from granulcal.loop.effects.tolerance import Tolerances
+from granulcal.loop.effects.untried import untried
 from granulcal.loop.pours.forward import Coarse
 from granulcal.loop.pours.measures import is_above_axis
 from granulcal.loop.recorded import doubts_of, doubts_of_distance, require_no_copies
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
 
-__all__ = ["FIT", "SEALED", "Condition", "Task"]
+__all__ = ["FIT", "SEALED", "USUAL", "Condition", "Task"]
 
 Array = NDArray[np.float64]
 
 FIT, SEALED = "fit", "sealed"
+USUAL = "usual"
+"""Among a task's effects: all that are tried where it names none."""
 _AT = Mapping(Number())
 _READING = Mapping(OneOf((Text(), Flag(), ListOf(Number()), Number())))
 _CONDITION = Table(
@@ -229,7 +233,7 @@ class Task:
         )
         definitions = tuple(Definition.of(table) for table in document.get("definitions", []))
         named = document.get("effects", [])
-        library = _named(named, file) if named else _default(scene, conditions[0].at)
+        library = _chosen(named, scene, conditions[0].at, file)
         ats = [one.at for one in _by_each(conditions, definitions)]
         declared = declared_nuisances(document.get("nuisances", {}), scene, ats)
         names = {effect.name for effect in declared}
@@ -364,6 +368,11 @@ class Task:
         return tuple(found)
 
     @property
+    def untried(self) -> tuple[LibraryEffect, ...]:
+        """The library's effects of the world that the scene takes and that are not tried."""
+        return untried(self.scene, self.library, (*self.paths, *self.prior.names))
+
+    @property
     def _by_each_definition(self) -> tuple[Condition, ...]:
         """The conditions by every definition."""
         return _by_each(self.stated or self.conditions, self.definitions)
@@ -431,6 +440,16 @@ def _default(scene: Scene, at: dict[str, float]) -> tuple[LibraryEffect, ...]:
         # A map has any origin.
         return tuple(effect for effect in library if effect.family != _ASIDE)
     return library
+
+
+def _chosen(
+    named: list[str], scene: Scene, at: dict[str, float], file: Path
+) -> tuple[LibraryEffect, ...]:
+    """The effects that a task's file names, `USUAL` being all that are tried where none is."""
+    usual = _default(scene, at) if USUAL in named or not named else ()
+    others = _named([name for name in named if name != USUAL], file)
+    added = tuple(effect for effect in others if effect not in usual)
+    return (*usual, *added)
 
 
 def _named(names: list[str], file: Path) -> tuple[LibraryEffect, ...]:

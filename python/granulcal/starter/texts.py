@@ -124,6 +124,7 @@ prior = "prior.toml"
 camera = "camera.toml"        # of the PNGs
 
 # effects = ["drag", "tilt.x"]          # what to test, by name; left out: the 22 of a funnel's pour (21 at one height)
+#                                       # ["usual", "clump", "ground.layer"]: these, rods and a soft table as well
 # nuisances = {{ "tilt.x" = 0.005 }}      # what may be off by that much and is no finding; {{ sd = 0.005, shared = false }}
 #                                       # where each condition has its own, or each session = "..." of conditions
 

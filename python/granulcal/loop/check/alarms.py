@@ -1,12 +1,13 @@
 """What speaks against a verdict without taking it away: said among its doubts."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.check.standing import Standing
+from granulcal.loop.effects.library import LIBRARY, LibraryEffect
 from granulcal.loop.pours.replicates import FEWEST
 from granulcal.loop.task import Task
 from granulcal.loop.test.distance import Improvement, noise_free_square
@@ -14,7 +15,15 @@ from granulcal.loop.test.thresholds import Thresholds
 from granulcal.loop.test.trace import Explanation
 from granulcal.loop.test.verdict import NAMING, Verdict
 
-__all__ = ["of_ends", "of_error", "of_labels", "of_left", "of_placebo", "of_rows"]
+__all__ = [
+    "of_ends",
+    "of_error",
+    "of_labels",
+    "of_left",
+    "of_placebo",
+    "of_rows",
+    "of_untried",
+]
 
 Array = NDArray[np.float64]
 
@@ -37,10 +46,11 @@ def of_placebo(placebo: Verdict, rules: Thresholds) -> tuple[str, ...]:
 
 
 def of_error(verdict: Verdict, fit: Improvement, sealed: Improvement | None) -> tuple[str, ...]:
-    """Returns what is to be said of a name with which the error grows.
+    """Returns what is to be said of a name with which the error grows, or does not fall.
 
     A fit weighs every direction by its scatter, the error by the spread of the archive: the first
-    can fall while the second grows.
+    can fall while the second grows. Where there was no error at the fitted conditions, none can
+    fall.
     """
     if verdict.kind not in NAMING:
         return ()
@@ -50,9 +60,16 @@ def of_error(verdict: Verdict, fit: Improvement, sealed: Improvement | None) -> 
         for use, error in (("fitted", fit), ("sealed", sealed))
         if error is not None and error.is_worse
     ]
+    named = ", ".join(verdict.named)
+    before, after = fit.total_before.square, fit.total_after.square
+    if not grown and after >= before > 0:
+        return (
+            f"with {named} the error D² at the fitted conditions is no less than without, "
+            f"{after:.3g} after {before:.3g}: what speaks for the name lies in directions that "
+            "scatter little, and the name predicts no better there",
+        )
     if not grown:
         return ()
-    named = ", ".join(verdict.named)
     return (
         f"with {named} the error D² grows, {' and '.join(grown)}: what speaks for the name lies in "
         "directions that scatter little",
@@ -141,4 +158,25 @@ def of_rows(standing: Standing) -> tuple[str, ...]:
         f"{-row.gain_interval[0]:.3g})"
         for row in standing.trivial
         if row.is_nearer
+    )
+
+
+def of_untried(verdict: Verdict, others: Sequence[LibraryEffect]) -> tuple[str, ...]:
+    """Returns which effects of the world were not tried beside a named fault of the measurement.
+
+    What grains do may pass for a fault of their image where it is not among what is tried: pours
+    of a soft layer, and of grains of two spheres, were called an offset of the camera.
+
+    Args:
+        verdict: the word.
+        others: effects that the task leaves out.
+    """
+    named = [effect for effect in LIBRARY if effect.name in verdict.named]
+    if not named or not others or not all(effect.is_of_sight for effect in named):
+        return ()
+    return (
+        f"{', '.join(verdict.named)} is how the grains were seen, chosen among what was tried; "
+        f"{', '.join(effect.name for effect in others)} were not, and what grains do may pass for "
+        "it: look for it at a thing of known height, and name what the grains may have (effects = "
+        '["usual", "clump"])',
     )

@@ -71,6 +71,11 @@ class LibraryEffect:
     nuisance_sd: float | None = None
     is_shared: bool = True
 
+    @property
+    def is_of_sight(self) -> bool:
+        """Whether it is a fault of the measurement, and nothing that grains do."""
+        return bool(self.image or self.camera or self.series)
+
     def at(self, scene: Scene) -> "LibraryEffect":
         """Returns the effect with the scene's own numbers put in for relative ones."""
         if not self.relative:

@@ -30,7 +30,8 @@ _SENTENCES = {
     "EFFECT": "The grains do something that this model lacks, and one effect accounts for it.",
     "SET": "The grains do something that this model lacks; several effects would account for it.",
     "EFFECTS": "The grains do something that this model lacks; it takes two effects.",
-    "UNEXPLAINED": "The grains do something that neither this model nor any known effect does.",
+    "UNEXPLAINED": "The grains do something that neither this model nor any effect that was tried "
+    "does.",
     "UNCONFIRMED": "Nothing may be said: the fits rest where the surrogate of the pours is wrong.",
     "OVERTURNED": "Nothing may be said: the verdict depends on how the pours are observed.",
 }
@@ -78,6 +79,7 @@ def write_page(closed: Closed, path: Path, *, command: str, title: str) -> None:
         picture_of=f"A pour at {closed.task.conditions[0].name}",
         rivals=closed.trace.explanations[:8],
         hidden=_hidden(closed),
+        untried=[effect.name for effect in closed.task.untried],
         experiments=closed.experiments[:5],
         pours=closed.pours,
         command=command,
@@ -90,14 +92,17 @@ def sentence_of(standing: Standing, seen: Sequence[Seen] = ()) -> str:
     """Returns what the verdict says, in a sentence."""
     if standing.verdict.kind == "UNEXPLAINED" and any(one.lacks for one in seen):
         return (
-            "The grains do something that neither this model nor any known effect does as far as "
-            "the archive has usable pours of it."
+            "The grains do something that neither this model nor any effect that was tried does as "
+            "far as the archive has usable pours of it."
         )
     if standing.verdict.kind == "NONE" and standing.surrogate_p is not None:
         return "The model explains these pours: pours of it leave no more than chance does."
     named = [effect for effect in LIBRARY if effect.name in standing.verdict.named]
-    if named and all(effect.image or effect.camera or effect.series for effect in named):
-        return "Not the grains: what this model leaves is how they were seen."
+    if named and all(effect.is_of_sight for effect in named):
+        return (
+            "Of what was tried it is not the grains: how they were seen accounts for what this "
+            "model leaves."
+        )
     return _SENTENCES[standing.verdict.kind]
 
 
