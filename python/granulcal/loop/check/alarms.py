@@ -177,6 +177,6 @@ def of_untried(verdict: Verdict, others: Sequence[LibraryEffect]) -> tuple[str, 
     return (
         f"{', '.join(verdict.named)} is how the grains were seen, chosen among what was tried; "
         f"{', '.join(effect.name for effect in others)} were not, and what grains do may pass for "
-        "it: look for it at a thing of known height, and name what the grains may have (effects = "
-        '["usual", "clump"])',
+        "it: look for it at a thing of known size and place, and name what the grains may have "
+        '(effects = ["usual", "clump"])',
     )
