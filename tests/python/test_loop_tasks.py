@@ -44,7 +44,7 @@ def test_what_the_conditions_state_is_left_out_of_the_effects_that_nobody_names(
     assert missing == ["tilt.x", "count"]
 
 
-def test_the_usual_effects_and_more_are_asked_in_the_librarys_order(tmp_path: Path) -> None:
+def test_the_usual_effects_and_more_are_asked_in_the_order_of_the_library(tmp_path: Path) -> None:
     usual = [effect.name for effect in load(tmp_path, "", LOW, HIGH).library]
     both = load(tmp_path, 'effects = ["clump", "usual", "drag"]', LOW, HIGH)
     assert [effect.name for effect in both.library] == [*usual, "clump"]

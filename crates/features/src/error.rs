@@ -138,7 +138,7 @@ pub enum FeatureError {
         got: usize,
     },
     /// No pixel was taken for a grain.
-    #[error("{}", no_grain(*valid, *highest, *threshold, *above, *cleaned, *extent))]
+    #[error("{}", no_grain(*valid, *highest, *threshold, *above, *cleaned, extent.as_deref().copied()))]
     EmptyMask {
         /// Valid pixels.
         valid: usize,
@@ -151,7 +151,7 @@ pub enum FeatureError {
         /// Why pixels above the threshold are none; `None` where there are none.
         cleaned: Option<Cleaned>,
         /// Width and height of the ground that a measured image shows `[m]`; `None` of a simulated one.
-        extent: Option<(f64, f64)>,
+        extent: Option<Box<(f64, f64)>>,
     },
     /// Segmentation by colour was half asked for.
     #[error(

@@ -32,7 +32,7 @@ fn every_kind_of_message_with_a_number_is_short() {
             threshold: tiny,
             above: 2,
             cleaned: None,
-            extent: Some((huge, tiny)),
+            extent: Some(Box::new((huge, tiny))),
         },
         FeatureError::DegeneratePlane { got: tiny, min: huge },
         FeatureError::TooSteep { got_deg: huge, max_deg: tiny },

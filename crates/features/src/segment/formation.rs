@@ -65,7 +65,7 @@ impl Levelled {
         if points.is_empty() {
             let highest = self.points.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
             let (along_x, along_y) = self.resolution;
-            let extent = Some((along_x * self.width as f64, along_y * self.height as f64));
+            let extent = (along_x * self.width as f64, along_y * self.height as f64);
             let Self { valid_count: valid, threshold, above_count: above, cleaned, .. } = self;
             return Err(FeatureError::EmptyMask {
                 valid,
@@ -73,7 +73,7 @@ impl Levelled {
                 threshold,
                 above,
                 cleaned,
-                extent,
+                extent: Some(Box::new(extent)),
             });
         }
         let volume = masked().map(|(_, i): (_, usize)| self.volumes[i]).sum();
