@@ -151,12 +151,15 @@ def test_a_tilted_table_is_found_named_and_removed(
 
 @pytest.mark.slow
 def test_a_declared_tilt_is_not_found(tmp_path: Path) -> None:
-    plain = make(tmp_path / "tilted", {"effects.tilt.y": 0.02})
-    declared = plain.with_name("declared.toml")
-    asked = plain.read_text().replace('"tilt.y", "ground', '"ground')
-    declared.write_text('nuisances = { "tilt.y" = 0.02 }\n' + asked)
-    found = gc.close_loop(Task.load(plain), tmp_path / "plain", budget=1100)
+    # Of .02 rad five of six triples of pours are called a tilt, this one a camera that stands
+    # aside: of twice as much it is a tilt by 24 nat.
+    far = make(tmp_path / "far", {"effects.tilt.y": 0.04})
+    found = gc.close_loop(Task.load(far), tmp_path / "plain", budget=1100)
     assert found.trace.verdict.named == ("tilt.y",)
+    near = make(tmp_path / "near", {"effects.tilt.y": 0.02})
+    declared = near.with_name("declared.toml")
+    asked = near.read_text().replace('"tilt.y", "ground', '"ground')
+    declared.write_text('nuisances = { "tilt.y" = 0.02 }\n' + asked)
     closed = gc.close_loop(Task.load(declared), tmp_path / "declared", budget=1100)
     assert closed.trace.verdict.kind == "NONE"
     page = (tmp_path / "declared" / "report.html").read_text()
