@@ -149,6 +149,8 @@ $(VENV)/.deps: pyproject.toml
 	touch $@
 
 # The extension: rebuilt when Rust changes, without asking the network.
+# Its time is that of the begin: what is edited meanwhile is newer.
 $(VENV)/.native: $(VENV)/.deps $(RUST)
+	touch $@.begun
 	VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --locked
-	touch $@
+	mv $@.begun $@
