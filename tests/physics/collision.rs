@@ -99,6 +99,16 @@ fn an_oblique_pair_keeps_its_momentum_and_its_restitution() {
     assert!(most_oblique < 0.9, "{most_oblique}");
 }
 
+/// Two grains without gravity, in view however far they fly.
+fn weightless_pair(preset: Preset, grains: Material) -> Scene {
+    let mut scene = one_grain(0.05, grains);
+    scene.preset = preset;
+    scene.gravity = [0.0; 3];
+    scene.camera.field_width = 1000.0;
+    scene.grains.count = 2;
+    scene
+}
+
 /// The contact problem of the substep before the touch must not push what will pass: the first normal's prediction is
 /// too near by `w_t^2 dt / (2 d)`, and by more where the centres go far beside each other.
 #[test]
@@ -111,11 +121,7 @@ fn a_fast_oblique_pair_meets_alike_wherever_in_a_substep() {
         ..Material::default()
     };
     for preset in Preset::ALL {
-        let mut scene = one_grain(0.05, elastic);
-        scene.preset = preset;
-        scene.gravity = [0.0; 3];
-        scene.camera.field_width = 1000.0;
-        scene.grains.count = 2;
+        let mut scene = weightless_pair(preset, elastic);
         for number in 0..200 {
             // They touch after a way of 1 to 9 radii along x, beside each other as far as the first goes along y.
             let way = RADIUS * (1.0 + 0.04 * f64::from(number));
@@ -148,11 +154,7 @@ fn a_pair_in_flight_keeps_its_angular_momentum() {
         grains.iter().map(|g| g.x.cross(&g.v) + 0.4 * RADIUS * g.w).sum()
     };
     for preset in Preset::ALL {
-        let mut scene = one_grain(0.05, rough);
-        scene.preset = preset;
-        scene.gravity = [0.0; 3];
-        scene.camera.field_width = 1000.0;
-        scene.grains.count = 2;
+        let mut scene = weightless_pair(preset, rough);
         let (mut met, mut worst) = (0, 0.0_f64);
         for number in 0..200 {
             let any = |f: f64| (f * (f64::from(number) + 1.0)).sin();

@@ -68,14 +68,7 @@ impl View {
             return Err(FeatureError::NoValidDepth { pixels: all.len(), got: 0, min: 1 });
         }
         let highest = seen().map(|(_, p)| p.z).fold(f64::NEG_INFINITY, f64::max);
-        Err(FeatureError::EmptyMask {
-            valid,
-            highest,
-            threshold,
-            above: 0,
-            cleaned: None,
-            extent: None,
-        })
+        Err(FeatureError::no_grain_in_image(valid, highest, threshold))
     }
 }
 

@@ -243,14 +243,7 @@ pub fn grain_points(
         return Err(FeatureError::NoValidDepth { pixels: image.depth.len(), got: 0, min: 1 });
     }
     if points.is_empty() {
-        return Err(FeatureError::EmptyMask {
-            valid,
-            highest,
-            threshold,
-            above: 0,
-            cleaned: None,
-            extent: None,
-        });
+        return Err(FeatureError::no_grain_in_image(valid, highest, threshold));
     }
     Ok(points)
 }

@@ -146,15 +146,8 @@ impl Motion {
     }
 
     /// Refuses a wall that jumps over grains: in a substep of `dt` `[s]` it may go as far as a grain is thick, turn by
-    /// [`LARGEST_TURN`] and swing by a part of a period, so that the steps show how it moves. `sweeps` is how fast its
-    /// surfaces go along their normals by turning `[m/s]`.
-    pub(crate) fn check_jumps(
-        &self,
-        name: &str,
-        dt: f64,
-        diameter: f64,
-        sweeps: f64,
-    ) -> Result<(), SceneError> {
+    /// [`LARGEST_TURN`] and swing by a part of a period, so that the steps show how it moves.
+    pub(crate) fn check_jumps(&self, name: &str, dt: f64, diameter: f64) -> Result<(), SceneError> {
         let refuse = |what: &str, got: f64, allowed: &'static str| {
             Err(SceneError::range(format!("{name}.motion{what}"), got, allowed))
         };
@@ -165,10 +158,6 @@ impl Motion {
         if self.fastest_turn() * dt > LARGEST_TURN {
             let allowed = "at most 0.1 rad in a substep, 200 rad/s with preset default";
             return refuse(" (rate) [rad/s]", self.fastest_turn(), allowed);
-        }
-        if sweeps * dt > diameter {
-            let allowed = "at most a grain's diameter in a substep: a lower rate, or a preset with a shorter substep";
-            return refuse(" (speed of its tip) [m/s]", sweeps, allowed);
         }
         match self {
             &Self::Shake { frequency, .. } => {
@@ -314,11 +303,11 @@ mod tests {
         (there[0], there[1]) = (1e-3, 0.05);
         let jump = Motion::Trajectory { file: None, knots: vec![still, there] };
         let (dt, diameter) = (5e-4, 4e-3);
-        let message = jump.check_jumps("walls.2", dt, diameter, 0.0).unwrap_err().to_string();
+        let message = jump.check_jumps("walls.2", dt, diameter).unwrap_err().to_string();
         assert!(message.contains("walls.2.motion (speed)") && message.contains("50"), "{message}");
         there[0] = 0.1;
         let slow = Motion::Trajectory { file: None, knots: vec![still, there] };
-        slow.check_jumps("walls.2", dt, diameter, 0.0).unwrap();
+        slow.check_jumps("walls.2", dt, diameter).unwrap();
     }
 
     #[test]
@@ -332,16 +321,15 @@ mod tests {
         };
         // One turn a substep would look like none.
         let whole = spin(std::f64::consts::TAU / dt);
-        let message = whole.check_jumps("walls.2", dt, diameter, 0.0).unwrap_err().to_string();
+        let message = whole.check_jumps("walls.2", dt, diameter).unwrap_err().to_string();
         assert!(
             message.contains("walls.2.motion (rate)") && message.contains("12566"),
             "{message}"
         );
-        let message =
-            shake(2000.0).check_jumps("walls.2", dt, diameter, 0.0).unwrap_err().to_string();
+        let message = shake(2000.0).check_jumps("walls.2", dt, diameter).unwrap_err().to_string();
         assert!(message.contains("walls.2.motion.frequency"), "{message}");
         for motion in [spin(-199.0), shake(200.0)] {
-            motion.check_jumps("walls.2", dt, diameter, 0.0).unwrap();
+            motion.check_jumps("walls.2", dt, diameter).unwrap();
         }
     }
 

@@ -268,13 +268,11 @@ impl Scene {
             wall.check(&format!("walls.{index}"), &self.material, &self.grains)?;
         }
         let (dt, diameter) = (self.settings().dt, self.grains.diameter);
-        let walls = self.walls.iter().enumerate();
-        let named = walls.map(|(index, wall)| (format!("walls.{index}"), wall.clone()));
-        let funnel = self.funnel.iter().flat_map(Funnel::walls);
-        for (name, Wall { shape, motion, .. }) in
-            named.chain(funnel.map(|of| ("funnel".into(), of)))
-        {
-            motion.check_jumps(&name, dt, diameter, shape.sweeps(&motion))?;
+        for (index, wall) in self.walls.iter().enumerate() {
+            wall.check_jumps(&format!("walls.{index}"), dt, diameter)?;
+        }
+        for shell in self.funnel.iter().flat_map(Funnel::walls) {
+            shell.check_jumps("funnel", dt, diameter)?;
         }
         if let Some(periodic) = &self.periodic {
             periodic.check(self.widest_grain())?;

@@ -8,13 +8,28 @@
 
 use nalgebra::Vector3;
 
+use crate::error::SceneError;
 use crate::motion::Motion;
-use crate::walls::{BoxSide, Shape};
+use crate::walls::{BoxSide, Shape, Wall};
+
+impl Wall {
+    /// Refuses a wall that jumps over grains: as its motion does, and one whose surface goes farther along its normal in a
+    /// substep of `dt` `[s]` than a grain is thick.
+    pub(crate) fn check_jumps(&self, name: &str, dt: f64, diameter: f64) -> Result<(), SceneError> {
+        self.motion.check_jumps(name, dt, diameter)?;
+        let speed = self.shape.sweeps(&self.motion);
+        if speed * dt <= diameter {
+            return Ok(());
+        }
+        let allowed = "at most a grain's diameter in a substep: a lower rate, or a preset with a shorter substep";
+        Err(SceneError::range(format!("{name}.motion (speed of its tip) [m/s]"), speed, allowed))
+    }
+}
 
 impl Shape {
     /// The largest speed along its own normal while it spins `[m/s]`; 0 of a plane, which has no other side, and of every
     /// other motion.
-    pub(crate) fn sweeps(&self, motion: &Motion) -> f64 {
+    fn sweeps(&self, motion: &Motion) -> f64 {
         let &Motion::Spin { point, axis, rate, .. } = motion else { return 0.0 };
         let (point, spin) = (Vector3::from(point), rate * Vector3::from(axis).normalize());
         let velocity = |at: &[f64; 3]| spin.cross(&(Vector3::from(*at) - point));

@@ -11,8 +11,8 @@ pub const FRAMES: usize = 10;
 /// What of a recording is read, and what is known besides.
 #[derive(Clone, Debug)]
 pub struct ReadOptions {
-    /// TOML of the camera. Without one images as PNG or .npy take that under their own name, else `camera.toml` in their folder or
-    /// the one above; for other recordings it replaces what they say.
+    /// TOML of the camera. Without one images as PNG or .npy take that under their own name, else `camera.toml` in their
+    /// folder or the one above; for other recordings it replaces what they say.
     pub camera: Option<PathBuf>,
     /// Topic of the depth images, where several fit.
     pub topic: Option<String>,
@@ -26,8 +26,8 @@ pub struct ReadOptions {
     pub first_frame: Option<u64>,
 }
 
-/// The camera of an image as PNG or .npy, or of a folder of them: a TOML under the image's name, as images are written with, else
-/// `camera.toml` in its folder or the one above.
+/// The camera of an image as PNG or .npy, or of a folder of them: a TOML under the image's name, as images are written
+/// with, else `camera.toml` in its folder or the one above.
 fn camera_beside(path: &Path) -> Option<PathBuf> {
     let own = path.is_file().then(|| path.with_extension("toml"));
     let folders = if path.is_dir() { path.ancestors().take(2) } else { path.ancestors().take(3) };
