@@ -1,5 +1,8 @@
 //! What can go wrong inside a pour, in numbers, and the bounds beyond which it is called unhealthy.
 
+use std::fmt;
+
+use granulcal_scene::Scene;
 use serde::{Deserialize, Serialize};
 
 use crate::energy::{Energy, Heights};
@@ -35,6 +38,71 @@ pub struct Health {
 /// Energy that a pour may create, [`Health::energy_created`], before it is called unhealthy. Correcting
 /// penetrations lifts grains a little; an unstable solver multiplies energy.
 pub const MAX_ENERGY_CREATED: f64 = 0.01;
+
+/// How much deeper than a sphere a convex body may be: a corner that no manifold had before enters by the way of a
+/// substep.
+const CORNER_SLACK: f64 = 2.0;
+
+/// A bound of [`Health`] that a pour has broken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Breach {
+    /// The deepest overlap, in radii of the smaller grain.
+    Overlap {
+        /// What it was `[-]`.
+        got: f64,
+        /// The most that is allowed `[-]`.
+        allowed: f64,
+    },
+    /// [`Health::energy_created`].
+    Energy {
+        /// What it was `[-]`.
+        got: f64,
+        /// The most that is allowed `[-]`.
+        allowed: f64,
+    },
+    /// Grains whose centre passed through a wall.
+    Lost(usize),
+}
+
+impl fmt::Display for Breach {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Overlap { got, allowed } => {
+                write!(f, "an overlap of {got:.3} radii, at most {allowed} are allowed")
+            }
+            Self::Energy { got, allowed } => {
+                write!(f, "{got:.2e} of the energy created, at most {allowed} is allowed")
+            }
+            Self::Lost(1) => write!(f, "1 grain went through a wall"),
+            Self::Lost(grains) => write!(f, "{grains} grains went through a wall"),
+        }
+    }
+}
+
+impl Health {
+    /// The bounds of a scene that are broken; none of a healthy pour, nor where a number became infinite or NaN.
+    pub fn breaches(&self, scene: &Scene) -> Vec<Breach> {
+        let is_cornered = scene.grains.solid().is_some();
+        self.beyond(deepest_allowed(is_cornered, scene.settings().max_penetration))
+    }
+
+    /// The bounds that are broken where overlaps may be so deep, in radii.
+    fn beyond(&self, deepest: f64) -> Vec<Breach> {
+        let (overlap, energy) = (self.worst_penetration, self.energy_created);
+        let breaches = [
+            (overlap > deepest).then_some(Breach::Overlap { got: overlap, allowed: deepest }),
+            (energy > MAX_ENERGY_CREATED)
+                .then_some(Breach::Energy { got: energy, allowed: MAX_ENERGY_CREATED }),
+            (self.grains_lost > 0).then_some(Breach::Lost(self.grains_lost)),
+        ];
+        breaches.into_iter().flatten().collect()
+    }
+}
+
+/// The deepest overlap that a healthy pour may have, in radii of the smaller grain `[-]`.
+fn deepest_allowed(is_cornered: bool, max_penetration: f64) -> f64 {
+    if is_cornered { CORNER_SLACK * max_penetration } else { max_penetration }
+}
 
 /// Collects the health of a running simulation.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -150,11 +218,10 @@ impl HealthWatch {
         self.lost.len() == grains
     }
 
-    pub fn is_healthy(&self, max_penetration: f64) -> bool {
-        self.is_finite()
-            && self.worst_penetration <= max_penetration
-            && self.energy_created() <= MAX_ENERGY_CREATED
-            && !self.lost.contains(&true)
+    /// Whether no bound is broken, of grains with corners or balls.
+    pub fn is_healthy(&self, is_cornered: bool, max_penetration: f64) -> bool {
+        let deepest = deepest_allowed(is_cornered, max_penetration);
+        self.is_finite() && self.health(0).beyond(deepest).is_empty()
     }
 
     fn energy_created(&self) -> f64 {
@@ -162,5 +229,28 @@ impl HealthWatch {
         let lowest = if self.lowest.is_finite() { self.lowest } else { 0.0 };
         let scale = (self.start_energy - lowest).max(self.least_scale);
         if scale > 0.0 { self.created / scale } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bound_that_is_broken_is_told() {
+        let scene = Scene::drop(0.02);
+        let deepest = scene.settings().max_penetration;
+        let fine = Health { worst_penetration: deepest, ..Health::default() };
+        assert_eq!(fine.breaches(&scene), []);
+        let health = Health {
+            worst_penetration: 0.75,
+            energy_created: 0.02,
+            grains_lost: 2,
+            ..Health::default()
+        };
+        let told: Vec<_> = health.breaches(&scene).iter().map(Breach::to_string).collect();
+        let overlap = format!("an overlap of 0.750 radii, at most {deepest} are allowed");
+        let energy = "2.00e-2 of the energy created, at most 0.01 is allowed".to_owned();
+        assert_eq!(told, [overlap, energy, "2 grains went through a wall".to_owned()]);
     }
 }

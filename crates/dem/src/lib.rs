@@ -84,7 +84,7 @@ pub use granulcal_scene::{
     StereoSensor, Tilt, TimeOfFlightSensor, Vibration, ViewSpec, Wall, WallMaterial,
     rolling_friction_from_length, rolling_friction_to_length,
 };
-pub use health::{Health, MAX_ENERGY_CREATED};
+pub use health::{Breach, Health, MAX_ENERGY_CREATED};
 pub use impact::ImpactWork;
 pub use law::{LAW, arithmetic, law_of};
 pub use pour::{BedAtRest, ConvexGrains, Pour, Status};

@@ -223,6 +223,14 @@ fn report(args: &GenerateArgs, scene: &Scene, summary: &Summary) -> anyhow::Resu
             progress.at_horizon
         );
     }
+    if progress.unhealthy > 0 {
+        tracing::warn!(
+            "{} of {complete} pours are unhealthy: worst_penetration, energy_created and grains_lost of their rows say why; \
+             small, thin or fast grains need a finer step, `substep` in the scene (now {} s)",
+            progress.unhealthy,
+            scene.settings().dt
+        );
+    }
     if progress.unverified > 0 {
         tracing::warn!(
             "{} parts of an earlier version have no hash of their rows: damage in them cannot be found",

@@ -10,7 +10,7 @@ use cpu_time::ProcessTime;
 use granulcal_dataset::{
     DatasetError, ObservedStatistic, Observer, Room, RowStatus, npy, observe, observed_statistics,
 };
-use granulcal_dem::{Health, Pour};
+use granulcal_dem::{Breach, Health, Pour, Status};
 use granulcal_features::{DIAGNOSTICS, PAPER16, Statistic};
 use granulcal_scene::Scene;
 use serde::Serialize;
@@ -110,6 +110,9 @@ fn run(context: &Context, args: &SimulateArgs) -> anyhow::Result<Outcome> {
         sides.keep(npy::write_points(path, &pour.positions).context("writing --positions"));
     }
     print(&report, &scene, args.json)?;
+    if pour.status == Status::Unhealthy {
+        tracing::warn!("{}", why_unhealthy(&pour.health, &scene));
+    }
     Ok(sides.finish(Outcome::healthy_if(status.is_healthy())))
 }
 
@@ -122,6 +125,21 @@ fn resumed(args: &SimulateArgs) -> Option<&Path> {
         return None;
     }
     Some(path)
+}
+
+/// Which bounds a pour has broken, and what may help.
+fn why_unhealthy(health: &Health, scene: &Scene) -> String {
+    let breaches: Vec<_> = health.breaches(scene).iter().map(Breach::to_string).collect();
+    let why = if breaches.is_empty() {
+        "a number is infinite or none".to_owned()
+    } else {
+        breaches.join("; ")
+    };
+    let dt = scene.settings().dt;
+    format!(
+        "unhealthy: {why}. Small, thin or fast grains need a finer step: `substep = {}` in the scene (now {dt} s)",
+        0.5 * dt
+    )
 }
 
 /// Looks at the pour and fills in the statistics; writes the image if asked.

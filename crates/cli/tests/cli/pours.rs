@@ -207,3 +207,29 @@ fn diagnostic_statistics_are_printed_when_asked_for() {
     let alone = [&recording[..], &["--grain-diameter", "0.004"]].concat();
     place.refused(&alone, &["--diagnostics"]);
 }
+
+#[test]
+fn an_unhealthy_pour_says_which_bound_it_broke_and_what_helps() {
+    let place = Place::new();
+    // Thin plates of 1 mm that land without friction turn by more than half a radian in a substep.
+    let plates = "name = \"plates\"\n[material]\nsliding_friction = 0.0\nrolling_friction = 0.0\nrestitution = 0.95\n\
+                  [grains]\ncount = 60\ndiameter = 0.001\ndensity = 1300.0\n\
+                  shape = { kind = \"box\", aspect = [1, 2, 0.3] }\n\
+                  [start]\nkind = \"grid\"\ncounts = [4, 4, 4]\nspacing = 0.0025\njitter = 5e-5\nbase = 0.1\n\
+                  [end]\nhorizon = 0.6\n";
+    place.write("plates.toml", plates);
+    let output = place.run(&["simulate", "plates.toml", "--seed", "1"]);
+    let (out, err) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(output.status.code(), Some(3), "{out}\n{err}");
+    assert!(out.contains("unhealthy"), "{out}");
+    for words in
+        ["an overlap of ", "at most 0.2 are allowed", "`substep = 0.00025`", "now 0.0005 s"]
+    {
+        assert!(err.contains(words), "{words}: {err}");
+    }
+    place.write("finer.toml", format!("substep = 1.25e-4\n{plates}"));
+    let finer =
+        json(&text(&place.run(&["simulate", "finer.toml", "--seed", "1", "--json"]).stdout));
+    assert_ne!(finer["status"], "unhealthy", "{finer}");
+    assert!(finer["health"]["worst_penetration"].as_f64().unwrap() < 0.1, "{finer}");
+}

@@ -18,10 +18,6 @@ const QUIET_SETTLED: f64 = 1e-2;
 /// Examinations between two evaluations of the residual, which cost about a sweep.
 const RESIDUAL_PERIOD: usize = 4;
 
-/// How much deeper than a sphere a convex body may be: a corner that no manifold had before enters by the way of a
-/// substep.
-const CORNER_SLACK: f64 = 2.0;
-
 /// How often contacts that bodies come to within a substep are looked for and solved, at most.
 const FORESEEN: usize = 3;
 
@@ -277,8 +273,8 @@ impl Simulation {
         let heights = self.particles.heights(&self.around.effects.gravity);
         self.watch.see_energy(&energy, &heights);
         self.ended = self.end_reached().map(|status| {
-            let slack = if self.bodies.is_some() { CORNER_SLACK } else { 1.0 };
-            let trusted = self.watch.is_healthy(slack * self.around.settings.max_penetration);
+            let (is_cornered, settings) = (self.bodies.is_some(), &self.around.settings);
+            let trusted = self.watch.is_healthy(is_cornered, settings.max_penetration);
             if trusted { status } else { Status::Unhealthy }
         });
         if self.ended.is_none() && !self.watch.is_finite() {
