@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from toy_models import QUICK, SCENE
 
 import granulcal as gc
 
@@ -46,3 +47,20 @@ def points() -> np.ndarray:
     generator = np.random.default_rng(0)
     r, angle = 0.05 * np.sqrt(generator.random(400)), 2 * np.pi * generator.random(400)
     return np.column_stack([r * np.cos(angle), r * np.sin(angle), 0.02 - 0.3 * r])
+
+
+@pytest.fixture(scope="session")
+def toy():
+    """A linear Gaussian, whose posteriors are known."""
+    pytest.importorskip("torch")
+    from granulcal.bayessim.check.toys import LinearGaussian
+
+    return LinearGaussian.random(seed=1, noise=2.0)
+
+
+@pytest.fixture(scope="session")
+def quick(toy):
+    """A model of it that has hardly learnt anything, in a moment."""
+    theta, x = toy.simulate(120, seed=1)
+    names = [f"s{i}" for i in range(16)]
+    return gc.BayesSim.fit(theta, x, toy.prior, x_names=names, scene=SCENE, **QUICK)
