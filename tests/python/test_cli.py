@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import granulcal
 from safetensors.numpy import load_file, save_file
 from signed import sign
 
@@ -34,11 +35,6 @@ def recording(small_pour: gc.Pour, tmp_path_factory: pytest.TempPathFactory) -> 
     return str(image), str(toml)
 
 
-def _run(*words: str) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "granulcal.cli", *words]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
-
-
 def test_help_teaches(capfd):
     assert main(["--help"]) == 0
     text = capfd.readouterr().out
@@ -49,10 +45,10 @@ def test_help_teaches(capfd):
 
 
 def test_words_of_the_simulator_are_passed_on():
-    done = _run("features", "--list")
+    done = granulcal("features", "--list")
     assert done.returncode == 0
     assert "max_z" in done.stdout
-    refused = _run("nonsense")
+    refused = granulcal("nonsense")
     assert refused.returncode == 2
     assert "nonsense" in refused.stderr
     assert refused.stdout == ""

@@ -1,27 +1,21 @@
+"""Plans of rings: heights from radii, what is out of reach, pours of a plan, the command."""
+
 import csv
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
+from command_line import granulcal
 
 import granulcal as gc
 from granulcal import _native
-from granulcal.bayessim.network.mixture import Mixture
-from granulcal.design.count_model import CountModel, beta_binomial_tail, log_gamma
 from granulcal.design.pattern import Pattern, simulate_plan
-from granulcal.design.posterior_file import PosteriorDraws
 from granulcal.design.reach import Reach
 from granulcal.design.ring import STATISTICS
 from granulcal.design.ring_model import HEIGHT, RingModel, height_prior, observing_radii
-from granulcal.design.spill import forecast_of
 from granulcal.errors import ExtrapolationError, TrainingDataError, UnreachableRingError
-from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.left_out import LeftOut
 
 pytest.importorskip("torch")
@@ -64,11 +58,6 @@ def line() -> RingModel:
 def _at(height: float) -> gc.Ring:
     inner, outer = _Line.radii(np.array([height]))[0]
     return gc.Ring(outer=outer, inner=inner)
-
-
-def _run(*words: str) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "granulcal.cli", "design", *words]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 class _Bow(_Line):
@@ -220,7 +209,7 @@ def test_a_plan_of_grains_that_differ_is_of_one_ring(line, tmp_path):
     assert np.ptp(one.radii) > 0
     (tmp_path / "scene.toml").write_text(mixed.to_toml())
     words = ["rings", str(tmp_path / "scene.toml"), "--pile", "0.1", "--pile", "0.05"]
-    refused = _run(*words, "-o", str(tmp_path / "plan"))
+    refused = granulcal("design", *words, "-o", str(tmp_path / "plan"))
     assert refused.returncode == 2 and "effects.polydispersity" in refused.stderr
     # Before any pour.
     assert not (tmp_path / "plan").exists()
@@ -247,259 +236,23 @@ def test_command_trains_plans_and_resumes(tmp_path):
     out = tmp_path / "plan"
     words = ["rings", "funnel", "--set", "grains.count=60", "--heights", "0.05", "0.13"]
     words += ["--pours", "60", "-o", str(out)]
-    done = _run(*words, "--held-out", "5")
+    done = granulcal("design", *words, "--held-out", "5")
     assert done.returncode == 0, done.stderr
     assert "height of 5 pours" in done.stdout
     model = RingModel.load(out)
     outer = float(model.reach.at(0.09).radii[1])
-    done = _run(*words, "--pile", str(outer), "--json")
+    done = granulcal("design", *words, "--pile", str(outer), "--json")
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     assert 0.05 < document["pours"][0]["height"] < 0.13
     assert document["trained"]["pours"] == 60
     assert (out / "plan.png").read_bytes().startswith(b"\x89PNG")
     assert gc.Plan.load(out).pours[0].height == document["pours"][0]["height"]
-    refused = _run(*words, "--pile", "2.0")
+    refused = granulcal("design", *words, "--pile", "2.0")
     assert refused.returncode == 2
     assert "lies outside the training" in refused.stderr
-    refused = _run("rings", str(out), "--set", "grains.count=60", "--pile", "0.1", "-o", str(out))
+    refused = granulcal(
+        "design", "rings", str(out), "--set", "grains.count=60", "--pile", "0.1", "-o", str(out)
+    )
     assert "a trained model has its material" in refused.stderr
-    assert _run(*words).returncode == 2
-
-
-def test_tail_of_a_beta_binomial_is_scipys():
-    share = np.array([1e-4, 0.01, 0.3, 0.9])
-    x = np.array([1e-5, 0.5, 3.0, 50.0, 1e6])
-    from scipy.special import gammaln
-
-    np.testing.assert_allclose(log_gamma(x), gammaln(x), rtol=1e-12, atol=1e-12)
-    for rho in (1e-5, 0.01, 0.2):
-        size = 1 / rho - 1
-        for least in (1, 7, 60):
-            expected = stats.betabinom.sf(least - 1, 200, share * size, (1 - share) * size)
-            found = beta_binomial_tail(least, 200, share, rho)
-            np.testing.assert_allclose(found, expected, atol=1e-8)
-    assert beta_binomial_tail(0, 10, share, 0.1).tolist() == [1.0] * 4
-    assert beta_binomial_tail(11, 10, share, 0.1).tolist() == [0.0] * 4
-
-
-def test_curve_of_a_known_binomial_is_found():
-    generator = np.random.default_rng(1)
-    heights = generator.uniform(0.05, 0.3, 300)
-    share = 1 / (1 + np.exp(6 - 12 * heights))
-    counts = generator.binomial(500, share).astype(float)
-    forecast = forecast_of(heights, np.empty((300, 0)), counts, 500, grains=(1, 5, 20))
-    assert forecast.rho < 1e-3
-    truth = 1 / (1 + np.exp(6 - 12 * forecast.heights))
-    np.testing.assert_allclose(forecast.expected, 500 * truth, rtol=0.25)
-    for i, k in enumerate(forecast.grains):
-        expected = stats.binom.sf(k - 1, 500, truth)
-        np.testing.assert_allclose(forecast.probability[i], expected, atol=0.06)
-        assert np.all(forecast.low[i] <= forecast.high[i])
-        inside = (forecast.low[i] - 0.01 <= expected) & (expected <= forecast.high[i] + 0.01)
-        assert inside.mean() > 0.8
-
-
-def test_more_spread_than_chance_is_seen():
-    generator = np.random.default_rng(2)
-    heights, rho = generator.uniform(0.05, 0.3, 300), 0.01
-    size = 1 / rho - 1
-    share = 1 / (1 + np.exp(5 - 12 * heights))
-    counts = generator.binomial(500, generator.beta(share * size, (1 - share) * size))
-    model = CountModel.fit(heights, np.empty((300, 0)), counts.astype(float), 500)
-    assert 0.6 * rho < model.rho < 1.6 * rho
-
-
-@pytest.mark.parametrize("all_spill", [False, True])
-@pytest.mark.parametrize("drawn", [0, 2])
-def test_pours_that_never_spill_or_always_leave_little_doubt(all_spill, drawn):
-    """A normal about the estimate had given P(>= 1) of 0.07 to 0.2 after 200 clean pours."""
-    total, count = 200, 200
-    heights = np.linspace(0.06, 0.3, count)
-    material = np.random.default_rng(1).normal(size=(count, drawn))
-    counts = np.full(count, float(total if all_spill else 0))
-    forecast = forecast_of(heights, material, counts, total, grains=(1, total))
-    rare = 1 - forecast.probability[1] if all_spill else forecast.probability[0]
-    assert rare.max() < 0.015
-    # And some: 200 pours exclude no chance of a thousandth.
-    assert rare.max() > 1e-5
-
-
-def test_draws_are_those_of_the_posterior():
-    """By quadrature over both coefficients and rho, with one pour of ten that spills a grain."""
-    heights = np.linspace(0.1, 0.2, 10)
-    counts = np.zeros(10)
-    counts[7] = 1
-    model = CountModel.fit(heights, np.empty((10, 0)), counts, 50, degrees=(1,))
-    drawn, rho = model.draw(1000, np.random.default_rng(0))
-    axes = np.linspace(-25, 0, 80), np.linspace(-15, 15, 80), np.linspace(1e-3, 0.5**0.5, 60)
-    level, slope, root = np.meshgrid(*axes, indexing="ij")
-    share = 1 / (1 + np.exp(-(level[..., None] + slope[..., None] * model.rows[:, 1])))
-    size = 1 / root[..., None] ** 2 - 1
-    log = stats.betabinom.logpmf(counts, 50, share * size, (1 - share) * size).sum(axis=-1)
-    log -= 0.5 * (level / 20) ** 2 + 0.5 * (slope / 5) ** 2
-    weight = np.exp(log - log.max())
-    found_of = ((level, drawn[:, 0]), (slope, drawn[:, 1]), (root, np.sqrt(rho)))
-    for values, found in found_of:
-        mean = np.average(values, weights=weight)
-        sd = np.average((values - mean) ** 2, weights=weight) ** 0.5
-        assert found.mean() == pytest.approx(mean, abs=0.1 * sd)
-        assert found.std() == pytest.approx(sd, rel=0.1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("pours", "rho"), [(40, 0.05), (100, 0.05), (25, 0.1)])
-def test_bands_hold_the_truth(pours, rho):
-    """Of known curves; with rho at its largest likelihood k = 10 was held in .6 to .7 of cases."""
-    total, size, sets = 100, 1 / rho - 1, 60
-    held, unsafe, advised = [], 0, 0
-    for seed in range(sets):
-        generator = np.random.default_rng(seed)
-        heights = np.linspace(0.06, 0.3, pours)
-        share = 1 / (1 + np.exp(4 - 2 * (2 * (heights - 0.06) / 0.24 - 1)))
-        counts = generator.binomial(total, generator.beta(share * size, (1 - share) * size))
-        known = np.empty((pours, 0))
-        forecast = forecast_of(heights, known, counts * 1.0, total, grains=(1, 10), seed=seed)
-        share = 1 / (1 + np.exp(4 - 2 * (2 * (forecast.heights - 0.06) / 0.24 - 1)))
-        for i, k in enumerate(forecast.grains):
-            truth = stats.betabinom.sf(k - 1, total, share * size, (1 - share) * size)
-            held.append(np.mean((forecast.low[i] <= truth) & (truth <= forecast.high[i])))
-            top = forecast.highest(k, 0.1)
-            if top is not None:
-                advised += 1
-                unsafe += truth[np.argmin(np.abs(forecast.heights - top))] > 0.1
-    print(f"{pours} pours, rho {rho}: held {np.mean(held):.3f}, unsafe {unsafe} of {advised}")
-    assert np.mean(held) > 0.8
-    assert unsafe < 0.25 * advised
-
-
-def test_unknown_material_widens_the_band():
-    generator = np.random.default_rng(4)
-    heights, material = generator.uniform(0.05, 0.3, 300), generator.normal(size=(300, 1))
-    share = 1 / (1 + np.exp(5.5 - 8 * heights - material[:, 0]))
-    counts = generator.binomial(500, share).astype(float)
-    known = np.empty((300, 0))
-    drawn = forecast_of(heights, material, counts, 500, grains=(10,), names=("material.friction",))
-    blind = forecast_of(heights, known, counts, 500, grains=(10,))
-    assert np.mean(drawn.high - drawn.low) > 3 * np.mean(blind.high - blind.low)
-    # Both see the same pours: what the one calls material is pour-to-pour noise to the other.
-    assert drawn.rho < 0.3 * blind.rho
-    top = drawn.highest(10, 0.05)
-    assert top is None or top < 0.2
-
-
-def _small_bowl(path: Path) -> Path:
-    scene = gc.Scene.load(_EXAMPLES / "bowl.toml").with_({"grains.count": 60, "preset": "fast"})
-    path.write_text(scene.to_toml())
-    return path
-
-
-def test_spill_command_resumes_and_writes(tmp_path):
-    bowl, out = _small_bowl(tmp_path / "bowl.toml"), tmp_path / "spill"
-    posterior = tmp_path / "posterior.json"
-    names = ["material.sliding_friction", "material.restitution"]
-    draws = np.random.default_rng(0).uniform([0.3, 0.6], [0.7, 0.9], (50, 2))
-    parameters = {name: {"mode": 0.65} for name in names}
-    posterior.write_text(json.dumps({"parameters": parameters, "samples": draws.tolist()}))
-    words = ["spill", str(bowl), "--heights", "0.1", "0.4", "--pours", "24", "--grains", "1", "5"]
-    words += ["--posterior", str(posterior), "-o", str(out)]
-    done = _run(*words)
-    assert done.returncode == 0, done.stderr
-    assert "24 pours of 60 grains" in done.stdout
-    assert "P(spilled >= 1)" in done.stdout
-    assert "spill.csv and spill.json (metres)" in done.stdout
-    kept = (out / "pours.json").read_text()
-    document = json.loads(kept)
-    del document["pours"]["7"]
-    # Without its hash, which would find the change.
-    del document["hash"]
-    (out / "pours.json").write_text(json.dumps(document))
-    before = (out / "spill.csv").read_text()
-    assert _run(*words).returncode == 0
-    again = json.loads((out / "pours.json").read_text())["pours"]
-    timeless = [
-        {i: {**row, "cpu_s": None} for i, row in pours.items()}
-        for pours in (again, json.loads(kept)["pours"])
-    ]
-    assert timeless[0] == timeless[1]
-    assert (out / "spill.csv").read_text() == before
-    assert _run(*words, "--pours", "26").returncode == 0
-    more = json.loads((out / "pours.json").read_text())["pours"]
-    assert len(more) == 26
-    assert {i: more[i] for i in again} == again
-    document = {"parameters": parameters, "samples": draws.tolist()}
-    posterior.write_text(json.dumps({**document, "inside_model": {"is_inside": False}}))
-    outside = _run(*words)
-    assert outside.returncode == 3 and "OUTSIDE THE MODEL" in outside.stderr
-    rows = list(csv.DictReader(before.splitlines()))
-    assert all(0 <= float(row["low"]) <= float(row["high"]) <= 1 for row in rows)
-    assert json.loads((out / "spill.json").read_text())["drawn"] == names
-    assert (out / "spill.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_spill_refuses_what_it_cannot_answer(tmp_path):
-    bowl = gc.Scene.load(_EXAMPLES / "bowl.toml")
-    with pytest.raises(ValueError, match=r"no \[observe\.spill\] table"):
-        gc.design_spill(gc.Scene.funnel(), out=tmp_path)
-    with pytest.raises(ValueError, match=r"grains must be from 1 to 2000, got \[0\]"):
-        gc.design_spill(bowl, grains=[0], out=tmp_path)
-    with pytest.raises(ValueError, match="heights must be positive and rising"):
-        gc.design_spill(bowl, heights=(0.2, 0.1), out=tmp_path)
-    with pytest.raises(ValueError, match="pours must be at least 20, got 3"):
-        gc.design_spill(bowl, pours=3, out=tmp_path)
-    posterior = {
-        "parameters": {"material.sliding_friction": {"mode": 0.4}},
-        "fixed": {"material.restitution": 0.3},
-        "samples": [[0.4], [0.5]],
-    }
-    (tmp_path / "posterior.json").write_text(json.dumps(posterior))
-    there = PosteriorDraws.load(tmp_path / "posterior.json").at_mode(gc.Scene.funnel())
-    assert there.get("material.sliding_friction") == 0.4
-    assert there.get("material.restitution") == 0.3
-    (tmp_path / "none.json").write_text("{}")
-    with pytest.raises(ValueError, match="parameters must be there"):
-        PosteriorDraws.load(tmp_path / "none.json")
-
-
-def _posterior() -> gc.Posterior:
-    """Of one parameter, whose prior fixed another."""
-    prior = gc.Prior(
-        [
-            gc.Parameter(
-                path="material.sliding_friction", distribution="uniform", low=0.3, high=0.6
-            ),
-            gc.Parameter(path="material.restitution", distribution="fixed", value=0.35),
-        ]
-    )
-    return gc.Posterior.from_mixture(
-        prior, Mixture(np.ones(1), np.zeros((1, 1)), np.ones((1, 1, 1)))
-    )
-
-
-def test_draws_are_taken_from_a_posterior() -> None:
-    posterior = _posterior()
-    draws = PosteriorDraws.of(posterior)
-    assert draws.names == ("material.sliding_friction",)
-    assert draws.samples.shape == (1000, 1) and draws.mode == pytest.approx(posterior.mode())
-    assert draws.fixed == {"material.restitution": 0.35}
-    assert PosteriorDraws.of(draws) is draws
-    with pytest.raises(TypeError, match=r"got str: PosteriorDraws\.load reads the one in a file"):
-        PosteriorDraws.of("posterior.json")  # pyright: ignore[reportArgumentType]
-
-
-def test_spill_takes_a_posterior_and_what_its_prior_fixed(tmp_path, monkeypatch):
-    bowl = gc.Scene.load(_small_bowl(tmp_path / "bowl.toml"))
-    poured = []
-
-    class Kept(KeptPours):
-        def __init__(self, scene: gc.Scene, *args: Any, **more: Any) -> None:
-            poured.append(scene)
-            super().__init__(scene, *args, **more)
-
-    monkeypatch.setattr("granulcal.design.spill.KeptPours", Kept)
-    forecast = gc.design_spill(
-        bowl, heights=(0.1, 0.4), grains=(1,), pours=24, posterior=_posterior(), out=tmp_path,
-        progress=False,
-    )  # fmt: skip
-    assert forecast.names == ("material.sliding_friction",)
-    assert poured[0].get("material.restitution") == 0.35
+    assert granulcal("design", *words).returncode == 2
