@@ -52,6 +52,8 @@ def test_no_height_is_advised_whose_probability_is_above(tmp_path: Path) -> None
     assert skewed.highest(1, 0.05) == pytest.approx(0.2)
     assert skewed.advice(1, 0.05).endswith("up to 20.0 cm")
     assert forecast([0.1, 0.2], [0.0, 0.0]).highest(1, 0.05) is None
+    lowest = forecast([0.01, 0.1, 0.2, 0.5], [0.02, 0.2, 0.3, 0.9]).advice(1, 0.05)
+    assert lowest.endswith("near the lowest height poured: pours from lower would tell")
 
 
 def failing(is_calibrated: bool | None) -> RingModel:

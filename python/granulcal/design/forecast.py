@@ -19,6 +19,8 @@ __all__ = ["SpillForecast"]
 Array = NDArray[np.float64]
 
 _CM = 1e2
+# What is nearer to the lowest height than this share of the range is advised by chance, where it is.
+_NEAR = 0.1
 _COLOURS = ("#1f5f8b", "#c8742b", "#4a8c4a", "#8b4a8b", "#8b1f3d", "#5b5b5b")
 _ROWS = 9
 
@@ -74,7 +76,10 @@ class SpillForecast:
             return f"{wanted}: at no height from {_CM * self.heights[0]:.1f} cm on"
         if top == self.heights[-1]:
             return f"{wanted}: at all heights up to {_CM * top:.1f} cm"
-        return f"{wanted}: up to {_CM * top:.1f} cm"
+        said = f"{wanted}: up to {_CM * top:.1f} cm"
+        if top - self.heights[0] < _NEAR * (self.heights[-1] - self.heights[0]):
+            said += ", near the lowest height poured: pours from lower would tell"
+        return said
 
     def save(self, folder: str | PathLike[str]) -> None:
         """Writes spill.csv (one row for each k and height), spill.json and spill.png."""
