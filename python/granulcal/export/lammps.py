@@ -123,7 +123,6 @@ fix           ground all wall/gran granular {contact(setup.ground, "wall", stiff
 {walls}
 fix           motion all nve/sphere
 timestep      {stiffness.dt:.6g}
-thermo_modify lost ignore
 
 # Runs until {100 * _RESTING:g} % of the grains are slower than {100 * _SLOW:g} cm/s.
 variable      slow atom "vx*vx + vy*vy + vz*vz < {_SLOW**2:g}"
@@ -169,12 +168,16 @@ def _is_closed(body: Body) -> bool:
 def _region(body: Body) -> str:
     shape, kind = body.shape, body.shape["kind"]
     if kind in ("cone", "cylinder"):
-        axis, (a, b), (low, high) = _along(body)
-        ends = {"none": " open 1 open 2", "from": " open 2", "to": " open 1", "both": ""}
-        rest = ends[shape.get("closed", "none")]
+        axis, (a, b), ends = _along(body)
+        closed = shape.get("closed", "none")
+        # A region's first end is its low one.
+        order = ("from", "to") if ends[0] < ends[1] else ("to", "from")
+        faces = enumerate(order, start=1)
+        rest = "".join(f" open {i}" for i, end in faces if closed not in (end, "both"))
+        low, high = sorted(ends)
         if kind == "cylinder":
             return f"cylinder {axis} {a:g} {b:g} {shape['radius']:.9g} {low:.9g} {high:.9g}{rest}"
-        radii = f"{shape['radius_from']:.9g} {shape['radius_to']:.9g}"
+        radii = " ".join(f"{shape[f'radius_{end}']:.9g}" for end in order)
         return f"cone {axis} {a:g} {b:g} {radii} {low:.9g} {high:.9g}{rest}"
     if kind == "plane":
         numbers = " ".join(f"{float(x):.9g}" for x in (*shape["point"], *shape["normal"]))
@@ -185,15 +188,20 @@ def _region(body: Body) -> str:
         numbers = " ".join(f"{float(x):.9g}" for pair in pairs for x in pair)
         missing = [f"open {sides.index(name) + 1}" for name in shape.get("open", [])]
         return " ".join(["block", numbers, *missing])
-    raise ValueError(f"{body.name}: LAMMPS has no wall of kind {kind!r}")
+    raise ValueError(
+        f"{body.path}: LAMMPS has no wall of kind {kind!r}, only plane, box, cylinder and cone"
+    )
 
 
 def _along(body: Body) -> tuple[str, tuple[float, float], tuple[float, float]]:
-    """Returns the axis of a round wall, its place across it and its ends."""
-    low, high = body.shape["from"], body.shape["to"]
-    moving = [k for k in range(3) if abs(high[k] - low[k]) > 1e-12]
-    if len(moving) != 1 or high[moving[0]] < low[moving[0]]:
-        raise ValueError(f"{body.name}: LAMMPS wants round walls along x, y or z, from low to high")
+    """Returns the axis of a round wall, its place across it, and `from` and `to` along it."""
+    begin, end = body.shape["from"], body.shape["to"]
+    moving = [k for k in range(3) if abs(end[k] - begin[k]) > 1e-12]
+    if len(moving) != 1:
+        raise ValueError(
+            f"{body.path}: LAMMPS has round walls along x, y or z alone, got one from "
+            f"{list(begin)} to {list(end)}"
+        )
     k = moving[0]
-    across = [float(low[i]) for i in range(3) if i != k]
-    return "xyz"[k], (across[0], across[1]), (float(low[k]), float(high[k]))
+    across = [float(begin[i]) for i in range(3) if i != k]
+    return "xyz"[k], (across[0], across[1]), (float(begin[k]), float(end[k]))

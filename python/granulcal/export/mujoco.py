@@ -76,7 +76,7 @@ def mjcf(setup: Setup) -> str:
             f'condim="6" friction="{_friction(body.law, radius)}" '
             f'solref="{-k:.6g} {-b:.6g}" solimp="0.99 0.99 0.001" rgba=".6 .6 .7 .3"'
         )
-        walls += [f"    {geom.format(words=words)}" for geom in _boxes(body.shape)]
+        walls += [f"    {geom.format(words=words)}" for geom in _boxes(body.shape, body.path)]
     k, b = solref(setup.ground.restitution)
     grains = []
     for i, (centre, size) in enumerate(zip(setup.centres, setup.radii, strict=True)):
@@ -109,8 +109,8 @@ def mjcf(setup: Setup) -> str:
     )
 
 
-def _boxes(shape: dict) -> list[str]:
-    """Returns a wall as flat boxes, one for each pair of its triangles."""
+def _boxes(shape: dict, path: str) -> list[str]:
+    """Returns a wall as flat boxes, one for each pair of its triangles; errors name `path`."""
     import numpy as np
 
     mesh = triangles(shape, sides=_SIDES)
@@ -123,7 +123,8 @@ def _boxes(shape: dict) -> list[str]:
         ]
         if shape.get("closed", "none") != "none":
             raise ValueError(
-                "a closed round wall has no MJCF here; leave its end to a disc of yours"
+                f"{path}: a round wall whose `closed` is {shape['closed']!r} has no MJCF here, only "
+                "'none': leave its end to a box or a plane"
             )
     elif shape["kind"] in ("box", "plane"):
         quads = [
@@ -131,7 +132,10 @@ def _boxes(shape: dict) -> list[str]:
             for a, b in zip(mesh.faces[::2], mesh.faces[1::2], strict=True)
         ]
     else:
-        raise ValueError(f"a wall of kind {shape['kind']!r} has no MJCF here")
+        raise ValueError(
+            f"{path}: a wall of kind {shape['kind']!r} has no MJCF here, only plane, box, cylinder "
+            "and cone"
+        )
     for a, b, c, d in quads:
         centre = (a + b + c + d) / 4
         along = (b + c - a - d) / 2

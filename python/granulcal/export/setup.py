@@ -40,6 +40,11 @@ class Body:
     shape: dict[str, Any]
     law: Contact
 
+    @property
+    def path(self) -> str:
+        """What messages call it: its path in the scene."""
+        return self.name.replace("wall_", "walls.")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
