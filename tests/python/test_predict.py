@@ -189,3 +189,65 @@ def test_what_a_model_has_is_said_and_what_is_asked_for_in_its_place(
     }
     assert main([*words[:6], "--model", "base"]) == 0
     assert "without any effect" in capsys.readouterr().out
+
+
+@pytest.fixture
+def inferred(tmp_path: Path) -> Path:
+    """Returns a folder as calibrate leaves it."""
+    names = ("material.sliding_friction", "material.rolling_friction")
+    posterior = {
+        "recordings": ["a.png"],
+        "parameters": {name: {"mode": 0.4} for name in names},
+        "samples": [[0.3, 0.3], [0.4, 0.4], [0.5, 0.35]],
+        "fixed": {"material.restitution": 0.2},
+    }
+    (tmp_path / "posterior.json").write_text(json.dumps(posterior))
+    scene = gc.Scene.drop(0.02, count=40, preset="fast")
+    (tmp_path / "scene.toml").write_text(scene.to_toml())
+    return tmp_path
+
+
+def test_a_posterior_predicts_by_pours_at_its_draws(
+    inferred: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--at", "start.height=0.03", "--pours", "4", "--threads", "1", "--json"]
+    scene = str(inferred / "scene.toml")
+    told = []
+    for what in (inferred, inferred / "posterior.json"):
+        assert main(["predict", str(what), scene, *words]) == 0
+        told.append(json.loads(capsys.readouterr().out))
+    assert told[0] == told[1] and told[0]["pours"] == 4 and told[0]["is_inside"] is True
+    assert told[0]["units"]["max_z"] == "m"
+    # The mean of pours at the draws, of what the prior fixed, under the condition.
+    at = {"start.height": 0.03, "material.restitution": 0.2}
+    rows = [
+        gc.simulate(
+            gc.Scene.load(scene).with_(
+                at | {"material.sliding_friction": mu, "material.rolling_friction": rolling}
+            ),
+            seed=8_700_001 + i,
+        ).statistics()["mean_r"]
+        for i, (mu, rolling) in enumerate([(0.3, 0.3), (0.4, 0.4), (0.5, 0.35), (0.3, 0.3)])
+    ]
+    found = told[0]["statistics"]["mean_r"]
+    assert found["middle"] == pytest.approx(np.mean(rows)) and found["low"] < min(rows)
+
+
+def test_what_no_posterior_predicts_is_refused_by_name(
+    inferred: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene, at = str(inferred / "scene.toml"), ["--at", "start.height=0.03"]
+
+    def said(*words: str) -> str:
+        assert main(["predict", *words]) == 2
+        return capsys.readouterr().err
+
+    assert "predict posterior.json SCENE" in said(str(inferred), *at)
+    assert "is of a closed loop" in said(str(inferred), scene, *at, "--corrected")
+    assert "at least 2" in said(str(inferred), scene, *at, "--pours", "1")
+    unknown = said(str(inferred), scene, "--at", "funnel.height=0.1")
+    assert "funnel.height" in unknown and "sliding_friction" not in unknown
+    # What was inferred is replaced, and that is said.
+    words = ["--at", "material.sliding_friction=0.1", "--pours", "2", "--threads", "1"]
+    assert main(["predict", str(inferred), scene, *words]) == 0
+    assert "no longer what was inferred" in capsys.readouterr().err

@@ -23,6 +23,7 @@ SMALL = {
     "close-loop loop.toml -o loop": "close-loop loop.toml -o loop --budget 1300",
     "budget=4000": "budget=1300",
     "--corrected`": "--corrected --pours 4`",
+    "predict posterior.json scene.toml": "predict posterior.json scene.toml --pours 4",
     # What so few grains make.
     "--ring 0.04 0.073 --pile 0.04 -o plan": "--pile 0.03 -o plan --pours 60 --extrapolate",
     "simulate examples/drum.toml": "simulate examples/drum.toml --set grains.count=400 "
@@ -56,6 +57,7 @@ MAY_END_WITH_3 = [
     "close-loop",
     "design",
     "generate",
+    "predict",
 ]
 # Commands within sentences that are run here.
 SHORT = (

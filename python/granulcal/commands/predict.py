@@ -14,6 +14,9 @@ from granulcal.progress import shown
 from granulcal.warned import warn
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from granulcal.loop.report.models import Prediction
     from granulcal.pours.scene import Scene
 
 __all__ = ["add"]
@@ -42,6 +45,13 @@ fitted one. `named` has the most probable candidate where the verdict names
 none: what a model has is printed, and stands in the JSON. A loop closed with
 --engine pours with the same.
 Intervals are those of one pour. Exit code 3: the loop's verdict does not stand.
+
+From a posterior of `infer -o` or `calibrate`, with the scene that it is of:
+
+  granulcal predict posterior.json scene.toml --at funnel.height=0.07
+  granulcal predict run scene.toml --at funnel.height=0.07   of calibrate -o run
+
+pours at draws of it; exit code 3: its recordings were outside the model.
 """
 
 
@@ -53,7 +63,14 @@ def add(commands: Any) -> None:
         description=_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("loop", type=READS, help="folder -o of close-loop")
+    parser.add_argument(
+        "loop",
+        type=READS,
+        help="folder -o of close-loop, or JSON of `infer -o`, or that or the folder of `calibrate`",
+    )
+    parser.add_argument(
+        "scene", type=READS, nargs="?", help="of a posterior: TOML, or the word funnel or drop"
+    )
     parser.add_argument(
         "--at",
         action="append",
@@ -92,6 +109,9 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     from granulcal.engines import engine_named, pouring_with
+
+    if options.scene is not None:
+        return _of_posterior(options)
     from granulcal.loop.pours.forward import Forward
     from granulcal.loop.report.asked import condition_of
     from granulcal.loop.report.models import Models
@@ -124,14 +144,54 @@ def _run(options: argparse.Namespace) -> int:
     word = " ".join([models.verdict["kind"], *models.verdict["named"]])
     print(f"{found.model} at {', '.join(options.at)}; the loop's verdict: {word}")
     print(f"{found.model} is {models.said(model, at)}")
+    _print_table(found, models.units)
+    return _outcome(models.verdict["kind"])
+
+
+def _print_table(found: "Prediction", units: "Mapping[str, str]") -> None:
     share = f"{100 * found.level:g} % from"
     print(f"{'statistic':<24}{'middle':>12}{share:>14}{'to':>12}  unit")
     for name, middle, low, high in zip(
         found.names, found.middle, found.low, found.high, strict=True
     ):
-        unit = models.units[name]
-        print(f"{name:<24}{middle:>12.5g}{low:>14.5g}{high:>12.5g}  {unit}")
-    return _outcome(models.verdict["kind"])
+        print(f"{name:<24}{middle:>12.5g}{low:>14.5g}{high:>12.5g}  {units[name]}")
+
+
+def _of_posterior(options: argparse.Namespace) -> int:
+    from granulcal.design.posterior_file import PosteriorDraws
+    from granulcal.design.predict_posterior import poured_scenes, predict_posterior
+    from granulcal.engines import engine_named, pouring_with
+    from granulcal.loop.report.asked import condition_of
+    from granulcal.loop.report.models import units_of
+    from granulcal.pours.scene import Scene
+
+    if options.model is not None:
+        raise ValueError(
+            f"the model {options.model} is of a closed loop: with a scene {options.loop} is a "
+            "posterior's"
+        )
+    at, scene = condition_of(options.at), Scene.named(options.scene)
+    file = options.loop / "posterior.json" if options.loop.is_dir() else options.loop
+    posterior = PosteriorDraws.load(file)
+    engine = None if options.engine is None else engine_named(options.engine)
+    threads = options.threads or os.cpu_count() or 1
+    scenes = poured_scenes(posterior, scene, at, options.pours)
+    with shown(), pouring_with(engine):
+        if options.dry_run:
+            return _say_how_long(options, scenes[:1], threads)
+        found = predict_posterior(
+            posterior, scene, at, level=options.level, pours=options.pours, threads=threads
+        )
+    warn(found.doubts)
+    if options.json:
+        told = {"at": at, "units": units_of(found.names, scene), "is_inside": posterior.is_inside}
+        print(json.dumps(found.to_dict() | told, indent=1, allow_nan=False))
+    else:
+        print(
+            f"{found.pours} pours of {scene.name} at {', '.join(options.at)}, at draws of a posterior"
+        )
+        _print_table(found, units_of(found.names, scene))
+    return 0 if posterior.is_inside else _FALLEN
 
 
 def _say_how_long(options: argparse.Namespace, scenes: "list[Scene]", threads: int) -> int:

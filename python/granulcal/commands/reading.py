@@ -41,7 +41,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         type=RECORDING,
         nargs="+",
         help=".bag, .mcap, .npz height map, 16-bit depth PNG, .npy or folder of PNGs; "
-        "several: pours of one material",
+        "several: pours of one material under one condition",
     )
     parser.add_argument(
         "--camera",

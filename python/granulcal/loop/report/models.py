@@ -55,7 +55,7 @@ from granulcal.pours.scene import Scene
 from granulcal.pours.statistics import REGISTRY
 from granulcal.progress import steps
 
-__all__ = ["MODELS", "Maker", "Models", "Prediction", "condition_of"]
+__all__ = ["MODELS", "Maker", "Models", "Prediction", "condition_of", "units_of"]
 
 Array = NDArray[np.float64]
 
@@ -173,8 +173,7 @@ class Models:
     @property
     def units(self) -> dict[str, str]:
         """Unit of each statistic; `-` if it has none."""
-        known = {each.name: each.unit for each in REGISTRY} | self.scene.observed_units
-        return {name: known[name] for name in self.names}
+        return units_of(self.names, self.scene)
 
     def write(self, folder: Path) -> Path:
         """Writes `models.json` into a folder and returns its path."""
@@ -212,7 +211,10 @@ class Models:
         """
         path = Path(folder) / _NAME
         if not path.exists():
-            raise FileNotFoundError(f"{path} is not there: is {folder} the -o of close-loop?")
+            raise FileNotFoundError(
+                f"{path} is not there: is {folder} the -o of close-loop? From what `infer -o` or "
+                "`calibrate` wrote, `predict posterior.json SCENE --at ...` predicts"
+            )
         data = read_bytes(path, most=LARGEST_DOCUMENT)
         d = parse_json(data, path, error=ObservationError)
         check_models(d, path)
@@ -488,6 +490,12 @@ class Models:
             if weights is not None:
                 squares.append((self.means[h] - weights @ self.means[rest]) ** 2)
         return np.mean(squares, axis=0) if squares else np.zeros(self.means.shape[1])
+
+
+def units_of(names: Sequence[str], scene: Scene) -> dict[str, str]:
+    """Returns the unit of each statistic of a scene; `-` if it has none."""
+    known = {each.name: each.unit for each in REGISTRY} | scene.observed_units
+    return {name: known[name] for name in names}
 
 
 def _known(scene: Scene, paths: Sequence[str]) -> dict[str, float]:

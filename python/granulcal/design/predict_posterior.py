@@ -1,0 +1,99 @@
+"""What an inferred material does under a condition that was not measured."""
+
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from granulcal.design.posterior_file import PosteriorDraws
+from granulcal.errors import ObservationError
+from granulcal.loop.pours.forward import Forward
+from granulcal.loop.pours.measures import Measures
+from granulcal.loop.report.interval import fewest_of_ranks, of_one_more
+from granulcal.loop.report.models import Prediction
+from granulcal.pours.scene import Scene
+
+__all__ = ["poured_scenes", "predict_posterior"]
+
+# Seeds of pours, apart from those of training sets and of the loop.
+_SEED = 8_700_001
+_FEWEST = 2
+
+
+def predict_posterior(
+    posterior: PosteriorDraws,
+    scene: Scene,
+    at: Mapping[str, float],
+    *,
+    level: float = 0.9,
+    pours: int = 20,
+    threads: int | None = None,
+) -> Prediction:
+    """Returns statistics of pours at draws of a posterior, with intervals of one pour.
+
+    Args:
+        posterior: `PosteriorDraws.load(file)`, or `PosteriorDraws.of(posterior)`.
+        scene: what it was inferred in.
+        at: numbers of the condition by path, such as `{"funnel.height": 0.07}`.
+        level: of the interval.
+        pours: at as many draws, at least 2.
+        threads: pours at once, all cores by default.
+
+    Raises:
+        ObservationError: no level, or too few pours or usable ones.
+        ValueError: a draw or a number of the condition that the scene refuses.
+    """
+    if not 0 < level < 1:
+        raise ObservationError(f"level must be between 0 and 1, got {level}")
+    if pours < _FEWEST:
+        raise ObservationError(f"pours must be at least {_FEWEST}, got {pours}")
+    scenes = poured_scenes(posterior, scene, at, pours)
+    asked = [(each, [_SEED + i]) for i, each in enumerate(scenes)]
+    with tempfile.TemporaryDirectory(prefix="granulcal-") as folder:
+        forward = Forward(Path(folder), threads or os.cpu_count() or 1)
+        forward.fill("pours", asked)
+        rows = np.concatenate([forward.pours(*one) for one in asked])
+    if len(rows) < _FEWEST:
+        raise ObservationError(
+            f"{len(rows)} of {pours} pours under this condition are usable, at least {_FEWEST} are "
+            "needed: grains jam, leave the view or are unhealthy"
+        )
+    low, high = of_one_more(rows, level, len(rows))
+    names = Measures.of(scenes[0]).names
+    doubts = (*_asked_for(posterior, at), *_few(len(rows), level))
+    return Prediction("posterior", names, rows.mean(axis=0), low, high, level, len(rows), doubts)
+
+
+def poured_scenes(
+    posterior: PosteriorDraws, scene: Scene, at: Mapping[str, float], pours: int
+) -> list[Scene]:
+    """Returns the scene at as many draws, under the condition.
+
+    Raises:
+        ValueError: a draw or a number of the condition that the scene refuses.
+    """
+    draws = posterior.samples[np.arange(pours) % len(posterior.samples)].tolist()
+    # By itself first, so that a message names the condition's numbers alone.
+    there = posterior.on(scene.with_(at))
+    return [there.with_({**dict(zip(posterior.names, draw, strict=True)), **at}) for draw in draws]
+
+
+def _asked_for(posterior: PosteriorDraws, at: Mapping[str, float]) -> list[str]:
+    return [
+        f"{path} = {at[path]:g} is what was asked for, no longer what was inferred or fixed"
+        for path in at
+        if path in (*posterior.names, *posterior.fixed)
+    ]
+
+
+def _few(pours: int, level: float) -> list[str]:
+    least = fewest_of_ranks(level)
+    if pours >= least:
+        return []
+    return [
+        f"{pours} usable pours are too few for ranks at {100 * level:g} %, {least} are needed: the "
+        "intervals are Student's t's of normal statistics, which may reach beyond what a statistic "
+        "can be"
+    ]
