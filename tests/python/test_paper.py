@@ -231,7 +231,10 @@ def test_command_line_refuses_by_name(capsys):
     assert main(["reproduce", "sensor", "--quick"]) == 2
     assert "quick belongs to the study 'paper'" in capsys.readouterr().err
     assert main(["reproduce"]) == 0
-    assert "paper" in capsys.readouterr().out.split()
+    *studies, of_data = capsys.readouterr().out.splitlines()
+    # Each with what it is of.
+    assert any(line.startswith("paper ") and "Matl" in line for line in studies)
+    assert all(len(line.split()) > 5 for line in studies) and "--data" in of_data
 
 
 def test_full_size_is_the_papers_or_larger():

@@ -157,6 +157,26 @@ def test_a_store_is_of_a_cluster(capfd: pytest.CaptureFixture[str]) -> None:
     assert "--ray-store" in capfd.readouterr().err
 
 
+@pytest.mark.parametrize("url", ["bogus://parts", ""])
+def test_a_store_that_is_none_is_refused_before_anything_is_started(
+    url: str, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    pytest.importorskip("fsspec")
+    # Nobody listens there: a cluster that is asked for first would be what is missing.
+    cluster = ["--ray", "127.0.0.1:1", "--ray-store", url]
+    generated, out = tmp_path / "pours", tmp_path / "out"
+    for words in (
+        ["generate", "drop", "default", "-n", "2", "-o", str(generated)],
+        ["generate", "drop", "default", "-n", "2", "-o", str(generated), "--dry-run"],
+        ["reproduce", "paper", "--quick", "--out", str(out)],
+    ):
+        assert main([*words, *cluster]) == 2
+        said = capfd.readouterr().err
+        assert "the store must be a folder's URL" in said and "file:///shared/run" in said, said
+        assert url in said
+    assert not generated.exists() and not out.exists()
+
+
 # Commands that do not say how long they would take, and why; granulcal-cli has its own list.
 NO_DRY_RUN = {
     "init": "writes four files",

@@ -110,6 +110,7 @@ def _run(options: argparse.Namespace) -> int:
     from granulcal.pours.cluster import spread_over
 
     engine = None if options.engine is None else engine_named(options.engine)
+    cluster = cluster_of(options)
     if options.dry_run:
         from granulcal.loop.call import check_call
         from granulcal.loop.close import planned
@@ -129,7 +130,7 @@ def _run(options: argparse.Namespace) -> int:
             poured = [task.scene.with_(condition.at) for condition in task.conditions]
             return say_how_long(options, poured, task.prior, options.budget)
     aside = contextlib.redirect_stdout(sys.stderr) if options.json else contextlib.nullcontext()
-    with aside, pouring_with(engine), spread_over(cluster_of(options)):
+    with aside, pouring_with(engine), spread_over(cluster):
         code = _close(options)
     if not options.json:
         return code

@@ -3,6 +3,7 @@
 import argparse
 
 from granulcal.pours.cluster import Cluster
+from granulcal.pours.part_store import PartStore
 
 __all__ = ["add_cluster", "cluster_of"]
 
@@ -28,10 +29,14 @@ def cluster_of(options: argparse.Namespace) -> Cluster | None:
     """Returns the cluster that was asked for, None for this machine's threads.
 
     Raises:
-        ValueError: a store without a cluster.
+        ValueError: a store without a cluster, or one that is no URL of a folder.
+        ModuleNotFoundError: what its kind of URL needs is not installed.
     """
     if options.ray is None:
         if options.ray_store is not None:
             raise ValueError("--ray-store belongs to --ray: where is the cluster?")
         return None
+    if options.ray_store is not None:
+        # Before anything is started: workers would find out one by one.
+        PartStore(options.ray_store)
     return Cluster(options.ray, store=options.ray_store)

@@ -88,7 +88,8 @@ def _run(options: argparse.Namespace) -> int:
     names = (module.name for module in pkgutil.iter_modules(experiments.__path__))
     studies = sorted(name for name in names if not name.startswith("_"))
     if options.study is None:
-        print("\n".join(studies))
+        print("\n".join(f"{name:<16} {_about(name)}" for name in studies))
+        print("paper needs no data; the others read measured data, a folder that --data names")
         _tell(options, studies=studies)
         return DONE
     if options.study not in studies:
@@ -109,14 +110,24 @@ def _run(options: argparse.Namespace) -> int:
     if given and options.study != "kinect_mounds":
         raise ValueError(f"--maps and --json FILE are of kinect_mounds, not of {options.study}")
     if data is None and options.maps is None:
-        raise FileNotFoundError("no measured data: give --data or set $GRANULCAL_DATA")
+        raise FileNotFoundError(
+            f"{options.study} reads measured data, of which there is none: give its folder with "
+            "--data or in $GRANULCAL_DATA; `reproduce paper` needs none"
+        )
+    cluster = cluster_of(options)
     if options.dry_run:
         return _say_how_long(options, module, data)
     # A study of the loop says whether its verdicts stand.
-    with shown(), spread_over(cluster_of(options)):
+    with shown(), spread_over(cluster):
         stands = module.reproduce(options.out, data, **given)
     _tell(options, study=options.study, out=str(options.out), stands=stands is not False)
     return UNHEALTHY if stands is False else DONE
+
+
+def _about(study: str) -> str:
+    """Returns what a study is of: the first line of its module."""
+    module = importlib.import_module(f"granulcal.experiments.{study}")
+    return (module.__doc__ or "").partition("\n")[0]
 
 
 def _reproduce_paper(options: argparse.Namespace) -> int:
@@ -126,9 +137,10 @@ def _reproduce_paper(options: argparse.Namespace) -> int:
     if options.quick and options.medium:
         raise ValueError("--quick and --medium are two sizes: give one of them")
     size = QUICK if options.quick else MEDIUM if options.medium else FULL
+    cluster = cluster_of(options)
     if options.dry_run:
         return _say_how_long_of_paper(options, size)
-    with shown(), spread_over(cluster_of(options)):
+    with shown(), spread_over(cluster):
         reproduce_paper(
             options.out,
             options.experiment,

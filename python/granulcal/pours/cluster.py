@@ -230,19 +230,20 @@ def gather(
     Raises:
         ModuleNotFoundError: ray is not installed.
         ConnectionError: there is no cluster at the address.
-        ValueError: a folder or a part in the store made from something else, or a worker with
-            another granulcal.
+        ValueError: a store that is no URL, a folder or a part in the store made from something
+            else, or a worker with another granulcal.
     """
     import ray
 
+    store = None if cluster.store is None else PartStore(cluster.store)
     batch = _native.GatheredBatch(
         scene, prior_toml, folder, rows=rows, seed=seed, resume=resume, chunk=chunk
     )
     try:
         stored = None
-        if cluster.store is not None:
+        if store is not None:
             stored = StoredParts(
-                PartStore(cluster.store),
+                store,
                 batch,
                 folder,
                 scene=scene,

@@ -20,14 +20,22 @@ class PartStore:
 
     Raises:
         ModuleNotFoundError: fsspec, or what it needs for this kind of URL, is not installed.
-        ValueError: no such kind of URL.
+        ValueError: no such kind of URL; the message says what is allowed.
     """
 
     def __init__(self, url: str) -> None:
         import fsspec  # pyright: ignore[reportMissingImports]
 
         self.url = url
-        found: tuple[Any, str] = fsspec.core.url_to_fs(url)
+        allowed = "a folder's URL as fsspec takes it, as file:///shared/run or s3://bucket/run"
+        if not url:
+            raise ValueError(f"the store must be {allowed}, got an empty text")
+        try:
+            found: tuple[Any, str] = fsspec.core.url_to_fs(url)
+        except ValueError as error:
+            raise ValueError(f"the store must be {allowed}, got {url!r}: {error}") from None
+        except ImportError as error:
+            raise ModuleNotFoundError(f"the store {url!r} needs another package: {error}") from None
         self._files, self._root = found[0], found[1].rstrip("/")
 
     def chunks(self) -> set[int]:
