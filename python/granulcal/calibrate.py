@@ -74,8 +74,8 @@ def require_own_statistics(model: "BayesSim") -> None:
     """
     if tuple(model.x_names) != tuple(NAMES):
         raise ValueError(
-            f"the model must be of the statistics {', '.join(NAMES)}, in this order; it is of "
-            f"{', '.join(model.x_names)}"
+            f"the model must be of the {len(NAMES)} statistics of an image, in order; it is of "
+            f"{', '.join(model.x_names)}: `granulcal infer` takes tables of these"
         )
 
 

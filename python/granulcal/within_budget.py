@@ -1,7 +1,7 @@
 """A material from recordings with a given number of pours, made for these recordings alone."""
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from granulcal.bayessim.training.sequential import Round, SequentialFit
     from granulcal.engines import Engine
 
-__all__ = ["KeptPours", "calibrate_within"]
+__all__ = ["KeptPours", "calibrate_observed", "calibrate_within"]
 
 
 def calibrate_within(
@@ -99,6 +99,80 @@ def calibrate_within(
     with spread_over(cluster_asked(ray)):
         found = infer_within_budget(
             pours, prior, observed, budget=budget, seed=seed, x_names=NAMES, progress=progress
+        )
+    return replace(found, left_out=pours.left_out(len(found.x)))
+
+
+def calibrate_observed(
+    scene: Scene,
+    prior: Prior,
+    measured: Mapping[str, Mapping[str, float]],
+    *,
+    budget: int = 100,
+    out: str | PathLike[str],
+    seed: int = 0,
+    threads: int | None = None,
+    progress: "Callable[[Round], None] | None" = None,
+    poured: Callable[[int], None] | None = None,
+    engine: "Engine | None" = None,
+    ray: "str | Cluster | None" = None,
+) -> "SequentialFit":
+    """Returns the posterior of what a scene observes, measured once or several times.
+
+    Args:
+        scene: what was measured, with its `observe`.
+        prior: of the parameters.
+        measured: by name of the measurement its statistics, as `Recording.observed` reads them;
+            of one material. Those that are NaN in one of them are left out of all.
+        budget: as in `calibrate_within`, like the rest.
+        out: folder of pours.json.
+        seed: seed of every random choice.
+        threads: pours at once; the default is one for each core.
+        progress: called after each round.
+        poured: called with the number of kept pours after each.
+        engine: another simulator in place of ours.
+        ray: address of a Ray cluster that makes the pours.
+
+    Raises:
+        PriorError: a parameter that has no place in the scene over its whole range.
+        ValueError: nothing was measured of what the scene observes, too small a budget, or a folder
+            of pours that were made for something else.
+    """
+    from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
+
+    round_sizes(budget)
+    _require_fits(prior, scene)
+    all_names = tuple(scene.observed_names)
+    table = np.array([[each[name] for name in all_names] for each in measured.values()], float)
+    known = np.atleast_1d(np.isfinite(table.reshape(len(measured), len(all_names))).all(axis=0))
+    if not measured or not known.any():
+        raise ValueError(
+            f"{', '.join(measured) or 'nothing that was measured'} must have a value of one of "
+            f"{', '.join(all_names) or 'the statistics that the scene observes'}, got none"
+        )
+    names = tuple(name for name, has in zip(all_names, known, strict=True) if has)
+    folder, observed = Path(out), table[:, known]
+    folder.mkdir(parents=True, exist_ok=True)
+    pours = KeptPours(
+        scene,
+        prior,
+        folder / "pours.json",
+        seed=seed,
+        threads=threads,
+        progress=poured,
+        observed=True,
+        engine=engine,
+        made_for=MadeFor.of(list(measured), observed),
+    )
+    with spread_over(cluster_asked(ray)):
+        found = infer_within_budget(
+            lambda theta, first: pours(theta, first)[:, known],
+            prior,
+            observed,
+            budget=budget,
+            seed=seed,
+            x_names=names,
+            progress=progress,
         )
     return replace(found, left_out=pours.left_out(len(found.x)))
 

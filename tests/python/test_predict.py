@@ -45,6 +45,8 @@ def test_a_condition_states_each_path_once() -> None:
     with pytest.raises(ObservationError, match="each path once, got a twice"):
         condition_of(["a=1", "b=2", "a=1"])
     assert condition_of(["a=1e-3 # mine", "b=-2"]) == {"a": 1e-3, "b": -2.0}
+    # As `--set` takes them.
+    assert condition_of(["a=.05", "b=+1."]) == {"a": 0.05, "b": 1.0}
 
 
 @pytest.mark.parametrize("model", ["line", "nearest", "corrected"])

@@ -4,12 +4,14 @@ import argparse
 import json
 import sys
 import warnings
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from granulcal.commands.cluster import add_cluster, cluster_of
 from granulcal.commands.counts import pour_count, seed_number, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
+from granulcal.commands.observed import add_observed, measured_of, not_measured
 from granulcal.commands.parameters import parameters_of, print_parameters
 from granulcal.commands.reading import (
     add_reading,
@@ -40,6 +42,7 @@ def add(commands: Any) -> None:
     parser.add_argument("scene", type=READS, help="scene as TOML, or the word funnel or drop")
     parser.add_argument("prior", type=READS, help="prior as TOML, or the word default")
     add_reading(parser)
+    add_observed(parser)
     parser.add_argument(
         "--budget", type=pour_count, default=100, help="pours in all, at least 60 (default: 100)"
     )
@@ -63,7 +66,7 @@ def _run(options: argparse.Namespace) -> int:
     from granulcal.pours.scene import Scene
     from granulcal.prior import Prior
     from granulcal.progress import shown
-    from granulcal.within_budget import calibrate_within
+    from granulcal.within_budget import calibrate_observed, calibrate_within
 
     scene = Scene.named(options.scene)
     prior = Prior.named(options.prior)
@@ -71,12 +74,18 @@ def _run(options: argparse.Namespace) -> int:
     round_sizes(options.budget)
     if options.dry_run:
         return say_how_long(options, scene, prior, options.budget, engine=engine)
-    recordings = open_recordings(options)
-    if impossible := violations(scene, prior, recordings, options.recording):
-        document = told_outside(options, impossible)
-        print(json.dumps(document, indent=1) if options.json else outside(impossible))
-        return UNHEALTHY
-    doubtful = doubts(scene, prior, recordings, options.recording)
+    measured = measured_of(options, scene)
+    recordings: list[Recording] = []
+    doubtful: list[str] = []
+    if measured is None:
+        recordings = open_recordings(options)
+        if impossible := violations(scene, prior, recordings, options.recording):
+            document = told_outside(options, impossible)
+            print(json.dumps(document, indent=1) if options.json else outside(impossible))
+            return UNHEALTHY
+        doubtful = doubts(scene, prior, recordings, options.recording)
+    else:
+        doubtful = not_measured(measured)
     warn(doubtful)
     # Told when the recordings were opened.
     unlike = [f"{r.path}: {r.unlike}" for r in recordings if r.unlike is not None]
@@ -90,10 +99,12 @@ def _run(options: argparse.Namespace) -> int:
     with shown() as line, warnings.catch_warnings():
         # They have been told.
         warnings.simplefilter("ignore", DoubtfulRecordingWarning)
-        found = calibrate_within(
-            scene,
-            prior,
-            recordings,
+        run = (
+            partial(calibrate_within, scene, prior, recordings)
+            if measured is None
+            else partial(calibrate_observed, scene, prior, measured)
+        )
+        found = run(
             budget=options.budget,
             out=options.out,
             seed=options.seed,

@@ -1,7 +1,8 @@
-"""`infer` by a model of what a scene observes: drums, run-outs, discharges, spills and the like."""
+"""`infer` and `calibrate` of what a scene observes: drums, run-outs, discharges, spills and the like."""
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,10 +13,12 @@ from granulcal.commands.parameters import parameters_of, print_parameters
 from granulcal.files import write_beside
 from granulcal.pours.scene import Scene
 
-__all__ = ["add_observed", "is_of_observed", "run"]
+__all__ = ["add_observed", "is_of_observed", "measured_of", "not_measured", "refuse", "run"]
 
 _SAMPLES = 1000
 _OURS = ("width", "fps", "series")
+# What no depth recording is called; a picture (.png) is one of a drum where --width goes with it.
+_TABLES = (".bmp", ".csv", ".json", ".txt")
 _OF_RECORDINGS = ("camera", "topic", "camera_topic", "colour_topic", "first_frame", "border")
 
 
@@ -46,6 +49,40 @@ def refuse(options: argparse.Namespace) -> None:
         ValueError: one of them is there.
     """
     _refuse(options, _OURS, "goes with a model of what a scene observes; this one is of images")
+
+
+def measured_of(options: argparse.Namespace, scene: Scene) -> dict[str, dict[str, float]] | None:
+    """Returns the statistics of each measurement by its path; None where they are depth images.
+
+    Raises:
+        ValueError: a measurement is none of the scene's, or a word does not go with it.
+    """
+    tables = [path for path in options.recording if path.suffix.lower() in _TABLES]
+    if not tables and options.width is None:
+        _refuse(options, _OURS, "goes with measurements of what a scene observes, not with images")
+        return None
+    if not scene.observed_names:
+        raise ValueError(
+            f"{options.recording[0]} is no depth image, and the scene {scene.name} observes "
+            "nothing else: say under [observe] what was measured (docs/scenes.md)"
+        )
+    _refuse(options, _OF_RECORDINGS, "is of depth images; these measurements are none")
+    _require_different(options.recording)
+    names = scene.observed_names
+    return {str(path): _read(options, path, scene, names) for path in options.recording}
+
+
+def not_measured(measured: dict[str, dict[str, float]]) -> list[str]:
+    """Returns what is to be said of statistics that not every measurement has."""
+    lacking: dict[str, list[str]] = {}
+    for path, found in measured.items():
+        for name in (name for name, value in found.items() if math.isnan(value)):
+            lacking.setdefault(name, []).append(path)
+    return [
+        f"{name} is left out: {', '.join(paths)} {'has' if len(paths) == 1 else 'have'} no value "
+        "of it"
+        for name, paths in lacking.items()
+    ]
 
 
 def run(options: argparse.Namespace, folder: Path, document: dict[str, Any]) -> int:
@@ -119,16 +156,23 @@ def _measured(
     options: argparse.Namespace, path: Path, scene: Scene, names: Sequence[str]
 ) -> dict[str, float]:
     """The statistics of the model by name, as one measurement has them."""
-    from granulcal.measured.recording import Recording
-
-    found = Recording.observed(
-        path, scene, width=options.width, fps=options.fps, series=options.series
-    )
+    found = _read(options, path, scene, names)
     if lacking := [name for name in names if not found[name] == found[name]]:
         raise ValueError(
             f"{path} has no value of {', '.join(lacking)}, which the model was trained on: it "
             "must be measured, or the scene must not observe it"
         )
+    return found
+
+
+def _read(
+    options: argparse.Namespace, path: Path, scene: Scene, names: Sequence[str]
+) -> dict[str, float]:
+    from granulcal.measured.recording import Recording
+
+    found = Recording.observed(
+        path, scene, width=options.width, fps=options.fps, series=options.series
+    )
     return {name: found[name] for name in names}
 
 
@@ -149,5 +193,5 @@ def _samples(posterior: Any, count: int, seed: int) -> list[list[float]]:
 
 def _refuse(options: argparse.Namespace, names: Sequence[str], why: str) -> None:
     for name in names:
-        if getattr(options, name) is not None:
+        if getattr(options, name, None) is not None:
             raise ValueError(f"--{name.replace('_', '-')} {why}")

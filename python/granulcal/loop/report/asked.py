@@ -1,6 +1,5 @@
 """A condition that a closed loop is asked for: its numbers, and how far it is from the measured."""
 
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -38,25 +37,25 @@ def condition_of(words: Sequence[str]) -> dict[str, float]:
     found: dict[str, float] = {}
     for word in words:
         path, _, value = word.partition("=")
-        try:
-            number = tomllib.loads(f"x = {value}")
-        except tomllib.TOMLDecodeError:
-            number = {}
-        if not path or set(number) != {"x"} or not _is_number(number["x"]):
+        number = _number(value)
+        if not path or number is None:
             raise ObservationError(
                 "a condition is written path=number, for example funnel.height=0.07, its number "
                 f"finite; got {word!r}"
             )
         if path in found:
             raise ObservationError(f"a condition states each path once, got {path} twice")
-        found[path] = float(number["x"])
+        found[path] = number
     return found
 
 
-def _is_number(value: object) -> bool:
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        return False
-    return -_LARGEST <= value <= _LARGEST
+def _number(text: str) -> float | None:
+    """Returns a number as `--set` takes it, before a comment; None of what is none."""
+    try:
+        number = float(text.partition("#")[0])
+    except ValueError:
+        return None
+    return number if -_LARGEST <= number <= _LARGEST else None
 
 
 def require_stated(model: str, at: Iterable[str], known: Sequence[str]) -> None:
