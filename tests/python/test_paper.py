@@ -314,3 +314,14 @@ def test_tests_are_made_until_enough_are_usable(small_scene, small_prior, tmp_pa
     assert len(found) == 5 and shop.pours >= 5 and shop.seeds == {"tests": 3}
     part = found.of(found.names[2:4])
     np.testing.assert_array_equal(part.x, found.x[:, 2:4])
+
+
+def test_a_change_that_no_curve_shows_is_beyond_the_range_without_a_warning(monkeypatch):
+    from granulcal.experiments.paper import propagation
+    from granulcal.pours.statistics import NAMES
+
+    values, x = np.linspace(0.0, 1.0, 5), np.ones((5, 3, len(NAMES)))
+    # NumPy warns of the difference of two infinite numbers, and warnings are errors here.
+    monkeypatch.setattr(propagation, "_RESAMPLES", 20)
+    row = propagation._row("q", "p", values, x, 0.5, [("max_z", lambda middle: np.array(0.1))])
+    assert (row.ours, row.interval) == ("more than ± 0.5", "beyond the range")

@@ -115,7 +115,9 @@ def _row(quantity: str, paper: str, values: Array, x: Array, at: float, wanted) 
         again = np.take_along_axis(x, rows[:, :, None], axis=1)
         again = again[:, :, [i for i, _ in shown]]
         drawn.append(_least(values, again, at, [of for _, of in shown]))
-    low, high = np.quantile(drawn, (0.025, 0.975))
+    # Between two that are infinite there is no number, which is beyond the range as well.
+    with np.errstate(invalid="ignore"):
+        low, high = np.quantile(drawn, (0.025, 0.975))
     reach = max(at - values[0], values[-1] - at)
     told = f"more than ± {reach:.2g}" if not np.isfinite(best) else f"± {best:.2g}"
     top = f"{high:.2g}" if np.isfinite(high) else "beyond the range"
