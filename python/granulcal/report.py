@@ -2,6 +2,7 @@
 
 import base64
 import platform
+import re
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -173,7 +174,15 @@ def template(name: str) -> Any:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["code"] = _with_code
     return environment.get_template(name)
+
+
+def _with_code(text: str) -> Any:
+    """Returns a sentence for a page, what stands between backticks as code."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def _formations(measured: Array, pour: Pour) -> str:

@@ -218,3 +218,11 @@ def test_a_band_holds_the_draws_and_tells_what_is_outside():
     lower = profile_band(_cone(0.01), [_cone(0.02)], draws)
     inner = lower.edges[1:] < 0.045
     assert np.all(lower.measured[inner] < lower.band[0][inner]) and lower.inside < 0.5
+
+
+def test_a_command_in_a_note_is_code_and_nothing_else_is_markup():
+    from granulcal.report import template
+
+    code = template("report.html.j2").environment.filters["code"]
+    told = "<code>granulcal check</code> &lt;b&gt; a` says"
+    assert str(code("`granulcal check` <b> a` says")) == told
