@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use granulcal_features::stats::DIAGNOSTIC_COUNT;
 use granulcal_features::{DIAGNOSTICS, PAPER16};
 
+use crate::faults::Faults;
 use crate::gaps::Gaps;
 use crate::header::Header;
 use crate::manifest::{self, Manifest};
@@ -32,7 +33,8 @@ impl Dataset {
     ///
     /// # Errors
     /// [`DatasetError::Io`], [`DatasetError::Parquet`], [`DatasetError::Damaged`] or [`DatasetError::Content`] name the
-    /// file and what is wrong with it; [`DatasetError::Differs`] for parts of different data sets.
+    /// file and what is wrong with it; [`DatasetError::Differs`] for parts of different data sets,
+    /// [`DatasetError::Several`] for parts that are wrong.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
         if !path.is_dir() {
             let Table { header, rows, is_verified, asked } = table::read(path)?;
@@ -43,15 +45,20 @@ impl Dataset {
         }
         let Manifest { header, rows: asked, .. } = Manifest::of(path)?;
         let mut dataset = Self { header, rows: Vec::new(), unverified: Vec::new(), asked };
+        let mut faults = Faults::default();
         for chunk in manifest::parts(path)? {
             let part = manifest::part_path(path, chunk);
-            let Table { header, rows, is_verified, .. } = table::read(&part)?;
-            dataset.header.require_same(&part, &header)?;
+            let checked = table::read(&part).and_then(|table| {
+                dataset.header.require_same(&part, &table.header)?;
+                Ok(table)
+            });
+            let Some(Table { rows, is_verified, .. }) = faults.keep(checked) else { continue };
             dataset.rows.extend(rows);
             if !is_verified {
                 dataset.unverified.push(part);
             }
         }
+        faults.require_none()?;
         dataset.sort(path)?;
         Ok(dataset)
     }

@@ -211,6 +211,12 @@ pub enum DatasetError {
         /// The hash that the file states.
         stated: String,
     },
+    /// Several files cannot be used, each for a reason of its own.
+    #[error("{} files cannot be used:{}", all.len(), lines(all))]
+    Several {
+        /// Why, two at least.
+        all: Vec<DatasetError>,
+    },
     /// Two things that must be the same differ.
     #[error("{}: {what} is {found}, but {given} is given; use another folder, or {what} of before", path.display())]
     Differs {
@@ -268,6 +274,7 @@ impl DatasetError {
             | Self::NoThread(_)
             | Self::Engine { .. } => false,
             Self::Row { source, .. } | Self::Part { source, .. } => source.is_bad_input(),
+            Self::Several { all } => all.iter().all(Self::is_bad_input),
             _ => true,
         }
     }
@@ -291,4 +298,18 @@ impl DatasetError {
             allowed: allowed.into(),
         }
     }
+}
+
+/// A line for each error, with its causes.
+fn lines(all: &[DatasetError]) -> String {
+    let line = |error: &DatasetError| {
+        let mut text = format!("\n  {error}");
+        let mut source = std::error::Error::source(error);
+        while let Some(cause) = source {
+            text += &format!(": {cause}");
+            source = cause.source();
+        }
+        text.trim_end().to_owned()
+    };
+    all.iter().map(line).collect()
 }

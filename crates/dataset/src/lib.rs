@@ -34,6 +34,7 @@ mod drawn;
 mod engine;
 mod error;
 mod fault;
+mod faults;
 mod files;
 mod form;
 mod frame_rate;

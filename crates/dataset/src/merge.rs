@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use crate::DatasetError;
+use crate::faults::{Faults, several};
 use crate::gaps::Gaps;
 use crate::header::Header;
 use crate::manifest::{self, Manifest};
@@ -39,8 +40,8 @@ pub struct Merged {
 ///
 /// # Errors
 /// [`DatasetError::Differs`] names the first difference, [`DatasetError::DuplicateRow`] a row that is another in two of
-/// them, [`DatasetError::Argument`] for no input; else as [`crate::Dataset::open`] and [`crate::Dataset::write`]. The
-/// file is then as it was before.
+/// them, [`DatasetError::Argument`] for no input; else as [`crate::Dataset::open`] and [`crate::Dataset::write`]: all
+/// files that cannot be used are named at once. The file is then as it was before.
 pub fn merge(inputs: &[PathBuf], out: &Path, named_gaps: usize) -> Result<Merged, DatasetError> {
     let Sources { header, asked, mut waiting } = sources(inputs)?;
     let mut file = GroupWriter::create(out, &header)?;
@@ -61,7 +62,15 @@ pub fn merge(inputs: &[PathBuf], out: &Path, named_gaps: usize) -> Result<Merged
                 break least;
             }
             if let Some(source) = waiting.pop_front() {
-                open.extend(source.open(&mut merged)?);
+                match source.open(&mut merged) {
+                    Ok(opened) => open.extend(opened),
+                    Err(error) => {
+                        // Those that were still to be opened may be bad, too.
+                        let rest = waiting.into_iter().map(|source| source.open(&mut merged));
+                        let others = rest.filter_map(Result::err);
+                        return Err(several(std::iter::once(error).chain(others).collect()));
+                    }
+                }
             }
         };
         let Some(least) = least else { break };
@@ -124,34 +133,17 @@ struct OpenSource {
 /// The files of all inputs, and what they are of.
 fn sources(inputs: &[PathBuf]) -> Result<Sources, DatasetError> {
     let mut found: Option<Header> = None;
-    let mut asked = None;
-    let mut sources = Vec::new();
+    let (mut asked, mut sources, mut faults) = (None, Vec::new(), Faults::default());
     for input in inputs {
-        let of_input = if input.is_dir() {
-            let Manifest { header, chunk, rows } = Manifest::of(input)?;
-            asked = asked.max(rows);
-            sources.extend(manifest::parts(input)?.into_iter().map(|number| Source {
-                input: input.clone(),
-                file: manifest::part_path(input, number),
-                first: number.saturating_mul(chunk),
-                read: None,
-            }));
-            header
-        } else {
-            let mut table = table::read(input)?;
-            table.rows.sort_by_key(|row| row.row);
-            asked = asked.max(table.asked);
-            let header = table.header.clone();
-            let first = table.rows.first().map_or(0, |row| row.row);
-            let (input, file) = (input.clone(), input.clone());
-            sources.push(Source { input, file, first, read: Some(table) });
-            header
-        };
+        let Some((header, rows, files)) = faults.keep(sources_of(input)) else { continue };
         match &found {
-            Some(found) => of_input.require_same(input, found)?,
-            None => found = Some(of_input),
+            Some(found) => _ = faults.keep(header.require_same(input, found)),
+            None => found = Some(header),
         }
+        asked = asked.max(rows);
+        sources.extend(files);
     }
+    faults.require_none()?;
     // Where two begin with the same row the one that was named first is first.
     sources.sort_by_key(|source| source.first);
     let header = found.ok_or(DatasetError::Argument {
@@ -160,6 +152,26 @@ fn sources(inputs: &[PathBuf]) -> Result<Sources, DatasetError> {
         allowed: "at least 1",
     })?;
     Ok(Sources { header, asked, waiting: sources.into() })
+}
+
+/// What an input is of, how many rows were asked for, and its files.
+fn sources_of(input: &Path) -> Result<(Header, Option<u64>, Vec<Source>), DatasetError> {
+    if input.is_dir() {
+        let Manifest { header, chunk, rows } = Manifest::of(input)?;
+        let source = |number: u64| Source {
+            input: input.to_owned(),
+            file: manifest::part_path(input, number),
+            first: number.saturating_mul(chunk),
+            read: None,
+        };
+        return Ok((header, rows, manifest::parts(input)?.into_iter().map(source).collect()));
+    }
+    let mut table = table::read(input)?;
+    table.rows.sort_by_key(|row| row.row);
+    let (header, asked) = (table.header.clone(), table.asked);
+    let first = table.rows.first().map_or(0, |row| row.row);
+    let (input, file) = (input.to_owned(), input.to_owned());
+    Ok((header, asked, vec![Source { input, file, first, read: Some(table) }]))
 }
 
 impl Source {

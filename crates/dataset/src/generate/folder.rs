@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::chunk::{OpenChunk, Progress};
 use super::options::GenerateOptions;
+use crate::faults::Faults;
 use crate::header::Header;
 use crate::manifest::{self, Manifest};
 use crate::random::pour_seed;
@@ -159,9 +160,10 @@ impl Folder {
         remaining.progress.total = rows_of_shard(options, self.chunk);
         let is_wanted =
             |chunk: &u64| *chunk < chunks && chunk % options.shard.count == options.shard.index;
+        let mut faults = Faults::default();
         for chunk in manifest::parts(&self.path)?.into_iter().filter(is_wanted) {
             let (first, end) = (chunk * self.chunk, ((chunk + 1) * self.chunk).min(options.rows));
-            let (rows, is_verified) = self.read_part(chunk)?;
+            let Some((rows, is_verified)) = faults.keep(self.read_part(chunk)) else { continue };
             remaining.progress.unverified += u64::from(!is_verified);
             let (kept, beyond): (Vec<_>, Vec<_>) = rows.iter().partition(|row| row.row < end);
             remaining.progress.resumed += kept.len() as u64;
@@ -179,6 +181,7 @@ impl Folder {
                 remaining.open.insert(chunk, OpenChunk { rows, left, changed: false });
             }
         }
+        faults.require_none()?;
         Ok(remaining)
     }
 

@@ -311,6 +311,36 @@ fn damaged_parts_are_named_and_leftovers_removed() {
 }
 
 #[test]
+fn all_that_is_damaged_is_named_at_once() {
+    let place = Place::new();
+    for (name, text) in [("left", "0/2"), ("right", "1/2")] {
+        place.make(name, &GenerateOptions { shard: text.parse().unwrap(), ..options(10) });
+    }
+    let bad = ["left/part-000000.parquet", "left/part-000002.parquet", "right/part-000001.parquet"];
+    bad.iter().for_each(|part| fs::write(place.at(part), b"not a table").unwrap());
+    let names = |error: DatasetError, expected: &[&str]| {
+        assert!(error.is_bad_input());
+        let text = error.to_string();
+        let all = bad.iter().chain(&["nothing", "none"]);
+        let named: Vec<_> = all.filter(|name| text.contains(*name)).copied().collect();
+        assert_eq!(named, expected, "{text}");
+    };
+    let merged = |inputs: &[&str]| {
+        let inputs: Vec<_> = inputs.iter().map(|name| place.at(name)).collect();
+        merge(&inputs, &place.at("all.parquet"), 5).unwrap_err()
+    };
+    names(merged(&["left", "right"]), &bad);
+    names(merged(&["nothing", "right", "none"]), &["nothing", "none"]);
+    names(Dataset::open(&place.at("left")).unwrap_err(), &bad[..2]);
+    let again = GenerateOptions { shard: "0/2".parse().unwrap(), ..options(10) };
+    let (prior, left) = (Prior::default(), place.at("left"));
+    let error = generate(&small(), &prior, &again, &left, &mut |_| true).unwrap_err();
+    assert_eq!(error.to_string().matches("its rows are made again").count(), 2);
+    names(error, &bad[..2]);
+    assert!(!place.at("all.parquet").exists());
+}
+
+#[test]
 fn rows_without_grains_in_view_are_rows() {
     let place = Place::new();
     let mut scene = small();
