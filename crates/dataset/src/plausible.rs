@@ -32,6 +32,8 @@ const LEFT_OVER: f64 = 0.2;
 /// Share of the formation's outline beyond which nothing is seen, above which that is said. A stereo camera's shadows at
 /// its foot stay below.
 const HIDDEN: f64 = 0.1;
+/// Factor beyond what a scene allows, above which a unit is asked for: millimetres are 1000 times as many as metres.
+const MUCH: f64 = 30.0;
 /// Factor on half the diagonal of the field of view.
 const EXTENT_MARGIN: f64 = 1.5;
 /// Grain diameters that the ground's residual may have as standard deviation, and metres that are always allowed.
@@ -70,6 +72,8 @@ pub struct Limits {
     pub shown: f64,
     /// Whether nothing in it prefers a direction.
     pub is_axisymmetric: bool,
+    /// Whether it lies on a bed of grains, which is no plane and of which single heaps may be thrown up.
+    pub is_on_bed: bool,
 }
 
 impl Limits {
@@ -103,6 +107,7 @@ impl Limits {
             bow: a.bow.max(b.bow),
             shown: a.shown.min(b.shown),
             is_axisymmetric: a.is_axisymmetric && b.is_axisymmetric,
+            is_on_bed: a.is_on_bed || b.is_on_bed,
         }))
     }
 
@@ -128,6 +133,7 @@ impl Limits {
             bow: bare.bow,
             shown: bare.shown,
             is_axisymmetric: scene.is_axisymmetric(),
+            is_on_bed: scene.bed.is_some(),
         })
     }
 
@@ -137,9 +143,12 @@ impl Limits {
         let mut found = Vec::new();
         let mut compare = |what: &str, unit: &str, value: f64, limit: f64| {
             if value.is_nan() || value > limit {
+                let hint =
+                    if value > MUCH * limit { ": is the unit of the depths right?" } else { "" };
                 let (value, limit) = (short(value), short(limit));
-                found
-                    .push(format!("{what} is {value} {unit}, in the scene at most {limit} {unit}"));
+                found.push(format!(
+                    "{what} is {value} {unit}, in the scene at most {limit} {unit}{hint}"
+                ));
             }
         };
         let height = quantile(points().map(|p| p.z).collect(), HEIGHT_SHARE);

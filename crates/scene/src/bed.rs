@@ -116,6 +116,7 @@ mod tests {
                 "bed.radius",
             ),
             (|s| s.bed.as_mut().unwrap().settle = -1.0, "bed.settle"),
+            (|s| s.bed.as_mut().unwrap().settle = 5.0, "bed.settle must be less than end.horizon"),
             (|s| s.bed.as_mut().unwrap().jitter = 1e-3, "bed.jitter"),
             (|s| s.bed.as_mut().unwrap().height = 3e-3, "smaller of radius and height"),
             (|s| s.bed.as_mut().unwrap().spacing = 4.0e-6, "bed.spacing"),

@@ -96,6 +96,8 @@ mod tests {
             (|i| i.position[1] = f64::NAN, "intruder.position"),
             (|i| i.velocity[0] = f64::INFINITY, "intruder.velocity"),
             (|i| i.enters = -1.0, "intruder.enters"),
+            // The scene's horizon is 4 s.
+            (|i| i.enters = 4.0, "intruder.enters must be less than end.horizon, got 4"),
         ] {
             let mut scene = scene();
             change(scene.intruder.as_mut().unwrap());

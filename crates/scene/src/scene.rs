@@ -283,8 +283,21 @@ impl Scene {
         if let Some(observe) = &self.observe {
             observe.check(self.end.horizon, self.grains.diameter)?;
         }
+        self.check_entries()?;
         check_views(&self.views)?;
         self.camera.check()
+    }
+
+    /// What is let in later has to come before the pour ends.
+    fn check_entries(&self) -> Result<(), SceneError> {
+        let enters = self.intruder.as_ref().map(|intruder| ("intruder.enters", intruder.enters));
+        let settles = self.bed.map(|bed| ("bed.settle", bed.settle));
+        for (name, at) in enters.into_iter().chain(settles) {
+            if at >= self.end.horizon {
+                return Err(SceneError::range(name, at, "less than end.horizon"));
+            }
+        }
+        Ok(())
     }
 }
 

@@ -165,7 +165,8 @@ impl Limits {
                 short(1e3 * self.diameter)
             ));
         }
-        let bow = formation.ground_bow()?;
+        // A crater is a bend of the bed.
+        let bow = formation.ground_bow().filter(|_| !self.is_on_bed)?;
         let least = (BENT * formation.threshold).max(formation.ground_sd);
         let most = least.max(BENT_BY_SENSOR * self.bow);
         (bow > most).then(|| {
@@ -193,8 +194,10 @@ impl Limits {
                 found.push(format!("{rest} more {more}"));
             }
         };
+        // A ring is often in pieces.
+        let apart = if self.is_on_bed { Vec::new() } else { formation.other_heaps(self.diameter) };
         tell(
-            formation.other_heaps(self.diameter),
+            apart,
             "stand apart from the formation and are taken for grains: if they are none, take them away or out of the image",
             "stand apart from it like these",
         );

@@ -29,6 +29,10 @@ fn a_heap_that_lacks_grains_or_is_in_another_unit_cannot_be_of_the_scene() {
     assert!(few.len() == 1 && few[0].contains("as many grains"), "{few:?}");
     let small = limits.violations(&cone(1e-3, 0.06));
     assert!(small.iter().any(|reason| reason.contains("unit of the depths")), "{small:?}");
+    // Millimetres that were taken for metres.
+    let giant = limits.violations(&cone(30.0, 0.06));
+    assert!(giant[0].starts_with("the formation's height is 2"), "{giant:?}");
+    assert!(giant[0].ends_with(": is the unit of the depths right?"), "{giant:?}");
     // Leftovers of a pour that has rolled out of view are a formation of the scene.
     assert_eq!(limits.violations(&cone(8e-3, 0.015)), Vec::<String>::new());
     let of_threshold = limits.doubts(&cone(0.03, 0.06));
@@ -89,6 +93,11 @@ fn a_heap_that_lacks_grains_or_is_in_another_unit_cannot_be_of_the_scene() {
     let limits = Limits { threshold: None, ..limits };
     assert_eq!(limits.violations(&cone(0.02, 0.04)), Vec::<String>::new());
     assert!(limits.doubts(&cone(0.02, 0.04)).is_empty());
+    // What is left of it is bent, and a ring is in pieces.
+    let pieces = field(&[(0.1, 0.0), (-0.1, 0.0)], HEAP, 1.0, -5e-4);
+    assert_eq!(limits.doubts(&pieces), Vec::<String>::new());
+    let on_a_table = funnel().doubts(&pieces).join("; ");
+    assert!(on_a_table.contains("stand apart") && on_a_table.contains("is bent"), "{on_a_table}");
 }
 
 /// Heaps of a height and radius at places of a field of half a metre, 4 mm to a pixel, on a ground of some bow `[m]`, all
