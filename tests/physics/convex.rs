@@ -101,3 +101,27 @@ fn a_thin_wall_that_moves_takes_a_body_along() {
         assert!(pour.positions[0].x > 0.02, "{seed}: {}", pour.positions[0].x);
     }
 }
+
+#[test]
+fn bodies_begin_as_their_start_states_and_what_lay_stays() {
+    let count = 12;
+    let pour = Simulation::new(&scene(cube(), count), 3).unwrap().run();
+    let convex = pour.convex.as_ref().unwrap();
+    let positions: Vec<[f64; 3]> = pour.positions.iter().map(|&at| at.into()).collect();
+    let orientations: Vec<[f64; 4]> =
+        convex.orientations.iter().map(|turn| turn.coords.into()).collect();
+    let mut lying = scene(cube(), count);
+    lying.start = Start::Poses { positions, orientations };
+    let simulation = Simulation::new(&lying, 8).unwrap();
+    simulation.check_start().unwrap();
+    let begun = simulation.convex().unwrap();
+    for (a, b) in begun.orientations.iter().zip(&convex.orientations) {
+        assert!(a.angle_to(b) < 1e-12);
+    }
+    let again = simulation.run();
+    assert_eq!(again.status, Status::AtRest);
+    for (a, b) in again.positions.iter().zip(&pour.positions) {
+        // Radii are 2 mm.
+        assert!((a - b).norm() < 1e-4, "{a} {b}");
+    }
+}

@@ -138,7 +138,7 @@ impl Bodies {
         }
     }
 
-    /// The bodies of a scene, turned at random, if its grains have a shape.
+    /// The bodies of a scene, turned at random or as its start states, if its grains have a shape.
     pub fn of(scene: &Scene, seed: u64) -> Option<Self> {
         let solid = scene.grains.solid()?;
         let mut turn = turns(seed ^ STREAM);
@@ -146,7 +146,13 @@ impl Bodies {
             let [i, j, k, w] = turn();
             RigidBody::still(centre, UnitQuaternion::new_normalize(Quaternion::new(w, i, j, k)))
         };
-        let all = scene.starting_positions(seed).into_iter().map(still).collect();
+        let centres = scene.starting_positions(seed).into_iter();
+        let all = match scene.starting_orientations() {
+            Some(stated) => {
+                centres.zip(stated).map(|(at, turn)| RigidBody::still(at, turn)).collect()
+            }
+            None => centres.map(still).collect(),
+        };
         Some(Self::new(solid, Small::of(scene), all))
     }
 

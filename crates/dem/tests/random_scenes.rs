@@ -254,6 +254,8 @@ fn scaled_start(start: Start, r: f64) -> Start {
         Start::Positions { positions } => Start::Positions {
             positions: positions.into_iter().map(|p| p.map(|c| r * c)).collect(),
         },
+        // Of grains with a shape, which these scenes have not.
+        start @ Start::Poses { .. } => start,
     }
 }
 

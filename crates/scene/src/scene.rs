@@ -3,7 +3,7 @@
 //! The same words stand in Rust, in TOML and in Python. Lengths are metres, angles radians, the
 //! ground is the plane z = 0 and gravity points down unless the scene says otherwise.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::bed::Bed;
@@ -225,6 +225,12 @@ impl Scene {
     pub fn starting_positions(&self, seed: u64) -> Vec<Vector3<f64>> {
         let pose = self.funnel.as_ref().and_then(|funnel| self.effects.funnel.of(funnel));
         self.start.positions(&self.held_grains(), self.funnel.as_ref(), pose.as_ref(), seed)
+    }
+
+    /// Turns of the grains at time zero from their own axes to the scene's, if the scene states them.
+    pub fn starting_orientations(&self) -> Option<Vec<UnitQuaternion<f64>>> {
+        let pose = self.funnel.as_ref().and_then(|funnel| self.effects.funnel.of(funnel));
+        self.start.orientations(pose.as_ref())
     }
 
     /// The preset's settings, at the substep that the scene states, if it does.

@@ -15,6 +15,8 @@ use crate::walls::Funnel;
 const MOST_PLACES: f64 = 1e8;
 /// Solid fraction of the closest packing of equal spheres, pi / sqrt(18).
 const CLOSEST_PACKING: f64 = 0.740_480_489_693_061;
+/// How far the norm of a stated quaternion may be from 1: what files round.
+const UNIT: f64 = 1e-3;
 /// What a limit in a message is within, as a share, so that it may be taken over as it is shown, with ten digits.
 const TOLD: f64 = 1e-9;
 
@@ -65,6 +67,13 @@ pub enum Start {
         /// Centre of each grain `[m]`, shape `[grains.count, 3]`. Overlaps are pushed apart like any other.
         positions: Vec<[f64; 3]>,
     },
+    /// Listed places of bodies, for example of grains with a shape that have come to rest. The seed changes nothing.
+    Poses {
+        /// Centre of mass of each grain `[m]`, shape `[grains.count, 3]`.
+        positions: Vec<[f64; 3]>,
+        /// Turn of each from its own axes to the scene's, as quaternions x, y, z, w, shape `[grains.count, 4]`.
+        orientations: Vec<[f64; 4]>,
+    },
 }
 
 impl Start {
@@ -110,19 +119,31 @@ impl Start {
                     return Err(SceneError::StartTooSmall { kind: "cylinder", capacity, count });
                 }
             }
-            Self::Positions { positions } => {
-                let (got, expected) = (positions.len(), grains.count);
-                if got != expected {
-                    return Err(SceneError::Length { name: "start.positions", got, expected });
-                }
-                for (grain, position) in positions.iter().enumerate() {
-                    for (axis, &value) in ["x", "y", "z"].iter().zip(position) {
-                        finite(&format!("start.positions.{grain}.{axis}"), value)?;
-                    }
-                }
+            Self::Positions { positions } => check_listed(positions, grains.count)?,
+            Self::Poses { positions, orientations } => {
+                check_listed(positions, grains.count)?;
+                check_turns(orientations, grains.count)?;
             }
         }
         Ok(())
+    }
+
+    /// Whether every place is stated.
+    pub fn is_listed(&self) -> bool {
+        matches!(self, Self::Positions { .. } | Self::Poses { .. })
+    }
+
+    /// The turns that are stated, one for each grain; `pose` is where the funnel hangs beside its place.
+    pub(crate) fn orientations(
+        &self,
+        pose: Option<&Isometry3<f64>>,
+    ) -> Option<Vec<UnitQuaternion<f64>>> {
+        let Self::Poses { orientations, .. } = self else { return None };
+        let turn = |&[x, y, z, w]: &[f64; 4]| {
+            let own = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+            pose.map_or(own, |pose| pose.rotation * own)
+        };
+        Some(orientations.iter().map(turn).collect())
     }
 
     /// How near two centres of a lattice may be `[m]`; none of listed ones.
@@ -134,7 +155,7 @@ impl Start {
             &Self::Ball { solid_fraction, jitter, .. } => {
                 (lattice_spacing(grains.diameter, solid_fraction), jitter)
             }
-            Self::Positions { .. } => return None,
+            Self::Positions { .. } | Self::Poses { .. } => return None,
         };
         Some(spacing - 2.0 * jitter * 3f64.sqrt())
     }
@@ -165,7 +186,7 @@ impl Start {
                 points.truncate(grains.count);
                 (points, jitter)
             }
-            Self::Positions { positions } => {
+            Self::Positions { positions } | Self::Poses { positions, .. } => {
                 (positions.iter().map(|&position| Vector3::from(position)).collect(), 0.0)
             }
         };
@@ -175,11 +196,41 @@ impl Start {
                 *point = (pose * Point3::from(*point)).coords;
             }
         }
-        if !matches!(self, Self::Positions { .. }) {
+        if !self.is_listed() {
             displace(&mut positions, jitter, &mut random);
         }
         positions
     }
+}
+
+fn check_listed(positions: &[[f64; 3]], expected: usize) -> Result<(), SceneError> {
+    let got = positions.len();
+    if got != expected {
+        return Err(SceneError::Length { name: "start.positions", got, expected });
+    }
+    for (grain, position) in positions.iter().enumerate() {
+        for (axis, &value) in ["x", "y", "z"].iter().zip(position) {
+            finite(&format!("start.positions.{grain}.{axis}"), value)?;
+        }
+    }
+    Ok(())
+}
+
+fn check_turns(orientations: &[[f64; 4]], expected: usize) -> Result<(), SceneError> {
+    let got = orientations.len();
+    if got != expected {
+        return Err(SceneError::Length { name: "start.orientations", got, expected });
+    }
+    for (grain, turn) in orientations.iter().enumerate() {
+        let norm = turn.iter().map(|part| part * part).sum::<f64>().sqrt();
+        // NaN is none.
+        let is_unit = (norm - 1.0).abs() <= UNIT;
+        if !is_unit {
+            let name = format!("start.orientations.{grain} (norm of the quaternion x, y, z, w)");
+            return Err(SceneError::range(name, norm, "1 within a thousandth"));
+        }
+    }
+    Ok(())
 }
 
 /// The random numbers of a seed.

@@ -13,7 +13,7 @@ impl Scene {
             Start::Grid { counts, .. } => self.funnel.is_some() || counts[0] == counts[1],
             Start::Ball { turned, .. } => !turned,
             Start::Cylinder { from, to, .. } => from[..2] == to[..2],
-            Start::Positions { .. } => false,
+            Start::Positions { .. } | Start::Poses { .. } => false,
         };
         let effects = &self.effects;
         let is_aside = effects.tilt.is_on()

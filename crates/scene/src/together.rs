@@ -53,7 +53,11 @@ impl Scene {
 
     /// What convex bodies cannot be with: they have walls, gravity and the plain law.
     fn check_shape(&self) -> Result<(), SceneError> {
-        let Some(shape) = &self.grains.shape else { return Ok(()) };
+        let Some(shape) = &self.grains.shape else {
+            let (one, needs) = ("start.orientations", "grains.shape");
+            let is_turned = matches!(self.start, Start::Poses { .. });
+            return if is_turned { Err(SceneError::Needs { one, needs }) } else { Ok(()) };
+        };
         shape.check()?;
         Solid::new(shape, self.grains.diameter)?;
         let Effects { ground, tilt, funnel, outlet, .. } = self.effects.clone();

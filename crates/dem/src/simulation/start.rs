@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use granulcal_scene::Start;
-
 use super::Simulation;
 use crate::bodies::{Bodies, Within};
 use crate::clumps::Clumps;
@@ -69,7 +67,7 @@ impl Simulation {
             }
         }
         // Elsewhere grains stand on a lattice that keeps them apart, or are parted.
-        let are_stated = matches!(self.origin.scene.start, Start::Positions { .. });
+        let are_stated = self.origin.scene.start.is_listed();
         let mut around = self.around.clone();
         around.move_walls(self.time());
         let mut found = TooDeep::default();

@@ -163,6 +163,38 @@ fn listed_positions_must_be_finite_and_one_for_each_grain() {
 }
 
 #[test]
+fn listed_turns_are_of_unit_length_and_of_grains_that_have_a_shape() {
+    let mut scene = Scene::drop(0.1);
+    scene.grains.count = 2;
+    let (positions, half) = (vec![[0.0, 0.0, 0.01], [0.01, -0.02, 0.01]], 0.5_f64.sqrt());
+    let turned = |orientations| Start::Poses { positions: positions.clone(), orientations };
+    scene.start = turned(vec![[0.0, 0.0, 0.0, 1.0], [half, 0.0, 0.0, half]]);
+    let refused = |scene: &Scene| scene.check().unwrap_err().to_string();
+    assert!(refused(&scene).contains("start.orientations needs grains.shape"));
+    scene.grains.shape = Some(crate::GrainShape::Box { aspect: [1.0, 1.0, 2.0] });
+    scene.check().unwrap();
+    assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
+    assert!(scene.start.is_listed() && !scene.is_axisymmetric());
+    let turns = scene.starting_orientations().unwrap();
+    // x, y, z, w: a quarter turn about x takes y to z.
+    assert!((turns[1] * Vector3::y() - Vector3::z()).norm() < 1e-15);
+    assert_eq!(scene.starting_positions(1), scene.starting_positions(2));
+    assert_eq!(Scene::drop(0.1).starting_orientations(), None);
+    // What a file rounds is taken as it is meant, and nothing else.
+    scene.start = turned(vec![[0.0, 0.0, 0.0, 1.0], [0.7071, 0.0, 0.0, 0.7071]]);
+    assert!((scene.starting_orientations().unwrap()[1].norm() - 1.0).abs() < 1e-15);
+    for (wrong, told) in [
+        (vec![[0.0, 0.0, 0.0, 1.0]], "start.orientations has 1 entries"),
+        (vec![[0.0, 0.0, 0.0, 1.0], [0.0; 4]], "start.orientations.1 (norm"),
+        (vec![[0.0, 0.0, 0.0, 1.0], [f64::NAN, 0.0, 0.0, 1.0]], "1 within a thousandth"),
+        (vec![[0.0, 0.0, 0.0, 1.002], [0.0, 0.0, 0.0, 1.0]], "start.orientations.0"),
+    ] {
+        scene.start = turned(wrong);
+        assert!(refused(&scene).contains(told), "{}", refused(&scene));
+    }
+}
+
+#[test]
 fn too_many_grains_or_too_much_jitter_is_refused() {
     let mut scene = Scene::funnel(0.12);
     scene.grains.count = 2001;
