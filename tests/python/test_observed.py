@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal import _native
 from granulcal.measured import DischargeCurve, DrumImage, RunOut
 
 _OBSERVE = """
@@ -200,6 +201,18 @@ def test_what_stays_behind_does_not_slow_a_discharge(scene: gc.Scene, tmp_path: 
         path.write_text("\n".join(["series,time_s,discharged_percent", *rows]) + "\n")
         observed = gc.Recording.observed(path, scene)
         assert observed["discharge_rate"] == pytest.approx(40.0), seconds
+
+
+def test_a_measured_rate_is_that_of_pours() -> None:
+    times = np.linspace(0.0, 3.0, 301)
+    # Not in one piece, as the columns of a file are.
+    table = np.column_stack([times, np.minimum(100.0, 45.0 * times), times])
+    curve = DischargeCurve(series="a", time=table[:, 0], percent=table[:, 1])
+    rate = _native.discharge_rate(times, np.minimum(100.0, 45.0 * times))
+    assert curve.rate() == rate == pytest.approx(45.0)
+    assert np.isnan(DischargeCurve(series="a", time=times[:2], percent=times[:2]).rate())
+    with pytest.raises(ValueError, match="one number for each of the 301 of time, got 2"):
+        _native.discharge_rate(times, times[:2])
 
 
 def test_numbers_measured_by_other_means_have_their_names(scene: gc.Scene, tmp_path: Path) -> None:

@@ -94,7 +94,8 @@ pub use message_file::{Damage, MessageFormat};
 pub use npz::{Npz, write_height_map};
 pub use observe::{Observation, TooFewGrains, View, capture, capture_from, observe, overhead};
 pub use observer::{
-    Observed, ObservedStatistic, Observer, POLL_INTERVAL, Series, observed_statistics,
+    DISCHARGE_RANGE, Observed, ObservedStatistic, Observer, POLL_INTERVAL, Series, discharge_rate,
+    observed_statistics,
 };
 pub use pictures::{Pictures, write_mask, write_pictures};
 pub use plausible::{LEAST_SHOWN, Limits};

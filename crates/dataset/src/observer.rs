@@ -19,6 +19,7 @@ use granulcal_scene::Scene;
 
 use crate::DatasetError;
 use crate::row::RowStatus;
+pub use discharge::{RATE_RANGE as DISCHARGE_RANGE, rate as discharge_rate};
 use observation::{Frame, Observation};
 pub use observation::{ObservedStatistic, Series};
 

@@ -9,6 +9,7 @@ mod array;
 mod camera;
 mod coordinates;
 mod dataset;
+mod discharge;
 mod emulated;
 mod error;
 mod files;
@@ -39,6 +40,8 @@ mod _native {
     use crate::coordinates::{Coordinates, quasi_uniform};
     #[pymodule_export]
     use crate::dataset::Dataset;
+    #[pymodule_export]
+    use crate::discharge::discharge_rate;
     #[pymodule_export]
     use crate::emulated::Emulated;
     #[pymodule_export]
@@ -75,6 +78,10 @@ mod _native {
     /// Number of the law that pours follow.
     #[pymodule_export]
     const LAW: u32 = granulcal_dem::LAW;
+
+    /// Shares between which the rate of a discharge is taken [%].
+    #[pymodule_export]
+    const DISCHARGE_RANGE: (f64, f64) = granulcal_dataset::DISCHARGE_RANGE;
 
     /// How often a right model is called wrong by an observation's misfit.
     #[pymodule_export]

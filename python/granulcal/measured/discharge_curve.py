@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal import _native
 from granulcal.measured.names import observed_of, value_at
 from granulcal.pours.scene import Scene
 from granulcal.pours.statistics import ObservedStatistics
@@ -17,10 +18,6 @@ __all__ = ["DischargeCurve"]
 Array = NDArray[np.float64]
 
 _HEADER = ["series", "time_s", "discharged_percent"]
-# As the simulated `discharge_rate`: after the start, before the end.
-_RATE_RANGE = (5.0, 85.0)
-# The last of what runs out is left out in any case: below this share of it [-].
-_BEFORE_THE_END = 0.95
 # Percent by which a weighed share may be off: what swings on a balance falls and overshoots.
 _MARGIN = 1.0
 
@@ -78,14 +75,11 @@ class DischargeCurve:
     def rate(self) -> float:
         """Returns the least-squares slope between 5 and 85 % [%/s], below 95 % of what runs out.
 
-        What stays behind, on a flat bottom or above an arch, is in no point of the flow.
+        What stays behind, on a flat bottom or above an arch, is in no point of the flow. The same
+        function as of the simulated `discharge_rate`.
         """
-        low, high = _RATE_RANGE
-        high = min(high, _BEFORE_THE_END * float(self.percent.max()))
-        within = (self.percent >= low) & (self.percent <= high)
-        if within.sum() < 2:
-            return float("nan")
-        return float(np.polyfit(self.time[within], self.percent[within], 1)[0])
+        time, percent = (np.ascontiguousarray(each, float) for each in (self.time, self.percent))
+        return _native.discharge_rate(time, percent)
 
     def observed(self, scene: Scene) -> ObservedStatistics:
         """Returns the measured `discharged[t]` of the scene's times and the `discharge_rate`.
@@ -110,8 +104,8 @@ def _require_rising(path: str | PathLike[str], series: str, percent: Array, line
             f"{path}: line {lines[at]:.0f}: what has run out cannot fall, series {series!r} does "
             f"by {fallen[at]:.3g} % to {percent[at]:.4g} %: is it the share that is left?"
         )
-    if not percent.max() > _RATE_RANGE[0]:
+    if not percent.max() > _native.DISCHARGE_RANGE[0]:
         raise ValueError(
             f"{path}: series {series!r} ends at {percent.max():.3g} %, must pass "
-            f"{_RATE_RANGE[0]:g} %: is it in percent?"
+            f"{_native.DISCHARGE_RANGE[0]:g} %: is it in percent?"
         )
