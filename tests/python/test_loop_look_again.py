@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from granulcal.loop import ConditionPours, Design, Effect, Surrogate, Thresholds, trace
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.check import look_again as module
-from granulcal.loop.check import placed, settle
+from granulcal.loop.check import placed, settle, weigh
 from granulcal.loop.check.look_again import ROUNDS, Looked, look_again
 from granulcal.loop.check.standing import stand
 from granulcal.loop.pours.replicates import ModelPours
@@ -64,9 +64,10 @@ def looked(
         )
 
     monkeypatch.setattr(settle, "both", both)
-    monkeypatch.setattr(
-        placed, "pours_of", lambda _, __, condition, one, seed: of(one, condition.at, seed)
-    )
+    for where in (placed, weigh):
+        monkeypatch.setattr(
+            where, "pours_of", lambda _, __, condition, one, seed: of(one, condition.at, seed)
+        )
     monkeypatch.setattr(module, "model_scene", lambda _, condition, one: (condition.at, one))
     monkeypatch.setattr(module, "model_faults", lambda _, one: {})
     monkeypatch.setattr(module, "seeds_of_replicates", lambda _, seed: seed)

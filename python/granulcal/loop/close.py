@@ -39,6 +39,7 @@ from granulcal.loop.check.checks import (
 from granulcal.loop.check.look_again import look_again
 from granulcal.loop.check.own_errors import as_recorded
 from granulcal.loop.check.prior_rounds import ROUNDS, drawn, prior_rounds
+from granulcal.loop.check.rival_rounds import rival_rounds
 from granulcal.loop.check.standing import stand
 from granulcal.loop.check.steady import drifts
 from granulcal.loop.check.unseen import seen_of, told_unseen
@@ -188,8 +189,13 @@ def close_loop(
         surrogate = conditioned(surrogate, more)
         found = trace(surrogate, observed, rules, seed=seed)
         say(f"after pours where the fits are, {found.verdict.kind}: {found.verdict.reason}")
-    seen = prior_rounds(analysis, surrogate, found, observed, measured)
-    looked = look_again(analysis, seen.surrogate, seen.trace, observed, measured)
+    beside = rival_rounds(analysis, surrogate, found, observed)
+    seen = prior_rounds(analysis, beside.surrogate, beside.trace, observed, measured)
+    begin = () if seen.best is None else seen.best.starts(analysis.plan.design)
+    again = rival_rounds(
+        analysis, seen.surrogate, seen.trace, observed, beside.rounds, starts=begin
+    )
+    looked = look_again(analysis, again.surrogate, again.trace, observed, measured)
     settled, there = looked.settled, looked.placed
     found, surrogate = settled.trace, settled.surrogate
     hidden = task.of(SEALED)
@@ -223,6 +229,7 @@ def close_loop(
         confirmed=settled.confirmed,
         anchors=settled.anchors,
         looked=looked.rounds,
+        weighed=[one.said for one in looked.weighed],
         own=own,
         of_base=of_base,
         draws=draws,
@@ -262,6 +269,8 @@ def close_loop(
         pours=plan.pours
         + _needed(task, pairs if wide is not None else 0, draws)
         + rounded
+        + beside.pours
+        + again.pours
         + settled.before
         + there.pours
         + looked.pours,

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from granulcal.loop.check.by_pours import ByPours
 from granulcal.loop.check.recentre import Recentred
 from granulcal.loop.check.trivial import TrivialRow
 from granulcal.loop.check.unseen import Seen
@@ -69,6 +70,7 @@ class Standing:
         of_base: the same of the base model.
         anchors: rounds of fresh pours that the surrogate was held by.
         looked: rounds of pours that contradicted the fits, from which the surrogate has learnt.
+        weighed: the name and its rivals by their own pours.
         draws: random draws of the model that were poured.
         nearer: D^2 of the best draw less that of the fit, with 95 %; None where neither was poured.
         moved: verdicts under the other definitions.
@@ -86,6 +88,7 @@ class Standing:
     of_base: Recentred | None = None
     anchors: int = 0
     looked: int = 0
+    weighed: tuple[ByPours, ...] = ()
 
     @property
     def stands(self) -> bool:
@@ -124,6 +127,7 @@ class Standing:
             "confirmed_p": None if self.confirmed != self.confirmed else self.confirmed,
             "anchors": self.anchors,
             "looked_again": self.looked,
+            "rivals": [one.to_dict() for one in self.weighed],
             "own_pours": None if self.own is None else self.own.to_dict(),
             "base_pours_p": None if self.of_base is None else self.of_base.residual_test.p,
             "random_draws": self.draws,
@@ -156,6 +160,7 @@ def stand(
     confirmed: float,
     anchors: int = 0,
     looked: int = 0,
+    weighed: Sequence[ByPours] = (),
     own: Recentred | None = None,
     of_base: Recentred | None = None,
     draws: int = 0,
@@ -174,6 +179,7 @@ def stand(
         confirmed: p of fresh pours of the verdict's model; NaN counts as failed.
         anchors: rounds of fresh pours that the surrogate was held by.
         looked: rounds of pours that contradicted the fits.
+        weighed: the name and its rivals by their own pours, where any was within reach.
         own: what the last of these pours say of the data.
         of_base: what fresh pours of the base model say of them.
         draws: random draws that were poured.
@@ -248,6 +254,7 @@ def stand(
         of_base=of_base,
         anchors=anchors,
         looked=looked,
+        weighed=tuple(weighed),
     )
     if verdict.kind in NAMING and found.unbeaten:
         said = Verdict(

@@ -16,6 +16,8 @@ Reference:
     Intelligence 243, 2017.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +26,7 @@ from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.surrogate.fit_draws import draw
+from granulcal.loop.test.refit import Model
 from granulcal.loop.test.trace import Trace
 
 __all__ = ["ROUND", "further"]
@@ -38,16 +41,21 @@ ROUND = (1 + _MODELS) * _EACH
 _SEED, _ROUND_STEP, _MODEL_STEP = 9_500_021, 10_000, 100
 
 
-def further(analysis: Analysis, found: Trace, number: int) -> list[Rows]:
-    """Runs the pours of round `number`; those of effects on the camera's lengths need none."""
+def further(
+    analysis: Analysis, found: Trace, number: int, models: Sequence[Model] | None = None
+) -> list[Rows]:
+    """Runs the pours of round `number`; those of effects on the camera's lengths need none.
+
+    They are of the base model and of `models`, or of the most probable ones.
+    """
     task, plan = analysis.task, analysis.plan
     free = {effect.name for effect in task.library if effect.camera}
-    fits = [found.base_fit, *(model.fit for model in found.models)]
+    fits = [found.base_fit, *(m.fit for m in (found.models if models is None else models))]
     effects = [[plan.design.effects[k].name for k in fit.active] for fit in fits]
     asked = [(f, e) for f, e in zip(fits, effects, strict=True) if not free & set(e)]
     first = _SEED + analysis.seed + _ROUND_STEP * number
     made = []
-    for i, (fit, names) in enumerate(asked[: 1 + _MODELS]):
+    for i, (fit, names) in enumerate(asked[: 1 + _MODELS] if models is None else asked):
         rows = _of_model(analysis, fit, names, first + _MODEL_STEP * i)
         if rows is not None:
             made.append(rows)

@@ -53,6 +53,8 @@ class Model:
         at_end: whether a strength's posterior leans on the end of its prior.
         curve: of a single effect: strengths, and the log of its posterior there over its largest,
             shape (2, n); of other models empty.
+        unsure: what the surrogate's error of the effects costs the evidence [nat], half the log of
+            |V| over that of no effect.
     """
 
     effects: tuple[int, ...]
@@ -63,6 +65,7 @@ class Model:
     intervals: Array
     at_end: bool
     curve: Array
+    unsure: float = 0.0
 
 
 def by_probability(model: Model) -> float:
@@ -140,6 +143,7 @@ def fit_single(
         np.array([interval(curve, thresholds.level)]),
         bool(weights[-1] > 0.2 or (effect.is_two_sided and weights[0] > 0.2)),
         curve,
+        _unsure(root, base),
     )
 
 
@@ -168,7 +172,8 @@ def fit_pair(
 ) -> Model:
     """Returns the model with two effects, from the base fit and a fit with one of them."""
     best = _joint(local, target, start, pair)
-    fit = improve(local, target, best.v, best.psi, pair, root=_root(local, base, best), steps=16)
+    root = _root(local, base, best)
+    fit = improve(local, target, best.v, best.psi, pair, root=root, steps=16)
     effects = local.surrogate.design.effects
     low = np.array([effects[k].low for k in pair])
     white = np.linalg.solve(fit.root, fit.slopes)
@@ -197,6 +202,7 @@ def fit_pair(
         np.quantile(used, [tail, 1 - tail], axis=0).T,
         bool((centre > 0.98).any()),
         np.empty((2, 0)),
+        _unsure(root, base),
     )
 
 
@@ -215,6 +221,11 @@ def _root(local: LinearisedSurrogate, base: Fit, best: Fit) -> Array:
     total = local.pour_covariance(base.v, none) + local.nuisance
     covariance = total + local.error_covariance(base.v, best.psi)
     return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+
+
+def _unsure(root: Array, base: Fit) -> float:
+    """Half the log of |V| over that of the base fit, from roots."""
+    return float(np.log(np.diag(root)).sum() - np.log(np.diag(base.root)).sum())
 
 
 def _laplace(fit: Fit) -> float:

@@ -157,8 +157,9 @@ class Trace:
     def best(self) -> Explanation:
         """The explanation that the verdict rests on, or the base model."""
         if self.verdict.kind in NAMING:
+            first = self.verdict.named[0]
             for one in self.explanations:
-                if set(one.effects) <= set(self.verdict.named):
+                if first in one.effects and set(one.effects) <= set(self.verdict.named):
                     return one
         return self.base
 

@@ -22,7 +22,7 @@ from granulcal.loop.test.refit import Model, by_probability
 from granulcal.loop.test.residual_test import ResidualTest
 from granulcal.loop.test.thresholds import Thresholds
 
-__all__ = ["KINDS", "NAMING", "Verdict", "decide"]
+__all__ = ["KINDS", "NAMING", "Verdict", "decide", "families_of"]
 
 NAMING = ("EFFECT", "SET", "EFFECTS")
 """Words that come with names."""
@@ -101,7 +101,7 @@ def decide(
             sorted(best.effects, key=lambda k: -by_probability(alone[k]) if k in alone else inf)
         )
         names = tuple(design.effects[k].name for k in members)
-        kin = _families(design, members, merged)
+        kin = families_of(design, members, merged)
         if len(kin) == 1:
             return Verdict("EFFECT", names, kin, p, _gain(gain))
         return Verdict("EFFECTS", names, kin, p, _gain(gain))
@@ -113,7 +113,7 @@ def decide(
     ]
     near.sort(key=by_probability, reverse=True)
     effects = tuple(model.effects[0] for model in near)
-    kin = _families(design, effects, merged)
+    kin = families_of(design, effects, merged)
     names = tuple(design.effects[k].name for k in effects)
     kind = "EFFECT" if len(kin) == 1 else "SET"
     return Verdict(kind, names, kin, p, _gain(gain))
@@ -123,10 +123,10 @@ def _gain(gain: float) -> str:
     return f"log probability {gain:.1f} nat above that of no effect"
 
 
-def _families(
+def families_of(
     design: Design, effects: tuple[int, ...], merged: list[tuple[int, ...]] | None
 ) -> tuple[str, ...]:
-    """Declared families, parallel effects counted with the first of their group."""
+    """Returns declared families, parallel effects counted with the first of their group."""
     found: list[str] = []
     for k in effects:
         first = next((group[0] for group in merged or [] if k in group), k)
