@@ -23,7 +23,7 @@ from granulcal.loop.test.trace import Trace, trace
 
 __all__ = ["ROUNDS", "RivalRounds", "rival_rounds"]
 
-ROUNDS = 3
+ROUNDS = 2
 """Most rounds of one analysis."""
 # Of their seeds, after those of `--rounds`.
 _FIRST = 50
