@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from granulcal.loop import ConditionPours, Design, Effect, Surrogate, Thresholds, trace
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.check import rival_rounds as module
+from granulcal.loop.check import rivals
 from granulcal.loop.check.by_pours import ByPours, log_evidence
 from granulcal.loop.check.placed import Placed
 from granulcal.loop.check.rival_rounds import ROUNDS, RivalRounds, rival_rounds
-from granulcal.loop.check.rivals import within_reach
+from granulcal.loop.check.rivals import as_named, within_reach
 from granulcal.loop.check.weigh import Weighed, judged
 from granulcal.loop.effects.design import cube_from_normal, normal_from_cube
 from granulcal.loop.pours.rows import Rows
 from granulcal.loop.surrogate.baseline import Fit
-from granulcal.loop.test.refit import Model
 from granulcal.loop.test.trace import Trace
 from granulcal.loop.test.verdict import Verdict
 
@@ -52,14 +52,20 @@ def surrogate() -> Surrogate:
     return Surrogate.fit(design, u[:, None], c[:, None], psi, x, features=4)
 
 
+def farther(found: Trace, effect: str) -> float:
+    """How much more probable an effect may be than its fit [nat]."""
+    (one,) = (one for one in found.explanations if one.effects == (effect,))
+    return rivals._farthest(found, found.model_of(one))[1]
+
+
 def rounds(
     surrogate: Surrogate, psi: Sequence[float], number: int, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[Trace, RivalRounds]:
     """What the fits say of a set, and what they say once rivals have been poured."""
 
-    def further(_: Any, found: Trace, number: int, models: Sequence[Model]) -> list[Rows]:
+    def further(_: Any, found: Trace, number: int, beside: Sequence[Fit]) -> list[Rows]:
         made = []
-        for i, fit in enumerate([found.base_fit, *(model.fit for model in models)]):
+        for i, fit in enumerate([found.base_fit, *beside]):
             theta = np.tile(cube_from_normal(fit.v), (EACH, 1))
             where = np.resize(PLACES, (EACH, 1))
             x = [
@@ -91,14 +97,14 @@ def test_who_is_poured_is_told_apart(
         before += found.verdict.named == true
         after += there.trace.verdict.named == true
         made += there.rounds
-        unsure = {m.effects: m.unsure for m in found.models}
-        assert unsure[(1,)] > 1 > abs(unsure[(0,)])
+        gain = {one: farther(found, one) for one in ("image", "poured")}
+        assert gain["poured"] > 1 > abs(gain["image"])
         assert there.rounds <= ROUNDS and (there.pours > 0) == (there.rounds > 0)
         if not there.rounds:
             assert there.trace is found and there.surrogate is surrogate
         # What has been poured is known: its error costs less.
-        elif there.trace.models:
-            assert {m.effects: m.unsure for m in there.trace.models}[(1,)] < unsure[(1,)]
+        else:
+            assert farther(there.trace, "poured") < gain["poured"]
     assert made and after > before and after >= SETS - 1
 
 
@@ -117,11 +123,18 @@ def test_a_rival_is_within_reach_by_what_is_not_known_of_it(
     found, _ = rounds(surrogate, (0.2, 0.0), 1, monkeypatch)
     best, other = found.explanations[:2]
     assert (best.effects, other.effects) == (("image",), ("poured",))
+    (rival,) = within_reach(found, RULES)
+    assert rival.one is other and rival.reach > best.log_probability - RULES.rivals
+    assert rival.reach == pytest.approx(other.log_probability + farther(found, "poured"))
+    there = as_named(found, rival)
+    assert there.best.effects == other.effects and there.fit_of(there.best) is rival.fit
+    assert there.best.best_strengths[0] == rival.fit.psi[1] and not rival.fit.psi[0]
     gap = best.log_probability - other.log_probability
 
-    def reached(unsure: float) -> bool:
-        models = tuple(replace(m, unsure=unsure) for m in found.models)
-        return other in within_reach(replace(found, models=models), RULES)
+    def reached(gain: float) -> bool:
+        with monkeypatch.context() as once:
+            once.setattr(rivals, "_farthest", lambda _, model: (model.fit, gain))
+            return bool(within_reach(found, RULES))
 
     assert not reached(gap - RULES.rivals - 0.01) and reached(gap - RULES.rivals + 0.01)
     # Of parallel effects, one family, none is a rival.
@@ -129,6 +142,17 @@ def test_a_rival_is_within_reach_by_what_is_not_known_of_it(
     assert not within_reach(replace(found, power=power), RULES)
     none = Verdict("NONE", (), (), 0.5, "")
     assert not within_reach(replace(found, verdict=none), RULES)
+
+
+def test_a_fit_that_stays_where_nothing_is_unknown_does_not_hide_a_rival(
+    surrogate: Surrogate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # At a strength of 0 the surrogate has no error of an effect, and a fit may end there.
+    found, _ = rounds(surrogate, (0.2, 0.0), 1, monkeypatch)
+    model = found.model_of(found.explanations[1])
+    stuck = replace(model, fit=replace(found.base_fit, active=(1,)))
+    fit, gain = rivals._farthest(found, stuck)
+    assert fit.psi[1] > 0.05 and gain > 5
 
 
 def test_the_evidence_by_pours_does_not_depend_on_where_they_are(surrogate: Surrogate) -> None:

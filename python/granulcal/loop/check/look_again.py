@@ -159,7 +159,7 @@ def _said(analysis: Analysis, looked: Looked, word: Verdict) -> Looked:
         return looked
     held = replace(settled.trace, verdict=word)
     for one in looked.weighed:
-        if one.fitted is held.best and one.placed is not there:
+        if one.fitted.effects == held.best.effects and one.placed is not there:
             # Its pours stand in place of the other's.
             rows = {name: two.augmented for name, two in one.placed.simulated.items()}
             fit = one.placed.trace.fit_of(one.placed.trace.best)

@@ -68,17 +68,16 @@ def rival_rounds(
         rivals = within_reach(found, analysis.rules)
         if not rivals:
             break
-        models = [found.model_of(one) for one in (found.best, *rivals)]
-        more = further(analysis, found, _FIRST + rounds, models)
+        fits = [found.fit_of(found.best), *(rival.fit for rival in rivals)]
+        more = further(analysis, found, _FIRST + rounds, fits)
         if not more:
             break
         rounds, pours = rounds + 1, pours + sum(map(len, more))
-        fits = [model.fit for model in models]
         begin = [*starts, *(Start(fit.v, fit.psi) for fit in fits)]
         surrogate = conditioned(surrogate, Rows.joined(more))
         named = ", ".join(found.verdict.named)
         found = trace(surrogate, observed, analysis.rules, seed=analysis.seed, starts=begin)
-        others = ", ".join(" + ".join(one.effects) for one in rivals)
+        others = ", ".join(" + ".join(rival.one.effects) for rival in rivals)
         analysis.say(
             f"after pours of {named} and of what they could make as probable ({others}), "
             f"{found.verdict.kind}: {found.verdict.reason}"

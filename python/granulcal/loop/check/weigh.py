@@ -30,7 +30,7 @@ class Weighed(NamedTuple):
     """A model and what its own pours say of the data.
 
     Attributes:
-        fitted: the model at the fit of the surrogate.
+        fitted: the model where the surrogate has it.
         placed: the model where its pours put it.
         said: how probable that is.
     """
@@ -58,18 +58,19 @@ def weigh(
     if not rivals or there.own is None:
         return []
     weighed = [_weighed(analysis, surrogate, found.best, there, measured)]
-    for one in rivals:
+    for rival in rivals:
+        named = as_named(found, rival)
         simulated = {
             c.name: ModelPours(
                 settled.simulated[c.name].base,
-                pours_of(analysis.forward, analysis.task, c, one, settled.seed),
+                pours_of(analysis.forward, analysis.task, c, named.best, settled.seed),
             )
             for c in analysis.fitted
         }
         if min(len(two.augmented) for two in simulated.values()) < FEWEST:
             continue
-        put = placed(analysis, surrogate, as_named(found, one), measured, simulated)
-        weighed.append(_weighed(analysis, surrogate, one, put, measured))
+        put = placed(analysis, surrogate, named, measured, simulated)
+        weighed.append(_weighed(analysis, surrogate, named.best, put, measured))
     if len(weighed) == 1:
         return []
     weighed.sort(key=lambda w: -w.said.log_probability)

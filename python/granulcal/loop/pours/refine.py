@@ -26,7 +26,6 @@ from granulcal.loop.pours.rows import Rows
 from granulcal.loop.pours.scenes import faults_of, scene_of
 from granulcal.loop.surrogate.baseline import Fit
 from granulcal.loop.surrogate.fit_draws import draw
-from granulcal.loop.test.refit import Model
 from granulcal.loop.test.trace import Trace
 
 __all__ = ["ROUND", "further"]
@@ -42,20 +41,21 @@ _SEED, _ROUND_STEP, _MODEL_STEP = 9_500_021, 10_000, 100
 
 
 def further(
-    analysis: Analysis, found: Trace, number: int, models: Sequence[Model] | None = None
+    analysis: Analysis, found: Trace, number: int, beside: Sequence[Fit] | None = None
 ) -> list[Rows]:
     """Runs the pours of round `number`; those of effects on the camera's lengths need none.
 
-    They are of the base model and of `models`, or of the most probable ones.
+    They are of the base model, and of the fits `beside` it or of the most probable models.
     """
     task, plan = analysis.task, analysis.plan
     free = {effect.name for effect in task.library if effect.camera}
-    fits = [found.base_fit, *(m.fit for m in (found.models if models is None else models))]
+    of_models = [model.fit for model in found.models] if beside is None else beside
+    fits = [found.base_fit, *of_models]
     effects = [[plan.design.effects[k].name for k in fit.active] for fit in fits]
     asked = [(f, e) for f, e in zip(fits, effects, strict=True) if not free & set(e)]
     first = _SEED + analysis.seed + _ROUND_STEP * number
     made = []
-    for i, (fit, names) in enumerate(asked[: 1 + _MODELS] if models is None else asked):
+    for i, (fit, names) in enumerate(asked[: 1 + _MODELS] if beside is None else asked):
         rows = _of_model(analysis, fit, names, first + _MODEL_STEP * i)
         if rows is not None:
             made.append(rows)

@@ -30,7 +30,7 @@ from granulcal.loop.surrogate.baseline import Fit, Start, improve
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.test.thresholds import Thresholds
 
-__all__ = ["Model", "by_probability", "fit_none", "fit_pair", "fit_single", "interval"]
+__all__ = ["Model", "by_probability", "fit_none", "fit_pair", "fit_single", "interval", "root_at"]
 
 Array = NDArray[np.float64]
 
@@ -53,8 +53,6 @@ class Model:
         at_end: whether a strength's posterior leans on the end of its prior.
         curve: of a single effect: strengths, and the log of its posterior there over its largest,
             shape (2, n); of other models empty.
-        unsure: what the surrogate's error of the effects costs the evidence [nat], half the log of
-            |V| over that of no effect.
     """
 
     effects: tuple[int, ...]
@@ -65,7 +63,6 @@ class Model:
     intervals: Array
     at_end: bool
     curve: Array
-    unsure: float = 0.0
 
 
 def by_probability(model: Model) -> float:
@@ -104,7 +101,7 @@ def fit_single(
     effect = local.surrogate.design.effects[k]
     nodes = np.linspace(effect.low, 1.0, 2 * _NODES - 1 if effect.is_two_sided else _NODES)
     fits: list[Fit | None] = [None] * len(nodes)
-    root = _root(local, base, _joint(local, target, base, (k,)))
+    root = root_at(local, base, _joint(local, target, base, (k,)).psi)
     alone = [s for s in starts if not np.delete(s.psi - local.none(), k).any()]
     for begin in (Start(base.v, local.none()), *alone):
         # Outwards, each node from its neighbour.
@@ -143,7 +140,6 @@ def fit_single(
         np.array([interval(curve, thresholds.level)]),
         bool(weights[-1] > 0.2 or (effect.is_two_sided and weights[0] > 0.2)),
         curve,
-        _unsure(root, base),
     )
 
 
@@ -172,8 +168,9 @@ def fit_pair(
 ) -> Model:
     """Returns the model with two effects, from the base fit and a fit with one of them."""
     best = _joint(local, target, start, pair)
-    root = _root(local, base, best)
-    fit = improve(local, target, best.v, best.psi, pair, root=root, steps=16)
+    fit = improve(
+        local, target, best.v, best.psi, pair, root=root_at(local, base, best.psi), steps=16
+    )
     effects = local.surrogate.design.effects
     low = np.array([effects[k].low for k in pair])
     white = np.linalg.solve(fit.root, fit.slopes)
@@ -202,7 +199,6 @@ def fit_pair(
         np.quantile(used, [tail, 1 - tail], axis=0).T,
         bool((centre > 0.98).any()),
         np.empty((2, 0)),
-        _unsure(root, base),
     )
 
 
@@ -215,17 +211,12 @@ def _joint(local: LinearisedSurrogate, target: Array, start: Fit, active: tuple[
     return improve(local, target, start.v, psi, active, steps=16)
 
 
-def _root(local: LinearisedSurrogate, base: Fit, best: Fit) -> Array:
-    """Root of V: pours of the base fit, the surrogate's error at the best strengths."""
+def root_at(local: LinearisedSurrogate, base: Fit, psi: Array) -> Array:
+    """Returns the root of V at strengths (K,): pours of the base fit, the surrogate's error."""
     none = local.none()
     total = local.pour_covariance(base.v, none) + local.nuisance
-    covariance = total + local.error_covariance(base.v, best.psi)
+    covariance = total + local.error_covariance(base.v, psi)
     return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-
-
-def _unsure(root: Array, base: Fit) -> float:
-    """Half the log of |V| over that of the base fit, from roots."""
-    return float(np.log(np.diag(root)).sum() - np.log(np.diag(base.root)).sum())
 
 
 def _laplace(fit: Fit) -> float:
