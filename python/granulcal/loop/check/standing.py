@@ -127,7 +127,7 @@ class Standing:
             "confirmed_p": None if self.confirmed != self.confirmed else self.confirmed,
             "anchors": self.anchors,
             "looked_again": self.looked,
-            "rivals": [one.to_dict() for one in self.weighed],
+            "rivals_by_pours": [one.to_dict() for one in self.weighed],
             "own_pours": None if self.own is None else self.own.to_dict(),
             "base_pours_p": None if self.of_base is None else self.of_base.residual_test.p,
             "random_draws": self.draws,
