@@ -137,9 +137,12 @@ def test_a_rival_is_within_reach_by_what_is_not_known_of_it(
             return bool(within_reach(found, RULES))
 
     assert not reached(gap - RULES.rivals - 0.01) and reached(gap - RULES.rivals + 0.01)
-    # Of parallel effects, one family, none is a rival.
+    # What is parallel near the base fit is a rival all the same, what is declared of one kind none.
     power = replace(found.power, families=(("image", "poured"),))
-    assert not within_reach(replace(found, power=power), RULES)
+    assert within_reach(replace(found, power=power), RULES)
+    with monkeypatch.context() as once:
+        once.setattr(Design, "family", lambda *_: "one")
+        assert not within_reach(found, RULES)
     none = Verdict("NONE", (), (), 0.5, "")
     assert not within_reach(replace(found, verdict=none), RULES)
 

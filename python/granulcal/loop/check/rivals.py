@@ -61,16 +61,16 @@ class Rival(NamedTuple):
 def within_reach(found: Trace, rules: Thresholds) -> list[Rival]:
     """Returns the rivals of the name that pours could make as probable, at most `_MOST`.
 
-    None of its families is a rival, nor is what has a further effect beside it: a second effect is
-    asked of what the first one's pours leave.
+    None of its declared family is a rival, nor is what has a further effect beside it: a second
+    effect is asked of what the first one's pours leave.
     """
     best = found.best
     if best is found.base:
         return []
-    kin, floor = set(families_in(found, best.effects)), best.log_probability - rules.rivals
+    kin, floor = _declared(found, best.effects), best.log_probability - rules.rivals
     rivals = []
     for one, model in zip(found.explanations, found.models, strict=True):
-        if len(one.effects) > len(best.effects) or set(families_in(found, one.effects)) == kin:
+        if len(one.effects) > len(best.effects) or _declared(found, one.effects) == kin:
             continue
         fit, gain = _farthest(found, model)
         rival = Rival(one, fit, one.log_probability + gain)
@@ -105,6 +105,12 @@ def families_in(found: Trace, names: Sequence[str]) -> tuple[str, ...]:
     known = [effect.name for effect in design.effects]
     merged = [tuple(known.index(name) for name in group) for group in found.power.families]
     return families_of(design, tuple(known.index(name) for name in names), merged)
+
+
+def _declared(found: Trace, names: Sequence[str]) -> set[str]:
+    """Families as the library has them: what is parallel near the base fit need not stay so."""
+    effects = {effect.name: k for k, effect in enumerate(found.local.surrogate.design.effects)}
+    return {found.local.surrogate.design.family(effects[name]) for name in names}
 
 
 def _farthest(found: Trace, model: Model) -> tuple[Fit, float]:
