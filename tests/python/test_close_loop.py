@@ -72,11 +72,14 @@ TRUTH = {
 
 
 def make(
-    folder: Path, extra: dict[str, float], effects: str = '["tilt.y", "ground.restitution"]'
+    folder: Path,
+    extra: dict[str, float],
+    effects: str = '["tilt.y", "ground.restitution"]',
+    scene_text: str = SCENE,
 ) -> Path:
     """Writes scene, prior, recordings and the task of pours with `extra` numbers in the scene."""
     folder.mkdir()
-    (folder / "scene.toml").write_text(SCENE)
+    (folder / "scene.toml").write_text(scene_text)
     (folder / "prior.toml").write_text(PRIOR)
     camera = Camera.overhead(height=0.3, field_width=0.3, pixels=220)
     lines = ['scene = "scene.toml"', 'prior = "prior.toml"', f"effects = {effects}"]
@@ -164,6 +167,22 @@ def test_a_declared_tilt_is_not_found(tmp_path: Path) -> None:
     assert closed.trace.verdict.kind == "NONE"
     page = (tmp_path / "declared" / "report.html").read_text()
     assert f"Closing the loop on {declared}" in page and "granulcal.close_loop(task, " in page
+
+
+@pytest.mark.slow
+def test_rods_are_no_fault_of_the_camera(tmp_path: Path) -> None:
+    # Whole sets of a funnel, with the words of before: benches/loop_rivals.py, docs/theory/loop.md.
+    wide = SCENE.replace("spacing = 6e-3", "spacing = 8e-3").replace(
+        "jitter = 5e-4", "jitter = 1e-4"
+    )
+    effects = '["camera.blur", "camera.offset", "camera.flying", "ground.restitution", "clump"]'
+    rods = make(tmp_path / "rods", {"effects.clump.aspect": 1.4}, effects, wide)
+    closed = gc.close_loop(Task.load(rods), tmp_path / "out", budget=1100, pairs=0)
+    assert closed.verdict.kind == "EFFECT" and closed.verdict.named[0] == "clump"
+    low, _, high = closed.strengths()["clump"]
+    assert low < 1.5 and high > 1.3
+    said = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert all({"effects", "log_probability", "p"} == set(one) for one in said["rivals_by_pours"])
 
 
 def test_a_declared_tolerance_is_no_candidate(tilted: Path, tmp_path: Path) -> None:

@@ -45,7 +45,8 @@ def weigh(
 ) -> list[Weighed]:
     """Returns the name and its rivals by their own pours, the most probable first.
 
-    Empty where none is within reach, or none can be poured.
+    Empty where none is within reach, none can be poured, or the base model's pours leave too little
+    for a name.
 
     Args:
         analysis: task and pours.
@@ -53,9 +54,11 @@ def weigh(
         there: the name where its pours put it.
         measured: statistics under each condition to fit, by name.
     """
-    found, surrogate = settled.trace, settled.surrogate
+    found, surrogate, of_base = settled.trace, settled.surrogate, there.of_base
+    if there.own is None or of_base is None or of_base.residual_test.p > analysis.rules.name:
+        return []
     rivals = within_reach(found, analysis.rules)
-    if not rivals or there.own is None:
+    if not rivals:
         return []
     weighed = [_weighed(analysis, surrogate, found.best, there, measured)]
     for rival in rivals:
