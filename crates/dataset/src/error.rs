@@ -306,7 +306,8 @@ fn lines(all: &[DatasetError]) -> String {
         let mut text = format!("\n  {error}");
         let mut source = std::error::Error::source(error);
         while let Some(cause) = source {
-            text += &format!(": {cause}");
+            text.push_str(": ");
+            text.push_str(&cause.to_string());
             source = cause.source();
         }
         text.trim_end().to_owned()

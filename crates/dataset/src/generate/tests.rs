@@ -317,7 +317,9 @@ fn all_that_is_damaged_is_named_at_once() {
         place.make(name, &GenerateOptions { shard: text.parse().unwrap(), ..options(10) });
     }
     let bad = ["left/part-000000.parquet", "left/part-000002.parquet", "right/part-000001.parquet"];
-    bad.iter().for_each(|part| fs::write(place.at(part), b"not a table").unwrap());
+    for part in bad {
+        fs::write(place.at(part), b"not a table").unwrap();
+    }
     let names = |error: DatasetError, expected: &[&str]| {
         assert!(error.is_bad_input());
         let text = error.to_string();

@@ -31,7 +31,7 @@ fn a_heap_that_lacks_grains_or_is_in_another_unit_cannot_be_of_the_scene() {
     assert!(small.iter().any(|reason| reason.contains("unit of the depths")), "{small:?}");
     // Millimetres that were taken for metres.
     let giant = limits.violations(&cone(30.0, 0.06));
-    assert!(giant[0].starts_with("the formation's height is 2"), "{giant:?}");
+    assert!(giant[0].starts_with("the formation's height is 30 m"), "{giant:?}");
     assert!(giant[0].ends_with(": is the unit of the depths right?"), "{giant:?}");
     // Leftovers of a pour that has rolled out of view are a formation of the scene.
     assert_eq!(limits.violations(&cone(8e-3, 0.015)), Vec::<String>::new());

@@ -181,7 +181,7 @@ fn listed_turns_are_of_unit_length_and_of_grains_that_have_a_shape() {
     assert_eq!(scene.starting_positions(1), scene.starting_positions(2));
     assert_eq!(Scene::drop(0.1).starting_orientations(), None);
     // What a file rounds is taken as it is meant, and nothing else.
-    scene.start = turned(vec![[0.0, 0.0, 0.0, 1.0], [0.7071, 0.0, 0.0, 0.7071]]);
+    scene.start = turned(vec![[0.0, 0.0, 0.0, 1.0], [0.6, 0.0, 0.0, 0.8003]]);
     assert!((scene.starting_orientations().unwrap()[1].norm() - 1.0).abs() < 1e-15);
     for (wrong, told) in [
         (vec![[0.0, 0.0, 0.0, 1.0]], "start.orientations has 1 entries"),
