@@ -19,11 +19,9 @@ import numpy as np
 import granulcal as gc
 from granulcal.loop import Thresholds, trace
 from granulcal.loop.analysis import Analysis
-from granulcal.loop.check.rivals import within_reach
 from granulcal.loop.close import fit_surrogate, planned
 from granulcal.loop.pours.archive import Archive
 from granulcal.loop.pours.forward import Forward
-from granulcal.loop.test.refit import root_at
 from granulcal.pours.camera import Camera
 
 BLIND = Path(__file__).parent / "blind"
@@ -105,6 +103,10 @@ def run(out: Path, names: list[str], threads: int) -> None:
 
 def why(out: Path, names: list[str]) -> None:
     """Prints what the evidence of the models is made of, by the surrogate of the archive."""
+    # Here, so that the rest runs on commits that had none of it.
+    from granulcal.loop.check.rivals import within_reach
+    from granulcal.loop.test.refit import root_at
+
     rules, fitted = Thresholds(), None
     for name in names:
         task = gc.Task.load(record(out / "sets" / name, *SETS[name]))
