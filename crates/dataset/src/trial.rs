@@ -45,9 +45,7 @@ pub fn try_pour(
             return Ok(Some(Trial { cpu_s, reached_s, has_ended: true }));
         }
         if reached_s > middle.1 && begun.elapsed() >= patience {
-            let pace = (cpu_s - middle.0) / (reached_s - middle.1);
-            let left_s = (scene.end.horizon - reached_s).max(0.0);
-            let cpu_s = cpu_s + pace * left_s;
+            let cpu_s = to_horizon((cpu_s, reached_s), middle, scene.end.horizon);
             return Ok(Some(Trial { cpu_s, reached_s, has_ended: false }));
         }
         if !keep_going() {
@@ -58,6 +56,12 @@ pub fn try_pour(
         }
         observer.advance(&mut simulation, stride)?;
     }
+}
+
+/// Processor time until the horizon `[s]`, at the pace since `middle`; both are processor time and simulated time `[s]`.
+fn to_horizon((cpu_s, reached_s): (f64, f64), middle: (f64, f64), horizon: f64) -> f64 {
+    let pace = (cpu_s - middle.0) / (reached_s - middle.1);
+    cpu_s + pace * (horizon - reached_s).max(0.0)
 }
 
 #[cfg(test)]
@@ -76,16 +80,18 @@ mod tests {
         assert!(whole.has_ended && whole.cpu_s > 0.0 && whole.reached_s > 0.0);
         let mut long = scene();
         long.end.horizon = 1e6;
-        let begun = Instant::now();
         // Vibration without end: it never comes to rest.
         long.end.kinetic_energy = 1e-300;
         let cut = try_pour(&long, 1, Duration::from_millis(300), &|| true).unwrap().unwrap();
-        assert!(!cut.has_ended && cut.reached_s > 0.0, "{cut:?}");
-        assert!(begun.elapsed() < Duration::from_secs(30));
-        // As much again for every second that is left.
-        let least = 0.2 * 0.3 / cut.reached_s * 1e6;
-        assert!(cut.cpu_s > least, "{cut:?} {least}");
+        assert!(!cut.has_ended && cut.reached_s > 0.0 && cut.cpu_s > 0.0, "{cut:?}");
         assert_eq!(try_pour(&long, 1, Duration::from_secs(600), &|| false).unwrap(), None);
+    }
+
+    #[test]
+    fn what_is_left_takes_as_long_as_the_last_half_says() {
+        // Half a second of it took 2 s, after a start that took 1.
+        assert_eq!(to_horizon((3.0, 0.75), (1.0, 0.25), 4.0), 3.0 + 4.0 * 3.25);
+        assert_eq!(to_horizon((3.0, 4.5), (1.0, 0.25), 4.0), 3.0);
     }
 
     #[test]

@@ -171,7 +171,7 @@ fn scene() -> impl Strategy<Value = Scene> {
     let period = prop::option::weighted(0.2, (any::<bool>(), -20.0..20.0, 8.0..60.0));
     let until = prop::option::of(prop_oneof![Just(100.0), 1.0..100.0]);
     let outflow = prop::option::weighted(0.2, (-5.0..30.0, until));
-    let entry = (log(0.2, 20.0), log(0.1, 10.0), vector(-20.0..20.0), vector(-3.0..3.0), 0.0..0.05);
+    let entry = (log(0.2, 20.0), log(0.1, 10.0), vector(-20.0..20.0), vector(-3.0..3.0), 0.0..1.0);
     let intruder = prop::option::weighted(0.2, entry);
     let finer = prop::option::weighted(0.3, 0.05..1.0);
     let rules = (end, period, outflow, intruder, finer);
@@ -202,14 +202,14 @@ fn scene() -> impl Strategy<Value = Scene> {
                         density: 1300.0 * density,
                         position: position.map(|c| radius * c),
                         velocity,
-                        enters,
+                        enters: enters * horizon(substeps, finer, preset),
                     },
                 ),
                 ground: Ground::default(),
                 funnel: funnel.map(|funnel| scaled_funnel(funnel, radius)),
                 walls: walls.into_iter().map(|wall| scaled_wall(wall, radius)).collect(),
                 end: EndRule {
-                    horizon: substeps * finer.unwrap_or(1.0) * preset.settings().dt,
+                    horizon: horizon(substeps, finer, preset),
                     kinetic_energy: energy,
                     ..EndRule::default()
                 },
@@ -227,6 +227,11 @@ fn scene() -> impl Strategy<Value = Scene> {
                 observe: None,
             },
         )
+}
+
+/// So many substeps of a preset, or of a share of them `[s]`.
+fn horizon(substeps: f64, finer: Option<f64>, preset: Preset) -> f64 {
+    substeps * finer.unwrap_or(1.0) * preset.settings().dt
 }
 
 fn scaled_start(start: Start, r: f64) -> Start {
