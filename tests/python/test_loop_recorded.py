@@ -14,6 +14,7 @@ import pytest
 import granulcal as gc
 from granulcal.commands.close_loop import _command
 from granulcal.errors import ObservationError
+from granulcal.loop.check.by_pours import ByPours
 from granulcal.loop.check.standing import stand
 from granulcal.loop.condition import Condition
 from granulcal.loop.effects.library import by_name
@@ -247,7 +248,9 @@ def page(**values: Any) -> str:
     words |= dict.fromkeys(("picture_of", "command"), "")
     filled |= {"is_named": True, "word": "EFFECT"}
     lists = dict.fromkeys(("nearest", "beyond", "doubts", "held", "untried"), ())
-    standing = SimpleNamespace(trivial=(), moved=(), draws=0, anchors=0, confirmed=0.5)
+    standing = SimpleNamespace(
+        trivial=(), moved=(), draws=0, anchors=0, confirmed=0.5, weighed=values.pop("weighed", ())
+    )
     placebo = SimpleNamespace(kind="NONE", p=0.5)
     return template("loop.html.j2").render(
         **{**filled, **words, **lists, "standing": standing, "placebo": placebo, "pours": 0}
@@ -266,6 +269,10 @@ def test_the_page_says_what_is_beyond_doubtful_and_which_p_decided() -> None:
     assert "Not tried" not in plain and "name them: clump, bonds." in page(
         untried=["clump", "bonds"]
     )
+    rivals = [ByPours(("clump",), -3.0, 0.4), ByPours(("camera.blur",), -15.5, 0.01)]
+    assert "own pours" not in plain
+    told = page(weighed=rivals).replace("\n", " ")
+    assert "clump, whose pours leave what has p = 0.4; camera.blur 12.5 nat less, whose" in told
     row = SimpleNamespace(label="low", before=2.0, after=1.0, refused="")
     assert "may repeat what the\nparameters could have done" in page(corrections=(row,))
 
