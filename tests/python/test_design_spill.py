@@ -106,7 +106,8 @@ def test_draws_are_those_of_the_posterior():
 @pytest.mark.parametrize(("pours", "rho"), [(40, 0.05), (100, 0.05), (25, 0.1)])
 def test_bands_hold_the_truth(pours, rho):
     """Of known curves; with rho at its largest likelihood k = 10 was held in .6 to .7 of cases."""
-    total, size, sets = 100, 1 / rho - 1, 60
+    total, size, sets, grains = 100, 1 / rho - 1, 60, (1, 10)
+    asked = sets * len(grains)
     held, unsafe, advised = [], 0, 0
     for seed in range(sets):
         generator = np.random.default_rng(seed)
@@ -114,7 +115,7 @@ def test_bands_hold_the_truth(pours, rho):
         share = 1 / (1 + np.exp(4 - 2 * (2 * (heights - 0.06) / 0.24 - 1)))
         counts = generator.binomial(total, generator.beta(share * size, (1 - share) * size))
         known = np.empty((pours, 0))
-        forecast = forecast_of(heights, known, counts * 1.0, total, grains=(1, 10), seed=seed)
+        forecast = forecast_of(heights, known, counts * 1.0, total, grains=grains, seed=seed)
         share = 1 / (1 + np.exp(4 - 2 * (2 * (forecast.heights - 0.06) / 0.24 - 1)))
         for i, k in enumerate(forecast.grains):
             truth = stats.betabinom.sf(k - 1, total, share * size, (1 - share) * size)
@@ -123,7 +124,6 @@ def test_bands_hold_the_truth(pours, rho):
             if top is not None:
                 advised += 1
                 unsafe += truth[np.argmin(np.abs(forecast.heights - top))] > 0.1
-    asked = sets * len(forecast.grains)
     print(f"{pours} pours, rho {rho}: held {np.mean(held):.3f}, ", end="")
     print(f"unsafe {unsafe} of {advised} advised, of {asked} asked")
     assert np.mean(held) > 0.8

@@ -162,7 +162,6 @@ def _of_posterior(options: argparse.Namespace) -> int:
     from granulcal.design.predict_posterior import poured_scenes, predict_posterior
     from granulcal.engines import engine_named, pouring_with
     from granulcal.loop.report.asked import condition_of
-    from granulcal.loop.report.models import units_of
     from granulcal.pours.scene import Scene
 
     if options.model is not None:
@@ -184,13 +183,13 @@ def _of_posterior(options: argparse.Namespace) -> int:
         )
     warn(found.doubts)
     if options.json:
-        told = {"at": at, "units": units_of(found.names, scene), "is_inside": posterior.is_inside}
+        told = {"at": at, "units": scene.units_of(found.names), "is_inside": posterior.is_inside}
         print(json.dumps(found.to_dict() | told, indent=1, allow_nan=False))
     else:
         print(
             f"{found.pours} pours of {scene.name} at {', '.join(options.at)}, at draws of a posterior"
         )
-        _print_table(found, units_of(found.names, scene))
+        _print_table(found, scene.units_of(found.names))
     return 0 if posterior.is_inside else _FALLEN
 
 

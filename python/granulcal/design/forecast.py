@@ -19,7 +19,7 @@ __all__ = ["SpillForecast"]
 Array = NDArray[np.float64]
 
 _CM = 1e2
-# What is nearer to the lowest height than this share of the range is advised by chance, where it is.
+# What is nearer to the lowest height than this share of the range may be advised by chance.
 _NEAR = 0.1
 _COLOURS = ("#1f5f8b", "#c8742b", "#4a8c4a", "#8b4a8b", "#8b1f3d", "#5b5b5b")
 _ROWS = 9

@@ -1,7 +1,7 @@
 """Scenes and materials: what is poured, onto what, and who looks at it."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
 from os import PathLike
 from pathlib import Path
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal import _native
+from granulcal.pours.statistics import UNITS
 from granulcal.real import check_real
 from granulcal.whole import check_seed, check_whole
 from granulcal.words import not_there
@@ -323,6 +324,11 @@ class Scene:
     def observed_units(self) -> dict[str, str]:
         """Unit of each statistic that the scene observes."""
         return {name: unit for name, unit, _ in self.native.observed_statistics()}
+
+    def units_of(self, names: Iterable[str]) -> dict[str, str]:
+        """Returns the unit of each of these statistics, of images or observed; `-` if none."""
+        known = UNITS | self.observed_units
+        return {name: known[name] for name in names}
 
     @property
     def observed_docs(self) -> dict[str, str]:

@@ -52,10 +52,9 @@ from granulcal.loop.report.interval import fewest_of_ranks, of_one_more, t_facto
 from granulcal.loop.report.models_schema import check_models
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.pours.scene import Scene
-from granulcal.pours.statistics import REGISTRY
 from granulcal.progress import steps
 
-__all__ = ["MODELS", "Maker", "Models", "Prediction", "condition_of", "units_of"]
+__all__ = ["MODELS", "Maker", "Models", "Prediction", "condition_of"]
 
 Array = NDArray[np.float64]
 
@@ -173,7 +172,7 @@ class Models:
     @property
     def units(self) -> dict[str, str]:
         """Unit of each statistic; `-` if it has none."""
-        return units_of(self.names, self.scene)
+        return self.scene.units_of(self.names)
 
     def write(self, folder: Path) -> Path:
         """Writes `models.json` into a folder and returns its path."""
@@ -490,12 +489,6 @@ class Models:
             if weights is not None:
                 squares.append((self.means[h] - weights @ self.means[rest]) ** 2)
         return np.mean(squares, axis=0) if squares else np.zeros(self.means.shape[1])
-
-
-def units_of(names: Sequence[str], scene: Scene) -> dict[str, str]:
-    """Returns the unit of each statistic of a scene; `-` if it has none."""
-    known = {each.name: each.unit for each in REGISTRY} | scene.observed_units
-    return {name: known[name] for name in names}
 
 
 def _known(scene: Scene, paths: Sequence[str]) -> dict[str, float]:
