@@ -235,6 +235,21 @@ def test_a_posterior_predicts_by_pours_at_its_draws(
     assert found["middle"] == pytest.approx(np.mean(rows)) and found["low"] < min(rows)
 
 
+def test_another_engine_than_the_material_was_inferred_with_is_told(
+    inferred: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = inferred / "posterior.json"
+    words = ["predict", str(inferred), str(inferred / "scene.toml"), "--at", "start.height=0.03"]
+    words += ["--pours", "2", "--threads", "1", "--json"]
+    told = {}
+    for engine in (None, "lammps"):
+        file.write_text(json.dumps({**json.loads(file.read_text()), "engine": engine}))
+        assert main(words) == 0
+        told[engine] = json.loads(capsys.readouterr().out)["warnings"]
+    assert not any("engine" in each for each in told[None])
+    assert any("by pours of lammps, these are of granulcal" in each for each in told["lammps"])
+
+
 def test_what_no_posterior_predicts_is_refused_by_name(
     inferred: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -119,6 +119,7 @@ def _run(options: argparse.Namespace) -> int:
         "recordings": [str(path) for path in options.recording],
         "parameters": parameters_of(posterior),
         "fixed": dict(prior.fixed),
+        "engine": options.engine,
         "inside_model": {
             "is_inside": found.misfit.is_inside,
             "p_value": found.misfit.p_value,

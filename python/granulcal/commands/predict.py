@@ -181,9 +181,17 @@ def _of_posterior(options: argparse.Namespace) -> int:
         found = predict_posterior(
             posterior, scene, at, level=options.level, pours=options.pours, threads=threads
         )
-    warn(found.doubts)
+    doubts = list(found.doubts)
+    if options.engine != posterior.engine:
+        learnt, poured = (name or "granulcal" for name in (posterior.engine, options.engine))
+        doubts.append(
+            f"the material was inferred by pours of {learnt}, these are of {poured}: what one engine "
+            "calls a friction is none of another's (--engine)"
+        )
+    warn(doubts)
     if options.json:
         told = {"at": at, "units": scene.units_of(found.names), "is_inside": posterior.is_inside}
+        told["warnings"] = doubts
         print(json.dumps(found.to_dict() | told, indent=1, allow_nan=False))
     else:
         print(

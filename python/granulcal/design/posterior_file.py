@@ -26,6 +26,7 @@ _SCHEMA = Table(
     optional={
         "inside_model": Table({"is_inside": Flag()}, open=True),
         "fixed": Mapping(Number()),
+        "engine": Maybe(Text()),
         "calibrated": Flag(),
         "warnings": ListOf(Text()),
     },
@@ -53,6 +54,7 @@ class PosteriorDraws:
         mode: most probable parameters, own units, shape (p,).
         is_inside: whether the model explains the recordings; if not these are its best compromise.
         fixed: values of the parameters that the prior fixed, by path.
+        engine: the `--engine` whose pours it was learnt from; None of our own, or not told.
     """
 
     names: tuple[str, ...]
@@ -60,6 +62,7 @@ class PosteriorDraws:
     mode: Array
     is_inside: bool = True
     fixed: dict[str, float] = field(default_factory=dict)
+    engine: str | None = None
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> "PosteriorDraws":
@@ -101,7 +104,8 @@ class PosteriorDraws:
                 UncheckedModelWarning,
                 stacklevel=2,
             )
-        return cls(names, samples, mode, is_inside, document.get("fixed", {}))
+        fixed, engine = document.get("fixed", {}), document.get("engine")
+        return cls(names, samples, mode, is_inside, fixed, engine)
 
     @classmethod
     def of(cls, posterior: "Posterior | PosteriorDraws") -> "PosteriorDraws":

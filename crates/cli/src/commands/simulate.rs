@@ -136,8 +136,13 @@ fn why_unhealthy(health: &Health, scene: &Scene) -> String {
         breaches.join("; ")
     };
     let dt = scene.settings().dt;
+    let enters = if scene.intruder.is_some() {
+        "; a ball that enters inside of grains or walls needs another place"
+    } else {
+        ""
+    };
     format!(
-        "unhealthy: {why}. Small, thin or fast grains need a finer step: `substep = {}` in the scene (now {dt} s)",
+        "unhealthy: {why}. Small, thin or fast grains need a finer step: `substep = {}` in the scene (now {dt} s){enters}",
         0.5 * dt
     )
 }
