@@ -78,7 +78,8 @@ def add(commands: Any) -> None:
         "--budget",
         type=pour_count,
         default=4000,
-        help="pours, but for those where a fit is looked at again (default: 4000)",
+        help="pours, but for those of a name's rivals and of a fit that is looked at again (default: "
+        "4000)",
     )
     parser.add_argument(
         "--pairs",
