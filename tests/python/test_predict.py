@@ -14,7 +14,8 @@ from granulcal.errors import ObservationError
 from granulcal.loop.check import discrepancy
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.report.asked import REACH
-from granulcal.loop.report.models import Maker, Models, Prediction, condition_of
+from granulcal.loop.report.models import Maker, Models, condition_of
+from granulcal.loop.report.prediction import Prediction
 from granulcal.loop.test.score import DISCREPANCY_LENGTH
 from granulcal.pours.scene import Scene
 

@@ -16,7 +16,7 @@ from granulcal.warned import warn
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from granulcal.loop.report.models import Prediction
+    from granulcal.loop.report.prediction import Prediction
     from granulcal.pours.scene import Scene
 
 __all__ = ["add"]

@@ -3,6 +3,7 @@
 import os
 import tempfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +12,13 @@ from granulcal.design.posterior_file import PosteriorDraws
 from granulcal.errors import ObservationError
 from granulcal.loop.pours.forward import Forward
 from granulcal.loop.pours.measures import Measures
-from granulcal.loop.report.interval import fewest_of_ranks, of_one_more
-from granulcal.loop.report.models import Prediction
+from granulcal.loop.report.prediction import FEWEST, Prediction, require_level
 from granulcal.pours.scene import Scene
 
 __all__ = ["poured_scenes", "predict_posterior"]
 
 # Seeds of pours, apart from those of training sets and of the loop.
 _SEED = 8_700_001
-_FEWEST = 2
 
 
 def predict_posterior(
@@ -45,25 +44,17 @@ def predict_posterior(
         ObservationError: no level, or too few pours or usable ones.
         ValueError: a draw or a number of the condition that the scene refuses.
     """
-    if not 0 < level < 1:
-        raise ObservationError(f"level must be between 0 and 1, got {level}")
-    if pours < _FEWEST:
-        raise ObservationError(f"pours must be at least {_FEWEST}, got {pours}")
+    require_level(level)
+    if pours < FEWEST:
+        raise ObservationError(f"pours must be at least {FEWEST}, got {pours}")
     scenes = poured_scenes(posterior, scene, at, pours)
     asked = [(each, [_SEED + i]) for i, each in enumerate(scenes)]
     with tempfile.TemporaryDirectory(prefix="granulcal-") as folder:
         forward = Forward(Path(folder), threads or os.cpu_count() or 1)
         forward.fill("pours", asked)
         rows = np.concatenate([forward.pours(*one) for one in asked])
-    if len(rows) < _FEWEST:
-        raise ObservationError(
-            f"{len(rows)} of {pours} pours under this condition are usable, at least {_FEWEST} are "
-            "needed: grains jam, leave the view or are unhealthy"
-        )
-    low, high = of_one_more(rows, level, len(rows))
-    names = Measures.of(scenes[0]).names
-    doubts = (*_asked_for(posterior, at), *_few(len(rows), level))
-    return Prediction("posterior", names, rows.mean(axis=0), low, high, level, len(rows), doubts)
+    found = Prediction.of_pours("posterior", Measures.of(scenes[0]).names, rows, level)
+    return replace(found, doubts=(*_asked_for(posterior, at), *found.doubts))
 
 
 def poured_scenes(
@@ -85,15 +76,4 @@ def _asked_for(posterior: PosteriorDraws, at: Mapping[str, float]) -> list[str]:
         f"{path} = {at[path]:g} is what was asked for, no longer what was inferred or fixed"
         for path in at
         if path in (*posterior.names, *posterior.fixed)
-    ]
-
-
-def _few(pours: int, level: float) -> list[str]:
-    least = fewest_of_ranks(level)
-    if pours >= least:
-        return []
-    return [
-        f"{pours} usable pours are too few for ranks at {100 * level:g} %, {least} are needed: the "
-        "intervals are Student's t's of normal statistics, which may reach beyond what a statistic "
-        "can be"
     ]

@@ -6,7 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from granulcal.loop.pours.forward import Forward
-from granulcal.loop.report.models import Models, Prediction
+from granulcal.loop.report.models import Models
+from granulcal.loop.report.prediction import Prediction
 
 __all__ = ["predict"]
 

@@ -27,7 +27,8 @@ from granulcal.experiments.predictions.column_tests import (
 )
 from granulcal.experiments.predictions.model_error import ModelError
 from granulcal.loop.pours.forward import Forward
-from granulcal.loop.report.models import Models, Prediction
+from granulcal.loop.report.models import Models
+from granulcal.loop.report.prediction import Prediction
 
 __all__ = ["column_rows", "column_rows_without_physics", "rows_of"]
 

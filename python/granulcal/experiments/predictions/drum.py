@@ -22,7 +22,8 @@ from granulcal.experiments.predictions.drum_fit import (
     true_size,
 )
 from granulcal.loop.pours.forward import Forward
-from granulcal.loop.report.models import Models, Prediction
+from granulcal.loop.report.models import Models
+from granulcal.loop.report.prediction import Prediction
 from granulcal.pours.pour_time import PourKind
 
 __all__ = ["SPEEDS", "drum_rows", "drum_rows_without_loop", "poured_of_drum"]

@@ -48,13 +48,14 @@ from granulcal.loop.report.asked import (
     shown_outside,
     shown_unlike,
 )
-from granulcal.loop.report.interval import fewest_of_ranks, of_one_more, t_factor
+from granulcal.loop.report.interval import t_factor
 from granulcal.loop.report.models_schema import check_models
+from granulcal.loop.report.prediction import FEWEST, Prediction, require_level
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.pours.scene import Scene
 from granulcal.progress import steps
 
-__all__ = ["MODELS", "Maker", "Models", "Prediction", "condition_of"]
+__all__ = ["MODELS", "Maker", "Models", "condition_of"]
 
 Array = NDArray[np.float64]
 
@@ -67,7 +68,6 @@ _NAME = "models.json"
 _SEED = 8_500_003
 # Draws of the correction for each pour.
 _EACH = 40
-_FEWEST = 2
 
 
 @dataclass(frozen=True)
@@ -83,47 +83,6 @@ class Maker:
     numbers: dict[str, float]
     shifts: dict[str, float]
     faults: dict[str, float]
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """Statistics under a condition.
-
-    Attributes:
-        model: one of `MODELS`.
-        names: of the statistics, s of them.
-        middle: mean, shape (s,).
-        low, high: ends of the interval, shape (s,).
-        level: of the interval.
-        pours: usable ones that it is of; None of a model that pours nothing.
-        doubts: what is to be said of it, a sentence each.
-    """
-
-    model: str
-    names: tuple[str, ...]
-    middle: Array
-    low: Array
-    high: Array
-    level: float
-    pours: int | None = None
-    doubts: tuple[str, ...] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns it for JSON: null where a statistic has no number."""
-
-        def number(value: float) -> float | None:
-            return float(value) if np.isfinite(value) else None
-
-        return {
-            "model": self.model,
-            "level": self.level,
-            "pours": self.pours,
-            "warnings": list(self.doubts),
-            "statistics": {
-                name: {"middle": number(m), "low": number(a), "high": number(b)}
-                for name, m, a, b in zip(self.names, self.middle, self.low, self.high, strict=True)
-            },
-        }
 
 
 @dataclass(frozen=True)
@@ -277,8 +236,7 @@ class Models:
         """
         if model not in MODELS:
             raise ObservationError(f"model must be one of {', '.join(MODELS)}, got {model!r}")
-        if not 0 < level < 1:
-            raise ObservationError(f"level must be between 0 and 1, got {level}")
+        require_level(level)
         # How a pour is observed goes without saying.
         observed = {p: self.scene.get(p) for p, _, _ in self.inputs if is_definition(p)}
         inputs = [path for path, _, _ in self.inputs]
@@ -299,8 +257,8 @@ class Models:
         if model in ("line", "nearest"):
             require_near(model, self._unit(at), self.known)
             return self._row(model, self._unit(at), level)
-        if pours < _FEWEST:
-            raise ObservationError(f"{model}: pours must be at least {_FEWEST}, got {pours}")
+        if pours < FEWEST:
+            raise ObservationError(f"{model}: pours must be at least {FEWEST}, got {pours}")
         if model == "corrected":
             return self._corrected(at, forward, level, pours)
         makers = self.makers[model]
@@ -433,21 +391,7 @@ class Models:
     def _of_rows(
         self, model: str, rows: Array, level: float, pours: int | None = None
     ) -> Prediction:
-        pours = len(rows) if pours is None else pours
-        if pours < _FEWEST:
-            raise ObservationError(
-                f"{model}: {pours} usable pours under this condition, at least {_FEWEST} are "
-                "needed: grains jam, leave the view or are unhealthy"
-            )
-        low, high = of_one_more(rows, level, pours)
-        few = []
-        if pours < fewest_of_ranks(level):
-            few = [
-                f"{pours} usable pours are too few for ranks at {100 * level:g} %, "
-                f"{fewest_of_ranks(level)} are needed: the intervals are Student's t's of normal "
-                "statistics, which may reach beyond what a statistic can be"
-            ]
-        return Prediction(model, self.names, rows.mean(axis=0), low, high, level, pours, (*few,))
+        return Prediction.of_pours(model, self.names, rows, level, pours)
 
     def _corrected(
         self, at: Mapping[str, float], forward: Forward, level: float, pours: int
