@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from granulcal.errors import DoubtfulRecordingWarning, PriorError
 from granulcal.measured.different import require_different
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from granulcal.engines import Engine
 
 __all__ = ["KeptPours", "calibrate_observed", "calibrate_within"]
+
+Array = NDArray[np.float64]
 
 
 def calibrate_within(
@@ -68,7 +71,7 @@ def calibrate_within(
     Warns:
         DoubtfulRecordingWarning: what `Recording.doubts` says.
     """
-    from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
+    from granulcal.bayessim.training.sequential import round_sizes
 
     if not recordings:
         raise ValueError("calibrate_within needs at least one recording, got none")
@@ -84,23 +87,17 @@ def calibrate_within(
     formations = [each.formation(**scene.reading) for each in recordings]
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
     require_different(observed)
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
     pours = KeptPours(
         scene,
         prior,
-        folder / "pours.json",
+        _file_in(out),
         seed=seed,
         threads=threads,
         progress=poured,
         engine=engine,
         made_for=MadeFor.of([each.path for each in recordings], observed),
     )
-    with spread_over(cluster_asked(ray)):
-        found = infer_within_budget(
-            pours, prior, observed, budget=budget, seed=seed, x_names=NAMES, progress=progress
-        )
-    return replace(found, left_out=pours.left_out(len(found.x)))
+    return _inferred(pours, pours, NAMES, observed, budget, progress, ray)
 
 
 def calibrate_observed(
@@ -138,7 +135,7 @@ def calibrate_observed(
         ValueError: nothing was measured of what the scene observes, too small a budget, or a folder
             of pours that were made for something else.
     """
-    from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
+    from granulcal.bayessim.training.sequential import round_sizes
 
     round_sizes(budget)
     _require_fits(prior, scene)
@@ -150,13 +147,11 @@ def calibrate_observed(
             f"{', '.join(measured) or 'nothing that was measured'} must have a value of one of "
             f"{', '.join(all_names) or 'the statistics that the scene observes'}, got none"
         )
-    names = tuple(name for name, has in zip(all_names, known, strict=True) if has)
-    folder, observed = Path(out), table[:, known]
-    folder.mkdir(parents=True, exist_ok=True)
+    observed = table[:, known]
     pours = KeptPours(
         scene,
         prior,
-        folder / "pours.json",
+        _file_in(out),
         seed=seed,
         threads=threads,
         progress=poured,
@@ -164,13 +159,40 @@ def calibrate_observed(
         engine=engine,
         made_for=MadeFor.of(list(measured), observed),
     )
+    names = tuple(name for name, has in zip(all_names, known, strict=True) if has)
+
+    def pour(theta: Array, first: int) -> Array:
+        return pours(theta, first)[:, known]
+
+    return _inferred(pours, pour, names, observed, budget, progress, ray)
+
+
+def _file_in(out: str | PathLike[str]) -> Path:
+    """The file of kept pours in a folder, which is made."""
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder / "pours.json"
+
+
+def _inferred(
+    pours: KeptPours,
+    pour: Callable[[Array, int], Array],
+    names: tuple[str, ...],
+    observed: Array,
+    budget: int,
+    progress: "Callable[[Round], None] | None",
+    ray: "str | Cluster | None",
+) -> "SequentialFit":
+    """The posterior by what `pour` gives of kept pours, and what pours it is without."""
+    from granulcal.bayessim.training.sequential import infer_within_budget
+
     with spread_over(cluster_asked(ray)):
         found = infer_within_budget(
-            lambda theta, first: pours(theta, first)[:, known],
-            prior,
+            pour,
+            pours.prior,
             observed,
             budget=budget,
-            seed=seed,
+            seed=pours.seed,
             x_names=names,
             progress=progress,
         )
