@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from small_archive import surrogate_of
 
-from granulcal.loop import ConditionPours, Design, Effect, Surrogate, Thresholds, trace
+from granulcal.loop import ConditionPours, Surrogate, Thresholds, trace
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.check import look_again as module
 from granulcal.loop.check import placed, settle, weigh
@@ -38,10 +39,7 @@ def surrogate() -> Surrogate:
     generator = np.random.default_rng(0)
     u, c, psi = generator.random(250), generator.random(250), np.zeros((250, 2))
     psi[180:183, 0], psi[190:, 1] = generator.random(3), generator.random(60)
-    rows = zip(u, c, psi, strict=True)
-    x = np.concatenate([pours(a, b, s.tolist(), 1, [7, i]) for i, (a, b, s) in enumerate(rows)])
-    design = Design(("a",), ("height",), tuple(map(Effect, EFFECTS)))
-    return Surrogate.fit(design, u[:, None], c[:, None], psi, x, features=4)
+    return surrogate_of(pours, EFFECTS, u, c, psi)
 
 
 def looked(

@@ -8,8 +8,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from small_archive import surrogate_of
 
-from granulcal.loop import ConditionPours, Design, Effect, Surrogate, Thresholds, trace
+from granulcal.loop import ConditionPours, Design, Surrogate, Thresholds, trace
 from granulcal.loop.analysis import Analysis
 from granulcal.loop.check import rival_rounds as module
 from granulcal.loop.check import rivals
@@ -46,10 +47,7 @@ def surrogate() -> Surrogate:
     generator = np.random.default_rng(0)
     u, c, psi = generator.random(400), generator.random(400), np.zeros((400, 2))
     psi[250:394, 0], psi[394:, 1] = generator.random(144), generator.random(6)
-    rows = zip(u, c, psi, strict=True)
-    x = np.concatenate([pours(a, b, s.tolist(), 1, [7, i]) for i, (a, b, s) in enumerate(rows)])
-    design = Design(("a",), ("height",), (Effect("image"), Effect("poured")))
-    return Surrogate.fit(design, u[:, None], c[:, None], psi, x, features=4)
+    return surrogate_of(pours, ("image", "poured"), u, c, psi)
 
 
 def farther(found: Trace, effect: str) -> float:
