@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Unpack, final
 
 import numpy as np
@@ -382,6 +383,7 @@ class Listener:
     def close(self) -> None: ...
 
 def listen_for_signals(pipe: str | PathLike[str]) -> Listener: ...
+def camera_beside(path: str | PathLike[str]) -> Path | None: ...
 def check_paths(
     reads: Sequence[tuple[str, str | PathLike[str], str]],
     writes: Sequence[tuple[str, str | PathLike[str], str]],

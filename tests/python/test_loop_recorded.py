@@ -92,6 +92,16 @@ def test_cameras_colours_and_what_is_known_are_fixed(
     refused(task)
     camera.write_text(text)
     assert registered(task, out) == first
+    # The same of depths that are no picture.
+    depths, of_depths = [image.with_suffix(".npy") for image in images], tmp_path / "of_depths"
+    for image, path in zip(images, depths, strict=True):
+        np.save(path, np.asarray(gc.Recording.open(image).depth))
+    of_depths.mkdir()
+    registered(task_of(scene, depths), of_depths)
+    camera.write_text(text.replace("fx = ", "fx = 1"))
+    with pytest.raises(ObservationError, match="conditions differ"):
+        registered(task_of(scene, depths), of_depths)
+    camera.write_text(text)
     own = images[0].with_suffix(".toml")
     own.write_text(text + "\n")
     refused(task)

@@ -100,7 +100,9 @@ pub use observer::{
 pub use pictures::{Pictures, write_mask, write_pictures};
 pub use plausible::{LEAST_SHOWN, Limits};
 pub use readable::{plain, readable};
-pub use recording::{FRAMES, Folder, Frame, ReadOptions, Recording, Source, measured_data};
+pub use recording::{
+    FRAMES, Folder, Frame, ReadOptions, Recording, Source, camera_beside, measured_data,
+};
 pub use room::Room;
 pub use row::{Row, RowStatus};
 pub use scene_file::{load_prior, load_scene, scene_from_text};

@@ -14,7 +14,7 @@ use granulcal_features::{
 };
 
 pub use folder::{Folder, Frame};
-pub use options::{FRAMES, ReadOptions};
+pub use options::{FRAMES, ReadOptions, camera_beside};
 
 use crate::camera_file::camera_of;
 use crate::depth_frame::{DepthFrame, Values};

@@ -17,6 +17,7 @@
 //! | `cylinders` | the nearest points of two cylinders |
 //! | `manifold` | where two bodies that are no boxes meet, by parry |
 //! | `contact` | the law at a point |
+//! | `manifolds` | which points lie between the same two |
 //! | `marks` | the impulses that points go on with |
 //! | `impact` | impacts, each at its time |
 //! | `rims` | points of contact at the rims of walls |
@@ -40,6 +41,7 @@ mod foresee;
 mod impact;
 mod lever;
 mod manifold;
+mod manifolds;
 mod marks;
 mod meeting;
 mod motion;
@@ -243,18 +245,23 @@ impl Bodies {
         let depths = contacts.points.iter().map(|point| -point.gap);
         step.deepest = depths.fold(0.0, f64::max);
         for round in 1..=ROUNDS {
-            let (impacts, work) =
-                impact::resolve(&mut contacts.points, &mut moving, &solid, dt, &small);
+            let (impacts, work) = impact::resolve(
+                (contacts.manifolds.all_mut(), &contacts.points),
+                &mut moving,
+                &solid,
+                dt,
+                &small,
+            );
             step.impacts += impacts;
             step.work_of_walls += work;
-            let known = contacts.points.len();
-            if round == ROUNDS || !contacts.foresee(&around, &moving, &mut self.neighbours, known) {
+            if round == ROUNDS || !contacts.foresee(&around, &moving, &mut self.neighbours) {
                 break;
             }
-            contacts.merge(known);
+            contacts.merge();
         }
-        contacts.carry(0, &moving);
-        self.known.recall(&mut contacts.points, &mut moving, solid.reach);
+        contacts.carry(&moving);
+        let of_manifolds = (&contacts.manifolds, &mut contacts.points[..]);
+        self.known.recall(of_manifolds, &mut moving, solid.reach);
         let sorted = contacts.points.len();
         let mut known = 0;
         contacts.corrected.clear();
@@ -264,11 +271,10 @@ impl Bodies {
             step.sweeps += settled.sweeps;
             (step.residual, step.unconverged) = (settled.residual, settled.unconverged);
             known = contacts.points.len();
-            if round == ROUNDS || !contacts.foresee(&around, &moving, &mut self.neighbours, sorted)
-            {
+            if round == ROUNDS || !contacts.foresee(&around, &moving, &mut self.neighbours) {
                 break;
             }
-            contacts.carry(known, &moving);
+            contacts.carry_from(known, &moving);
         }
         self.batches.put_back(&mut contacts.points);
         let points = contacts.points;

@@ -31,6 +31,12 @@ pub(crate) fn check_paths(
     py.detach(|| claims.check()).map_err(error::dataset)
 }
 
+/// The TOML of the camera by which images without one of their own are read; None of other recordings.
+#[pyfunction]
+pub(crate) fn camera_beside(path: PathBuf) -> Option<PathBuf> {
+    granulcal_dataset::camera_beside(&path)
+}
+
 /// Writes a whole file or none; it may replace a file of its own kind, which `ending` names; one of another ending,
 /// anything but TOML.
 #[pyfunction]

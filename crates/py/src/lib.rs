@@ -45,7 +45,7 @@ mod _native {
     #[pymodule_export]
     use crate::emulated::Emulated;
     #[pymodule_export]
-    use crate::files::{check_paths, hash_bytes, readable, write_file};
+    use crate::files::{camera_beside, check_paths, hash_bytes, readable, write_file};
     #[pymodule_export]
     use crate::film::film;
     #[pymodule_export]

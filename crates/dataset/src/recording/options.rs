@@ -28,12 +28,26 @@ pub struct ReadOptions {
 
 /// The camera of an image as PNG or .npy, or of a folder of them: a TOML under the image's name, as images are written
 /// with, else `camera.toml` in its folder or the one above.
-fn camera_beside(path: &Path) -> Option<PathBuf> {
+fn camera_of_images_beside(path: &Path) -> Option<PathBuf> {
     let own = path.is_file().then(|| path.with_extension("toml"));
     let folders = if path.is_dir() { path.ancestors().take(2) } else { path.ancestors().take(3) };
     let skipped = usize::from(!path.is_dir());
     let shared = folders.skip(skipped).map(|folder| folder.join("camera.toml"));
     own.into_iter().chain(shared).find(|file| file.is_file())
+}
+
+/// The camera by which a recording is read that is given none: beside an image as PNG or .npy or a folder of PNGs. None of
+/// recordings that say themselves what saw them, or that are not there.
+pub fn camera_beside(path: &Path) -> Option<PathBuf> {
+    let ends = |path: &Path, all: &[&str]| {
+        path.extension().is_some_and(|end| all.iter().any(|of| end.eq_ignore_ascii_case(of)))
+    };
+    let is_images = if path.is_dir() {
+        path.read_dir().is_ok_and(|all| all.flatten().any(|file| ends(&file.path(), &["png"])))
+    } else {
+        ends(path, &["png", "npy"])
+    };
+    if is_images { camera_of_images_beside(path) } else { None }
 }
 
 impl Default for ReadOptions {
@@ -72,7 +86,7 @@ impl ReadOptions {
 
     /// The TOML of the camera that took the images at `path`, which say nothing of it themselves.
     pub(super) fn camera_of_images(&self, path: &Path) -> Result<PathBuf, DatasetError> {
-        self.camera.clone().or_else(|| camera_beside(path)).ok_or_else(|| {
+        self.camera.clone().or_else(|| camera_of_images_beside(path)).ok_or_else(|| {
             let allowed = "given for depth images as PNG or .npy (--camera camera.toml), or beside them as camera.toml or \
                            under an image's own name";
             DatasetError::content(path, "the camera", "none", allowed)
@@ -110,5 +124,26 @@ mod tests {
         assert_eq!(window(5, Some(30), 30), None);
         assert_eq!(window(0, None, 30), None);
         assert_eq!(window(1, None, 0), None);
+    }
+
+    #[test]
+    fn the_camera_of_images_lies_beside_them_and_of_others_nowhere() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["camera.toml", "own.toml", "own.png", "one.npy", "map.npz", "a.mcap"] {
+            std::fs::write(at(name), "").unwrap();
+        }
+        std::fs::create_dir_all(at("frames/deep")).unwrap();
+        assert_eq!(camera_beside(&at("frames")), None, "no image is in it");
+        std::fs::write(at("frames/0.png"), "").unwrap();
+        std::fs::write(at("frames/deep/0.PNG"), "").unwrap();
+        let shared = Some(at("camera.toml"));
+        assert_eq!(camera_beside(&at("own.png")), Some(at("own.toml")));
+        for images in ["one.npy", "frames", "frames/0.png"] {
+            assert_eq!(camera_beside(&at(images)), shared, "{images}");
+        }
+        for other in ["frames/deep/0.PNG", "map.npz", "a.mcap", "absent"] {
+            assert_eq!(camera_beside(&at(other)), None, "{other}");
+        }
     }
 }

@@ -9,6 +9,7 @@ use super::boxes;
 use super::contact::Point;
 use super::edges::at_edges;
 use super::manifold::manifold;
+use super::manifolds::Manifolds;
 use super::meeting::{Asked, Meeting};
 use super::motion::{Motion, Way};
 use super::pairs::{Neighbours, Pair};
@@ -29,8 +30,10 @@ pub(super) struct Contacts {
     pub examined: Vec<Way>,
     /// The numbers of points whose gaps were corrected by what was foreseen last.
     pub corrected: Vec<usize>,
-    /// In the order of their names, which depends on the places alone.
+    /// In the order of their names, which depends on the places alone; what is foreseen comes behind.
     pub points: Vec<Point>,
+    /// Of the points in that order.
+    pub manifolds: Manifolds,
 }
 
 /// Every point of contact that the next substep may close, as far as it can be seen where the bodies are.
@@ -44,14 +47,14 @@ pub(super) fn contacts(
     points.clear();
     let motions: Vec<_> = bodies.iter().map(|body| Motion::of(body, around.solid.reach)).collect();
     let mut clear_of_walls = Vec::with_capacity(bodies.len());
+    let mut manifolds = Manifolds::default();
     for (i, Moving { pose, .. }) in bodies.iter().enumerate() {
         let first = points.len();
         let range = around.range(&motions[i], None) + around.way_of_walls(&pose.centre);
-        let is_near = at_walls(around, pose, i, (0.0, range), &mut points)
-            | at_rims(around, pose, i, (0.0, range), &mut points)
-            | at_edges(around, pose, i, (0.0, range), &mut points);
+        let is_near = at_all_of_walls(around, pose, i, (0.0, range), &mut points);
         clear_of_walls.push(if is_near { f64::NEG_INFINITY } else { range });
         points[first..].sort_by_key(Point::name);
+        manifolds.add(&points[first..]);
     }
     let mut pairs = neighbours.near(around, bodies, &motions);
     let mut near = Vec::new();
@@ -70,11 +73,13 @@ pub(super) fn contacts(
         &asked,
         |number, meeting| {
             pairs[numbers[number]].clear = f64::NEG_INFINITY;
+            let first = points.len();
             meeting.points(around, &asked[number], |point| points.push(point));
+            manifolds.add(&points[first..]);
         },
     );
     let (examined, corrected) = (Vec::new(), Vec::new());
-    Contacts { pairs, motions, clear_of_walls, examined, corrected, points }
+    Contacts { pairs, motions, clear_of_walls, examined, corrected, points, manifolds }
 }
 
 /// Gives, for each pair that may be as near as asked, its number and where it meets.
@@ -112,9 +117,23 @@ pub(super) fn clearance(solid: &Solid, a: &Pose, b: &Pose) -> f64 {
     (square - extent(a) - extent(b)) / square.sqrt().max(f64::MIN_POSITIVE)
 }
 
+/// Adds the points of body `i` at the surfaces of walls, at their rims and at the edges of their triangles that are nearer
+/// than `range` `[m]` at `now` `[s]` into the substep; returns whether any may be so near.
+pub(super) fn at_all_of_walls(
+    around: &Around<'_>,
+    body: &Pose,
+    i: usize,
+    when: (f64, f64),
+    found: &mut Vec<Point>,
+) -> bool {
+    at_walls(around, body, i, when, found)
+        | at_rims(around, body, i, when, found)
+        | at_edges(around, body, i, when, found)
+}
+
 /// Adds the points of body `i` at all surfaces that are nearer than `range` at `now` `[s]` into the substep; returns
 /// whether any may be so near.
-pub(super) fn at_walls(
+fn at_walls(
     around: &Around<'_>,
     body: &Pose,
     i: usize,

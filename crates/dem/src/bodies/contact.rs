@@ -51,8 +51,6 @@ pub(super) struct Point {
     pub mark: Vector3<f64>,
     /// On body i `[m/s]`.
     pub impulse: Vector3<f64>,
-    /// Whether impacts have not been looked for at it since it was found or its gap corrected.
-    pub is_news: bool,
 }
 
 /// What the law needs of a point's block W.
@@ -77,7 +75,6 @@ impl Point {
             restitution: 0.0,
             mark: Vector3::zeros(),
             impulse: Vector3::zeros(),
-            is_news: true,
         }
     }
 

@@ -2,14 +2,12 @@
 
 use super::around::Around;
 use super::body::Moving;
-use super::collide::{Contacts, at_walls, clearance, meet};
+use super::collide::{Contacts, at_all_of_walls, clearance, meet};
 use super::contact::Point;
-use super::edges::at_edges;
 use super::meeting::Asked;
 use super::motion::{Motion, Way};
 use super::pairs::{Neighbours, Pair, SLACK};
 use super::pose::Pose;
-use super::rims::at_rims;
 
 /// What goes farther than this within a substep is examined where it will be, too, in the least margin `[-]`.
 const FORESEEN: f64 = 0.5;
@@ -20,16 +18,14 @@ const SAME_WAY: f64 = 2e-4;
 
 impl Contacts {
     /// Adds the points at which bodies would lie in something at the end of the substep, behind the others: a corner that
-    /// swings in from elsewhere is none of those that are nearest at its begin. Those before `sorted` are in the order of
-    /// their names. Returns whether there are any.
+    /// swings in from elsewhere is none of those that are nearest at its begin. Returns whether there are any.
     pub fn foresee(
         &mut self,
         around: &Around<'_>,
         bodies: &[Moving],
         neighbours: &mut Neighbours,
-        sorted: usize,
     ) -> bool {
-        let known = self.points.len();
+        let (sorted, known) = (self.manifolds.points(), self.points.len());
         self.corrected.clear();
         self.seek_farther(around, bodies, neighbours);
         let (reach, dt) = (around.solid.reach, around.dt);
@@ -43,10 +39,7 @@ impl Contacts {
         for (i, way) in ways.iter().enumerate() {
             let goes = way.length + around.way_of_walls(&bodies[i].pose.centre);
             if is_other[i] && goes > least.max(self.clear_of_walls[i]) {
-                let pose = later.find(i);
-                at_walls(around, pose, i, (dt, range), &mut new);
-                at_rims(around, pose, i, (dt, range), &mut new);
-                at_edges(around, pose, i, (dt, range), &mut new);
+                at_all_of_walls(around, later.find(i), i, (dt, range), &mut new);
             }
         }
         let mut asked = Vec::new();
@@ -74,17 +67,19 @@ impl Contacts {
         let (least, mut is_news) = (CORRECTED * around.solid.reach, false);
         for point in new {
             let point = point.foreseen(bodies, |body| later.pose(body), around.dt);
-            let first = self.points[..sorted].partition_point(|of| of.name() < point.name());
-            let of_manifold = |number: &usize| self.points[*number].name() == point.name();
-            let same = (first..sorted)
-                .take_while(of_manifold)
-                .chain((sorted..known).filter(of_manifold))
+            let name = point.name();
+            let mut manifold = self.manifolds.of(name);
+            let of_manifold = manifold.as_ref().map_or(0..0, |manifold| manifold.range());
+            let same = of_manifold
+                .chain((sorted..known).filter(|&number| self.points[number].name() == name))
                 .find(|&number| self.points[number].is_like(&point, around.solid.reach));
             match same {
                 // Its bodies turn so far that it gets there sooner than its velocity says.
                 Some(number) if point.gap < self.points[number].gap - least => {
                     self.points[number].gap = point.gap;
-                    self.points[number].is_news = true;
+                    if let Some(manifold) = &mut manifold {
+                        manifold.is_news = true;
+                    }
                     self.corrected.push(number);
                 }
                 Some(_) => continue,
@@ -95,20 +90,32 @@ impl Contacts {
         is_news
     }
 
-    /// Moves those of the points from `first` on of which impacts have moved a body to where its last motion begins: the
-    /// impulses of sweeps act from there.
-    pub fn carry(&mut self, first: usize, bodies: &[Moving]) {
-        for point in &mut self.points[first..] {
-            if point.last_hit(bodies) > 0.0 {
-                point.carry(|body| bodies[body].pose, |body| bodies[body].foreseen(0.0));
+    /// Moves those of the points of which impacts have moved a body to where its last motion begins: the impulses of
+    /// sweeps act from there.
+    pub fn carry(&mut self, bodies: &[Moving]) {
+        for manifold in self.manifolds.all() {
+            if manifold.last_hit(bodies) > 0.0 {
+                carry(&mut self.points[manifold.range()], bodies);
             }
         }
     }
 
-    /// Puts the points from `sorted` on among those before, in the order of their names: behind those of the same.
-    pub fn merge(&mut self, sorted: usize) {
+    /// The same of the points from `first` on, which are in no manifold yet.
+    pub fn carry_from(&mut self, first: usize, bodies: &[Moving]) {
+        for point in &mut self.points[first..] {
+            if point.last_hit(bodies) > 0.0 {
+                carry(std::slice::from_mut(point), bodies);
+            }
+        }
+    }
+
+    /// Puts the points that are in no manifold yet among the others, in the order of their names: behind those of the
+    /// same.
+    pub fn merge(&mut self) {
+        let sorted = self.manifolds.points();
         let mut new = self.points.split_off(sorted);
         new.sort_by_key(Point::name);
+        self.manifolds.merge(&new);
         let (mut left, mut at) = (sorted, sorted + new.len());
         self.points.extend_from_slice(&new);
         for point in new.into_iter().rev() {
@@ -156,6 +163,13 @@ impl Contacts {
             is_other
         };
         self.examined.iter_mut().zip(ways).map(is_other).collect()
+    }
+}
+
+/// Moves points to where the last motions of their bodies begin.
+fn carry(points: &mut [Point], bodies: &[Moving]) {
+    for point in points {
+        point.carry(|body| bodies[body].pose, |body| bodies[body].foreseen(0.0));
     }
 }
 

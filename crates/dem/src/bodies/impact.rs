@@ -11,12 +11,11 @@
 //!
 //! no impact creates energy, whatever the shapes, and a single point without friction obeys Newton's law.
 
-use std::ops::Range;
-
 use nalgebra::Vector3;
 
 use super::body::{Moving, product};
 use super::contact::Point;
+use super::manifolds::Manifold;
 use super::motion::Motion;
 use crate::law::Small;
 use granulcal_scene::Solid;
@@ -32,24 +31,23 @@ const FARTHEST: f64 = 2.0;
 /// Resolves what meets within the substep faster than an impact must; returns the number of impacts, and what moving
 /// walls have put in over the mass `[m^2/s^2]`.
 pub(super) fn resolve(
-    points: &mut [Point],
+    (manifolds, points): (&mut [Manifold], &[Point]),
     bodies: &mut [Moving],
     solid: &Solid,
     dt: f64,
     small: &Small,
 ) -> (usize, f64) {
-    let manifolds = manifolds(points);
     let (mut count, mut work) = (0, 0.0);
     // The round in which each body was hit last: what is not due stays so until a body of it is.
     let mut hit_in = vec![0; bodies.len()];
     let motions: Vec<_> =
         bodies.iter().map(|body| Motion::of(body, FARTHEST * solid.reach)).collect();
     for round in 1..=ROUNDS {
-        let may_be_due = |range: &Range<usize>| {
-            let (i, j) = (points[range.start].i(), points[range.start].j());
+        let may_be_due = |manifold: &Manifold| {
+            let (i, j) = (manifold.i(), manifold.j());
             if round == 1 {
                 // Two that go side by side do not close fast, wherever they touch.
-                points[range.clone()].iter().any(|point| point.is_news)
+                manifold.is_news
                     && j.is_none_or(|j| motions[i].beside(&motions[j]) > small.impact_speed)
             } else {
                 hit_in[i] + 1 == round || j.is_some_and(|j| hit_in[j] + 1 == round)
@@ -58,21 +56,21 @@ pub(super) fn resolve(
         let mut due: Vec<(f64, usize)> = manifolds
             .iter()
             .enumerate()
-            .filter(|(_, range)| may_be_due(range))
-            .filter_map(|(number, range)| {
-                first_touch(&points[range.clone()], bodies, dt, small).map(|time| (time, number))
+            .filter(|(_, manifold)| may_be_due(manifold))
+            .filter_map(|(number, manifold)| {
+                first_touch(&points[manifold.range()], bodies, dt, small).map(|time| (time, number))
             })
             .collect();
         if due.is_empty() {
             // None of them comes to be due before a body of it is hit again.
-            for point in points.iter_mut() {
-                point.is_news = false;
+            for manifold in manifolds.iter_mut() {
+                manifold.is_news = false;
             }
             break;
         }
         due.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (_, number) in due {
-            let group = &points[manifolds[number].clone()];
+            let group = &points[manifolds[number].range()];
             // What has been hit meanwhile may be on its way out.
             if let Some(time) = first_touch(group, bodies, dt, small) {
                 work += bounce(group, bodies, solid, [time, dt]);
@@ -85,16 +83,6 @@ pub(super) fn resolve(
         }
     }
     (count, work)
-}
-
-/// Consecutive points of one pair, or of one body and one surface.
-fn manifolds(points: &[Point]) -> Vec<Range<usize>> {
-    let starts = (0..points.len()).filter(|&k| k == 0 || points[k - 1].name() != points[k].name());
-    let mut all: Vec<_> = starts.map(|start| start..points.len()).collect();
-    for number in 1..all.len() {
-        all[number - 1].end = all[number].start;
-    }
-    all
 }
 
 /// When the first of the points that are fast enough touches, if one does within the substep `[s]`; not before its

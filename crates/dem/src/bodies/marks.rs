@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::body::Moving;
 use super::contact::{Name, Point};
+use super::manifolds::Manifolds;
 use nalgebra::Vector3;
 
 /// A point is known again within this distance from where it was on its body, in its reach `[-]`.
@@ -26,17 +27,22 @@ impl Marks {
     }
 
     /// A point that is where one was begins with its impulse, which its bodies get; `reach` is theirs `[m]`.
-    pub fn recall(&self, points: &mut [Point], bodies: &mut [Moving], reach: f64) {
-        debug_assert!(points.is_sorted_by_key(Point::name));
+    pub fn recall(
+        &self,
+        (manifolds, points): (&Manifolds, &mut [Point]),
+        bodies: &mut [Moving],
+        reach: f64,
+    ) {
+        debug_assert!(points.is_sorted_by_key(Point::name) && points.len() == manifolds.points());
         let near = KNOWN * reach;
         let mut is_free = vec![true; self.0.len()];
         let mut first = 0;
-        for manifold in points.chunk_by_mut(|a, b| a.name() == b.name()) {
+        for manifold in manifolds.all() {
             // Both are in one order.
-            let name = manifold[0].name();
+            let name = manifold.name;
             first += self.0[first..].iter().take_while(|mark| mark.0 < name).count();
             let end = first + self.0[first..].iter().take_while(|mark| mark.0 == name).count();
-            for point in manifold {
+            for point in &mut points[manifold.range()] {
                 let square = |mark: &Mark| (Vector3::from(mark.1) - point.mark).norm_squared();
                 let nearest = (first..end)
                     .filter(|&number| is_free[number])

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal import _native
 from granulcal.errors import ObservationError
 from granulcal.loop.effects.image_faults import Frame
 from granulcal.loop.effects.series_faults import reread
@@ -149,12 +150,5 @@ def formation_of(
 
 def camera_used(path: Path, given: Path | None) -> Path | None:
     """Returns the TOML of the camera by which a recording is read; None for its own."""
-    return given or _camera_beside(path)
-
-
-def _camera_beside(path: Path) -> Path | None:
-    """The camera of a PNG: its own TOML, or `camera.toml` in its folder or one above."""
-    if path.suffix != ".png":
-        return None
-    near = [path.with_suffix(".toml"), *(p / "camera.toml" for p in path.parents[:2])]
-    return next((file for file in near if file.exists()), None)
+    beside = None if given else _native.camera_beside(path)
+    return given or (Path(beside) if beside else None)
