@@ -15,6 +15,7 @@ import pytest
 
 import granulcal as gc
 from granulcal import _native
+from granulcal.bayessim.check.toys import LinearGaussian
 
 
 def test_points_of_other_types_are_coerced_once(points):
@@ -210,6 +211,26 @@ def _interrupt(call: str, *, after: float) -> subprocess.CompletedProcess:
 def test_ctrl_c_stops_a_pour():
     ended = _interrupt("gc.simulate(gc.Scene.funnel(), preset='accurate')", after=0.5)
     assert (ended.returncode, ended.stdout) == (7, "interrupted\n")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for a child process")
+def test_ctrl_c_stops_draws_of_a_posterior(monkeypatch):
+    """They had gone on to the last, a minute for some ten millions."""
+    monkeypatch.setenv("GRANULCAL_NO_LIMITS", "1")
+    call = (
+        "from granulcal.bayessim.check.toys import LinearGaussian; "
+        "toy = LinearGaussian.random(bounded=True); "
+        "toy.posterior(toy.simulate(1)[1][0]).sample(50_000_000)"
+    )
+    assert _interrupt(call, after=2.0).returncode == 7
+
+
+def test_more_draws_than_there_is_memory_for_are_refused():
+    """The process had been aborted, and a notebook's kernel with it."""
+    toy = LinearGaussian.random(bounded=True)
+    posterior = toy.posterior(toy.simulate(1)[1][0])
+    with pytest.raises(ValueError, match=r"needs about .* GB of memory, and .* are free"):
+        posterior.sample(10**12)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for a child process")

@@ -13,7 +13,7 @@ use crate::kernels::Kernels;
 use crate::likelihood::{FEWEST_EFFECTIVE, Scratch};
 use crate::matrix::Matrix;
 use crate::mixture::Mixture;
-use crate::random::{Random, cumulative};
+use crate::random::{BLOCK, KeepGoing, Random, cumulative};
 
 const CENTRES: usize = 60;
 /// Share of every proposal that stays as wide as the prior.
@@ -85,30 +85,28 @@ impl Importance {
         (0..n).map(|_| self.draws.row(random.index(&sums)).to_vec()).collect()
     }
 
-    /// Draws that walk.
+    /// Draws that walk; none where `keep_going` gives up.
     pub fn sample(
         &self,
         n: usize,
         random: &mut Random,
         coordinates: &Coordinates,
         log_target: &LogTarget<'_>,
-    ) -> Vec<Vec<f64>> {
+        keep_going: &KeepGoing<'_>,
+    ) -> Option<Vec<Vec<f64>>> {
         let sums = cumulative(self.weights.iter().copied());
         let is_poor = self.effective_sample_size() < FEWEST_EFFECTIVE;
         let best = 2.38 / (2.0 * coordinates.dimension() as f64).sqrt();
-        // All that is random is drawn first, so that threads may share the chains.
-        let chains: Vec<_> = (0..n)
-            .map(|_| MetropolisChain {
-                from: random.index(&sums),
-                steps: (0..if is_poor { MENDING_STEPS } else { STEPS })
-                    .map(|_| Step {
-                        between: [random.index(&sums), random.index(&sums)],
-                        length: best * STEP_FACTORS[random.below(STEP_FACTORS.len())],
-                        log_level: random.uniform().ln(),
-                    })
-                    .collect(),
-            })
-            .collect();
+        let mut chain = || MetropolisChain {
+            from: random.index(&sums),
+            steps: (0..if is_poor { MENDING_STEPS } else { STEPS })
+                .map(|_| Step {
+                    between: [random.index(&sums), random.index(&sums)],
+                    length: best * STEP_FACTORS[random.below(STEP_FACTORS.len())],
+                    log_level: random.uniform().ln(),
+                })
+                .collect(),
+        };
         let run = |scratch: &mut Scratch, chain: &MetropolisChain| {
             let mut draw = self.draws.row(chain.from).to_vec();
             let mut height = self.heights[chain.from];
@@ -126,7 +124,16 @@ impl Importance {
             }
             draw
         };
-        chains.par_iter().map_init(Scratch::default, run).collect()
+        let mut draws = Vec::with_capacity(n);
+        while draws.len() < n {
+            if !keep_going() {
+                return None;
+            }
+            // All that is random is drawn first, so that threads may share the chains.
+            let chains: Vec<_> = (0..BLOCK.min(n - draws.len())).map(|_| chain()).collect();
+            draws.par_extend(chains.par_iter().map_init(Scratch::default, run));
+        }
+        Some(draws)
     }
 
     /// The same density by a proposal that starts at these draws, and half at what may be known of the
@@ -299,7 +306,8 @@ mod tests {
         // Half of the mass is cut off.
         let exact = 1.5 * (std::f64::consts::TAU * sd * sd).ln() - 2f64.ln();
         assert!((found.log_normaliser - exact).abs() < 0.1, "{} {exact}", found.log_normaliser);
-        let sample = found.sample(4000, &mut Random::new(1), &coordinates, &log_target);
+        let sample =
+            found.sample(4000, &mut Random::new(1), &coordinates, &log_target, &|| true).unwrap();
         let mean = sample.iter().map(|u| u[1]).sum::<f64>() / 4000.0;
         let variance = sample.iter().map(|u| (u[1] - mean).powi(2)).sum::<f64>() / 4000.0;
         assert!((mean - 0.4).abs() < 1e-3, "{mean}");
@@ -338,7 +346,8 @@ mod tests {
         assert!(found.effective_sample_size() > 400.0, "{}", found.effective_sample_size());
         let exact = 1.5 * (std::f64::consts::TAU * sd * sd).ln();
         assert!((found.log_normaliser - exact).abs() < 0.1, "{} {exact}", found.log_normaliser);
-        let sample = found.sample(4000, &mut Random::new(1), &coordinates, &log_target);
+        let sample =
+            found.sample(4000, &mut Random::new(1), &coordinates, &log_target, &|| true).unwrap();
         let right = sample.iter().filter(|u| u[0] > 0.5).count() as f64 / 4000.0;
         assert!((right - 0.25).abs() < 0.06, "{right}");
     }
@@ -370,7 +379,8 @@ mod tests {
         let found = start.adapted(&coordinates, &log_target, None, &effort);
         let effective = found.effective_sample_size();
         assert!(effective < 200.0, "{effective}");
-        let sample = found.sample(4000, &mut Random::new(1), &coordinates, &log_target);
+        let sample =
+            found.sample(4000, &mut Random::new(1), &coordinates, &log_target, &|| true).unwrap();
         let mut variance = 0.0;
         for i in 0..6 {
             variance = 0.25 * variance + sd * sd;

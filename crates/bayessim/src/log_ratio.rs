@@ -10,7 +10,7 @@ use crate::coordinates::Coordinates;
 use crate::importance::{Effort, Importance};
 use crate::likelihood::{FEWEST_EFFECTIVE, Likelihood, Observed, Scratch, pool_points};
 use crate::mixture::Mixture;
-use crate::random::Random;
+use crate::random::{KeepGoing, Random};
 
 /// A point whose weight is that much below another's cannot matter `[nat]`.
 const NEGLIGIBLE: f64 = 30.0;
@@ -55,10 +55,16 @@ impl LogRatio {
         self.log(u, scratch) + self.coordinates.log_density(u)
     }
 
-    /// Draws of the posterior.
-    pub fn sample(&self, posterior: &Importance, n: usize, random: &mut Random) -> Vec<Vec<f64>> {
+    /// Draws of the posterior; none where `keep_going` gives up.
+    pub fn sample(
+        &self,
+        posterior: &Importance,
+        n: usize,
+        random: &mut Random,
+        keep_going: &KeepGoing<'_>,
+    ) -> Option<Vec<Vec<f64>>> {
         let log_target = |u: &[f64], scratch: &mut Scratch| self.log_target(u, scratch);
-        posterior.sample(n, random, &self.coordinates, &log_target)
+        posterior.sample(n, random, &self.coordinates, &log_target, keep_going)
     }
 
     /// The posterior, normalised.

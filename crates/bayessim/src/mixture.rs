@@ -6,7 +6,7 @@ use crate::component::Component;
 use crate::coordinates::Coordinates;
 use crate::lanes::Lanes;
 use crate::matrix::log_sum_exp;
-use crate::random::{Random, cumulative};
+use crate::random::{BLOCK, KeepGoing, Random, cumulative};
 
 /// With less mass than this inside the bounds the density is integrated over draws of the prior.
 const SMALLEST_MASS: f64 = 0.02;
@@ -134,28 +134,34 @@ impl TruncatedMixture {
         }
     }
 
+    /// Draws; none where `keep_going` gives up.
     pub fn sample(
         &self,
         coordinates: &Coordinates,
         n: usize,
         random: &mut Random,
-    ) -> Vec<Vec<f64>> {
+        keep_going: &KeepGoing<'_>,
+    ) -> Option<Vec<Vec<f64>>> {
         if self.is_mostly_outside() {
             let draws = coordinates.quasi_prior(PRIOR_POINTS);
             let weight = |u: &Vec<f64>| {
                 (self.mixture.log_prob(u) - coordinates.log_density(u) - self.log_mass).exp()
             };
             let sums = cumulative(draws.iter().map(weight));
-            return (0..n).map(|_| draws[random.index(&sums)].clone()).collect();
+            return Some((0..n).map(|_| draws[random.index(&sums)].clone()).collect());
         }
         let sampler = self.mixture.sampler();
-        let mut kept = Vec::with_capacity(n);
+        let (mut kept, mut tried) = (Vec::with_capacity(n), 0_usize);
         while kept.len() < n {
+            if tried.is_multiple_of(BLOCK) && !keep_going() {
+                return None;
+            }
+            tried += 1;
             let draw = sampler.draw(random);
             if coordinates.is_inside(&draw) {
                 kept.push(draw);
             }
         }
-        kept
+        Some(kept)
     }
 }

@@ -17,7 +17,7 @@ use crate::log_ratio::LogRatio;
 use crate::matrix::log_sum_exp;
 use crate::mixture::{Mixture, TruncatedMixture};
 use crate::mode;
-use crate::random::Random;
+use crate::random::{KeepGoing, Random};
 
 /// Draws among which the search for the mode begins.
 const MODE_DRAWS: usize = 1000;
@@ -132,10 +132,16 @@ impl Weighted {
         ratio + coordinates.log_density(u) - self.density.log_normaliser
     }
 
-    fn sample(&self, n: usize, random: &mut Random, draws: Draws) -> Vec<Vec<f64>> {
+    fn sample(
+        &self,
+        n: usize,
+        random: &mut Random,
+        draws: Draws,
+        keep_going: &KeepGoing<'_>,
+    ) -> Option<Vec<Vec<f64>>> {
         match draws {
-            Draws::Resampled => self.density.resample(n, random),
-            Draws::Walked => self.ratio.sample(&self.density, n, random),
+            Draws::Resampled => Some(self.density.resample(n, random)),
+            Draws::Walked => self.ratio.sample(&self.density, n, random, keep_going),
         }
     }
 }
@@ -332,6 +338,16 @@ impl Posterior {
         self.draws(n, seed, Draws::Walked)
     }
 
+    /// The same, or none where `keep_going` gives up; it is asked every some thousand draws.
+    pub fn coordinate_sample_while(
+        &self,
+        n: usize,
+        seed: u64,
+        keep_going: &dyn Fn() -> bool,
+    ) -> Option<Vec<Vec<f64>>> {
+        self.draws_while(n, seed, Draws::Walked, keep_going)
+    }
+
     /// What it knows of the parameters.
     pub fn identifiability(&self) -> Identifiability {
         let draws = self.draws(identifiability::DRAWS, 0, Draws::Walked);
@@ -347,18 +363,30 @@ impl Posterior {
     }
 
     fn draws(&self, n: usize, seed: u64, kind: Draws) -> Vec<Vec<f64>> {
+        // What goes on always gives all.
+        self.draws_while(n, seed, kind, &|| true).unwrap_or_default()
+    }
+
+    fn draws_while(
+        &self,
+        n: usize,
+        seed: u64,
+        kind: Draws,
+        keep_going: &KeepGoing<'_>,
+    ) -> Option<Vec<Vec<f64>>> {
         let (coordinates, mut random) = (&self.coordinates, Random::new(seed));
         match &self.source {
-            Source::Weighted(weighted) => weighted.sample(n, &mut random, kind),
-            Source::Learnt(learnt) => learnt.sample(coordinates, n, &mut random),
+            Source::Weighted(weighted) => weighted.sample(n, &mut random, kind, keep_going),
+            Source::Learnt(learnt) => learnt.sample(coordinates, n, &mut random, keep_going),
             Source::Sum(weighted, learnt, weight) => {
                 let of_first: Vec<_> = (0..n).map(|_| random.uniform() < *weight).collect();
                 let count = of_first.iter().filter(|&&is_first| is_first).count();
-                let mut first = weighted.sample(count, &mut random, kind).into_iter();
-                let mut second = learnt.sample(coordinates, n - count, &mut random).into_iter();
+                let first = weighted.sample(count, &mut random, kind, keep_going)?;
+                let second = learnt.sample(coordinates, n - count, &mut random, keep_going)?;
+                let (mut first, mut second) = (first.into_iter(), second.into_iter());
                 // In random order: any of them are draws of both.
                 let draw = |is_first| if is_first { first.next() } else { second.next() };
-                of_first.into_iter().filter_map(draw).collect()
+                Some(of_first.into_iter().filter_map(draw).collect())
             }
         }
     }

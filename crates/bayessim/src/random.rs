@@ -4,6 +4,12 @@ use granulcal_numbers::{box_muller, open};
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 
+/// Asked now and then whether to go on.
+pub type KeepGoing<'a> = dyn Fn() -> bool + 'a;
+
+/// Draws between two such questions.
+pub const BLOCK: usize = 1 << 14;
+
 /// Uniform and normal numbers.
 #[derive(Debug)]
 pub struct Random(Pcg64);

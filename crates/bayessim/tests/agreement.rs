@@ -91,6 +91,13 @@ fn draws_stay_inside_the_prior_and_repeat_with_their_seed() {
     let draws = posterior.sample(2000, 7);
     assert_eq!(draws, posterior.sample(2000, 7));
     assert_ne!(draws, posterior.sample(2000, 8));
+    let asked = std::cell::Cell::new(0);
+    let twice = || {
+        asked.set(asked.get() + 1);
+        asked.get() < 2
+    };
+    assert!(posterior.coordinate_sample_while(1_000_000_000, 7, &twice).is_none());
+    assert_eq!(asked.get(), 2);
     let inside =
         |d: &Vec<f64>| (-1.0..=3.0).contains(&d[0]) && (0.001..=1.0).contains(&d[1]) && d[2] >= 0.0;
     assert!(draws.iter().all(inside));

@@ -22,6 +22,11 @@ const BASE: f64 = 64e6;
 const ROW: f64 = 1024.0;
 /// Bytes of the number of a row.
 const NUMBER: f64 = 8.0;
+/// Bytes of a pixel of an image that is rendered, blurred and handed over.
+const IMAGE_PIXEL: f64 = 16.0;
+/// Bytes of a draw of a posterior, and of each of its numbers with its copies.
+const DRAW: f64 = 48.0;
+const DRAW_NUMBER: f64 = 40.0;
 /// Bytes of a part of a data set on disk besides its rows: scene, prior and what the format says of its columns.
 const PART: f64 = 17e3;
 /// Bytes of a grain and of a pixel in one frame of a film.
@@ -69,6 +74,17 @@ impl Room {
             memory: BASE + (pour.memory - BASE) * threads + ROW * in_memory,
             disk: ROW * rows + PART * parts,
         }
+    }
+
+    /// An image of so many pixels, rendered and disturbed.
+    pub fn of_image(pixels: usize) -> Self {
+        Self { memory: BASE + IMAGE_PIXEL * pixels as f64, disk: 0.0 }
+    }
+
+    /// So many draws of so many numbers each, with what is made of them on the way.
+    pub fn of_draws(count: usize, numbers: usize) -> Self {
+        let row = DRAW + DRAW_NUMBER * numbers as f64;
+        Self { memory: BASE + row * count as f64, disk: 0.0 }
     }
 
     /// The numbers of so many rows.

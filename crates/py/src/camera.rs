@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use granulcal_dataset::{CameraFile, Claims, Form, Product, load_sensor, png};
+use granulcal_dataset::{CameraFile, Claims, Form, Product, Room, load_sensor, png};
 use granulcal_features::{DepthImage, FeatureError, Intrinsics, Observe, SensorNoise};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -51,6 +51,8 @@ impl Camera {
         seed: u64,
         sensor: Option<PathBuf>,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let lens = &self.inner.intrinsics;
+        Room::of_image(lens.width * lens.height).require(None).map_err(error::dataset)?;
         let sensor = sensor.map(|path| load_sensor(&path)).transpose().map_err(error::dataset)?;
         let positions = Vectors::borrow("positions", positions)?;
         let radii = Numbers::borrow("radii", radii)?;

@@ -1,6 +1,7 @@
 //! Class `Posterior`.
 
 use granulcal_bayessim::{Average, Component, Evidence, Form, Identifiability, Mixture, Warning};
+use granulcal_dataset::Room;
 use nalgebra::{DMatrix, DVector};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
@@ -10,6 +11,10 @@ use crate::array::{self, Rows};
 use crate::coordinates::Coordinates;
 use crate::emulated::Emulated;
 use crate::error;
+use crate::signals::Watch;
+
+/// Points between two looks at signals.
+const PART: usize = 1 << 14;
 
 /// Weights (k,), means (k, p) and factors of the precisions (k, p, p).
 type MixtureArrays<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
@@ -63,25 +68,37 @@ impl Posterior {
         Ok(Self { inner, dimension })
     }
 
-    /// Log density at coordinates `u` (n, p), shape (n,); -inf outside the bounds.
+    /// Log density at coordinates `u` (n, p), shape (n,); -inf outside the bounds. Ctrl-C stops it.
     fn log_prob<'py>(
         &self,
         py: Python<'py>,
         u: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let u = Rows::read("u", u, Some(self.dimension))?.0;
-        let found = py.detach(|| self.inner.coordinate_log_probs(&u)).map_err(error::model)?;
+        let mut found = Vec::with_capacity(u.len());
+        for part in u.chunks(PART) {
+            py.check_signals()?;
+            let more = py.detach(|| self.inner.coordinate_log_probs(part));
+            found.extend(more.map_err(error::model)?);
+        }
         Ok(PyArray1::from_vec(py, found))
     }
 
-    /// Draws of the coordinates, shape (n, p).
+    /// Draws of the coordinates, shape (n, p). Ctrl-C stops it.
     fn sample<'py>(
         &self,
         py: Python<'py>,
         n: usize,
         seed: u64,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let draws = py.detach(|| self.inner.coordinate_sample(n, seed).concat());
+        Room::of_draws(n, self.dimension).require(None).map_err(error::dataset)?;
+        let (draws, stopped) = py.detach(|| {
+            let watch = Watch::new();
+            let keep_going = || watch.keep_going(|_| Ok(()));
+            let draws = self.inner.coordinate_sample_while(n, seed, &keep_going);
+            (draws.unwrap_or_default().concat(), watch.finish())
+        });
+        stopped?;
         array::matrix(py, draws, n, self.dimension)
     }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::Context as _;
 use clap::Args;
 use granulcal_bayessim::Model;
-use granulcal_dataset::{Form, Limits, Product, Recording, scene_from_text, write_file};
+use granulcal_dataset::{Form, Limits, Product, Recording, Room, scene_from_text, write_file};
 use granulcal_dem::{LAW, law_of};
 use granulcal_features::PAPER16;
 use granulcal_scene::Scene;
@@ -92,6 +92,7 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
             "note: the model is of an earlier version without hashes: damage in it cannot be found",
         );
     }
+    Room::of_draws(args.samples, model.prior.names().len()).require(None)?;
     let chosen = places(&model.x_names)?;
     // The scene may name meshes that are not here; the camera does not need them.
     let trained =
