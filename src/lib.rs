@@ -11,8 +11,12 @@
 //! scene.grains.count = 20;
 //! let pour = Simulation::new(&scene, 1)?.run();
 //! assert_eq!(pour.positions.len(), 20);
-//! # Ok::<(), granulcal::dem::DemError>(())
+//! let seen = granulcal::dataset::observe(&scene.camera, &pour, 1)?;
+//! assert!(seen.statistics?[0] > 0.0); // in the order of granulcal::features::PAPER16
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! `examples/library.rs` goes on from there: positions, energies and contact forces over time.
 
 pub use granulcal_bayessim as bayessim;
 pub use granulcal_dataset as dataset;

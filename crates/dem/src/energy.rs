@@ -5,14 +5,17 @@
 
 use nalgebra::Vector3;
 
-/// Kinetic energy, and potential energy above the scene's origin `[m^2/s^2]`.
+/// Mechanical energy of all grains of a simulation, over the mass of a grain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Energy {
+pub struct Energy {
+    /// Of translation and rotation, at the time of the positions `[m^2/s^2]`.
     pub kinetic: f64,
+    /// Above the scene's origin, and of what bonds, layers and attractions hold `[m^2/s^2]`.
     pub potential: f64,
 }
 
 impl Energy {
+    /// Both `[m^2/s^2]`.
     pub fn total(&self) -> f64 {
         self.kinetic + self.potential
     }

@@ -12,7 +12,28 @@
 //! # Ok::<(), granulcal_dem::DemError>(())
 //! ```
 //!
-//! Read [`Scene`], then [`Simulation`]; the law is in `law.rs`, the solvers in `solver/`.
+//! A pour is looked into while it goes on, at times of the caller's own:
+//!
+//! ```
+//! use granulcal_dem::{Partner, Scene, Simulation};
+//!
+//! let mut scene = Scene::drop(0.0);
+//! scene.grains.count = 10;
+//! let mut simulation = Simulation::new(&scene, 7)?;
+//! for frame in 1..=20 {
+//!     simulation.advance_to(0.01 * f64::from(frame));
+//!     let highest = simulation.positions().iter().map(|at| at.z).fold(0.0, f64::max);
+//!     println!("{:.2} s: {highest:.4} m, {:?}", simulation.time(), simulation.energy());
+//! }
+//! // What the ground carries, over the weight of a grain.
+//! let forces = simulation.contact_forces()?;
+//! let on_ground = forces.iter().filter(|contact| contact.partner == Partner::Wall(0));
+//! let carried = on_ground.map(|contact| contact.force.z).sum::<f64>() / granulcal_dem::GRAVITY;
+//! assert!((carried - 10.0).abs() < 0.1);
+//! # Ok::<(), granulcal_dem::DemError>(())
+//! ```
+//!
+//! Vectors are those of `nalgebra`, which a program of its own depends on, too. Read [`Scene`], then [`Simulation`]; the law is in `law.rs`, the solvers in `solver/`.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -39,6 +60,7 @@ mod checkpoint;
 mod clumps;
 mod contact;
 mod contact_context;
+mod contact_force;
 mod contact_set;
 mod contacts;
 mod effect;
@@ -70,6 +92,8 @@ mod wall;
 mod wall_load;
 
 pub use checkpoint::CheckpointHeader;
+pub use contact_force::ContactForce;
+pub use energy::Energy;
 pub use error::DemError;
 pub use frozen_search::FrozenSearch;
 /// What is asked, from the crate below; all of it is in [`granulcal_scene`].

@@ -4,6 +4,7 @@
 mod bed;
 mod end;
 mod frozen;
+mod inside;
 mod intruder;
 mod rest;
 mod start;

@@ -1,6 +1,6 @@
 //! One substep, line by line as box 3 of docs/theory/contact.md, and what is seen of the state between them.
 
-use super::{Simulation, energy};
+use super::Simulation;
 use crate::assemble::Seen;
 use crate::bodies::Sweeps;
 use crate::contacts::Contacts;
@@ -266,10 +266,7 @@ impl Simulation {
         if self.bodies.is_none() {
             self.watch.see_contacts(self.contacts.count());
         }
-        let grains = (self.clumps.as_ref(), self.bodies.as_ref());
-        let held = self.bonds.as_ref().map_or(0.0, |bonds| bonds.energy(&self.particles));
-        let mut energy = energy(&self.particles, grains, &self.around);
-        energy.potential += held;
+        let energy = self.energy();
         let heights = self.particles.heights(&self.around.effects.gravity);
         self.watch.see_energy(&energy, &heights);
         self.ended = self.end_reached().map(|status| {
