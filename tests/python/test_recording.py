@@ -93,6 +93,34 @@ def test_what_the_scenes_images_do_not_show_is_cut_off(pour, tmp_path):
         seen["wide"].formation(field_width=-1.0)
 
 
+def test_the_floor_of_a_tray_is_looked_at_alone(pour, tmp_path):
+    """Its rim and the table around it had been grains, or the ground."""
+    camera = gc.Camera.overhead(height=0.4, field_width=0.8, pixels=400)
+    depth = camera.render(pour.positions, pour.radii)
+    pixels = np.abs(np.arange(400) - 199.5)
+    out = np.maximum(*np.meshgrid(pixels, pixels))
+    depth[out > 150] = 0.415
+    depth[(out > 150) & (out <= 155)] = 0.38
+    lens = {"fx": 200.0, "fy": 200.0, "cx": 199.5, "cy": 199.5}
+    tray = gc.Recording.from_depth(depth, **lens)
+    alone = gc.Recording.from_depth(camera.render(pour.positions, pour.radii), **lens)
+    floor = (50, 50, 300, 300)
+    got, want = tray.formation(region=floor), alone.formation(region=floor)
+    assert np.array_equal(got.points, want.points) and got.mask.shape == (300, 300)
+    assert tray.formation().volume > 2 * got.volume
+    np.save(tmp_path / "tray.npy", depth)
+    text = "width = 400\nheight = 400\nfx = 200.0\nfy = 200.0\ncx = 199.5\ncy = 199.5\n"
+    toml = tmp_path / "tray.toml"
+    toml.write_text(f"{text}[segmentation]\nregion = {list(floor)}\n")
+    stated = gc.Recording.open(tmp_path / "tray.npy", camera=toml)
+    assert np.array_equal(stated.formation().points, got.points)
+    with pytest.raises(ValueError, match=r"edge of a region \[px\] must be in \[1, 400\], got"):
+        tray.formation(region=(350, 0, 100, 100))
+    wrong: Any = {"region": (1, 2, 3)}
+    with pytest.raises(TypeError, match=r"must be whole pixels \(x, y, width, height\), got"):
+        tray.formation(**wrong)
+
+
 def test_a_png_finds_the_camera_that_lies_beside_it(pour, camera, tmp_path):
     image, toml = camera.record(pour.positions, pour.radii, tmp_path / "a" / "frames")
     stored = gc.Recording.open(image, camera=toml)

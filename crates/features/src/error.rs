@@ -30,7 +30,7 @@ pub enum FeatureError {
         got: f64,
     },
     /// A number outside its range.
-    #[error("{what} must be in [{}, {}], got {}", General(*min), General(*max), General(*got))]
+    #[error("{what} must be {}, got {}", range(*min, *max), General(*got))]
     OutOfRange {
         /// The quantity.
         what: &'static str,
@@ -303,6 +303,16 @@ pub(crate) fn require_in(
     } else {
         Err(FeatureError::OutOfRange { what, got, min, max })
     }
+}
+
+/// A range in words.
+fn range(min: f64, max: f64) -> String {
+    let max = General(max);
+    // What is positive has no least number that means anything.
+    if min == f64::MIN_POSITIVE {
+        return format!("above 0 and at most {max}");
+    }
+    format!("in [{}, {max}]", General(min))
 }
 
 /// Refuses an array of the wrong length.

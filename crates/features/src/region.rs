@@ -1,9 +1,12 @@
 //! Rectangles of pixels, as people point at parts of an image.
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::{FeatureError, require_in};
 
-/// A rectangle of pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A rectangle of pixels; `[x, y, width, height]` in files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "[usize; 4]", into = "[usize; 4]")]
 pub struct Region {
     /// First column `[px]`.
     pub x: usize,
@@ -13,6 +16,18 @@ pub struct Region {
     pub width: usize,
     /// Rows `[px]`.
     pub height: usize,
+}
+
+impl From<[usize; 4]> for Region {
+    fn from([x, y, width, height]: [usize; 4]) -> Self {
+        Self { x, y, width, height }
+    }
+}
+
+impl From<Region> for [usize; 4] {
+    fn from(Region { x, y, width, height }: Region) -> Self {
+        [x, y, width, height]
+    }
 }
 
 impl std::str::FromStr for Region {
@@ -46,6 +61,13 @@ impl Region {
         require_in("lower edge of a region [px]", bottom, 1.0, height as f64)
     }
 
+    /// Whether a pixel (u, v) lies in the region.
+    pub(crate) fn holds(&self, u: usize, v: usize) -> bool {
+        let across = self.x..self.x.saturating_add(self.width);
+        let down = self.y..self.y.saturating_add(self.height);
+        across.contains(&u) && down.contains(&v)
+    }
+
     /// The pixels (u, v) of the region, row by row.
     pub(crate) fn pixels(self) -> impl Iterator<Item = (usize, usize)> {
         let columns = self.x..self.x + self.width;
@@ -69,5 +91,7 @@ mod tests {
         assert!(region.require_inside(4, 3).is_ok() && region.require_inside(3, 3).is_err());
         assert_eq!(region.pixels().collect::<Vec<_>>(), [(2, 1), (3, 1), (2, 2), (3, 2)]);
         assert!(Region { x: usize::MAX, ..region }.require_inside(4, 3).is_err());
+        let held = |(u, v): &(usize, usize)| region.holds(*u, *v);
+        assert_eq!(Region::whole(4, 3).pixels().filter(held).count(), 4);
     }
 }

@@ -88,6 +88,7 @@ pub fn level_depth(
     camera.require_valid()?;
     image.require_valid()?;
     camera.require_size(image.width, image.height)?;
+    segmentation.require_region(image.width, image.height)?;
     let colour = match (colour, &segmentation.colour) {
         (Some(colour), Some(range)) => {
             let (got, expected) = ((colour.width, colour.height), (image.width, image.height));
@@ -147,8 +148,10 @@ fn of_area((x, y): (f64, f64)) -> f64 {
     (x * y).sqrt()
 }
 
-/// What of it lies in the field of view that is asked for; columns of the image go `along`.
+/// What of it lies in the region and in the field of view that are asked for; columns of the image go `along`.
 fn in_field(levelled: Levelled, segmentation: &Segmentation, along: &Vector3<f64>) -> Levelled {
+    // As if the camera had seen no more.
+    let levelled = if segmentation.region.is_some() { levelled.trimmed() } else { levelled };
     match segmentation.field_width {
         Some(width) => levelled.within(width, along),
         None => levelled,
@@ -189,6 +192,7 @@ pub fn level_height_map(
 ) -> Result<Levelled, FeatureError> {
     segmentation.require_valid()?;
     map.require_valid()?;
+    segmentation.require_region(map.width, map.height)?;
     if segmentation.colour.is_some() {
         return Err(incomplete_colour(false, true));
     }

@@ -1,12 +1,12 @@
 //! How a recording is segmented, as Python's keywords.
 
-use granulcal_features::{Segmentation, Threshold};
+use granulcal_features::{Region, Segmentation, Threshold};
 use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// Every keyword, in the order of the page.
-const KEYWORDS: &str = "height_threshold, threshold_floor, scene_threshold, border_px, downsample, ground_resolution, field_width, \
+const KEYWORDS: &str = "height_threshold, threshold_floor, scene_threshold, border_px, region, downsample, ground_resolution, field_width, \
                         inlier_distance, max_tilt_deg, flying_deg, max_height, min_component_px, plane_seed";
 
 /// A recording's own segmentation with what the keywords change; what is None stays.
@@ -45,6 +45,7 @@ pub(crate) fn changed(
             "threshold_floor" => floor = Some(real()?),
             "scene_threshold" => of_scene = Some(real()?),
             "border_px" => settings.border_px = whole()?,
+            "region" => settings.region = Some(region(&value)?),
             "downsample" => settings.downsample = Some(whole()?),
             "ground_resolution" => settings.ground_resolution = Some(real()?),
             "field_width" => settings.field_width = Some(real()?),
@@ -69,6 +70,15 @@ pub(crate) fn changed(
         settings = settings.with_scene_threshold(of_scene);
     }
     Ok(settings)
+}
+
+/// Four whole numbers: first column, first row, columns, rows.
+fn region(value: &Bound<'_, PyAny>) -> PyResult<Region> {
+    let numbers: Result<[usize; 4], _> = value.extract();
+    numbers.map(Region::from).map_err(|_| {
+        let text = format!("region: must be whole pixels (x, y, width, height), got {value}");
+        PyTypeError::new_err(text)
+    })
 }
 
 /// What is wrong with a count or a seed: below 0 or too large for one, or else what `named` makes of it.

@@ -17,6 +17,7 @@ from granulcal.arrays import read_array
 from granulcal.experiments.sensor import write_d435_camera
 from granulcal.files import write_beside, write_toml
 from granulcal.measured.recording import Formation, Levelled, Recording
+from granulcal.measured.segmentation import SegmentationSettings
 
 __all__ = ["Rig", "Seen", "images", "reproduce", "see"]
 
@@ -43,7 +44,7 @@ class Rig:
     """
 
     title: str
-    options: dict[str, int]
+    options: SegmentationSettings
 
 
 _RIGS = {

@@ -18,6 +18,8 @@ class SegmentationSettings(TypedDict, total=False):
         scene_threshold: the same where neither these nor the camera's file state a threshold: the
             `camera.height_threshold` of the scene to compare with; see `Scene.reading`.
         border_px: frame at the edge of the full image that is ignored [px]; default 0.
+        region: part of the full image that is looked at, (x, y, width, height) [px]: the floor of a
+            tray, without its rim and the table around it; default all.
         downsample: keep one pixel of every block of this side; the default matches
             `ground_resolution`, or is 1 without.
         ground_resolution: width on the ground that a pixel should have [m], as in the
@@ -39,6 +41,7 @@ class SegmentationSettings(TypedDict, total=False):
     threshold_floor: float | None
     scene_threshold: float | None
     border_px: int | None
+    region: tuple[int, int, int, int] | None
     downsample: int | None
     ground_resolution: float | None
     field_width: float | None

@@ -88,6 +88,7 @@ fn segmentation(args: &FeaturesArgs, scene: Option<&Scene>, own: &Segmentation) 
         changed.height_threshold = Threshold::Absolute(height);
     }
     changed.border_px = args.border.unwrap_or(changed.border_px);
+    changed.region = args.region.or(changed.region);
     changed.downsample = args.downsample.or(changed.downsample);
     changed.max_height = args.max_height.or(changed.max_height);
     changed.min_component_px = args.min_component.unwrap_or(changed.min_component_px);

@@ -132,10 +132,10 @@ impl Limits {
         let most = LONG + BY_CHANCE / self.independent(formation).sqrt();
         let elongation = formation.elongation();
         // What is stretched by s has an elongation of (s - 1)/(s + 1).
-        let stretch = |elongation: f64| short(rounded((1.0 + elongation) / (1.0 - elongation)));
+        let stretch = |elongation: f64| (1.0 + elongation) / (1.0 - elongation);
         (elongation > most).then(|| {
             format!(
-                "the formation is {} times as long as wide, by chance at most {} times, and nothing in the scene makes it \
+                "the formation is {:.2} times as long as wide, by chance at most {:.2} times, and nothing in the scene makes it \
                  so: are fx and fy of the lens right, and was the funnel still?",
                 stretch(elongation),
                 stretch(most)
@@ -160,7 +160,7 @@ impl Limits {
         if formation.ground_sd > (UNEVEN * self.diameter).max(UNEVEN_FLOOR) {
             return Some(format!(
                 "the ground deviates from a plane by {} mm (standard deviation), grains are {} mm wide: is it bent, or of \
-                 two levels?",
+                 two levels (a tray on a table), or are the depths distances along the rays?",
                 short(1e3 * formation.ground_sd),
                 short(1e3 * self.diameter)
             ));
@@ -213,7 +213,7 @@ impl Limits {
         tell(
             formation.flat_parts(self.diameter),
             "are taken for grains and flat, as grains are not: if they are a mat, a ruler or a marker, take it away or out \
-             of the image",
+             of the image; if the grains lie on a tray or a board, give its floor as the region of the segmentation",
             "are flat like these",
         );
         found

@@ -70,7 +70,7 @@ fn a_heap_that_lacks_grains_or_is_in_another_unit_cannot_be_of_the_scene() {
     let half = Formation { mask, heights, ..seen.clone() };
     assert!(doubt(&half).contains("of the formation's outline nothing is seen"));
     let uneven = Formation { ground_sd: 3e-3, ..seen.clone() };
-    assert!(doubt(&uneven).contains("of two levels?"), "{}", doubt(&uneven));
+    assert!(doubt(&uneven).contains("of two levels"), "{}", doubt(&uneven));
     let beyond = vec![Part { volume: 4e-5, height: 0.02 }, Part { volume: 3e-8, height: 4e-3 }];
     let chosen = Formation { left_out: beyond, ..seen.clone() };
     assert!(
@@ -129,7 +129,11 @@ fn a_formation_that_is_longer_than_wide_is_told_where_nothing_makes_it_so() {
     let limits = funnel();
     let told = |stretch| limits.doubts(&field(&[(0.0, 0.0)], HEAP, stretch, 0.0)).join("; ");
     assert_eq!((told(1.0), told(1.1)), (String::new(), String::new()));
-    assert!(told(1.7).starts_with("the formation is 1.7 times as long as wide"), "{}", told(1.7));
+    let long = told(1.7);
+    assert!(
+        long.starts_with("the formation is 1.7") && long.contains(" times as long as wide"),
+        "{long}"
+    );
     // Few grains lie anyhow.
     let few = [(0.1, 0.01), (-0.1, 0.0), (0.15, -0.01), (-0.12, 0.02), (0.05, 0.01)];
     let lone = field(&few, (4e-3, 4e-3), 1.0, 0.0);

@@ -52,6 +52,16 @@ pub(super) fn read(input: Input<'_>, options: &ReadOptions) -> Result<Depths, Da
         let allowed = format!("{}x{} as in {}", lens.width, lens.height, camera_path.display());
         return Err(DatasetError::content(&path, "the size", format!("{width}x{height}"), allowed));
     }
+    if count == 0 {
+        let allowed = "at least one image, (h, w) or (k, h, w)";
+        return Err(DatasetError::content(&path, "the array", "none", allowed));
+    }
+    if array.values.iter().all(|&value| value.is_nan() || value <= 0.0)
+        && let Some(found) = array.values.iter().find(|&&value| value < 0.0)
+    {
+        let allowed = "positive away from the camera, 0 or NaN where there is no data";
+        return Err(DatasetError::content(&path, "the depths", found.to_string(), allowed));
+    }
     let window = options.window(&path, count as u64)?;
     let metres = |value: &f64| (value * unit.unwrap_or(1.0)) as f32;
     let frames = array.values.chunks_exact(width * height);
@@ -115,7 +125,8 @@ mod tests {
             (npy::encode(&[6], [0.4; 6]), "(h, w) or (k, h, w)"),
             (npy::encode(&[3, 2], [0.4; 6]), "the size must be 3x2 as in"),
             (npy::encode(&[2, 3], [400.0; 6]), "are they counts or millimetres?"),
-            (npy::encode(&[0, 2, 3], []), "the first frame"),
+            (npy::encode(&[0, 2, 3], []), "the array must be at least one image"),
+            (npy::encode(&[2, 3], [-0.4; 6]), "the depths must be positive away from the camera"),
             (npy::encode_text("depth"), "the dtype"),
         ] {
             let told = read(&camera, &array, &ReadOptions::default()).unwrap_err();

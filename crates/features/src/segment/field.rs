@@ -48,6 +48,12 @@ impl Levelled {
         self.cut_to(&kept)
     }
 
+    /// Leaves the rectangle of pixels that holds all with data.
+    pub(super) fn trimmed(self) -> Self {
+        let all = vec![true; self.points.len()];
+        self.cut_to(&all)
+    }
+
     /// The patches of grains that are cut off whole, or more than half; a heap has some pixels.
     fn beyond(&self, kept: &[bool]) -> Vec<Part> {
         let part = |patch: Vec<usize>| {

@@ -121,13 +121,19 @@ impl Formation {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Formation, HeightMap, Segmentation, Threshold, segment_height_map};
+    use crate::{Formation, HeightMap, Region, Segmentation, Threshold, segment_height_map};
 
     const SIDE: usize = 80;
     const DIAMETER: f64 = 4e-3;
 
     /// Cones on level ground of 2 mm to a pixel: middle `[px]`, height and radius `[m]`; the first columns have no data.
     fn seen(cones: &[([f64; 2], f64, f64)], blind: usize) -> Formation {
+        let height_threshold = Threshold::Absolute(1e-3);
+        let settings = Segmentation { height_threshold, ..Segmentation::default() };
+        segment_height_map(&map(cones, blind), &settings).unwrap()
+    }
+
+    fn map(cones: &[([f64; 2], f64, f64)], blind: usize) -> HeightMap {
         let (mut z, step) = (Vec::new(), 2e-3);
         for row in 0..SIDE {
             for column in 0..SIDE {
@@ -139,10 +145,25 @@ mod tests {
                 z.push(if column < blind { f64::NAN } else { top });
             }
         }
-        let map = HeightMap::new(SIDE, SIDE, step, step, z).unwrap();
+        HeightMap::new(SIDE, SIDE, step, step, z).unwrap()
+    }
+
+    #[test]
+    fn a_region_is_seen_as_if_there_were_no_more() {
+        let (pile, rim) = (([40.0, 40.0], 0.02, 0.03), ([8.0, 40.0], 0.02, 0.015));
+        let region = Some(Region { x: 20, y: 15, width: 45, height: 50 });
         let height_threshold = Threshold::Absolute(1e-3);
-        let settings = Segmentation { height_threshold, ..Segmentation::default() };
-        segment_height_map(&map, &settings).unwrap()
+        let settings = Segmentation { height_threshold, region, ..Segmentation::default() };
+        let inside = segment_height_map(&map(&[pile, rim], 0), &settings).unwrap();
+        assert_eq!((inside.width, inside.height), (45, 50));
+        assert!(inside.seen_share() == 1.0 && !inside.is_cut_off());
+        assert!(inside.other_heaps(DIAMETER).is_empty());
+        let (alone, both) = (seen(&[pile], 0), seen(&[pile, rim], 0));
+        assert!((inside.volume - alone.volume).abs() < 1e-12 && both.volume > 1.1 * alone.volume);
+        let beyond = Some(Region { x: 40, y: 0, width: 45, height: 50 });
+        let settings = Segmentation { region: beyond, ..settings };
+        let error = segment_height_map(&map(&[pile], 0), &settings).unwrap_err().to_string();
+        assert_eq!(error, "right edge of a region [px] must be in [1, 80], got 85");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::camera::sample_offset;
 use crate::colour::HsvRange;
 use crate::error::{FeatureError, require_in};
+use crate::region::Region;
 use granulcal_scene::{CameraSpec, Mask};
 
 /// Largest length `[m]` that a setting may have.
@@ -68,6 +69,9 @@ pub struct Segmentation {
     pub colour: Option<HsvRange>,
     /// Frame of pixels at the edge of the full image that is ignored `[px]`; default 0.
     pub border_px: usize,
+    /// Part of the full image that is looked at `[px]`: the floor of a tray, without its rim and the table around it.
+    /// Default none, which is all of it.
+    pub region: Option<Region>,
     /// Keep the middle pixel of every n × n block (the paper: 10 for its D435); default the n with
     /// which a pixel is as wide on the ground as `ground_resolution`, or 1 without one.
     pub downsample: Option<usize>,
@@ -101,6 +105,7 @@ impl Default for Segmentation {
             height_threshold: Threshold::default(),
             colour: None,
             border_px: 0,
+            region: None,
             downsample: None,
             ground_resolution: None,
             field_width: None,
@@ -175,7 +180,12 @@ impl Segmentation {
         }
     }
 
-    /// Whether a pixel of the down-sampled image lies inside the border of the full one.
+    /// Refuses a region that is not in an image of this size.
+    pub(super) fn require_region(&self, width: usize, height: usize) -> Result<(), FeatureError> {
+        self.region.map_or(Ok(()), |region| region.require_inside(width, height))
+    }
+
+    /// Whether a pixel of the down-sampled image lies inside the border of the full one, and in its region.
     pub(super) fn inside(
         &self,
         width: usize,
@@ -183,11 +193,13 @@ impl Segmentation {
         n: usize,
     ) -> impl Fn(usize, usize) -> bool + use<> {
         let border = self.border_px;
-        let kept = move |pixel: usize, side: usize| {
-            let full = pixel * n + sample_offset(n);
-            full >= border && full < side.saturating_sub(border)
-        };
-        move |u, v| kept(u, width) && kept(v, height)
+        let region = self.region.unwrap_or(Region::whole(width, height));
+        let full = move |pixel: usize| pixel * n + sample_offset(n);
+        let kept = move |at: usize, side: usize| at >= border && at < side.saturating_sub(border);
+        move |u, v| {
+            let (u, v) = (full(u), full(v));
+            kept(u, width) && kept(v, height) && region.holds(u, v)
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use clap::Args;
 use granulcal_dataset::{Form, Product};
+use granulcal_features::Region;
 
 use crate::args::ReadArgs;
 use crate::args::paths::{Reads, Writes, recording, writes};
@@ -49,6 +50,9 @@ pub struct FeaturesArgs {
     /// Ignore a frame of so many pixels
     #[arg(long, value_name = "PIXELS")]
     pub border: Option<usize>,
+    /// Look at this part of the image alone: the floor of a tray, without its rim and the table
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT")]
+    pub region: Option<Region>,
     /// Keep the middle pixel of every n x n block
     #[arg(long, value_name = "N")]
     pub downsample: Option<usize>,
