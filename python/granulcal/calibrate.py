@@ -24,7 +24,13 @@ if TYPE_CHECKING:
     from granulcal.bayessim.check.misfit import Misfit
     from granulcal.bayessim.posterior.posterior import Posterior
 
-__all__ = ["Calibrated", "calibrate", "require_own_statistics", "require_same_scene"]
+__all__ = [
+    "Calibrated",
+    "calibrate",
+    "calibrate_measured",
+    "require_own_statistics",
+    "require_same_scene",
+]
 
 # Seeds of forward pours: far from those of data sets, which are hashes, and of demo recordings.
 _FIRST_SEED = 9000
@@ -36,7 +42,7 @@ class Calibrated:
 
     Attributes:
         posterior: the inferred parameters.
-        observed: statistics of each recording, SI units, shape (k, 16).
+        observed: statistics of each recording, SI units, shape (k, s).
         pours: pours at the posterior's mode.
         prior_pours: pours at the prior's mean.
         report: the HTML page.
@@ -75,7 +81,7 @@ def require_own_statistics(model: "BayesSim") -> None:
     if tuple(model.x_names) != tuple(NAMES):
         raise ValueError(
             f"the model must be of the {len(NAMES)} statistics of an image, in order; it is of "
-            f"{', '.join(model.x_names)}: `granulcal infer` takes tables of these"
+            f"{', '.join(model.x_names)}: `granulcal infer` and `report` take tables of these"
         )
 
 
@@ -129,6 +135,93 @@ def calibrate(
     observed = np.array([np.asarray(formation.statistics()) for formation in formations])
     require_different(observed)
     known = np.hstack([observed, _diagnostics(formations, data.scene, diagnostics)])
+    return _told(
+        model,
+        data,
+        (known, observed),
+        report=report,
+        seeds=seeds,
+        draws=draws,
+        threads=threads,
+        observed_points=formations[0].points,
+        truth=truth,
+        title=title,
+        summary=summary,
+        notes=notes,
+        command=command,
+    )
+
+
+def calibrate_measured(
+    model: "BayesSim",
+    data: Dataset,
+    measured: Sequence[Mapping[str, float]],
+    *,
+    report: str | PathLike[str],
+    seeds: int = 3,
+    threads: int | None = None,
+    title: str = "Calibration report",
+    summary: str = "",
+    notes: Sequence[str] = (),
+    command: str = "",
+) -> Calibrated:
+    """Infers the material of what a scene observes, simulates it and writes the report.
+
+    As `calibrate`, of drums, run-outs, discharges and the like; the page has no pictures of piles.
+
+    Args:
+        model: trained on `data`, of statistics that its scene observes.
+        data: the pours that the model was trained on.
+        measured: the statistics by name of pours of one material, at least one.
+        report: the HTML file.
+        seeds: number of pours at the posterior's mode and at the prior's mean.
+        threads: pours at once; the default is one for each core.
+        title: heading of the page.
+        summary: one paragraph that says what was done.
+        notes: further sentences that a reader must know.
+        command: command line that makes the page again.
+
+    Raises:
+        ValueError: nothing measured, another scene, or other statistics.
+    """
+    if not measured:
+        raise ValueError("calibrate_measured needs at least one measurement, got none")
+    require_same_scene(model, data.scene)
+    if tuple(model.x_names) != tuple(data.x_names):
+        raise ValueError(
+            f"the pours must have the statistics of the model, {', '.join(model.x_names)}; "
+            f"they have {', '.join(data.x_names)}"
+        )
+    known = np.array([[found[name] for name in model.x_names] for found in measured])
+    return _told(
+        model,
+        data,
+        (known, known),
+        report=report,
+        seeds=seeds,
+        draws=0,
+        threads=threads,
+        observed_points=None,
+        title=title,
+        summary=summary,
+        notes=notes,
+        command=command,
+    )
+
+
+def _told(
+    model: "BayesSim",
+    data: Dataset,
+    statistics: tuple[NDArray[np.float64], NDArray[np.float64]],
+    *,
+    report: str | PathLike[str],
+    seeds: int,
+    draws: int,
+    threads: int | None,
+    **told: Any,
+) -> Calibrated:
+    """Infers, pours and writes the page, given what the model and what the page asks for."""
+    known, observed = statistics
     posterior = model.posterior(known)
     misfit = model.misfit(known)
     numbers = range(_FIRST_SEED, _FIRST_SEED + seeds)
@@ -136,23 +229,17 @@ def calibrate(
     unfitted = scene_at(data.scene, model.prior, model.prior.mean())
     pours = pours_at(fitted, numbers, threads=threads)
     prior_pours = pours_at(unfitted, numbers, threads=threads)
-    drawn = draws_of(data.scene, posterior, draws, threads=threads)
     page = write_report(
         report,
         observed=observed.mean(axis=0),
-        observed_points=formations[0].points,
         posterior=posterior,
         pours=pours,
         prior_pours=prior_pours,
-        drawn=drawn,
+        drawn=draws_of(data.scene, posterior, draws, threads=threads),
         data=data,
         calibration=model.calibration,
         misfit=misfit,
-        truth=truth,
-        title=title,
-        summary=summary,
-        notes=notes,
-        command=command,
+        **told,
     )
     return Calibrated(
         posterior=posterior,

@@ -91,7 +91,7 @@ def write_report(
     path: str | PathLike[str],
     *,
     observed: ArrayLike,
-    observed_points: ArrayLike,
+    observed_points: ArrayLike | None = None,
     posterior: "Posterior",
     pours: Sequence[Pour],
     data: Dataset,
@@ -109,8 +109,9 @@ def write_report(
 
     Args:
         path: the HTML file.
-        observed: measured statistics, shape (16,).
-        observed_points: points of the measured formation [m], shape (n, 3), centred.
+        observed: measured statistics as `data` has them, shape (s,).
+        observed_points: points of the measured formation [m], shape (n, 3), centred; None where
+            what was measured is no image: pictures and profile are left out.
         posterior: the inferred parameters.
         pours: pours at the posterior's mode, one for each seed, at least one.
         data: the pours that the model was trained on.
@@ -130,23 +131,27 @@ def write_report(
     if not pours:
         raise ValueError("a report needs at least one pour at the posterior's mode, got none")
     measured = np.asarray(unmasked("observed", observed), dtype=float)
-    measured_points = np.asarray(unmasked("observed_points", observed_points), dtype=float)
     scale = Scale.of(data)
-    simulated = [np.asarray(pour.statistics()) for pour in pours]
+    simulated = [_of_pour(pour, data) for pour in pours]
+    scene = data.scene
+    formations, profile = None, None
+    if observed_points is not None:
+        points = np.asarray(unmasked("observed_points", observed_points), dtype=float)
+        formations, profile = _formations(points, pours[0]), _profile(points, pours, drawn)
     page = template(_TEMPLATE).render(
         title=title,
         summary=summary,
         notes=[*notes, *(str(warning) for warning in posterior.warnings)],
         command=command,
-        formations=_formations(measured_points, pours[0]),
-        profile=_profile(measured_points, pours, drawn),
+        formations=formations,
+        profile=profile,
         drawn_count=len(drawn),
         pairs=_pair_plot(posterior, truth),
         parameters=_parameters(posterior, truth),
         assumed=assumed(data.scene_toml, posterior.prior),
         has_truth=truth is not None,
-        statistics=comparison_table(measured, simulated, scale),
-        docs=DOCS,
+        statistics=comparison_table(measured, simulated, scale, scene.units_of(data.x_names)),
+        docs=DOCS | scene.observed_docs,
         pour_count=len(pours),
         distances=_distances(measured, simulated, prior_pours, data, scale),
         health=_health(data, pours, prior_pours),
@@ -183,6 +188,12 @@ def _with_code(text: str) -> Any:
     from markupsafe import Markup, escape
 
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
+def _of_pour(pour: Pour, data: Dataset) -> Array:
+    """The statistics of a pour that the data set has, in its order."""
+    found = pour.observed() if pour.scene.observed_names else pour.statistics()
+    return np.array([found[name] for name in data.x_names])
 
 
 def _formations(measured: Array, pour: Pour) -> str:
@@ -243,7 +254,7 @@ def _distances(
     """Distance to the measurement of each way to choose parameters, with a label."""
     rows = []
     if prior_pours:
-        vectors = [np.asarray(pour.statistics()) for pour in prior_pours]
+        vectors = [_of_pour(pour, data) for pour in prior_pours]
         distance = standardised_distance(np.mean(vectors, axis=0), measured, scale)
         rows.append((f"prior mean, {_pours(len(vectors))}", distance))
     best = nearest_row(measured, data)

@@ -65,6 +65,25 @@ def test_measured_numbers_become_a_posterior(model, scene, tmp_path, capfd):
     assert cli.main(command) in (0, 3)
 
 
+def test_a_report_is_of_the_statistics_that_the_scene_observes(model, scene, tmp_path, capfd):
+    pytest.importorskip("jinja2")
+    files = [_measured(scene, tmp_path / f"{seed}.json", seed) for seed in (11, 12)]
+    page, pours = tmp_path / "report.html", model.parent / "pours"
+    words = ["report", str(model), *files, "--data", str(pours), "-o", str(page), "--seeds", "2"]
+    assert cli.main([*words, "--json"]) in (0, 3)
+    told = json.loads(capfd.readouterr().out)
+    assert told["report"] == str(page) and told["warnings"] == []
+    text = page.read_text(encoding="utf-8")
+    for name in scene.observed_names:
+        assert f"<code>{name}</code>" in text
+    assert f"over the {len(scene.observed_names)} statistics" in text and "max_z" not in text
+    assert "Depth images" not in text and "mean of 2 pours" in text
+    assert f"granulcal report {model}" in text and "--draws" not in text
+    # What is of depth images is refused, as `infer` refuses it.
+    assert cli.main([*words, "--camera", str(pours)]) == 2
+    assert "--camera is of depth images" in capfd.readouterr().err
+
+
 def test_what_does_not_go_with_the_model_is_named(model, scene, tmp_path, capfd):
     file = _measured(scene, tmp_path / "pour.json", 11)
     part = tmp_path / "part.csv"

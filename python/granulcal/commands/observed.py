@@ -1,4 +1,4 @@
-"""`infer` and `calibrate` of what a scene observes: drums, run-outs, discharges, spills and the like."""
+"""`infer`, `report` and `calibrate` of what a scene observes: drums, run-outs, discharges, spills and the like."""
 
 import argparse
 import json
@@ -13,7 +13,16 @@ from granulcal.commands.parameters import parameters_of, print_parameters
 from granulcal.files import write_beside
 from granulcal.pours.scene import Scene
 
-__all__ = ["add_observed", "is_of_observed", "measured_of", "not_measured", "refuse", "run"]
+__all__ = [
+    "add_observed",
+    "is_of_observed",
+    "measured_of",
+    "not_measured",
+    "observed_words",
+    "read_measured",
+    "refuse",
+    "run",
+]
 
 _SAMPLES = 1000
 _OURS = ("width", "fps", "series")
@@ -25,8 +34,16 @@ _OF_RECORDINGS = ("camera", "topic", "camera_topic", "colour_topic", "first_fram
 def add_observed(parser: argparse.ArgumentParser) -> None:
     """Adds what measurements of other kinds than depth images need besides their file."""
     parser.add_argument("--width", type=float, help="inner diameter of a drum's picture [m]")
-    parser.add_argument("--fps", type=float, help="frames a second of a run-out file (240)")
+    parser.add_argument(
+        "--fps", type=float, help="frames a second of a run-out file (default: 240)"
+    )
     parser.add_argument("--series", help="name of a discharge curve, where the file has several")
+
+
+def observed_words(options: argparse.Namespace) -> list[str]:
+    """Returns what `add_observed` was told, as words of a command line."""
+    given = {name: getattr(options, name) for name in _OURS}
+    return [f"--{name}={value}" for name, value in given.items() if value is not None]
 
 
 def is_of_observed(document: dict[str, Any]) -> bool:
@@ -96,11 +113,8 @@ def run(options: argparse.Namespace, folder: Path, document: dict[str, Any]) -> 
     from granulcal.bayessim.check.identifiability import Identifiability
     from granulcal.calibrate import require_same_scene
 
-    _refuse(options, _OF_RECORDINGS, "is of depth images; this model is of what its scene observes")
-    _require_different(options.recording)
-    scene = Scene.from_toml(document["scene_toml"])
     # Before PyTorch is loaded.
-    observed = [_measured(options, path, scene, document["x_names"]) for path in options.recording]
+    observed = read_measured(options, document)
     model = BayesSim.load(folder)
     if options.scene is not None:
         require_same_scene(model, Scene.load(options.scene))
@@ -150,6 +164,19 @@ def run(options: argparse.Namespace, folder: Path, document: dict[str, Any]) -> 
         title = "" if misfit.is_inside else "OUTSIDE THE MODEL: its best compromise"
         posterior.pair_plot(options.plot, title=title)
     return DONE if misfit.is_inside else UNHEALTHY
+
+
+def read_measured(options: argparse.Namespace, document: dict[str, Any]) -> list[dict[str, float]]:
+    """Returns what each measurement says of the statistics of a model.
+
+    Raises:
+        ValueError: a measurement lacks a statistic of the model, or is none of its scene.
+    """
+    _refuse(options, _OF_RECORDINGS, "is of depth images; this model is of what its scene observes")
+    _require_different(options.recording)
+    scene = Scene.from_toml(document["scene_toml"])
+    names = document["x_names"]
+    return [_measured(options, path, scene, names) for path in options.recording]
 
 
 def _measured(

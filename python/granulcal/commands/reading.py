@@ -69,8 +69,13 @@ def reading_words(options: argparse.Namespace) -> list[str]:
     return [*words, f"--frames={options.frames or 'all'}"]
 
 
-def open_model(options: argparse.Namespace) -> Any:
-    """Returns the model that `add_recordings` names, if it is of the scene that is asked."""
+def open_model(options: argparse.Namespace, *, of_images: bool = True) -> Any:
+    """Returns the model that `add_recordings` names, if it is of the scene that is asked.
+
+    Args:
+        options: the words.
+        of_images: whether it must be of the statistics of an image.
+    """
     from granulcal.starter.models import model_named
 
     # Before PyTorch is loaded: a name that leads nowhere is told at once.
@@ -80,7 +85,8 @@ def open_model(options: argparse.Namespace) -> Any:
     from granulcal.pours.scene import Scene
 
     model = BayesSim.load(folder)
-    require_own_statistics(model)
+    if of_images:
+        require_own_statistics(model)
     if options.scene is not None:
         require_same_scene(model, Scene.load(options.scene))
     return model

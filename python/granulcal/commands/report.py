@@ -3,8 +3,9 @@
 import argparse
 import shlex
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from granulcal.commands import observed
 from granulcal.commands.counts import pour_count, thread_count
 from granulcal.commands.dry_run import add_dry_run, say_how_long
 from granulcal.commands.exit_code import UNHEALTHY
@@ -22,21 +23,27 @@ from granulcal.paths import READS, writes
 from granulcal.progress import shown
 from granulcal.warned import warn
 
+if TYPE_CHECKING:
+    from granulcal.calibrate import Calibrated
+    from granulcal.pours.dataset import Dataset
+
 __all__ = ["add"]
 
 
 def add(commands: Any) -> None:
     """Adds the word to the command line."""
     text = "infer, simulate the result and write one HTML page"
-    parser = commands.add_parser("report", help=text, description=text)
+    more = f"{text}; of a model of what its scene observes, too, as `infer` takes its measurements"
+    parser = commands.add_parser("report", help=text, description=more)
     add_recordings(parser)
+    observed.add_observed(parser)
     parser.add_argument("-o", "--out", type=writes("html"), required=True, help="the HTML file")
     parser.add_argument("--seeds", type=pour_count, default=3, help="pours to compare (default: 3)")
     parser.add_argument(
         "--draws",
         type=pour_count,
         default=8,
-        help="pours at draws of the posterior, for the band of the profile (default: 8)",
+        help="pours at draws of the posterior, for the band of a formation's profile (default: 8)",
     )
     parser.add_argument("--threads", type=thread_count, help="pours at once (default: all cores)")
     parser.add_argument(
@@ -48,18 +55,23 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from granulcal.calibrate import calibrate, require_same_scene
-    from granulcal.measured.plausible import doubts, violations
+    from granulcal.bayessim.storage.model_document import read_model_document
+    from granulcal.calibrate import require_same_scene
     from granulcal.pours.dataset import Dataset
-    from granulcal.pours.left_out import LeftOut
     from granulcal.starter.models import model_named
 
     if options.seeds < 1:
         raise ValueError(f"--seeds must be at least 1, got {options.seeds}")
     if options.draws < 0:
         raise ValueError(f"--draws must be at least 0, got {options.draws}")
-    model = open_model(options)
     folder = model_named(options.model)
+    _, document = read_model_document(folder)
+    is_of_observed = observed.is_of_observed(document)
+    # What was measured is read before PyTorch is loaded.
+    measured = observed.read_measured(options, document) if is_of_observed else []
+    if not is_of_observed:
+        observed.refuse(options)
+    model = open_model(options, of_images=not is_of_observed)
     training = folder / TRAINING if options.data is None else options.data
     if options.data is None and not training.exists():
         told = "give some of its scene with --data, as `granulcal generate` makes them"
@@ -68,8 +80,36 @@ def _run(options: argparse.Namespace) -> int:
     require_same_scene(model, data.scene)
     if options.dry_run:
         # At the mode, at the prior's mean, at draws.
-        pours = 2 * options.seeds + options.draws
+        pours = 2 * options.seeds + (0 if is_of_observed else options.draws)
         return say_how_long(options, data.scene, model.prior, pours)
+    if is_of_observed:
+        return _of_observed(options, model, data, measured)
+    return _of_images(options, model, data)
+
+
+def _of_observed(
+    options: argparse.Namespace, model: Any, data: "Dataset", measured: list[dict[str, float]]
+) -> int:
+    from granulcal.calibrate import calibrate_measured
+
+    words = [*observed.observed_words(options), *_own_words(options)]
+    with shown():
+        found = calibrate_measured(
+            model,
+            data,
+            measured,
+            report=options.out,
+            seeds=options.seeds,
+            threads=options.threads,
+            **_said(options, data, words),
+        )
+    return _tell(options, found, [], [])
+
+
+def _of_images(options: argparse.Namespace, model: Any, data: "Dataset") -> int:
+    from granulcal.calibrate import calibrate
+    from granulcal.measured.plausible import doubts, violations
+
     recordings = open_recordings(options)
     if impossible := violations(data.scene, model.prior, recordings, options.recording):
         options.told |= told_outside(options, impossible)
@@ -77,13 +117,7 @@ def _run(options: argparse.Namespace) -> int:
         return UNHEALTHY
     doubtful = doubts(data.scene, model.prior, recordings, options.recording)
     warn(doubtful)
-    names = " ".join(str(path) for path in options.recording)
-    words = ["granulcal", "report", str(options.model), *map(str, options.recording)]
-    words += reading_words(options)
-    words += ["-o", str(options.out), "--seeds", str(options.seeds)]
-    words += ["--draws", str(options.draws)]
-    if options.data is not None:
-        words += ["--data", str(options.data)]
+    words = [*reading_words(options), *_own_words(options), "--draws", str(options.draws)]
     with shown():
         found = calibrate(
             model,
@@ -93,12 +127,35 @@ def _run(options: argparse.Namespace) -> int:
             seeds=options.seeds,
             draws=options.draws,
             threads=options.threads,
-            title=f"Calibration from {names}",
-            summary=f"Parameters of the scene {data.scene.name!r}, inferred from {names} "
-            f"with a model trained on {len(data)} pours.",
-            command=shlex.join(words),
             notes=doubtful,
+            **_said(options, data, words),
         )
+    return _tell(options, found, recordings, doubtful)
+
+
+def _own_words(options: argparse.Namespace) -> list[str]:
+    words = ["-o", str(options.out), "--seeds", str(options.seeds)]
+    return words if options.data is None else [*words, "--data", str(options.data)]
+
+
+def _said(options: argparse.Namespace, data: "Dataset", words: list[str]) -> dict[str, Any]:
+    """Title, summary and command of the page."""
+    names = " ".join(str(path) for path in options.recording)
+    command = ["granulcal", "report", str(options.model), *map(str, options.recording), *words]
+    return {
+        "title": f"Calibration from {names}",
+        "summary": f"Parameters of the scene {data.scene.name!r}, inferred from {names} "
+        f"with a model trained on {len(data)} pours.",
+        "command": shlex.join(command),
+    }
+
+
+def _tell(
+    options: argparse.Namespace, found: "Calibrated", recordings: list[Any], doubtful: list[str]
+) -> int:
+    """Says where the page is and what is wrong with it; returns the exit code."""
+    from granulcal.pours.left_out import LeftOut
+
     if not found.misfit.is_inside:
         print(found.misfit)
     print(found.report)

@@ -1,6 +1,6 @@
 """How far two formations are from each other, in standard deviations of the training data."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ class Scale:
     """Standard deviation of each statistic over the usable pours of a data set.
 
     Attributes:
-        sd: standard deviations, SI units, shape (16,).
+        sd: standard deviations, SI units, shape (s,).
     """
 
     sd: Array
@@ -55,7 +55,7 @@ def standardised_distance(a: ArrayLike, b: ArrayLike, scale: Scale) -> float:
 
 
 def nearest_row(observed: ArrayLike, data: Dataset) -> int:
-    """Returns the index of the usable pour of `data` that is nearest to `observed` (16,)."""
+    """Returns the index of the usable pour of `data` that is nearest to `observed` (s,)."""
     usable = np.flatnonzero(data.is_usable)
     scaled = Scale.of(data).difference(data.x[usable], unmasked("observed", observed))
     return int(usable[np.linalg.norm(scaled, axis=1).argmin()])
@@ -88,28 +88,33 @@ class StatisticRow:
 
 
 def comparison_table(
-    measured: ArrayLike, simulated: Sequence[ArrayLike], scale: Scale
+    measured: ArrayLike,
+    simulated: Sequence[ArrayLike],
+    scale: Scale,
+    units: Mapping[str, str] | None = None,
 ) -> list[StatisticRow]:
     """Returns one row for each statistic.
 
     Args:
-        measured: measured statistics, shape (16,).
-        simulated: statistics of each simulated pour, each of shape (16,), at least one.
+        measured: measured statistics, shape (s,).
+        simulated: statistics of each simulated pour, each of shape (s,), at least one.
         scale: standard deviations of the training data.
+        units: unit of each statistic by its name, in order; the paper's 16 if None.
     """
+    units = {name: UNITS[name] for name in NAMES} if units is None else units
     pours = np.array([np.asarray(pour, dtype=float) for pour in simulated])
     mean = pours.mean(axis=0)
-    sd = pours.std(axis=0, ddof=1) if len(pours) > 1 else np.full(len(NAMES), np.nan)
+    sd = pours.std(axis=0, ddof=1) if len(pours) > 1 else np.full(len(units), np.nan)
     vector = np.asarray(unmasked("measured", measured), dtype=float)
     differences = scale.difference(mean, vector)
     return [
         StatisticRow(
             name=name,
-            unit=UNITS[name],
+            unit=unit,
             measured=float(vector[i]),
             simulated=float(mean[i]),
             sd=float(sd[i]),
             difference=float(differences[i]),
         )
-        for i, name in enumerate(NAMES)
+        for i, (name, unit) in enumerate(units.items())
     ]
