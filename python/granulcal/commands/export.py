@@ -79,7 +79,8 @@ def _add_engine(parser: argparse.ArgumentParser) -> None:
         "--young",
         type=float,
         metavar="PA",
-        help="Young's modulus, 1e4 to 1e12; lammps, liggghts and yade alone",
+        help="Young's modulus, 1e4 to 1e12 (default: 3e6 at 1300 kg/m^3, "
+        "in proportion to the density); lammps, liggghts and yade alone",
     )
 
 

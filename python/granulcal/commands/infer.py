@@ -41,8 +41,10 @@ def add(commands: Any) -> None:
     add_observed(parser)
     parser.add_argument("--border", type=int, help="ignore a frame of so many pixels")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
-    parser.add_argument("--samples", type=int, help="print so many draws in the JSON")
-    parser.add_argument("--seed", type=seed_number, help="seed of the draws (default 0)")
+    parser.add_argument(
+        "--samples", type=int, help="print so many draws in the JSON (default: none)"
+    )
+    parser.add_argument("--seed", type=seed_number, help="seed of the draws (default: 0)")
     parser.add_argument(
         "-o", "--out", type=writes("json"), help="write JSON with samples to this file"
     )

@@ -54,12 +54,18 @@ def _add_init(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("folder", type=writes("folder"), help="made if it does not exist")
-    parser.add_argument("--scene", choices=("funnel", "drop"), default="funnel", help="built-in")
+    parser.add_argument(
+        "--scene", choices=("funnel", "drop"), default="funnel", help="built-in (default: funnel)"
+    )
     parser.add_argument("--recording", type=RECORDING, help="depth recording to take the lens from")
     parser.add_argument(
         "--camera", type=READS, help="TOML of the camera, if the recording is a PNG without it"
     )
-    parser.add_argument("--preset", choices=("fast", "default", "accurate"), help="of the solver")
+    parser.add_argument(
+        "--preset",
+        choices=("fast", "default", "accurate"),
+        help="of the solver (default: the scene's)",
+    )
     parser.add_argument(
         "--set",
         action="append",
@@ -87,7 +93,9 @@ def _add_sample(commands: Any) -> None:
         default=Path(),
         help="of `init` (default: this one)",
     )
-    parser.add_argument("--seed", type=seed_number, help="seed of the pours and of the noise")
+    parser.add_argument(
+        "--seed", type=seed_number, help="seed of the pours and of the noise (default: 20231)"
+    )
     parser.add_argument(
         "--set",
         action="append",

@@ -25,7 +25,7 @@ __all__ = ["add"]
 _FALLEN = 3
 _MODELS = ("base", "named", "corrected", "line", "nearest")
 
-_TEXT = "what the models of a closed loop say of a condition that was not measured"
+_TEXT = "what a closed loop, or a posterior, says of a condition that was not measured"
 _DESCRIPTION = """\
 What the models of a closed loop say of a condition that was not measured, with
 intervals.

@@ -108,10 +108,11 @@ fx = {fx:.6g}
 fy = {fy:.6g}
 cx = {cx:.6g}
 cy = {cy:.6g}
-depth_unit = {unit:g}          # metres per count of the 16-bit PNG
+depth_unit = {unit:g}          # metres per count of the 16-bit PNG; a RealSense has 0.001 unless it was told another
 
 [segmentation]
 border_px = 0                 # ignore a frame of so many pixels
+# region = [170, 120, 300, 240] # look at this part alone, x, y, width, height: a tray's floor without rim and table
 max_height = {max_height:g}             # no data above it: the funnel, a hand
 height_threshold = {{ absolute = {threshold:g} }}   # as in scene.toml, and three times the ground's noise or more
 """

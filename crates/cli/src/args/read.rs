@@ -10,7 +10,7 @@ use super::paths::Reads;
 /// What of a recording is read.
 #[derive(Clone, Debug, Args)]
 pub struct ReadArgs {
-    /// TOML of the camera: lens, depth unit and segmentation. Images as PNG take that under their own name,
+    /// TOML of the camera: lens, depth unit and segmentation. Images as PNG or .npy take that under their own name,
     /// or camera.toml in their folder or the one above, if none is given; for .bag and .mcap it replaces
     /// what they say, key by key
     #[arg(long, value_name = "CAMERA.toml")]

@@ -19,8 +19,8 @@ which you pour. One camera stands still: what the frames share is its fixed
 pattern, what differs is its noise.
 
 RECORDING is what `features` reads: a .bag or .mcap of one or more frames,
-16-bit depth PNGs or a folder of them, with --camera, or .npz height maps. Each
-frame is taken by itself. With --baseline the camera is stereo: errors are px
+16-bit depth PNGs, a folder of them or .npy, with --camera, or .npz height maps.
+Each frame is taken by itself. With --baseline the camera is stereo: errors are px
 of disparity, and depth errors grow with the square of the depth. Without,
 errors are metres, whatever the depth.
 
