@@ -20,7 +20,7 @@ SMALL = {
     "own_simulator": {"POURS = 200": "POURS = 80"},
     "rings": {"POURS = 400": "POURS = 80", "COUNT = 2000": "COUNT = 150"},
     "drum": {
-        "POURS = 200": "POURS = 60",
+        "POURS = 200": "POURS = 80",
         "CHANGES = {}": 'CHANGES = {"grains.count": 400, "grains.diameter": 5e-3, '
         '"start.spacing": 5.3e-3, "end.horizon": 1.6}',
     },
