@@ -227,9 +227,11 @@ def read_bytes(path: str | os.PathLike[str], *, most: int = _LARGEST_FILE) -> by
     """Returns the bytes of a plain file of at most `most`.
 
     Raises:
+        TypeError: no path; a number would be a file that is open already.
         OSError: it cannot be read.
         ValueError: a folder, a device or a pipe, or a larger file.
     """
+    os.fspath(path)
     if not stat.S_ISREG(os.stat(path).st_mode):
         kind = "a folder" if os.path.isdir(path) else "a device or pipe"
         raise ValueError(f"{path}: the file must be a plain file, found {kind}")

@@ -68,10 +68,12 @@ def save_figure(figure: "Figure", path: str | PathLike[str], **options: Any) -> 
     """Writes a figure as its ending says, PNG if it has none; whole or not at all.
 
     Raises:
-        ValueError: an ending of another kind.
+        ValueError: an ending of another kind, or a folder.
     """
     require_figure(path)
     target = Path(path)
+    if target.is_dir():
+        raise ValueError(f"{path} must be a file to write, found a folder")
     if not target.suffix:
         target = target.with_suffix(".png")
     buffer = BytesIO()

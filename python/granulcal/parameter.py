@@ -4,6 +4,8 @@ Which numbers it may have is checked by the simulator, as in files. The coordina
 stay here: training and its plots need them for arrays of parameters.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from statistics import NormalDist
 

@@ -1,5 +1,7 @@
 """Prior over any numbers of a scene or a material, each named by its path."""
 
+from __future__ import annotations
+
 import tomllib
 from collections.abc import Iterable, Mapping
 from os import PathLike
@@ -15,6 +17,7 @@ from granulcal.documents import LARGEST_DOCUMENT, read_bytes
 from granulcal.errors import PriorError
 from granulcal.parameter import Parameter
 from granulcal.real import check_real
+from granulcal.whole import check_seed, check_whole
 from granulcal.words import not_there
 
 __all__ = ["Parameter", "Prior"]
@@ -52,6 +55,8 @@ class Prior:
 
     def __init__(self, parameters: Iterable[Parameter]) -> None:
         """Checks the list as a whole; each parameter has checked itself."""
+        if not isinstance(parameters, Iterable):
+            raise TypeError(f"parameters must be a list of Parameter objects, got {parameters!r}")
         self.parameters: tuple[Parameter, ...] = tuple(parameters)
         for each in self.parameters:
             if not isinstance(each, Parameter):
@@ -65,12 +70,12 @@ class Prior:
             raise PriorError("a prior needs at least one parameter that is not fixed, got none")
 
     @classmethod
-    def default(cls) -> "Prior":
+    def default(cls) -> Prior:
         """Returns the prior of this library: three dimensionless material coefficients."""
         return cls.material(rolling_friction=(1e-3, 1.0))
 
     @classmethod
-    def paper(cls, *, grain_diameter: float = 0.004) -> "Prior":
+    def paper(cls, *, grain_diameter: float = 0.004) -> Prior:
         """Returns the paper's prior, its rolling friction made dimensionless.
 
         The paper samples rolling friction log-uniformly from 1e-7 to 1e-1, read here as a length
@@ -92,7 +97,7 @@ class Prior:
         return cls.material(rolling_friction=(low / effective_radius, high / effective_radius))
 
     @classmethod
-    def material(cls, *, rolling_friction: tuple[float, float]) -> "Prior":
+    def material(cls, *, rolling_friction: tuple[float, float]) -> Prior:
         """Returns sliding friction and restitution in [0, 1] and a log-uniform rolling friction."""
         low, high = rolling_friction
         return cls(
@@ -108,7 +113,7 @@ class Prior:
         )
 
     @classmethod
-    def load(cls, path: str | PathLike[str]) -> "Prior":
+    def load(cls, path: str | PathLike[str]) -> Prior:
         """Returns the prior in a TOML file.
 
         Raises:
@@ -121,7 +126,7 @@ class Prior:
             raise PriorError(f"{path}: {error}") from None
 
     @classmethod
-    def named(cls, name: str | PathLike[str]) -> "Prior":
+    def named(cls, name: str | PathLike[str]) -> Prior:
         """Returns the prior that a command line names: the word `default`, or a TOML file.
 
         Raises:
@@ -135,7 +140,7 @@ class Prior:
         return cls.load(name)
 
     @classmethod
-    def from_toml(cls, text: str) -> "Prior":
+    def from_toml(cls, text: str) -> Prior:
         """Returns the prior written as `[[parameter]]` tables.
 
         Raises:
@@ -154,7 +159,7 @@ class Prior:
         return cls.from_tables(document.get("parameter", []))
 
     @classmethod
-    def from_tables(cls, tables: Any) -> "Prior":
+    def from_tables(cls, tables: Any) -> Prior:
         """Returns the prior of TOML tables, one for each parameter.
 
         Raises:
@@ -197,8 +202,8 @@ class Prior:
 
     def sample(self, n: int, seed: int = 0) -> Array:
         """Returns `n` draws, own units, shape (n, p); the same seed gives the same draws."""
-        if n < 0:
-            raise ValueError(f"n must be at least 0, got {n}")
+        check_whole("n", n, at_least=0)
+        check_seed(seed)
         uniform = np.random.default_rng(seed).random((n, len(self.free)))
         columns = [p.quantile(uniform[:, i]) for i, p in enumerate(self.free)]
         return np.column_stack(columns)
@@ -261,7 +266,7 @@ class Prior:
 
     def __repr__(self) -> str:
         """The parameters and their distributions, one line."""
-        shown = ", ".join(f"{p.path} ~ {p.distribution}" for p in self.parameters)
+        shown = ", ".join(f"{p.path} {p.in_words}" for p in self.parameters)
         return f"Prior({shown})"
 
 

@@ -88,6 +88,20 @@ def test_notebooks_show_a_table_and_a_picture(small_pour: gc.Pour, small_data: g
     assert "90 % interval" in toy.posterior(x[0])._repr_html_()
 
 
+def test_what_a_session_types_out_is_a_line(small_pour: gc.Pour) -> None:
+    """Arrays and addresses had been."""
+    camera = gc.Camera.overhead(height=0.3, field_width=0.3, pixels=150)
+    assert repr(camera) == "Camera.overhead(height=0.3, field_width=0.3, pixels=150)"
+    assert repr(camera.tilted(x_deg=3)) == f"{camera!r}.tilted(x_deg=3, y_deg=0)"
+    depth = camera.render(small_pour.positions, small_pour.radii)
+    recording = gc.Recording.from_depth(depth, fx=150.0, fy=150.0, cx=74.5, cy=74.5)
+    formation, levelled = recording.formation(), recording.level()
+    count = len(formation.points)
+    assert repr(formation).startswith(f"Formation(pile, {count} of 22500 pixels with data, ")
+    assert repr(levelled).startswith(f"Levelled(150 x 150 pixels, {count} of 22500 with data are ")
+    assert "material.restitution uniform from 0 to 1" in repr(gc.Prior.default())
+
+
 def test_arviz_gets_the_draws() -> None:
     pytest.importorskip("arviz")
     toy = LinearGaussian.random(bounded=True)

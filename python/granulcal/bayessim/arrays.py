@@ -1,5 +1,6 @@
 """The one place where arrays from outside become float64 matrices of a known shape."""
 
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -25,8 +26,18 @@ def as_real(name: str, value: Any) -> NDArray[np.float64]:
     except ValueError as error:
         raise TypeError(f"{name} must be an array of real numbers: {error}") from None
     if array.dtype.kind not in "fiu":
-        raise TypeError(f"{name} must be an array of real numbers, got dtype {array.dtype}")
+        raise TypeError(f"{name} must be an array of real numbers, got {_shown(value, array)}")
     return array.astype(np.float64)
+
+
+def _shown(value: Any, array: NDArray[Any]) -> str:
+    """What was given: an array's dtype, else its type, and what of it would do."""
+    if isinstance(value, np.ndarray | list | tuple):
+        return f"dtype {array.dtype}"
+    if isinstance(value, str | os.PathLike):
+        return f"the path or word {str(value)!r}: open it first, as with Recording.open"
+    helps = ": give its statistics()" if hasattr(value, "statistics") else ""
+    return f"{type(value).__name__}{helps}"
 
 
 def as_matrix(name: str, value: Any, *, columns: int | None = None) -> NDArray[np.float64]:

@@ -1,5 +1,7 @@
 """BayesSim: train once on simulated pairs, then a posterior for any observation."""
 
+from __future__ import annotations
+
 import hashlib
 import sys
 import warnings
@@ -128,7 +130,7 @@ class BayesSim:
         quiet: bool = False,
         progress: Callable[[Progress], None] | None = None,
         **config: Any,
-    ) -> "BayesSim":
+    ) -> BayesSim:
         """Returns a model trained on pairs; prints a summary and a calibration check.
 
         The same pairs, seed and settings give the same model, whatever the number of threads. In a
@@ -198,7 +200,7 @@ class BayesSim:
         seed: int,
         proposal: Prior | None,
         progress: Callable[[Progress], None] | None,
-    ) -> "BayesSim":
+    ) -> BayesSim:
         """Trains and checks."""
         made = train_model(pairs, settings, seed, proposal=proposal, progress=progress)
         kept = settings.component_counts[0]
@@ -331,7 +333,7 @@ class BayesSim:
         save_model(self, path, compact=compact)
 
     @classmethod
-    def load(cls, path: str | PathLike[str]) -> "BayesSim":
+    def load(cls, path: str | PathLike[str]) -> BayesSim:
         """Returns the model that `save` wrote to the folder `path`, equal to the last bit.
 
         Raises:

@@ -1,5 +1,7 @@
 """What is found in a recording: the plane of its ground, levelled points, the formation."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,6 +67,12 @@ class Levelled:
     downsample: int
     resolution: tuple[float, float]
 
+    def __repr__(self) -> str:
+        rows, columns = self.mask.shape
+        shares = f"{self.mask.sum()} of {self.valid_count} with data"
+        found = f"above {1e3 * self.threshold:.3g} mm; tilt {self.plane.tilt_deg:.2f} deg"
+        return f"Levelled({columns} x {rows} pixels, {shares} are grain, {found})"
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Formation:
@@ -103,6 +111,13 @@ class Formation:
     downsample: int
     resolution: tuple[float, float]
     spacing: float
+
+    def __repr__(self) -> str:
+        return (
+            f"Formation({self.kind}, {len(self.points)} of {self.valid_count} pixels with data, "
+            f"{1e6 * self.volume:.3g} cm3, half of it within {1e3 * self.half_volume_radius:.3g} "
+            f"mm; tilt {self.plane.tilt_deg:.2f} deg)"
+        )
 
     def statistics(self) -> Statistics:
         """Returns the statistics of the points."""

@@ -1,11 +1,13 @@
 """Measured depth images and height maps, and other measurements of a scene's statistics."""
 
+from __future__ import annotations
+
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, NoReturn, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +29,7 @@ from granulcal.pours.statistics import (
     ObservedStatistics,
     Statistics,
 )
+from granulcal.real import check_real
 
 if TYPE_CHECKING:
     from granulcal.prior import Prior
@@ -118,7 +121,7 @@ class Recording:
         colour_topic: str | None = None,
         frames: int | None = FRAMES,
         first_frame: int | None = None,
-    ) -> "Recording":
+    ) -> Recording:
         """Returns the recording at `path`.
 
         A file that is cut off or damaged gives the frames that are whole, with a warning; `lost`
@@ -172,7 +175,7 @@ class Recording:
         cx: float,
         cy: float,
         unit: float | None = None,
-    ) -> "Recording":
+    ) -> Recording:
         """Returns the recording of depth images in memory, as a camera's software hands them out.
 
         Args:
@@ -185,6 +188,7 @@ class Recording:
             unit: metres per count; None for depths in metres.
 
         Raises:
+            TypeError: no array of real numbers, or a lens that is no numbers.
             ValueError: another shape, masked entries, whole numbers without a unit, a unit or a
                 lens that none is, or depths of more than 100 m.
 
@@ -192,6 +196,12 @@ class Recording:
             UnlikeFramesWarning: the frames do not look like images of one formation at rest.
         """
         given = unmasked("depth", depth)
+        if given.dtype.kind not in "fiu":
+            raise TypeError(f"depth must be an array of real numbers, got dtype {given.dtype}")
+        for name, value in (("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy)):
+            check_real(name, value)
+        if unit is not None:
+            check_real("unit", unit)
         if unit is None and np.issubdtype(given.dtype, np.integer):
             raise ValueError(
                 f"depth is of whole numbers ({given.dtype}): say what one is, unit=0.001 for "
@@ -202,7 +212,9 @@ class Recording:
         if given.ndim == 3 and given.shape[2] == 1 and given.shape[1] > 1:
             given = given[:, :, 0]  # As some readers keep their one channel.
         images = given[None] if given.ndim == 2 else given
-        if images.ndim != 3 or images.size == 0:
+        # The channels of a colour image come last.
+        is_colour = images.ndim == 3 and images.shape[2] in (3, 4) and images.shape[1] > 4
+        if images.ndim != 3 or images.size == 0 or is_colour:
             raise ValueError(f"depth must have shape (h, w) or (k, h, w), got {np.shape(depth)}")
         metres = images.astype(np.float32) * np.float32(1.0 if unit is None else unit)
         native = _native.Recording.of_depths(np.ascontiguousarray(metres), (fx, fy, cx, cy), unit)
@@ -226,7 +238,7 @@ class Recording:
         return self._native.topic
 
     @property
-    def lost(self) -> "Lost | None":
+    def lost(self) -> Lost | None:
         """Frames that are lost; None for a whole recording."""
         found = self._native.lost
         return None if found is None else Lost(*found)
@@ -349,7 +361,7 @@ class Recording:
         return self._formation.points
 
     def doubts(
-        self, scene: Scene, prior: "Prior", **settings: Unpack[SegmentationSettings]
+        self, scene: Scene, prior: Prior, **settings: Unpack[SegmentationSettings]
     ) -> list[str]:
         """Returns why this can be no recording of the scene, and what makes it doubtful.
 
@@ -360,7 +372,14 @@ class Recording:
             scene: what was poured, with the camera that looked.
             prior: of its parameters.
             **settings: arguments of `formation`; `scene.reading` unless any is given.
+
+        Raises:
+            TypeError: no scene, or no prior.
         """
+        if not isinstance(scene, Scene):
+            raise TypeError(f"scene must be a Scene, as Scene.load reads it, got {scene!r}")
+        if not hasattr(prior, "to_toml") or isinstance(prior, Scene):
+            raise TypeError(f"prior must be a Prior, as Prior.load reads it, got {prior!r}")
         text, reading = prior.to_toml(), settings or scene.reading
         judges = (scene.native.violations, scene.native.doubts)
         return [told for judge in judges for told in judge(text, self.native, **reading)]
@@ -439,6 +458,11 @@ class Recording:
             rows["damage"] = str(self.lost)
         drawn = "" if image is None else picture(seen_from_above(image, label))
         return page(f"Recording {self.path.name}", rows, drawn)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "a Recording stays in its process: hand over its path, or statistics() and doubts(...)"
+        )
 
     def __repr__(self) -> str:
         kind = "height map" if self.depth is None else f"depth, {self.frames} frame(s)"

@@ -1,15 +1,20 @@
 """A camera that makes recordings of simulated grains, as a real one would."""
 
+from __future__ import annotations
+
 import tomllib
 from os import PathLike
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
 from granulcal.arrays import unmasked
+from granulcal.documents import LARGEST_DOCUMENT, read_bytes
 from granulcal.pours.statistics import as_points
+from granulcal.real import check_finite, check_real
 from granulcal.whole import check_seed, check_whole
 
 __all__ = ["Camera"]
@@ -25,11 +30,12 @@ class Camera:
     Image right is world +x, image up is world +y.
     """
 
-    def __init__(self, native: _native.Camera) -> None:
+    def __init__(self, native: _native.Camera, words: str = "Camera()") -> None:
         self._native = native
+        self._words = words
 
     @classmethod
-    def overhead(cls, *, height: float, field_width: float, pixels: int) -> "Camera":
+    def overhead(cls, *, height: float, field_width: float, pixels: int) -> Camera:
         """Returns a camera that looks straight down.
 
         Args:
@@ -38,13 +44,18 @@ class Camera:
             pixels: pixels along a side of the image.
 
         Raises:
+            TypeError: no number.
             ValueError: a number is out of its range.
         """
+        check_real("height", height)
+        check_real("field_width", field_width)
         check_whole("pixels", pixels, at_least=1)
-        return cls(_native.Camera.overhead(height, field_width, pixels))
+        made = _native.Camera.overhead(height, field_width, pixels)
+        told = f"height={height:g}, field_width={field_width:g}, pixels={pixels}"
+        return cls(made, f"Camera.overhead({told})")
 
     @classmethod
-    def load(cls, path: str | PathLike[str], *, height: float) -> "Camera":
+    def load(cls, path: str | PathLike[str], *, height: float) -> Camera:
         """Returns the camera whose lens stands in a TOML, looking straight down.
 
         Args:
@@ -53,10 +64,13 @@ class Camera:
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: it lacks a number of the lens, or one is out of its range.
+            ValueError: it is no file of TOML, lacks a number of the lens, or one is out of its
+                range.
         """
+        check_real("height", height)
         try:
-            table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+            text = read_bytes(path, most=LARGEST_DOCUMENT).decode("utf-8")
+            table = tomllib.loads(text)
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{path}: not valid TOML: {error}") from None
         missing = [name for name in _LENS if name not in table]
@@ -64,11 +78,28 @@ class Camera:
             raise ValueError(f"{path} must have {', '.join(_LENS)}; it lacks {', '.join(missing)}")
         columns, rows, *rest = (table[name] for name in _LENS)
         fx, fy, cx, cy = map(float, rest)
-        return cls(_native.Camera.above(height, (columns, rows, fx, fy, cx, cy)))
+        made = _native.Camera.above(height, (columns, rows, fx, fy, cx, cy))
+        return cls(made, f"Camera.load({str(path)!r}, height={height:g})")
 
-    def tilted(self, *, x_deg: float = 0.0, y_deg: float = 0.0) -> "Camera":
-        """Returns the camera turned about its own x axis, then its own y axis [deg]."""
-        return Camera(self._native.tilted(float(np.radians(x_deg)), float(np.radians(y_deg))))
+    def tilted(self, *, x_deg: float = 0.0, y_deg: float = 0.0) -> Camera:
+        """Returns the camera turned about its own x axis, then its own y axis [deg].
+
+        Raises:
+            TypeError: an angle is no number.
+            ValueError: it is not finite.
+        """
+        check_finite("x_deg", x_deg)
+        check_finite("y_deg", y_deg)
+        tilted = self._native.tilted(float(np.radians(x_deg)), float(np.radians(y_deg)))
+        return Camera(tilted, f"{self._words}.tilted(x_deg={x_deg:g}, y_deg={y_deg:g})")
+
+    def __repr__(self) -> str:
+        return self._words
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "a Camera stays in its process: make it again there, by `overhead` or `load`"
+        )
 
     def render(
         self,

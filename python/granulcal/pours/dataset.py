@@ -1,5 +1,7 @@
 """Data sets: many pours of one scene under a prior, on disk and in memory."""
 
+from __future__ import annotations
+
 import tempfile
 import warnings
 from collections import Counter
@@ -85,7 +87,7 @@ class Dataset:
         """Number of the law that the pours follow; 0 for another simulator, None if unknown."""
 
     @classmethod
-    def load(cls, path: str | PathLike[str]) -> "Dataset":
+    def load(cls, path: str | PathLike[str]) -> Dataset:
         """Returns the data set in a folder that `generate` made, or in one Parquet file.
 
         Raises:
@@ -182,7 +184,7 @@ class Dataset:
         return f"Dataset({len(self)} pours: {counts}; {', '.join(self.theta_names)})"
 
 
-def _asked(engine: "Engine") -> Callable[[_native.Scene, int], Any]:
+def _asked(engine: Engine) -> Callable[[_native.Scene, int], Any]:
     """Returns the function that the Rust side calls from its threads."""
     return lambda scene, seed: engine(Scene(scene), seed)
 
@@ -197,8 +199,8 @@ def generate(
     resume: bool = True,
     *,
     progress: bool | Callable[..., object] = True,
-    engine: "Engine | None" = None,
-    ray: "str | Cluster | None" = None,
+    engine: Engine | None = None,
+    ray: str | Cluster | None = None,
     chunk: int | None = None,
 ) -> Dataset:
     """Returns `n` pours with parameters drawn from `prior`, simulating what `out` lacks.

@@ -1,5 +1,7 @@
 """One pour: from a scene to grains at rest, and what the camera sees of them."""
 
+from __future__ import annotations
+
 from functools import cached_property
 from typing import TYPE_CHECKING, NoReturn
 
@@ -253,7 +255,7 @@ def simulate(
     preset: str | None = None,
     threads: int = 1,
     *,
-    engine: "Engine | None" = None,
+    engine: Engine | None = None,
 ) -> Pour:
     """Returns the pour of a scene; the same arguments give the same bits.
 
@@ -289,7 +291,7 @@ def simulate(
     return Pour(_native.simulate(scene.native, seed, threads), scene, seed)
 
 
-def _left_by(engine: "Engine", scene: Scene, seed: int) -> _native.Pour:
+def _left_by(engine: Engine, scene: Scene, seed: int) -> _native.Pour:
     left = engine(scene, seed)
     if not isinstance(left, tuple):
         raise ValueError(f"{engine.name} gave points of a surface and no grains")

@@ -1,5 +1,7 @@
 """The statistics of a granular formation: the paper's 16 numbers and the diagnostic family."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from granulcal import _native
 from granulcal.arrays import unmasked
+from granulcal.real import check_real
 
 __all__ = [
     "DIAGNOSTIC_NAMES",
@@ -230,7 +233,7 @@ def diagnostic_statistics(
             which hides modes of order 1.
 
     Raises:
-        TypeError: `points` does not hold real numbers.
+        TypeError: `points` does not hold real numbers, or a length is none.
         ValueError: another shape, a value that is masked or not finite, fewer than 3 points, or a
             length out of range.
 
@@ -243,13 +246,24 @@ def diagnostic_statistics(
         >>> round(found["profile_slope"], 1), found["ring_depth"]
         (-0.4, 1.0)
     """
+    check_real("grain_diameter", grain_diameter)
+    check_real("spacing", spacing)
     values = _native.diagnostics(
         as_points("points", points),
         grain_diameter=grain_diameter,
         spacing=spacing,
-        pour_axis=pour_axis,
+        pour_axis=None if pour_axis is None else _axis(pour_axis),
     )
     return DiagnosticStatistics(values)
+
+
+def _axis(value: object) -> tuple[float, float]:
+    """A place on the ground, of whatever holds two numbers."""
+    try:
+        x, y = np.asarray(value, dtype=np.float64).tolist()
+        return float(x), float(y)
+    except (TypeError, ValueError):
+        raise TypeError(f"pour_axis must be two numbers (x, y) [m], got {value!r}") from None
 
 
 def as_points(name: str, value: ArrayLike) -> Array:

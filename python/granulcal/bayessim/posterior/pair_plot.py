@@ -73,12 +73,15 @@ def pair_plot(
         title: over the figure.
 
     Raises:
+        TypeError: `extra` is no posterior.
         ValueError: `truth` has another shape, or `extra` other parameters.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     names = posterior.names
+    if extra is not None and not hasattr(extra, "marginals"):
+        raise TypeError(f"extra must be a Posterior, got {extra!r}")
     if extra is not None and extra.names != names:
         raise ValueError(f"extra must have the parameters {names}, got {extra.names}")
     true_values = None if truth is None else as_matrix("truth", truth, columns=len(names))[0]

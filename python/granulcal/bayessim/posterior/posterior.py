@@ -1,5 +1,7 @@
 """Posterior of the free parameters given an observation: draws, density, regions, marginals."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -89,14 +91,14 @@ class Posterior:
         self._last: tuple[tuple[int, int], Array] | None = None
 
     @classmethod
-    def from_mixture(cls, prior: Prior, mixture: Mixture, **options: Any) -> "Posterior":
+    def from_mixture(cls, prior: Prior, mixture: Mixture, **options: Any) -> Posterior:
         """Returns the posterior that is `mixture` in coordinates, cut to the prior's bounds."""
         return cls.from_mixtures(prior, [mixture], **options)
 
     @classmethod
     def from_mixtures(
         cls, prior: Prior, mixtures: list[Mixture], *, warnings: tuple[Doubt, ...] = ()
-    ) -> "Posterior":
+    ) -> Posterior:
         r"""Returns the posterior of k pours of one material, given each pour's own mixture.
 
         Given the parameters the pours are independent, so for k > 1 this is
@@ -117,7 +119,7 @@ class Posterior:
         conditions: list[tuple[Likelihood, Array]],
         *,
         warnings: tuple[Doubt, ...] = (),
-    ) -> "Posterior":
+    ) -> Posterior:
         """Returns the posterior of one material under one or several conditions.
 
         Args:
@@ -136,7 +138,7 @@ class Posterior:
         average: Average,
         *,
         warnings: tuple[Doubt, ...] = (),
-    ) -> "Posterior":
+    ) -> Posterior:
         r"""Returns the average of an emulator's and a network's posterior of k pours.
 
         $$ p(u \mid x_1, \ldots, x_k) \propto p(u) \, L_k(u)^a \,
@@ -164,7 +166,7 @@ class Posterior:
         mixtures: list[Mixture],
         average: Average,
         warnings: tuple[Doubt, ...],
-    ) -> "Posterior":
+    ) -> Posterior:
         density = _native.Posterior(
             coordinates_of(prior),
             [(likelihood.native, np.ascontiguousarray(z)) for likelihood, z in conditions],
@@ -360,9 +362,9 @@ class Posterior:
         self,
         path: str | PathLike[str] | None = None,
         truth: ArrayLike | None = None,
-        extra: "Posterior | None" = None,
+        extra: Posterior | None = None,
         title: str = "",
-    ) -> "Figure":
+    ) -> Figure:
         """Returns a figure of all marginals, and of each pair the regions of 50 % and 90 %.
 
         Args:
