@@ -20,8 +20,8 @@ pattern, what differs is its noise.
 
 RECORDING is what `features` reads: a .bag or .mcap of one or more frames,
 16-bit depth PNGs, a folder of them or .npy, with --camera, or .npz height maps.
-Each frame is taken by itself. With --baseline the camera is stereo: errors are px
-of disparity, and depth errors grow with the square of the depth. Without,
+Each frame is taken by itself. With --baseline the camera is stereo: errors are
+px of disparity, and depth errors grow with the square of the depth. Without,
 errors are metres, whatever the depth.
 
 Where the frames show more than the flat surface, --region says where it is;
