@@ -74,6 +74,19 @@ def test_an_offset_moves_heights_by_itself_and_nothing_else(pour: gc.Pour) -> No
             assert found[name] == pytest.approx(plain[name], rel=1e-9)
 
 
+def test_what_an_offset_takes_below_the_threshold_is_not_seen() -> None:
+    # The flank of a blurred grain: a reading knows the lifted heights and one threshold.
+    flank = np.array([[0.0, 0.8e-3, 1.2e-3, 1.6e-3, 2.4e-3]])
+    frame = Frame(flank, spacing=1e-3, eye=np.inf, threshold=1e-3, diameter=4e-3)
+
+    def seen(offset: float) -> list[float]:
+        return frame.with_({"offset": offset}, seed=0).points()[:, 2].tolist()
+
+    assert seen(-5e-4) == pytest.approx([1.1e-3, 1.9e-3])
+    # What was ground is ground, however high it would be.
+    assert seen(5e-4) == pytest.approx([1.7e-3, 2.1e-3, 2.9e-3])
+
+
 def test_a_blurred_step_is_an_error_function() -> None:
     sigma, count = 2.5, 81
     z = np.zeros((7, count))

@@ -7,7 +7,7 @@ With the heights z over the ground of the pixels of an image, NaN where there is
   around it, $a \sim U(0, 1)$: pixels that see both sides of an edge, and that segmentation leaves;
 - lost: a body no larger than a grain that touches nothing is taken for ground with probability p;
 - offset: $z' = z + o$ of the pixels that are grain: their heights are told from another plane than
-  the ground on which they lie (the pile of velvet);
+  the ground on which they lie (the pile of velvet), and so is whether they are above the threshold;
 - missing: a share f of the pixels has no data, each by itself;
 - aside: $x' = x - o$, or y, of the pixels' points: the camera stands beside the pour's axis.
 
@@ -102,10 +102,11 @@ class Frame:
     def points(self) -> Array:
         """Returns the points of the pixels that are taken for grains [m], shape (n, 3)."""
         x, y = self.ground()
-        kept = self.is_grain
+        lifted = self.z + self.lift
+        # Whoever reads the recording knows the lifted heights alone.
+        kept = self.is_grain & (lifted > self.threshold)
         aside_x, aside_y = self.aside
-        lifted = self.z[kept] + self.lift
-        return np.stack([x[kept] - aside_x, y[kept] - aside_y, lifted], axis=1)
+        return np.stack([x[kept] - aside_x, y[kept] - aside_y, lifted[kept]], axis=1)
 
     def with_(self, faults: Mapping[str, float], seed: int) -> "Frame":
         """Returns the image with the faults of `faults`, by kind; `seed` is of what is random."""
