@@ -7,11 +7,15 @@ from numpy.typing import NDArray
 
 from granulcal.bayessim.emulator.basis import Basis, polynomial
 from granulcal.errors import TrainingDataError
+from granulcal.loop.effects.design import Design
 from granulcal.loop.surrogate.leading import LeadingBasis
 
 __all__ = [
+    "CURVES",
     "crossed_columns",
     "crossed_effects",
+    "curve_columns",
+    "curved_effects",
     "held_residuals",
     "lack_of_fit",
     "mean_columns",
@@ -35,6 +39,10 @@ _LACK_ROWS, _NEIGHBOURS = 2000, 4
 _CONSTANT, _SLOPE, _CURVATURE = 1.0, 0.5, 0.25
 # Fewest rows that say what two effects do together.
 _CROSSED_ROWS = 4
+CURVES = 12
+"""Sines of a strength of an effect that has a curve."""
+# Fewest rows of an effect that show a curve.
+_CURVED_ROWS = 200
 
 
 def held_residuals(noise: Array) -> Array:
@@ -96,6 +104,7 @@ def mean_columns(
     bent: NDArray[np.bool_],
     crossed: Sequence[tuple[int, int]] = (),
     inputs: int = 0,
+    curved: Sequence[int] = (),
 ) -> tuple[Array, list[slice]]:
     """Returns the features of the mean, shape (n, f), and where each block of them stands.
 
@@ -106,6 +115,7 @@ def mean_columns(
         bent: effects that have a square, shape (K,).
         crossed: two effects each that have a product.
         inputs: q.
+        curved: effects that have a curve.
     """
     first, second = _effect_columns(u)
     main = basis(u)
@@ -119,9 +129,28 @@ def mean_columns(
     for k, other in crossed:
         parts.append(psi[:, k : k + 1] * psi[:, other : other + 1] * both)
         widths.append(both.shape[1])
+    for k in curved:
+        parts.append(curve_columns(psi[:, k]))
+        widths.append(CURVES)
     stops = np.cumsum(widths)
     blocks = [slice(int(b - w), int(b)) for b, w in zip(stops, widths, strict=True)]
     return np.concatenate(parts, axis=1), blocks
+
+
+def curve_columns(strength: Array) -> Array:
+    """Returns prior-scaled sines of a strength (n,), 0 at 0 and at 1, shape (n, `CURVES`)."""
+    number = np.arange(1, CURVES + 1)
+    return np.sin(np.pi * np.multiply.outer(strength, number)) / number
+
+
+def curved_effects(design: Design, psi: Array) -> tuple[int, ...]:
+    """Returns the one-sided effects with so many rows of psi (n, K) that they show a curve."""
+    many = np.count_nonzero(psi, axis=0) >= _CURVED_ROWS
+    return tuple(
+        k
+        for k, effect in enumerate(design.effects)
+        if many[k] and not effect.is_two_sided and effect.held is None
+    )
 
 
 def crossed_columns(condition: Array) -> Array:

@@ -7,18 +7,20 @@ as well known as it deserves. On the axes
 
 $$ m(\theta, c, \psi) = f_0(\theta, c)
    + \sum_k \psi_k (J a_k + \tilde g_k)(\theta, c) + \psi_k^2 h_k(\theta, c)
-   + \sum_{k < l} \psi_k \psi_l q_{kl}(c), \qquad
+   + \sum_{k < l} \psi_k \psi_l q_{kl}(c) + \sum_k r_k(\psi_k), \qquad
    y = m + s(\theta, c, \psi) \epsilon, \quad \epsilon \sim (0, R) $$
 
 $f_0$ is a quadratic and the leading eigenfunctions of a Matern kernel (`leading.py`); $J a_k$ the
 part of an effect that is a shift of theta (`shift.py`), $\tilde g_k$ a quadratic and $h_k$ a linear
 function, each with a prior width learnt for every statistic and effect (`blocks.py`). $q_{kl}$,
 linear in c, is what two effects do together, learnt of those that the archive has poured or read
-together. log s is a function of the same coordinates and of the strengths. What the archive leaves
-unknown about m is the posterior of the coefficients, the same for all pours of a condition and
-correlated between conditions; nothing about it averages away with more measured pours. What the
-features cannot follow would pass for noise of a pour; it shows as left-out residuals that near rows
-share,
+together. $r_k$, a sum of sines, is the curve of a one-sided effect that many pours show, as those
+of the image are: a blur of a small $\sigma$ takes no pixel across the threshold and a larger one at
+once all along an edge, which no parabola follows. log s is a function of the same coordinates and
+of the strengths. What the archive leaves unknown about m is the posterior of the coefficients, the
+same for all pours of a condition and correlated between conditions; nothing about it averages away
+with more measured pours. What the features cannot follow would pass for noise of a pour; it shows
+as left-out residuals that near rows share,
 
 $$ \lambda_j = \overline{(e_i / s_i)(e_{i'} / s_{i'})} + \overline{h_{ii'}} $$
 
@@ -44,9 +46,12 @@ from granulcal.loop.effects.design import Design
 from granulcal.loop.surrogate.anchor import Anchor
 from granulcal.loop.surrogate.blocks import fit_blocks
 from granulcal.loop.surrogate.columns import (
+    CURVES,
     _effect_columns,
     crossed_columns,
     crossed_effects,
+    curve_columns,
+    curved_effects,
     held_residuals,
     lack_of_fit,
     mean_columns,
@@ -104,6 +109,7 @@ class Surrogate:
         dof: rows less coefficients that they decided, mean over statistics.
         excluded: rows that were not finite.
         crossed: two effects each that have a q_kl.
+        curved: effects that have an r_k.
         anchor: what true pours at fits have shown; None before any.
     """
 
@@ -131,6 +137,7 @@ class Surrogate:
     dof: float
     excluded: int
     crossed: tuple[tuple[int, int], ...] = ()
+    curved: tuple[int, ...] = ()
     anchor: Anchor | None = None
 
     @classmethod
@@ -200,9 +207,9 @@ class Surrogate:
             moved[on] += psi_[on, k, None] * shift.move(u[on], k)
         z = z - moved
         bent = np.array([effect.held is None for effect in design.effects], dtype=bool)
-        crossed = crossed_effects(psi_)
+        crossed, curved = crossed_effects(psi_), curved_effects(design, psi_)
         inputs = condition_.shape[1]
-        design_matrix, blocks = mean_columns(basis, u, psi_, bent, crossed, inputs)
+        design_matrix, blocks = mean_columns(basis, u, psi_, bent, crossed, inputs, curved)
         scale_matrix = scale_columns(scale_basis, u, psi_, bent)
         coefficients = np.empty((size, design_matrix.shape[1]))
         roots = np.empty((size, design_matrix.shape[1], design_matrix.shape[1]))
@@ -249,6 +256,7 @@ class Surrogate:
             dof=dof,
             excluded=int((~kept).sum()),
             crossed=crossed,
+            curved=curved,
         )
 
     @property
@@ -307,7 +315,8 @@ class Surrogate:
     def features(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns the features at rows of (theta, condition, psi), shape (n, d)."""
         u, inputs = np.column_stack([theta, condition]), condition.shape[1]
-        return mean_columns(self.basis, u, psi, self._bent, self.crossed, inputs)[0]
+        of = self._bent, self.crossed, inputs, self.curved
+        return mean_columns(self.basis, u, psi, *of)[0]
 
     @property
     def _bent(self) -> NDArray[np.bool_]:
@@ -348,6 +357,8 @@ class Surrogate:
             bend = strength**2 if self._bent[k] else 0.0 * strength
             columns = np.concatenate([strength * first, bend * second], axis=1)
             total += columns @ self.coefficients[:, start : start + step].T
+            if k in self.curved:
+                total += curve_columns(psi[:, k]) @ self.coefficients[:, self.curve_slice(int(k))].T
         total += self.shift.along(u, psi)
         for k, other in self.crossed_of(psi):
             strength = psi[:, k : k + 1] * psi[:, other : other + 1]
@@ -363,9 +374,14 @@ class Surrogate:
     def crossed_slice(self, k: int, other: int) -> slice:
         """Returns the columns of q_kl among the features."""
         width = 1 + len(self.design.conditions)
-        start = self.coefficients.shape[1] - width * len(self.crossed)
+        start = self.coefficients.shape[1] - CURVES * len(self.curved) - width * len(self.crossed)
         start += width * self.crossed.index((k, other))
         return slice(start, start + width)
+
+    def curve_slice(self, k: int) -> slice:
+        """Returns the columns of r_k among the features."""
+        start = self.coefficients.shape[1] - CURVES * (len(self.curved) - self.curved.index(k))
+        return slice(start, start + CURVES)
 
     def scale(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns s at rows of (theta, condition, psi), shape (n, m)."""

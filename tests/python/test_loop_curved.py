@@ -1,0 +1,97 @@
+"""What an effect does along its strength, where many pours show it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from granulcal.loop import Design, Effect, Surrogate
+from granulcal.loop.surrogate.columns import CURVES, curve_columns, curved_effects
+from granulcal.loop.surrogate.linearised import LinearisedSurrogate
+
+Array = NDArray[np.float64]
+
+SIZE, NOISE, BASE = 6, 0.3, 240
+DESIGN = Design(("a",), ("height",), (Effect("sight"), Effect("drag")))
+ALONG, SIGHT, DRAG = np.random.default_rng(5).standard_normal((3, SIZE))
+
+
+def mean(u: Array, psi: Array) -> Array:
+    """The first effect does nothing until an edge comes across the threshold, nearly at once."""
+    rise = 1 / (1 + np.exp(-(psi[:, 0] - 0.2) / 0.03))
+    return (2 * u - 1)[:, None] * ALONG + rise[:, None] * SIGHT + psi[:, 1:] * DRAG
+
+
+def fitted(count: int, design: Design = DESIGN) -> Surrogate:
+    """Of plain pours, of so many of the first effect, and of a few of the second."""
+    generator = np.random.default_rng(1)
+    psi = np.zeros((BASE + count + 60, 2))
+    psi[BASE : BASE + count, 0] = generator.random(count)
+    psi[BASE + count :, 1] = generator.random(60)
+    u, c = generator.random((2, len(psi)))
+    x = mean(u, psi) + NOISE * generator.standard_normal((len(psi), SIZE))
+    return Surrogate.fit(design, u[:, None], c[:, None], psi, x, features=4)
+
+
+@pytest.fixture(scope="module")
+def curved() -> Surrogate:
+    return fitted(300)
+
+
+def test_a_curve_is_nothing_at_both_ends() -> None:
+    ends = curve_columns(np.array([0.0, 1.0]))
+    assert ends.shape == (2, CURVES) and np.abs(ends).max() < 1e-12
+
+
+def test_one_sided_effects_of_many_rows_have_a_curve() -> None:
+    kinds = (
+        Effect("seen"),
+        Effect("few"),
+        Effect("both", is_two_sided=True),
+        Effect("size", held=-1),
+    )
+    psi = np.full((250, 4), 0.5)
+    psi[100:, 1] = 0.0
+    assert curved_effects(Design(("a",), (), kinds), psi) == (0,)
+
+
+def test_a_step_along_a_strength_is_learnt(curved: Surrogate) -> None:
+    assert (fitted(150).curved, curved.curved) == ((), (0,))
+    both = replace(DESIGN, effects=(replace(DESIGN.effects[0], is_two_sided=True), Effect("drag")))
+    parabola = fitted(300, both)
+    generator = np.random.default_rng(2)
+    u, c, strength = generator.random((3, 300))
+    psi = np.column_stack([0.4 * strength, np.zeros(300)])
+    off = {}
+    for one in (parabola, curved):
+        gap = one.standardise(mean(u, psi)) - one.mean(u[:, None], c[:, None], psi)
+        features = one.features(u[:, None], c[:, None], psi)
+        claimed = np.mean([np.sum((features @ root) ** 2, axis=1) for root in one.roots])
+        off[one.curved] = float(np.mean(gap**2)), float(claimed)
+    (plain, sure), (found, claimed) = off[()], off[(0,)]
+    # A parabola is far off and does not know it.
+    assert found < 0.1 * plain and plain > 10 * sure
+    assert 0.2 < found / claimed < 5
+
+
+@pytest.mark.parametrize("strengths", [(0.0, 0.4), (0.17, 0.0), (0.6, 0.3)])
+def test_the_uncertainty_is_that_of_the_features(
+    curved: Surrogate, strengths: tuple[float, ...]
+) -> None:
+    psi, c = np.array(strengths), np.array([[0.0], [0.5], [1.0]])
+    local = LinearisedSurrogate.at(curved, c, np.ones(3), np.zeros(1))
+    u, rows = np.full((3, 1), 0.5), np.tile(psi, (3, 1))
+    features = curved.features(u, c, rows)
+    expected = np.stack([features @ root for root in curved.roots], axis=1)
+    np.testing.assert_allclose(local.error_root(psi), expected, atol=1e-10)
+    found = local.mean(np.zeros(1), psi)
+    np.testing.assert_allclose(found, curved.mean(u, c, rows).ravel(), atol=1e-10)
+    if not psi[1]:
+        half = curved.features(u, c, np.tile([0.5, 0.0], (3, 1)))
+        chord = 2 * (half - curved.features(u, c, np.zeros((3, 2))))
+        variance = np.stack([np.sum((chord @ root) ** 2, axis=1) for root in curved.roots], axis=1)
+        shift = local.shift_roots[0]
+        of_shift = np.sum(shift**2, axis=1)
+        found = np.diag(local.direction_error(0)) - of_shift
+        np.testing.assert_allclose(found, variance.ravel(), atol=1e-10)
