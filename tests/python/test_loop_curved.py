@@ -1,12 +1,11 @@
 """What an effect does along its strength, where many pours show it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from granulcal.loop import Design, Effect, Surrogate
+from granulcal.loop.surrogate import columns
 from granulcal.loop.surrogate.columns import CURVES, curve_columns, curved_effects
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 
@@ -40,26 +39,31 @@ def curved() -> Surrogate:
 
 
 def test_a_curve_is_nothing_at_both_ends() -> None:
-    ends = curve_columns(np.array([0.0, 1.0]))
-    assert ends.shape == (2, CURVES) and np.abs(ends).max() < 1e-12
+    for is_two_sided in (False, True):
+        ends = curve_columns(np.array([-1.0, 0.0, 1.0]), is_two_sided)
+        assert ends.shape == (3, CURVES) and np.abs(ends).max() < 1e-12
+    # Either side has its own.
+    one, other = curve_columns(np.array([0.3, -0.3]), True)
+    assert one @ other == 0 and np.abs(one).max() > 0.1
 
 
-def test_one_sided_effects_of_many_rows_have_a_curve() -> None:
+def test_effects_of_many_rows_have_a_curve() -> None:
     kinds = (
         Effect("seen"),
         Effect("few"),
         Effect("both", is_two_sided=True),
         Effect("size", held=-1),
     )
-    psi = np.full((250, 4), 0.5)
+    psi = np.full((350, 4), 0.5)
     psi[100:, 1] = 0.0
-    assert curved_effects(Design(("a",), (), kinds), psi) == (0,)
+    assert curved_effects(Design(("a",), (), kinds), psi) == ((0, False), (2, True))
 
 
 def test_a_step_along_a_strength_is_learnt(curved: Surrogate) -> None:
-    assert (fitted(150).curved, curved.curved) == ((), (0,))
-    both = replace(DESIGN, effects=(replace(DESIGN.effects[0], is_two_sided=True), Effect("drag")))
-    parabola = fitted(300, both)
+    assert (fitted(150).curved, curved.curved) == ((), ((0, False),))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(columns, "_CURVED_ROWS", 1000)
+        parabola = fitted(300)
     generator = np.random.default_rng(2)
     u, c, strength = generator.random((3, 300))
     psi = np.column_stack([0.4 * strength, np.zeros(300)])
@@ -69,7 +73,7 @@ def test_a_step_along_a_strength_is_learnt(curved: Surrogate) -> None:
         features = one.features(u[:, None], c[:, None], psi)
         claimed = np.mean([np.sum((features @ root) ** 2, axis=1) for root in one.roots])
         off[one.curved] = float(np.mean(gap**2)), float(claimed)
-    (plain, sure), (found, claimed) = off[()], off[(0,)]
+    (plain, sure), (found, claimed) = off[()], off[curved.curved]
     # A parabola is far off and does not know it.
     assert found < 0.1 * plain and plain > 10 * sure
     assert 0.2 < found / claimed < 5
@@ -95,3 +99,27 @@ def test_the_uncertainty_is_that_of_the_features(
         of_shift = np.sum(shift**2, axis=1)
         found = np.diag(local.direction_error(0)) - of_shift
         np.testing.assert_allclose(found, variance.ravel(), atol=1e-10)
+
+
+def test_a_corner_at_0_is_learnt() -> None:
+    # As an offset has: below 0 alone it takes pixels below the threshold.
+    design = Design(("a",), (), (Effect("offset", is_two_sided=True),))
+    generator = np.random.default_rng(3)
+    psi = np.zeros((640, 1))
+    psi[BASE:, 0] = generator.uniform(-1, 1, 400)
+    u = generator.random(640)
+
+    def true(u: Array, psi: Array) -> Array:
+        return (2 * u - 1)[:, None] * ALONG + 6 * np.minimum(psi, 0.0) * SIGHT
+
+    x = true(u, psi) + NOISE * generator.standard_normal((640, SIZE))
+    none = np.empty((640, 0))
+    one = Surrogate.fit(design, u[:, None], none, psi, x, features=4)
+    at, middle = np.array([[-0.2], [-0.1], [0.1], [0.2]]), np.full(4, 0.5)
+    gap = one.standardise(true(middle, at)) - one.mean(middle[:, None], none[:4], at)
+    assert float(np.mean(gap**2)) < 0.15
+    local = LinearisedSurrogate.at(one, np.empty((1, 0)), np.ones(1), np.zeros(1))
+    ends = one.features(middle[:2, None], none[:2], np.array([[0.25], [-0.25]]))
+    variance = [np.sum((2 * (ends[0] - ends[1]) @ root) ** 2) for root in one.roots]
+    of_shift = np.sum(local.shift_roots[0] ** 2, axis=1)
+    np.testing.assert_allclose(np.diag(local.direction_error(0)) - of_shift, variance, atol=1e-10)

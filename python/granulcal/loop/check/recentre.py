@@ -161,7 +161,7 @@ def _without_error(local: LinearisedSurrogate) -> LinearisedSurrogate:
         surrogate=surrogate,
         error_roots=np.zeros_like(local.error_roots),
         crossed_roots=np.zeros_like(local.crossed_roots),
-        curve_roots=np.zeros_like(local.curve_roots),
+        curve_roots=tuple(np.zeros_like(root) for root in local.curve_roots),
         shift_roots=np.zeros_like(local.shift_roots),
     )
 

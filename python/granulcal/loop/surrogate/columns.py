@@ -40,9 +40,9 @@ _CONSTANT, _SLOPE, _CURVATURE = 1.0, 0.5, 0.25
 # Fewest rows that say what two effects do together.
 _CROSSED_ROWS = 4
 CURVES = 12
-"""Sines of a strength of an effect that has a curve."""
+"""Sines of an effect that has a curve, half of them for each side of a two-sided one."""
 # Fewest rows of an effect that show a curve.
-_CURVED_ROWS = 200
+_CURVED_ROWS = 300
 
 
 def held_residuals(noise: Array) -> Array:
@@ -104,7 +104,7 @@ def mean_columns(
     bent: NDArray[np.bool_],
     crossed: Sequence[tuple[int, int]] = (),
     inputs: int = 0,
-    curved: Sequence[int] = (),
+    curved: Sequence[tuple[int, bool]] = (),
 ) -> tuple[Array, list[slice]]:
     """Returns the features of the mean, shape (n, f), and where each block of them stands.
 
@@ -115,7 +115,7 @@ def mean_columns(
         bent: effects that have a square, shape (K,).
         crossed: two effects each that have a product.
         inputs: q.
-        curved: effects that have a curve.
+        curved: effects that have a curve, and whether it is two-sided.
     """
     first, second = _effect_columns(u)
     main = basis(u)
@@ -129,27 +129,33 @@ def mean_columns(
     for k, other in crossed:
         parts.append(psi[:, k : k + 1] * psi[:, other : other + 1] * both)
         widths.append(both.shape[1])
-    for k in curved:
-        parts.append(curve_columns(psi[:, k]))
+    for k, is_two_sided in curved:
+        parts.append(curve_columns(psi[:, k], is_two_sided))
         widths.append(CURVES)
     stops = np.cumsum(widths)
     blocks = [slice(int(b - w), int(b)) for b, w in zip(stops, widths, strict=True)]
     return np.concatenate(parts, axis=1), blocks
 
 
-def curve_columns(strength: Array) -> Array:
-    """Returns prior-scaled sines of a strength (n,), 0 at 0 and at 1, shape (n, `CURVES`)."""
+def curve_columns(strength: Array, is_two_sided: bool) -> Array:
+    """Returns prior-scaled sines of a strength (n,), 0 at 0 and both ends, shape (n, `CURVES`)."""
+    if is_two_sided:
+        # Apart, for what has a threshold has a corner at 0.
+        number = np.arange(1, CURVES // 2 + 1)
+        sides = np.maximum(strength, 0.0), np.maximum(-strength, 0.0)
+        sines = [np.sin(np.pi * np.multiply.outer(side, number)) / number for side in sides]
+        return np.concatenate(sines, axis=-1)
     number = np.arange(1, CURVES + 1)
     return np.sin(np.pi * np.multiply.outer(strength, number)) / number
 
 
-def curved_effects(design: Design, psi: Array) -> tuple[int, ...]:
-    """Returns the one-sided effects with so many rows of psi (n, K) that they show a curve."""
+def curved_effects(design: Design, psi: Array) -> tuple[tuple[int, bool], ...]:
+    """Returns effects that many rows of psi (n, K) show, and whether they are two-sided."""
     many = np.count_nonzero(psi, axis=0) >= _CURVED_ROWS
     return tuple(
-        k
+        (k, effect.is_two_sided)
         for k, effect in enumerate(design.effects)
-        if many[k] and not effect.is_two_sided and effect.held is None
+        if many[k] and effect.held is None
     )
 
 

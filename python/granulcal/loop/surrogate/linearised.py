@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.effects.design import cube_from_normal
-from granulcal.loop.surrogate.columns import CURVES, crossed_columns, curve_columns
+from granulcal.loop.surrogate.columns import crossed_columns
 from granulcal.loop.surrogate.surrogate import Surrogate
 
 __all__ = ["LinearisedSurrogate"]
@@ -43,8 +43,8 @@ class LinearisedSurrogate:
             psi multiplies and the part that psi^2 does, shape (1 + 2 K, H, m, d).
         crossed_roots: of the part that the product of two strengths multiplies, for each two that
             have one, shape (X, H, m, d).
-        curve_roots: of the part that each sine of a strength multiplies, for each effect that has a
-            curve, shape (C, `CURVES`, m, d).
+        curve_roots: of the part that each sine of a strength multiplies, for each effect, shape
+            (f, m, d), f = 0 without a curve.
         shift_roots: of the shifts of theta that effects are in part, shape (K, H m, r).
         own_errors: what a standard deviation of each declared nuisance does, shape (N, H, m).
         sessions: number of the session of each condition, shape (H,).
@@ -57,7 +57,7 @@ class LinearisedSurrogate:
     correlations: Array
     error_roots: Array
     crossed_roots: Array
-    curve_roots: Array
+    curve_roots: tuple[Array, ...]
     shift_roots: Array
     own_errors: Array
     sessions: NDArray[np.int64]
@@ -93,9 +93,8 @@ class LinearisedSurrogate:
             linear = surrogate.effect_features(rows, conditions, k)[0]
             along = linear @ surrogate.coefficients.T + surrogate.effect_move(rows, conditions, k)
             own_errors[i] = (effect.nuisance_sd or 0.0) * along
-            if k in surrogate.curved:
-                sines = curve_columns(np.array([effect.nuisance_sd or 0.0]))
-                own_errors[i] += sines @ surrogate.coefficients[:, surrogate.curve_slice(k)].T
+            sines = surrogate.curve_features(np.array(effect.nuisance_sd or 0.0), k)
+            own_errors[i] += sines @ surrogate.coefficients[:, surrogate.curve(k)].T
         return cls(
             surrogate,
             conditions,
@@ -106,7 +105,10 @@ class LinearisedSurrogate:
                 roots.reshape(size, count, 1 + 2 * len(effects), -1).transpose(2, 1, 0, 3)
             ),
             _crossed_roots(surrogate, conditions),
-            _curve_roots(surrogate),
+            tuple(
+                surrogate.roots[:, surrogate.curve(k)].transpose(1, 0, 2)
+                for k in range(len(effects))
+            ),
             np.array(
                 [
                     surrogate.shift.root(np.column_stack([rows, conditions]), k).reshape(
@@ -224,18 +226,18 @@ class LinearisedSurrogate:
         return root
 
     def _curve_root(self, k: int, strength: float) -> Array:
-        """Root of the uncertainty of r_k, the same for all conditions, shape (m, d) or ()."""
-        if k not in self.surrogate.curved:
-            return np.zeros(())
-        roots = self.curve_roots[self.surrogate.curved.index(k)]
-        return np.tensordot(curve_columns(np.array(strength)), roots, axes=1)
+        """Root of the uncertainty of r_k, the same for all conditions, shape (m, d)."""
+        sines = self.surrogate.curve_features(np.array(strength), k)
+        return np.tensordot(sines, self.curve_roots[k], axes=1)
 
     @cached_property
     def _direction_errors(self) -> list[Array]:
         found = []
         for k, effect in enumerate(self.surrogate.design.effects):
             root = self.error_roots[1 + 2 * k]
-            if not effect.is_two_sided:
+            if effect.is_two_sided:
+                root = root + 2 * (self._curve_root(k, 0.25) - self._curve_root(k, -0.25))
+            else:
                 root = root + 0.5 * self.error_roots[2 + 2 * k] + 2 * self._curve_root(k, 0.5)
             shift = self.shift_roots[k]
             found.append(self._error(root) + shift @ shift.T)
@@ -265,15 +267,6 @@ class LinearisedSurrogate:
         count = len(self.conditions)
         theta = np.tile(cube_from_normal(v), (count, 1))
         return self.surrogate.scale(theta, self.conditions, np.tile(psi, (count, 1)))
-
-
-def _curve_roots(surrogate: Surrogate) -> Array:
-    """Roots of the uncertainty of each curve, shape (C, `CURVES`, m, d)."""
-    shape = len(surrogate.curved), CURVES, *surrogate.roots.shape[::2]
-    roots: Array = np.empty(shape)
-    for i, k in enumerate(surrogate.curved):
-        roots[i] = surrogate.roots[:, surrogate.curve_slice(k)].transpose(1, 0, 2)
-    return roots
 
 
 def _crossed_roots(surrogate: Surrogate, conditions: Array) -> Array:

@@ -14,8 +14,8 @@ $f_0$ is a quadratic and the leading eigenfunctions of a Matern kernel (`leading
 part of an effect that is a shift of theta (`shift.py`), $\tilde g_k$ a quadratic and $h_k$ a linear
 function, each with a prior width learnt for every statistic and effect (`blocks.py`). $q_{kl}$,
 linear in c, is what two effects do together, learnt of those that the archive has poured or read
-together. $r_k$, a sum of sines, is the curve of a one-sided effect that many pours show, as those
-of the image are: a blur of a small $\sigma$ takes no pixel across the threshold and a larger one at
+together. $r_k$, a sum of sines, is the curve of an effect that many pours show, as those of the
+image are: a blur of a small $\sigma$ takes no pixel across the threshold and a larger one at
 once all along an edge, which no parabola follows. log s is a function of the same coordinates and
 of the strengths. What the archive leaves unknown about m is the posterior of the coefficients, the
 same for all pours of a condition and correlated between conditions; nothing about it averages away
@@ -109,7 +109,7 @@ class Surrogate:
         dof: rows less coefficients that they decided, mean over statistics.
         excluded: rows that were not finite.
         crossed: two effects each that have a q_kl.
-        curved: effects that have an r_k.
+        curved: effects that have an r_k, and whether it is two-sided.
         anchor: what true pours at fits have shown; None before any.
     """
 
@@ -137,7 +137,7 @@ class Surrogate:
     dof: float
     excluded: int
     crossed: tuple[tuple[int, int], ...] = ()
-    curved: tuple[int, ...] = ()
+    curved: tuple[tuple[int, bool], ...] = ()
     anchor: Anchor | None = None
 
     @classmethod
@@ -357,8 +357,7 @@ class Surrogate:
             bend = strength**2 if self._bent[k] else 0.0 * strength
             columns = np.concatenate([strength * first, bend * second], axis=1)
             total += columns @ self.coefficients[:, start : start + step].T
-            if k in self.curved:
-                total += curve_columns(psi[:, k]) @ self.coefficients[:, self.curve_slice(int(k))].T
+            total += self.curve_features(psi[:, k], int(k)) @ self.coefficients[:, self.curve(k)].T
         total += self.shift.along(u, psi)
         for k, other in self.crossed_of(psi):
             strength = psi[:, k : k + 1] * psi[:, other : other + 1]
@@ -378,10 +377,21 @@ class Surrogate:
         start += width * self.crossed.index((k, other))
         return slice(start, start + width)
 
-    def curve_slice(self, k: int) -> slice:
-        """Returns the columns of r_k among the features."""
-        start = self.coefficients.shape[1] - CURVES * (len(self.curved) - self.curved.index(k))
-        return slice(start, start + CURVES)
+    def curve(self, k: int) -> slice:
+        """Returns the columns of r_k among the features; none if effect k has no curve."""
+        stop = self.coefficients.shape[1]
+        for other, _ in reversed(self.curved):
+            if other == k:
+                return slice(stop - CURVES, stop)
+            stop -= CURVES
+        return slice(0, 0)
+
+    def curve_features(self, strength: Array, k: int) -> Array:
+        """Returns the features of r_k at strengths (n,) or (), shape (n, 0) without a curve."""
+        kinds = dict(self.curved)
+        if k not in kinds:
+            return np.empty((*np.shape(strength), 0))
+        return curve_columns(strength, kinds[k])
 
     def scale(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns s at rows of (theta, condition, psi), shape (n, m)."""
