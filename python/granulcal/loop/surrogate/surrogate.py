@@ -357,7 +357,8 @@ class Surrogate:
             bend = strength**2 if self._bent[k] else 0.0 * strength
             columns = np.concatenate([strength * first, bend * second], axis=1)
             total += columns @ self.coefficients[:, start : start + step].T
-            total += self.curve_features(psi[:, k], int(k)) @ self.coefficients[:, self.curve(k)].T
+            curve = self.coefficients[:, self.curve(int(k))]
+            total += self.curve_features(psi[:, k], int(k)) @ curve.T
         total += self.shift.along(u, psi)
         for k, other in self.crossed_of(psi):
             strength = psi[:, k : k + 1] * psi[:, other : other + 1]
