@@ -219,6 +219,8 @@ def form(out: Path, budget: int, threads: int) -> None:
                 miss = float(np.sum(within.mean(axis=0) ** 2)) if len(within) else np.nan
                 cells.append(f"{max(miss - left.shape[1] / count, 0.0):.1f} ({len(within)})")
             print(f"| {camera} | {effect.name} | {' | '.join(cells)} |")
+        largest = np.sort(np.abs(known.white).max(axis=0))[::-1]
+        print(f"\nlargest residual of the axes: {', '.join(f'{x:.0f}' for x in largest[:10])}\n")
 
 
 def run(out: Path, only: list[str], budget: int, threads: int) -> None:
