@@ -215,9 +215,11 @@ def form(out: Path, budget: int, threads: int) -> None:
             cells = []
             for low, high in bands:
                 within = left[alone & (strength > 0) & (strength >= low) & (strength < high)]
-                count = max(len(within), 1)
-                miss = float(np.sum(within.mean(axis=0) ** 2)) if len(within) else np.nan
-                cells.append(f"{max(miss - left.shape[1] / count, 0.0):.1f} ({len(within)})")
+                if len(within) == 0:
+                    cells.append("")
+                    continue
+                miss = float(np.sum(within.mean(axis=0) ** 2)) - left.shape[1] / len(within)
+                cells.append(f"{max(miss, 0.0):.1f} ({len(within)})")
             print(f"| {camera} | {effect.name} | {' | '.join(cells)} |")
         largest = np.sort(np.abs(known.white).max(axis=0))[::-1]
         print(f"\nlargest residual of the axes: {', '.join(f'{x:.0f}' for x in largest[:10])}\n")
