@@ -191,6 +191,12 @@ impl Moving {
     }
 }
 
+/// When the later of the last impacts of two bodies was, or of one at a wall, 0 if there was none `[s]`.
+#[inline(always)]
+pub(super) fn last_hit(bodies: &[Moving], i: usize, j: Option<usize>) -> f64 {
+    bodies[i].hit.max(j.map_or(0.0, |j| bodies[j].hit))
+}
+
 /// `matrix * vector`, which must be inlined in the innermost loop.
 #[inline(always)]
 pub(super) fn product(m: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {

@@ -12,7 +12,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::body::Moving;
+use super::body::{Moving, last_hit};
 use super::pose::Pose;
 use crate::law::Small;
 use crate::wall::Wall;
@@ -210,7 +210,7 @@ impl Point {
 
     /// When the later of the last impacts of its bodies was, 0 if there was none `[s]`.
     pub fn last_hit(&self, bodies: &[Moving]) -> f64 {
-        bodies[self.i()].hit.max(self.j().map_or(0.0, |j| bodies[j].hit))
+        last_hit(bodies, self.i(), self.j())
     }
 
     /// Velocity of i relative to what it touches there `[m/s]`.

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::body::Moving;
+use super::body::{Moving, last_hit};
 use super::contact::{Name, Point};
 
 /// Consecutive points of one pair, or of one body and one surface.
@@ -35,7 +35,7 @@ impl Manifold {
 
     /// When the later of the last impacts of its bodies was, 0 if there was none `[s]`.
     pub fn last_hit(&self, bodies: &[Moving]) -> f64 {
-        bodies[self.i()].hit.max(self.j().map_or(0.0, |j| bodies[j].hit))
+        last_hit(bodies, self.i(), self.j())
     }
 }
 
