@@ -113,5 +113,5 @@ def test_few_pours_narrow_the_prior(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     pytest.importorskip("torch")
     monkeypatch.chdir(tmp_path)
     names = run("few_pours")
-    spread = names["draws"].std(axis=0) / names["before"].std(axis=0)
+    spread = names["after"].std(axis=0) / names["before"].std(axis=0)
     assert spread.min() < 0.8 and np.isfinite(spread).all()
