@@ -1,5 +1,8 @@
+import sys
+
 import numpy as np
 import pytest
+from own_simulators import SIMULATOR
 from toy_models import QUICK, SCENE
 
 import granulcal as gc
@@ -64,3 +67,11 @@ def quick(toy):
     theta, x = toy.simulate(120, seed=1)
     names = [f"s{i}" for i in range(16)]
     return gc.BayesSim.fit(theta, x, toy.prior, x_names=names, scene=SCENE, **QUICK)
+
+
+@pytest.fixture(scope="session")
+def own_simulator(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The command of a simulator of one's own."""
+    path = tmp_path_factory.mktemp("own") / "simulator.py"
+    path.write_text(SIMULATOR)
+    return f"{sys.executable} {path}"
