@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import granulcal as gc
+from granulcal.cli import main
 from granulcal.measured.live import RealSense, Ros2, _frame_of, record
 from granulcal.measured.ros_files import DepthFrame, write_bag, write_mcap
 
@@ -164,6 +165,18 @@ def test_what_cannot_be_recorded_is_refused(tmp_path: Path) -> None:
         record(OwnSource(), tmp_path / "x.png")
     with pytest.raises(ValueError, match="frames must be from 1 to 1000, got 0"):
         record(OwnSource(), tmp_path / "x.bag", frames=0)
+
+
+def test_what_cannot_be_recorded_is_refused_before_a_camera_is_looked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """That no camera's package is installed had been said first."""
+    for name, count, told in (
+        ("x.bag", "0", "frames must be from 1 to 1000, got 0"),
+        ("x.png", "5", "must end in .bag or .mcap"),
+    ):
+        assert main(["record", str(tmp_path / name), "--frames", count]) == 2
+        assert told in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["couscous.bag", "couscous.mcap"])

@@ -44,18 +44,31 @@ impl SensorNoise {
     /// # Errors
     /// `OutOfRange` for a negative or absurd standard deviation, `LengthMismatch` for a broken image.
     pub fn apply(&self, image: &DepthImage, seed: u64) -> Result<DepthImage, FeatureError> {
+        let image = self.apply_while(image, seed, &|| true)?;
+        Ok(image.unwrap_or_else(|| unreachable!("nothing stops it")))
+    }
+
+    /// The same, or none if `keep_going`, asked at every row that is blurred, says no.
+    ///
+    /// # Errors
+    /// As [`SensorNoise::apply`].
+    pub fn apply_while(
+        &self,
+        image: &DepthImage,
+        seed: u64,
+        keep_going: &dyn Fn() -> bool,
+    ) -> Result<Option<DepthImage>, FeatureError> {
         image.require_valid()?;
         let field = image
             .depth
             .iter()
             .map(|&d| if is_valid(d) { f64::from(d) } else { f64::NAN })
             .collect();
-        let depth = self
-            .disturb(field, image.width, seed)?
-            .into_iter()
-            .map(|d| if is_valid(d as f32) { d as f32 } else { 0.0 })
-            .collect();
-        DepthImage::new(image.width, image.height, depth)
+        let Some(depth) = self.disturb(field, image.width, seed, keep_going)? else {
+            return Ok(None);
+        };
+        let depth = depth.into_iter().map(|d| if is_valid(d as f32) { d as f32 } else { 0.0 });
+        DepthImage::new(image.width, image.height, depth.collect()).map(Some)
     }
 
     /// The height map that the rig would have delivered; heights may go below 0.
@@ -69,22 +82,34 @@ impl SensorNoise {
     ) -> Result<HeightMap, FeatureError> {
         map.require_valid()?;
         let field = map.z.iter().map(|&z| if z.is_finite() { z } else { f64::NAN }).collect();
-        Ok(HeightMap { z: self.disturb(field, map.width, seed)?, ..*map })
+        let z = self.disturb(field, map.width, seed, &|| true)?;
+        let z = z.unwrap_or_else(|| unreachable!("nothing stops it"));
+        Ok(HeightMap { z, ..*map })
     }
 
     /// Blurs and disturbs a row-major field in which NaN is no data.
-    fn disturb(&self, field: Vec<f64>, width: usize, seed: u64) -> Result<Vec<f64>, FeatureError> {
+    fn disturb(
+        &self,
+        field: Vec<f64>,
+        width: usize,
+        seed: u64,
+        keep_going: &dyn Fn() -> bool,
+    ) -> Result<Option<Vec<f64>>, FeatureError> {
         require_in("blur_px [px]", self.blur_px, 0.0, MAX_BLUR)?;
         require_in("depth_sigma [m]", self.depth_sigma, 0.0, MAX_DEPTH_NOISE)?;
-        let mut field =
-            if self.blur_px > 0.0 { blur::normalised(&field, width, self.blur_px) } else { field };
+        let blurred = if self.blur_px > 0.0 {
+            blur::normalised(&field, width, self.blur_px, keep_going)
+        } else {
+            Some(field)
+        };
+        let Some(mut field) = blurred else { return Ok(None) };
         if self.depth_sigma > 0.0 {
             let mut stream = Stream::new(seed);
             for value in &mut field {
                 *value += self.depth_sigma * stream.normal();
             }
         }
-        Ok(field)
+        Ok(Some(field))
     }
 }
 

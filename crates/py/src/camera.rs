@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use granulcal_dataset::{CameraFile, Claims, Form, Product, Room, load_sensor, png};
 use granulcal_features::{DepthImage, FeatureError, Intrinsics, Observe, SensorNoise};
 use numpy::PyArray2;
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use crate::array::{Image, Numbers, Vectors};
+use crate::signals::Watch;
 use crate::{array, error};
 
 /// A pinhole camera in the world.
@@ -57,16 +59,22 @@ impl Camera {
         let positions = Vectors::borrow("positions", positions)?;
         let radii = Numbers::borrow("radii", radii)?;
         let (positions, radii) = (positions.as_slice()?, radii.as_slice()?);
-        let image = py
-            .detach(|| {
-                let image = granulcal_features::render(&self.inner, positions, radii)?;
-                let image = SensorNoise { blur_px, depth_sigma }.apply(&image, seed)?;
-                match sensor {
-                    Some(sensor) => sensor.observe(&self.inner, &image, seed),
-                    None => Ok(image),
-                }
-            })
-            .map_err(error::features)?;
+        let (image, interrupted) = py.detach(|| {
+            let watch = Watch::new();
+            let noise = SensorNoise { blur_px, depth_sigma };
+            let image = granulcal_features::render(&self.inner, positions, radii)
+                .and_then(|image| noise.apply_while(&image, seed, &|| watch.keep_going(|_| Ok(()))))
+                .and_then(|image| match (image, &sensor) {
+                    (Some(image), Some(sensor)) => {
+                        sensor.observe(&self.inner, &image, seed).map(Some)
+                    }
+                    (image, _) => Ok(image),
+                });
+            (image, watch.finish())
+        });
+        interrupted?;
+        let image = image.map_err(error::features)?;
+        let image = image.ok_or_else(|| PyKeyboardInterrupt::new_err("the image was given up"))?;
         array::matrix(py, image.depth, image.height, image.width)
     }
 

@@ -39,8 +39,10 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from granulcal.measured.live import RealSense, Ros2, record
+    from granulcal.measured.live import RealSense, Ros2, record, require_recordable
 
+    # Before a camera is opened, which takes seconds and may be missing.
+    require_recordable(options.out, options.frames)
     if options.topic is not None:
         source = Ros2(options.topic, options.camera_topic)
     else:

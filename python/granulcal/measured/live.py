@@ -11,7 +11,7 @@ import numpy as np
 from granulcal import _native
 from granulcal.measured.ros_files import DepthFrame, write_bag, write_mcap
 
-__all__ = ["RealSense", "Ros2", "Source", "record"]
+__all__ = ["RealSense", "Ros2", "Source", "record", "require_recordable"]
 
 _WARM_UP = 30
 _PATIENCE_S = 5.0
@@ -160,6 +160,19 @@ def _frame_of(message: Any) -> DepthFrame:
     return DepthFrame(depth, stamp.sec * 1_000_000_000 + stamp.nanosec)
 
 
+def require_recordable(path: str | PathLike[str], frames: int) -> None:
+    """Refuses a number of frames that is not recorded, and a file that is not written.
+
+    Raises:
+        ValueError: names it.
+    """
+    if not 1 <= frames <= _MOST_FRAMES:
+        raise ValueError(f"frames must be from 1 to {_MOST_FRAMES}, got {frames}")
+    if Path(path).suffix.lower() not in (".bag", ".mcap"):
+        raise ValueError(f"{path} must end in .bag or .mcap")
+    _native.check_paths([], [("path", path, "messages")])
+
+
 def record(source: Source, path: str | PathLike[str], *, frames: int = 10) -> int:
     """Records depth frames into a .bag or an .mcap and returns their number.
 
@@ -172,13 +185,8 @@ def record(source: Source, path: str | PathLike[str], *, frames: int = 10) -> in
         ValueError: another name, one of a file that is there, or no frames asked for.
         OSError: the source delivers nothing.
     """
-    if not 1 <= frames <= _MOST_FRAMES:
-        raise ValueError(f"frames must be from 1 to {_MOST_FRAMES}, got {frames}")
-    kind = Path(path).suffix.lower()
-    if kind not in (".bag", ".mcap"):
-        raise ValueError(f"{path} must end in .bag or .mcap")
     # Before the camera is asked.
-    _native.check_paths([], [("path", path, "messages")])
+    require_recordable(path, frames)
     delivered = source.frames()
     try:
         taken = [frame for frame, _ in zip(delivered, range(frames), strict=False)]
@@ -188,6 +196,6 @@ def record(source: Source, path: str | PathLike[str], *, frames: int = 10) -> in
             close()
     if not taken:
         raise OSError("the source delivered no frame")
-    if kind == ".bag":
+    if Path(path).suffix.lower() == ".bag":
         return write_bag(path, taken, source.lens, depth_unit=source.depth_unit)
     return write_mcap(path, taken, source.lens)
