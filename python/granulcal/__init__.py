@@ -20,9 +20,12 @@ from granulcal.design.spill import design_spill
 from granulcal.measured.recording import Formation, Levelled, Plane, Recording
 from granulcal.pours.camera import Camera
 from granulcal.pours.cluster import Cluster
+from granulcal.pours.contacts import Contacts
 from granulcal.pours.dataset import Dataset, generate
+from granulcal.pours.pour import Pour
 from granulcal.pours.scene import Material, Scene
-from granulcal.pours.simulate import Pour, simulate
+from granulcal.pours.simulate import simulate
+from granulcal.pours.simulation import Simulation
 from granulcal.pours.statistics import (
     DiagnosticStatistics,
     ObservedStatistics,
@@ -30,6 +33,7 @@ from granulcal.pours.statistics import (
     diagnostic_statistics,
     statistics,
 )
+from granulcal.pours.trajectory import Trajectory
 from granulcal.prior import Parameter, Prior
 
 if TYPE_CHECKING:
@@ -46,6 +50,7 @@ __all__ = [
     "Camera",
     "Cluster",
     "Condition",
+    "Contacts",
     "Dataset",
     "DiagnosticStatistics",
     "Formation",
@@ -62,8 +67,10 @@ __all__ = [
     "Ring",
     "RingModel",
     "Scene",
+    "Simulation",
     "Statistics",
     "Task",
+    "Trajectory",
     "__version__",
     "calibrate_within",
     "close_loop",

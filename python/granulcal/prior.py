@@ -20,7 +20,7 @@ from granulcal.real import check_real
 from granulcal.whole import check_seed, check_whole
 from granulcal.words import not_there
 
-__all__ = ["Parameter", "Prior"]
+__all__ = ["Parameter", "Prior", "require_prior"]
 
 Array = NDArray[np.float64]
 
@@ -299,3 +299,13 @@ def _toml_float(value: float) -> str:
     text = repr(value)
     # TOML floats need a digit on both sides of the point, and 1e-07 is allowed as it is.
     return text if any(mark in text for mark in ".e") else f"{text}.0"
+
+
+def require_prior(prior: object) -> None:
+    """Refuses what is no prior, a file's name above all.
+
+    Raises:
+        TypeError: not a prior.
+    """
+    if not isinstance(prior, Prior):
+        raise TypeError(f"prior must be a Prior, as Prior.load reads it, got {prior!r}")

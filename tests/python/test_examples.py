@@ -81,9 +81,12 @@ def test_calibrate(tmp_path, capsys):
         "granulcal",
         "granulcal.design.ring",
         "granulcal.prior",
+        "granulcal.pours.contacts",
+        "granulcal.pours.pour",
         "granulcal.pours.scene",
-        "granulcal.pours.simulate",
+        "granulcal.pours.simulation",
         "granulcal.pours.statistics",
+        "granulcal.pours.trajectory",
     ],
 )
 def test_docstrings(name):

@@ -208,8 +208,19 @@ def _interrupt(call: str, *, after: float) -> subprocess.CompletedProcess:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for a child process")
-def test_ctrl_c_stops_a_pour():
-    ended = _interrupt("gc.simulate(gc.Scene.funnel(), preset='accurate')", after=0.5)
+@pytest.mark.parametrize(
+    "call",
+    [
+        "gc.simulate(gc.Scene.funnel(preset='accurate'))",
+        "gc.simulate(gc.Scene.funnel(preset='accurate'), every=0.5)",
+        "gc.Simulation(gc.Scene.funnel(preset='accurate')).advance(10.0)",
+        # A minute and more: it had gone on to its end.
+        "gc.Camera.overhead(height=0.3, field_width=0.3, pixels=4000)"
+        ".render([[0, 0, 0.1]], [0.01], blur_px=300)",
+    ],
+)
+def test_ctrl_c_stops_a_pour(call):
+    ended = _interrupt(call, after=0.5)
     assert (ended.returncode, ended.stdout) == (7, "interrupted\n")
 
 

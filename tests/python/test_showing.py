@@ -9,7 +9,7 @@ import pytest
 import granulcal as gc
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.cli import main
-from granulcal.pours.film import film
+from granulcal.pours.film import _outlines, film
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -41,6 +41,15 @@ def test_a_long_film_keeps_its_last_frame(small_scene: gc.Scene, tmp_path: Path)
     assert film(small_scene, tmp_path / "x.gif", fps=60, slow=1, width=64, most_frames=3) == 4
     with pytest.raises(ValueError, match="must end in .gif or .mp4"):
         film(small_scene, tmp_path / "x.avi")
+
+
+def test_a_gate_that_moves_leaves_the_other_walls_in_the_picture() -> None:
+    """One wall that moved had taken all lines away."""
+    hopper = gc.Scene.load(EXAMPLES / "hopper_round.toml")
+    # Of a cylinder and of a cone two rings and two sides each; the disc is the gate.
+    assert len(_outlines(hopper)) == 8
+    assert len(_outlines(gc.Scene.load(EXAMPLES / "drum.toml"))) == 0
+    assert len(_outlines(gc.Scene.funnel())) == 8
 
 
 def test_a_film_as_mp4_lasts_as_long_as_its_frames(small_scene: gc.Scene, tmp_path: Path) -> None:

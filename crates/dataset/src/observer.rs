@@ -142,13 +142,27 @@ impl Observer {
         if self.is_idle() {
             return simulation.run_while(keep_going);
         }
-        while simulation.ended().is_none() {
+        let has_ended = self.advance_while(&mut simulation, f64::INFINITY, keep_going);
+        has_ended.then(|| simulation.into_pour())
+    }
+
+    /// Simulates to the substep that ends nearest to `time` `[s]`, or less if the pour ends before, and takes the samples
+    /// that fall due. Gives up between two substeps when `keep_going` says so: false then.
+    pub fn advance_while(
+        &mut self,
+        simulation: &mut Simulation,
+        time: f64,
+        keep_going: &dyn Fn() -> bool,
+    ) -> bool {
+        let dt = simulation.settings().dt;
+        while simulation.ended().is_none() && simulation.time() + 0.5 * dt < time {
             if !keep_going() {
-                return None;
+                return false;
             }
-            self.go_on(&mut simulation, POLL_INTERVAL);
+            // A substep at least, whatever the rounding.
+            self.go_on(simulation, (time - simulation.time()).min(POLL_INTERVAL).max(dt));
         }
-        Some(simulation.into_pour())
+        true
     }
 
     /// Takes a sample if one is due, and one of the end.

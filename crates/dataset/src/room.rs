@@ -22,6 +22,8 @@ const BASE: f64 = 64e6;
 const ROW: f64 = 1024.0;
 /// Bytes of the number of a row.
 const NUMBER: f64 = 8.0;
+/// Bytes of a grain in a frame in memory: place, velocity, spin and turn.
+const FRAME_GRAIN: f64 = 104.0;
 /// Bytes of a pixel of an image that is rendered, blurred and handed over.
 const IMAGE_PIXEL: f64 = 16.0;
 /// Bytes of a draw of a posterior, and of each of its numbers with its copies.
@@ -74,6 +76,13 @@ impl Room {
             memory: BASE + (pour.memory - BASE) * threads + ROW * in_memory,
             disk: ROW * rows + PART * parts,
         }
+    }
+
+    /// A pour with frames of so many spheres in memory, one every so many simulated seconds, and a copy of each.
+    pub fn of_frames(scene: &Scene, spheres: usize, every: f64) -> Self {
+        let frames = scene.end.horizon / every + 2.0;
+        let frame = 2.0 * FRAME_GRAIN * spheres as f64;
+        Self { memory: Self::of_pour(scene, None).memory + frames * frame, disk: 0.0 }
     }
 
     /// An image of so many pixels, rendered and disturbed.

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-/// Mechanical energy of all grains of a simulation, over the mass of a grain.
+/// Mechanical energy of all grains of a simulation, over [`crate::Simulation::unit_mass`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
     /// Of translation and rotation, at the time of the positions `[m^2/s^2]`.

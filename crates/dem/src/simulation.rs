@@ -352,6 +352,11 @@ impl Simulation {
 
     /// The state as it is, as a pour; one that has not ended counts as cut at its horizon.
     pub fn into_pour(self) -> Pour {
+        self.to_pour()
+    }
+
+    /// The same of a simulation that goes on.
+    pub fn to_pour(&self) -> Pour {
         Pour {
             velocities: self.velocities(),
             angular_velocities: self.angular_velocities(),

@@ -1,6 +1,7 @@
 //! NumPy arrays as slices and back; errors name the argument, what was found and what is allowed.
 
 use bytemuck::cast_slice;
+use granulcal_dem::ConvexGrains;
 use nalgebra::Vector3;
 use numpy::{
     Element, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods,
@@ -148,6 +149,16 @@ pub(crate) fn from_vectors<'py>(
     vectors: &[Vector3<f64>],
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_slice(py, cast_slice::<_, f64>(vectors)).reshape([vectors.len(), 3])
+}
+
+/// Turns of grains that are not round, quaternions i, j, k, w, shape (n, 4); (0, 4) of others.
+pub(crate) fn from_turns<'py>(
+    py: Python<'py>,
+    convex: Option<&ConvexGrains>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let turned = convex.map_or(&[][..], |convex| &convex.orientations);
+    let numbers = turned.iter().flat_map(|turn| <[f64; 4]>::from(turn.coords)).collect();
+    matrix(py, numbers, turned.len(), 4)
 }
 
 /// A new array, shape (rows, columns), from its values row by row.

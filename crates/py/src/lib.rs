@@ -7,13 +7,13 @@
 
 mod array;
 mod camera;
+mod contacts;
 mod coordinates;
 mod dataset;
 mod discharge;
 mod emulated;
 mod error;
 mod files;
-mod film;
 mod formation;
 mod gathered;
 mod generate;
@@ -28,6 +28,7 @@ mod scene;
 mod segmentation;
 mod signals;
 mod simulate;
+mod simulation;
 mod statistics;
 
 use pyo3::pymodule;
@@ -46,8 +47,6 @@ mod _native {
     use crate::emulated::Emulated;
     #[pymodule_export]
     use crate::files::{camera_beside, check_paths, hash_bytes, readable, write_file};
-    #[pymodule_export]
-    use crate::film::film;
     #[pymodule_export]
     use crate::formation::Formation;
     #[pymodule_export]
@@ -72,6 +71,8 @@ mod _native {
     use crate::scene::{Scene, law_of};
     #[pymodule_export]
     use crate::simulate::{simulate, try_pour};
+    #[pymodule_export]
+    use crate::simulation::Simulation;
     #[pymodule_export]
     use crate::statistics::{diagnostics, paper16, statistics_table};
 

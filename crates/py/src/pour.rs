@@ -4,9 +4,11 @@ use granulcal_dataset::{Drawn, Observed, RowStatus, Series, View};
 use granulcal_dem::Health;
 use granulcal_scene::{CameraSpec, ViewSpec};
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::contacts::{ContactArrays, Contacts};
 use crate::observation::Observation;
 use crate::{array, error};
 
@@ -16,6 +18,10 @@ pub(crate) struct Pour {
     pub(crate) inner: granulcal_dem::Pour,
     pub(crate) status: RowStatus,
     pub(crate) observed: Observed,
+    /// Of the grains in the scene [kg].
+    pub(crate) masses: Vec<f64>,
+    /// Those of the last substep, or why they cannot be told.
+    pub(crate) contacts: Result<Contacts, String>,
     pub(crate) camera: CameraSpec,
     pub(crate) views: Vec<ViewSpec>,
     pub(crate) seed: u64,
@@ -42,14 +48,24 @@ impl Pour {
     /// Quaternions i, j, k, w of grains that are not round, else none of them.
     #[getter]
     fn orientations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let turned = self.inner.convex.as_ref().map_or(&[][..], |convex| &convex.orientations);
-        let numbers = turned.iter().flat_map(|turn| <[f64; 4]>::from(turn.coords)).collect();
-        array::matrix(py, numbers, turned.len(), 4)
+        array::from_turns(py, self.inner.convex.as_ref())
     }
 
     #[getter]
     fn radii<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.inner.radii)
+    }
+
+    #[getter]
+    fn masses<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.masses)
+    }
+
+    fn contacts<'py>(&self, py: Python<'py>) -> PyResult<ContactArrays<'py>> {
+        match &self.contacts {
+            Ok(contacts) => contacts.arrays(py),
+            Err(reason) => Err(PyValueError::new_err(reason.clone())),
+        }
     }
 
     #[getter]

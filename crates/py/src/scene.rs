@@ -186,6 +186,10 @@ impl Scene {
         Ok(Pour {
             status: observer.status(&pour),
             observed: observer.observed(&pour),
+            masses: pour.radii.iter().map(|&radius| scene.grains.mass_of(radius)).collect(),
+            contacts: Err(
+                "another simulator leaves its grains alone: no contacts are known".to_owned()
+            ),
             inner: pour,
             camera: scene.camera,
             views: scene.views.clone(),

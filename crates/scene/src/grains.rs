@@ -127,6 +127,17 @@ impl Grains {
         0.5 * self.diameter
     }
 
+    /// Mass of a grain `[kg]`: of a ball of the diameter, or of the body that it is; of a checked scene.
+    pub fn mass(&self) -> f64 {
+        let ball = PI / 6.0 * self.diameter.powi(3);
+        self.density * self.solid().map_or(ball, |solid| solid.volume)
+    }
+
+    /// Mass of a grain that is as large as `radius` says `[kg]`.
+    pub fn mass_of(&self, radius: f64) -> f64 {
+        self.mass() * (radius / self.radius()).powi(3)
+    }
+
     /// The body that every grain is, if it has a shape; of a checked scene.
     ///
     /// # Panics

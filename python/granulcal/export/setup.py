@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 from granulcal.export.law import Contact, Stiffness
 from granulcal.export.mark import plain
 from granulcal.export.mesh import triangles
+from granulcal.export.points import ENDINGS
+from granulcal.export.walls import Body, require_still, walls_of
 from granulcal.pours.scene import Scene
 
-__all__ = ["Body", "Contact", "Setup", "Stiffness", "require_funnel_in_place", "walls_of"]
+__all__ = ["Body", "Contact", "Setup", "Stiffness", "require_funnel_in_place"]
 
 Array = NDArray[np.float64]
 
@@ -24,26 +26,6 @@ _FALLEN = 0.25
 _NOT_ROUND = ("grains.shape", "effects.clump")
 _REFUSED = ("periodic", "outflow", "intruder", "bed", *_NOT_ROUND)
 _POSE = ("x", "y", "lean_x", "lean_y")
-
-
-@dataclass(frozen=True)
-class Body:
-    """A wall at rest.
-
-    Attributes:
-        name: what an engine's file calls it.
-        shape: its table in the scene: kind and lengths [m].
-        law: of its contacts with grains.
-    """
-
-    name: str
-    shape: dict[str, Any]
-    law: Contact
-
-    @property
-    def path(self) -> str:
-        """What messages call it: its path in the scene."""
-        return self.name.replace("wall_", "walls.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,8 +69,7 @@ class Setup:
         """
         table = scene.to_dict()
         _refuse(scene.name, table, _REFUSED)
-        for name, wall in _movable(table):
-            _refuse_motion(name, wall)
+        require_still(table)
         return cls._of(scene, table, seed)
 
     @classmethod
@@ -106,10 +87,32 @@ class Setup:
         return cls._of(scene, table, 0)
 
     @classmethod
+    def of_bed(cls, scene: Scene, kind: str, seed: int = 0) -> "Setup":
+        """Returns what a bed of a scene's grains needs, in one of `bed.FORMATS`.
+
+        Tables of points know no engine: whatever walls a pour has had, its grains can be viewed.
+
+        Raises:
+            ValueError: points of grains with a shape; of other formats as `of`.
+        """
+        if kind not in ENDINGS:
+            return cls.of(scene, seed)
+        table = scene.to_dict()
+        if "shape" in table["grains"]:
+            raise ValueError(
+                f"{scene.name}: `grains.shape` is not in a {kind} of points; Pour.vertices() has the "
+                "bodies' corners"
+            )
+        if kind == "csv":
+            # What is read as grains elsewhere; the others are for viewing.
+            _refuse(scene.name, table, _NOT_ROUND)
+        return cls._of(scene, table, seed)
+
+    @classmethod
     def _of(cls, scene: Scene, table: dict[str, Any], seed: int) -> "Setup":
         grains = Contact.of(table["material"])
         ground = Contact.of(table.get("ground", {}).get("material", {}), grains)
-        walls = _walls(table, grains)
+        walls = walls_of(table, grains)
         centres, radii = scene.start(seed)
         gravity = tuple(float(g) for g in table["gravity"])
         fall = float(np.sqrt(2.0 * centres[:, 2].max() / max(np.linalg.norm(gravity), 1e-9)))
@@ -183,37 +186,11 @@ def require_funnel_in_place(scene: Scene) -> None:
         )
 
 
-def walls_of(scene: Scene) -> tuple[Body, ...]:
-    """Returns the walls of a scene besides the ground, whatever its grains are.
-
-    Raises:
-        ValueError: one of them moves, or is a mesh.
-    """
-    table = scene.to_dict()
-    for name, wall in _movable(table):
-        _refuse_motion(name, wall)
-    return tuple(_walls(table, Contact.of(table["material"])))
-
-
 def _refuse(name: str, table: dict[str, Any], paths: tuple[str, ...]) -> None:
     for path in paths:
         *places, key = path.split(".")
         if key in (table.get(places[0], {}) if places else table):
             raise ValueError(f"{name}: `{path}` has no counterpart in other engines' files")
-
-
-def _movable(table: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    """Returns the tables of what may have a motion, with the names that messages give them."""
-    funnel = [("funnel", table["funnel"])] if "funnel" in table else []
-    return [*funnel, *((f"walls.{i}", wall) for i, wall in enumerate(table.get("walls", [])))]
-
-
-def _walls(table: dict[str, Any], grains: Contact) -> list[Body]:
-    walls = [*_funnel(table.get("funnel"), grains)]
-    for i, wall in enumerate(table.get("walls", [])):
-        law = Contact.of(wall.get("material", {}), grains)
-        walls.append(Body(f"wall_{i}", wall["shape"], law))
-    return walls
 
 
 def _half_width(
@@ -232,36 +209,6 @@ def _half_width(
     ends = [np.abs(triangles(shape).vertices[:, :2]).max() for shape in shapes]
     farthest = max([np.abs(centres[:, :2]).max() + rolled, *ends])
     return float(max(_LEAST_WIDTH, farthest + 2.0 * radius))
-
-
-def _funnel(table: dict[str, Any] | None, grains: Contact) -> list[Body]:
-    if table is None:
-        return []
-    law = Contact.of(table.get("material", {}), grains)
-    tip = float(table["height"])
-    neck = tip + float(table["stem_length"])
-    rim = neck + float(table["cone_length"])
-    stem, wide = float(table["stem_radius"]), float(table["rim_radius"])
-    bodies = []
-    if neck > tip:
-        shape = {"kind": "cylinder", "from": [0, 0, tip], "to": [0, 0, neck], "radius": stem}
-        bodies.append(Body("stem", shape, law))
-    shape = {
-        "kind": "cone",
-        "from": [0, 0, neck],
-        "to": [0, 0, rim],
-        "radius_from": stem,
-        "radius_to": wide,
-    }
-    return [*bodies, Body("cone", shape, law)]
-
-
-def _refuse_motion(name: str, table: dict[str, Any]) -> None:
-    kind = table.get("motion", {}).get("kind", "still")
-    if kind != "still":
-        raise ValueError(f"{name}: motion {kind!r} is not exported; only walls at rest are")
-    if table.get("shape", {}).get("kind") == "mesh":
-        raise ValueError(f"{name}: meshes are not exported; give the engine the file itself")
 
 
 def _left_out(table: dict[str, Any]) -> list[str]:

@@ -19,11 +19,10 @@ from granulcal.engines.in_use import engine_in_use, required
 from granulcal.errors import OtherLawWarning, UnverifiedDataWarning
 from granulcal.pours.cluster import Cluster, cluster_asked, gather, refuse_engine
 from granulcal.pours.left_out import LeftOut
-from granulcal.pours.scene import Scene
-from granulcal.pours.simulate import require_scene
+from granulcal.pours.scene import Scene, require_scene
 from granulcal.pours.statistics import DIAGNOSTIC_NAMES, NAMES
 from granulcal.pours.status import NO_GRAINS, UNUSABLE
-from granulcal.prior import Prior
+from granulcal.prior import Prior, require_prior
 from granulcal.progress import ProgressLine
 from granulcal.whole import check_seed, check_whole
 
@@ -156,8 +155,11 @@ class Dataset:
         Raises:
             ModuleNotFoundError: pandas is not installed.
         """
-        import pandas  # pyright: ignore[reportMissingImports]
-
+        try:
+            import pandas  # pyright: ignore[reportMissingImports]
+        except ModuleNotFoundError as error:
+            told = "pandas is not installed: pip install pandas; columns() is the same as arrays"
+            raise ModuleNotFoundError(told, name=error.name) from None
         return pandas.DataFrame(self.columns())
 
     def __len__(self) -> int:
@@ -239,8 +241,7 @@ def generate(
     """
     require_scene(scene)
     engine = required(engine) or engine_in_use()
-    if not isinstance(prior, Prior):
-        raise TypeError(f"prior must be a Prior, as Prior.load reads it, got {prior!r}")
+    require_prior(prior)
     check_whole("n", n, at_least=1)
     check_seed(seed)
     if chunk is not None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from granulcal import _native
 from granulcal.pours.scene import Scene
+from granulcal.pours.simulation import Simulation
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -110,17 +111,20 @@ def film(
     last: list[Image.Image] = []
     over = 0
 
-    def see(time: float, centres: Array, sizes: Array) -> None:
-        nonlocal over
+    simulation = Simulation(scene, seed)
+    for number in itertools.count(1):
         if progress is not None:
-            progress(time)
+            progress(simulation.time)
+        has_ended = simulation.status is not None
         if len(frames) < most_frames:
-            frames.append(_picture(eye, centres, sizes, lines))
+            frames.append(_picture(eye, simulation.positions, simulation.radii, lines))
         else:
             over += 1
-            last[:] = [_picture(eye, centres, sizes, lines)]
-
-    _native.film(scene.native, seed, fps * slow, see)
+            if has_ended:
+                last = [_picture(eye, simulation.positions, simulation.radii, lines)]
+        if has_ended:
+            break
+        simulation.advance_to(number / (fps * slow))
     frames += last
     _WRITERS[ending](Path(path), frames, fps)
     # The last one is there.
@@ -193,15 +197,13 @@ def _ball(draw: Any, at: Array, r: float) -> None:
 
 def _outlines(scene: Scene) -> list[Array]:
     """Returns lines along the walls at rest [m], each of shape (k, 3)."""
-    from granulcal.export.setup import walls_of
+    from granulcal.export.law import Contact
+    from granulcal.export.walls import still_walls_of
 
-    try:
-        walls = walls_of(scene)
-    except ValueError:
-        # Walls that move are not drawn; the grains show them.
-        return []
+    table = scene.to_dict()
     found: list[Array] = []
-    for body in walls:
+    # Walls that move are not drawn; the grains show them.
+    for body in still_walls_of(table, Contact.of(table["material"])):
         found += _outline(body.shape)
     return found
 

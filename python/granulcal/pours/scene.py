@@ -19,7 +19,7 @@ from granulcal.words import not_there
 if TYPE_CHECKING:
     from granulcal.measured.segmentation import SegmentationSettings
 
-__all__ = ["Material", "Scene"]
+__all__ = ["Material", "Scene", "require_scene"]
 
 _BUILT_IN = ("funnel", "drop")
 
@@ -395,6 +395,16 @@ class Scene:
     def __repr__(self) -> str:
         count = int(self.get("grains.count"))
         return f"Scene({self.name!r}, {count} grains, preset {self.preset!r})"
+
+
+def require_scene(scene: object) -> None:
+    """Refuses what is no scene, a file's name above all.
+
+    Raises:
+        TypeError: not a scene.
+    """
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene must be a Scene, as Scene.load reads it, got {scene!r}")
 
 
 def _word(path: str, value: float | str) -> str:

@@ -1,251 +1,21 @@
-"""One pour: from a scene to grains at rest, and what the camera sees of them."""
+"""One pour: from a scene to grains at rest."""
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING, NoReturn
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from granulcal import _native
-from granulcal.arrays import read_only
 from granulcal.engines.in_use import engine_in_use, required
-from granulcal.pours.scene import Material, Scene
-from granulcal.pours.statistics import DiagnosticStatistics, ObservedStatistics, Statistics
+from granulcal.pours.pour import Pour
+from granulcal.pours.recorded import recorded
+from granulcal.pours.scene import Material, Scene, require_scene
+from granulcal.pours.simulation import Simulation
 from granulcal.whole import check_seed, check_whole
 
 if TYPE_CHECKING:
     from granulcal.engines import Engine
 
 __all__ = ["Pour", "simulate"]
-
-Array = NDArray[np.float64]
-
-
-class Pour:
-    """Grains at the end of a pour, how it ended and how far it can be trusted.
-
-    Its arrays are read-only: copy one to change it.
-
-    Examples:
-        >>> pour = simulate(Scene.drop(0.02, count=20), seed=1)
-        >>> pour.positions.shape, pour.status
-        ((20, 3), 'at_rest')
-    """
-
-    def __init__(self, native: _native.Pour, scene: Scene, seed: int) -> None:
-        self._native = native
-        self.scene = scene
-        """The scene, with the material and the preset that were simulated."""
-        self.seed = seed
-        """Seed of the grains' start and of the camera's noise."""
-
-    @cached_property
-    def positions(self) -> Array:
-        """Centres of the grains [m], ground at z = 0, shape (n, 3): of those in the scene.
-
-        Grains that are clumps (`effects.clump`) have a row for each sphere, of one grain after the
-        other; so have velocities and radii.
-        """
-        return read_only(self._native.positions)
-
-    @cached_property
-    def velocities(self) -> Array:
-        """Velocities of the grains [m/s], shape (n, 3)."""
-        return read_only(self._native.velocities)
-
-    @cached_property
-    def angular_velocities(self) -> Array:
-        """Angular velocities of the grains [rad/s], shape (n, 3)."""
-        return read_only(self._native.angular_velocities)
-
-    @cached_property
-    def orientations(self) -> Array:
-        """Turns of grains with a shape, quaternions i, j, k, w, shape (n, 4); else (0, 4).
-
-        From the body's axes, about its centre of mass, to the scene's: those of a box are along its
-        edges, a cylinder's axis is y, a superquadric and a hull have their principal axes.
-        `Scene.body_vertices` has the body in them, `vertices` in the scene. SciPy's
-        `Rotation.from_quat` takes this order.
-        """
-        return read_only(self._native.orientations)
-
-    @cached_property
-    def radii(self) -> Array:
-        """Radii [m], shape (n,), of clumps those of spheres; of a shape half the diameter."""
-        return read_only(self._native.radii)
-
-    @cached_property
-    def radii_out(self) -> Array:
-        """Radii of the grains that have left through the scene's outflow [m], shape (m,)."""
-        return read_only(self._native.radii_out)
-
-    @property
-    def status(self) -> str:
-        """How it ended: `at_rest`, `out_of_view`, `ran_out`, `jammed`, `horizon`, `unhealthy`."""
-        return self._native.status
-
-    @property
-    def grains_in_funnel(self) -> int:
-        """Grains whose centre is in the funnel at the end; 0 where the scene has none."""
-        return self._native.grains_in_funnel
-
-    @property
-    def state_hash(self) -> str:
-        """Hash of every bit of the final state, 32 hexadecimal digits: equal for equal pours."""
-        return self._native.state_hash
-
-    @cached_property
-    def health(self) -> dict[str, float]:
-        """Penetration [radii], residuals [-], energy created [-], grains lost, work done."""
-        return self._native.health
-
-    @property
-    def simulated_s(self) -> float:
-        """Simulated time [s]."""
-        return self._native.simulated_s
-
-    @property
-    def cpu_seconds(self) -> float:
-        """Processor time of the simulation [s]."""
-        return self._native.cpu_seconds
-
-    def vertices(self, on_rim: int = 64) -> Array:
-        """Returns where the points of `Scene.body_vertices` are at the end [m], shape (n, k, 3).
-
-        (0, 0, 3) if the grains are round or clumps.
-
-        Args:
-            on_rim: points on each rim of a cylinder.
-
-        Raises:
-            TypeError: `on_rim` is no whole number.
-            ValueError: it is below 3 or above 100,000.
-        """
-        body = self.scene.body_vertices(on_rim)
-        if len(self.orientations) == 0:
-            return np.zeros((0, 0, 3))
-        axis, w = self.orientations[:, None, :3], self.orientations[:, None, 3:]
-        across = np.cross(axis, body[None])
-        turned = body[None] + 2.0 * (w * across + np.cross(axis, across))
-        return self.positions[:, None] + turned
-
-    def depth_image(self) -> NDArray[np.float32]:
-        """Returns what the scene's pinhole camera sees: depth [m], 0 is no data, shape (h, w).
-
-        Raises:
-            ValueError: the scene's camera is orthographic; it delivers `height_map`.
-        """
-        image = self._observation.depth
-        if image is None:
-            raise ValueError("the scene's camera is orthographic: ask for height_map()")
-        return image
-
-    def look_from(self, view: str) -> NDArray[np.float32]:
-        """Returns what one of the scene's further views sees: depth [m], shape (h, w).
-
-        0 is no data, and the image is without noise.
-
-        Args:
-            view: its name in the scene (table `views`).
-
-        Raises:
-            KeyError: the scene has no view of this name.
-        """
-        image = self._native.look_from(view)
-        if image is None:
-            raise KeyError(f"this scene has no view {view!r}; views stand in its table `views`")
-        return image
-
-    def height_map(self) -> Array:
-        """Returns what the scene's orthographic camera sees: heights [m], shape (h, w).
-
-        Raises:
-            ValueError: the scene's camera is a pinhole; it delivers `depth_image`.
-        """
-        heights = self._observation.heights
-        if heights is None:
-            raise ValueError("the scene's camera is a pinhole: ask for depth_image()")
-        return heights
-
-    def points(self) -> Array:
-        """Returns the points of the image that were taken for grains [m], shape (k, 3).
-
-        Empty if no grain is in view.
-        """
-        return self._observation.points
-
-    def statistics(self) -> Statistics:
-        """Returns the statistics of the image, the simulated half of every comparison.
-
-        Raises:
-            ValueError: too few grains are in view.
-        """
-        return Statistics(self._observation.statistics())
-
-    def diagnostic_statistics(self) -> DiagnosticStatistics:
-        """Returns the diagnostic statistics of the image, about the scene's vertical axis.
-
-        Isolated grains are seen only by pixels finer than a grain: `camera.downsample` decides.
-
-        Raises:
-            ValueError: too few grains are in view.
-        """
-        return DiagnosticStatistics(self._observation.diagnostics())
-
-    def observed(self) -> ObservedStatistics:
-        """Returns the statistics that the scene observes; there are none if it observes nothing."""
-        return ObservedStatistics(self._native.observed, self.scene.observed_names)
-
-    def series(self, name: str) -> tuple[Array, Array]:
-        """Returns times after the begin of the observation [s] and the samples of what is observed.
-
-        Args:
-            name: `front_radius` or `liquid_radius` [m], `discharged` [%], `surface_slope` [deg] or
-                the height of the surface at a stated x, `surface_z[0.01]` [m].
-
-        Raises:
-            KeyError: the scene does not observe it.
-        """
-        all_series = self._native.series
-        if name not in all_series:
-            known = ", ".join(all_series) or "nothing"
-            raise KeyError(f"this scene has no series {name!r}; it observes {known} over time")
-        return all_series[name]
-
-    @cached_property
-    def _observation(self) -> _native.Observation:
-        return self._native.observe()
-
-    def _repr_html_(self) -> str:
-        from granulcal.html import page, picture, seen_from_above
-
-        rows = {"status": self.status, "what": self._told_count}
-        rows |= {"simulated": f"{self.simulated_s:.2f} s", "seed": self.seed}
-        view = self._observation
-        label = "z [m]" if view.depth is None else "depth [m]"
-        image = view.heights if view.depth is None else view.depth
-        drawn = "" if image is None else picture(seen_from_above(image, label))
-        return page(f"Pour of {self.scene.name}", rows, drawn)
-
-    @property
-    def _told_count(self) -> str:
-        spheres = len(self.radii)
-        if self.scene.get("effects.clump.aspect") <= 1.0:
-            return f"{spheres} grains"
-        return (
-            f"{spheres} spheres of {spheres // int(self.scene.get('effects.clump.spheres'))} grains"
-        )
-
-    def __reduce__(self) -> NoReturn:
-        raise TypeError(
-            "a Pour stays in its process: hand over its arrays and statistics(), or the "
-            "scene and the seed, which make it again"
-        )
-
-    def __repr__(self) -> str:
-        return f"Pour({self._told_count}, {self.status}, {self.simulated_s:.2f} s)"
 
 
 def simulate(
@@ -256,6 +26,7 @@ def simulate(
     threads: int = 1,
     *,
     engine: Engine | None = None,
+    every: float | None = None,
 ) -> Pour:
     """Returns the pour of a scene; the same arguments give the same bits.
 
@@ -271,10 +42,13 @@ def simulate(
             thousand grains gain from a second thread, and `generate` runs many pours at once.
         engine: another simulator in place of ours, or of the one in use; docs/engines.md says what
             it must do. It has to give grains: points alone are for `generate`.
+        every: simulated time between two frames [s], which `Pour.trajectory` then has. They change
+            no bit of the pour; `Simulation` stops at times of one's own.
 
     Raises:
         TypeError: `scene` is no scene.
-        ValueError: a number is out of its range, or more memory is needed than there is.
+        ValueError: a number is out of its range, more memory is needed than there is, or frames are
+            asked of another simulator.
     """
     require_scene(scene)
     check_seed(seed)
@@ -287,7 +61,15 @@ def simulate(
         scene = scene.with_(preset=preset)
     engine = required(engine) or engine_in_use()
     if engine is not None:
+        if every is not None:
+            raise ValueError(
+                f"every={every!r} is not for the engine {engine.name!r}, which leaves the end alone"
+            )
         return Pour(_left_by(engine, scene, seed), scene, seed)
+    if every is not None:
+        simulation = Simulation(scene, seed, threads=threads)
+        trajectory = recorded(simulation, every)
+        return Pour(simulation.native.pour(), scene, seed, trajectory)
     return Pour(_native.simulate(scene.native, seed, threads), scene, seed)
 
 
@@ -296,13 +78,3 @@ def _left_by(engine: Engine, scene: Scene, seed: int) -> _native.Pour:
     if not isinstance(left, tuple):
         raise ValueError(f"{engine.name} gave points of a surface and no grains")
     return scene.native.pour_of(*left, seed)
-
-
-def require_scene(scene: object) -> None:
-    """Refuses what is no scene, a file's name above all.
-
-    Raises:
-        TypeError: not a scene.
-    """
-    if not isinstance(scene, Scene):
-        raise TypeError(f"scene must be a Scene, as Scene.load reads it, got {scene!r}")

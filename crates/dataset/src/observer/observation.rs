@@ -95,7 +95,7 @@ impl Clone for Box<dyn Observation> {
 }
 
 /// One kind of observation.
-pub(super) trait Observation: Copied + Debug + Send {
+pub(super) trait Observation: Copied + Debug + Send + Sync {
     /// The statistics that it gives.
     fn statistics(&self) -> Vec<ObservedStatistic>;
     /// Takes a sample.

@@ -112,6 +112,33 @@ fn to_be_observed_changes_no_bit() {
 }
 
 #[test]
+fn a_pour_in_pieces_is_the_same_and_stops_where_it_is_told_to() {
+    let scene = scene();
+    let (whole, seen) = run(&scene);
+    for piece in [3e-4, 7e-3, f64::INFINITY] {
+        let mut observer = Observer::new(&scene);
+        let mut simulation = Simulation::new(&scene, 1).unwrap();
+        for frame in 1.. {
+            let time = f64::from(frame) * piece;
+            assert!(observer.advance_while(&mut simulation, time, &|| true));
+            let dt = simulation.settings().dt;
+            assert!(simulation.ended().is_some() || (simulation.time() - time).abs() <= 0.501 * dt);
+            if simulation.ended().is_some() {
+                break;
+            }
+        }
+        let pour = simulation.into_pour();
+        assert_eq!(pour, whole);
+        assert_eq!(observer.observed(&pour), seen.observed(&whole));
+    }
+    let mut simulation = Simulation::new(&scene, 1).unwrap();
+    assert!(!Observer::new(&scene).advance_while(&mut simulation, 1.0, &|| false));
+    assert_eq!(simulation.time(), 0.0);
+    assert!(Observer::new(&scene).advance_while(&mut simulation, f64::NAN, &|| true));
+    assert_eq!(simulation.time(), 0.0);
+}
+
+#[test]
 fn no_time_is_refused_and_simulates_nothing() {
     let watched = scene();
     let blind = Scene { observe: None, ..watched.clone() };

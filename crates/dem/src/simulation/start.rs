@@ -127,7 +127,17 @@ impl Simulation {
         }
     }
 
-    /// The scene's word for a wall of the solver, the ground first.
+    /// The scene's words for the walls, in the order of [`Simulation::wall_loads`]: `ground`, `funnel` for its cone and
+    /// for its stem, `walls.0` and so on.
+    pub fn wall_names(&self) -> Vec<String> {
+        let name = |wall| match wall {
+            0 => "ground".to_owned(),
+            wall => self.wall_name(wall),
+        };
+        (0..self.around.walls.count()).map(name).collect()
+    }
+
+    /// What a sentence calls a wall of the solver, the ground first.
     fn wall_name(&self, wall: usize) -> String {
         let shells = self.origin.scene.funnel.as_ref().map_or(0, |_| 2);
         match wall {
@@ -176,6 +186,8 @@ mod tests {
             matches!(&error, DemError::StartInWall { wall, .. } if wall == "walls.1"),
             "{error}"
         );
+        let names = Simulation::new(&scene, 1).unwrap().wall_names();
+        assert_eq!(names, ["ground", "funnel", "funnel", "walls.0", "walls.1"]);
         // One that has come by its motion is where it is at time 0.
         scene.walls[1].shape = tube(0.07);
         check(&scene).unwrap();
