@@ -186,6 +186,7 @@ NO_DRY_RUN = {
     "export posterior": "writes files",
     "export scene": "writes files",
     "export bed": "one pour",
+    "export frames": "one pour",
     "film": "one pour, whose line says how far it is",
     "record": "as long as the camera takes for its frames",
 }

@@ -26,11 +26,13 @@ dashpot, what has no counterpart said in the file (docs/export.md).
   granulcal export posterior posterior.json scene.toml --to lammps -o materials
   granulcal export scene scene.toml --to liggghts -o pour
   granulcal export bed scene.toml --to vtk -o pile.vtk
+  granulcal export frames scene.toml --to vtk --every 0.02 -o frames
 
 posterior.json is what `infer -o` or `calibrate` wrote. `scene` writes a whole
-pour, whose README.txt says how to run it, `bed` the grains at rest. A file that
-granulcal did not export is not replaced. Exit code 3: the posterior is outside
-its model, or the pour of a bed did not come to rest.
+pour, whose README.txt says how to run it, `bed` the grains at rest, `frames`
+those of our own pour over time, for ParaView (frames.vtk.series) or Blender. A
+file that granulcal did not export is not replaced. Exit code 3: the posterior
+is outside its model, or the pour of a bed did not come to rest.
 """
 _ENGINES = ("lammps", "liggghts", "yade", "mujoco", "chrono", "isaac", "gazebo", "newton")
 # What is wrong with pours whose grains are not at rest on the ground, by status.
@@ -39,6 +41,7 @@ _UNSETTLED = {
     "jammed": "grains wait in the funnel",
     "unhealthy": "the simulation lost its accuracy; try another seed",
 }
+_POINTS = ("vtk", "ply", "csv")
 _FORMATS = ("lammps-data", "vtk", "ply", "csv", "mjcf", "sdf", "urdf")
 
 
@@ -56,6 +59,7 @@ def add(commands: Any) -> None:
     _add_posterior(words)
     _add_scene(words)
     _add_bed(words)
+    _add_frames(words)
 
 
 def _add_common(parser: argparse.ArgumentParser, out: str) -> None:
@@ -133,6 +137,20 @@ def _add_bed(words: Any) -> None:
     )
     _add_common(parser, "the file")
     parser.set_defaults(run=_bed)
+
+
+def _add_frames(words: Any) -> None:
+    text = "grains over time: a pour as a file for each frame"
+    parser = words.add_parser("frames", help=text, description=text)
+    parser.add_argument("scene", type=READS, help="TOML, or the word funnel or drop")
+    parser.add_argument("--to", required=True, choices=_POINTS, help="the format")
+    parser.add_argument(
+        "--every", type=float, default=0.02, metavar="S",
+        help="simulated seconds between two frames (default: 0.02)",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=seed_number, default=0, help="seed of the pour (default: 0)")
+    _add_common(parser, "the folder")
+    parser.set_defaults(run=_frames)
 
 
 def _loaded(options: argparse.Namespace) -> Any:
@@ -214,7 +232,7 @@ def _bed(options: argparse.Namespace) -> int:
 
     scene = _loaded(options)
     # What cannot be exported, and where it cannot be written, is told before a pour.
-    Setup.of(scene, options.seed)
+    Setup.of_bed(scene, options.to, options.seed)
     if options.to != "csv":
         require_replaceable([options.out])
     status = "at_rest"
@@ -229,3 +247,13 @@ def _bed(options: argparse.Namespace) -> int:
         print(f"warning: the pour ended as {status}: {told}", file=sys.stderr)
     file = export_bed(scene, positions, radii, options.to, options.out, seed=options.seed)
     return _told(options, [file], status not in _UNSETTLED)
+
+
+def _frames(options: argparse.Namespace) -> int:
+    from granulcal.export.frames import export_frames, require_frames
+    from granulcal.pours.simulate import simulate
+
+    scene = _loaded(options)
+    require_frames(scene, options.to)
+    pour = simulate(scene, seed=options.seed, every=options.every)
+    return _told(options, export_frames(pour.trajectory, options.to, options.out))

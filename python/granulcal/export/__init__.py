@@ -7,12 +7,14 @@ from granulcal.export.engines import (
     export_material,
     export_scene,
 )
+from granulcal.export.frames import export_frames
 from granulcal.export.posterior import export_posterior
 
 __all__ = [
     "ENGINES",
     "DeepContactWarning",
     "export_bed",
+    "export_frames",
     "export_material",
     "export_posterior",
     "export_scene",

@@ -2,21 +2,16 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from granulcal.export import gazebo, lammps, mujoco
-from granulcal.export.mark import MARK, signed
+from granulcal.export.mark import signed
+from granulcal.export.points import ENDINGS, points_text
 from granulcal.export.setup import Setup
 
 __all__ = ["FORMATS", "bed_text"]
 
-Array = NDArray[np.float64]
 FORMATS = {
     "lammps-data": ".data",
-    "vtk": ".vtk",
-    "ply": ".ply",
-    "csv": ".csv",
+    **ENDINGS,
     "mjcf": ".xml",
     "sdf": ".sdf",
     "urdf": ".urdf",
@@ -36,9 +31,10 @@ def bed_text(setup: Setup, kind: str) -> str:
     """
     makers = {
         "lammps-data": lambda: lammps.data(setup),
-        "vtk": lambda: _vtk(setup.centres, setup.radii),
-        "ply": lambda: _ply(setup.centres, setup.radii),
-        "csv": lambda: _csv(setup.centres, setup.radii),
+        **{
+            name: lambda name=name: points_text(name, setup.centres, setup.radii)
+            for name in ENDINGS
+        },
         "mjcf": lambda: mujoco.mjcf(setup),
         "sdf": lambda: gazebo.scene(setup)["pour.sdf"],
         "urdf": lambda: _urdf(setup),
@@ -46,29 +42,6 @@ def bed_text(setup: Setup, kind: str) -> str:
     if kind not in makers:
         raise ValueError(f"a bed is written as one of {', '.join(FORMATS)}, got {kind!r}")
     return makers[kind]()
-
-
-def _vtk(centres: Array, radii: Array) -> str:
-    """Returns legacy VTK of points with their radii; ParaView draws them by Glyph, scaled by radius."""
-    n = len(radii)
-    lines = ["# vtk DataFile Version 3.0", f"grains [m], {MARK}", "ASCII", "DATASET POLYDATA"]
-    lines += [f"POINTS {n} double", *(" ".join(f"{c:.9g}" for c in at) for at in centres)]
-    lines += [f"VERTICES {n} {2 * n}", *(f"1 {i}" for i in range(n))]
-    lines += [f"POINT_DATA {n}", "SCALARS radius double 1", "LOOKUP_TABLE default"]
-    return "\n".join([*lines, *(f"{r:.9g}" for r in radii)]) + "\n"
-
-
-def _ply(centres: Array, radii: Array) -> str:
-    head = ["ply", "format ascii 1.0", f"comment grains, lengths in metres, {MARK}"]
-    head += [f"element vertex {len(radii)}"]
-    head += [f"property double {name}" for name in ("x", "y", "z", "radius")] + ["end_header"]
-    rows = (" ".join(f"{v:.9g}" for v in (*at, r)) for at, r in zip(centres, radii, strict=True))
-    return "\n".join([*head, *rows]) + "\n"
-
-
-def _csv(centres: Array, radii: Array) -> str:
-    rows = (",".join(f"{v:.9g}" for v in (*at, r)) for at, r in zip(centres, radii, strict=True))
-    return "\n".join(["x,y,z,radius", *rows]) + "\n"
 
 
 def _urdf(setup: Setup) -> str:

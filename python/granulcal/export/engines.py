@@ -170,8 +170,10 @@ def export_scene(
     """
     _engine(to)
     _check_young(to, young)
-    _warn_of(_landing(Setup.of(scene, seed), to, young))
-    return write_scene(scene, to, folder, seed=seed, young=young, source=source)
+    setup = Setup.of(scene, seed)
+    _warn_of(_landing(setup, to, young))
+    require_funnel_in_place(scene)
+    return _write_setup(setup, to, Path(folder), young, source)
 
 
 def write_scene(
@@ -184,9 +186,15 @@ def write_scene(
     source: Sequence[str] = (),
 ) -> list[Path]:
     """Writes a pour as `export_scene` does, without a word of what may be doubtful."""
-    module, place = _engine(to), Path(folder)
+    _engine(to)
     require_funnel_in_place(scene)
-    setup = Setup.of(scene, seed)
+    return _write_setup(Setup.of(scene, seed), to, Path(folder), young, source)
+
+
+def _write_setup(
+    setup: Setup, to: str, place: Path, young: float | None, source: Sequence[str]
+) -> list[Path]:
+    module = ENGINES[to]
     texts = dict(module.scene(setup, young))
     texts["README.txt"] = (
         "\n".join([_RUN[to], "", *head(setup, module, source, _landing(setup, to, young))]) + "\n"
@@ -218,11 +226,12 @@ def export_bed(
         seed: of the pour, which draws radii that differ.
 
     Raises:
-        ValueError: a scene that cannot be exported, positions of another shape or that are no
+        ValueError: a scene that cannot be exported (as points, `vtk`, `ply` and `csv`, it always can
+            be where its grains are spheres), positions of another shape or that are no
             numbers, no radii where the scene's differ and are not as many, or a file stands there
             that granulcal did not export.
     """
-    setup = Setup.of(scene, seed)
+    setup = Setup.of_bed(scene, kind, seed)
     centres = np.asarray(unmasked("positions", positions), float)
     if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
         raise ValueError(f"positions must have shape (n, 3), got {centres.shape}")
