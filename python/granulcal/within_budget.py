@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from granulcal.errors import DoubtfulRecordingWarning, PriorError
+from granulcal.errors import DoubtfulRecordingWarning, PriorError, TrainingDataError
 from granulcal.measured.different import require_different
 from granulcal.measured.recording import Recording
 from granulcal.pours.cluster import Cluster, cluster_asked, spread_over
 from granulcal.pours.kept_pours import KeptPours
 from granulcal.pours.made_for import MadeFor
-from granulcal.pours.scene import Scene
+from granulcal.pours.scene import Scene, require_scene
 from granulcal.pours.statistics import NAMES
-from granulcal.prior import Prior
+from granulcal.prior import Prior, require_prior
 
 if TYPE_CHECKING:
     from granulcal.bayessim.training.sequential import Round, SequentialFit
@@ -64,7 +64,8 @@ def calibrate_within(
 
     Raises:
         PriorError: a parameter that has no place in the scene over its whole range.
-        TypeError: something that is no recording.
+        TrainingDataError: too few pours of the first round can be used; says why.
+        TypeError: something that is no scene, no prior or no recording.
         ValueError: no recording, one that is given twice, too small a budget, or a folder of pours
             that were made for other recordings.
 
@@ -73,6 +74,8 @@ def calibrate_within(
     """
     from granulcal.bayessim.training.sequential import round_sizes
 
+    require_scene(scene)
+    require_prior(prior)
     if not recordings:
         raise ValueError("calibrate_within needs at least one recording, got none")
     round_sizes(budget)
@@ -186,16 +189,22 @@ def _inferred(
     """The posterior by what `pour` gives of kept pours, and what pours it is without."""
     from granulcal.bayessim.training.sequential import infer_within_budget
 
-    with spread_over(cluster_asked(ray)):
-        found = infer_within_budget(
-            pour,
-            pours.prior,
-            observed,
-            budget=budget,
-            seed=pours.seed,
-            x_names=names,
-            progress=progress,
-        )
+    try:
+        with spread_over(cluster_asked(ray)):
+            found = infer_within_budget(
+                pour,
+                pours.prior,
+                observed,
+                budget=budget,
+                seed=pours.seed,
+                x_names=names,
+                progress=progress,
+            )
+    except TrainingDataError as error:
+        left_out = pours.left_out(budget)
+        if left_out.total == 0:
+            raise
+        raise TrainingDataError(f"{error}. Not usable: {left_out}{left_out.advice}") from None
     return replace(found, left_out=pours.left_out(len(found.x)))
 
 

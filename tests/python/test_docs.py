@@ -7,8 +7,10 @@ from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
+import numpy as np
 import pytest
 
 import granulcal as gc
@@ -107,3 +109,21 @@ def test_the_reference_of_scenes_has_every_key_of_the_built_in_ones(scene: gc.Sc
         section = text[start : text.find("\n## ", start + 1)] if start >= 0 else text
         for key in value if isinstance(value, dict) else ():
             assert f"`{key}`" in section or f"`{table}.{key}`" in section, f"{table}.{key}"
+
+
+def test_what_the_page_on_pours_shows_runs_as_it_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "pours.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```", text, flags=re.S | re.M)
+    assert len(blocks) == 5
+    shown: dict[str, Any] = {}
+    for block in blocks:
+        exec(compile(block, "docs/pours.md", "exec"), shown)
+    weight = 9.81 * 200 * 1300.0 * np.pi / 6 * 4e-3**3
+    carried = shown["contacts"].forces[shown["on_ground"]].sum(axis=0)
+    assert carried == pytest.approx([0.0, 0.0, weight], abs=0.01 * weight)
+    assert shown["seen"].positions.shape[1:] == (200, 3)
+    assert "degrees" in capsys.readouterr().out
+    assert (tmp_path / "frames" / "frames.vtk.series").exists() and len(shown["data"]) == 4

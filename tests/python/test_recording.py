@@ -203,6 +203,13 @@ def test_a_recording_of_which_half_is_hidden_is_doubtful_in_python_too(pour, tmp
     assert any("half.png: at" in str(each.message) for each in warned)
     with pytest.raises(TypeError, match=r"what Recording.open returns"):
         gc.calibrate_within(scene, prior, cast(Any, ["half.png"]), out=tmp_path / "out")
+    # They had no attribute `with_`, or `parameters`.
+    for words, told in (
+        ((cast(Any, "scene.toml"), prior), "scene must be a Scene, .* got 'scene.toml'"),
+        ((scene, cast(Any, "prior.toml")), "prior must be a Prior, .* got 'prior.toml'"),
+    ):
+        with pytest.raises(TypeError, match=told):
+            gc.calibrate_within(*words, [half], out=tmp_path / "out")
 
 
 def test_segmentation_options_are_honoured(pour, camera, tmp_path):

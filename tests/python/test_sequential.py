@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("torch")
 
+import granulcal as gc
 from granulcal.bayessim.check.toys import LinearGaussian
 from granulcal.bayessim.training.sequential import infer_within_budget, round_sizes
 from granulcal.errors import ObservationError, PriorError, TrainingDataError
@@ -74,6 +75,30 @@ def test_a_prior_that_does_not_fit_the_scene_is_refused_before_any_pour(
     with pytest.raises(PriorError, match=f"prior of {path} does not fit the scene {told}"):
         calibrate_within(Scene.drop(0.02, count=20), prior, never_read, out=tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+def test_too_few_usable_pours_are_told_by_why(tmp_path):
+    """That nine in ten were unhealthy, for want of a finer step, had been told nowhere."""
+    scene = Scene.drop(0.02, count=60, preset="fast")
+    camera = gc.Camera.overhead(height=0.29, field_width=0.58, pixels=150)
+    depth = camera.render(*scene.start(1))
+    recording = gc.Recording.from_depth(depth, fx=75.0, fy=75.0, cx=74.5, cy=74.5)
+
+    def lossy(scene, seed):
+        centres, radii = scene.start(seed)
+        return (centres * np.nan if seed % 3 else centres), radii
+
+    engine = gc.engines.CallableEngine(lossy, name="lossy")
+    prior = Prior([Parameter(path="material.restitution", distribution="uniform", low=0, high=1)])
+    with (
+        pytest.warns(UserWarning),
+        pytest.raises(
+            TrainingDataError,
+            match=r"(?s)20 pours must be usable, \d+ of 24 are.*Not usable: \d+ unhealthy; of "
+            "unhealthy ones `granulcal simulate` says .* a finer `substep`",
+        ),
+    ):
+        calibrate_within(scene, prior, [recording], budget=60, out=tmp_path, engine=engine)
 
 
 def test_pours_are_kept_and_never_made_twice(tmp_path):

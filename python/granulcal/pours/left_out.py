@@ -64,6 +64,17 @@ class LeftOut:
         """Returns the counts by name, for JSON."""
         return asdict(self)
 
+    @property
+    def advice(self) -> str:
+        """What may help where pours are unhealthy, as the end of a sentence; else nothing."""
+        if not self.unhealthy:
+            return ""
+        return (
+            "; of unhealthy ones `granulcal simulate` says which bound is broken (some seeds show "
+            "it), and a finer `substep` in the scene may mend it, above all where grains are small "
+            "or differ in size"
+        )
+
     def __add__(self, other: "LeftOut") -> "LeftOut":
         mine, theirs = self.to_dict(), other.to_dict()
         return LeftOut(**{name: mine[name] + theirs[name] for name in mine})
