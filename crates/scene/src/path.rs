@@ -27,16 +27,41 @@ impl Scene {
     pub fn set(&mut self, values: &[(&str, f64)]) -> Result<(), SceneError> {
         let mut tree = self.tree()?;
         for &(path, value) in values {
-            insert(&mut tree, path, value)?;
+            insert(&mut tree, path, value).map_err(|error| self.with_hint(error, &[path]))?;
         }
-        let paths = || values.iter().map(|(path, _)| *path).collect::<Vec<_>>().join(", ");
-        let mut changed: Self = Value::Table(tree)
-            .try_into()
-            .map_err(|e: toml::de::Error| not_a_scene(&paths(), e.message()))?;
+        let paths: Vec<_> = values.iter().map(|(path, _)| *path).collect();
+        let mut changed: Self = Value::Table(tree).try_into().map_err(|e: toml::de::Error| {
+            self.with_hint(not_a_scene(&paths.join(", "), e.message()), &paths)
+        })?;
         changed.take_meshes(self);
         changed.check()?;
         *self = changed;
         Ok(())
+    }
+
+    /// An error with the whole path that the first of `paths` which is none may be the end of.
+    fn with_hint(&self, error: SceneError, paths: &[&str]) -> SceneError {
+        match (error, paths.iter().find_map(|path| self.path_that_ends_so(path))) {
+            (SceneError::Path { path, reason }, Some(whole)) => {
+                SceneError::Path { path, reason: format!("{reason}; did you mean \"{whole}\"?") }
+            }
+            (error, _) => error,
+        }
+    }
+
+    /// The shortest path of a number of this scene, or of an effect that is off, of which `path` is the end alone.
+    fn path_that_ends_so(&self, path: &str) -> Option<String> {
+        let mut tree = self.tree().ok()?;
+        tree.insert(EFFECTS.to_owned(), self.effects.tables().ok()?.into());
+        let mut all = Vec::new();
+        number_paths("", &Value::Table(tree), &mut all);
+        let path: Vec<_> = keys(path).collect();
+        let end = format!(".{}", path.join("."));
+        if all.iter().any(|whole| *whole == end[1..]) {
+            return None;
+        }
+        all.retain(|whole| whole.ends_with(&end));
+        all.into_iter().min_by_key(|whole| whole.matches('.').count())
     }
 
     /// The number at `path`.
@@ -92,6 +117,22 @@ impl Scene {
 
     fn tree(&self) -> Result<Table, SceneError> {
         Table::try_from(self).map_err(|e| SceneError::TomlWrite(Box::new(e)))
+    }
+}
+
+/// Adds the paths of all numbers of a tree that stands at `path`.
+fn number_paths(path: &str, tree: &Value, all: &mut Vec<String>) {
+    let at = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+    match tree {
+        Value::Table(table) => {
+            table.iter().for_each(|(key, value)| number_paths(&at(key), value, all));
+        }
+        Value::Array(entries) => {
+            let numbered = entries.iter().enumerate();
+            numbered.for_each(|(number, value)| number_paths(&at(&number.to_string()), value, all));
+        }
+        Value::Float(_) | Value::Integer(_) => all.push(path.to_owned()),
+        _ => {}
     }
 }
 
@@ -250,6 +291,28 @@ mod tests {
         assert_eq!(changed.with("grains.count", 100.0).unwrap().grains.count, 100);
         let ground = scene.with("scene.ground.material.restitution", 0.1).unwrap();
         assert_eq!(ground.ground.material.restitution, Some(0.1));
+    }
+
+    #[test]
+    fn the_end_of_a_path_is_told_with_its_begin() {
+        let scene = Scene::funnel(0.12);
+        for (end, whole) in [
+            ("diameter", "grains.diameter"),
+            ("polydispersity.cv", "effects.polydispersity.cv"),
+            ("sliding_friction", "material.sliding_friction"),
+            ("stem_radius", "funnel.stem_radius"),
+        ] {
+            let said = scene.with(end, 0.004).unwrap_err().to_string();
+            assert!(said.contains(&format!("did you mean \"{whole}\"?")), "{said}");
+        }
+        for none in ["grains.diamter", "walls.0.material.restitution", "", "grains"] {
+            let said = scene.with(none, 0.004).unwrap_err().to_string();
+            assert!(!said.contains("did you mean"), "{said}");
+        }
+        // Of several that are set the one that is none.
+        let values = [("grains.diameter", 0.003), ("cv", 0.1)];
+        let said = scene.clone().set(&values).unwrap_err().to_string();
+        assert!(said.contains("did you mean \"effects.polydispersity.cv\"?"), "{said}");
     }
 
     #[test]

@@ -11,6 +11,9 @@ use crate::preset::Preset;
 use crate::scene::Scene;
 use crate::start::Start;
 
+/// Largest ratio of a listed diameter to that of a typical grain, and one over the smallest `[-]`.
+const UNLIKE: f64 = 50.0;
+
 impl Scene {
     /// Refuses what cannot be with something else that is there.
     ///
@@ -18,6 +21,7 @@ impl Scene {
     /// [`SceneError::Exclude`] and [`SceneError::Needs`] name both; [`SceneError::OutOfRange`] and [`SceneError::BadShape`] what is wrong with one.
     pub(crate) fn check_together(&self) -> Result<(), SceneError> {
         self.check_rolled_away()?;
+        self.check_sizes()?;
         self.check_clump()?;
         self.check_shape()?;
         self.check_bodies()?;
@@ -29,6 +33,20 @@ impl Scene {
         self.check_layer()?;
         self.check_vibration()?;
         self.check_of_funnel()
+    }
+
+    /// Whether listed sizes may be those of these grains: millimetres among metres are not.
+    fn check_sizes(&self) -> Result<(), SceneError> {
+        let typical = self.grains.diameter;
+        let listed = self.effects.polydispersity.diameters.iter().enumerate();
+        for (number, &diameter) in listed {
+            if !(typical / UNLIKE..=typical * UNLIKE).contains(&diameter) {
+                let path = format!("effects.polydispersity.diameters.{number}");
+                let allowed = "from a fiftieth to 50 times grains.diameter, in metres";
+                return Err(SceneError::range(path, diameter, allowed));
+            }
+        }
+        Ok(())
     }
 
     /// What grains that are not round cannot be with.
@@ -336,6 +354,16 @@ mod tests {
         assert!(said.contains("intruder.density") && said.contains("effects.fluid"), "{said}");
         scene.effects.fluid.density = 0.0;
         scene.check().unwrap();
+    }
+
+    #[test]
+    fn sizes_in_another_unit_are_refused() {
+        let mut scene = Scene::drop(0.1);
+        scene.effects.polydispersity.diameters = vec![1e-4, 4e-3, 0.19];
+        scene.check().unwrap();
+        scene.effects.polydispersity.diameters = vec![4e-3, 3.0];
+        let said = scene.check().unwrap_err().to_string();
+        assert!(said.contains("diameters.1") && said.contains("in metres, got 3"), "{said}");
     }
 
     #[test]

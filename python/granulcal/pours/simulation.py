@@ -25,7 +25,8 @@ class Simulation:
     """A pour that goes on as far as it is told to; `simulate` is for one that is of use at its end.
 
     What it shows is of the present time, each array a copy of its own. Where one stops on the way
-    changes no bit of the pour.
+    changes no bit of the pour. While one thread simulates, another that asks it for anything gets a
+    RuntimeError.
 
     Velocities are those of the middle of the last substep, v(t - dt / 2): grains that are let go at
     time 0 rest at -dt / 2. The kinetic energy is that at the time of the positions.
