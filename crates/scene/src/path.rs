@@ -305,7 +305,7 @@ mod tests {
             let said = scene.with(end, 0.004).unwrap_err().to_string();
             assert!(said.contains(&format!("did you mean \"{whole}\"?")), "{said}");
         }
-        for none in ["grains.diamter", "walls.0.material.restitution", "", "grains"] {
+        for none in ["grains.width", "walls.0.material.restitution", "", "grains"] {
             let said = scene.with(none, 0.004).unwrap_err().to_string();
             assert!(!said.contains("did you mean"), "{said}");
         }
