@@ -47,7 +47,9 @@ CAMERAS: dict[str, dict[str, float]] = {
     "noisy": {"depth_noise": 2e-4, "blur": 0.6},
 }
 """Noise [m] and blur [px] of the camera, of the recordings and of the model."""
-NULLS, REPEATS = 24, 6
+NULLS, REPEATS = 32, 10
+# So many nulls have each a part of the range of sliding friction.
+_SPREAD = 24
 ALARMS = (*NAMING, "RESIDUAL", "UNEXPLAINED")
 
 
@@ -130,10 +132,10 @@ def material(one: Set) -> dict[str, float]:
     prior = gc.Prior.load(BLIND / "prior.toml")
     unit = np.random.default_rng([one.seed, 47]).uniform(size=len(prior.names))
     if one.kind is None:
-        order = np.random.default_rng(53).permutation(NULLS)
+        order = np.random.default_rng(53).permutation(_SPREAD)
         unit[prior.names.index("material.sliding_friction")] = (
-            order[one.of_kind] + unit[0]
-        ) / NULLS
+            order[one.of_kind % _SPREAD] + unit[0]
+        ) / _SPREAD
     return dict(zip(prior.names, from_cube(prior, unit[None])[0].tolist(), strict=True))
 
 
@@ -228,7 +230,7 @@ def form(out: Path, budget: int, threads: int) -> None:
 def run(out: Path, only: list[str], budget: int, threads: int) -> None:
     """Closes the loop on the sets that have no row yet."""
     file = out / "rows.jsonl"
-    done = {row["set"] for row in _rows(file)}
+    done = {row["set"] for row in rows_of(file)}
 
     @cache
     def surrogate(camera: str) -> Surrogate:
@@ -284,7 +286,7 @@ def _row(one: Set, said: dict[str, Any], seconds: float) -> dict[str, Any]:
 
 def table(out: Path) -> None:
     """Prints the word of each set, and the rates."""
-    rows = _rows(out / "rows.jsonl")
+    rows = rows_of(out / "rows.jsonl")
     print("| set | camera | material | psi, seen from | word | nat | p, of the base | pours |")
     print("|---|---|---|---|---|---|---|---|")
     for row in rows:
@@ -300,28 +302,30 @@ def table(out: Path) -> None:
     others = [row for row in rows if row["truth"]]
     named = [row for row in others if row["verdict"] in NAMING]
     print("\n| what | rate | 95 %, exact |\n|---|---|---|")
-    _rate("null: named", [row["verdict"] in NAMING for row in nulls])
-    _rate("null: alarm", [row["verdict"] in ALARMS for row in nulls])
-    _rate("null: alarm of the fits", [row["fits"] in ALARMS for row in nulls])
-    _rate("null: no word (UNCONFIRMED)", [row["verdict"] == "UNCONFIRMED" for row in nulls])
-    _rate("effect: alarm", [row["verdict"] in ALARMS for row in others])
-    _rate("effect: named", [row["verdict"] in NAMING for row in others])
-    _rate("effect: no word (UNCONFIRMED)", [row["verdict"] == "UNCONFIRMED" for row in others])
-    _rate("named: the truth alone", [row["named"] == [row["truth"]] for row in named])
-    _rate("named: the truth first", [row["named"][0] == row["truth"] for row in named])
-    _rate("named: the truth among them", [row["truth"] in row["named"] for row in named])
+    rate("null: named", [row["verdict"] in NAMING for row in nulls])
+    rate("null: alarm", [row["verdict"] in ALARMS for row in nulls])
+    rate("null: alarm of the fits", [row["fits"] in ALARMS for row in nulls])
+    rate("null: no word (UNCONFIRMED)", [row["verdict"] == "UNCONFIRMED" for row in nulls])
+    rate("effect: alarm", [row["verdict"] in ALARMS for row in others])
+    rate("effect: named", [row["verdict"] in NAMING for row in others])
+    rate("effect: no word (UNCONFIRMED)", [row["verdict"] == "UNCONFIRMED" for row in others])
+    rate("named: the truth alone", [row["named"] == [row["truth"]] for row in named])
+    rate("named: the truth first", [row["named"][0] == row["truth"] for row in named])
+    rate("named: the truth among them", [row["truth"] in row["named"] for row in named])
     seconds = [row["seconds"] for row in rows]
     print(f"\n{len(rows)} sets, {np.median(seconds):.0f} s each (median, one core)")
 
 
-def _rate(what: str, hits: list[bool]) -> None:
+def rate(what: str, hits: list[bool]) -> None:
+    """Prints the rate of something, with its exact interval."""
     if hits:
         low, high = binomtest(sum(hits), len(hits)).proportion_ci(0.95, "exact")
         share = f"{sum(hits)} of {len(hits)} = {100 * sum(hits) / len(hits):.0f} %"
         print(f"| {what} | {share} | {100 * low:.0f} to {100 * high:.0f} % |")
 
 
-def _rows(file: Path) -> list[dict[str, Any]]:
+def rows_of(file: Path) -> list[dict[str, Any]]:
+    """Returns the rows of a file, none if it is not there."""
     return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
 
 

@@ -129,14 +129,26 @@ def test_a_block_without_a_trace_shrinks_to_nothing() -> None:
     np.testing.assert_allclose(fit.coefficients[:3], [1, -1, 2], atol=0.15)
 
 
-@pytest.mark.parametrize(("kind", "power_"), [("identity", 0), ("log", 1)])
-def test_the_transform_makes_noise_normal(kind: str, power_: int) -> None:
+@pytest.mark.parametrize("kind", ["identity", "log", "reciprocal"])
+def test_the_transform_makes_noise_normal(kind: str) -> None:
     generator = np.random.default_rng(2)
     features = np.column_stack([np.ones(400), generator.random(400)])
     y = 1 + features[:, 1] + 0.4 * generator.standard_normal(400)
-    found = Transform.choose(np.exp(y) if power_ else y, features)
+    x = {"identity": y, "log": np.exp(y), "reciprocal": 1 / (4 - y)}[kind]
+    # A few beyond the end would be negative.
+    found = Transform.choose(np.abs(x), features)
     assert found.kind == kind
-    assert found(np.exp(y) if power_ else y).std() == pytest.approx(1)
+    assert found(np.abs(x)).std() == pytest.approx(1)
+
+
+def test_what_runs_off_to_its_bound_is_no_outlier() -> None:
+    # Degrees of freedom of a chi distribution where radii are nearly normal.
+    generator = np.random.default_rng(4)
+    share = np.clip(0.7 + 0.15 * generator.standard_normal(600), 0.05, 1.0)
+    found = Transform.choose(1 / share, np.ones((600, 1)))
+    near, far = found(np.array([4.9, 100.0]))
+    assert 0 < far - near < 2
+    assert found.inverse(np.array([99.0])) == pytest.approx(found.width)
 
 
 def test_the_surrogate_finds_mean_and_noise(toy: Linear, surrogate: Surrogate) -> None:

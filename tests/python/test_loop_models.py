@@ -212,9 +212,11 @@ def test_a_model_pours_with_the_engine_of_its_loop_alone(
     Models.load(tmp_path).require_engine("base")
 
 
-@pytest.mark.parametrize("kind", ["identity", "log", "asinh"])
-def test_transforms_have_inverses(kind: str) -> None:
-    transform = Transform(kind, 0.4, 2.0, 0.7, 1.5)
+@pytest.mark.parametrize(
+    ("kind", "width"), [("identity", 1.0), ("log", 1.0), ("reciprocal", 10.0), ("asinh", 2.0)]
+)
+def test_transforms_have_inverses(kind: str, width: float) -> None:
+    transform = Transform(kind, 0.4, width, 0.7, 1.5)
     x = np.linspace(0.5, 9.0, 20)
     assert transform.inverse(transform(x)) == pytest.approx(x)
 

@@ -35,8 +35,8 @@ Array = NDArray[np.float64]
 _CHUNK = 16
 # Of the random numbers, apart from those of every other part.
 _STREAM = 5
-# Share of the pours that each effect reads again: copies of a pour share its noise, and a surrogate
-# that took many for pours of their own would be too sure of itself.
+# Share of the pours that each effect reads again: readings of a pour share its noise, and more of
+# them would tell little more.
 _SHARE = 0.5
 # The same of each two effects.
 _TWO_SHARE = 0.2

@@ -32,6 +32,17 @@ class Rows:
         """Returns how many pours these are."""
         return len(self.x)
 
+    @property
+    def pour(self) -> NDArray[np.intp]:
+        """Number of each row's pour, shape (n,).
+
+        Readings of a pour have its parameters, and no two pours of a continuous prior have the
+        same; without parameters each row counts as a pour.
+        """
+        if self.theta.shape[1] == 0:
+            return np.arange(len(self), dtype=np.intp)
+        return np.unique(self.theta, axis=0, return_inverse=True)[1].ravel().astype(np.intp)
+
     def taken(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> "Rows":
         """Returns a copy of some of the rows, by number or by mask."""
         return Rows(self.theta[which], self.condition[which], self.psi[which], self.x[which])

@@ -27,7 +27,7 @@ _MAKER = Table(
 )
 _TRANSFORM = Table(
     {
-        "kind": Text(("identity", "log", "asinh")),
+        "kind": Text(("identity", "log", "reciprocal", "asinh")),
         "centre": Number(),
         "width": _POSITIVE,
         "shift": Number(),

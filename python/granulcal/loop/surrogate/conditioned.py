@@ -76,6 +76,7 @@ def conditioned(surrogate: Surrogate, rows: Rows) -> Surrogate:
         noise=np.concatenate([surrogate.noise, noise]),
         rows=np.concatenate([surrogate.rows, u]),
         is_donor=np.concatenate([surrogate.is_donor, donors]),
+        shares=np.concatenate([surrogate.shares, np.ones(len(u))]),
         anchor=None,
         raw_range=np.stack([np.fmin(low, rows.x.min(axis=0)), np.fmax(high, rows.x.max(axis=0))]),
     )

@@ -15,5 +15,12 @@ def fit_surrogate(store: Archive, *, seed: int, say: Callable[[str], None] = pri
     rows = store.pours()
     say(f"surrogate of {len(rows)} pours (left out: {rows.left_out})")
     return Surrogate.fit(
-        store.plan.design, rows.theta, rows.condition, rows.psi, rows.x, names=rows.names, seed=seed
+        store.plan.design,
+        rows.theta,
+        rows.condition,
+        rows.psi,
+        rows.x,
+        names=rows.names,
+        pour=rows.pour,
+        seed=seed,
     )

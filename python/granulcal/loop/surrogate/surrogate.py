@@ -17,7 +17,8 @@ linear in c, is what two effects do together, learnt of those that the archive h
 together. $r_k$, a sum of sines, is the curve of an effect that many pours show, as those of the
 image are: a blur of a small $\sigma$ takes no pixel across the threshold and a larger one at
 once all along an edge, which no parabola follows. log s is a function of the same coordinates and
-of the strengths. What the archive leaves unknown about m is the posterior of the coefficients, the
+of the strengths. A pour that is read under several effects is several rows, which share its noise
+(`readings.py`). What the archive leaves unknown about m is the posterior of the coefficients, the
 same for all pours of a condition and correlated between conditions; nothing about it averages away
 with more measured pours. What the features cannot follow would pass for noise of a pour; it shows
 as left-out residuals that near rows share,
@@ -62,6 +63,7 @@ from granulcal.loop.surrogate.columns import (
 )
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.leading import LeadingBasis
+from granulcal.loop.surrogate.readings import Readings
 from granulcal.loop.surrogate.shift import Shift
 from granulcal.loop.surrogate.transform import Transform
 from granulcal.progress import steps
@@ -75,6 +77,8 @@ _LENGTH_FREQUENCIES = 64
 _SCALE_FEATURES = 10
 _SCALE_STRETCH = 2.0
 _LEAST_ROWS = 60
+# What readings of one pour share of its noise before residuals have told it.
+_SHARED = 0.5
 
 DONOR_SHARE = 0.35
 """Rows whose residuals are kept from R, to make replicates of."""
@@ -106,7 +110,8 @@ class Surrogate:
         noise: the same, of the scale of the noise alone, shape (n, m).
         rows: (theta, c) of each row, shape (n, p + q).
         is_donor: rows whose residuals make replicates and no covariance, shape (n,).
-        dof: rows less coefficients that they decided, mean over statistics.
+        shares: one over the readings of each row's pour, shape (n,).
+        dof: pours less coefficients that they decided, mean over statistics.
         excluded: rows that were not finite.
         crossed: two effects each that have a q_kl.
         curved: effects that have an r_k, and whether it is two-sided.
@@ -134,6 +139,7 @@ class Surrogate:
     noise: Array
     rows: Array
     is_donor: NDArray[np.bool_]
+    shares: Array
     dof: float
     excluded: int
     crossed: tuple[tuple[int, int], ...] = ()
@@ -150,6 +156,7 @@ class Surrogate:
         x: ArrayLike,
         *,
         names: Sequence[str] | None = None,
+        pour: ArrayLike | None = None,
         features: int = _FEATURES,
         seed: int = 0,
     ) -> "Surrogate":
@@ -162,6 +169,8 @@ class Surrogate:
             psi: shape (n, K), 0 where an effect is off.
             x: statistics in their own units, shape (n, s).
             names: of the statistics, s of them.
+            pour: number of the pour that each row is a reading of, shape (n,); None: each of its
+                own.
             features: largest number of the kernel's eigenfunctions in f_0.
             seed: seed of frequencies and of the choice of donors.
 
@@ -177,6 +186,10 @@ class Surrogate:
             raise TrainingDataError(f"{x_.shape[1]} statistics need as many names, got {labels}")
         columns, dropped = usable_statistics(x_, labels)
         kept = np.isfinite(x_[:, columns]).all(axis=1)
+        number = np.arange(len(x_)) if pour is None else np.asarray(pour)
+        if number.shape != (len(x_),):
+            raise TrainingDataError(f"pour must have shape ({len(x_)},), got {number.shape}")
+        readings = Readings.of(number[kept])
         theta_, condition_, psi_, x_ = theta_[kept], condition_[kept], psi_[kept], x_[kept]
         finite = np.where(np.isfinite(x_), x_, np.nan)
         base = ~np.any(psi_ != 0, axis=1)
@@ -187,7 +200,11 @@ class Surrogate:
             )
         u = np.column_stack([theta_, condition_])
         quadratic = polynomial(2 * u[base] - 1, 2)
-        transforms = tuple(Transform.choose(x_[base, j], quadratic) for j in columns)
+        active = psi_[:, psi_.any(axis=0)]
+        everywhere = np.column_stack([polynomial(2 * u - 1, 2), active, active**2])
+        transforms = tuple(
+            Transform.choose(x_[base, j], quadratic, (x_[:, j], everywhere)) for j in columns
+        )
         z = np.column_stack([t(x_[:, j]) for t, j in zip(transforms, columns, strict=True)])
         axes = uncorrelated_axes(z[base], quadratic)
         z = z @ axes
@@ -216,21 +233,27 @@ class Surrogate:
         scale_coefficients = np.empty((size, scale_matrix.shape[1]))
         white, noise, scales = np.empty((3, count, size))
         dof = 0.0
-        gram = design_matrix.T @ design_matrix
+        alike = readings.apart(design_matrix, _SHARED)
+        gram = alike.T @ alike
         ones = np.ones(count)
         for j in steps("surrogate", range(size)):
-            fit = fit_blocks(design_matrix, z[:, j], ones, blocks, gram)
-            scale = np.exp(scale_matrix @ fit_log_scale(scale_matrix, fit.noise))
-            weighted = design_matrix / scale[:, None]
-            fit = fit_blocks(design_matrix, z[:, j], scale, blocks, weighted.T @ weighted)
-            scale_coefficients[j] = fit_log_scale(scale_matrix, fit.noise)
-            scale = np.exp(scale_matrix @ scale_coefficients[j])
+            fit = fit_blocks(alike, readings.apart(z[:, j], _SHARED), ones, blocks, gram)
+            left = readings.together(fit.noise, _SHARED)
+            scale = np.exp(scale_matrix @ fit_log_scale(scale_matrix, left))
+            rho = readings.shared(left / scale)
+            weighted = readings.apart(design_matrix / scale[:, None], rho)
+            target = readings.apart(z[:, j] / scale, rho)
+            fit = fit_blocks(weighted, target, ones, blocks, weighted.T @ weighted)
+            left = scale * readings.together(fit.noise, rho)
+            scale_coefficients[j] = fit_log_scale(scale_matrix, left)
+            scales[:, j] = np.exp(scale_matrix @ scale_coefficients[j])
             coefficients[j], roots[j] = fit.coefficients, fit.root
-            white[:, j], noise[:, j] = fit.left_out / scale, fit.noise / scale
-            scales[:, j] = scale
-            dof += fit.dof / size
+            white[:, j] = scale * readings.together(fit.left_out, rho) / scales[:, j]
+            noise[:, j] = left / scales[:, j]
+            dof += (fit.dof - (count - len(readings.counts))) / size
         noise /= np.sqrt(np.mean(np.clip(noise, -6, 6) ** 2, axis=0))
-        is_donor = np.random.default_rng(seed).random(count) < DONOR_SHARE
+        # All readings of a pour or none: another's residual is nearly its own.
+        lends = np.random.default_rng(seed).random(len(readings.counts)) < DONOR_SHARE
         return cls(
             design=design,
             names=tuple(labels[j] for j in columns),
@@ -247,12 +270,13 @@ class Surrogate:
             roots=roots,
             scale_basis=scale_basis,
             scale_coefficients=scale_coefficients,
-            correlation=noise_correlation(noise, np.ones(count)),
+            correlation=noise_correlation(noise, readings.shares),
             lack=lack_of_fit(basis, u[base], design_matrix[base], roots, white[base], scales[base]),
             white=white,
             noise=noise,
             rows=u,
-            is_donor=is_donor,
+            is_donor=lends[readings.pour],
+            shares=readings.shares,
             dof=dof,
             excluded=int((~kept).sum()),
             crossed=crossed,
@@ -401,9 +425,12 @@ class Surrogate:
         return np.exp(features @ self.scale_coefficients.T)
 
     def weights_near(self, theta: Array, condition: Array, width: float) -> Array:
-        """Returns how near each archive row is to a point, in (0, 1], shape (n,)."""
+        """Returns how near each archive row is to a point, in (0, 1], shape (n,).
+
+        The readings of a pour count as one pour together.
+        """
         at = np.concatenate([theta, condition])
-        return np.exp(-0.5 * np.sum(((self.rows - at) / width) ** 2, axis=1))
+        return self.shares * np.exp(-0.5 * np.sum(((self.rows - at) / width) ** 2, axis=1))
 
     def correlation_near(self, theta: Array, condition: Array, width: float) -> Array:
         """Returns R of rows near a point, blended with that of the archive, shape (m, m).
@@ -412,7 +439,7 @@ class Surrogate:
         left out, so that replicates made of them are no draws of what made the covariance.
         """
         near = self.weights_near(theta, condition, width) * ~self.is_donor
-        effective = near.sum() ** 2 / max(float(near @ near), 1e-300)
+        effective = near.sum() ** 2 / max(float(near @ (near / self.shares)), 1e-300)
         share = effective / (effective + 4 * self.size)
         local = noise_correlation(self.noise, near + 1e-12)
         return share * local + (1 - share) * self.correlation
