@@ -9,18 +9,25 @@ surrogate's error at the model's best strength. A V that moved with them would s
 determinant, and with a hundred numbers 10 % of variance is worth 5 nat; what pours scatter is not
 known that well.
 
-One strength is integrated on a grid of its uniform prior, theta by Laplace's method at the best
-theta of each node: strengths are bounded and ridges are bent, both of which a single normal gets
-wrong. Two strengths take Laplace's method jointly, the normal cut to the priors' box. A model's log
-probability adds the log of its prior share.
+One strength is integrated over its uniform prior, theta by Laplace's method at the best theta of
+each node: strengths are bounded and ridges are bent, both of which a single normal gets wrong. A
+grid of nodes is split where its log density changes much near its largest, for a camera's blur is
+known to a hundredth of its range and falls by hundreds of nats from one node to the next; between
+nodes the log density is the cubic that keeps to what is between their values. Two strengths take
+Laplace's method jointly, the normal cut to the priors' box. A model's log probability adds the log
+of its prior share.
 
 Reference:
     Tierney and Kadane, Accurate approximations for posterior moments, JASA 81, 1986.
+    Fritsch and Butland, A method for constructing local monotone piecewise cubic interpolants, SIAM
+    J. Sci. Stat. Comput. 5, 1984 (slopes; a cubic through all nodes with slopes of neighbours
+    had its largest where there was none).
     MacKay, Information theory, inference and learning algorithms, 2003, chapters 27 and 28.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -36,6 +43,12 @@ Array = NDArray[np.float64]
 
 _NODES = 17
 _FINE = 1001
+# Nodes are split while the log density changes by more than `_CHANGE` between two, one of which is
+# within `_NEAR` of the largest [nat]; at most so often, and to so small a difference in strength.
+_CHANGE, _NEAR = 1.0, 3.0
+_SPLITS, _CLOSEST = 14, 2e-5
+# Points between two nodes that are closer than those of `_FINE`.
+_BETWEEN = 8
 _BOX_DRAWS = 4000
 
 
@@ -100,8 +113,20 @@ def fit_single(
     """
     effect = local.surrogate.design.effects[k]
     nodes = np.linspace(effect.low, 1.0, 2 * _NODES - 1 if effect.is_two_sided else _NODES)
-    fits: list[Fit | None] = [None] * len(nodes)
-    root = root_at(local, base, _joint(local, target, base, (k,)).psi)
+    known: dict[float, tuple[Fit, float]] = {}
+    joint = _joint(local, target, base, (k,))
+    root = root_at(local, base, joint.psi)
+
+    def seek(at: float, v: Array, steps: int) -> Array:
+        """Keeps the better fit of a strength, and returns where this one has gone."""
+        psi = local.none()
+        psi[k] = at
+        found = improve(local, target, v, psi, (), root=root, steps=steps)
+        before = known.get(at)
+        if before is None or found.log_density > before[0].log_density:
+            known[at] = found, _laplace(found)
+        return found.v
+
     alone = [s for s in starts if not np.delete(s.psi - local.none(), k).any()]
     for begin in (Start(base.v, local.none()), *alone):
         # Outwards, each node from its neighbour.
@@ -109,16 +134,22 @@ def fit_single(
         for path in (range(start, len(nodes)), range(start, -1, -1)):
             v = begin.v
             for i in path:
-                psi = local.none()
-                psi[k] = nodes[i]
-                found = improve(local, target, v, psi, (), root=root, steps=4)
-                v, before = found.v, fits[i]
-                if before is None or found.log_density > before.log_density:
-                    fits[i] = found
-    known = [fit for fit in fits if fit is not None]
-    logs = np.array([_laplace(fit) for fit in known])
-    fine = np.linspace(effect.low, 1.0, _FINE)
-    density = _cubic(nodes, logs, fine)
+                v = seek(float(nodes[i]), v, 4)
+    seek(float(joint.psi[k]), joint.v, 8)
+    for _ in range(_SPLITS):
+        at = sorted(known)
+        pairs = _uneven(np.array(at), np.array([known[a][1] for a in at]))
+        if not pairs:
+            break
+        for i in pairs:
+            middle = 0.5 * (at[i] + at[i + 1])
+            for end in (at[i], at[i + 1]):
+                seek(middle, known[end][0].v, 8)
+    at = sorted(known)
+    logs = np.array([known[a][1] for a in at])
+    close = [np.linspace(a, b, _BETWEEN) for a, b in pairwise(at) if b - a < nodes[1] - nodes[0]]
+    fine = np.unique(np.concatenate([np.linspace(effect.low, 1.0, _FINE), *close]))
+    density = _cubic(np.array(at), logs, fine)
     largest = float(density.max())
     weights = np.exp(density - largest)
     mass = _trapezoid(weights, fine)
@@ -128,7 +159,7 @@ def fit_single(
     best = float(fine[int(density.argmax())])
     psi = local.none()
     psi[k] = best
-    v = known[int(np.abs(nodes - best).argmin())].v
+    v = known[min(at, key=lambda a: abs(a - best))][0].v
     fit = improve(local, target, v, psi, (k,))
     count = len(local.surrogate.design.candidates)
     return Model(
@@ -227,11 +258,25 @@ def _laplace(fit: Fit) -> float:
     return fit.log_density + 0.5 * p * float(np.log(2 * np.pi)) - 0.5 * log_det
 
 
+def _uneven(at: Array, logs: Array) -> list[int]:
+    """Returns after which of nodes (n,) another is wanted, by their log density (n,)."""
+    change, width = np.abs(np.diff(logs)), np.diff(at)
+    near = np.maximum(logs[1:], logs[:-1]) > logs.max() - _NEAR
+    return np.nonzero((change > _CHANGE) & near & (width > _CLOSEST))[0].tolist()
+
+
 def _cubic(x: Array, y: Array, at: Array) -> Array:
-    """Catmull-Rom interpolation on even nodes."""
-    slopes = np.gradient(y, x)
+    """Piecewise cubic interpolation on nodes (n,) that rise, between the values of neighbours."""
     i = np.clip(np.searchsorted(x, at) - 1, 0, len(x) - 2)
-    width = x[i + 1] - x[i]
+    widths = np.diff(x)
+    rises = np.diff(y) / widths
+    # Harmonic means of the rises to either side, nothing at a peak.
+    before, after = 2 * widths[1:] + widths[:-1], widths[1:] + 2 * widths[:-1]
+    is_along = rises[:-1] * rises[1:] > 0
+    one, other = np.where(is_along, rises[:-1], 1.0), np.where(is_along, rises[1:], 1.0)
+    inner = np.where(is_along, (before + after) / (before / one + after / other), 0.0)
+    slopes = np.concatenate([rises[:1], inner, rises[-1:]])
+    width = widths[i]
     t = (at - x[i]) / width
     a = (1 + 2 * t) * (1 - t) ** 2 * y[i] + t * (1 - t) ** 2 * width * slopes[i]
     return a + t**2 * (3 - 2 * t) * y[i + 1] + t**2 * (t - 1) * width * slopes[i + 1]
