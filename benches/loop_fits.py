@@ -40,7 +40,7 @@ TRUTHS = {
     "none": ("", 0.0),
     "offset -0.2 mm": ("camera.offset", -0.2),
     "offset 0.3 mm": ("camera.offset", 0.3),
-    "blur 0.4 px": ("camera.blur", 0.4 / 3),
+    "blur 0.39 px": ("camera.blur", 0.13),
     "blur 0.6 px": ("camera.blur", 0.2),
     "3 % missing": ("camera.missing", 0.3),
     "diameter 3.94 mm": ("diameter", 0.15),

@@ -20,8 +20,8 @@ of its prior share.
 Reference:
     Tierney and Kadane, Accurate approximations for posterior moments, JASA 81, 1986.
     Fritsch and Butland, A method for constructing local monotone piecewise cubic interpolants, SIAM
-    J. Sci. Stat. Comput. 5, 1984 (slopes; a cubic through all nodes with slopes of neighbours
-    had its largest where there was none).
+    Journal on Scientific and Statistical Computing 5, 1984 (slopes; with those of neighbours the
+    cubic had its largest where there was none).
     MacKay, Information theory, inference and learning algorithms, 2003, chapters 27 and 28.
 """
 
