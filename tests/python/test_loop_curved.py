@@ -6,7 +6,14 @@ from numpy.typing import NDArray
 
 from granulcal.loop import Design, Effect, Surrogate
 from granulcal.loop.surrogate import columns
-from granulcal.loop.surrogate.columns import CURVES, curve_columns, curved_effects
+from granulcal.loop.surrogate.columns import (
+    CURVES,
+    curve_columns,
+    curve_width,
+    curved_columns,
+    curved_effects,
+    fold_curve,
+)
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 
 Array = NDArray[np.float64]
@@ -45,6 +52,41 @@ def test_a_curve_is_nothing_at_both_ends() -> None:
     # Either side has its own.
     one, other = curve_columns(np.array([0.3, -0.3]), True)
     assert one @ other == 0 and np.abs(one).max() > 0.1
+
+
+@pytest.mark.parametrize("is_two_sided", [False, True])
+def test_what_goes_with_the_coordinates_folds_into_the_sines(is_two_sided: bool) -> None:
+    generator = np.random.default_rng(7)
+    u, columns = generator.random((5, 3)), generator.standard_normal((curve_width(3), 2))
+    for strength in (-0.4, 0.0, 0.3):
+        plain = curved_columns(np.full(5, strength), u, is_two_sided) @ columns
+        sines = curve_columns(np.array(strength), is_two_sided)
+        folded = np.tensordot(sines, fold_curve(columns, u, is_two_sided), axes=1)
+        np.testing.assert_allclose(folded, plain, atol=1e-12)
+    # In the middle of all coordinates it is the curve alone.
+    middle = fold_curve(columns, np.full((1, 3), 0.5), is_two_sided)[:, 0]
+    np.testing.assert_allclose(middle, columns[:CURVES], atol=1e-12)
+
+
+def test_a_step_that_grows_with_a_coordinate_is_learnt() -> None:
+    generator = np.random.default_rng(8)
+    design = Design(("a",), ("height",), (Effect("sight"),))
+    psi = np.zeros((BASE + 400, 1))
+    psi[BASE:, 0] = generator.random(400)
+    u, c = generator.random((2, len(psi)))
+
+    def true(u: Array, psi: Array) -> Array:
+        rise = 1 / (1 + np.exp(-(psi[:, 0] - 0.2) / 0.03))
+        return (2 * u - 1)[:, None] * ALONG + 6 * (u * rise)[:, None] * SIGHT
+
+    x = true(u, psi) + NOISE * generator.standard_normal((len(psi), SIZE))
+    one = Surrogate.fit(design, u[:, None], c[:, None], psi, x, features=4)
+    at = np.tile([0.1, 0.15, 0.2, 0.25, 0.3], 2)[:, None]
+    where = np.repeat([0.1, 0.9], 5)
+    middle = np.full((10, 1), 0.5)
+    gap = one.standardise(true(where, at)) - one.mean(where[:, None], middle, at)
+    # By the curve of the middle it would be off by 40 % of the step, some 8 of these units.
+    assert float(np.sqrt(np.mean(gap**2))) < 0.8
 
 
 def test_effects_of_many_rows_have_a_curve() -> None:

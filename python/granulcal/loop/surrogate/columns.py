@@ -15,7 +15,10 @@ __all__ = [
     "crossed_columns",
     "crossed_effects",
     "curve_columns",
+    "curve_width",
+    "curved_columns",
     "curved_effects",
+    "fold_curve",
     "held_residuals",
     "lack_of_fit",
     "mean_columns",
@@ -130,8 +133,8 @@ def mean_columns(
         parts.append(psi[:, k : k + 1] * psi[:, other : other + 1] * both)
         widths.append(both.shape[1])
     for k, is_two_sided in curved:
-        parts.append(curve_columns(psi[:, k], is_two_sided))
-        widths.append(CURVES)
+        parts.append(curved_columns(psi[:, k], u, is_two_sided))
+        widths += [CURVES, curve_width(u.shape[1]) - CURVES]
     stops = np.cumsum(widths)
     blocks = [slice(int(b - w), int(b)) for b, w in zip(stops, widths, strict=True)]
     return np.concatenate(parts, axis=1), blocks
@@ -147,6 +150,43 @@ def curve_columns(strength: Array, is_two_sided: bool) -> Array:
         return np.concatenate(sines, axis=-1)
     number = np.arange(1, CURVES + 1)
     return np.sin(np.pi * np.multiply.outer(strength, number)) / number
+
+
+def curve_width(dimension: int) -> int:
+    """Returns how many columns a curve has: its sines, and the first half times coordinates."""
+    return CURVES + CURVES // 2 * dimension
+
+
+def curved_columns(strength: Array, u: Array, is_two_sided: bool) -> Array:
+    """Returns the columns of a curve that goes with u (n, d), at strengths (n,)."""
+    sines = curve_columns(strength, is_two_sided)
+    slopes = _slow(is_two_sided)
+    along = sines[:, slopes, None] * (_SLOPE * (2 * u - 1))[:, None, :]
+    return np.concatenate([sines, along.reshape(len(u), -1)], axis=1)
+
+
+def fold_curve(columns: Array, u: Array, is_two_sided: bool) -> Array:
+    """Returns what each sine multiplies at u (n, d), of what each column does.
+
+    Args:
+        columns: shape (`curve_width`, ...).
+        u: coordinates.
+        is_two_sided: whether the effect is.
+
+    Returns:
+        Shape (`CURVES`, n, ...).
+    """
+    plain, rest = columns[:CURVES], columns[CURVES:]
+    found = np.repeat(plain[:, None], len(u), axis=1)
+    each = rest.reshape(CURVES // 2, u.shape[1], *columns.shape[1:])
+    found[_slow(is_two_sided)] += np.einsum("ni,ji...->jn...", _SLOPE * (2 * u - 1), each)
+    return found
+
+
+def _slow(is_two_sided: bool) -> list[int]:
+    """Numbers of the sines that go with the coordinates, the slowest of each side."""
+    half = CURVES // 2
+    return [*range(half // 2), *range(half, half + half // 2)] if is_two_sided else [*range(half)]
 
 
 def curved_effects(design: Design, psi: Array) -> tuple[tuple[int, bool], ...]:

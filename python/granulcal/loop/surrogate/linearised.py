@@ -17,7 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granulcal.loop.effects.design import cube_from_normal
-from granulcal.loop.surrogate.columns import crossed_columns
+from granulcal.loop.surrogate.columns import (
+    CURVES,
+    crossed_columns,
+    curve_columns,
+    fold_curve,
+)
 from granulcal.loop.surrogate.surrogate import Surrogate
 
 __all__ = ["LinearisedSurrogate"]
@@ -44,7 +49,7 @@ class LinearisedSurrogate:
         crossed_roots: of the part that the product of two strengths multiplies, for each two that
             have one, shape (X, H, m, d).
         curve_roots: of the part that each sine of a strength multiplies, for each effect, shape
-            (f, m, d), f = 0 without a curve.
+            (f, H, m, d), f = 0 without a curve.
         shift_roots: of the shifts of theta that effects are in part, shape (K, H m, r).
         own_errors: what a standard deviation of each declared nuisance does, shape (N, H, m).
         sessions: number of the session of each condition, shape (H,).
@@ -93,7 +98,8 @@ class LinearisedSurrogate:
             linear = surrogate.effect_features(rows, conditions, k)[0]
             along = linear @ surrogate.coefficients.T + surrogate.effect_move(rows, conditions, k)
             own_errors[i] = (effect.nuisance_sd or 0.0) * along
-            sines = surrogate.curve_features(np.array(effect.nuisance_sd or 0.0), k)
+            at = np.full(count, effect.nuisance_sd or 0.0)
+            sines = surrogate.curve_features(at, np.column_stack([rows, conditions]), k)
             own_errors[i] += sines @ surrogate.coefficients[:, surrogate.curve(k)].T
         return cls(
             surrogate,
@@ -106,7 +112,7 @@ class LinearisedSurrogate:
             ),
             _crossed_roots(surrogate, conditions),
             tuple(
-                surrogate.roots[:, surrogate.curve(k)].transpose(1, 0, 2)
+                _curve_roots(surrogate, np.column_stack([rows, conditions]), k)
                 for k in range(len(effects))
             ),
             np.array(
@@ -225,10 +231,14 @@ class LinearisedSurrogate:
             root = root + psi[k] * psi[other] * self.crossed_roots[crossed.index((k, other))]
         return root
 
-    def _curve_root(self, k: int, strength: float) -> Array:
-        """Root of the uncertainty of r_k, the same for all conditions, shape (m, d)."""
-        sines = self.surrogate.curve_features(np.array(strength), k)
-        return np.tensordot(sines, self.curve_roots[k], axes=1)
+    def _curve_root(self, k: int, strength: float) -> Array | float:
+        """Root of the uncertainty of r_k, shape (H, m, d); 0 without a curve."""
+        kinds = dict(self.surrogate.curved)
+        if k not in kinds:
+            return 0.0
+        return np.tensordot(
+            curve_columns(np.array(strength), kinds[k]), self.curve_roots[k], axes=1
+        )
 
     @cached_property
     def _direction_errors(self) -> list[Array]:
@@ -267,6 +277,18 @@ class LinearisedSurrogate:
         count = len(self.conditions)
         theta = np.tile(cube_from_normal(v), (count, 1))
         return self.surrogate.scale(theta, self.conditions, np.tile(psi, (count, 1)))
+
+
+def _curve_roots(surrogate: Surrogate, u: Array, k: int) -> Array:
+    """Roots of the uncertainty of what sines of r_k multiply at u (H, p + q), (f, H, m, d)."""
+    kinds = dict(surrogate.curved)
+    size, width = surrogate.roots.shape[::2]
+    if k not in kinds:
+        return np.empty((0, len(u), size, width))
+    columns = surrogate.roots[:, surrogate.curve(k)].transpose(1, 0, 2)
+    found = fold_curve(columns, u, kinds[k])
+    assert found.shape == (CURVES, len(u), size, width)
+    return found
 
 
 def _crossed_roots(surrogate: Surrogate, conditions: Array) -> Array:

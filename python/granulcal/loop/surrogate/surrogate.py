@@ -7,16 +7,17 @@ as well known as it deserves. On the axes
 
 $$ m(\theta, c, \psi) = f_0(\theta, c)
    + \sum_k \psi_k (J a_k + \tilde g_k)(\theta, c) + \psi_k^2 h_k(\theta, c)
-   + \sum_{k < l} \psi_k \psi_l q_{kl}(c) + \sum_k r_k(\psi_k), \qquad
+   + \sum_{k < l} \psi_k \psi_l q_{kl}(c) + \sum_k r_k(\psi_k, \theta, c), \qquad
    y = m + s(\theta, c, \psi) \epsilon, \quad \epsilon \sim (0, R) $$
 
 $f_0$ is a quadratic and the leading eigenfunctions of a Matern kernel (`leading.py`); $J a_k$ the
 part of an effect that is a shift of theta (`shift.py`), $\tilde g_k$ a quadratic and $h_k$ a linear
 function, each with a prior width learnt for every statistic and effect (`blocks.py`). $q_{kl}$,
 linear in c, is what two effects do together, learnt of those that the archive has poured or read
-together. $r_k$, a sum of sines, is the curve of an effect that many pours show, as those of the
-image are: a blur of a small $\sigma$ takes no pixel across the threshold and a larger one at
-once all along an edge, which no parabola follows. log s is a function of the same coordinates and
+together. $r_k$, a sum of sines, the slower ones linear in the coordinates, is the curve of an
+effect that many pours show, as those of the image are: a blur of a small $\sigma$ takes no pixel
+across the threshold and a larger one at once all along an edge, which no parabola follows, and
+how much edge there is goes with the coordinates. log s is a function of the same coordinates and
 of the strengths. A pour that is read under several effects is several rows, which share its noise
 (`readings.py`). What the archive leaves unknown about m is the posterior of the coefficients, the
 same for all pours of a condition and correlated between conditions; nothing about it averages away
@@ -47,11 +48,11 @@ from granulcal.loop.effects.design import Design
 from granulcal.loop.surrogate.anchor import Anchor
 from granulcal.loop.surrogate.blocks import fit_blocks
 from granulcal.loop.surrogate.columns import (
-    CURVES,
     _effect_columns,
     crossed_columns,
     crossed_effects,
-    curve_columns,
+    curve_width,
+    curved_columns,
     curved_effects,
     held_residuals,
     lack_of_fit,
@@ -382,7 +383,7 @@ class Surrogate:
             columns = np.concatenate([strength * first, bend * second], axis=1)
             total += columns @ self.coefficients[:, start : start + step].T
             curve = self.coefficients[:, self.curve(int(k))]
-            total += self.curve_features(psi[:, k], int(k)) @ curve.T
+            total += self.curve_features(psi[:, k], u, int(k)) @ curve.T
         total += self.shift.along(u, psi)
         for k, other in self.crossed_of(psi):
             strength = psi[:, k : k + 1] * psi[:, other : other + 1]
@@ -398,7 +399,8 @@ class Surrogate:
     def crossed_slice(self, k: int, other: int) -> slice:
         """Returns the columns of q_kl among the features."""
         width = 1 + len(self.design.conditions)
-        start = self.coefficients.shape[1] - CURVES * len(self.curved) - width * len(self.crossed)
+        start = self.coefficients.shape[1] - self._curve_width * len(self.curved)
+        start -= width * len(self.crossed)
         start += width * self.crossed.index((k, other))
         return slice(start, start + width)
 
@@ -407,16 +409,24 @@ class Surrogate:
         stop = self.coefficients.shape[1]
         for other, _ in reversed(self.curved):
             if other == k:
-                return slice(stop - CURVES, stop)
-            stop -= CURVES
+                return slice(stop - self._curve_width, stop)
+            stop -= self._curve_width
         return slice(0, 0)
 
-    def curve_features(self, strength: Array, k: int) -> Array:
-        """Returns the features of r_k at strengths (n,) or (), shape (n, 0) without a curve."""
+    @property
+    def _curve_width(self) -> int:
+        """Columns of one r_k."""
+        return curve_width(len(self.design.parameters) + len(self.design.conditions))
+
+    def curve_features(self, strength: Array, u: Array, k: int) -> Array:
+        """Returns the features of r_k at strengths (n,) and (theta, c) (n, p + q), (n, f).
+
+        f is 0 without a curve.
+        """
         kinds = dict(self.curved)
         if k not in kinds:
-            return np.empty((*np.shape(strength), 0))
-        return curve_columns(strength, kinds[k])
+            return np.empty((len(u), 0))
+        return curved_columns(strength, u, kinds[k])
 
     def scale(self, theta: Array, condition: Array, psi: Array) -> Array:
         """Returns s at rows of (theta, condition, psi), shape (n, m)."""
