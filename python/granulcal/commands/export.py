@@ -42,7 +42,7 @@ _UNSETTLED = {
     "unhealthy": "the simulation lost its accuracy; try another seed",
 }
 _POINTS = ("vtk", "ply", "csv")
-_FORMATS = ("lammps-data", "vtk", "ply", "csv", "mjcf", "sdf", "urdf")
+_FORMATS = ("lammps-data", *_POINTS, "mjcf", "sdf", "urdf")
 
 
 def add(commands: Any) -> None:

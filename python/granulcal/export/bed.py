@@ -29,12 +29,10 @@ def bed_text(setup: Setup, kind: str) -> str:
     Raises:
         ValueError: another format.
     """
+    if kind in ENDINGS:
+        return points_text(kind, setup.centres, setup.radii)
     makers = {
         "lammps-data": lambda: lammps.data(setup),
-        **{
-            name: lambda name=name: points_text(name, setup.centres, setup.radii)
-            for name in ENDINGS
-        },
         "mjcf": lambda: mujoco.mjcf(setup),
         "sdf": lambda: gazebo.scene(setup)["pour.sdf"],
         "urdf": lambda: _urdf(setup),

@@ -16,6 +16,7 @@ Reference:
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,7 +74,7 @@ class Readings:
         contrasts = self._turned(held)[is_contrast]
         return float(np.clip(1.0 - np.mean(contrasts**2) / np.mean(held**2), 0.0, _LARGEST))
 
-    @property
+    @cached_property
     def _is_contrast(self) -> NDArray[np.bool_]:
         """Rows of a pour after its first, shape (n,)."""
         order = np.argsort(self.pour, kind="stable")
