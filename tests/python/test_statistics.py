@@ -329,7 +329,7 @@ def test_diagnostic_statistics_of_a_pour_and_of_its_recording_agree(small_scene,
     camera = gc.Camera.overhead(height=0.29, field_width=0.58, pixels=960)
     image, toml = camera.record(pour.positions, pour.radii, tmp_path, depth_unit=1e-5)
     formation = gc.Recording.open(image, camera=toml).formation(height_threshold=1e-3)
-    assert formation.spacing == pytest.approx(0.58 / 960, rel=0.03)
+    assert formation.spacing == pytest.approx(0.58 / 960, rel=1e-3)
     measured = formation.diagnostic_statistics(grain_diameter=4e-3, pour_axis=(0, 0))
     # The fitted ground is not quite the known one: a grain may touch another through one pixel.
     assert measured["isolated_grains"] == pytest.approx(found["isolated_grains"], rel=0.1)

@@ -18,7 +18,6 @@ mod outlook;
 mod part;
 mod settings;
 mod shape;
-mod spacing;
 mod step;
 
 use nalgebra::Vector3;

@@ -82,7 +82,7 @@ impl Formation {
     }
 
     #[getter]
-    fn spacing(&self) -> Option<f64> {
+    fn spacing(&self) -> f64 {
         self.inner.spacing()
     }
 

@@ -93,7 +93,7 @@ class Formation:
         profile: mean heights within half of that radius and around it [m], which decide the kind.
         downsample: factor by which the image was down-sampled.
         resolution: width of a pixel on the ground along x and y [m].
-        spacing: distance on the ground of points from neighbouring pixels [m]; NaN of one point.
+        spacing: side of a pixel on the ground [m], the root of its area.
     """
 
     points: Array

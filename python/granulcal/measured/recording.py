@@ -314,7 +314,7 @@ class Recording:
             profile=found.profile,
             downsample=found.downsample,
             resolution=found.resolution,
-            spacing=float("nan") if found.spacing is None else found.spacing,
+            spacing=found.spacing,
         )
 
     def _tell_edge(self, count: int, frame: int, downsample: int) -> None:

@@ -117,9 +117,7 @@ fn diagnostic_settings(
         from_centroid.y += axis[1];
         from_centroid
     });
-    // A single point has no neighbour, and is refused as too few.
-    let spacing = formation.spacing().unwrap_or(grain_diameter);
-    Ok(DiagnosticSettings { pour_axis, grain_diameter, spacing })
+    Ok(DiagnosticSettings { pour_axis, grain_diameter, spacing: formation.spacing() })
 }
 
 /// Name, unit and value of each statistic.

@@ -103,6 +103,14 @@ impl Levelled {
     }
 }
 
+impl Formation {
+    /// Side of a pixel on the ground `[m]`, the root of its area: what diagnostic statistics take for the spacing of
+    /// points, as they do of a pour.
+    pub fn spacing(&self) -> f64 {
+        super::of_area(self.resolution)
+    }
+}
+
 /// Moves the points' centroid to x = y = 0 and returns where it was.
 fn centre(points: &mut [Vector3<f64>]) -> Vector2<f64> {
     let centroid = points.iter().map(Vector3::xy).sum::<Vector2<f64>>() / points.len() as f64;

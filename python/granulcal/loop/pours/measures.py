@@ -128,14 +128,8 @@ class Measures:
                 'camera.projection = "orthographic"'
             )
         # What of a camera beside the axis: the effects camera.x and camera.y.
-        aside = formation.centroid
-        axis = None if is_map else (-aside[0], -aside[1])
-        # As of a pour, a pixel is as wide as on the ground: the formation's own spacing is that of
-        # its points, which stand nearer to the camera.
-        spacing = float(np.sqrt(np.prod(formation.resolution)))
-        found = diagnostic_statistics(
-            formation.points, grain_diameter=diameter, spacing=spacing, pour_axis=axis
-        )
+        axis = None if is_map else (0.0, 0.0)
+        found = formation.diagnostic_statistics(grain_diameter=diameter, pour_axis=axis)
         both = {**formation.statistics().to_dict(), **found.to_dict()}
         return np.array([both[name] for name in self.names])
 
