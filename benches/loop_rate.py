@@ -4,6 +4,7 @@
     python benches/loop_rate.py run OUT --only null-0 blur-1
     python benches/loop_rate.py table OUT                 # the sets, and rates with exact intervals
     python benches/loop_rate.py form OUT                  # what effects leave of the surrogate
+    python benches/loop_rate.py seen OUT                  # is what is seen in 80 % seen so often?
 
 The scene is that of benches/blind with 150 grains and pixels of 1.6 mm: three pours from each of 4,
 8 and 12 cm, two of 6 and 10 cm that are sealed. Nulls and sets with one effect come in turn, so
@@ -35,6 +36,7 @@ from granulcal.loop.pours.cube import from_cube
 from granulcal.loop.surrogate.surrogate import Surrogate
 from granulcal.loop.task import FIT, SEALED
 from granulcal.loop.test.thresholds import Thresholds
+from granulcal.loop.test.trace import power
 from granulcal.loop.test.verdict import NAMING
 from granulcal.pours.camera import Camera
 
@@ -316,6 +318,27 @@ def table(out: Path) -> None:
     print(f"\n{len(rows)} sets, {np.median(seconds):.0f} s each (median, one core)")
 
 
+def seen(out: Path, budget: int, threads: int) -> None:
+    """Prints from which strength on effects are seen in 80 %, and how often those of rows were."""
+    rows = [row for row in rows_of(out / "rows.jsonl") if row["truth"]]
+    alarms: dict[bool, list[bool]] = {True: [], False: []}
+    print("| set | camera | psi | seen from | word |\n|---|---|---|---|---|")
+    for camera in CAMERAS:
+        store = archive(out, camera, budget, threads)
+        units = store.plan.unit_condition(np.array(HEIGHTS[FIT])[:, None])
+        known = fit_surrogate(store, seed=0)
+        middle = np.full(len(known.design.parameters), 0.5)
+        sights = power(known, middle, units, np.full(len(units), POURS[FIT]))
+        least = dict(zip(sights.effects, sights.shown, strict=True))
+        for row in (row for row in rows if row["camera"] == camera):
+            size, needed = row["psi"], least[row["truth"]]
+            print(f"| {row['set']} | {camera} | {size:.2f} | {needed:.2f} | {row['verdict']} |")
+            alarms[abs(size) >= needed].append(row["verdict"] in ALARMS)
+    print("\n| what | rate | 95 %, exact |\n|---|---|---|")
+    rate("alarm, of strengths seen in 80 %", alarms[True])
+    rate("alarm, of weaker ones", alarms[False])
+
+
 def rate(what: str, hits: list[bool]) -> None:
     """Prints the rate of something, with its exact interval."""
     if hits:
@@ -334,7 +357,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("do", choices=("run", "table", "form"))
+    parser.add_argument("do", choices=("run", "table", "form", "seen"))
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", nargs="+", default=[], metavar="SET")
     parser.add_argument("--budget", type=int, default=4000)
@@ -342,8 +365,9 @@ def main() -> None:
     options = parser.parse_args()
     if options.do == "table":
         table(options.out)
-    elif options.do == "form":
-        form(options.out, options.budget, options.threads)
+    elif options.do in ("form", "seen"):
+        told = {"form": form, "seen": seen}[options.do]
+        told(options.out, options.budget, options.threads)
     else:
         run(options.out, options.only, options.budget, options.threads)
 

@@ -136,8 +136,7 @@ def test_a_rival_is_within_reach_by_what_is_not_known_of_it(
 
     assert not reached(gap - RULES.rivals - 0.01) and reached(gap - RULES.rivals + 0.01)
     # What is parallel near the base fit is a rival all the same, what is declared of one kind none.
-    power = replace(found.power, families=(("image", "poured"),))
-    assert within_reach(replace(found, power=power), RULES)
+    assert within_reach(replace(found, families=(("image", "poured"),)), RULES)
     with monkeypatch.context() as once:
         once.setattr(Design, "family", lambda *_: "one")
         assert not within_reach(found, RULES)

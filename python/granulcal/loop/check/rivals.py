@@ -103,7 +103,7 @@ def families_in(found: Trace, names: Sequence[str]) -> tuple[str, ...]:
     """Returns the families of effects, parallel ones with the first of their group."""
     design = found.local.surrogate.design
     known = [effect.name for effect in design.effects]
-    merged = [tuple(known.index(name) for name in group) for group in found.power.families]
+    merged = [tuple(known.index(name) for name in group) for group in found.families]
     return families_of(design, tuple(known.index(name) for name in names), merged)
 
 

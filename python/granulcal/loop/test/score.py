@@ -11,9 +11,8 @@ efficient one, and projecting it once more would project it twice. With the dire
 $$ S_k = D_k^T r, \quad I_{kl} = D_k^T M D_l, \quad \hat\psi_k = S_k / I_{kk}, \quad
    T_k = \max(0, \hat\psi_k)^2 I_{kk}, \quad c_{kl} = I_{kl} / \sqrt{I_{kk} I_{ll}} $$
 
-(no cut at 0 for two-sided effects), $\kappa_k = I_{kk} / D_k^T D_k$ is the share of an effect that
-the parameters cannot mimic, and a strength of
-$\mathrm{MDE}_k = (z_{1 - .05 / K} + z_{.8}) / \sqrt{I_{kk}}$ is seen in four of five experiments.
+(no cut at 0 for two-sided effects), and $\kappa_k = I_{kk} / D_k^T D_k$ is the share of an effect
+that the parameters cannot mimic.
 
 Reference:
     Rao, Large sample tests of statistical hypotheses, Proc. Camb. Phil. Soc. 44, 1948.
@@ -23,7 +22,6 @@ Reference:
 """
 
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,15 +117,6 @@ class Scores:
         share = left / np.maximum(np.sum(self.directions**2, axis=0), 1e-300)
         known = left > np.maximum(_LEAST_SQUARE, self.direction_errors)
         return np.where(known, share, np.nan)
-
-    @property
-    def detectable(self) -> Array:
-        """Smallest strength seen in 80 % of experiments at the library's 5 %, (K,)."""
-        normal = NormalDist()
-        sides = np.where(self.two_sided, 2, 1)
-        level = [normal.inv_cdf(1 - 0.05 / (len(self.effects) * side)) for side in sides]
-        size = np.sqrt(np.maximum(np.diag(self.information), 1e-12))
-        return (np.array(level) + normal.inv_cdf(0.8)) / size
 
     def strengths(self, residuals: Array) -> Array:
         """Returns the one-step strengths of whitened efficient `residuals` (n, b), (K, b)."""

@@ -2,18 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from granulcal.loop.effects.design import cube_from_normal, normal_from_cube
+from granulcal.loop.effects.design import Design, cube_from_normal, normal_from_cube
 from granulcal.loop.surrogate.baseline import Fit, Start, fit_base
 from granulcal.loop.surrogate.condition_pours import ConditionPours
 from granulcal.loop.surrogate.linearised import LinearisedSurrogate
 from granulcal.loop.surrogate.stacked_means import StackedMeans
 from granulcal.loop.surrogate.surrogate import Surrogate
+from granulcal.loop.test.detectable import detectable, distances
 from granulcal.loop.test.refit import Model, by_probability, fit_none, fit_pair, fit_single
 from granulcal.loop.test.residual_test import ResidualTest, residual_test
 from granulcal.loop.test.score import Scores, families
@@ -30,6 +32,8 @@ Array = NDArray[np.float64]
 _HOPELESS = 12.0
 # Effects named beside a residual.
 _NEAREST = 3
+# Of which the table before any data says what is seen.
+_MATERIALS = 5
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,8 @@ class Power:
     Attributes:
         effects: names of the candidates, K of them.
         kappa: share of each that theta cannot mimic; NaN if too weak to say.
-        detectable: smallest strength seen in 80 %, in units of its prior's upper end.
+        detectable: strength from which on each is seen in 80 %, in units of its prior's upper end;
+            infinite if it is not at any (`detectable.py`).
         cosines: c, shape (K, K).
         families: groups of parallel effects.
     """
@@ -51,13 +56,11 @@ class Power:
     families: tuple[tuple[str, ...], ...]
 
     @classmethod
-    def of(cls, surrogate: Surrogate, scores: Scores) -> "Power":
-        """Returns the table of scores at a fit."""
-        names = tuple(surrogate.design.effects[k].name for k in scores.effects)
-        groups = tuple(
-            tuple(surrogate.design.effects[k].name for k in group) for group in families(scores)
-        )
-        return cls(names, scores.kappa, scores.detectable, scores.cosines, groups)
+    def of(cls, design: Design, scores: Scores, found: Array) -> "Power":
+        """Returns the table of scores at a fit, and of distances (M, K, 2, S) of materials."""
+        names = tuple(design.effects[k].name for k in scores.effects)
+        least = detectable(found, scores.two_sided)
+        return cls(names, scores.kappa, least, scores.cosines, _families(design, scores))
 
     @property
     def shown(self) -> Array:
@@ -69,7 +72,7 @@ class Power:
         return {
             "effects": list(self.effects),
             "kappa": [None if np.isnan(k) else float(k) for k in self.kappa],
-            "detectable_strength": [None if np.isnan(d) else float(d) for d in self.shown],
+            "detectable_strength": [float(d) if np.isfinite(d) else None for d in self.shown],
             "cosines": self.cosines.tolist(),
             "families": [list(group) for group in self.families],
         }
@@ -122,7 +125,7 @@ class Trace:
         base: the model without effects; its p_after is that of the residual test.
         explanations: fitted models, most probable first; empty if the residual test did not reject.
         residual_test: the test of the base fit.
-        power: kappa, confusion and detectable strengths at the base fit.
+        families: groups of candidates that are parallel at the base fit.
         labels: of the conditions, H of them.
         statistics: names, m of them.
         residuals: of the base fit in standard deviations of its covariance, shape (H, m).
@@ -140,7 +143,7 @@ class Trace:
     base: Explanation
     explanations: tuple[Explanation, ...]
     residual_test: ResidualTest
-    power: Power
+    families: tuple[tuple[str, ...], ...]
     labels: tuple[str, ...]
     statistics: tuple[str, ...]
     residuals: Array
@@ -152,6 +155,12 @@ class Trace:
     models: tuple[Model, ...]
     base_fit: Fit
     local: LinearisedSurrogate
+
+    @cached_property
+    def power(self) -> Power:
+        """Kappa, confusion and detectable strengths at the base fit."""
+        design = self.local.surrogate.design
+        return power_at(design, [(self.local, self.base_fit)])
 
     @property
     def best(self) -> Explanation:
@@ -177,7 +186,7 @@ class Trace:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns everything for JSON."""
-        test = self.residual_test
+        test, design = self.residual_test, self.local.surrogate.design
         return {
             "verdict": {
                 "kind": self.verdict.kind,
@@ -192,7 +201,7 @@ class Trace:
                 "p_any": test.p_any,
                 "p_smooth": test.p_smooth,
                 "bartlett": test.factors.tolist(),
-                "effects": list(self.power.effects),
+                "effects": [design.effects[k].name for k in test.effects],
                 "squares": test.squares.tolist(),
                 "one_step_strengths": test.strengths.tolist(),
                 "adjusted_p": test.adjusted.tolist(),
@@ -254,7 +263,7 @@ def trace(
         base=_explain(surrogate, none, none, test.p),
         explanations=tuple(_explain(surrogate, m, none, p) for m, p in explained),
         residual_test=test,
-        power=Power.of(surrogate, scores),
+        families=_families(design, scores),
         labels=stack.labels,
         statistics=surrogate.names,
         residuals=_residuals(local, fit),
@@ -296,18 +305,35 @@ def power(
 
     Args:
         surrogate: of the archive.
-        theta: where, shape (p,).
+        theta: where kappa and the cosines are taken, shape (p,); strengths are seen in 80 % of
+            experiments there and with other materials of the prior.
         conditions: unit coordinates, shape (H, q).
         counts: pours of each, shape (H,).
         sessions: number of the session of each, shape (H,); None: each has its own.
     """
-    v = normal_from_cube(np.asarray(theta, dtype=np.float64))
+    first = np.asarray(theta, dtype=np.float64)
+    others = np.random.default_rng(0).random((_MATERIALS - 1, len(first)))
     each = np.asarray(counts, dtype=np.float64)
     # Repeats of one condition have no inputs: (H, 0) is what no -1 can stand for.
     where = np.asarray(conditions, dtype=np.float64)
     where = where.reshape(len(each), len(surrogate.design.conditions))
-    local = LinearisedSurrogate.at(surrogate, where, each, v, sessions)
-    return Power.of(surrogate, Scores.of(local, fit_at(local, v), surrogate.design.candidates))
+    places = []
+    for v in normal_from_cube(np.vstack([first, others])):
+        local = LinearisedSurrogate.at(surrogate, where, each, v, sessions)
+        places.append((local, fit_at(local, v)))
+    return power_at(surrogate.design, places)
+
+
+@one_thread()
+def power_at(design: Design, places: Sequence[tuple[LinearisedSurrogate, Fit]]) -> Power:
+    """Returns what pours could see of materials, kappa and the cosines those of the first."""
+    shown = steps("materials", places)
+    found = np.array([distances(local, fit, design.candidates) for local, fit in shown])
+    return Power.of(design, Scores.of(*places[0], design.candidates), found)
+
+
+def _families(design: Design, scores: Scores) -> tuple[tuple[str, ...], ...]:
+    return tuple(tuple(design.effects[k].name for k in group) for group in families(scores))
 
 
 def fit_at(local: LinearisedSurrogate, v: Array) -> Fit:
