@@ -38,7 +38,7 @@ pub(super) fn meet<'p>(
             let boxes = Boxes::new(half, a[lane], b[lane]);
             if let Some(normal) = boxes.across(&gaps, lane, asked.range) {
                 meeting.normal = normal;
-                boxes.share(&normal, &mut meeting.spots);
+                boxes.share(&normal, asked.range, &mut meeting.spots);
                 found(first + lane, &meeting);
             }
         }
@@ -211,8 +211,8 @@ impl<'a> Boxes<'a> {
         if self.offset.dot(&along) < 0.0 { -along } else { along }
     }
 
-    /// The corners of what the faces that look at each other share, seen along the normal.
-    fn share(&self, normal: &Vector3<f64>, spots: &mut Vec<Spot>) {
+    /// The corners of what the faces that look at each other share, seen along the normal, that are near enough.
+    fn share(&self, normal: &Vector3<f64>, range: f64, spots: &mut Vec<Spot>) {
         spots.clear();
         let near = Face::towards(self.a, normal);
         let far = Face::towards(self.b, &-normal);
@@ -235,7 +235,7 @@ impl<'a> Boxes<'a> {
         mark[near.axis] = near.side * self.half[near.axis];
         let face = mark[near.axis] * self.a.axes.column(near.axis);
         let sides = near.across.map(|k| self.a.axes.column(k));
-        for &[s, t, gap] in shared.all() {
+        for &[s, t, gap] in shared.all().iter().filter(|corner| corner[2] <= range) {
             (mark[near.across[0]], mark[near.across[1]]) = (s, t);
             let on_a = face + s * sides[0] + t * sides[1];
             let on_b = on_a + gap * normal - self.offset;
@@ -316,7 +316,7 @@ mod tests {
 
     proptest! {
         /// The normal is parry's, or one along which the boxes are as far apart; across parry's normal the points are
-        /// its own, each once.
+        /// those of its own that are in range, each once.
         #[test]
         fn boxes_meet_where_parry_says(
             half in prop::array::uniform3(0.3..1.0_f64),
@@ -357,7 +357,7 @@ mod tests {
                     (place - mark).norm() < 1e-6 && (of - gap).abs() < 1e-6
                 }
             };
-            for &(place, gap) in &their_points {
+            for &(place, gap) in their_points.iter().filter(|point| point.1 < RANGE - 1e-9) {
                 let mut spots = ours.spots.iter().map(|spot| (spot.mark, spot.gap));
                 prop_assert!(spots.any(is_there(place, gap)), "ours lacks {place} {gap}");
             }

@@ -60,7 +60,10 @@ pub(super) fn contacts(
     let mut near = Vec::new();
     for (number, pair) in pairs.iter_mut().enumerate() {
         let Pair { i, j, range, .. } = *pair;
-        pair.clear = clearance(around.solid, &bodies[i].pose, &bodies[j].pose);
+        // Most are given for what an impact may do to them, and are too far from each other as balls.
+        if pair.clear <= range {
+            pair.clear = clearance(around.solid, &bodies[i].pose, &bodies[j].pose);
+        }
         if pair.clear <= range {
             pair.clear = range;
             near.push((Asked { i, j, range }, number));

@@ -18,7 +18,7 @@ use crate::law::Small;
 use crate::wall::Wall;
 
 /// Points of a manifold are one within this distance in the bodies' reach and this cosine of their normals `[-]`.
-const SAME_PLACE: f64 = 0.1;
+pub(super) const SAME_PLACE: f64 = 0.1;
 const SAME_NORMAL: f64 = 0.99;
 
 /// What the points of a manifold have in common: whether they are between bodies, body i, and body j or the wall's

@@ -3,7 +3,7 @@
 use super::around::Around;
 use super::body::Moving;
 use super::collide::{Contacts, at_all_of_walls, clearance, meet};
-use super::contact::Point;
+use super::contact::{Point, SAME_PLACE};
 use super::meeting::Asked;
 use super::motion::{Motion, Way};
 use super::pairs::{Neighbours, Pair, SLACK};
@@ -13,8 +13,12 @@ use super::pose::Pose;
 const FORESEEN: f64 = 0.5;
 /// Gaps of points that bodies turn past are corrected by no less than this, in their reach `[-]`.
 const CORRECTED: f64 = 2e-3;
-/// Ways that lead no farther from each other than this, in the bodies' reach, lead into the same `[-]`.
-const SAME_WAY: f64 = 2e-4;
+/// Ways that lead no farther from each other than this, in the bodies' reach, lead into the same `[-]`: two bodies get
+/// deeper by twice of it, a third of what sweeps may leave a point.
+const SAME_WAY: f64 = 2e-3;
+/// Two bodies that go no farther beside each other, in their reach, meet at the points that are known of them `[-]`:
+/// another would lie within half of what makes it one of these.
+const KNOWN_WAY: f64 = 0.5 * SAME_PLACE;
 
 impl Contacts {
     /// Adds the points at which bodies would lie in something at the end of the substep, behind the others: a corner that
@@ -43,10 +47,14 @@ impl Contacts {
             }
         }
         let mut asked = Vec::new();
+        let lengths: Vec<_> = ways.iter().map(|way| way.length).collect();
+        let longest = lengths.iter().copied().fold(0.0, f64::max);
         for &Pair { i, j, clear, .. } in &self.pairs {
-            let far = least.max(clear);
-            if (is_other[i] || is_other[j])
-                && ways[i].length + ways[j].length > far
+            let is_known = clear == f64::NEG_INFINITY;
+            let far = if is_known { KNOWN_WAY * reach } else { least.max(clear) };
+            if far < 2.0 * longest
+                && (is_other[i] || is_other[j])
+                && lengths[i] + lengths[j] > far
                 && ways[i].beside(&ways[j]) > far
             {
                 later.find(i);
