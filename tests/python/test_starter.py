@@ -88,6 +88,35 @@ def test_a_folder_is_fitted_to_the_lens_of_a_recording(folder: Path, tmp_path: P
     assert scene.get("camera.field_width") == pytest.approx(480 * 0.4 / D435.fx, rel=0.01)
 
 
+def test_images_are_compared_at_a_pixel_about_as_wide_as_the_grains_that_are_set(
+    tmp_path: Path,
+) -> None:
+    """It was that of grains of 4 mm, whatever was set, and called about a grain."""
+    assert main(["init", str(tmp_path), "--set", "grains.diameter=0.002"]) == 0
+    scene = gc.Scene.load(tmp_path / "scene.toml")
+    assert scene.get("grains.diameter") == 0.002
+    assert 0.8 < scene.ground_resolution / 0.002 < 1.7
+    told = f"{1e3 * scene.ground_resolution:.1f} mm, {scene.ground_resolution / 0.002:.1f} grain"
+    assert f"here {told} diameters.\n" in (tmp_path / "scene.toml").read_text()
+
+
+def test_a_camera_too_far_for_the_grains_is_told_before_the_first_pour(
+    folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Counts of 0.1 mm read as millimetres: 4 m to the ground had been written without a word."""
+    good = (folder / "camera.toml").read_text()
+    camera = tmp_path / "camera.toml"
+    camera.write_text(good.replace("depth_unit = 0.0001", "depth_unit = 0.001"))
+    words = ["init", str(tmp_path / "new"), "--recording", str(folder / "couscous.png"), "--json"]
+    assert main([*words, "--camera", str(camera)]) == 0
+    (told,) = json.loads(capfd.readouterr().out)["warnings"]
+    assert "a pixel is 10.2 mm wide on the ground, 4 m" in told and "grains are 4 mm" in told
+    assert "another than 0.001 m per count" in told and "depth_unit" in told
+    assert main([*words, "--camera", str(folder / "camera.toml"), "--force"]) == 0
+    captured = capfd.readouterr()
+    assert json.loads(captured.out)["warnings"] == [] and "warning" not in captured.err
+
+
 def test_the_wall_is_flat_and_fits_a_sensor(folder: Path, tmp_path: Path) -> None:
     pytest.importorskip("rosbags")
     levelled = gc.Recording.open(folder / "wall.bag").level()

@@ -10,6 +10,7 @@ from typing import Any
 from granulcal.commands.counts import seed_number
 from granulcal.commands.setting import setting
 from granulcal.paths import READS, RECORDING, writes
+from granulcal.warned import warn
 
 __all__ = ["add"]
 
@@ -109,7 +110,7 @@ def _add_sample(commands: Any) -> None:
 
 
 def _init(options: argparse.Namespace) -> int:
-    from granulcal.starter.folder import D435, FILES, lens_of, write_folder
+    from granulcal.starter.folder import D435, FILES, doubt_of_pixels, lens_of, write_folder
 
     lens = D435 if options.recording is None else lens_of(options.recording, options.camera)
     changes: dict[str, float | str] = dict(options.set)
@@ -123,8 +124,10 @@ def _init(options: argparse.Namespace) -> int:
         force=options.force,
     )
     files = [str(options.folder / name) for name in FILES]
+    doubts = doubt_of_pixels(lens, scene.get("grains.diameter"))
+    warn(doubts)
     if options.json:
-        print(json.dumps({"files": files, "scene": scene.name}, indent=1))
+        print(json.dumps({"files": files, "scene": scene.name, "warnings": doubts}, indent=1))
         return 0
     print(f"written: {', '.join(files)}")
     print(f"next: granulcal simulate {quote(str(options.folder / 'scene.toml'))}")

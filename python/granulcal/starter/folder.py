@@ -11,7 +11,7 @@ from granulcal.pours.scene import Scene
 from granulcal.starter.numbers import with_numbers
 from granulcal.starter.texts import CAMERA, DROP_START, FUNNEL_START, LOOP, PRIOR, SCENE
 
-__all__ = ["CONDITIONS", "FILES", "SCENES", "Lens", "lens_of", "write_folder"]
+__all__ = ["CONDITIONS", "FILES", "SCENES", "Lens", "doubt_of_pixels", "lens_of", "write_folder"]
 
 SCENES = ("funnel", "drop")
 """Built-in scenes."""
@@ -62,6 +62,11 @@ class Lens:
     def field_width(self) -> float:
         """Side of the ground that this square sees [m]."""
         return self.pixels * self.distance / min(self.fx, self.fy)
+
+    @property
+    def pixel(self) -> float:
+        """Width of one of its pixels on the ground [m]."""
+        return self.field_width / self.pixels
 
     @property
     def threshold(self) -> float:
@@ -137,9 +142,13 @@ def write_folder(
     if lens != D435:
         tip = Scene.built_in(scene).get(path)
         _require_above(float(changes.get(path, tip)), scene, lens)
-    text = with_numbers(scene_text(scene, lens), changes, folder / "scene.toml")
+    file = folder / "scene.toml"
+    text = with_numbers(scene_text(scene, lens), changes, file)
+    # Once it is known to be a number of a scene, images are compared at a pixel that fits it.
+    diameter = Scene.from_toml(text).get("grains.diameter")
+    text = with_numbers(scene_text(scene, lens, diameter), changes, file)
     written = Scene.from_toml(text)
-    replace_file(folder / "scene.toml", text)
+    replace_file(file, text)
     replace_file(folder / "prior.toml", PRIOR)
     replace_file(folder / "camera.toml", camera_text(lens, written.get(path)))
     names = {
@@ -173,28 +182,49 @@ def _require_above(tip: float, name: str, lens: Lens) -> None:
         )
 
 
-def scene_text(name: str, lens: Lens) -> str:
-    """Returns the commented TOML of a built-in scene under this camera."""
+def doubt_of_pixels(lens: Lens, diameter: float) -> list[str]:
+    """Returns whether a camera's pixels miss grains of a diameter [m], as where its unit is another."""
+    if lens.pixel <= _PIXEL * diameter:
+        return []
+    return [
+        f"a pixel is {1e3 * lens.pixel:.3g} mm wide on the ground, {lens.distance:.3g} m from the "
+        f"camera, and grains are {1e3 * diameter:g} mm: single grains and tops are missed; bring the "
+        f"camera nearer. Or is the depth unit another than {lens.unit:g} m per count? A PNG has it "
+        "from depth_unit in the TOML of --camera"
+    ]
+
+
+def scene_text(name: str, lens: Lens, diameter: float | None = None) -> str:
+    """Returns the commented TOML of a built-in scene under this camera.
+
+    Args:
+        name: of the scene.
+        lens: of the camera.
+        diameter: of the grains that its images are to show [m], if not the scene's; the text states
+            the scene's.
+    """
     built_in = Scene.built_in(name)
-    diameter = built_in.get("grains.diameter")
+    stated = built_in.get("grains.diameter")
+    diameter = stated if diameter is None else diameter
     paths = {"jitter": "start.jitter", "tip": _TIPS[name]}
     start, wanted = DROP_START, paths
     if name == "funnel":
         start, wanted = FUNNEL_START, paths | {"spacing": "start.spacing", "base": "start.base"}
-    width = lens.field_width / lens.pixels
-    downsample = max(1, round(_PIXEL * diameter / width))
+    downsample = max(1, round(_PIXEL * diameter / lens.pixel))
+    resolution = lens.pixel * downsample
     return SCENE.format(
         name=name,
         preset=built_in.preset,
         count=int(built_in.get("grains.count")),
-        diameter=diameter,
+        diameter=stated,
         start=start.format(**{key: built_in.get(path) for key, path in wanted.items()}),
         height=lens.distance,
         field_width=round(lens.field_width, 4),
         pixels=lens.pixels,
         downsample=downsample,
         threshold=lens.threshold,
-        resolution_mm=1e3 * width * downsample,
+        resolution_mm=1e3 * resolution,
+        in_grains=resolution / diameter,
     )
 
 

@@ -24,7 +24,7 @@ density = 1300.0              # kg/m^3; of no influence on a dry pour
 horizon = 4.0                 # seconds at most; a pour ends when it rests
 
 # The camera that will look at the real pile. Images are compared at one width of a pixel on the ground:
-# field_width / pixels * downsample, here {resolution_mm:.1f} mm, about a grain.
+# field_width / pixels * downsample, here {resolution_mm:.1f} mm, {in_grains:.1f} grain diameters.
 [camera]
 projection = "pinhole"
 height = {height:g}                  # of the camera above the ground
