@@ -45,6 +45,25 @@ def test_a_number_is_set_or_of_the_posterior(
     assert f"{NAME} = 0.3" in readme and "material.rolling_friction = 0.07" in readme
 
 
+def test_a_posterior_is_named_by_its_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run, out = tmp_path / "run", tmp_path / "out"
+    run.mkdir()
+    words = ["export", "posterior", str(run), "drop", "--to", "lammps", "-o", str(out)]
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert "run holds no posterior.json; asked for is JSON of `infer -o`" in told
+    assert "`granulcal infer" not in told
+    (run / "model.json").touch()
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert f"`granulcal infer {run} RECORDING -o posterior.json` makes one of this model" in told
+    posterior(run)
+    assert main(words) == 0
+    assert f"{NAME} = 0.3" in (out / "mode.in").read_text()
+
+
 @pytest.mark.parametrize("words", [["scene=", "material.restitution"], ["a=b"], ["a=nan"]])
 def test_set_takes_numbers(
     words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]

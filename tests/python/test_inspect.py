@@ -31,8 +31,9 @@ def _told(capfd: pytest.CaptureFixture[str], *words: object, code: int = 0) -> s
     return out if code == 0 else err
 
 
-@pytest.mark.parametrize("path", [SHIPPED, SHIPPED / "model.json"])
-def test_a_model_says_what_it_is_of(path, capfd):
+@pytest.mark.parametrize("path", ["funnel", SHIPPED, SHIPPED / "model.json"])
+def test_a_model_says_what_it_is_of(path, tmp_path, monkeypatch, capfd):
+    monkeypatch.setenv("GRANULCAL_CACHE", str(tmp_path))
     told = _told(capfd, path)
     found = json.loads(_told(capfd, path, "--json"))
     assert found["kind"] == "model" and found["pours"] > 100 and len(found["statistics"]) == 16
@@ -68,6 +69,15 @@ def test_other_documents_are_refused_by_name(tmp_path, capfd):
     shutil.copy(SHIPPED / "model.json", tmp_path)
     (tmp_path / "model.json").write_text('{"format": "other"}')
     assert "model.json is not a granulcal-bayessim file" in _told(capfd, tmp_path, code=2)
+
+
+def test_a_built_in_scene_without_a_model_and_a_file_of_its_name(tmp_path, monkeypatch, capfd):
+    monkeypatch.setenv("GRANULCAL_CACHE", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert "`granulcal model drop` makes it" in _told(capfd, "drop", code=2)
+    (tmp_path / "drop").mkdir()
+    (tmp_path / "drop" / "posterior.json").write_text(json.dumps(POSTERIOR))
+    assert _told(capfd, "drop").startswith("kind: posterior\n")
 
 
 def test_what_the_simulator_reads_is_still_its_own(tmp_path, capfd):

@@ -33,8 +33,15 @@ def test_a_model_is_found_by_its_scene_if_it_fits_the_simulator(cache: Path) -> 
     assert models.find_model("funnel") == shipped
     (own / "made.json").write_text(json.dumps({"fingerprint": fitting}))
     assert models.find_model("funnel") == own
-    (cache / "own").mkdir()
-    assert models.model_named(cache / "own") == cache / "own"
+    folder = cache / "own"
+    folder.mkdir()
+    with pytest.raises(FileNotFoundError, match=r"own holds no model.json; asked for .* or drop$"):
+        models.model_named(folder)
+    (folder / "manifest.toml").touch()
+    with pytest.raises(FileNotFoundError, match=r"`granulcal train .*own -o model` makes one"):
+        models.model_named(folder)
+    (folder / "model.json").touch()
+    assert models.model_named(folder) == folder
     with pytest.raises(FileNotFoundError, match="did you mean funnel"):
         models.model_named("funel")
     with pytest.raises(NotADirectoryError, match="is a file"):

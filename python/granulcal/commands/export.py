@@ -28,11 +28,12 @@ dashpot, what has no counterpart said in the file (docs/export.md).
   granulcal export bed scene.toml --to vtk -o pile.vtk
   granulcal export frames scene.toml --to vtk --every 0.02 -o frames
 
-posterior.json is what `infer -o` or `calibrate` wrote. `scene` writes a whole
-pour, whose README.txt says how to run it, `bed` the grains at rest, `frames`
-those of our own pour over time, for ParaView (frames.vtk.series) or Blender. A
-file that granulcal did not export is not replaced. Exit code 3: the posterior
-is outside its model, or the pour of a bed did not come to rest.
+posterior.json is what `infer -o` or `calibrate` wrote; the folder of the latter
+will do. `scene` writes a whole pour, whose README.txt says how to run it, `bed`
+the grains at rest, `frames` those of our own pour over time, for ParaView
+(frames.vtk.series) or Blender. A file that granulcal did not export is not
+replaced. Exit code 3: the posterior is outside its model, or the pour of a bed
+did not come to rest.
 """
 _ENGINES = ("lammps", "liggghts", "yade", "mujoco", "chrono", "isaac", "gazebo", "newton")
 # What is wrong with pours whose grains are not at rest on the ground, by status.
@@ -100,7 +101,9 @@ def _add_material(words: Any) -> None:
 def _add_posterior(words: Any) -> None:
     text = "the most probable material of a posterior, and draws of it"
     parser = words.add_parser("posterior", help=text, description=text)
-    parser.add_argument("posterior", type=READS, help="JSON of `infer -o` or `calibrate`")
+    parser.add_argument(
+        "posterior", type=READS, help="JSON of `infer -o`, or that or the folder of `calibrate`"
+    )
     parser.add_argument("scene", type=READS, help="TOML, or the word funnel or drop")
     parser.add_argument("--draws", type=int, default=0, help="files of draws (default: none)")
     _add_engine(parser)

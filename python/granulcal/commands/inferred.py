@@ -10,14 +10,15 @@ from granulcal.bayessim.storage.model_document import read_model_document
 from granulcal.bayessim.storage.place import MODEL_JSON
 from granulcal.commands.exit_code import DONE
 from granulcal.commands.reading import TRAINING
+from granulcal.design.posterior_file import POSTERIOR_JSON
 from granulcal.documents import Flag, ListOf, Mapping, Maybe, Number, Table, Text, read_json
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
+from granulcal.starter.models import BUILT_IN, model_named
 
 __all__ = ["is_asked", "run"]
 
 _FLAGS = {"--json", "-q", "--quiet", "-v", "-vv", "--verbose"}
-_POSTERIOR_JSON = "posterior.json"
 _NUMBERS = {"mode": Number(), "mean": Number(), "interval90": ListOf(Number(), least=2)}
 _POSTERIOR = Table(
     {"recordings": ListOf(Text()), "parameters": Maybe(Mapping(Table(_NUMBERS, open=True)))},
@@ -41,16 +42,20 @@ _POSTERIOR = Table(
 def is_asked(words: Sequence[str]) -> bool:
     """Returns whether the words ask `inspect` for a model, a posterior or the folder of one."""
     given = [word for word in words[1:] if word not in _FLAGS]
-    return words[:1] == ["inspect"] and len(given) == 1 and _what(Path(given[0])) is not None
+    if words[:1] != ["inspect"] or len(given) != 1:
+        return False
+    return _is_built_in(given[0]) or _what(Path(given[0])) is not None
 
 
 def run(words: Sequence[str]) -> int:
     """Says what is in it; returns the exit code.
 
     Raises:
+        FileNotFoundError: a built-in scene of which there is no model.
         ValueError: the document is no model's or no posterior's, or is damaged.
     """
-    path = Path(next(word for word in words[1:] if word not in _FLAGS))
+    given = next(word for word in words[1:] if word not in _FLAGS)
+    path = model_named(given) if _is_built_in(given) else Path(given)
     facts = _of_model(path) if _what(path) == MODEL_JSON else _of_posterior(path)
     if "--json" in words:
         print(json.dumps(facts, indent=1))
@@ -59,11 +64,16 @@ def run(words: Sequence[str]) -> int:
     return DONE
 
 
+def _is_built_in(word: str) -> bool:
+    """Whether it is the name of a built-in scene's model, as `infer` takes it, and of no file here."""
+    return word in BUILT_IN and not Path(word).exists()
+
+
 def _what(path: Path) -> str | None:
     """The name of the document that is inspected; None for what is granulcal-cli's to read."""
     if path.is_file() and path.suffix.lower() == ".json":
-        return MODEL_JSON if path.name == MODEL_JSON else _POSTERIOR_JSON
-    documents = (MODEL_JSON, _POSTERIOR_JSON)
+        return MODEL_JSON if path.name == MODEL_JSON else POSTERIOR_JSON
+    documents = (MODEL_JSON, POSTERIOR_JSON)
     return next((name for name in documents if (path / name).is_file()), None)
 
 
@@ -114,7 +124,7 @@ def _coverage(calibration: dict[str, Any] | None) -> dict[str, str] | None:
 
 def _of_posterior(path: Path) -> dict[str, Any]:
     try:
-        document = read_json(path / _POSTERIOR_JSON if path.is_dir() else path, _POSTERIOR)
+        document = read_json(path / POSTERIOR_JSON if path.is_dir() else path, _POSTERIOR)
     except ValueError as error:
         allowed = "of JSON a model's document and what `infer -o` or `calibrate` writes"
         raise ValueError(f"{error}; {allowed} can be inspected") from None

@@ -170,8 +170,7 @@ def _of_posterior(options: argparse.Namespace) -> int:
             "posterior's"
         )
     at, scene = condition_of(options.at), Scene.named(options.scene)
-    file = options.loop / "posterior.json" if options.loop.is_dir() else options.loop
-    posterior = PosteriorDraws.load(file)
+    posterior = PosteriorDraws.load(options.loop)
     engine = None if options.engine is None else engine_named(options.engine)
     threads = options.threads or os.cpu_count() or 1
     scenes = poured_scenes(posterior, scene, at, options.pours)

@@ -3,18 +3,23 @@
 import warnings
 from dataclasses import dataclass, field, replace
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from granulcal.bayessim.storage.place import MODEL_JSON
 from granulcal.documents import Flag, ListOf, Mapping, Maybe, Number, Table, Text, read_json
 from granulcal.pours.scene import Scene
 
 if TYPE_CHECKING:
     from granulcal.bayessim.posterior.posterior import Posterior
 
-__all__ = ["OutsideModelWarning", "PosteriorDraws", "UncheckedModelWarning"]
+__all__ = ["POSTERIOR_JSON", "OutsideModelWarning", "PosteriorDraws", "UncheckedModelWarning"]
+
+POSTERIOR_JSON = "posterior.json"
+"""What `calibrate` writes into its folder."""
 
 Array = NDArray[np.float64]
 
@@ -66,15 +71,19 @@ class PosteriorDraws:
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> "PosteriorDraws":
-        """Returns the draws in a file; warns of those of recordings that no parameters explain.
+        """Returns the draws of a file; warns of those of recordings that no parameters explain.
 
         Those by a model that has not passed a check of its own are warned of, too, each with what
         the file says of them.
 
+        Args:
+            path: JSON of `granulcal infer -o`, or that or the folder of `granulcal calibrate`.
+
         Raises:
-            FileNotFoundError: there is no such file.
+            FileNotFoundError: there is no such file, or a folder has no posterior.
             ValueError: it is not a posterior of `granulcal infer -o` or `granulcal calibrate`.
         """
+        path = _file_at(Path(path))
         document = read_json(path, _SCHEMA)
         parameters: dict[str, dict[str, float]] = document["parameters"] or {}
         names = tuple(parameters)
@@ -142,3 +151,21 @@ class PosteriorDraws:
         """Returns the scene with the most probable parameters and those that the prior fixed."""
         mode = dict(zip(self.names, self.mode.tolist(), strict=True))
         return self.on(scene).with_(mode)
+
+
+def _file_at(path: Path) -> Path:
+    """Returns the file of a posterior that is named by itself or by its folder.
+
+    Raises:
+        FileNotFoundError: a folder without one; says what makes it.
+    """
+    if not path.is_dir():
+        return path
+    file = path / POSTERIOR_JSON
+    if not file.exists():
+        made = f"; `granulcal infer {path} RECORDING -o {POSTERIOR_JSON}` makes one of this model"
+        raise FileNotFoundError(
+            f"{path} holds no {POSTERIOR_JSON}; asked for is JSON of `infer -o`, or that or the "
+            f"folder of `calibrate`{made if (path / MODEL_JSON).is_file() else ''}"
+        )
+    return file

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from granulcal import _native
-from granulcal.bayessim.storage.place import require_place
+from granulcal.bayessim.storage.place import MODEL_JSON, require_place
 from granulcal.documents import Table, read_json
 from granulcal.files import write_beside
 from granulcal.pours.scene import Scene
@@ -35,6 +35,8 @@ __all__ = [
 BUILT_IN = ("funnel", "drop")
 """Scenes that a model can be asked for by name."""
 _MADE = "made.json"
+# What the folder of `generate` holds.
+_MANIFEST = "manifest.toml"
 _SHIPPED = Path(__file__).parents[1] / "models"
 
 
@@ -84,11 +86,18 @@ def model_named(name: str | Path) -> Path:
     """Returns the folder of a model that a command line names: a folder, or a built-in scene.
 
     Raises:
-        FileNotFoundError: nothing of this name, or a built-in scene of which there is no model yet.
+        FileNotFoundError: nothing of this name, a folder of something else, or a built-in scene of
+            which there is no model yet.
         NotADirectoryError: it is a file.
     """
     path, allowed = Path(name), f"the folder of a model, or {' or '.join(BUILT_IN)}"
     if path.is_dir():
+        if not (path / MODEL_JSON).exists():
+            made = f"; `granulcal train {name} -o model` makes one of these pours"
+            raise FileNotFoundError(
+                f"{name} holds no {MODEL_JSON}; asked for is {allowed}"
+                f"{made if (path / _MANIFEST).is_file() else ''}"
+            )
         return path
     if path.exists():
         raise NotADirectoryError(f"{name} is a file; asked for is {allowed}")
