@@ -5,7 +5,7 @@ import pytest
 
 import granulcal as gc
 from granulcal.cli import main
-from granulcal.starter import models
+from granulcal.starter import make_model, models
 
 
 @pytest.fixture
@@ -48,6 +48,21 @@ def test_a_model_is_found_by_its_scene_if_it_fits_the_simulator(cache: Path) -> 
         models.model_named(own / "made.json")
 
 
+def test_a_model_is_loaded_by_the_name_of_its_scene(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As `infer funnel` takes it; Python had been told that funnel/model.json does not exist."""
+    monkeypatch.setenv("GRANULCAL_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    assert gc.BayesSim.load("funnel").prior == gc.Prior.default()
+    with pytest.raises(FileNotFoundError, match="`granulcal model drop` makes it once"):
+        gc.BayesSim.load("drop")
+    # What is here goes first.
+    (tmp_path / "funnel").mkdir()
+    with pytest.raises(FileNotFoundError, match=r"model.json does not exist"):
+        gc.BayesSim.load("funnel")
+
+
 def test_infer_without_a_model_says_how_to_make_one(
     cache: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -62,7 +77,7 @@ def test_a_model_is_made_once_and_goes_on_after_a_stop(
     pytest.importorskip("torch")
     small = gc.Scene.drop(0.02, count=60, preset="fast")
     monkeypatch.setattr(gc.Scene, "built_in", lambda name: small)
-    folder = models.make_model("drop", pours=60, say=lambda text: None)
+    folder = make_model.make_model("drop", pours=60, say=lambda text: None)
     assert folder == cache / "models" / "drop" and models.find_model("drop") == folder
     assert (folder / "training.parquet").exists()
     capsys.readouterr()
@@ -110,16 +125,16 @@ def test_pours_of_another_scene_prior_or_simulator_make_no_model(
     monkeypatch.setattr(gc.Scene, "built_in", lambda name: small)
     scene, prior = small, gc.Prior.default()
     good = gc.generate(scene, prior, 2, out=tmp_path / "good", progress=False)
-    models.require_pours_of("drop", good)
+    make_model.require_pours_of("drop", good)
     other = gc.generate(
         gc.Scene.drop(0.02, count=41, preset="fast"), prior, 2, out=tmp_path / "o", progress=False
     )
     with pytest.raises(ValueError, match="another scene than drop"):
-        models.require_pours_of("drop", other)
+        make_model.require_pours_of("drop", other)
     narrow = gc.Prior.from_toml(prior.to_toml().replace("high = 1.0", "high = 0.9", 1))
     wrong = gc.generate(scene, narrow, 2, out=tmp_path / "prior", progress=False)
     with pytest.raises(ValueError, match="another prior"):
-        models.require_pours_of("drop", wrong)
+        make_model.require_pours_of("drop", wrong)
     good.paper16[0, 0] *= 1 + 1e-12
     with pytest.raises(ValueError, match="another simulator"):
-        models.require_pours_of("drop", good)
+        make_model.require_pours_of("drop", good)

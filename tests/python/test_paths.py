@@ -160,7 +160,7 @@ def test_a_figure_has_an_ending_that_can_be_drawn(tmp_path, capsys):
 
 
 def test_a_model_finds_its_place_before_the_training(tmp_path, capsys, monkeypatch):
-    from granulcal.starter.models import make_model
+    from granulcal.starter.make_model import make_model
 
     taken = tmp_path / "pours"
     taken.mkdir()

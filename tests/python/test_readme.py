@@ -97,7 +97,7 @@ def within_sentences() -> list[str]:
     text = re.sub(
         r"^```.*?^```", "", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.S | re.M
     )
-    found = re.findall(r"`(granulcal [^`]+)`", text)
+    found = re.findall(r"`(granulcal\s[^`]+)`", text)
     return [" ".join(words.split()) for words in dict.fromkeys(found)]
 
 

@@ -37,6 +37,7 @@ from granulcal.errors import NotOfPriorWarning, ObservationError, TrainingDataEr
 from granulcal.one_thread import one_thread
 from granulcal.prior import Prior
 from granulcal.progress import shown, steps
+from granulcal.starter.models import is_built_in, model_named
 from granulcal.whole import check_seed, check_whole
 
 __all__ = ["BayesSim"]
@@ -336,11 +337,16 @@ class BayesSim:
     def load(cls, path: str | PathLike[str]) -> BayesSim:
         """Returns the model that `save` wrote to the folder `path`, equal to the last bit.
 
+        Args:
+            path: folder of a model, or the name of a built-in scene (`funnel` or `drop`): the model
+                that `granulcal model` made of it, or that came with the package.
+
         Raises:
-            FileNotFoundError: the folder or one of its files does not exist.
+            FileNotFoundError: the folder or one of its files does not exist, or there is no model
+                of the built-in scene yet.
             ModelFormatError: the files are there but cannot be this model; the message says why.
         """
-        return cls(**load_parts(path))
+        return cls(**load_parts(model_named(path) if is_built_in(path) else path))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # What the extension holds is made again from the files: a model goes to another process so.

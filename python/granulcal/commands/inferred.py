@@ -14,7 +14,7 @@ from granulcal.design.posterior_file import POSTERIOR_JSON
 from granulcal.documents import Flag, ListOf, Mapping, Maybe, Number, Table, Text, read_json
 from granulcal.pours.scene import Scene
 from granulcal.prior import Prior
-from granulcal.starter.models import BUILT_IN, model_named
+from granulcal.starter.models import is_built_in, model_named
 
 __all__ = ["is_asked", "run"]
 
@@ -44,7 +44,7 @@ def is_asked(words: Sequence[str]) -> bool:
     given = [word for word in words[1:] if word not in _FLAGS]
     if words[:1] != ["inspect"] or len(given) != 1:
         return False
-    return _is_built_in(given[0]) or _what(Path(given[0])) is not None
+    return is_built_in(given[0]) or _what(Path(given[0])) is not None
 
 
 def run(words: Sequence[str]) -> int:
@@ -55,18 +55,13 @@ def run(words: Sequence[str]) -> int:
         ValueError: the document is no model's or no posterior's, or is damaged.
     """
     given = next(word for word in words[1:] if word not in _FLAGS)
-    path = model_named(given) if _is_built_in(given) else Path(given)
+    path = model_named(given) if is_built_in(given) else Path(given)
     facts = _of_model(path) if _what(path) == MODEL_JSON else _of_posterior(path)
     if "--json" in words:
         print(json.dumps(facts, indent=1))
     else:
         print("\n".join(_lines(facts)))
     return DONE
-
-
-def _is_built_in(word: str) -> bool:
-    """Whether it is the name of a built-in scene's model, as `infer` takes it, and of no file here."""
-    return word in BUILT_IN and not Path(word).exists()
 
 
 def _what(path: Path) -> str | None:

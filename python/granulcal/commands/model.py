@@ -64,7 +64,7 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from granulcal.starter.models import make_model
+    from granulcal.starter.make_model import make_model
 
     if options.dry_run:
         from granulcal.pours.scene import Scene
