@@ -363,6 +363,7 @@ fn other_content(path: &Path, first: &[u8]) -> DatasetError {
         _ if first.starts_with(b"#ROSBAG V") => {
             format!("{:?}", String::from_utf8_lossy(first).trim())
         }
+        _ if first.starts_with(b"SQLite format 3") => folder::OTHER_STORAGE.to_owned(),
         _ if first.iter().all(|byte| matches!(byte, b'\t' | b'\n' | b'\r' | b' '..=b'~')) => {
             "text".to_owned()
         }

@@ -196,6 +196,9 @@ fn what_is_no_recording_is_named() {
     let old = error("old.bag", b"#ROSBAG V1.2\n---");
     assert!(old.contains("#ROSBAG V1.2") && old.contains("#ROSBAG V2.0"), "{old}");
     assert!(error("text.mcap", b"hello").contains("MCAP"));
+    assert!(
+        error("a_0.db3", b"SQLite format 3\0...").contains("`ros2 bag convert` turns into .mcap")
+    );
     // The content counts, not the name.
     let options = ReadOptions::default();
     assert!(read("misnamed.png", &bytes("foxglove_raw.mcap"), &options).is_ok());

@@ -11,6 +11,10 @@ use crate::input::unpack_limit;
 use crate::mean::Mean;
 use crate::png::unreadable;
 
+/// How the other storage of ROS 2 is told.
+pub(super) const OTHER_STORAGE: &str =
+    "an SQLite recording (.db3), which `ros2 bag convert` turns into .mcap";
+
 /// A PNG frame: its name and its bytes, or why it cannot be read.
 pub type Frame = Result<(PathBuf, Vec<u8>), DatasetError>;
 
@@ -50,10 +54,7 @@ impl Folder {
         }
         let found = match (messages.len(), of("db3").len()) {
             (0, 0) => "no .png, .mcap or .bag".to_owned(),
-            // The other storage of ROS 2.
-            (0, _) => {
-                "an SQLite recording (.db3), which `ros2 bag convert` turns into .mcap".to_owned()
-            }
+            (0, _) => OTHER_STORAGE.to_owned(),
             (count, _) => format!("{count} recordings of messages; give one of them"),
         };
         let allowed = "depth frames as .png, or one .mcap or .bag";

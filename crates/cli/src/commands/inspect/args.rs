@@ -14,7 +14,8 @@ Says what is in a file or folder: a scene, prior or camera (.toml), a data set
 folder of frames, a checkpoint (.ckpt), or a recording over time (.bag, .mcap):
 its topics with types, counts and sizes, which of them `features` reads, with
 which lens and depth unit. The whole file is read, so a damaged one is found:
-it is said where, and how many frames are lost (exit code 3).
+it is said where, and how many frames are lost (exit code 3). `granulcal` of the
+Python package says of a model and a posterior (.json) what they are of, too.
 
 With --contact-problem PATH is a scene, or one of the words `funnel` and
 `drop`: it is simulated until --time, and the contact problem of the next
