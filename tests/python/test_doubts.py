@@ -101,6 +101,26 @@ def test_a_heap_that_is_stretched_or_lies_on_a_bent_ground_is_told(scene, prior,
     assert "the ground is bent: its middle lies 1 mm off its edges" in told
 
 
+@pytest.mark.parametrize("times", [0.25, 4, 10])
+def test_depths_in_another_unit_are_asked_for_by_the_distance_of_the_ground(
+    scene, prior, heap, times
+):
+    """A heap that was a quarter as large had been inferred from without a word of it."""
+    told = seen(times * heap).doubts(scene, prior)
+    at = f"the ground is {0.35 * times:.4g} m from the camera, of the scene's images 0.35 m"
+    (asked,) = [text for text in told if text.startswith(at)]
+    assert asked.endswith("is the unit of the depths right (depth_unit)?")
+
+
+def test_a_height_map_tells_no_distance(scene, prior, heap, tmp_path):
+    side = len(heap)
+    pitch = 0.4 / side
+    arrays = {"depthmap": 0.35 - heap, "xres": pitch, "yres": pitch, "zres": 1.0, "scale": "m"}
+    np.savez(tmp_path / "map.npz", **arrays)
+    told = gc.Recording.open(tmp_path / "map.npz").doubts(scene, prior)
+    assert not any("from the camera" in text for text in told), told
+
+
 @pytest.mark.slow
 def test_a_scenes_own_pours_are_hardly_doubted_and_spoiled_ones_are(scene, prior):
     own, long, heaps, bent, pours = 0, 0, 0, 0, 0

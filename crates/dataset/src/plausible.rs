@@ -7,7 +7,7 @@
 use granulcal_dem::Simulation;
 use granulcal_features::Formation;
 use granulcal_numbers::short;
-use granulcal_scene::{Mask, Prior, Scene};
+use granulcal_scene::{Mask, Prior, Projection, Scene};
 
 mod bare;
 mod doubts;
@@ -60,6 +60,8 @@ pub struct Limits {
     pub field: f64,
     /// Width of its images' pixels on the ground `[m]`.
     pub resolution: f64,
+    /// Least and greatest distance of its camera from the ground `[m]`; none where it has none, as for a height map.
+    pub distance: Option<(f64, f64)>,
     /// Height from which its images' pixels count as grain `[m]`; none where a colour decides.
     pub threshold: Option<f64>,
     /// Greatest distance of most points from their middle `[m]`.
@@ -101,6 +103,7 @@ impl Limits {
             diameter: a.diameter.max(b.diameter),
             field: a.field.max(b.field),
             resolution: a.resolution.max(b.resolution),
+            distance: a.distance.zip(b.distance).map(|(a, b)| (a.0.min(b.0), a.1.max(b.1))),
             threshold: a.threshold,
             extent: a.extent.max(b.extent),
             ground_sd: a.ground_sd.max(b.ground_sd),
@@ -127,6 +130,8 @@ impl Limits {
             diameter: scene.grains.diameter,
             field,
             resolution: scene.camera.ground_resolution(),
+            distance: (scene.camera.projection == Projection::Pinhole)
+                .then_some((scene.camera.height, scene.camera.height)),
             threshold: (scene.camera.mask == Mask::Height).then_some(scene.camera.height_threshold),
             extent: EXTENT_MARGIN * field * 0.5_f64.sqrt(),
             ground_sd: (GROUND_DIAMETERS * scene.grains.diameter).max(GROUND_FLOOR),

@@ -33,7 +33,7 @@ impl Scene {
         prior_toml: &str,
         recording: &Recording,
         settings: Option<&Bound<'_, PyDict>>,
-        judge: fn(&Limits, &Formation) -> Vec<String>,
+        judge: fn(&Limits, &granulcal_dataset::Recording, &Formation) -> Vec<String>,
     ) -> PyResult<Vec<String>> {
         let prior = Prior::from_toml(prior_toml).map_err(error::dem)?;
         let own = recording.inner.segmentation.as_seen_by(&self.inner.camera);
@@ -41,7 +41,7 @@ impl Scene {
         let found = py.detach(|| {
             let Some(limits) = Limits::of(&self.inner, &prior)? else { return Ok(Vec::new()) };
             let formation = recording.inner.formation_with(&settings);
-            formation.map(|formation| judge(&limits, &formation))
+            formation.map(|formation| judge(&limits, &recording.inner, &formation))
         });
         found.map_err(error::dataset)
     }
@@ -87,7 +87,9 @@ impl Scene {
         recording: &Recording,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Vec<String>> {
-        self.judged(py, prior_toml, recording, settings, Limits::violations)
+        self.judged(py, prior_toml, recording, settings, |limits, _, formation| {
+            limits.violations(formation)
+        })
     }
 
     /// What makes it doubtful where it may be of this scene, a sentence each.
@@ -99,7 +101,7 @@ impl Scene {
         recording: &Recording,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Vec<String>> {
-        self.judged(py, prior_toml, recording, settings, Limits::doubts)
+        self.judged(py, prior_toml, recording, settings, Limits::doubts_of)
     }
 
     fn to_toml(&self) -> PyResult<String> {

@@ -60,7 +60,7 @@ fn run(args: &FeaturesArgs) -> anyhow::Result<Outcome> {
     if let (None, Some(edge)) = (args.border, pixels_at_edge(&formation)) {
         eprintln!("{edge}");
     }
-    let doubts = scene.as_ref().map(|scene| doubts(scene, &formation)).transpose()?;
+    let doubts = scene.as_ref().map(|scene| doubts(scene, &recording, &formation)).transpose()?;
     for doubt in doubts.iter().flatten() {
         note(&format!("warning: {doubt}"));
     }
@@ -96,9 +96,15 @@ fn segmentation(args: &FeaturesArgs, scene: Option<&Scene>, own: &Segmentation) 
 }
 
 /// Why it cannot be a formation of the scene, of whatever material, or is doubtful as one.
-fn doubts(scene: &Scene, formation: &Formation) -> anyhow::Result<Vec<String>> {
+fn doubts(
+    scene: &Scene,
+    recording: &Recording,
+    formation: &Formation,
+) -> anyhow::Result<Vec<String>> {
     let limits = Limits::of(scene, &Prior::default())?;
-    let said = |limits: Limits| [limits.violations(formation), limits.doubts(formation)].concat();
+    let said = |limits: Limits| {
+        [limits.violations(formation), limits.doubts_of(recording, formation)].concat()
+    };
     Ok(limits.map(said).unwrap_or_default())
 }
 

@@ -140,7 +140,7 @@ fn run(args: &InferArgs) -> anyhow::Result<Outcome> {
             let name = path.display();
             let of_it = |reason| format!("{name}: {reason}");
             impossible.extend(limits.violations(&formation).into_iter().map(of_it));
-            doubts.extend(limits.doubts(&formation).into_iter().map(of_it));
+            doubts.extend(limits.doubts_of(&recording, &formation).into_iter().map(of_it));
         }
         observed.push(match recording.statistics_of(&formation) {
             Ok(statistics) => chosen.iter().map(|&at| statistics[at]).collect(),

@@ -5,6 +5,7 @@ use granulcal_features::{Formation, Part, Threshold};
 use granulcal_numbers::short;
 
 use super::{HIDDEN, LEAST_VOLUME, LEFT_OVER, Limits};
+use crate::{Recording, Source};
 
 /// Share of a formation's volume in its largest patch, above which it is a heap from which grains may have rolled, and not
 /// what has rolled away. Of 460 pours of two priors no heap took less room than the grains by themselves.
@@ -35,6 +36,9 @@ const THRESHOLD: f64 = 1.25;
 /// Factor between the width of a recording's pixels on the ground and the scene's, above which that is said. Every n-th
 /// pixel of a finer image comes within 4/3.
 const COARSE: f64 = 1.5;
+/// Factor between the distances of a recording's camera and of the scene's from the ground, above which the unit of the
+/// depths is asked for: it is wrong by 4 or 10, and cameras stand at 20 cm to 1 m.
+const FAR: f64 = 3.0;
 /// Standard deviation of the ground about its plane, over a grain's diameter and in metres, above both of which it is
 /// said to be uneven.
 const UNEVEN: f64 = 0.5;
@@ -43,6 +47,17 @@ const UNEVEN_FLOOR: f64 = 1.5e-3;
 const MOST_ALIKE: usize = 3;
 
 impl Limits {
+    /// What makes a recording doubtful whose formation may be one of the scene, a sentence each.
+    pub fn doubts_of(&self, recording: &Recording, formation: &Formation) -> Vec<String> {
+        let distance = match recording.source {
+            // Its camera is at the origin.
+            Source::Depth { .. } => self.doubt_of_distance(formation.plane.plane.offset.abs()),
+            Source::Heights(_) => None,
+        };
+        // What else is told may follow from it.
+        distance.into_iter().chain(self.doubts(formation)).collect()
+    }
+
     /// What makes a formation doubtful that may be one of the scene, a sentence each.
     pub fn doubts(&self, formation: &Formation) -> Vec<String> {
         let mut found = self.doubts_of_view(formation);
@@ -58,6 +73,20 @@ impl Limits {
         }
         found.extend(self.doubts_of_parts(formation));
         found
+    }
+
+    /// Whether the ground is `found` `[m]` from the camera, so near or far that depths are in another unit.
+    pub(super) fn doubt_of_distance(&self, found: f64) -> Option<String> {
+        let (least, most) = self.distance?;
+        let stated = found.clamp(least, most);
+        (found > FAR * stated || found < stated / FAR).then(|| {
+            format!(
+                "the ground is {} m from the camera, of the scene's images {} m (camera.height): is the unit of the depths \
+                 right (depth_unit)?",
+                short(found),
+                short(stated)
+            )
+        })
     }
 
     /// What makes it doubtful that all of the formation is in view.

@@ -1,5 +1,5 @@
 use granulcal_features::{HeightMap, Part, Segmentation, Threshold, segment_height_map};
-use granulcal_scene::{Bed, DepthSensor, NoiseField, Projection, StereoSensor};
+use granulcal_scene::{Bed, DepthSensor, NoiseField, StereoSensor};
 
 use super::doubts::rounded_up;
 use super::*;
@@ -123,6 +123,37 @@ fn funnel() -> Limits {
 }
 
 const HEAP: (f64, f64) = (0.03, 0.06);
+
+#[test]
+fn a_ground_at_another_distance_asks_for_the_unit_of_the_depths() {
+    let limits = funnel();
+    assert_eq!(limits.distance, Some((0.29, 0.29)));
+    // Cameras stand at 20 cm to 80 cm.
+    for near in [0.2, 0.29, 0.5, 0.8] {
+        assert_eq!(limits.doubt_of_distance(near), None);
+    }
+    for far in [0.029, 0.0725, 1.16, 2.9] {
+        let doubt = limits.doubt_of_distance(far).unwrap();
+        let begins = format!("the ground is {far} m from the camera, of the scene's images 0.29 m");
+        assert!(doubt.starts_with(&begins), "{doubt}");
+        assert!(doubt.ends_with("is the unit of the depths right (depth_unit)?"));
+    }
+    // A scene of height maps has no camera anywhere.
+    let mut mapped = Scene::funnel(0.12);
+    (mapped.camera.projection, mapped.camera.pixels) = (Projection::Orthographic, 200);
+    let of_maps = Limits::of(&mapped, &Prior::default()).unwrap().unwrap();
+    assert_eq!((of_maps.distance, of_maps.doubt_of_distance(5.0)), (None, None));
+    // What the prior draws the camera's height from is allowed for.
+    let height = r#"[[parameter]]
+        path = "camera.height"
+        distribution = "uniform"
+        low = 0.25
+        high = 1.0"#;
+    let prior = Prior::from_toml(height).unwrap();
+    let (least, most) =
+        Limits::of(&Scene::funnel(0.12), &prior).unwrap().unwrap().distance.unwrap();
+    assert!((0.25..0.27).contains(&least) && (0.98..=1.0).contains(&most));
+}
 
 #[test]
 fn a_formation_that_is_longer_than_wide_is_told_where_nothing_makes_it_so() {
